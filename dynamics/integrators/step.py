@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from cgraph.extend import STATEMENTS, Statement
+from cgraph.extend import Statement
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,8 +25,3 @@ class Step:
     body: Sequence[Statement]
     fixed: tuple[str, ...] = ()
     failed: str = ""
-
-    @property
-    def branches(self) -> bool:
-        """Whether what is done depends on numbers, so that steps from several states cannot go side by side."""
-        return any(STATEMENTS[type(each)].beside is None for each in (*self.start, *self.body))

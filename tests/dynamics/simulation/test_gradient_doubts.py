@@ -239,6 +239,6 @@ def test_ctrl_c_is_a_keyboard_interrupt(method: str, derive: Any, monkeypatch: p
     loss = [] if derive is dyn.sensitivities else [lambda q, qd, t: q[0]]
     events = {} if derive is dyn.gradient_many else {"events": dyn.Event("half", lambda q, qd, t: q[0] - 0.5)}
     if derive is dyn.gradient_many and method == "rk4":
-        monkeypatch.setattr("dynamics.simulation.gradients.motion_run._run", advance)
+        monkeypatch.setattr("cgraph.program.derivatives.tape.run_passes", advance)
     with raises(KeyboardInterrupt):
         derive(ball, *loss, [[1.0]] if derive is dyn.gradient_many else [1.0], [0.0], 0.4, method, **events)
