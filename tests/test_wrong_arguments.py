@@ -341,6 +341,7 @@ CALLS |= {
     "extend.Pop": call(a_program_of(extend.Pop), "x", "y", ("z",)),
     "extend.Push": call(a_program_of(extend.Push), "x", "y", ("z",)),
     "extend.Take": call(a_program_of(extend.Take), "x", "y", (0,)),
+    "extend.many": call(extend.many, PROGRAM),
     "extend.program_jvp": call(extend.program_jvp, PROGRAM, [], constant=[]),
     "extend.program_vjp": call(
         extend.program_vjp, PROGRAM, ["x"], [], constant=[], turns=4, checkpoints=0, backend="python"

@@ -63,13 +63,18 @@ class Writer:
         """The address of a register."""
         return self.pointers[register]
 
-    def load(self, register: str) -> str:
-        """The one number of a register."""
-        return self.value(f"load {self.type}, ptr {self.pointer(register)}, align 8")
+    def place(self, register: str, k: int) -> str:
+        """The address of number k of a register."""
+        pointer = self.pointer(register)
+        return self.value(f"getelementptr {self.type}, ptr {pointer}, i64 {k}") if k else pointer
 
-    def store(self, value: str, register: str) -> None:
-        """register = value, a number."""
-        self.line(f"store {self.type} {value}, ptr {self.pointer(register)}, align 8")
+    def load(self, register: str, k: int = 0) -> str:
+        """Number k of a register."""
+        return self.value(f"load {self.type}, ptr {self.place(register, k)}, align 8")
+
+    def store(self, value: str, register: str, k: int = 0) -> None:
+        """register[k] = value, a number."""
+        self.line(f"store {self.type} {value}, ptr {self.place(register, k)}, align 8")
 
     def copy(self, target: str, source: str, count: int) -> None:
         """So many numbers from one address to another."""
