@@ -142,6 +142,25 @@ def test_every_lane_has_rows_of_its_own_on_a_stack(backend: str) -> None:
     side_by_side(program, values, np.empty((2, 0, COUNT)), backend)
 
 
+@pytest.mark.parametrize("backend", ["python", "llvm"])
+def test_a_batch_of_a_program_with_a_loop(backend: str) -> None:
+    """From each value of a register of x and n, x halved n times."""
+    if backend == "llvm":
+        pytest.importorskip("llvmlite")
+    x, n = cg.variables("x n")
+    apart = Call(cg.Graph([x, n], {"x": x, "n": n}), ("both",), ("x", "n"))
+    registers = {"both": 2, "x": 1, "n": 1}
+    values = np.stack([np.linspace(-1.0, 1.0, 37), np.arange(37) % 7.0], axis=1)
+    run = runner(Program(registers, [apart, While("n", (HALVE, LESS))], record=["x"]), backend)
+    assert run.batch("both", values)[:, 0].tolist() == (values[:, 0] * 0.5 ** values[:, 1]).tolist()
+    unsure = runner(Program(registers, [apart, If("n", (HALVE,))], record=["x"]), backend)
+    assert unsure.batch("both", values[:2])[:, 0].tolist() == [-1.0, values[1, 0] / 2.0]
+    seldom = If("n", (Call(HALVE.graph, ("x",), ("y",)),))
+    sometimes = runner(Program({**registers, "y": 1}, [apart, seldom], record=["y"]), backend)
+    with pytest.raises(cg.GraphError, match="register 'y' is read before"):
+        sometimes.batch("both", values)
+
+
 def test_what_runs_one_memory_at_a_time_is_told() -> None:
     for control in ({"stop": "n"}, {"record_if": "n"}):
         run = runner(Program({"n": 1}, [LESS], record=["n"], **control), "python")  # type: ignore[arg-type]
