@@ -28,7 +28,7 @@ label may have. `certain_digits` says what rounding leaves of the outputs.
 **At the edges**: `real_array`, `real_number`, `is_finite`, `check_name`, `require_graph`, `require_flag`,
 `require_whole`, `require_choice`, `require_sequence`, `require_mapping` and `require_path` check what a caller passed,
 `thread_count` reads `threads=`, `share` gives work to threads, `atomic_write` writes a file whole or not at all,
-`write_files` several, and `check_writable` looks beforehand; `many` is a number with its noun; `html_table`,
+`write_files` several, and `check_writable` looks beforehand; `counted` is a number with its noun; `html_table`,
 `html_text`, `html_lines` and `picture` are what a notebook shows of a result; `install` ends an error about a missing
 package, `scipy_integrate` gives SciPy's module or raises it. `memo` and `kept_by_first` make a
 function keep its results. `Array` is the type of an array of float64, `Json` of what JSON can hold.
@@ -73,6 +73,7 @@ if TYPE_CHECKING:
     from .program.derivatives.linearization import Linearization, Linearized
     from .program.derivatives.tape import Tape, run_passes
     from .program.derivatives.transforms import ProgramVjp, Pulled, program_jvp, program_vjp
+    from .program.many import many
     from .program.program import Program
     from .program.runner import Record, Runner
     from .program.statement import STATEMENTS, Statement, StatementRow, register_statement, require_length
@@ -85,11 +86,11 @@ if TYPE_CHECKING:
     from .simplification.reciprocals import with_reciprocals
     from .util.atomic_write import atomic_write, check_writable, write_files
     from .util.caches import kept_by_first, memo
+    from .util.counted import counted
     from .util.doors import doors
     from .util.extras import install
     from .util.html_text import html_lines, html_table, html_text, picture
     from .util.json_type import Json
-    from .util.many import many
     from .util.nearest import nearest, or_nearest
     from .util.real_arrays import is_finite, real_array, real_number
     from .util.require import (
@@ -157,6 +158,7 @@ __all__ = [
     "columns",
     "compressed_jacobian",
     "cotangents",
+    "counted",
     "doors",
     "expand",
     "folded",

@@ -341,6 +341,7 @@ CALLS |= {
     "extend.Pop": call(a_program_of(extend.Pop), "x", "y", ("z",)),
     "extend.Push": call(a_program_of(extend.Push), "x", "y", ("z",)),
     "extend.Take": call(a_program_of(extend.Take), "x", "y", (0,)),
+    "extend.many": call(extend.many, PROGRAM),
     "extend.program_jvp": call(extend.program_jvp, PROGRAM, [], constant=[]),
     "extend.program_vjp": call(
         extend.program_vjp, PROGRAM, ["x"], [], constant=[], turns=4, checkpoints=0, backend="python"
@@ -382,7 +383,7 @@ CALLS |= {
     "extend.is_finite": call(extend.is_finite, 1.0),
     "extend.ldl_elimination": call(extend.ldl_elimination, [[4.0], [2.0, 2.0]], [10.0, 6.0]),
     "extend.ldl_solve": call(extend.ldl_solve, [[ONE], [X, Y]], [ONE, Y], None, check=False),
-    "extend.many": call(extend.many, 2, "node"),
+    "extend.counted": call(extend.counted, 2, "node"),
     "extend.nearest": call(extend.nearest, "a", ["b"], 3),
     "extend.or_nearest": call(extend.or_nearest, "a", ["b"]),
     "extend.picture": call(extend.picture, "nothing", 3),

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 from ..core.checks import GraphError
 from ..core.graph import Graph
 from ..core.node import VARIABLE, Node, variable
+from ..util.counted import counted
 from ..util.html_text import html_lines
-from ..util.many import many
 from ..util.require import require_choice, require_graph, require_sequence, require_texts
 from ..writing.structure_hash import node_hashes
 from .names import Names, joined
@@ -84,7 +84,7 @@ class Comparison:
         return dict(sorted(counts.items(), key=lambda item: (-item[1], item[0])))
 
     def __str__(self) -> str:
-        sizes = f"{many(len(self.left.nodes), 'node')} left, {len(self.right.nodes)} right"
+        sizes = f"{counted(len(self.left.nodes), 'node')} left, {len(self.right.nodes)} right"
         only = f"{len(self.only_left)} only left, {len(self.only_right)} only right"
         lines = [f"{sizes}: {len(self.common)} in both, {only}."]
         if self.same_outputs:

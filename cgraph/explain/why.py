@@ -12,8 +12,8 @@ from ..core.checks import GraphError
 from ..core.graph import Edge, Graph
 from ..core.node import Node
 from ..operations.operation import columns
+from ..util.counted import counted
 from ..util.html_text import html_table, html_text
-from ..util.many import many
 from ..util.require import require_graph
 from ..writing.source_lines import lines_text
 from .edge_partials import Point, edge_slopes
@@ -329,7 +329,7 @@ def digits_of(count: int) -> str:
 
 def count_text(count: int) -> str:
     """`1 path`, `12 paths`, `3.21e+41 paths`."""
-    return many(count, "path") if count <= EXACT else f"{digits_of(count)} paths"
+    return counted(count, "path") if count <= EXACT else f"{digits_of(count)} paths"
 
 
 def _weight(path: Path) -> str:

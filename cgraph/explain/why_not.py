@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from ..core.checks import GraphError
 from ..core.graph import Graph
 from ..core.node import Node
+from ..util.counted import counted
 from ..util.html_text import html_lines
-from ..util.many import many
 from ..util.require import require_graph
 from .names import Name, Names, joined
 from .reachability import ancestors, descendants
@@ -66,7 +66,7 @@ class WhyNot:
         lines = [f"{self.output} does not depend on {self.input}."]
         if number:
             lines.append(
-                f"{self.input} reaches {many(number, 'other node')}, and of the outputs {joined(self.outputs)}."
+                f"{self.input} reaches {counted(number, 'other node')}, and of the outputs {joined(self.outputs)}."
             )
         elif self.outputs:
             lines.append(f"{self.input} is the output {joined(self.outputs)}; no operation uses it.")

@@ -105,11 +105,6 @@ class Step:
         prepare = self.prepare if self.smooth is None else self.smooth
         return arriving([*self.rates, *prepare, *self.body, *self.kept])
 
-    @property
-    def branches(self) -> bool:
-        """Whether what is done depends on numbers, so that steps from several states cannot go side by side."""
-        return any(STATEMENTS[type(each)].beside is None for each in (*self.start, *self.derived))
-
 
 def arriving(statements: Sequence[Statement]) -> list[Statement]:
     """The statements with x_new as the new x: where the last one makes it, written there, else copied."""

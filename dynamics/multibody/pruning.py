@@ -8,7 +8,15 @@ from functools import cached_property
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import check_name, many, real_number, require_flag, require_graph, require_mapping, require_sequence
+from cgraph.extend import (
+    check_name,
+    counted,
+    real_number,
+    require_flag,
+    require_graph,
+    require_mapping,
+    require_sequence,
+)
 
 from ..equations.formulations import inverse_dynamics
 from ..systems.model import Model, as_system
@@ -46,7 +54,7 @@ class OmittedTerm:
     edges: int
 
     def __str__(self) -> str:
-        return f"{self.what}: {self.why} ({many(self.nodes, 'node')}, {many(self.edges, 'edge')})"
+        return f"{self.what}: {self.why} ({counted(self.nodes, 'node')}, {counted(self.edges, 'edge')})"
 
 
 @dataclass(frozen=True, eq=False)
@@ -272,4 +280,4 @@ def _saved(before: Graph, after: Graph) -> tuple[int, int]:
 
 
 def _size(graph: Graph) -> str:
-    return f"{many(len(graph.nodes), 'node')} and {many(len(graph.edges), 'edge')}"
+    return f"{counted(len(graph.nodes), 'node')} and {counted(len(graph.edges), 'edge')}"

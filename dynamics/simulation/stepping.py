@@ -92,8 +92,7 @@ class Integration(ABC):
 
     def nonfinite(self, state: Array) -> str:
         """The first component that is not finite, in words; empty if all are."""
-        bad = np.flatnonzero(~np.isfinite(state))
-        return f"{self.components[bad[0]]} is {state[bad[0]]} after the step" if len(bad) else ""
+        return nonfinite(self.components, state)
 
     def too_many(self, t: float, most: float) -> str:
         """The status of a run that may not go on."""
@@ -251,12 +250,27 @@ class FixedStepIntegration(NativeIntegration):
 
     def _failure(self, memory: Array, before: Array) -> str:
         """Why the step from a state (m,) failed."""
-        t = self._number(memory, "t")
-        if "singular" in self.runner.program.registers and (index := int(self._number(memory, "singular"))):
-            return f"stopped at t = {t:.6g} s: {self.components[index - 1]} has an inertia that is not positive"
-        if reason := self.nonfinite(self.runner.read(memory, "x")):
-            return f"stopped at t = {t:.6g} s: {reason}"
-        return f"stopped at t = {t:.6g} s: {unsolved(self.components, before, self.runner.read(memory, 'x'))}"
+        singular = self._number(memory, "singular") if "singular" in self.runner.program.registers else 0.0
+        after = self.runner.read(memory, "x")
+        return failed_step(self.components, self._number(memory, "t"), before, after, int(singular))
+
+
+def failed_step(components: Sequence[str], t: float, before: Array, x: Array, singular: int) -> str:
+    """Why a step from one state to another, (m,), at t, failed.
+
+    singular: the number of the component whose inertia is not positive, from 1 on; else 0.
+    """
+    if singular:
+        reason = f"{components[singular - 1]} has an inertia that is not positive"
+    else:
+        reason = nonfinite(components, x) or unsolved(components, before, x)
+    return f"stopped at t = {t:.6g} s: {reason}"
+
+
+def nonfinite(components: Sequence[str], state: Array) -> str:
+    """The first component that is not finite, in words; empty if all are."""
+    bad = np.flatnonzero(~np.isfinite(state))
+    return f"{components[bad[0]]} is {state[bad[0]]} after the step" if len(bad) else ""
 
 
 def unsolved(components: Sequence[str], before: Array, x: Array) -> str:

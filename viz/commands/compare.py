@@ -65,7 +65,7 @@ def run(options: argparse.Namespace) -> int:
     sizes = {"left_nodes": len(left.nodes), "right_nodes": len(right.nodes), "in_both": both}
     only = comparison.only_left, comparison.only_right
     lines = [
-        f"{side}: {named[side]}, {extend.many(len(graph.nodes), 'node')} = {both} in both + {len(rest)} only {side}"
+        f"{side}: {named[side]}, {extend.counted(len(graph.nodes), 'node')} = {both} in both + {len(rest)} only {side}"
         for side, graph, rest in zip(named, (left, right), only, strict=True)
     ]
     data = {"scene": scene.name} | named | sizes | comparison.to_dict()

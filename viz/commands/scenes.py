@@ -35,7 +35,8 @@ def run(options: argparse.Namespace) -> None:
         )
     lines = [
         f"{row['name']:16} {row['about']}\n{'':16} coordinates: {row['coordinates']}, inverse dynamics "
-        f"{extend.many(row['inverse_nodes'], 'node')}, forward dynamics {extend.many(row['forward_nodes'], 'node')}"
+        f"{extend.counted(row['inverse_nodes'], 'node')}, "
+        f"forward dynamics {extend.counted(row['forward_nodes'], 'node')}"
         for row in rows
     ]
     answer(unless_json(options, rows, "\n".join(lines)))

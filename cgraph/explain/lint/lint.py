@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 from ...core.graph import Edge, Graph
 from ...core.node import Node
+from ...util.counted import counted
 from ...util.html_text import html_table, html_text
-from ...util.many import many
 from ...util.require import require_graph, require_mapping, require_sequence
 from ..edge_partials import Point
 from ..names import Name, Names
@@ -169,7 +169,7 @@ def lint(
         singular = singular_nodes(known, box)
         findings += singular
         if not singular:
-            proofs.append(f"no slope is unbounded in the box, of {many(len(known.number), 'operation')}.")
+            proofs.append(f"no slope is unbounded in the box, of {counted(len(known.number), 'operation')}.")
     if at is not None:
         losses = cancellations(known, at, digits)
         findings += losses

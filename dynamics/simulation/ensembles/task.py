@@ -23,8 +23,8 @@ from ..run_options import RunOptions
 from ..step_program import CompiledSteps, StepProgram, compile_steps
 from ..stepping import Integration, StoppedError
 from ..watched import WatchedIntegration
-from .branch_free import branch_free
 from .chunk import Chunk, Part, empty
+from .lane_steps import lane_steps
 from .step_grid import StepGrid
 from .vectorized import VectorCode, VectorizedIntegration, beside
 
@@ -136,14 +136,13 @@ _lock = threading.Lock()  # threads that come at the same time wait for one to m
 @memo(KEPT)
 def _vector_code(pickled: bytes, backend: str) -> VectorCode:
     program: StepProgram = pickle.loads(pickled)  # noqa: S301  # it came with the task itself
-    programs = branch_free(program)
-    assert programs is not None
+    programs = lane_steps(program)
     start = None if programs.start is None else runner(programs.start, backend)
     one_pass = runner(programs.one_pass, backend)
     for code in (start, one_pass):
         if code is not None:
             code.run_many(np.zeros((code.size, 0)), 0)  # the code for vectors is compiled at its first use
-    return VectorCode(program, start, one_pass)
+    return VectorCode(program, start, one_pass, programs.stops)
 
 
 @memo(KEPT)

@@ -82,4 +82,4 @@ def motion_programs(request: Request) -> MotionPrograms:
 
 def _along(passes: Linearization, linear: Linearized, results: list[str], backend: str) -> Along:
     forward = passes.forward([*linear.program.feed, passes.handed["x"]], results)
-    return Along(passes, runner(forward, backend).prepared(), linear, runner(linear.program, backend).prepared())
+    return Along(passes, runner(forward, backend), linear, runner(linear.program, backend))
