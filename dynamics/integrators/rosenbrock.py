@@ -16,7 +16,7 @@ from cgraph.extend import Call, Factor, Map, Solve, Statement
 from .elementwise import SAME, identity, weighted
 from .explicit import stage_time
 from .jacobian_statements import jacobian_statements
-from .problem import Problem, state_jacobian, time_derivative
+from .problem import Problem, time_derivative
 from .step import Step
 from .step_control import lost, measured
 from .tableau import Row
@@ -86,7 +86,7 @@ RODAS5P = Rosenbrock(
 
 
 def rosenbrock_step(method: Rosenbrock, problem: Problem) -> Step:
-    """The step; where it has derivatives, its Jacobian is written out."""
+    """The step."""
     m, last, degree = problem.size, f"U{len(method.c) - 1}", len(method.dense) + 1
     now, on_the_way = jacobian_statements(problem)
     both = Graph(cg.variables("error lost"), {"error": cg.variable("error") + cg.variable("lost")})
@@ -100,7 +100,6 @@ def rosenbrock_step(method: Rosenbrock, problem: Problem) -> Step:
         estimate=method.order,
         dense=_dense(method),
         dense_lengths={f"{name}{k + 1}": m for name, count in names for k in range(count)},
-        smooth=[Call(state_jacobian(problem), ("x", "t", "p"), ("jacobian",)), *_time_slope(problem)],
     )
 
 

@@ -54,8 +54,6 @@ class Step:
         the cubic through states and rates at both ends.
     dense_lengths : dict, optional
         Of the registers that only `dense` needs, those of its result included.
-    smooth : sequence of Statement, optional
-        In place of `prepare` where derivatives are taken of it. Default `prepare`.
 
     Examples
     --------
@@ -97,13 +95,11 @@ class Step:
     handed: Sequence[Statement] = ()
     dense: Sequence[Statement] = ()
     dense_lengths: Mapping[str, int] = field(default_factory=dict)
-    smooth: Sequence[Statement] | None = None
 
     @property
     def derived(self) -> list[Statement]:
         """The statements of a step whose derivatives are taken, from x to the new x."""
-        prepare = self.prepare if self.smooth is None else self.smooth
-        return arriving([*self.rates, *prepare, *self.body, *self.kept])
+        return arriving([*self.rates, *self.prepare, *self.body, *self.kept])
 
 
 def arriving(statements: Sequence[Statement]) -> list[Statement]:

@@ -138,12 +138,10 @@ def gradient_many(
     [[-0.8804], [-1.1123], [-0.595]]
     """
     options = {"dt": dt, "max_step": max_step, "rtol": rtol, "atol": atol, "first_step": first_step, "backend": backend}
-    options["estimate_error"] = estimate_error
+    options |= {"estimate_error": estimate_error}
     motions, problem = _motions(model, q, qd, time_span(t_end, t0, t_span), method, tau, parameters, wrt, options, form)
     count, nq, run = motions.many, problem.nq, motions.options
-    parts: list[int | slice] = [*range(count)]
-    if not run.adaptive:
-        parts = [slice(k, min(k + WIDE, count)) for k in range(0, count, WIDE)]
+    parts = _parts(count, side_by_side=not run.adaptive)
     value, end = np.full(count, np.nan), np.full((count, problem.size), np.nan)
     by_name = {name: np.full((count, *shape), np.nan) for name, shape in _shapes(motions).items()}
     early, said = dict[int, str](), dict[int, str]()
@@ -175,6 +173,11 @@ def gradient_many(
             warnings.warn(text, SimulationWarning, stacklevel=2)
     t = motions.legs[0].t.copy() if motions.legs else np.array([run.t0, run.t_end])
     return MotionGradients(value, by_name, t, end[:, :nq], end[:, nq:])
+
+
+def _parts(count: int, *, side_by_side: bool) -> list[int | slice]:
+    """Motions that are run together: by steps that each of them chooses, one alone."""
+    return [slice(k, min(k + WIDE, count)) for k in range(0, count, WIDE)] if side_by_side else [*range(count)]
 
 
 def _shapes(motions: MotionOf) -> dict[str, tuple[int, ...]]:

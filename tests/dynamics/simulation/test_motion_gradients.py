@@ -374,7 +374,7 @@ def test_motions_side_by_side_whose_equations_are_not_solved_are_told_as_alone()
         many = dyn.gradient_many(model, end, [0.3], None, parameters={"k": strengths}, **given)
     with raises(dyn.MotionError) as error:
         dyn.gradient(model, end, [0.3], None, parameters={"k": strengths[1]}, **given)
-    assert str(words[0].message) == f"1 of 4 motions: of 1, {error.value}"
+    assert str(words[0].message) == f"1 of 4 motions stopped early: motion 1: {error.value}"
     assert "did not converge" in str(error.value)
     assert np.isnan([many.value[1], many["q"][1, 0], many["k"][1], many.q[1, 0]]).all()
     for k in (0, 2, 3):
