@@ -1,13 +1,14 @@
 """Integrators: methods for xdot = f(x, t), as programs over the graphs of a model."""
 
+from collections.abc import Callable
 from functools import partial
+from importlib import import_module
 
-from cgraph.extend import memo
+from cgraph.extend import doors, memo
 
-from .composition import COMPOSITIONS
+from .composition import COMPOSITIONS, Composition
 from .dop853 import DOP853
 from .explicit import explicit_step
-from .jacobian_statements import jacobian_statements
 from .method import Method
 from .momentum_form import in_form, momentum_form
 from .momentum_graphs import Mechanics, mechanics
@@ -23,14 +24,17 @@ from .problem import (
     time_derivative,
     total_energy,
 )
-from .radau import ORDER as RADAU_ORDER, radau_step
-from .rosenbrock import RODAS5P, rosenbrock_step
 from .step import Step
 from .step_control import measured
-from .symplectic import composed_step, partitioned_step
 from .tableau import TABLEAUS, Tableau
-from .taylor import ORDER as TAYLOR_ORDER, taylor_step
 
+TYPE_CHECKING = False  # as a checker knows it
+
+if TYPE_CHECKING:
+    from .jacobian_statements import jacobian_statements
+
+__getattr__, __dir__ = doors(__name__, __file__)
+TAYLOR_ORDER = 20  # of a tolerance of 2^-52
 MOST_STAGES = 12  # of Gauss's methods: order 24, beyond which float64 gains nothing
 
 
@@ -42,8 +46,18 @@ def runge_kutta(tableau: Tableau) -> Method:
     return Method(tableau.order, step)
 
 
-def _symplectic(method: Partitioned) -> Method:
-    return Method(method.order, partial(partitioned_step, method))
+def _later(file: str, name: str, *given: object) -> Callable[[Problem], Step]:
+    """The step of a method, whose file is loaded when a problem first takes it."""
+
+    def step(problem: Problem) -> Step:
+        made: Step = getattr(import_module(f"{__name__}.{file}"), name)(*given, problem)
+        return made
+
+    return step
+
+
+def _symplectic(method: Partitioned | Composition, step: str = "partitioned_step") -> Method:
+    return Method(method.order, _later("symplectic", step, method))
 
 
 class Methods(dict[str, Method]):
@@ -71,11 +85,11 @@ METHODS: dict[str, Method] = Methods(
     {
         **{name: runge_kutta(tableau) for name, tableau in TABLEAUS.items()},
         "dop853": runge_kutta(DOP853),
-        "rodas": Method(RODAS5P.order, partial(rosenbrock_step, RODAS5P), adaptive=True, degree=len(RODAS5P.dense) + 1),
-        "radau": Method(RADAU_ORDER, radau_step, adaptive=True, degree=3),
+        "rodas": Method(5, _later("rosenbrock", "rodas_step"), adaptive=True, degree=4),
+        "radau": Method(5, _later("radau", "radau_step"), adaptive=True, degree=3),
         "taylor": Method(
             TAYLOR_ORDER,
-            partial(taylor_step, TAYLOR_ORDER),
+            _later("taylor", "taylor_step", TAYLOR_ORDER),
             adaptive=True,
             degree=TAYLOR_ORDER,
             finest=2.0**-52,
@@ -83,7 +97,9 @@ METHODS: dict[str, Method] = Methods(
             derived=False,
         ),
         **{name: _symplectic(method) for name, method in PARTITIONED.items()},
-        **{name: Method(each.order, partial(composed_step, each)) for name, each in COMPOSITIONS.items()},
+        **{
+            name: Method(each.order, _later("symplectic", "composed_step", each)) for name, each in COMPOSITIONS.items()
+        },
     }
 )
 

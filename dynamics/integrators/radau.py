@@ -43,7 +43,6 @@ ROUNDING = 2.0**-52  # relative
 STALLS = 3.0  # turns that come no nearer: the rest is rounding
 SMALL = 1e-6  # of the largest coordinate or velocity, below which a component is measured by it
 CHANGES = ("right0", "F1", "F2")  # of W in a turn
-ORDER = 5
 
 
 def _transformation() -> tuple[list[Row], list[Row]]:

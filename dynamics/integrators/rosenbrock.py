@@ -85,6 +85,11 @@ RODAS5P = Rosenbrock(
 )
 
 
+def rodas_step(problem: Problem) -> Step:
+    """The step of Rodas5P."""
+    return rosenbrock_step(RODAS5P, problem)
+
+
 def rosenbrock_step(method: Rosenbrock, problem: Problem) -> Step:
     """The step."""
     m, last, degree = problem.size, f"U{len(method.c) - 1}", len(method.dense) + 1

@@ -21,7 +21,6 @@ from .problem import Problem
 from .step import Step
 from .step_control import count
 
-ORDER = 20  # of a tolerance of 2^-52
 LEAST = 3  # order
 CHECKED = 2.0**-46  # relative: rounding of the rates, below which a defect says nothing
 
