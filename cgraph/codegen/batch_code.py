@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 
 from ..core.evaluation import Array
-from .compiled import lies_in_rows
+from ..util.memory import aligned, lies_in_rows
 from .llvm_engine import Code
-from .sweep import aligned
 
 _BATCH = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, *[ctypes.c_int64] * 3, ctypes.c_void_p)
 
@@ -51,11 +52,20 @@ class BatchCode:
             self._run(filled, values, self._lanes, axis)
             result[:, whole:] = values[:, : count - whole]
 
+    def bind(self, points: Array, result: Array, shared: int) -> tuple[Array, Callable[[], None]]:
+        """Where so many numbers go that are the same for all points, and the function for whole vectors in rows."""
+        start = -(-shared // 8) * 8  # a line of the cache
+        memory = aligned(start + self._size)
+        sizes = len(points), points.shape[1], result.shape[1]
+        run = partial(self._rows, points.ctypes.data, result.ctypes.data, *sizes, memory.ctypes.data + 8 * start)
+        run.kept = points, result, memory  # type: ignore[attr-defined]  # whose addresses it has
+        return memory[start - shared : start], run
+
     def _run(self, points: Array, result: Array, count: int, axis: int) -> None:
         try:
             memory = self._free.pop()
         except IndexError:
-            memory = aligned((self._size,))
+            memory = aligned(self._size)
         entry = self._rows if axis else self._columns
         strides = points.strides[axis] // points.itemsize, result.strides[axis] // result.itemsize
         entry(points.ctypes.data, result.ctypes.data, count, *strides, memory.ctypes.data)  # type: ignore[misc]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from ..codegen.arithmetic import REGISTERS, Arithmetic
 from ..codegen.llvm_engine import MissingFunctionError
 from ..codegen.llvm_ir import libm_functions, point_arithmetic, preamble
@@ -26,14 +28,14 @@ def require_texts(program: Program) -> None:
             raise MissingFunctionError(f"statement {type(statement).__name__} has no text for LLVM")
 
 
-def offsets(program: Program, width: int) -> dict[str, int]:
+def offsets(registers: Mapping[str, int], width: int) -> dict[str, int]:
     """Where each register begins in the memory, and, under "", the size of it all.
 
     A register of more than one number is padded to a multiple of `width`, so that whole vectors can be read and
     written.
     """
     at, places = 0, {}
-    for name, length in program.registers.items():
+    for name, length in registers.items():
         places[name] = at
         at += length if length < 2 else -(-length // width) * width
     places[""] = at
@@ -58,6 +60,31 @@ def program_ir(program: Program, flags: str = "", lanes: int = 1, width: int = 1
     return "\n".join([*preamble(program.graphs(), arithmetic), *functions.definitions, *run, ""])
 
 
+def point_ir(
+    program: Program, x: str, y: str, flags: str = "", width: int = 1, registers: int = REGISTERS
+) -> tuple[str, dict[str, int]]:
+    """A module with `void point(double *x, double *y, double *memory)`: one pass, of which two registers lie apart.
+
+    The others lie in `memory`, at the places that come with it, see `offsets`.
+    """
+    functions = Functions(point_arithmetic(flags, registers), width)
+    writer = Writer(program.registers, functions)
+    writer.pointers |= {x: "%x", y: "%y"}
+    writer.run(program.body)
+    inner = {name: length for name, length in program.registers.items() if name not in (x, y)}
+    places = offsets(inner, width)
+    lines = [
+        *preamble(program.graphs(), functions.arithmetic),
+        *functions.definitions,
+        "define void @point(ptr noalias %x, ptr noalias %y, ptr noalias %memory) nounwind {",
+        "start:",
+        *[f"  {writer.pointers[each]} = getelementptr double, ptr %memory, i64 {places[each]}" for each in inner],
+        *writer.scratch,
+        *writer.written,
+    ]
+    return "\n".join([*lines, "  ret void", "}", ""]), places
+
+
 _ARGUMENTS = "ptr noalias %memory, ptr noalias %records, i64 %passes, i64 %every, ptr %done, ptr noalias %feed, "
 _ARGUMENTS += "i64 %stride"
 
@@ -76,7 +103,7 @@ class _RunFunction(Writer):
 
     def lines(self) -> list[str]:
         """The whole function."""
-        places = offsets(self.program, self.functions.width)
+        places = offsets(self.program.registers, self.functions.width)
         self.run(self.program.body)
         return [
             f"define i64 @run({_ARGUMENTS}) nounwind {{",

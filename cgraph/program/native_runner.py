@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
@@ -12,33 +12,47 @@ import numpy as np
 
 from ..codegen import llvm_engine as llvm
 from ..codegen.batch_code import BatchCode
+from ..codegen.bound_call import LONG, SHORT, bound_call
+from ..codegen.disk_cache import Cache
 from ..core.evaluation import Array
 from ..core.scope import without_collection
+from ..util.memory import aligned
 from .fuse import fused
-from .llvm_ir import program_functions, program_ir, require_texts
+from .llvm_ir import point_ir, program_functions, program_ir, require_texts
 from .program import Program
 from .rows_ir import program_rows_ir
 from .runner import Record, Runner
 
 _NUMBER = 8  # bytes
 _POINTER, _COUNT = ctypes.c_void_p, ctypes.c_int64
+MANY = 2**14  # operations that take some microseconds: time enough for Python's other threads
 _RUN = ctypes.CFUNCTYPE(_COUNT, _POINTER, _POINTER, _COUNT, _COUNT, _POINTER, _POINTER, _COUNT)
+
+
+_FAST = "reassoc nsz arcp contract afn"  # all but the promise that there is no NaN and no infinity
+
+
+def flags_of(fast: bool, fma: bool) -> str:
+    """What the arithmetic may do, in LLVM's words."""
+    return _FAST if fast else "contract" if fma else ""
 
 
 class NativeRunner(Runner):
     """A program as machine code. Any number of threads may run it at once, on a memory each."""
 
-    def __init__(self, program: Program, flags: str) -> None:
+    def __init__(self, program: Program, flags: str, cache: Cache | None = None) -> None:
         host = llvm.host()
         super().__init__(program, host.lanes)
         require_texts(program)
-        self._flags, self._host = flags, host
+        self._flags, self._host, self._cache = flags, host, cache
         self._fused = fused(program)
+        self._nodes = sum([len(graph.nodes) for graph in self._fused.graphs()])
         self._functions = program_functions(self._fused)
         host.require(self._functions)
         self._lock = threading.Lock()
         self._one: Any = None  # what runs one memory, and a vector of them
         self._many: Any = None
+        self._points: dict[tuple[str, str], tuple[Any, dict[str, int]]] = {}  # by the registers that lie apart
         self._batches: dict[str, BatchCode] = {}  # by the register that varies
 
     def prepared(self) -> NativeRunner:
@@ -47,8 +61,7 @@ class NativeRunner(Runner):
         return self
 
     def _compiled(self, text: str, *, looped: bool = False) -> llvm.Code:
-        nodes = sum([len(graph.nodes) for graph in self._fused.graphs()])
-        return self._host.compile(text, self._functions, nodes, looped=looped)
+        return self._host.compile(text, self._functions, self._nodes, self._cache, looped=looped)
 
     @property
     def _entry(self) -> Any:
@@ -84,6 +97,36 @@ class NativeRunner(Runner):
         call = partial(self._entry, at[0], at[1], len(rows), 1, at[2], at[3], 0)
         call.kept = self, arrays  # type: ignore[attr-defined]  # whose addresses it has
         return call
+
+    def _bind_pass(
+        self, x: tuple[str, Array], y: tuple[str, Array], values: Mapping[str, Array], stopped: Callable[[], None]
+    ) -> Callable[[], None]:
+        (first, point), (last, result) = x, y
+        entry, places = self._point(first, last)
+        memory = aligned(places[""])
+        memory[:] = 0.0
+        for name, value in values.items():
+            memory[places[name] : places[name] + len(value)] = value
+        run = bound_call(entry, point, result, memory)
+        if self.program.stop is None:
+            return run
+        stop = memory[places[self.program.stop] :].data
+
+        def checked() -> None:
+            run()
+            if stop[0]:
+                stopped()
+
+        return checked
+
+    def _point(self, x: str, y: str) -> tuple[Any, dict[str, int]]:
+        """What runs one pass of which two registers lie apart, and where the others lie."""
+        with self._lock:
+            if (x, y) not in self._points:
+                kind = SHORT if self._nodes < MANY else LONG
+                text, places = point_ir(self._fused, x, y, self._flags, self.width, self._host.registers)
+                self._points[x, y] = self._compiled(text).function("point", kind), places
+            return self._points[x, y]
 
     def _rows_writer(self, name: str) -> Callable[[Array, Array], None]:
         with self._lock:

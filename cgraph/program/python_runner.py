@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from ..codegen.compile import compile
-from ..codegen.compiled import Compiled
+from ..codegen.python_function import OnArrays, OnFloats
 from ..core.evaluation import Array
 from ..core.graph import Graph
 from .execution import Execution
 from .program import Program
 from .runner import Record, Runner
 from .statement import row_of
+
+BLOCK = 4096  # points that NumPy takes at once: temporaries stay in the cache
 
 
 class PythonRunner(Runner):
@@ -23,8 +24,8 @@ class PythonRunner(Runner):
     def __init__(self, program: Program, *, fma: bool = True) -> None:
         super().__init__(program)
         self._fma = fma
-        self._functions = {id(graph): compile(graph, "python") for graph in program.graphs()}
-        self._arrays: dict[int, Compiled] = {}
+        self._functions: dict[int, OnFloats] = {}
+        self._arrays: dict[int, OnArrays] = {}
 
     def _run(self, memory: Array, passes: int, every: int, feed: Array) -> Record:
         program = self.program
@@ -61,13 +62,38 @@ class PythonRunner(Runner):
             memories[place] = state[name]
         return Record(rows, passes)
 
+    def _bind_pass(
+        self, x: tuple[str, Array], y: tuple[str, Array], values: Mapping[str, Array], stopped: Callable[[], None]
+    ) -> Callable[[], None]:
+        (first, point), (last, result) = x, y
+        flat, program = result.reshape(-1), self.program
+        others = {name: [0.0] * length for name, length in program.registers.items() if name not in (first, last)}
+        others |= {name: value.tolist() for name, value in values.items()}
+        execution = Execution(program.registers, self._at, self._batch)
+
+        def run() -> None:
+            state: dict[str, Any] = {**others, first: point.tolist(), last: flat}
+            execution.run(program.body, state)
+            if state[last] is not flat:
+                flat[:] = state[last]
+            if program.stop is not None and state[program.stop][0] != 0.0:
+                stopped()
+
+        return run
+
     def _at(self, graph: Graph, x: Sequence[float]) -> Sequence[float]:
-        return self._functions[id(graph)].values(list(x))
+        if id(graph) not in self._functions:
+            self._functions[id(graph)] = OnFloats(graph)
+        return self._functions[id(graph)](x)
 
     def _batch(self, graph: Graph, points: Array) -> Array:
         if id(graph) not in self._arrays:
-            self._arrays[id(graph)] = compile(graph, "numpy", fma=self._fma)
-        return self._arrays[id(graph)].batch(points)
+            self._arrays[id(graph)] = OnArrays(graph, exact=not self._fma)
+        result = np.empty((len(graph.outputs), points.shape[1]))
+        for start in range(0, points.shape[1], BLOCK):
+            here = slice(start, start + BLOCK)
+            self._arrays[id(graph)](points[:, here], result[:, here])
+        return result
 
 
 def _split(values: Any, names: Sequence[str], lengths: Mapping[str, int]) -> dict[str, Any]:

@@ -10,10 +10,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..codegen.compiled import require_out
-from ..codegen.differentiable import describe, require_memory
 from ..core.checks import GraphError
 from ..core.evaluation import Array
+from ..util.memory import describe, require_memory, require_out
 from ..util.real_arrays import real_array
 from ..util.require import require_mapping, require_whole
 from ..util.threads import share, thread_count
@@ -82,7 +81,7 @@ class Runner(ABC):
 
     def __init__(self, program: Program, width: int = 1) -> None:
         self.program, self.width = program, width
-        places = offsets(program, width)
+        places = offsets(program.registers, width)
         self._slices = {name: slice(places[name], places[name] + n) for name, n in program.registers.items()}
         self.size = places[""]
 
@@ -205,6 +204,17 @@ class Runner(ABC):
             rows[: len(found)] = found
 
         return call
+
+    @abstractmethod
+    def _bind_pass(
+        self, x: tuple[str, Array], y: tuple[str, Array], values: Mapping[str, Array], stopped: Callable[[], None]
+    ) -> Callable[[], None]:
+        """A function of nothing: one pass, of which a register x that is read and a y that is written lie in arrays.
+
+        The arrays, contiguous and of as many numbers, are not checked; no `Map` may write y.
+        values: what other registers hold before the first pass, 0 elsewhere; those that a pass writes, it sets first.
+        stopped: what is called after a pass that stops the program.
+        """
 
     def run_many(self, memories: Array, passes: int, every: int = 1, feed: ArrayLike | None = None) -> Record:
         """As `run`, for N memories at once, in vectors; the program has to be branch-free.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from .derivatives import call_rules, control_rules, fixed_point_rules, matrix_rules, memory_rules
 from .statement import StatementRow, register_statement
-from .statements import call, control, matrix, memory
+from .statements import call, control, matrix, memory, tiles
 
 ROWS = [
     StatementRow(
@@ -121,6 +121,23 @@ ROWS = [
         text=memory.pop_text,
         jvp=memory_rules.push_pop,
         transpose=memory_rules.pull_pop,
+    ),
+    StatementRow(
+        tiles.TiledMap,
+        reads=("shared", "inputs"),
+        writes=("outputs",),
+        run=tiles.run_tiled_map,
+        check=tiles.check_tiled_map,
+        graph="graph",
+        text=tiles.tiled_map_text,
+    ),
+    StatementRow(
+        tiles.Scatter,
+        reads=("source", "target"),
+        writes=("target",),
+        run=tiles.run_scatter,
+        check=tiles.check_scatter,
+        text=tiles.scatter_text,
     ),
 ]
 for _row in ROWS:

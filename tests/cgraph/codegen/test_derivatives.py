@@ -11,7 +11,8 @@ from hypothesis import given, settings, strategies as st
 
 import cgraph as cg
 from cgraph import GraphError
-from cgraph.codegen import colored_matrix, differentiable, parts, sweep
+from cgraph.codegen import parts
+from cgraph.program import colored_matrix, differentiable, generated_function, native_function
 from tests import high_precision
 from tests.strategies import cases, examples
 from tests.tolerances import LAST_BITS, LONG_SUM, SHORT_SUM
@@ -129,7 +130,9 @@ def test_the_number_of_directions_is_no_matter(backend, k, monkeypatch):
     assert found.shape == (k, 8)
     some = range(0, k, 97)
     assert same(found[some], np.array([values(graph, POINT, directions[i]) for i in some]).reshape(-1, 8))
-    monkeypatch.setattr(sweep, "WORK", 1)  # blocks of one group
+    monkeypatch.setattr(native_function, "KEPT", 8)  # blocks of a few vectors
+    monkeypatch.setattr(generated_function, "BLOCK", 8)
+    function = compiled(example(), backend, fma=False)
     assert same(function.jvp(POINT, directions), found)
     assert same(function.jvp(POINT, np.asfortranarray(directions)), found)
 
@@ -387,7 +390,7 @@ def test_machine_code_of_derivatives_is_kept_on_disk(tmp_path):
         products = function.jvp([1.0, 2.0], np.eye(2)).tolist(), function.hessian([1.0, 2.0], [1.0, 0.0]).tolist()
         found.append((products, sorted(tmp_path.iterdir())))
     assert found[0] == found[1]
-    assert len(found[0][1]) == 3  # with the function itself
+    assert len(found[0][1]) == 4  # the function, the point's and the directions' part of products, the Hessian
 
 
 @pytest.mark.parametrize("given_x", [POINT.tolist(), POINT.astype(np.float32), np.repeat(POINT, 2)[::2]])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import cgraph as cg
-from cgraph.codegen import native_function as native, python_function as generated
+from cgraph.program import generated_function as generated, native_function as native
 from cgraph.util import threads
 from cgraph.util.threads import share, thread_count
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import threading
 from collections.abc import Callable
 from struct import Struct
@@ -12,27 +11,23 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..autodiff.direction_split import DirectionSplit
+from ..codegen import llvm_engine as llvm
+from ..codegen.batch_code import BatchCode
+from ..codegen.batch_ir import Batch, batch_ir
+from ..codegen.bound_call import SHORT, bound_call
+from ..codegen.disk_cache import open_cache
+from ..codegen.llvm_ir import libm_functions, scalar_ir
 from ..core.evaluation import Array
 from ..core.graph import Graph
 from ..core.scope import without_collection
-from . import llvm_engine as llvm
-from .batch_code import BatchCode
-from .batch_ir import Batch, batch_ir
-from .bound_call import bound_call
+from .colored_matrix import Derivative
 from .compiled import Compiled
-from .disk_cache import open_cache
-from .llvm_ir import libm_functions, scalar_ir
-from .native_sweep import NativeSweep
+from .direction_products import KEPT, Buffers, DirectionProducts
+from .native_runner import NativeRunner, flags_of
+from .program import Program
 
-_POINT = ctypes.PYFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)  # too short a call to give the interpreter away for
 WORK = 2**23  # nodes times columns in a block of a batch: some tenths of a millisecond, several times a thread's start
 _Buffers = tuple[Any, Array, memoryview, Callable[[], None]]  # memory of x; y, as an array and as memory; the call
-_FAST = "reassoc nsz arcp contract afn"  # all but the promise that there is no NaN and no infinity
-
-
-def flags_of(fast: bool, fma: bool) -> str:
-    """What the arithmetic may do, in LLVM's words."""
-    return _FAST if fast else "contract" if fma else ""
 
 
 class Native(Compiled):
@@ -48,9 +43,10 @@ class Native(Compiled):
         self._flags = flags_of(options["fast"], options["fma"])
         self._cache = open_cache(options["cache"])
         self._host = llvm.host()
+        self.lanes = self._host.lanes
         with without_collection():
             self.source = scalar_ir(graph, self._flags, self._host.registers)
-        self._entry = self._code(self.source).function("point", _POINT)
+        self._entry = self._code(self.source).function("point", SHORT)
         self._free: list[_Buffers] = []  # pop and append are atomic: no lock, and a call inside a call is safe
         self._pack, self._unpack = Struct(f"{self.n_in}d").pack_into, Struct(f"{self.n_out}d").unpack_from
         self._batch: BatchCode | None = None
@@ -107,8 +103,33 @@ class Native(Compiled):
                 self._batch = BatchCode(self._code(text.source), lanes, text.size)
         return max(WORK // len(self.graph.nodes) // lanes, 1) * lanes, self._batch
 
-    def _sweep(self, split: DirectionSplit, guarded: DirectionSplit | None) -> NativeSweep:
-        return NativeSweep(split, self._host, self._flags, self._cache, guarded)
+    def _ready(self, program: Program) -> NativeRunner:
+        return NativeRunner(program, self._flags, self._cache)
+
+    def _along(self, derivative: Derivative) -> DirectionProducts:
+        return DirectionProducts(derivative, self._prepared, self.lanes, KEPT)
+
+    def _prepared(self, split: DirectionSplit) -> Callable[[int], Buffers]:
+        """What makes buffers for so many directions, a multiple of the lanes."""
+        primal = Native(split.primal, self.backend, self.options)
+        linear, known = split.linear, len(split.primal.outputs)
+        text = batch_ir(linear, self.lanes, self._flags, self._host.registers, known)
+        code = self._host.compile(text.source, (), len(linear.nodes), self._cache)
+        batch = BatchCode(code, self.lanes, text.size, columns=False)
+
+        def buffers(size: int) -> Buffers:
+            x, directions = np.empty(primal.n_in), np.empty((size, split.directions))
+            results = np.empty((size, len(linear.outputs)))
+            p, along = batch.bind(directions, results, known)
+            at = primal._bound(x, p)
+
+            def run() -> None:
+                at()
+                along()
+
+            return Buffers(x, directions, results, run)
+
+        return buffers
 
     def _code(self, text: str) -> llvm.Code:
         return self._host.compile(text, libm_functions(self.graph), len(self.graph.nodes), self._cache)
