@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable
-from functools import partial
 
 import numpy as np
 
@@ -51,15 +49,6 @@ class BatchCode:
             values = np.empty((len(result), self._lanes), order=order)  # type: ignore[call-overload]
             self._run(filled, values, self._lanes, axis)
             result[:, whole:] = values[:, : count - whole]
-
-    def bind(self, points: Array, result: Array, shared: int) -> tuple[Array, Callable[[], None]]:
-        """Where so many numbers go that are the same for all points, and the function for whole vectors in rows."""
-        start = -(-shared // 8) * 8  # a line of the cache
-        memory = aligned(start + self._size)
-        sizes = len(points), points.shape[1], result.shape[1]
-        run = partial(self._rows, points.ctypes.data, result.ctypes.data, *sizes, memory.ctypes.data + 8 * start)
-        run.kept = points, result, memory  # type: ignore[attr-defined]  # whose addresses it has
-        return memory[start - shared : start], run
 
     def _run(self, points: Array, result: Array, count: int, axis: int) -> None:
         try:

@@ -32,21 +32,14 @@ class Batch(NamedTuple):
     size: int
 
 
-def batch_ir(graph: Graph, lanes: int, flags: str = "", registers: int = REGISTERS, shared: int = 0) -> Batch:
-    """The module for a graph, in vectors of so many lanes.
-
-    shared: so many inputs, the first, are no part of x, but the same for all points; they end where w begins. Then
-    there is `rows` alone.
-    """
+def batch_ir(graph: Graph, lanes: int, flags: str = "", registers: int = REGISTERS) -> Batch:
+    """The module for a graph, in vectors of so many lanes."""
     arithmetic = Arithmetic(flags, lanes, registers)
-    n_in, n_out = len(graph.inputs) - shared, len(graph.outputs)
+    n_in, n_out = len(graph.inputs), len(graph.outputs)
 
     tiled = n_in + n_out > FEW
 
     def address(base: str, name: str, row: int) -> list[str]:
-        row -= shared if base == "x" else 0
-        if row < 0:
-            return [f"  {name} = getelementptr double, ptr %w, i64 {row}"]
         if tiled:
             return [f"  {name} = getelementptr {arithmetic.type}, ptr %{base}, i64 {row}"]
         return [
@@ -54,30 +47,26 @@ def batch_ir(graph: Graph, lanes: int, flags: str = "", registers: int = REGISTE
             f"  {name} = getelementptr double, ptr %{base}, i64 {name}.row",
         ]
 
-    code = instructions(graph, arithmetic, address, "batch", shared)
+    code = instructions(graph, arithmetic, address, "batch")
     lines = [*preamble([graph], arithmetic), *code.definitions]
     for number, part in enumerate(code.parts):
         lines += [_PART.format(number=number, bytes=8 * lanes), *code.start, *part, "  ret void", "}"]
     vectors = max(1, min(VECTORS, MEMORY // (8 * lanes * max(1, n_in + n_out)))) if tiled else 0
-    columns = (
-        ""
-        if shared
-        else (_TILED if tiled else _DIRECT).format(
-            t=arithmetic.type,
-            lanes=lanes,
-            columns=vectors * lanes,
-            places=code.places,
-            n_in=n_in,
-            n_out=n_out,
-            x_vector=n_in * lanes,
-            y_vector=n_out * lanes,
-            x_tile=n_in * vectors,
-            parts="\n".join([_CALL.format(number=number) for number in range(len(code.parts))]),
-        )
+    text = (_TILED if tiled else _DIRECT).format(
+        t=arithmetic.type,
+        lanes=lanes,
+        columns=vectors * lanes,
+        places=code.places,
+        n_in=n_in,
+        n_out=n_out,
+        x_vector=n_in * lanes,
+        y_vector=n_out * lanes,
+        x_tile=n_in * vectors,
+        parts="\n".join([_CALL.format(number=number) for number in range(len(code.parts))]),
     )
     calls = [_CALL_IN_ROWS.format(number=number, lanes=lanes) for number in range(len(code.parts))]
     lines += rows_ir(arithmetic, Place(code.places, n_in), [Place(code.places + n_in, n_out)], calls)
-    return Batch("\n".join([*lines, columns]), lanes * (code.places + max(1, vectors) * (n_in + n_out)))
+    return Batch("\n".join([*lines, text]), lanes * (code.places + max(1, vectors) * (n_in + n_out)))
 
 
 _PART = """\

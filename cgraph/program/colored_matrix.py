@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Sequence
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from ..autodiff.sparsity import Indices, Indices32, Pattern
 from ..core.evaluation import Array
 from ..core.graph import Graph
 from ..core.node import as_node, variable
+from .bound_function import BoundFunction
 from .program import Program
 from .runner import Runner
 from .statement import Statement
@@ -54,13 +55,16 @@ class Part(NamedTuple):
     result: Indices
     entries: Indices
 
+    def tiles(self, lanes: int) -> int:
+        """Of directions."""
+        return -(-(max(self.colors) + 1) // lanes)
 
-class _Buffers(NamedTuple):
-    """What one call at a time has for itself."""
-
-    x: Any  # memory
-    values: Array
-    run: Callable[[], None]
+    def write_seeds(self, directions: Array, lanes: int) -> None:
+        """Of each color the sum of its unit vectors."""
+        seeds = directions.reshape(-1, len(self.colors), lanes)
+        for k, color in enumerate(self.colors):
+            if color != NONE:
+                seeds[color // lanes, k, color % lanes] = 1.0
 
 
 class ColoredMatrix:
@@ -68,7 +72,7 @@ class ColoredMatrix:
 
     entries: those that can be other than zero, in the order in which `values` gives them.
     source: the graph that gives them all, or the parts that do.  points: the numbers in a point.
-    lanes: the directions in a tile, 0 for all in one.  ready: makes a program ready to run.
+    lanes: the directions in a tile.  ready: makes a program ready to run.
     """
 
     def __init__(
@@ -81,9 +85,11 @@ class ColoredMatrix:
     ) -> None:
         self.entries, self._source, self._points = entries, source, points
         self._lanes, self._ready = lanes, ready
-        self._made: dict[tuple[bool, bool], tuple[Runner, dict[str, Array]]] = {}
+        self._made: dict[tuple[bool, bool], Runner] = {}
         self._making = threading.Lock()
-        self._free: dict[bool, list[_Buffers]] = {True: [], False: []}  # pop and append are atomic
+        size, (m, n) = len(entries.rows), entries.shape
+        self._entries = BoundFunction(self.bind, points, size)
+        self._dense = BoundFunction(lambda x, y: self.bind(x, y.reshape(m, n)), points, m * n)
 
     @cached_property
     def compressed(self) -> tuple[Indices32, Indices32]:
@@ -92,83 +98,86 @@ class ColoredMatrix:
 
     def values(self, x: Array, dense: bool) -> Array:
         """The entries, or with `dense` the whole matrix."""
+        if not dense:
+            return self._entries(x)
         m, n = self.entries.shape
-        if dense and m * n > LARGE:
-            matrix = np.zeros((m, n))
-            matrix[self.entries.rows, self.entries.columns] = self.values(x, dense=False)
-            return matrix
-        free = self._free[dense]
-        try:
-            buffers = free.pop()
-        except IndexError:
-            point = np.empty(self._points)
-            values = np.zeros(self.entries.shape) if dense else np.empty(len(self.entries.rows))
-            buffers = _Buffers(point.data, values, self.bind(point, values))
-        buffers.x[:] = x
-        buffers.run()
-        result = buffers.values.copy()
-        free.append(buffers)
-        return result
+        if m * n <= LARGE:
+            return self._dense(x).reshape(m, n)
+        matrix = np.zeros((m, n))
+        matrix[self.entries.rows, self.entries.columns] = self._entries(x)
+        return matrix
 
     def bind(self, x: Array, values: Array) -> Callable[[], None]:
         """A function of nothing that reads x and writes the values: entries, (count,), or into a matrix of zeros."""
 
         def bound(careful: bool) -> Callable[[], None]:
-            runner, seeds = self._runner(values.ndim == 2 and values.size > len(self.entries.rows), careful)
-            return runner._bind_pass(("x", x), ("y", values), seeds, lambda: bound(careful=True)())
+            runner = self._runner(values.ndim == 2 and values.size > len(self.entries.rows), careful)
+            run, registers = runner._bind_pass(("x", x), ("y", values))
+            for k, part in enumerate(() if isinstance(self._source, Graph) else self._source):
+                part.write_seeds(registers[f"s{k}"], self._lanes)
+                registers[f"tiles{k}"][0] = part.tiles(self._lanes)
+            if "nonfinite" not in registers:
+                return run
+            nonfinite = registers["nonfinite"].data
+
+            def checked() -> None:
+                run()
+                if nonfinite[0]:
+                    bound(careful=True)()
+
+            return checked
 
         return bound(careful=False)
 
-    def _runner(self, dense: bool, careful: bool) -> tuple[Runner, dict[str, Array]]:
-        """What runs the program, and values of its registers; made at the first use."""
-        key = dense, careful
+    def _runner(self, dense: bool, careful: bool) -> Runner:
+        """What runs the program, made at the first use."""
         with self._making:
-            if key not in self._made:
-                program, seeds = self._program(*key)
-                self._made[key] = self._ready(program), seeds
-            return self._made[key]
+            if (dense, careful) not in self._made:
+                self._made[dense, careful] = self._ready(self._program(dense, careful))
+            return self._made[dense, careful]
 
-    def _program(self, dense: bool, careful: bool) -> tuple[Program, dict[str, Array]]:
-        """x -> y, the entries, or with `dense` the whole matrix; and the directions."""
-        m, n = self.entries.shape
+    def _program(self, dense: bool, careful: bool) -> Program:
+        """x -> y, the entries, or with `dense` the whole matrix."""
+        (m, n), lanes = self.entries.shape, self._lanes
         places = self.entries.rows * n + self.entries.columns if dense else np.arange(len(self.entries.rows))
         registers = {"x": self._points, "y": m * n if dense else len(places)}
         if isinstance(self._source, Graph):
-            body: list[Statement] = [Call(self._source, ("x",), ("e",) if dense else ("y",))]
-            if dense:
-                registers["e"] = len(places)
-                body.append(Scatter("e", "y", tuple(range(len(places))), tuple(places.tolist())))
-            return Program(registers, body, ["y"]), {}
-        statements, seeds, checks = [], {}, []
+            if not dense:
+                return Program(registers, [Call(self._source, ("x",), ("y",))], ["y"])
+            body = [Call(self._source, ("x",), ("e",)), Scatter("e", "y", tuple(range(len(places))), _tuple(places))]
+            return Program(registers | {"e": len(places)}, body, ["y"])
+        statements: list[Statement] = []
+        checks: dict[str, int] = {}
         for k, part in enumerate(self._source):
             derivative = part.derivative.careful if careful else part.derivative
-            (primal, linear), count = derivative.split, max(part.colors) + 1
-            lanes = self._lanes or count
-            p, s, t = (f"{letter}{k}" for letter in "pst")
-            tiles, results = -(-count // lanes), len(linear.outputs)
-            seeds[s] = np.zeros((tiles, len(part.colors), lanes))
-            for entry, color in enumerate(part.colors):
-                if color != NONE:
-                    seeds[s][color // lanes, entry, color % lanes] = 1.0
-            registers |= {p: len(primal.outputs), s: seeds[s].size, t: tiles * results * lanes}
-            taken = ((part.color // lanes) * results + part.result) * lanes + part.color % lanes
-            statements += [
-                Call(primal, ("x",), (p,)),
-                TiledMap(linear, s, t, (p,), lanes),
-                Scatter(t, "y", tuple(taken.tolist()), tuple(places[part.entries].tolist())),
-            ]
+            (primal, linear), tiles = derivative.split, part.tiles(lanes)
+            sizes = len(primal.outputs), tiles * len(part.colors) * lanes, tiles * len(linear.outputs) * lanes, 1
+            registers |= {f"{letter}{k}": size for letter, size in zip(("p", "s", "t", "tiles"), sizes, strict=True)}
+            taken = ((part.color // lanes) * len(linear.outputs) + part.result) * lanes + part.color % lanes
+            statements += product_statements(derivative, k, f"t{k}", lanes)
+            statements.append(Scatter(f"t{k}", "y", _tuple(taken), _tuple(places[part.entries])))
             if derivative.guarded is not None:
-                registers[f"check{k}"] = tiles * lanes
-                checks.append(f"check{k}")
-                statements.append(TiledMap(_nonfinite(results), t, checks[-1], (), lanes))
+                checks[f"check{k}"] = tiles * lanes
         if checks:
-            registers["nonfinite"] = 1
-            statements.append(Call(_nonfinite(sum([registers[each] for each in checks])), (*checks,), ("nonfinite",)))
-        return Program(registers, statements, ["y"], stop="nonfinite" if checks else None), _flat(seeds)
+            registers |= {**checks, "nonfinite": 1}
+            statements.append(Call(_nonfinite(sum(checks.values())), (*checks,), ("nonfinite",)))
+        return Program(registers, statements, ["y"])
 
 
-def _flat(arrays: dict[str, Array]) -> dict[str, Array]:
-    return {name: array.reshape(-1) for name, array in arrays.items()}
+def product_statements(derivative: Derivative, k: int, results: str, lanes: int) -> list[Statement]:
+    """A register of results: of the point x along `tiles` of directions s; the number k stands behind names.
+
+    With a guard a register `check` has NaN for a direction of which a result is infinite or NaN, else 0.
+    """
+    (primal, linear), p, tiles = derivative.split, f"p{k}", f"tiles{k}"
+    statements: list[Statement] = [Call(primal, ("x",), (p,)), TiledMap(linear, f"s{k}", results, (p,), lanes, tiles)]
+    if derivative.guarded is not None:
+        statements.append(TiledMap(_nonfinite(len(linear.outputs)), results, f"check{k}", (), lanes, tiles))
+    return statements
+
+
+def _tuple(numbers: Indices) -> tuple[int, ...]:
+    return tuple(numbers.tolist())
 
 
 def _nonfinite(count: int) -> Graph:

@@ -16,8 +16,10 @@ from ..core.graph import Graph
 from ..util.html_text import html_table, html_text
 from ..util.memory import lies_in_rows, require_memory, require_out, require_target
 from ..util.real_arrays import real_array
-from ..util.threads import share, thread_count
+from ..util.threads import thread_count
+from .bound_function import point_of
 from .differentiable import Differentiable
+from .write_batch import write_batch
 
 
 class Compiled(Differentiable):
@@ -83,14 +85,7 @@ class Compiled(Differentiable):
         result = np.empty((self.n_out, total), order=order) if out is None else out  # type: ignore[call-overload]
         if out is not None:
             require_out(out, (self.n_out, total), points)
-        width, columns = self._columns()
-
-        def block(start: int) -> None:
-            stop = start + width
-            columns(points[:, start:stop], result[:, start:stop])
-
-        # Blocks begin where they begin whatever `threads` is, so that each column always has the same neighbours.
-        share(block, range(0, total, width), min(count, total // width))
+        write_batch(*self._columns(), points, result, count)
         return result
 
     def bind(self, x: Array, y: Array) -> Callable[[], None]:
@@ -115,10 +110,7 @@ class Compiled(Differentiable):
         """`bind`, after its checks."""
 
     def _point(self, x: ArrayLike) -> Array:
-        point = real_array("x", x)
-        if point.shape != (self.n_in,):
-            raise GraphError(f"x must have shape ({self.n_in},), one value for each input, got {point.shape}")
-        return point
+        return point_of(x, self.n_in)
 
     def _repr_html_(self) -> str:
         rows = [("back end", self.backend), ("inputs", str(self.n_in)), ("outputs", str(self.n_out))]

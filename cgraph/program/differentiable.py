@@ -47,7 +47,7 @@ class Differentiable(ABC):
     graph: Graph
     n_in: int
     n_out: int
-    lanes = 0  # directions in a tile; 0: all that there are
+    lanes, tiles = LANES, 512  # directions in a tile, and tiles in a block of them
     vector_cost = 1  # of an operation on a vector of directions, in operations on numbers
 
     def __init__(self) -> None:
@@ -57,10 +57,6 @@ class Differentiable(ABC):
     @abstractmethod
     def _ready(self, program: Program) -> Runner:
         """A program made ready to run in the same way."""
-
-    @abstractmethod
-    def _along(self, derivative: Derivative) -> DirectionProducts:
-        """What writes products with directions."""
 
     @abstractmethod
     def _point(self, x: ArrayLike) -> Array:
@@ -160,10 +156,15 @@ class Differentiable(ABC):
         if rows.ndim not in (1, 2) or rows.shape[-1] != shape[0]:
             raise GraphError(f"{name} must have shape (k, {shape[0]}) or ({shape[0]},), got {rows.shape}")
         matrix = rows if rows.ndim == 2 else rows[None]
-        result = np.zeros((len(matrix), shape[1]))
-        if self.n_in and result.size:
+        result = np.empty((len(matrix), shape[1]))
+        if not self.n_in:
+            result[...] = 0.0
+        elif result.size:
             self._once(name, chosen, lambda _: self._along(derivative(chosen)))(point, matrix, result)
         return result if rows.ndim == 2 else result[0]
+
+    def _along(self, derivative: Derivative) -> DirectionProducts:
+        return DirectionProducts(derivative, self._ready, self.lanes, self.tiles)
 
     def _matrix(self, matrix: ColoredMatrix, point: Array, sparse: bool) -> Any:
         if not require_flag("sparse", sparse):

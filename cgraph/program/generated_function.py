@@ -9,13 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..autodiff.direction_split import DirectionSplit
 from ..codegen.python_function import OnArrays, OnFloats
 from ..core.evaluation import Array
 from ..core.graph import Graph
-from .colored_matrix import Derivative
 from .compiled import Compiled
-from .direction_products import Buffers, DirectionProducts
 from .program import Program
 from .python_runner import BLOCK, PythonRunner
 
@@ -48,25 +45,6 @@ class Generated(Compiled):
 
     def _ready(self, program: Program) -> PythonRunner:
         return PythonRunner(program, fma=self.options["fma"])
-
-    def _along(self, derivative: Derivative) -> DirectionProducts:
-        return DirectionProducts(derivative, self._prepared, 1, BLOCK)
-
-    def _prepared(self, split: DirectionSplit) -> Callable[[int], Buffers]:
-        """What makes buffers for so many directions."""
-        primal, linear, known = OnFloats(split.primal), self._on_arrays(split.linear), len(split.primal.outputs)
-
-        def buffers(size: int) -> Buffers:
-            x, points = np.empty(len(split.primal.inputs)), np.empty((len(split.linear.inputs), size))
-            results = np.empty((len(split.linear.outputs), size))
-
-            def run() -> None:
-                points[:known] = np.array(primal(x.tolist()))[:, None]
-                linear(points, results)
-
-            return Buffers(x, points[known:].T, results.T, run)
-
-        return buffers
 
     def _columns(self) -> tuple[int, Callable[[Array, Array], None]]:
         if self.backend == "python":

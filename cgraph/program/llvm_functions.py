@@ -97,8 +97,8 @@ class Functions:
         scope += [f"ptr %same{k}" for k in scalars]
         return lines
 
-    def tiled_map(self, graph: Graph, shared: Lengths, tiles: int, lanes: int) -> str:
-        """Every tile y = graph(shared, x), each number a vector."""
+    def tiled_map(self, graph: Graph, shared: Lengths, lanes: int) -> str:
+        """y = graph(shared, x) of every tile, each number a vector; the last input says how many there are."""
         arithmetic, known, last = self.arithmetic._replace(lanes=lanes, together=1), _numbers(shared), len(shared)
         t, sizes = arithmetic.type, {"x": len(graph.inputs) - len(known), "y": len(graph.outputs)}
 
@@ -109,14 +109,16 @@ class Functions:
 
         def lines() -> list[str]:
             written = self._body(graph, arithmetic, address, scope, len(known))
+            start = [f"  %number = load double, ptr %in{last + 1}, align 8", "  %tiles = fptosi double %number to i64"]
             here = []
-            for base, start in (("x", f"%in{last}"), ("y", "%out0")):
+            for base, register in (("x", f"%in{last}"), ("y", "%out0")):
                 here.append(f"  %{base}.row = mul i64 %i, {sizes[base]}")
-                here.append(f"  %{base} = getelementptr {t}, ptr {start}, i64 %{base}.row")
-            return _loop(written._replace(lines=[*here, *written.lines]), [], tiles) if tiles else []
+                here.append(f"  %{base} = getelementptr {t}, ptr {register}, i64 %{base}.row")
+            body = written._replace(start=[*start, *written.start], lines=[*here, *written.lines])
+            return _loop(body, [], "%tiles")
 
         scope = [*_pointers("in", shared), "ptr %x", "ptr %y"]
-        return self._define(("tiles", id(graph), shared, tiles, lanes), "tiles", lines, last + 1, 1)
+        return self._define(("tiles", id(graph), shared, lanes), "tiles", lines, last + 2, 1)
 
     def sum(self, graph: Graph, inputs: Lengths, count: int, shared: Lengths = (), outputs: Lengths = (1,)) -> str:
         """y = sum over i = 0 .. count - 1 of graph(shared, x[i]), added up in this order from 0."""
@@ -214,7 +216,7 @@ def _pointers(name: str, registers: Iterable[object]) -> list[str]:
     return [f"ptr %{name}{k}" for k, _ in enumerate(registers)]
 
 
-def _loop(written: Body, after: list[str], count: int) -> list[str]:
+def _loop(written: Body, after: list[str], count: int | str) -> list[str]:
     """The body, which may hold blocks, and the lines after it for %i = 0 .. count - 1."""
     return [
         *written.start,

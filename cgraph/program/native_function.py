@@ -2,134 +2,45 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable
-from struct import Struct
 from typing import Any
 
-import numpy as np
-from numpy.typing import ArrayLike
-
-from ..autodiff.direction_split import DirectionSplit
-from ..codegen import llvm_engine as llvm
-from ..codegen.batch_code import BatchCode
-from ..codegen.batch_ir import Batch, batch_ir
-from ..codegen.bound_call import SHORT, bound_call
 from ..codegen.disk_cache import open_cache
-from ..codegen.llvm_ir import libm_functions, scalar_ir
 from ..core.evaluation import Array
 from ..core.graph import Graph
-from ..core.scope import without_collection
-from .colored_matrix import Derivative
+from .bound_function import BoundFunction
 from .compiled import Compiled
-from .direction_products import KEPT, Buffers, DirectionProducts
 from .native_runner import NativeRunner, flags_of
 from .program import Program
-
-WORK = 2**23  # nodes times columns in a block of a batch: some tenths of a millisecond, several times a thread's start
-_Buffers = tuple[Any, Array, memoryview, Callable[[], None]]  # memory of x; y, as an array and as memory; the call
+from .statements.call import Call
 
 
-class Native(Compiled):
+class Native(BoundFunction, Compiled):
     """Machine code through LLVM. The function of one point is made at once, that of batches at its first use.
 
     options: fast, fma and cache, see `compile`. Any number of threads may call it at once.
     """
 
-    takes_rows = True
+    takes_rows, tiles = True, 16
 
     def __init__(self, graph: Graph, backend: str, options: dict[str, Any]) -> None:
-        super().__init__(graph, backend, options)
+        Compiled.__init__(self, graph, backend, options)
+        BoundFunction.__init__(self, self._bound, self.n_in, self.n_out)
         self._flags = flags_of(options["fast"], options["fma"])
         self._cache = open_cache(options["cache"])
-        self._host = llvm.host()
-        self.lanes = self._host.lanes
-        with without_collection():
-            self.source = scalar_ir(graph, self._flags, self._host.registers)
-        self._entry = self._code(self.source).function("point", SHORT)
-        self._free: list[_Buffers] = []  # pop and append are atomic: no lock, and a call inside a call is safe
-        self._pack, self._unpack = Struct(f"{self.n_in}d").pack_into, Struct(f"{self.n_out}d").unpack_from
-        self._batch: BatchCode | None = None
-        self._batch_lock = threading.Lock()
-
-    def __call__(self, x: ArrayLike) -> Array:
-        """The outputs at one point, through buffers that a call at a time has for itself."""
-        buffers = self._take()
-        x_memory, y, _, run = buffers
-        point = x if type(x) is np.ndarray else self._point(x)
-        try:
-            x_memory[:] = point  # compares shape and type, and copies: quicker than to look at them first
-        except ValueError:
-            x_memory[:] = self._point(point).copy()
-        run()
-        result = y.copy()
-        self._free.append(buffers)
-        return result
-
-    def values(self, x: list[float]) -> tuple[float, ...]:
-        """The outputs as floats at a list of floats."""
-        buffers = self._take()
-        x_memory, _, y_memory, run = buffers
-        self._pack(x_memory, 0, *x)
-        run()
-        result = self._unpack(y_memory)
-        self._free.append(buffers)
-        return result
+        self._runner = self._ready(Program({"x": self.n_in, "y": self.n_out}, [Call(graph, ("x",), ("y",))], ["y"]))
+        self.lanes = self._runner.width
+        self.source = self._runner.point("x", "y").source
 
     def batch_source(self) -> str:
         """The text in LLVM's language of the function for batches."""
-        return self._batch_text().source
-
-    def _batch_text(self) -> Batch:
-        with without_collection():
-            return batch_ir(self.graph, self._host.lanes, self._flags, self._host.registers)
-
-    def _take(self) -> _Buffers:
-        """Where one call at a time puts its point and finds its result."""
-        try:
-            return self._free.pop()
-        except IndexError:
-            x, y = np.empty(self.n_in), np.empty(self.n_out)
-            return x.data, y, y.data, self._bound(x, y)
+        return self._runner.batch_text("x").source
 
     def _bound(self, x: Array, y: Array) -> Callable[[], None]:
-        return bound_call(self._entry, x, y)
+        return self._runner._bind_pass(("x", x), ("y", y))[0]
 
     def _columns(self) -> tuple[int, Callable[[Array, Array], None]]:
-        lanes = self._host.lanes
-        with self._batch_lock:
-            if self._batch is None:
-                text = self._batch_text()
-                self._batch = BatchCode(self._code(text.source), lanes, text.size)
-        return max(WORK // len(self.graph.nodes) // lanes, 1) * lanes, self._batch
+        return self._runner._columns("x")
 
     def _ready(self, program: Program) -> NativeRunner:
         return NativeRunner(program, self._flags, self._cache)
-
-    def _along(self, derivative: Derivative) -> DirectionProducts:
-        return DirectionProducts(derivative, self._prepared, self.lanes, KEPT)
-
-    def _prepared(self, split: DirectionSplit) -> Callable[[int], Buffers]:
-        """What makes buffers for so many directions, a multiple of the lanes."""
-        primal = Native(split.primal, self.backend, self.options)
-        linear, known = split.linear, len(split.primal.outputs)
-        text = batch_ir(linear, self.lanes, self._flags, self._host.registers, known)
-        code = self._host.compile(text.source, (), len(linear.nodes), self._cache)
-        batch = BatchCode(code, self.lanes, text.size, columns=False)
-
-        def buffers(size: int) -> Buffers:
-            x, directions = np.empty(primal.n_in), np.empty((size, split.directions))
-            results = np.empty((size, len(linear.outputs)))
-            p, along = batch.bind(directions, results, known)
-            at = primal._bound(x, p)
-
-            def run() -> None:
-                at()
-                along()
-
-            return Buffers(x, directions, results, run)
-
-        return buffers
-
-    def _code(self, text: str) -> llvm.Code:
-        return self._host.compile(text, libm_functions(self.graph), len(self.graph.nodes), self._cache)

@@ -6,25 +6,27 @@ import ctypes
 import threading
 from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ..codegen import llvm_engine as llvm
 from ..codegen.batch_code import BatchCode
+from ..codegen.batch_ir import Batch, batch_ir
 from ..codegen.bound_call import LONG, SHORT, bound_call
 from ..codegen.disk_cache import Cache
 from ..core.evaluation import Array
 from ..core.scope import without_collection
 from ..util.memory import aligned
 from .fuse import fused
-from .llvm_ir import point_ir, program_functions, program_ir, require_texts
+from .llvm_ir import point_ir, program_functions, program_ir, require_texts, whole_graph
 from .program import Program
 from .rows_ir import program_rows_ir
 from .runner import Record, Runner
 
 _NUMBER = 8  # bytes
 _POINTER, _COUNT = ctypes.c_void_p, ctypes.c_int64
+WORK = 2**23  # nodes times points in a block of a batch: some tenths of a millisecond, several times a thread's start
 MANY = 2**14  # operations that take some microseconds: time enough for Python's other threads
 _RUN = ctypes.CFUNCTYPE(_COUNT, _POINTER, _POINTER, _COUNT, _COUNT, _POINTER, _POINTER, _COUNT)
 
@@ -35,6 +37,14 @@ _FAST = "reassoc nsz arcp contract afn"  # all but the promise that there is no 
 def flags_of(fast: bool, fma: bool) -> str:
     """What the arithmetic may do, in LLVM's words."""
     return _FAST if fast else "contract" if fma else ""
+
+
+class PointCode(NamedTuple):
+    """One pass of which two registers lie apart: the text, the function, and where the other registers lie."""
+
+    source: str
+    entry: Any
+    places: dict[str, int]
 
 
 class NativeRunner(Runner):
@@ -52,7 +62,7 @@ class NativeRunner(Runner):
         self._lock = threading.Lock()
         self._one: Any = None  # what runs one memory, and a vector of them
         self._many: Any = None
-        self._points: dict[tuple[str, str], tuple[Any, dict[str, int]]] = {}  # by the registers that lie apart
+        self._points: dict[tuple[str, str], PointCode] = {}  # by the registers that lie apart
         self._batches: dict[str, BatchCode] = {}  # by the register that varies
 
     def prepared(self) -> NativeRunner:
@@ -98,48 +108,41 @@ class NativeRunner(Runner):
         call.kept = self, arrays  # type: ignore[attr-defined]  # whose addresses it has
         return call
 
-    def _bind_pass(
-        self, x: tuple[str, Array], y: tuple[str, Array], values: Mapping[str, Array], stopped: Callable[[], None]
-    ) -> Callable[[], None]:
-        (first, point), (last, result) = x, y
-        entry, places = self._point(first, last)
-        memory = aligned(places[""])
+    def _bind_pass(self, x: tuple[str, Array], y: tuple[str, Array]) -> tuple[Callable[[], None], Mapping[str, Array]]:
+        code = self.point(x[0], y[0])
+        memory = aligned(code.places[""])
         memory[:] = 0.0
-        for name, value in values.items():
-            memory[places[name] : places[name] + len(value)] = value
-        run = bound_call(entry, point, result, memory)
-        if self.program.stop is None:
-            return run
-        stop = memory[places[self.program.stop] :].data
+        lengths = self.program.registers
+        registers = {name: memory[at : at + lengths[name]] for name, at in code.places.items() if name}
+        return bound_call(code.entry, x[1], y[1], memory), registers
 
-        def checked() -> None:
-            run()
-            if stop[0]:
-                stopped()
-
-        return checked
-
-    def _point(self, x: str, y: str) -> tuple[Any, dict[str, int]]:
-        """What runs one pass of which two registers lie apart, and where the others lie."""
+    def point(self, x: str, y: str) -> PointCode:
+        """What runs one pass of which two registers lie apart, made at its first use."""
         with self._lock:
             if (x, y) not in self._points:
-                kind = SHORT if self._nodes < MANY else LONG
-                text, places = point_ir(self._fused, x, y, self._flags, self.width, self._host.registers)
-                self._points[x, y] = self._compiled(text).function("point", kind), places
+                how = self._flags, self.width, self._host.registers
+                with without_collection():
+                    text, places = point_ir(self._fused, x, y, *how)
+                entry = self._compiled(text).function("point", SHORT if self._nodes < MANY else LONG)
+                self._points[x, y] = PointCode(text, entry, places)
             return self._points[x, y]
 
-    def _rows_writer(self, name: str) -> Callable[[Array, Array], None]:
+    def _columns(self, name: str) -> tuple[int, Callable[[Array, Array], None]]:
+        lanes = self._host.lanes
         with self._lock:
             if name not in self._batches:
-                self._batches[name] = self._batch_code(name)
-            code = self._batches[name]
-        return lambda values, rows: code(values.T, rows.T)
+                text, alone = self.batch_text(name), whole_graph(self._fused, name) is not None
+                code = self._compiled(text.source, looped=not alone)
+                self._batches[name] = BatchCode(code, lanes, text.size, columns=alone)
+            return max(WORK // max(1, self._nodes) // lanes, 1) * lanes, self._batches[name]
 
-    def _batch_code(self, name: str) -> BatchCode:
-        lanes, registers = self._host.lanes, self._host.registers
+    def batch_text(self, name: str) -> Batch:
+        """The text in LLVM's language of the function for batches of a register."""
+        lanes, how, graph = self._host.lanes, (self._flags, self._host.registers), whole_graph(self._fused, name)
         with without_collection():
-            text = program_rows_ir(self._fused, name, lanes, self._flags, registers)
-        return BatchCode(self._compiled(text.source, looped=True), lanes, text.size, columns=False)
+            if graph is not None:
+                return batch_ir(graph, lanes, *how)
+            return program_rows_ir(self._fused, name, lanes, *how)
 
     def _run_many(self, memories: Array, passes: int, every: int, feed: Array) -> Record:
         lanes = self._host.lanes

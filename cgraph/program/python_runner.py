@@ -62,24 +62,19 @@ class PythonRunner(Runner):
             memories[place] = state[name]
         return Record(rows, passes)
 
-    def _bind_pass(
-        self, x: tuple[str, Array], y: tuple[str, Array], values: Mapping[str, Array], stopped: Callable[[], None]
-    ) -> Callable[[], None]:
-        (first, point), (last, result) = x, y
-        flat, program = result.reshape(-1), self.program
-        others = {name: [0.0] * length for name, length in program.registers.items() if name not in (first, last)}
-        others |= {name: value.tolist() for name, value in values.items()}
-        execution = Execution(program.registers, self._at, self._batch)
+    def _bind_pass(self, x: tuple[str, Array], y: tuple[str, Array]) -> tuple[Callable[[], None], Mapping[str, Array]]:
+        arrays = {name: np.zeros(length) for name, length in self.program.registers.items() if name not in (x[0], y[0])}
+        arrays[y[0]] = y[1].reshape(-1)
+        execution = Execution(self.program.registers, self._at, self._batch)
 
         def run() -> None:
-            state: dict[str, Any] = {**others, first: point.tolist(), last: flat}
-            execution.run(program.body, state)
-            if state[last] is not flat:
-                flat[:] = state[last]
-            if program.stop is not None and state[program.stop][0] != 0.0:
-                stopped()
+            state: dict[str, Any] = {**arrays, x[0]: x[1].tolist()}
+            execution.run(self.program.body, state)
+            for name, array in arrays.items():
+                if state[name] is not array:
+                    array[:] = state[name]
 
-        return run
+        return run, arrays
 
     def _at(self, graph: Graph, x: Sequence[float]) -> Sequence[float]:
         if id(graph) not in self._functions:

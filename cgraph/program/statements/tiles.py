@@ -21,6 +21,7 @@ class TiledMap(Statement):
     """outputs[e] = graph(shared, inputs[e]) for every element e, in tiles of so many lanes.
 
     Number k of the element e is at ((e // lanes) n + k) lanes + e % lanes, where an element has n numbers.
+    tiles: a register that says how many are computed, at least one; others stay as they are.
     """
 
     graph: Graph
@@ -28,6 +29,7 @@ class TiledMap(Statement):
     outputs: str
     shared: Names
     lanes: int
+    tiles: str
 
 
 @dataclass(frozen=True)
@@ -43,32 +45,29 @@ class Scatter(Statement):
 def check_tiled_map(statement: TiledMap, lengths: Lengths) -> None:
     """Raises GraphError if registers do not hold whole tiles, as many of them on either side."""
     where, graph = f"TiledMap of {statement.graph!r}", statement.graph
-    known, tiles = _sizes(statement, lengths)
-    require_length(lengths, where, statement.inputs, tiles * (len(graph.inputs) - known) * statement.lanes)
+    tiles = lengths[statement.outputs] // (len(graph.outputs) * statement.lanes)
+    size = len(graph.inputs) - sum([lengths[name] for name in statement.shared])
+    require_length(lengths, where, statement.inputs, tiles * size * statement.lanes)
     require_length(lengths, where, statement.outputs, tiles * len(graph.outputs) * statement.lanes)
-
-
-def _sizes(statement: TiledMap, lengths: Lengths) -> tuple[int, int]:
-    """How many numbers are shared, and how many tiles there are."""
-    known = sum([lengths[name] for name in statement.shared])
-    return known, lengths[statement.outputs] // (max(1, len(statement.graph.outputs)) * statement.lanes)
+    require_length(lengths, where, statement.tiles, 1)
 
 
 def run_tiled_map(statement: TiledMap, state: dict[str, Any], execution: Execution) -> None:
-    """In Python, all elements as one batch."""
-    (known, tiles), lanes = _sizes(statement, execution.lengths), statement.lanes
-    shared = [value for name in statement.shared for value in state[name]]
-    rows = np.array(state[statement.inputs]).reshape(tiles, -1, lanes).transpose(1, 0, 2).reshape(-1, tiles * lanes)
-    points = np.concatenate([np.repeat(np.reshape(shared, (known, 1)), tiles * lanes, axis=1), rows])
-    results = execution.batch(statement.graph, points).reshape(-1, tiles, lanes)
-    state[statement.outputs] = results.transpose(1, 0, 2).ravel().tolist()
+    """In Python, all elements as one batch, in place."""
+    graph, tiles, lanes = statement.graph, int(state[statement.tiles][0]), statement.lanes
+    shared = np.array([value for name in statement.shared for value in state[name]])
+    numbers = tiles * (len(graph.inputs) - len(shared)) * lanes
+    rows = np.array(state[statement.inputs][:numbers]).reshape(tiles, -1, lanes).transpose(1, 0, 2)
+    points = np.concatenate([np.repeat(shared[:, None], tiles * lanes, axis=1), rows.reshape(-1, tiles * lanes)])
+    results = execution.batch(graph, points).reshape(-1, tiles, lanes)
+    state[statement.outputs][: results.size] = results.transpose(1, 0, 2).reshape(-1)
 
 
 def tiled_map_text(statement: TiledMap, writer: Writer) -> None:
     """As machine code, a tile after another."""
-    _, tiles = _sizes(statement, writer.registers)
-    name = writer.functions.tiled_map(statement.graph, writer.lengths(statement.shared), tiles, statement.lanes)
-    writer.calls(name, (*statement.shared, statement.inputs), (statement.outputs,))
+    name = writer.functions.tiled_map(statement.graph, writer.lengths(statement.shared), statement.lanes)
+    inputs = (*statement.shared, statement.inputs, statement.tiles)
+    writer.calls(name, inputs, (statement.outputs,))
 
 
 def check_scatter(statement: Scatter, lengths: Lengths) -> None:
