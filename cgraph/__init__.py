@@ -11,8 +11,6 @@ if TYPE_CHECKING:
     from .autodiff.products import gradient, jvp, vjp
     from .autodiff.sparsity import sparsity
     from .codegen.c.c_source import CSource, to_c
-    from .codegen.compile import compile
-    from .codegen.compiled import Compiled
     from .codegen.disk_cache import clear_cache
     from .codegen.wasm.to_wasm import to_wasm
     from .core.checks import GraphError
@@ -62,6 +60,8 @@ if TYPE_CHECKING:
         tanh,
         where,
     )
+    from .program.compile import compile
+    from .program.compiled import Compiled
     from .program.loop import Loop, loop
     from .simplification.balanced_sums import balanced_sums
     from .simplification.double_double import double_double

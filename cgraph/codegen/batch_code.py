@@ -7,9 +7,8 @@ import ctypes
 import numpy as np
 
 from ..core.evaluation import Array
-from .compiled import lies_in_rows
+from ..util.memory import aligned, lies_in_rows
 from .llvm_engine import Code
-from .sweep import aligned
 
 _BATCH = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, *[ctypes.c_int64] * 3, ctypes.c_void_p)
 
@@ -55,7 +54,7 @@ class BatchCode:
         try:
             memory = self._free.pop()
         except IndexError:
-            memory = aligned((self._size,))
+            memory = aligned(self._size)
         entry = self._rows if axis else self._columns
         strides = points.strides[axis] // points.itemsize, result.strides[axis] // result.itemsize
         entry(points.ctypes.data, result.ctypes.data, count, *strides, memory.ctypes.data)  # type: ignore[misc]

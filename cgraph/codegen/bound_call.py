@@ -17,21 +17,25 @@ from ..core.evaluation import Array
 from ..util.caches import memo
 from . import llvm_engine as llvm
 
+SHORT = ctypes.PYFUNCTYPE(None, *[ctypes.c_void_p] * 3)  # too short a call to give the interpreter away for
+LONG = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 3)
 _STAYS = "a bound call holds addresses of this process: pickle the compiled graph and bind it again"
 _NO_ARGUMENTS = 4  # METH_NOARGS of CPython's methodobject.h
 
-# What CPython calls: `self` are bytes with the addresses of the function, its arguments, None and Py_IncRef
+# What CPython calls: `self` are bytes with the addresses of the function, its arguments and None
 _ENTER = """\
 define ptr @enter(ptr %self, ptr %none) nounwind {{
   %bytes = call ptr inttoptr (i64 {PyBytes_AsString} to ptr)(ptr %self)
   %x.at = getelementptr ptr, ptr %bytes, i64 1
   %y.at = getelementptr ptr, ptr %bytes, i64 2
-  %result.at = getelementptr ptr, ptr %bytes, i64 3
+  %memory.at = getelementptr ptr, ptr %bytes, i64 3
+  %result.at = getelementptr ptr, ptr %bytes, i64 4
   %function = load ptr, ptr %bytes
   %x = load ptr, ptr %x.at
   %y = load ptr, ptr %y.at
+  %memory = load ptr, ptr %memory.at
   %result = load ptr, ptr %result.at
-  call void %function(ptr %x, ptr %y)
+  call void %function(ptr %x, ptr %y, ptr %memory)
   call void inttoptr (i64 {Py_IncRef} to ptr)(ptr %result)
   ret ptr %result
 }}
@@ -70,13 +74,14 @@ def bound(run: Callable[[], None]) -> Callable[[], None]:
     return run if isinstance(run, BuiltinFunctionType) else _Bound(run)
 
 
-def bound_call(entry: Any, x: Array, y: Array) -> Callable[[], None]:
-    """A function of nothing that calls `entry`, a function of ctypes, with the addresses of two arrays."""
-    if (made := _enter()) is None:
-        return partial(entry, x.ctypes.data_as(ctypes.c_void_p), y.ctypes.data_as(ctypes.c_void_p))
+def bound_call(entry: Any, x: Array, y: Array, memory: Array | None = None) -> Callable[[], None]:
+    """A function of nothing that calls `entry`, of type SHORT or LONG, with the addresses of arrays."""
+    arrays = x, y, y if memory is None else memory
+    if not isinstance(entry, SHORT) or (made := _enter()) is None:
+        return partial(entry, *[array.ctypes.data_as(ctypes.c_void_p) for array in arrays])
     new_function, method = made
-    self = _Addresses(struct.pack("4P", _address(entry), x.ctypes.data, y.ctypes.data, id(None)))
-    self.kept = entry, x, y, method
+    self = _Addresses(struct.pack("5P", _address(entry), *[array.ctypes.data for array in arrays], id(None)))
+    self.kept = entry, arrays, method
     function: Callable[[], None] = new_function(ctypes.addressof(method), self, None)
     return function
 

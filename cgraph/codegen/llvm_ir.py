@@ -34,11 +34,11 @@ def point_arithmetic(flags: str, registers: int = REGISTERS) -> Arithmetic:
 
 
 def scalar_ir(graph: Graph, flags: str = "", registers: int = REGISTERS) -> str:
-    """A module with `void point(double *x, double *y)`: the outputs y at the inputs x."""
+    """A module with `void point(double *x, double *y, double *)`: the outputs y at the inputs x."""
     arithmetic = point_arithmetic(flags, registers)
     written = body(graph, arithmetic, _element, "point", ["ptr %x", "ptr %y"])
     lines = [*preamble([graph], arithmetic), *written.definitions]
-    lines += ["define void @point(ptr noalias %x, ptr noalias %y) nounwind {", "start:"]
+    lines += ["define void @point(ptr noalias %x, ptr noalias %y, ptr) nounwind {", "start:"]
     return "\n".join([*lines, *written.start, *written.lines, "  ret void", "}", ""])
 
 

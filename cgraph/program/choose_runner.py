@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from ..codegen.llvm_engine import MissingFunctionError
-from ..codegen.native_function import flags_of
 from ..util.explain_failure import explain_failure
 from ..util.require import require_choice, require_flag
-from .native_runner import NativeRunner
+from .native_runner import NativeRunner, flags_of
 from .program import Program
 from .python_runner import PythonRunner
 from .runner import Runner

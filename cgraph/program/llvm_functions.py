@@ -97,6 +97,29 @@ class Functions:
         scope += [f"ptr %same{k}" for k in scalars]
         return lines
 
+    def tiled_map(self, graph: Graph, shared: Lengths, lanes: int) -> str:
+        """y = graph(shared, x) of every tile, each number a vector; the last input says how many there are."""
+        arithmetic, known, last = self.arithmetic._replace(lanes=lanes, together=1), _numbers(shared), len(shared)
+        t, sizes = arithmetic.type, {"x": len(graph.inputs) - len(known), "y": len(graph.outputs)}
+
+        def address(base: str, name: str, row: int) -> list[str]:
+            if base == "x" and row < len(known):
+                return [f"  {name} = getelementptr double, ptr %in{known[row][0]}, i64 {known[row][1]}"]
+            return [f"  {name} = getelementptr {t}, ptr %{base}, i64 {row - len(known) if base == 'x' else row}"]
+
+        def lines() -> list[str]:
+            written = self._body(graph, arithmetic, address, scope, len(known))
+            start = [f"  %number = load double, ptr %in{last + 1}, align 8", "  %tiles = fptosi double %number to i64"]
+            here = []
+            for base, register in (("x", f"%in{last}"), ("y", "%out0")):
+                here.append(f"  %{base}.row = mul i64 %i, {sizes[base]}")
+                here.append(f"  %{base} = getelementptr {t}, ptr {register}, i64 %{base}.row")
+            body = written._replace(start=[*start, *written.start], lines=[*here, *written.lines])
+            return _loop(body, [], "%tiles")
+
+        scope = [*_pointers("in", shared), "ptr %x", "ptr %y"]
+        return self._define(("tiles", id(graph), shared, lanes), "tiles", lines, last + 2, 1)
+
     def sum(self, graph: Graph, inputs: Lengths, count: int, shared: Lengths = (), outputs: Lengths = (1,)) -> str:
         """y = sum over i = 0 .. count - 1 of graph(shared, x[i]), added up in this order from 0."""
         t, known, first = self.arithmetic.type, _numbers(shared), len(shared)
@@ -129,25 +152,31 @@ class Functions:
         key = ("sum", id(graph), inputs, count, first, outputs)
         return self._define(key, "sum", lines, len(inputs), len(outputs))
 
-    def take(self, table: Sequence[int]) -> str:
-        """y[i] = x[table[i]]."""
+    def take(self, table: Sequence[int], places: Sequence[int] = ()) -> str:
+        """y[i] = x[table[i]], or y[places[i]]; where these are all, in order, they are left out."""
         t, size = self.arithmetic.type, len(table)
+        places = () if tuple(places) == tuple(range(size)) else places
+
+        def number(kind: str, numbers: Sequence[int]) -> list[str]:
+            name, text = f"@{kind}{len(self._names)}", ", ".join(f"i64 {each}" for each in numbers)
+            self.definitions.append(f"{name} = internal unnamed_addr constant [{size} x i64] [{text}]")
+            return [
+                f"  %{kind}.at = getelementptr i64, ptr {name}, i64 %i",
+                f"  %{kind} = load i64, ptr %{kind}.at, align 8",
+            ]
 
         def lines() -> list[str]:
-            numbers = ", ".join(f"i64 {place}" for place in table)
-            name = f"@table{len(self._names)}"
-            self.definitions.append(f"{name} = internal unnamed_addr constant [{size} x i64] [{numbers}]")
             body = [
-                f"  %place.at = getelementptr i64, ptr {name}, i64 %i",
-                "  %place = load i64, ptr %place.at, align 8",
-                f"  %from = getelementptr {t}, ptr %in0, i64 %place",
-                f"  %to = getelementptr {t}, ptr %out0, i64 %i",
+                *number("table", table),
+                *(number("place", places) if places else []),
+                f"  %from = getelementptr {t}, ptr %in0, i64 %table",
+                f"  %to = getelementptr {t}, ptr %out0, i64 {'%place' if places else '%i'}",
                 f"  %taken = load {t}, ptr %from, align 8",
                 f"  store {t} %taken, ptr %to, align 8",
             ]
             return _loop(Body([], body, []), [], size) if size else []
 
-        return self._define(("take", tuple(table)), "take", lines, 1, 1)
+        return self._define(("take", tuple(table), tuple(places)), "take", lines, 1, 1)
 
     def _body(
         self, graph: Graph, arithmetic: Arithmetic, address: Address, scope: Sequence[str], uniform: int = 0
@@ -187,7 +216,7 @@ def _pointers(name: str, registers: Iterable[object]) -> list[str]:
     return [f"ptr %{name}{k}" for k, _ in enumerate(registers)]
 
 
-def _loop(written: Body, after: list[str], count: int) -> list[str]:
+def _loop(written: Body, after: list[str], count: int | str) -> list[str]:
     """The body, which may hold blocks, and the lines after it for %i = 0 .. count - 1."""
     return [
         *written.start,

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from ..codegen.arithmetic import REGISTERS, Arithmetic
 from ..codegen.llvm_engine import MissingFunctionError
-from ..codegen.llvm_ir import libm_functions, point_arithmetic, preamble
+from ..codegen.llvm_ir import libm_functions, point_arithmetic, preamble, scalar_ir
+from ..core.graph import Graph
 from .llvm_functions import Functions
 from .program import Program
 from .statement import row_of
+from .statements.call import Call
 from .writer import Writer, copy_text
 
 
@@ -26,14 +30,14 @@ def require_texts(program: Program) -> None:
             raise MissingFunctionError(f"statement {type(statement).__name__} has no text for LLVM")
 
 
-def offsets(program: Program, width: int) -> dict[str, int]:
+def offsets(registers: Mapping[str, int], width: int) -> dict[str, int]:
     """Where each register begins in the memory, and, under "", the size of it all.
 
     A register of more than one number is padded to a multiple of `width`, so that whole vectors can be read and
     written.
     """
     at, places = 0, {}
-    for name, length in program.registers.items():
+    for name, length in registers.items():
         places[name] = at
         at += length if length < 2 else -(-length // width) * width
     places[""] = at
@@ -58,6 +62,44 @@ def program_ir(program: Program, flags: str = "", lanes: int = 1, width: int = 1
     return "\n".join([*preamble(program.graphs(), arithmetic), *functions.definitions, *run, ""])
 
 
+def whole_graph(program: Program, x: str) -> Graph | None:
+    """The graph, if a pass is one call of it, of the register x."""
+    call = program.body[0] if len(program.body) == 1 else None
+    if isinstance(call, Call) and call.inputs == (x,) and call.outputs == tuple(program.record):
+        return call.graph
+    return None
+
+
+def point_ir(
+    program: Program, x: str, y: str, flags: str = "", width: int = 1, registers: int = REGISTERS
+) -> tuple[str, dict[str, int]]:
+    """A module with `void point(double *x, double *y, double *memory)`: one pass, of which two registers lie apart.
+
+    The others lie in `memory`, at the places that come with it, see `offsets`.
+    """
+    graph = whole_graph(program, x)
+    if graph is not None:
+        return scalar_ir(graph, flags, registers), {"": 0}
+    functions = Functions(point_arithmetic(flags, registers), width)
+    writer = Writer(program.registers, functions)
+    writer.pointers |= {x: "%x", y: "%y"}
+    writer.run(program.body)
+    # Single numbers last: others then begin where vectors may.
+    lengths = sorted(program.registers.items(), key=lambda item: item[1] < 2)
+    inner = {name: length for name, length in lengths if name not in (x, y)}
+    places = offsets(inner, width)
+    lines = [
+        *preamble(program.graphs(), functions.arithmetic),
+        *functions.definitions,
+        "define void @point(ptr noalias %x, ptr noalias %y, ptr noalias %memory) nounwind {",
+        "start:",
+        *[f"  {writer.pointers[each]} = getelementptr double, ptr %memory, i64 {places[each]}" for each in inner],
+        *writer.scratch,
+        *writer.written,
+    ]
+    return "\n".join([*lines, "  ret void", "}", ""]), places
+
+
 _ARGUMENTS = "ptr noalias %memory, ptr noalias %records, i64 %passes, i64 %every, ptr %done, ptr noalias %feed, "
 _ARGUMENTS += "i64 %stride"
 
@@ -76,7 +118,7 @@ class _RunFunction(Writer):
 
     def lines(self) -> list[str]:
         """The whole function."""
-        places = offsets(self.program, self.functions.width)
+        places = offsets(self.program.registers, self.functions.width)
         self.run(self.program.body)
         return [
             f"define i64 @run({_ARGUMENTS}) nounwind {{",

@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from ..codegen.compile import compile
-from ..codegen.compiled import Compiled
+from ..codegen.python_function import OnArrays, OnFloats
 from ..core.evaluation import Array
 from ..core.graph import Graph
 from .execution import Execution
 from .program import Program
 from .runner import Record, Runner
+
+BLOCK = 4096  # points that NumPy takes at once: temporaries stay in the cache
 
 
 class PythonRunner(Runner):
@@ -22,8 +23,8 @@ class PythonRunner(Runner):
     def __init__(self, program: Program, *, fma: bool = True) -> None:
         super().__init__(program)
         self._fma = fma
-        self._functions = {id(graph): compile(graph, "python") for graph in program.graphs()}
-        self._arrays: dict[int, Compiled] = {}
+        self._functions: dict[int, OnFloats] = {}
+        self._arrays: dict[int, OnArrays] = {}
 
     def _run(self, memory: Array, passes: int, every: int, feed: Array) -> Record:
         program = self.program
@@ -59,13 +60,33 @@ class PythonRunner(Runner):
             memories[place] = state[name]
         return Record(rows, passes)
 
+    def _bind_pass(self, x: tuple[str, Array], y: tuple[str, Array]) -> tuple[Callable[[], None], Mapping[str, Array]]:
+        arrays = {name: np.zeros(length) for name, length in self.program.registers.items() if name not in (x[0], y[0])}
+        arrays[y[0]] = y[1].reshape(-1)
+        execution = Execution(self.program.registers, self._at, self._batch)
+
+        def run() -> None:
+            state: dict[str, Any] = {**arrays, x[0]: x[1].tolist()}
+            execution.run(self.program.body, state)
+            for name, array in arrays.items():
+                if state[name] is not array:
+                    array[:] = state[name]
+
+        return run, arrays
+
     def _at(self, graph: Graph, x: Sequence[float]) -> Sequence[float]:
-        return self._functions[id(graph)].values(list(x))
+        if id(graph) not in self._functions:
+            self._functions[id(graph)] = OnFloats(graph)
+        return self._functions[id(graph)](x)
 
     def _batch(self, graph: Graph, points: Array) -> Array:
         if id(graph) not in self._arrays:
-            self._arrays[id(graph)] = compile(graph, "numpy", fma=self._fma)
-        return self._arrays[id(graph)].batch(points)
+            self._arrays[id(graph)] = OnArrays(graph, exact=not self._fma)
+        result = np.empty((len(graph.outputs), points.shape[1]))
+        for start in range(0, points.shape[1], BLOCK):
+            here = slice(start, start + BLOCK)
+            self._arrays[id(graph)](points[:, here], result[:, here])
+        return result
 
 
 def _split(values: Any, names: Sequence[str], lengths: Mapping[str, int]) -> dict[str, Any]:

@@ -16,7 +16,7 @@ def program_rows_ir(program: Program, name: str, lanes: int, flags: str, registe
 
     Both are read and written where they lie among the registers.
     """
-    places = offsets(program, 1)
+    places = offsets(program.registers, 1)
     point, *results = [Place(places[each], program.registers[each]) for each in (name, *program.record)]
     calls = ["  %rows = call i64 @run(ptr %w, ptr null, i64 1, i64 1, ptr %done, ptr null)"]
     driver = rows_ir(Arithmetic(flags, lanes), point, results, calls, ["  %done = alloca i64, align 8"])

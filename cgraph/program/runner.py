@@ -10,19 +10,19 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..codegen.compiled import require_out
-from ..codegen.differentiable import describe, require_memory
 from ..core.checks import GraphError
 from ..core.evaluation import Array
+from ..util.memory import describe, require_memory, require_out
 from ..util.real_arrays import real_array
 from ..util.require import require_mapping, require_whole
-from ..util.threads import share, thread_count
+from ..util.threads import thread_count
 from .llvm_ir import offsets
 from .many import many
 from .program import Program
 from .statement import reads_and_writes, row_of
+from .write_batch import write_batch
 
-BLOCK = 64  # states of a batch that are run between looks at the keyboard, and that a thread takes at a time
+BLOCK = 64  # states of a batch in Python that are run between looks at the keyboard
 
 
 class Record(NamedTuple):
@@ -83,7 +83,7 @@ class Runner(ABC):
 
     def __init__(self, program: Program, width: int = 1) -> None:
         self.program, self.width = program, width
-        places = offsets(program, width)
+        places = offsets(program.registers, width)
         self._slices = {name: slice(places[name], places[name] + n) for name, n in program.registers.items()}
         self.size = places[""]
         self._masked: Program | None = None
@@ -215,6 +215,14 @@ class Runner(ABC):
 
         return call
 
+    @abstractmethod
+    def _bind_pass(self, x: tuple[str, Array], y: tuple[str, Array]) -> tuple[Callable[[], None], Mapping[str, Array]]:
+        """A function of nothing: one pass, of which a register x that is read and a y that is written lie in arrays.
+
+        The arrays, contiguous and of as many numbers, are not checked; no `Map` may write y. With it come the other
+        registers, zeros.
+        """
+
     def run_many(self, memories: Array, passes: int, every: int = 1, feed: ArrayLike | None = None) -> Record:
         """As `run`, for N memories at once, in vectors: what `run` does of each, whichever course it takes.
 
@@ -281,26 +289,20 @@ class Runner(ABC):
             raise GraphError("a batch takes no feed: give its registers a place in the one that varies")
         if (unset := _first_unset(self.program, name)) is not None:
             raise GraphError(f"a batch needs a pass that sets what it reads: register {unset!r} is read before")
-        write = self._rows_writer(name)
         shape = len(rows), self.program.width
         result = np.empty(shape) if out is None else out
         require_out(result, shape, rows)
-
-        def block(start: int) -> None:
-            here = slice(start, start + BLOCK)
-            write(rows[here], result[here])
-
-        share(block, range(0, len(rows), BLOCK), count)
+        write_batch(*self._columns(name), rows.T, result.T, count)
         return result
 
-    def _rows_writer(self, name: str) -> Callable[[Array, Array], None]:
-        """A function of values of a register, and of where the rows of their record go."""
+    def _columns(self, name: str) -> tuple[int, Callable[[Array, Array], None]]:
+        """What writes records, (width, k), of values of a register, (length, k); and the k worth a thread's start."""
 
-        def write(values: Array, rows: Array) -> None:
-            memories = self.memory({name: values.T}, len(values))
-            rows[...] = self._run_many(memories, 1, 1, np.empty((1, 0, len(values)))).rows[0].T
+        def write(values: Array, records: Array) -> None:
+            memories = self.memory({name: values}, values.shape[1])
+            records[...] = self._run_many(memories, 1, 1, np.empty((1, 0, values.shape[1]))).rows[0]
 
-        return write
+        return BLOCK, write
 
     def _require_beside(self) -> None:
         if alone := self.program.alone:

@@ -8,7 +8,7 @@ from typing import Any
 
 from .masks import masked_if, masked_push, masked_while
 from .statement import StatementRow, register_statement
-from .statements import call, control, matrix, memory
+from .statements import call, control, matrix, memory, tiles
 
 
 def _later(file: str, name: str) -> Callable[..., Any]:
@@ -146,6 +146,23 @@ ROWS = [
         beside=memory.pop_beside,
         jvp=_later("memory_rules", "push_pop"),
         transpose=_later("memory_rules", "pull_pop"),
+    ),
+    StatementRow(
+        tiles.TiledMap,
+        reads=("shared", "inputs"),
+        writes=("outputs",),
+        run=tiles.run_tiled_map,
+        check=tiles.check_tiled_map,
+        graph="graph",
+        text=tiles.tiled_map_text,
+    ),
+    StatementRow(
+        tiles.Scatter,
+        reads=("source", "target"),
+        writes=("target",),
+        run=tiles.run_scatter,
+        check=tiles.check_scatter,
+        text=tiles.scatter_text,
     ),
 ]
 for _row in ROWS:

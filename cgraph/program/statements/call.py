@@ -220,7 +220,7 @@ def _rows(statement: Map | Sum, state: State, execution: Execution) -> list[Sequ
 
 
 def _joined(state: Mapping[str, list[float]], names: Sequence[str]) -> list[float]:
-    return [value for name in names for value in state[name]]
+    return state[names[0]] if len(names) == 1 else [value for name in names for value in state[name]]
 
 
 def _split(values: Sequence[float], names: Sequence[str], state: State) -> None:

@@ -13,10 +13,10 @@ import pytest
 from hypothesis import assume, given, strategies as st
 
 import cgraph as cg
-from cgraph.codegen import differentiable
 from cgraph.core.node import apply
 from cgraph.extend import cotangents
 from cgraph.operations.operation import OPS
+from cgraph.program import differentiable
 from tests.tolerances import LONG_SUM
 
 NAMES = ("x", "y", "z")

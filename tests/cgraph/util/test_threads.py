@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import cgraph as cg
-from cgraph.codegen import native_function as native, python_function as generated
+from cgraph.program import generated_function as generated, native_runner
 from cgraph.util import threads
 from cgraph.util.threads import share, thread_count
 
@@ -36,7 +36,7 @@ def function(request, monkeypatch):
         pytest.importorskip("llvmlite")
     if "without" in request.param:
         monkeypatch.setitem(sys.modules, "llvmlite", None)
-    monkeypatch.setattr(native, "WORK", 24 * len(graph().nodes))
+    monkeypatch.setattr(native_runner, "WORK", 24 * len(graph().nodes))
     monkeypatch.setattr(generated, "BLOCK", 24)
     return cg.compile(graph(), request.param.partition(" ")[0])
 

@@ -9,14 +9,17 @@ from typing import TypedDict
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..codegen.bound_call import bound
 from ..core.checks import GraphError
 from ..core.evaluation import Array
 from ..core.graph import Graph
 from ..util.html_text import html_table, html_text
+from ..util.memory import lies_in_rows, require_memory, require_out, require_target
 from ..util.real_arrays import real_array
-from ..util.threads import share, thread_count
-from .bound_call import bound
-from .differentiable import Differentiable, describe, require_memory
+from ..util.threads import thread_count
+from .bound_function import point_of
+from .differentiable import Differentiable
+from .write_batch import write_batch
 
 
 class Options(TypedDict):
@@ -90,14 +93,7 @@ class Compiled(Differentiable):
         result = np.empty((self.n_out, total), order=order) if out is None else out  # type: ignore[call-overload]
         if out is not None:
             require_out(out, (self.n_out, total), points)
-        width, columns = self._columns()
-
-        def block(start: int) -> None:
-            stop = start + width
-            columns(points[:, start:stop], result[:, start:stop])
-
-        # Blocks begin where they begin whatever `threads` is, so that each column always has the same neighbours.
-        share(block, range(0, total, width), min(count, total // width))
+        write_batch(*self._columns(), points, result, count)
         return result
 
     def bind(self, x: Array, y: Array) -> Callable[[], None]:
@@ -110,10 +106,7 @@ class Compiled(Differentiable):
         """
         require_memory("x", x, (self.n_in,))
         require_memory("y", y, (self.n_out,))
-        if not y.flags.writeable:
-            raise GraphError("y must be an array that can be written, got one that is read-only")
-        if np.may_share_memory(x, y):
-            raise GraphError("x and y must not share memory")
+        require_target("y", y, "x", x)
         return bound(self._bound(x, y))
 
     @abstractmethod
@@ -124,14 +117,8 @@ class Compiled(Differentiable):
     def _bound(self, x: Array, y: Array) -> Callable[[], None]:
         """`bind`, after its checks."""
 
-    def _like(self, graph: Graph) -> Compiled:
-        return type(self)(graph, self.backend, self.options)
-
     def _point(self, x: ArrayLike) -> Array:
-        point = real_array("x", x)
-        if point.shape != (self.n_in,):
-            raise GraphError(f"x must have shape ({self.n_in},), one value for each input, got {point.shape}")
-        return point
+        return point_of(x, self.n_in)
 
     def _repr_html_(self) -> str:
         rows = [("back end", self.backend), ("inputs", str(self.n_in)), ("outputs", str(self.n_out))]
@@ -140,18 +127,3 @@ class Compiled(Differentiable):
 
     def __repr__(self) -> str:
         return f"<compiled {self.graph!r}, backend {self.backend!r}>"
-
-
-def lies_in_rows(points: Array) -> bool:
-    """Whether points, (n, N), lie in memory one after another, n numbers each."""
-    return points.flags.f_contiguous and not points.flags.c_contiguous
-
-
-def require_out(out: Array, shape: tuple[int, int], points: Array) -> None:
-    """Raise GraphError unless results of that shape can be written there while the points are read."""
-    if not isinstance(out, np.ndarray) or out.dtype != np.float64 or out.shape != shape:
-        raise GraphError(f"out must be an array of float64 in shape {shape}, got {describe(out)}")
-    if not out.flags.writeable:
-        raise GraphError("out must be an array that can be written, got one that is read-only")
-    if np.may_share_memory(out, points):
-        raise GraphError("out and X must not share memory")

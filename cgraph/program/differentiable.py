@@ -12,20 +12,23 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..autodiff.coloring import jacobian_coloring
-from ..autodiff.direction_split import DirectionSplit, direction_split
+from ..autodiff.direction_split import direction_split
 from ..autodiff.jacobian_entries import entry_graph, written_sizes
 from ..autodiff.products import forward_products, reverse_products
 from ..autodiff.sparsity import Pattern, pattern, symmetric
+from ..codegen.bound_call import bound
 from ..core.checks import GraphError
 from ..core.evaluation import Array
 from ..core.graph import Graph
 from ..core.node import Node, variable
+from ..util.memory import require_memory, require_target
 from ..util.real_arrays import real_array
 from ..util.require import require_flag
 from ..util.scipy_modules import scipy_sparse
-from .bound_call import bound
-from .colored_matrix import ColoredMatrix, WrittenPart, colored_hessian, colored_jacobian
-from .sweep import Sweep
+from .colored_matrix import ColoredMatrix, Derivative, Part, hessian_parts, jacobian_parts
+from .direction_products import DirectionProducts
+from .program import Program
+from .runner import Runner
 
 CHECK = 256  # operations that take as long as to look whether slopes are infinite
 Made = TypeVar("Made")
@@ -44,19 +47,16 @@ class Differentiable(ABC):
     graph: Graph
     n_in: int
     n_out: int
+    lanes, tiles = LANES, 512  # directions in a tile, and tiles in a block of them
     vector_cost = 1  # of an operation on a vector of directions, in operations on numbers
 
     def __init__(self) -> None:
-        self._made: dict[Hashable, Any] = {}  # sweeps and matrices
+        self._made: dict[Hashable, Any] = {}  # derivatives and matrices
         self._making = threading.RLock()
 
     @abstractmethod
-    def _sweep(self, split: DirectionSplit, guarded: DirectionSplit | None) -> Sweep:
-        """The sweep of a derivative, see `Sweep`."""
-
-    @abstractmethod
-    def _like(self, graph: Graph) -> Any:
-        """Another graph compiled in the same way."""
+    def _ready(self, program: Program) -> Runner:
+        """A program made ready to run in the same way."""
 
     @abstractmethod
     def _point(self, x: ArrayLike) -> Array:
@@ -72,7 +72,7 @@ class Differentiable(ABC):
         Raises GraphError for another shape, or an input that is not there.
         """
         chosen = self._chosen(wrt)
-        return self._along(self._forward, chosen, x, "X_dot", X_dot, (self._count(chosen), self.n_out))
+        return self._products(self._forward, chosen, x, "X_dot", X_dot, (self._count(chosen), self.n_out))
 
     def vjp(self, x: ArrayLike, Y_bar: ArrayLike, *, wrt: Inputs = None) -> Array:
         """Products x_bar = J^T y_bar of the transposed Jacobian at x with cotangents, side by side: reverse mode.
@@ -82,7 +82,7 @@ class Differentiable(ABC):
         Raises GraphError for another shape, or an input that is not there.
         """
         chosen = self._chosen(wrt)
-        return self._along(self._reverse, chosen, x, "Y_bar", Y_bar, (self.n_out, self._count(chosen)))
+        return self._products(self._reverse, chosen, x, "Y_bar", Y_bar, (self.n_out, self._count(chosen)))
 
     def jacobian(self, x: ArrayLike, *, wrt: Inputs = None, sparse: bool = False) -> Any:
         """The Jacobian dy_i/dx_j at x, (n_out, n_in).
@@ -127,10 +127,7 @@ class Differentiable(ABC):
         count = len(matrix.entries.rows)
         require_memory("x", x, (self.n_in,))
         require_memory("values", values, matrix.entries.shape, (count,))
-        if not values.flags.writeable:
-            raise GraphError("values must be an array that can be written, got one that is read-only")
-        if np.may_share_memory(x, values):
-            raise GraphError("x and values must not share memory")
+        require_target("values", values, "x", x)
         values[...] = 0.0
         return bound(matrix.bind(x, values))
 
@@ -145,9 +142,9 @@ class Differentiable(ABC):
     def _count(self, chosen: Chosen) -> int:
         return self.n_in if chosen is None else len(chosen)
 
-    def _along(
+    def _products(
         self,
-        sweep: Callable[[Chosen], Sweep],
+        derivative: Callable[[Chosen], Derivative],
         chosen: Chosen,
         x: ArrayLike,
         name: str,
@@ -159,8 +156,15 @@ class Differentiable(ABC):
         if rows.ndim not in (1, 2) or rows.shape[-1] != shape[0]:
             raise GraphError(f"{name} must have shape (k, {shape[0]}) or ({shape[0]},), got {rows.shape}")
         matrix = rows if rows.ndim == 2 else rows[None]
-        result = sweep(chosen).along(point, matrix) if self.n_in else np.zeros((len(matrix), shape[1]))
+        result = np.empty((len(matrix), shape[1]))
+        if not self.n_in:
+            result[...] = 0.0
+        elif result.size:
+            self._once(name, chosen, lambda _: self._along(derivative(chosen)))(point, matrix, result)
         return result if rows.ndim == 2 else result[0]
+
+    def _along(self, derivative: Derivative) -> DirectionProducts:
+        return DirectionProducts(derivative, self._ready, self.lanes, self.tiles)
 
     def _matrix(self, matrix: ColoredMatrix, point: Array, sparse: bool) -> Any:
         if not require_flag("sparse", sparse):
@@ -176,47 +180,42 @@ class Differentiable(ABC):
         graph, wrt = self._numbered(chosen)
         entries = pattern(graph, wrt)
         if not len(entries.rows):
-            return ColoredMatrix(entries, [], self.n_in)
+            return self._colored(entries, [], self.n_in)
         coloring = jacobian_coloring(entries, LANES)
         once, columns, rows = written_sizes(graph, wrt)
         if min(columns, rows) <= once * coloring.vectors(LANES) * self.vector_cost:
-            written = entry_graph(graph, wrt, entries, rows < columns)
-            return ColoredMatrix(entries, [WrittenPart(self._like(written))], self.n_in)
-        sweeps = partial(self._forward, chosen), partial(self._reverse, chosen)
-        return colored_jacobian(entries, coloring, *sweeps, self.n_in)
+            return self._colored(entries, entry_graph(graph, wrt, entries, rows < columns), self.n_in)
+        derivatives = partial(self._forward, chosen), partial(self._reverse, chosen)
+        return self._colored(entries, jacobian_parts(entries, coloring, *derivatives), self.n_in)
+
+    def _colored(self, entries: Pattern, source: Graph | Sequence[Part], points: int) -> ColoredMatrix:
+        return ColoredMatrix(entries, source, points, self.lanes, self._ready)
 
     def _hessian(self, chosen: Chosen) -> ColoredMatrix:
         return self._once("hessian", chosen, self._make_hessian)
 
     def _make_hessian(self, chosen: Chosen) -> ColoredMatrix:
-        if not self.n_in:  # and no cotangents, which would be the outputs of the reverse sweep
+        if not self.n_in:  # and no cotangents, which would be the outputs of the reverse mode
             nothing = np.zeros(0, dtype=np.int64)
-            return ColoredMatrix(Pattern(nothing, nothing, (0, 0)), [], self.n_out)
+            return self._colored(Pattern(nothing, nothing, (0, 0)), [], self.n_out)
         graph, wrt = self._numbered(chosen)
         entries = symmetric(pattern(reverse_products(graph, wrt, zero_wins=False), wrt))
-        sweep = self._guarded_sweep(partial(_second_products, graph, wrt), len(wrt))
-        return colored_hessian(entries, sweep, self.n_in + self.n_out)
+        derivative = _guarded(partial(_second_products, graph, wrt), len(wrt))
+        return self._colored(entries, hessian_parts(entries, derivative), self.n_in + self.n_out)
 
-    def _forward(self, chosen: Chosen) -> Sweep:
+    def _forward(self, chosen: Chosen) -> Derivative:
         return self._once("forward", chosen, self._make_forward)
 
-    def _make_forward(self, chosen: Chosen) -> Sweep:
+    def _make_forward(self, chosen: Chosen) -> Derivative:
         graph, wrt = self._numbered(chosen)
-        return self._guarded_sweep(partial(forward_products, graph, wrt), len(wrt))
+        return _guarded(partial(forward_products, graph, wrt), len(wrt))
 
-    def _reverse(self, chosen: Chosen) -> Sweep:
+    def _reverse(self, chosen: Chosen) -> Derivative:
         return self._once("reverse", chosen, self._make_reverse)
 
-    def _make_reverse(self, chosen: Chosen) -> Sweep:
+    def _make_reverse(self, chosen: Chosen) -> Derivative:
         graph, wrt = self._numbered(chosen)
-        return self._guarded_sweep(partial(reverse_products, graph, wrt), self.n_out)
-
-    def _guarded_sweep(self, derive: Callable[..., Graph], directions: int) -> Sweep:
-        """The sweep in which zeros win over infinite slopes; where that takes long, only where there are such."""
-        plain = direction_split(derive(zero_wins=False), directions, divide=False)
-        guarded = direction_split(derive(zero_wins=True), directions)
-        saved = len(guarded.linear.nodes) - len(plain.linear.nodes)
-        return self._sweep(plain, guarded) if saved > CHECK else self._sweep(guarded, None)
+        return _guarded(partial(reverse_products, graph, wrt), self.n_out)
 
     def _numbered(self, chosen: Chosen) -> tuple[Graph, tuple[Node, ...]]:
         """The graph with numbers for names, and the chosen inputs: the longest name has no room for a suffix."""
@@ -238,21 +237,15 @@ class Differentiable(ABC):
         return made
 
 
+def _guarded(derive: Callable[..., Graph], directions: int) -> Derivative:
+    """The derivative in which zeros win over infinite slopes; where that takes long, only where there are such."""
+    plain = direction_split(derive(zero_wins=False), directions, divide=False)
+    guarded = direction_split(derive(zero_wins=True), directions)
+    saved = len(guarded.linear.nodes) - len(plain.linear.nodes)
+    return Derivative(plain, guarded) if saved > CHECK else Derivative(guarded)
+
+
 def _second_products(graph: Graph, wrt: Sequence[Node], *, zero_wins: bool) -> Graph:
     """x, y_bar, x_dot -> the Hessian of y_bar . y times x_dot."""
     reverse = reverse_products(graph, wrt, zero_wins=zero_wins)
     return forward_products(reverse, wrt, zero_wins=zero_wins)
-
-
-def require_memory(name: str, array: object, *shapes: tuple[int, ...]) -> None:
-    """Raise GraphError unless machine code can use the array as it lies."""
-    wanted = " or ".join(map(str, shapes))
-    if not isinstance(array, np.ndarray) or array.dtype != np.float64 or array.shape not in shapes:
-        raise GraphError(f"{name} must be an array of float64 in shape {wanted}, got {describe(array)}")
-    if not array.flags.c_contiguous or not array.flags.aligned:
-        raise GraphError(f"{name} must be contiguous and aligned, got strides {array.strides}")
-
-
-def describe(value: object) -> str:
-    """What a value is that should have been an array of float64 of some shape."""
-    return f"{value.dtype} {value.shape}" if isinstance(value, np.ndarray) else type(value).__name__

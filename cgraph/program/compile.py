@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
+from ..codegen.llvm_engine import MissingFunctionError
 from ..core.graph import Graph
 from ..util.require import require_choice, require_flag, require_graph
 from .compiled import Compiled, Options
-from .llvm_engine import MissingFunctionError
+from .generated_function import Generated
 from .native_function import Native
-from .python_function import Generated
 
 BACKENDS = ("auto", "python", "numpy", "llvm")
 LARGE = 1_000_000  # nodes; beyond, making machine code takes longer than most callers gain

@@ -1,0 +1,52 @@
+"""Arrays that machine code uses as they lie: checked."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..core.checks import GraphError
+
+Array = np.ndarray[Any, np.dtype[np.float64]]
+
+
+def require_memory(name: str, array: Any, *shapes: tuple[int, ...]) -> None:
+    """Raise GraphError unless machine code can use the array as it lies."""
+    wanted = " or ".join(map(str, shapes))
+    if not isinstance(array, np.ndarray) or array.dtype != np.float64 or array.shape not in shapes:
+        raise GraphError(f"{name} must be an array of float64 in shape {wanted}, got {describe(array)}")
+    if not array.flags.c_contiguous or not array.flags.aligned:
+        raise GraphError(f"{name} must be contiguous and aligned, got strides {array.strides}")
+
+
+def require_target(name: str, target: Array, of: str, read: Array) -> None:
+    """Raise GraphError unless an array can be written while another one is read."""
+    if not target.flags.writeable:
+        raise GraphError(f"{name} must be an array that can be written, got one that is read-only")
+    if np.may_share_memory(target, read):
+        raise GraphError(f"{of} and {name} must not share memory")
+
+
+def require_out(out: Array, shape: tuple[int, int], points: Array) -> None:
+    """Raise GraphError unless results of that shape can be written there while the points are read."""
+    if not isinstance(out, np.ndarray) or out.dtype != np.float64 or out.shape != shape:
+        raise GraphError(f"out must be an array of float64 in shape {shape}, got {describe(out)}")
+    require_target("out", out, "X", points)
+
+
+def describe(value: Any) -> str:
+    """What a value is that should have been an array of float64 of some shape."""
+    return f"{value.dtype} {value.shape}" if isinstance(value, np.ndarray) else type(value).__name__
+
+
+def lies_in_rows(points: Array) -> bool:
+    """Whether points, (n, N), lie in memory one after another, n numbers each."""
+    return points.flags.f_contiguous and not points.flags.c_contiguous
+
+
+def aligned(size: int) -> Array:
+    """An array that begins where a line of the cache does: a vector then lies in one."""
+    memory = np.empty(size + 7)
+    start = -(memory.ctypes.data // 8) % 8
+    return memory[start : start + size]
