@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from cgraph.extend import Statement
+from cgraph.extend import FixedPoint, Statement, While
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,3 +25,8 @@ class Step:
     body: Sequence[Statement]
     fixed: tuple[str, ...] = ()
     failed: str = ""
+
+    @property
+    def iterates(self) -> bool:
+        """Whether it turns as often as numbers say, so that steps side by side wait for one another."""
+        return any(isinstance(each, While | FixedPoint) for each in (*self.start, *self.body))
