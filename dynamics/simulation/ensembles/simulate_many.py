@@ -35,7 +35,7 @@ from .chunk import INTERRUPTED, Chunk
 from .ensemble import Ensemble, EnsembleStats
 from .ensemble_rows import EnsembleRows
 from .initial_states import Starts, starts
-from .lane_steps import lane_steps
+from .lane_steps import iterates
 from .step_grid import StepGrid, step_grids
 from .task import Task
 from .workers import Map, Workers, checked, finished
@@ -149,7 +149,7 @@ def simulate_many(
     program, watch = step_program(problem, METHODS[method], dense=True), event_program(problem, watched)
 
     # Share out the work: what a worker is sent, and the starts of chunks of trajectories
-    grids = [] if watched else _grids(program, options, count)
+    grids = [] if watched else _grids(program, options, len(start.x))
     sent = replace(options, t_eval=options.row_times) if watched else options
     task = Task(pickled_steps(program), sent, count, tuple(grids), pickle.dumps(watch) if watched else b"")
     x, p = _steps_from(start, problem, t0)
@@ -230,7 +230,7 @@ def _check_room(x: Array, rows: int) -> None:
 
 def _grids(program: StepProgram, options: RunOptions, count: int) -> list[StepGrid]:
     """The equal steps of trajectories side by side; empty where they have to go, or are done sooner, one by one."""
-    if program.adaptive or (count < VECTOR and lane_steps(program).stops):
+    if program.adaptive or (count < VECTOR and iterates(program)):
         return []
     grids = step_grids(options)
     return grids if sum(grid.steps * grid.rows for grid in grids) <= options.max_steps else []
