@@ -23,7 +23,8 @@ the table of operations, `register` adds a row to it, an `Op`, and `ADJOINT`, `P
 label may have. `certain_digits` says what rounding leaves of the outputs.
 
 **Run**: a `Program` is graphs over registers of numbers (`Call`, `Map`, `Sum`, `Factor`, `Solve`, `If`, `While`), and
-`runner` makes it machine code or Python.
+`runner` makes it machine code or Python. `program_jvp` and `program_vjp` are its derivatives, `many` is what memories
+side by side run, and `register_statement` adds a kind of statement.
 
 **At the edges**: `real_array`, `real_number`, `is_finite`, `check_name`, `require_graph`, `require_flag`,
 `require_whole`, `require_choice`, `require_sequence`, `require_mapping` and `require_path` check what a caller passed,

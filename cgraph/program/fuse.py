@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+from ..codegen.schedule import products_of
 from ..core.graph import Graph
 from ..core.node import Node, variable
 from ..core.traversal import rebuild
-from ..operations.operation import OPS
 from .program import Program
 from .statement import Statement, row_of
 from .statements.call import Call, Map, elements
@@ -54,14 +54,15 @@ def _one_call(program: Program, run: list[Call | Map]) -> list[Call | Map]:
             registers.call(statement)
         elif count:
             registers.map(statement, count)
-    return run if registers.lost_product else [registers.statement()]
+    whole = registers.statement()
+    return run if registers.overwritten.intersection(products_of(whole.graph).values()) else [whole]
 
 
 class _Registers:
     """What registers hold while statements are followed."""
 
     def __init__(self, program: Program) -> None:
-        self.lost_product = False  # overwritten
+        self.overwritten: set[Node] = set()
         self._lengths = program.registers
         self._read: dict[str, list[Node]] = {}  # {register that is read before it is written: its values}
         self._written: dict[str, list[Node]] = {}
@@ -99,7 +100,7 @@ class _Registers:
         return self._read[name]
 
     def _write(self, name: str, values: list[Node]) -> None:
-        self.lost_product |= any([each.op is OPS["mul"] for each in self._written.get(name, ())])
+        self.overwritten |= {*self._written.get(name, ())}
         self._written[name] = values
 
 

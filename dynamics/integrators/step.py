@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from cgraph.extend import STATEMENTS, Call, Map, Statement
+from cgraph.extend import STATEMENTS, Call, FixedPoint, Map, Statement, While
 
 from .elementwise import SAME
 from .problem import Problem
@@ -100,6 +100,11 @@ class Step:
     def derived(self) -> list[Statement]:
         """The statements of a step whose derivatives are taken, from x to the new x."""
         return arriving([*self.rates, *self.prepare, *self.body, *self.kept])
+
+    @property
+    def iterates(self) -> bool:
+        """Whether it turns as often as numbers say, so that steps side by side wait for one another."""
+        return any(isinstance(each, While | FixedPoint) for each in (*self.start, *self.derived))
 
 
 def arriving(statements: Sequence[Statement]) -> list[Statement]:

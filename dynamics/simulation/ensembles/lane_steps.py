@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import Call, If, Program, many
+from cgraph.extend import Call, FixedPoint, If, Program, While
 
 from ..step_program import StepProgram
 
@@ -29,13 +29,18 @@ def lane_steps(program: StepProgram) -> LaneSteps:
     first, start = steps.body[0], None
     if isinstance(first, If) and first.register == "fresh" and not first.otherwise:
         start, steps = replace(steps, body=first.body), replace(steps, body=steps.body[1:])
-    stops = many(steps) is not steps
+    stops = iterates(program)
     if stops:  # equations that were not solved leave a state that is finite
         registers = {**steps.registers, "live": 1}
         body = (Call(_LIVE, ("nonfinite",), ("live",)), If("live", tuple(steps.body)))
         start = start and replace(start, registers=registers)
         steps = replace(steps, registers=registers, body=body)
     return LaneSteps(start, steps, stops)
+
+
+def iterates(program: StepProgram) -> bool:
+    """Whether steps turn as often as numbers say, so that lanes wait for one another."""
+    return any(isinstance(each, While | FixedPoint) for each in program.steps.statements())
 
 
 _NONFINITE = cg.variable("nonfinite")

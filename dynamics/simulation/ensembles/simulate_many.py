@@ -35,6 +35,7 @@ from .chunk import INTERRUPTED, Chunk
 from .ensemble import Ensemble, EnsembleStats
 from .ensemble_rows import EnsembleRows
 from .initial_states import Starts, starts
+from .lane_steps import iterates
 from .step_grid import StepGrid, step_grids
 from .task import Task
 from .workers import Map, Workers, checked, finished
@@ -73,7 +74,8 @@ def simulate_many(
 ) -> Ensemble:
     """The motions of a system from N starts at t0 to t_end, by one program that is compiled once.
 
-    In equal steps trajectories run side by side, a vector of them at a time; in chosen ones one by one. One
+    In equal steps trajectories run side by side, a vector of them at a time; in chosen ones one by one, as do fewer
+    than eight by a method that iterates. One
     whose state is not finite is NaN from there on, `stats.message` and a `SimulationWarning` name the time and the
     coordinate, and the others go on. Ctrl-C keeps the chunks that are done, without a warning.
 
@@ -147,7 +149,7 @@ def simulate_many(
     program, watch = step_program(problem, METHODS[method], dense=True), event_program(problem, watched)
 
     # Share out the work: what a worker is sent, and the starts of chunks of trajectories
-    grids = [] if watched else _grids(program, options)
+    grids = [] if watched else _grids(program, options, len(start.x))
     sent = replace(options, t_eval=options.row_times) if watched else options
     task = Task(pickled_steps(program), sent, count, tuple(grids), pickle.dumps(watch) if watched else b"")
     x, p = _steps_from(start, problem, t0)
@@ -234,9 +236,9 @@ def _check_room(x: Array, rows: int) -> None:
         )
 
 
-def _grids(program: StepProgram, options: RunOptions) -> list[StepGrid]:
-    """The equal steps of trajectories side by side; empty where they have to go one after another."""
-    if program.adaptive:
+def _grids(program: StepProgram, options: RunOptions, count: int) -> list[StepGrid]:
+    """The equal steps of trajectories side by side; empty where they have to go, or are done sooner, one by one."""
+    if program.adaptive or (count < VECTOR and iterates(program)):
         return []
     grids = step_grids(options)
     return grids if sum(grid.steps * grid.rows for grid in grids) <= options.max_steps else []

@@ -36,6 +36,7 @@ from .motion import (
 )
 from .motion_equations import motion_equations
 
+FEW = 4  # motions: fewer by a method that iterates are done sooner one by one
 WIDE = 16  # motions side by side: whole vectors of any processor, of which what is recorded stays in its caches
 
 
@@ -100,9 +101,9 @@ def gradient_many(
 ) -> MotionGradients:
     """Losses of N motions and their gradients, each by its own start, forces and parameters: `gradient`, N times.
 
-    Motions in equal steps go side by side, a vector of them at a time; those that choose their steps go one by one. One
-    that does not stay finite, whose equations are not solved, or which does not reach its end, is NaN, and a
-    `SimulationWarning` says how many are, and of the first when and why.
+    Motions in equal steps go side by side, a vector of them at a time; those that choose their steps go one by one, as
+    do fewer than four by a method that iterates. One that does not stay finite, whose equations are not solved, or
+    which does not reach its end, is NaN, and a `SimulationWarning` says how many are, and of the first when and why.
 
     Parameters
     ----------
@@ -141,7 +142,7 @@ def gradient_many(
     options |= {"estimate_error": estimate_error}
     motions, problem = _motions(model, q, qd, time_span(t_end, t0, t_span), method, tau, parameters, wrt, options, form)
     count, nq, run = motions.many, problem.nq, motions.options
-    parts = _parts(count, side_by_side=not run.adaptive)
+    parts = _parts(motions)
     value, end = np.full(count, np.nan), np.full((count, problem.size), np.nan)
     by_name = {name: np.full((count, *shape), np.nan) for name, shape in _shapes(motions).items()}
     early, said = dict[int, str](), dict[int, str]()
@@ -175,9 +176,12 @@ def gradient_many(
     return MotionGradients(value, by_name, t, end[:, :nq], end[:, nq:])
 
 
-def _parts(count: int, *, side_by_side: bool) -> list[int | slice]:
-    """Motions that are run together: by steps that each of them chooses, one alone."""
-    return [slice(k, min(k + WIDE, count)) for k in range(0, count, WIDE)] if side_by_side else [*range(count)]
+def _parts(motions: MotionOf) -> list[int | slice]:
+    """The motions that go one by one, or side by side."""
+    count = motions.many
+    if motions.options.adaptive or (count < FEW and motions.method.step(motions.problem).iterates):
+        return [*range(count)]
+    return [slice(k, min(k + WIDE, count)) for k in range(0, count, WIDE)]
 
 
 def _shapes(motions: MotionOf) -> dict[str, tuple[int, ...]]:

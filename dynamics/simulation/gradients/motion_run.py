@@ -20,6 +20,7 @@ from .motion_steps import LOSS
 
 MOST_RECORDED = 128 * 2**20  # bytes of what is recorded of steps; of more, checkpoints are kept
 PIECE = 4096  # passes between two looks at Python
+FEW = 4  # directions: of fewer, iterations one after another are done sooner than a vector of them
 
 
 class MotionRun:
@@ -158,7 +159,7 @@ class MotionRun:
         back, names = self.step.back, self.step.linear.vectors
         if self.start is not None:
             memory = self._linear_memory(self.start, self._start_constants, directions)
-            run_passes(self.start.back, memory, 1, 1, self._start_tape)
+            _run_all(self.start.back, memory, self._start_tape)
             directions = {**directions, **self._vectors(self.start, memory)}
         memory = self._linear_memory(self.step, self._constants, directions)
         m, width = len(self.x), back.program.feed_width
@@ -169,8 +170,7 @@ class MotionRun:
             for begin, end in itertools.pairwise([first, *[k for k in range(first + 1, last) if k in changes], last]):
                 if len(lengths):
                     back.write(memory, names["h"], lengths[None, begin])
-                rows = tape[begin - first : end - first, :width]
-                tangents.append(run_passes(back, memory, end - begin, 1, rows).rows)
+                tangents.append(_run_all(back, memory, tape[begin - first : end - first, :width]))
         self._vectors(self.step, memory)
         return np.concatenate(states), np.concatenate(tangents)
 
@@ -187,6 +187,18 @@ class MotionRun:
         if np.any(unsolved & np.isfinite(self.x).all(axis=0) if self.motion.many else unsolved):
             raise MotionError("the equations of a step's derivative were not solved: the step is too long")
         return {name: along.back.read(memory, register).copy() for name, register in along.linear.vectors.items()}
+
+
+def _run_all(ready: Runner, memories: Array, feed: Array) -> Array:
+    """The rows (passes, width, k) of k memories that are fed the same."""
+    if ready.masked is ready.program or memories.shape[1] >= FEW:
+        return run_passes(ready, memories, len(feed), 1, feed).rows
+    rows = np.empty((len(feed), ready.program.width, memories.shape[1]))
+    for k in range(memories.shape[1]):
+        memory = memories[:, k].copy()
+        rows[:, :, k] = ready.run(memory, len(feed), 1, feed).rows
+        memories[:, k] = memory
+    return rows
 
 
 def _memory(ready: Runner, values: Mapping[str, Array], many: int) -> Array:

@@ -79,3 +79,11 @@ def test_an_overwritten_product_keeps_its_rounding():
     run = runner(program, "llvm")
     x = 1.0 + 2.0**-30
     assert run.run(run.memory({"x": x, "y": x * x}), 1).rows.tolist() == [[0.0]]
+
+
+def test_an_overwritten_product_that_no_sum_takes_is_fused():
+    """As where memories side by side choose between what was and what is."""
+    a, b, c = cg.variables("a b c")
+    product = Call(cg.Graph([a], {"p": a * a}), ("x",), ("p",))
+    choice = Call(cg.Graph([a, b, c], {"p": cg.where(a, b, c)}), ("y", "p", "x"), ("p",))
+    assert len(fuse.fused(Program({"x": 1, "y": 1, "p": 1}, [product, choice], record=["p"])).body) == 1
