@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 from cgraph import Node
 from cgraph.extend import Array, require_whole
 
+from ...equations.initial_value import InitialValues, initial_values
 from ...integrators import METHODS, Problem, derive, in_form
 from ...systems.controller import with_closed_form
 from ...systems.model import Model
@@ -35,7 +36,6 @@ from .branch_free import branch_free
 from .chunk import INTERRUPTED, Chunk
 from .ensemble import Ensemble, EnsembleStats
 from .ensemble_rows import EnsembleRows
-from .initial_states import Starts, starts
 from .step_grid import StepGrid, step_grids
 from .task import Task
 from .workers import Map, Workers, checked, finished
@@ -138,14 +138,14 @@ def simulate_many(
     options = RunOptions(t_end, method, *arguments, t0, estimate_error)
     watched, team = as_events(events), checked(workers)
     model, tau = _closed(model, tau, parameters)
-    start = starts(model, q, qd, tau, parameters, t0)
+    start = initial_values(model, q, qd, tau, parameters, t0)
     options.check(start.states)
     count = _row_count(options)
     _check_room(start.x, count)
 
     # Derive the equations as graphs, and write the steps of the method over them
     begin = time.perf_counter()
-    problem = in_form(derive(model, start.same), form)
+    problem = in_form(derive(model, start.bound), form)
     program, watch = step_program(problem, METHODS[method], dense=True), event_program(problem, watched)
 
     # Share out the work: what a worker is sent, and the starts of chunks of trajectories
@@ -189,7 +189,9 @@ def _row_count(options: RunOptions) -> int:
     return step_count(options.t_end - options.t0, options.step) + 1
 
 
-def _judged(stats: EnsembleStats, problem: Problem, options: RunOptions, rows: Array, start: Starts) -> EnsembleStats:
+def _judged(
+    stats: EnsembleStats, problem: Problem, options: RunOptions, rows: Array, start: InitialValues
+) -> EnsembleStats:
     """The same, with what speaks against the velocities of momenta."""
     if problem.missing is None:
         return stats
@@ -244,7 +246,7 @@ def _grids(program: StepProgram, options: RunOptions) -> list[StepGrid]:
     return grids if sum(grid.steps * grid.rows for grid in grids) <= options.max_steps else []
 
 
-def _steps_from(start: Starts, problem: Problem, t: float) -> tuple[Array, Array]:
+def _steps_from(start: InitialValues, problem: Problem, t: float) -> tuple[Array, Array]:
     """What the steps start from, states (N, m) and the parameters of the problem, (N, k)."""
     names = problem.parameters
     p = np.stack([start.varied[name] for name in names], axis=1) if names else start.x[:, :0]

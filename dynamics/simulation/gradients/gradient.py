@@ -164,7 +164,7 @@ def gradient(
     options = {"dt": dt, "max_step": max_step, "rtol": rtol, "atol": atol, "first_step": first_step, "backend": backend}
     options["estimate_error"] = estimate_error
     watched = as_events(events)
-    motion = motion_of(model, q, qd, (t_end, t0, t_span), method, tau, parameters, wrt, options, watched, form)
+    motion = motion_of(model, q, qd, (t_end, t0, t_span), method, tau, parameters, wrt, options, form, watched)
     value, gradients, legs, slopes = differentiated(motion, loss, running, watched)
     for text in doubts(legs, value, gradients, slopes)[0]:
         warnings.warn(text, SimulationWarning, stacklevel=2)

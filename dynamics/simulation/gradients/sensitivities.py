@@ -128,7 +128,7 @@ def sensitivities(
     options = {"dt": dt, "max_step": max_step, "rtol": rtol, "atol": atol, "first_step": first_step, "backend": backend}
     options["estimate_error"] = estimate_error
     watched = as_events(events)
-    motion = motion_of(model, q, qd, (t_end, t0, t_span), method, tau, parameters, wrt, options, watched, form)
+    motion = motion_of(model, q, qd, (t_end, t0, t_span), method, tau, parameters, wrt, options, form, watched)
     if motion.each_step:
         raise ValueError(f"tau must be constant, (n,), got shape {motion.tau.shape}: gradient takes a row a step")
     by = [TORQUE] if TORQUE in motion.wrt else []
