@@ -174,7 +174,7 @@ def simulate(
 
     # Write the steps of the method over these graphs, and compile them
     made = partial(integration_of, stepped, events=program, between=bool(watched) or dense_output)
-    run, x = made(options, hold=hold), converted(stepped.momentum, np.array([t0]), start.x[np.newaxis])[0]
+    run, x = made(options, hold=hold), converted(stepped.momentum, t0, start.x)
 
     # Integrate, noting rows and events
     recorder = Recorder(x, options.times, options.t0, options.direction)
@@ -185,11 +185,11 @@ def simulate(
     # Put the result together
     rows, held = recorder.table(), None if hold is None else hold.held
     stats = _stats(run, options.method, outcome, missed_momenta(stepped, *rows, start=(t0, start.x, x)))
-    table, momenta = _table(stepped, energy, *rows, held)
     for text in [*outcome.early, *stats.warnings]:
         warnings.warn(text, SimulationWarning, stacklevel=2)
     dense = None if steps is None else Solution(options.t0, x, steps, problem.nq, stepped.velocities)
     kept = run.crossings(problem.nq), _graphs(problem, applied), dense, held
+    table, momenta = _table(stepped, energy, *rows, held)
     return Trajectory(*table, stats, *kept, model.coordinates, model.velocities, momenta)
 
 
@@ -283,7 +283,7 @@ def _table(
     states, nq = converted(stepped.velocities, times, rows), stepped.nq
     energies = np.full(len(times), math.nan)
     if energy is not None:
-        energies = row_values(energy, times, states, None if held is None else held.at(times))[:, 0]
+        energies = row_values(energy, times, states, () if held is None else held.at(times))[:, 0]
     return (times, states[:, :nq], states[:, nq:], energies), rows[:, nq:] if stepped.momenta else None
 
 
