@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from cgraph.extend import Array, real_array
 
 from ..systems.arguments import parameter_value, per_coordinate
-from ..systems.model import Model, as_ode, as_system
+from ..systems.model import Model
 from .projection import projected_start
 from .state_equation import StateInputs, normalization, state_inputs
 
@@ -76,7 +76,8 @@ def initial_values(
     many: else one motion, whose arguments have no axis N.
     """
     start = _given(model, q, qd, tau, parameters, many=many)
-    if as_ode(model) is not None or not len((system := as_system(model)).constraints):
+    system = model.system
+    if system is None or not len(system.constraints):
         return start
     rows = []
     for k, x in enumerate(start.x):
@@ -107,14 +108,14 @@ def _given(
     many: bool,
 ) -> InitialValues:
     """The starts as they are given."""
-    inputs, ode = state_inputs(model), as_ode(model) is not None
+    inputs, system = state_inputs(model), model.system
     n = len(inputs.applied)
     nq = len(inputs.states) - n
     bound, varied = _parameters(inputs, parameters, many=many)
-    if parameters and not ode:
-        as_system(model).require_values({**bound, **varied})
+    if parameters and system is not None:
+        system.require_values({**bound, **varied})
     counts = {f"parameter {name!r}": len(column) for name, column in varied.items()}
-    if ode:
+    if system is None:
         if np.any(real_array("tau", tau)):
             raise ValueError(f"tau must be 0 for a system of first order, which no force acts on, got {tau!r:.60}")
         if qd is not None:

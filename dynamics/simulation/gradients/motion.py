@@ -16,7 +16,7 @@ from cgraph.extend import Array, real_array, require_sequence
 from ...equations.initial_value import initial_values
 from ...equations.state_equation import state_inputs
 from ...integrators import METHODS, Method, Problem, derive, in_form
-from ...systems.model import Model, as_ode, as_system
+from ...systems.model import Model
 from ..applied_forces import with_applied
 from ..equal_steps import step_count
 from ..event import Event
@@ -235,7 +235,7 @@ def _rows(model: Model, tau: Any, *, many: bool) -> Array | None:
     rows = real_array("tau", tau)
     if rows.ndim != (3 if many else 2):
         return None
-    n = 0 if as_ode(model) is not None else as_system(model).n
+    n = len(state_inputs(model).applied)
     if not rows.size or rows.shape[-1] != n:
         shapes = "(N, n) or (N, steps, n)" if many else "(n,) or (steps, n)"
         raise ValueError(f"tau must have shape {shapes} with n = {n} velocities, got {rows.shape}")
@@ -246,8 +246,8 @@ def _rows(model: Model, tau: Any, *, many: bool) -> Array | None:
 
 def names_of(model: Model, wrt: str | Iterable[str] | None, *, closed: bool) -> tuple[str, ...]:
     """What to differentiate by. By default the start, and the applied force where it is numbers."""
-    ode, inputs = as_ode(model) is not None, state_inputs(model)
-    usual = [START] if ode else [START, VELOCITY] if closed else [START, VELOCITY, TORQUE]
+    inputs = state_inputs(model)
+    usual = [START] if not inputs.applied else [START, VELOCITY] if closed else [START, VELOCITY, TORQUE]
     if wrt is None:
         return tuple(usual)
     names = [wrt] if isinstance(wrt, str) else require_sequence("wrt", wrt, "names")
