@@ -103,13 +103,12 @@ class Task:
 
     def _interrupted(self, run: Integration, x: Array, recorder: Recorder) -> tuple[bool, ErrorEstimate | None]:
         """Run one trajectory; whether it was interrupted, and its error where that is estimated."""
-        estimate = RunEstimate(run, x, self.options) if self.options.estimated else None
+        estimate = RunEstimate(run, x, self.options)
         try:
             for block in run.blocks(x):
                 recorder.add(block)
-                if estimate is not None:
-                    estimate.add(block)
-            return False, estimate.result() if estimate is not None and not run.status else None
+                estimate.add(block)
+            return False, None if run.status else estimate.result()
         except (KeyboardInterrupt, StoppedError):
             return True, None
 
