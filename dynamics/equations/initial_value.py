@@ -131,10 +131,12 @@ def _given(
         else:
             forces = per_coordinate("tau", tau.tolist() if isinstance(tau, np.ndarray) else tau, model.velocities)
             bound = dict(zip(inputs.applied, forces, strict=True)) | bound
-    counts = {what: len(array) for what, array in rows.items() if array.ndim == 2} | counts
-    count = _one_count(counts) if many else 1
-    x = np.concatenate([np.broadcast_to(array, (count, array.shape[-1])) for array in rows.values()], axis=1)
-    return InitialValues(normalized(model, x if many else x[0]).reshape(x.shape), inputs.states, bound, varied)
+    parts = list(rows.values())
+    if many:
+        count = _one_count({what: len(array) for what, array in rows.items() if array.ndim == 2} | counts)
+        parts = [np.broadcast_to(array, (count, array.shape[-1])) for array in parts]
+    x = normalized(model, np.concatenate(parts, axis=-1))
+    return InitialValues(x.reshape(-1, x.shape[-1]), inputs.states, bound, varied)
 
 
 def normalized(model: Model, x: Array) -> Array:
@@ -208,9 +210,9 @@ def _parameters(
 
 def _rows(what: str, value: ArrayLike | None, n: int, item: str, *, many: bool) -> Array:
     """Numbers for a motion, (n,), or of many also for each, (N, n)."""
-    needed = f"(N, {n}), or ({n},) for all trajectories" if many else f"({n},), one for each {item}"
     array = None if value is None else real_array(what, value)
     if array is None or array.ndim not in ((1, 2) if many else (1,)) or array.shape[-1] != n:
+        needed = f"(N, {n}), or ({n},) for all trajectories" if many else f"({n},), one for each {item}"
         raise ValueError(f"{what} must have shape {needed}, got {None if array is None else array.shape}")
     if not (good := np.isfinite(array)).all():
         if array.ndim == 1:

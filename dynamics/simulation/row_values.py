@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -31,14 +30,13 @@ def row_values(graph: Graph, times: ArrayLike, states: Array, parameters: ArrayL
     times: (..), or as many as go along the last axes.  parameters: (.., p) in the same way.
     """
     *shape, m = states.shape
-    held = np.broadcast_to(parameters, (*shape, len(graph.inputs) - m - 1))
-    inputs = [*np.moveaxis(states, -1, 0), np.broadcast_to(times, shape), *np.moveaxis(held, -1, 0)]
-    columns = dict(zip(graph.input_names, [each.reshape(-1) for each in inputs], strict=True))
-    result = np.empty((math.prod(shape), len(graph.outputs)))
+    rows, t, count = states.reshape(-1, m), np.broadcast_to(times, shape).reshape(-1), len(graph.inputs) - m - 1
+    held = np.broadcast_to(parameters, (*shape, count)).reshape(len(rows), count)
+    names, result = graph.input_names, np.empty((len(rows), len(graph.outputs)))
     with np.errstate(all="ignore"):
-        for start in range(0, len(result), BLOCK):
+        for start in range(0, len(rows), BLOCK):
             part = slice(start, start + BLOCK)
-            values: dict[str, Any] = {name: column[part] for name, column in columns.items()}
+            values: dict[str, Any] = dict(zip(names, [*rows[part].T, t[part], *held[part].T], strict=True))
             for column, value in enumerate(graph.evaluate(values).values()):
                 result[part, column] = value
     return result.reshape(*shape, len(graph.outputs))

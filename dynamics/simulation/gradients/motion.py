@@ -182,9 +182,9 @@ def motion_of(
     free = {*inputs, *chosen, *(parameters or ())}  # what a caller changes from call to call stays an input
     problem = in_form(derive(moving, {name: value for name, value in start.bound.items() if name not in free}), form)
     equations, columns = motion_equations(problem, len(inputs)), start.bound | start.varied
-    shape = start.x.shape[:1] if many else ()
+    ones = np.ones(start.x.shape[:1] if many else ())
     forces, values = (
-        np.array([np.broadcast_to(columns[name], shape) for name in each], dtype=np.float64).reshape(len(each), *shape)
+        np.array([columns[name] * ones for name in each]).reshape(len(each), *ones.shape)
         for each in (inputs, equations.names)
     )
     if rows is not None:
