@@ -66,6 +66,7 @@ if TYPE_CHECKING:
     from .simplification.balanced_sums import balanced_sums
     from .simplification.double_double import double_double
     from .simplification.simplify import simplify, specialize
+    from .util.caches import clear_caches
     from .writing.counts import Counts
     from .writing.latex import latex
     from .writing.naming import variables, with_name
@@ -94,6 +95,7 @@ __all__ = [
     "cbrt",
     "ceil",
     "clear_cache",
+    "clear_caches",
     "compare",
     "compile",
     "constant",

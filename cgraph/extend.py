@@ -10,7 +10,8 @@ copies nodes through a builder, `topological` gives all nodes that some nodes re
 `with_reciprocals` leaves one division for a divisor.
 
 **Differentiate**: `cotangents` pulls from outputs, `tangents` pushes from inputs, `hessian_nodes` gives the lower
-triangle of second derivatives, all as nodes. `compressed_jacobian` gives the parts of a loop over colors of columns.
+triangle of second derivatives, all as nodes. `compressed_jacobian` gives the parts of a loop over colors of columns,
+`jets` the Taylor coefficients of a solution.
 
 **Solve**: `solve_nodes` is `cg.hessian_solve` on nodes, `solve_tangents` the same with the tangents of all that lies
 between, `ldl_solve` the dense factorization; all raise `SingularError`. `ldl_elimination` does the same over any
@@ -27,9 +28,10 @@ label may have. `certain_digits` says what rounding leaves of the outputs.
 **At the edges**: `real_array`, `real_number`, `is_finite`, `check_name`, `require_graph`, `require_flag`,
 `require_whole`, `require_choice`, `require_sequence`, `require_mapping` and `require_path` check what a caller passed,
 `thread_count` reads `threads=`, `share` gives work to threads, `atomic_write` writes a file whole or not at all,
-`write_files` several, and `check_writable` looks beforehand; `many` is a number with its noun; `html_table`,
+`write_files` several, and `check_writable` looks beforehand; `counted` is a number with its noun; `html_table`,
 `html_text`, `html_lines` and `picture` are what a notebook shows of a result; `install` ends an error about a missing
-package, `scipy_integrate` gives SciPy's module or raises it. `Array` is the type of an array of float64.
+package, `scipy_integrate` gives SciPy's module or raises it. `memo` and `kept_by_first` make a
+function keep its results. `Array` is the type of an array of float64, `Json` of what JSON can hold.
 
     >>> import cgraph as cg
     >>> from cgraph.extend import Builder, building, cotangents
@@ -50,6 +52,7 @@ if TYPE_CHECKING:
     from .autodiff.compressed_jacobian import CompressedJacobian, compressed_jacobian
     from .autodiff.hessian_solve import Order, solve_nodes, solve_tangents
     from .autodiff.jacobian import hessian_nodes
+    from .autodiff.jets import Jets, NoSeriesError, jets
     from .autodiff.ldl_solve import ldl_elimination, ldl_solve
     from .autodiff.symmetric_elimination import SingularError
     from .core.builder import Builder, folded
@@ -70,6 +73,7 @@ if TYPE_CHECKING:
     from .program.derivatives.linearization import Linearization, Linearized
     from .program.derivatives.tape import Tape, run_passes
     from .program.derivatives.transforms import ProgramVjp, Pulled, program_jvp, program_vjp
+    from .program.many import many
     from .program.program import Program
     from .program.runner import Record, Runner
     from .program.statement import STATEMENTS, Statement, StatementRow, register_statement, require_length
@@ -81,10 +85,12 @@ if TYPE_CHECKING:
     from .simplification.polynomial import Polynomial, expand, format_polynomial
     from .simplification.reciprocals import with_reciprocals
     from .util.atomic_write import atomic_write, check_writable, write_files
+    from .util.caches import kept_by_first, memo
+    from .util.counted import counted
     from .util.doors import doors
     from .util.extras import install
     from .util.html_text import html_lines, html_table, html_text, picture
-    from .util.many import many
+    from .util.json_type import Json
     from .util.nearest import nearest, or_nearest
     from .util.real_arrays import is_finite, real_array, real_number
     from .util.require import (
@@ -116,11 +122,14 @@ __all__ = [
     "FixedPoint",
     "Formulas",
     "If",
+    "Jets",
+    "Json",
     "Linearization",
     "Linearized",
     "Map",
     "MathML",
     "Names",
+    "NoSeriesError",
     "Notation",
     "Op",
     "Order",
@@ -149,6 +158,7 @@ __all__ = [
     "columns",
     "compressed_jacobian",
     "cotangents",
+    "counted",
     "doors",
     "expand",
     "folded",
@@ -159,9 +169,12 @@ __all__ = [
     "html_text",
     "install",
     "is_finite",
+    "jets",
+    "kept_by_first",
     "ldl_elimination",
     "ldl_solve",
     "many",
+    "memo",
     "nearest",
     "or_nearest",
     "picture",

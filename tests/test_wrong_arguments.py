@@ -341,6 +341,7 @@ CALLS |= {
     "extend.Pop": call(a_program_of(extend.Pop), "x", "y", ("z",)),
     "extend.Push": call(a_program_of(extend.Push), "x", "y", ("z",)),
     "extend.Take": call(a_program_of(extend.Take), "x", "y", (0,)),
+    "extend.many": call(extend.many, PROGRAM),
     "extend.program_jvp": call(extend.program_jvp, PROGRAM, [], constant=[]),
     "extend.program_vjp": call(
         extend.program_vjp, PROGRAM, ["x"], [], constant=[], turns=4, checkpoints=0, backend="python"
@@ -369,6 +370,7 @@ CALLS |= {
     "extend.check_name": call(lambda name: extend.check_name("a body", name), "b"),
     "extend.check_writable": call(extend.check_writable, "file"),
     "extend.compressed_jacobian": call(extend.compressed_jacobian, GRAPH, None),
+    "extend.jets": call(extend.jets, GRAPH, "t", exact=False),
     "extend.cotangents": call(extend.cotangents, {X * Y: ONE}, [X, Y], None, fixed=(), through={}, zero_wins=False),
     "extend.expand": call(extend.expand, X * Y, {X: "a"}),
     "extend.folded": call(extend.folded, [X * Y], extend.Builder(), {X: Y}),
@@ -381,7 +383,7 @@ CALLS |= {
     "extend.is_finite": call(extend.is_finite, 1.0),
     "extend.ldl_elimination": call(extend.ldl_elimination, [[4.0], [2.0, 2.0]], [10.0, 6.0]),
     "extend.ldl_solve": call(extend.ldl_solve, [[ONE], [X, Y]], [ONE, Y], None, check=False),
-    "extend.many": call(extend.many, 2, "node"),
+    "extend.counted": call(extend.counted, 2, "node"),
     "extend.nearest": call(extend.nearest, "a", ["b"], 3),
     "extend.or_nearest": call(extend.or_nearest, "a", ["b"]),
     "extend.picture": call(extend.picture, "nothing", 3),
@@ -460,18 +462,19 @@ RECORDS = """
     dyn.ConstraintLint dyn.Freedom dyn.HeldForces dyn.JointForce dyn.MotionGradient dyn.MotionGradients dyn.OmittedTerm
     dyn.PruneResult dyn.QuasiVelocities dyn.ReducedLinearization dyn.Reference dyn.Released dyn.Sensitivities dyn.Stats
     dyn.Subtree dyn.TorqueTable dyn.Trajectory dyn.Verdict
-    extend.CompressedJacobian extend.Linearized extend.MathML extend.Pulled extend.Statement extend.StatementRow
-    extend.Notation extend.Op extend.Record
+    extend.CompressedJacobian extend.Jets extend.Linearized extend.MathML extend.Pulled extend.Statement
+    extend.StatementRow extend.Notation extend.Op extend.Record
 """
-# Nothing to give; types; what a mechanism calls; what empties the user's cache; the fast way into compiled code, which
-# looks at nothing, and into the names of nodes.
-LEFT_OUT = """cg.recording_lines cg.clear_cache cg.Compiled.bind cg.Compiled.values cg.Graph.check cg.Graph.counts
-    cg.Graph.listing cg.Graph.only_output cg.Graph.to_networkx dyn.System.bias_forces dyn.System.require_values
-    dyn.System.momentum_rates
+# Nothing to give; types; decorators; what a mechanism calls; what empties the user's caches; the fast way into compiled
+# code, which looks at nothing, and into the names of nodes.
+LEFT_OUT = """cg.recording_lines cg.clear_cache cg.clear_caches cg.Compiled.bind cg.Compiled.values cg.Graph.check
+    cg.Graph.counts cg.Graph.listing cg.Graph.only_output cg.Graph.to_networkx dyn.System.bias_forces
+    dyn.System.require_values dyn.System.momentum_rates
     dyn.System.momentum_derivatives dyn.System.torque_derivatives
     dyn.JointForce.along dyn.JointForce.check dyn.JointLimit.along dyn.JointLimit.check dyn.JointFriction.along
     dyn.JointFriction.check dyn.Actuator.along dyn.Actuator.check
     extend.Array extend.columns extend.doors extend.Order extend.Polynomial extend.Builder extend.Runner
+    extend.kept_by_first extend.memo
     extend.ProgramVjp extend.Tape extend.Tape.run extend.Tape.recorded extend.run_passes extend.Linearization.adjoint
     extend.Linearization.beside extend.Linearization.forward extend.Linearization.tangent extend.require_length
     extend.Runner.read extend.Runner.write

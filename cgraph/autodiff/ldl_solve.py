@@ -67,7 +67,7 @@ def ldl_solve(
         return [solution[unknown] for unknown in unknowns] + ([equations.info()] if check else [])
 
 
-def _require_triangle(lower: Sequence[Sequence[Any]], rhs: Sequence[Any]) -> None:
+def _require_triangle(lower: Sequence[Sequence[object]], rhs: Sequence[object]) -> None:
     lengths = [len(row) for row in lower]
     if len(lengths) != len(rhs) or any([length <= i for i, length in enumerate(lengths)]):
         raise ValueError(f"lower needs at least 1 to {len(rhs)} entries in {len(rhs)} rows as rhs has, got {lengths}")
@@ -77,7 +77,7 @@ def _require_triangle(lower: Sequence[Sequence[Any]], rhs: Sequence[Any]) -> Non
 
 
 @explain_failure
-def ldl_elimination(lower: Sequence[Sequence[Any]], rhs: Sequence[Any]) -> tuple[list[Any], list[Any]]:
+def ldl_elimination(lower: Sequence[Sequence[Any]], rhs: Sequence[object]) -> tuple[list[Any], list[Any]]:
     """The solution x of A x = rhs and the pivots of A, over any numbers with + - * /.
 
     For i = n - 1 .. 0:  g_ij = A_ij / A_ii,  A_jk -= g_ij A_ik,  b_j -= g_ij b_i  (j, k < i);

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from functools import cache
 from typing import NamedTuple
 
 from ..core.builder import Builder
 from ..core.forward import tangents
 from ..core.node import Node, as_node, variable
+from ..core.row import Row
 from ..core.scope import building
 from ..core.traversal import topological
-from ..operations.operation import Op
+from ..util.caches import OPERATIONS, memo
 
 
 class _Second(NamedTuple):
@@ -40,8 +40,8 @@ def second_partials(node: Node, build: Builder) -> list[tuple[int, int, Node]]:
     return result
 
 
-@cache
-def _seconds_of(op: Op) -> tuple[Node, list[Node], list[_Second]]:
+@memo(OPERATIONS)
+def _seconds_of(op: Row) -> tuple[Node, list[Node], list[_Second]]:
     """Placeholders for the output y and the arguments a of an operation, and its second partials over them."""
     output = variable("output#")
     arguments = [variable(f"argument{i}#") for i in range(op.arity)]

@@ -5,21 +5,25 @@ from __future__ import annotations
 import itertools
 from collections import Counter
 from collections.abc import Collection, Iterator, Sequence
-from functools import cache
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..core.builder import Builder
 from ..core.graph import Graph
 from ..core.node import Node, as_node, variable
+from ..core.row import Row
 from ..core.scope import building
-from ..operations.operation import Op
+from ..util.caches import OPERATIONS, memo
 from ..util.require import require_graph
 from ..util.scipy_modules import scipy_sparse
 
-Indices = np.ndarray[Any, np.dtype[np.int64]]
-Indices32 = np.ndarray[Any, np.dtype[np.int32]]
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+Indices = NDArray[np.int64]
+Indices32 = NDArray[np.int32]
 
 
 class Pattern(NamedTuple):
@@ -54,7 +58,7 @@ def _grouped(values: Indices, keys: Indices, count: int) -> list[list[int]]:
     return [flat[begin:end] for begin, end in itertools.pairwise(ends)]
 
 
-def sparsity(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None) -> Any:
+def sparsity(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None) -> csr_array:
     """Where the Jacobian of a graph can be other than zero, whatever the values of the inputs.
 
     An entry that is left out is zero everywhere: no path leads from the input to the output, or each one passes an
@@ -92,7 +96,10 @@ def sparsity(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None)
     require_graph("sparsity", graph)
     sparse = scipy_sparse("sparsity")
     entries = pattern(graph, graph.select_inputs(wrt))
-    return sparse.csr_array((np.ones(len(entries.rows), dtype=bool), *entries.compressed()), shape=entries.shape)
+    found: csr_array = sparse.csr_array(
+        (np.ones(len(entries.rows), dtype=bool), *entries.compressed()), shape=entries.shape
+    )
+    return found
 
 
 def pattern(graph: Graph, wrt: Sequence[Node]) -> Pattern:
@@ -157,8 +164,8 @@ def slopes(node: Node) -> Collection[Node]:
     return [arg for arg, partial in zip(node.args, partials, strict=True) if partial.value != 0.0]
 
 
-@cache
-def _sloping_slots(op: Op) -> list[int]:
+@memo(OPERATIONS)
+def _sloping_slots(op: Row) -> list[int]:
     """The slots in which an operation on variables has a slope."""
     arguments = [variable(f"argument{slot}#") for slot in range(op.arity)]
     with building(Builder()):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import struct
-from functools import cache
 from typing import NamedTuple
 
 REGISTERS = 13  # values that fit in the registers of any processor at once, some registers left over
@@ -50,7 +49,6 @@ class Arithmetic(NamedTuple):
         ]
 
 
-@cache
 def words_of(arithmetic: Arithmetic) -> dict[str, str]:
     """What the column `llvm` of the operation table names."""
     return {

@@ -9,11 +9,12 @@ import ctypes
 import struct
 import sys
 from collections.abc import Callable
-from functools import cache, partial
+from functools import partial
 from types import BuiltinFunctionType
-from typing import Any
+from typing import Any, NoReturn, SupportsIndex
 
 from ..core.evaluation import Array
+from ..util.caches import memo
 from . import llvm_engine as llvm
 
 _STAYS = "a bound call holds addresses of this process: pickle the compiled graph and bind it again"
@@ -51,16 +52,16 @@ class _Method(ctypes.Structure):
 class _Addresses(bytes):
     """What a call needs, `self` of its function: as addresses, and as objects that stay alive with it."""
 
-    kept: tuple[Any, ...]
+    kept: tuple[object, ...]
 
-    def __reduce_ex__(self, protocol: Any) -> Any:
+    def __reduce_ex__(self, protocol: SupportsIndex) -> NoReturn:
         raise TypeError(_STAYS)
 
 
 class _Bound(partial[None]):
     """A call of a function of Python, as little to be copied."""
 
-    def __reduce_ex__(self, protocol: Any) -> Any:
+    def __reduce_ex__(self, protocol: SupportsIndex) -> NoReturn:
         raise TypeError(_STAYS)
 
 
@@ -80,7 +81,7 @@ def bound_call(entry: Any, x: Array, y: Array) -> Callable[[], None]:
     return function
 
 
-@cache
+@memo(1)
 def _enter() -> tuple[Any, _Method] | None:
     """CPython's PyCFunction_NewEx, and the method that `_ENTER` is; None for another Python."""
     if sys.implementation.name != "cpython":

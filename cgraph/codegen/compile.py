@@ -13,7 +13,7 @@ import numpy as np
 
 from ..core.graph import Graph
 from ..util.require import require_choice, require_flag, require_graph
-from .compiled import Compiled
+from .compiled import Compiled, Options
 from .llvm_engine import MissingFunctionError
 from .native_function import Native
 from .python_function import Generated
@@ -86,7 +86,7 @@ def compile(
     """
     require_choice("backend", backend, BACKENDS)
     require_graph("compile", graph)
-    options = {"fast": require_flag("fast", fast), "fma": require_flag("fma", fma), "cache": _place(cache)}
+    options: Options = {"fast": require_flag("fast", fast), "fma": require_flag("fma", fma), "cache": _place(cache)}
     large = backend == "auto" and len(graph.nodes) > LARGE
     if large:
         warnings.warn(

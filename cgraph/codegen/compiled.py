@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable
-from typing import Any
+from typing import TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,6 +17,14 @@ from ..util.real_arrays import real_array
 from ..util.threads import share, thread_count
 from .bound_call import bound
 from .differentiable import Differentiable, describe, require_memory
+
+
+class Options(TypedDict):
+    """The choices of `compile`, besides the backend."""
+
+    fast: bool
+    fma: bool
+    cache: bool | str
 
 
 class Compiled(Differentiable):
@@ -49,7 +57,7 @@ class Compiled(Differentiable):
     source: str
     takes_rows = False  # whether batches of points that lie one after another are read and written as they lie
 
-    def __init__(self, graph: Graph, backend: str, options: dict[str, Any]) -> None:
+    def __init__(self, graph: Graph, backend: str, options: Options) -> None:
         super().__init__()
         self.graph = graph
         self.backend, self.options = backend, options

@@ -244,7 +244,7 @@ def _second_products(graph: Graph, wrt: Sequence[Node], *, zero_wins: bool) -> G
     return forward_products(reverse, wrt, zero_wins=zero_wins)
 
 
-def require_memory(name: str, array: Any, *shapes: tuple[int, ...]) -> None:
+def require_memory(name: str, array: object, *shapes: tuple[int, ...]) -> None:
     """Raise GraphError unless machine code can use the array as it lies."""
     wanted = " or ".join(map(str, shapes))
     if not isinstance(array, np.ndarray) or array.dtype != np.float64 or array.shape not in shapes:
@@ -253,6 +253,6 @@ def require_memory(name: str, array: Any, *shapes: tuple[int, ...]) -> None:
         raise GraphError(f"{name} must be contiguous and aligned, got strides {array.strides}")
 
 
-def describe(value: Any) -> str:
+def describe(value: object) -> str:
     """What a value is that should have been an array of float64 of some shape."""
     return f"{value.dtype} {value.shape}" if isinstance(value, np.ndarray) else type(value).__name__

@@ -6,11 +6,15 @@ import ctypes.util
 import threading
 import weakref
 from collections.abc import Iterable
-from functools import cache as cached
-from typing import Any
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
 
+from ..util.caches import memo
 from ..util.extras import install
 from .disk_cache import Cache
+
+if TYPE_CHECKING:
+    from llvmlite.binding import ExecutionEngine, TargetMachine
 
 LEVEL = 2  # of the code generator's optimization; the text has no redundancy for passes over it to find
 # Nodes; beyond, level 0: a quarter of the time to compile, code that takes a third longer, or a tenth where it waits
@@ -26,7 +30,7 @@ class MissingFunctionError(RuntimeError):
 class Code:
     """Machine code, alive as long as this object is."""
 
-    def __init__(self, engine: Any) -> None:
+    def __init__(self, engine: ExecutionEngine) -> None:
         self._engine = engine
         # Not by the engine's own __del__: in a cycle of garbage Python may end LLVM's context before what lives in it.
         weakref.finalize(self, engine.close).atexit = False
@@ -48,7 +52,7 @@ class Host:
     lanes: the doubles in one of its vectors.  registers: the values that its registers hold at once, some left over.
     """
 
-    def __init__(self, binding: Any, version: str) -> None:
+    def __init__(self, binding: ModuleType, version: str) -> None:
         self._binding = binding
         binding.initialize_native_target()
         binding.initialize_native_asmprinter()
@@ -94,7 +98,7 @@ class Host:
         engine.finalize_object()
         return Code(engine)
 
-    def _machine(self, level: int) -> Any:
+    def _machine(self, level: int) -> TargetMachine:
         return self._target.create_target_machine(cpu=self._name, features=self._features, opt=level, jit=True)
 
     def _find(self, functions: Iterable[str]) -> None:
@@ -118,6 +122,6 @@ def host() -> Host:
     return _host(binding, __version__)
 
 
-@cached
-def _host(binding: Any, version: str) -> Host:
+@memo(1)
+def _host(binding: ModuleType, version: str) -> Host:
     return Host(binding, version)

@@ -127,7 +127,7 @@ def instructions(graph: Graph, arithmetic: Arithmetic, address: Address, name: s
 
     uniform: so many inputs, the first, are single numbers in memory, the same for all lanes.
     """
-    t = arithmetic.type
+    t, words = arithmetic.type, words_of(arithmetic)
     constants = Constants(graph, arithmetic, name)
     rows = {node: row for row, node in enumerate(graph.inputs)}
 
@@ -158,7 +158,7 @@ def instructions(graph: Graph, arithmetic: Arithmetic, address: Address, name: s
         args, lines = parts.read(reads)
         if isinstance(step, Joined) or (step not in merged.calls and columns(step.op).calls_library):
             lines += parts.forget()
-        r, more = _step(step, f"%v{number}", args, merged, arithmetic)
+        r, more = _step(step, f"%v{number}", args, merged, arithmetic, words)
         written[-1] += [*lines, *more, *parts.write(step, r), *store(step, r)]
     for node in outputs:
         if not node.args:
@@ -167,8 +167,13 @@ def instructions(graph: Graph, arithmetic: Arithmetic, address: Address, name: s
     return Code(written, constants.start(), parts.places, constants.definitions())
 
 
-def _step(step: Step, r: str, args: list[str], merged: Merged, arithmetic: Arithmetic) -> tuple[str, list[str]]:
-    """The name of a step's value, r or the value that it is part of, and the lines that compute it."""
+def _step(
+    step: Step, r: str, args: list[str], merged: Merged, arithmetic: Arithmetic, words: Mapping[str, str]
+) -> tuple[str, list[str]]:
+    """The name of a step's value, r or the value that it is part of, and the lines that compute it.
+
+    words: see `words_of`.
+    """
     if isinstance(step, Joined):
         return r, _call(step, r, args, arithmetic)
     if step in merged.calls:
@@ -180,7 +185,6 @@ def _step(step: Step, r: str, args: list[str], merged: Merged, arithmetic: Arith
         f"@{f'lanes{arithmetic.lanes}.' if arithmetic.lanes > 1 else ''}{columns(step.op).library}",
     )
     if columns(step.op).llvm:
-        words = words_of(arithmetic)
         return r, [f"  {line.format(*args, r=r, call=call, **words)}" for line in columns(step.op).llvm]
     return r, [f"  {r} = call {t} {call}({', '.join(f'{t} {arg}' for arg in args)})"]
 

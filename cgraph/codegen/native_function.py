@@ -19,7 +19,7 @@ from . import llvm_engine as llvm
 from .batch_code import BatchCode
 from .batch_ir import Batch, batch_ir
 from .bound_call import bound_call
-from .compiled import Compiled
+from .compiled import Compiled, Options
 from .disk_cache import open_cache
 from .llvm_ir import libm_functions, scalar_ir
 from .native_sweep import NativeSweep
@@ -43,7 +43,7 @@ class Native(Compiled):
 
     takes_rows = True
 
-    def __init__(self, graph: Graph, backend: str, options: dict[str, Any]) -> None:
+    def __init__(self, graph: Graph, backend: str, options: Options) -> None:
         super().__init__(graph, backend, options)
         self._flags = flags_of(options["fast"], options["fma"])
         self._cache = open_cache(options["cache"])

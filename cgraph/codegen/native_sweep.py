@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable
 from functools import partial
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from ..autodiff.direction_split import DirectionSplit
 from ..autodiff.sparsity import Indices
@@ -23,7 +23,7 @@ class _Fields(ctypes.Structure):
     """What the one argument of the machine code points to."""
 
     _fields_: ClassVar = [(name, ctypes.c_int64) for name in FIELDS]
-    arrays: dict[str, Any]
+    arrays: object  # which it keeps alive
 
 
 class NativeSweep(Sweep):
@@ -50,7 +50,7 @@ class NativeSweep(Sweep):
     def _like(self, split: DirectionSplit) -> NativeSweep:
         return NativeSweep(split, *self._how)
 
-    def _bound(self, x: Array, s: Array, y: Array, take: Indices, put: Indices, values: Array) -> Callable[[], Any]:
+    def _bound(self, x: Array, s: Array, y: Array, take: Indices, put: Indices, values: Array) -> Callable[[], object]:
         groups, p = len(s), aligned((whole(len(self.split.primal.outputs), self.lanes),))
         p[:] = 0.0
         arrays = {"x": x, "p": p, "s": s, "y": y, "take": take, "put": put, "values": values}

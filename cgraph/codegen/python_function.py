@@ -18,13 +18,13 @@ from ..core.graph import Graph
 from ..operations.operation import LIBRARY, Op
 from ..operations.table import OPS
 from ..operations.values import by_element
-from .compiled import Compiled
+from .compiled import Compiled, Options
 from .numpy_sweep import NumpySweep
 from .python_source import source
 
 BLOCK = 4096  # states a NumPy sweep takes at once: its temporaries stay in the cache
 
-_Function = Callable[[Any], tuple[Any, ...]]
+_Function = Callable[[Any], tuple[float, ...]]
 _PLAIN = ("float", "inf", "np")
 
 
@@ -36,7 +36,7 @@ class Generated(Compiled):
 
     vector_cost = 20  # NumPy's call, against one of Python's operators
 
-    def __init__(self, graph: Graph, backend: str, options: dict[str, Any]) -> None:
+    def __init__(self, graph: Graph, backend: str, options: Options) -> None:
         super().__init__(graph, backend, options)
         dialect = _Dialect("numpy" if backend == "numpy" else "python", exact=not options["fma"])
         self.source = dialect.source(graph)

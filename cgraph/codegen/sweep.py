@@ -42,7 +42,13 @@ class Sweep(ABC):
         """Another split made ready to run in the same way, without a guard."""
 
     def bind(
-        self, x: Array, s: Array, y: Array, take: Indices = NO_ENTRIES, put: Indices = NO_ENTRIES, values: Any = None
+        self,
+        x: Array,
+        s: Array,
+        y: Array,
+        take: Indices = NO_ENTRIES,
+        put: Indices = NO_ENTRIES,
+        values: Array | None = None,
     ) -> Callable[[], None]:
         """A function of nothing: y of the point x along s, then values[put] = y[take], y and values as rows of numbers.
 

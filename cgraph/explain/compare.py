@@ -5,16 +5,19 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
 from ..core.checks import GraphError
 from ..core.graph import Graph
 from ..core.node import VARIABLE, Node, variable
+from ..util.counted import counted
 from ..util.html_text import html_lines
-from ..util.many import many
 from ..util.require import require_choice, require_graph, require_sequence, require_texts
 from ..writing.structure_hash import node_hashes
 from .names import Names, joined
+
+if TYPE_CHECKING:
+    from ..util.json_type import Json
 
 Classify = Callable[[Graph], Callable[[Node], str]]
 Side = Literal["left", "right"]
@@ -81,7 +84,7 @@ class Comparison:
         return dict(sorted(counts.items(), key=lambda item: (-item[1], item[0])))
 
     def __str__(self) -> str:
-        sizes = f"{many(len(self.left.nodes), 'node')} left, {len(self.right.nodes)} right"
+        sizes = f"{counted(len(self.left.nodes), 'node')} left, {len(self.right.nodes)} right"
         only = f"{len(self.only_left)} only left, {len(self.only_right)} only right"
         lines = [f"{sizes}: {len(self.common)} in both, {only}."]
         if self.same_outputs:
@@ -103,7 +106,7 @@ class Comparison:
     def _repr_html_(self) -> str:
         return html_lines(str(self))
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Json]:
         """The same for JSON; nodes are numbered as in `graph.nodes` of their graph."""
         left, right = ({node: i for i, node in enumerate(graph.nodes)} for graph in (self.left, self.right))
         return {
@@ -245,7 +248,7 @@ def _by_label(graph: Graph) -> Callable[[Node], str]:
 
 def _described(
     graph: Graph, nodes: Iterable[Node], classify: Classify, called: Mapping[str, str]
-) -> list[dict[str, Any]]:
+) -> list[dict[str, Json]]:
     names, name_of = Names(graph, called), classify(graph)
     number = {node: i for i, node in enumerate(graph.nodes)}
     return [{"node": number[node], "text": names.line(node), "class": name_of(node)} for node in nodes]

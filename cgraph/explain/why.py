@@ -6,20 +6,23 @@ import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING
 
 from ..core.checks import GraphError
 from ..core.graph import Edge, Graph
 from ..core.node import Node
 from ..operations.operation import columns
+from ..util.counted import counted
 from ..util.html_text import html_table, html_text
-from ..util.many import many
 from ..util.require import require_graph
 from ..writing.source_lines import lines_text
 from .edge_partials import Point, edge_slopes
 from .names import Name, Names
 from .paths import best_paths, by_target, path_count
 from .reachability import between
+
+if TYPE_CHECKING:
+    from ..util.json_type import Json
 
 EXACT = 10**15  # up to here a number of paths is printed digit by digit
 LENGTH = 90  # characters up to which a path is written out; a longer one is written by its tags
@@ -131,7 +134,7 @@ class Why:
         share = f" and carry {self.share:.1%} of the weight of all" if self.share is not None else ""
         return f"The {len(self.paths)} heaviest add up to {listed:.6g}{share}."
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Json]:
         """The same for JSON; nodes are numbered as in `graph.nodes`, an edge is (source, target, argument slot)."""
         number = {node: i for i, node in enumerate(self.graph.nodes)}
         return {
@@ -326,7 +329,7 @@ def digits_of(count: int) -> str:
 
 def count_text(count: int) -> str:
     """`1 path`, `12 paths`, `3.21e+41 paths`."""
-    return many(count, "path") if count <= EXACT else f"{digits_of(count)} paths"
+    return counted(count, "path") if count <= EXACT else f"{digits_of(count)} paths"
 
 
 def _weight(path: Path) -> str:

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING
 
 from ..core.checks import GraphError
 from ..core.graph import Graph
 from ..core.node import Node
+from ..util.counted import counted
 from ..util.html_text import html_lines
-from ..util.many import many
 from ..util.require import require_graph
 from .names import Name, Names, joined
 from .reachability import ancestors, descendants
+
+if TYPE_CHECKING:
+    from ..util.json_type import Json
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +66,7 @@ class WhyNot:
         lines = [f"{self.output} does not depend on {self.input}."]
         if number:
             lines.append(
-                f"{self.input} reaches {many(number, 'other node')}, and of the outputs {joined(self.outputs)}."
+                f"{self.input} reaches {counted(number, 'other node')}, and of the outputs {joined(self.outputs)}."
             )
         elif self.outputs:
             lines.append(f"{self.input} is the output {joined(self.outputs)}; no operation uses it.")
@@ -78,7 +81,7 @@ class WhyNot:
     def _repr_html_(self) -> str:
         return html_lines(str(self))
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Json]:
         """The same for JSON; nodes are numbered as in `graph.nodes`."""
         nodes = self.graph.nodes
         return {

@@ -15,7 +15,7 @@ from .operation import BY_UFUNC
 _TURNED = {np.greater: np.less, np.greater_equal: np.less_equal}  # a > b is b < a
 
 
-def of_ufunc(ufunc: np.ufunc, method: str, inputs: tuple[Any, ...], options: Mapping[str, Any]) -> Any:
+def of_ufunc(ufunc: np.ufunc, method: str, inputs: tuple[Any, ...], options: Mapping[str, object]) -> Any:
     """`np.sin(node)`, `np.float64(2) * node`, and element by element for arrays of nodes."""
     if ufunc in _TURNED:
         ufunc, inputs = _TURNED[ufunc], inputs[::-1]

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable
-from functools import cache
 
 from ..core.node import Node, Scalar, apply, constant
+from ..util.caches import kept_by_first
 from .operation import OPS, Op
 
 Function = Callable[..., Node]
@@ -80,7 +80,7 @@ def of_name(name: str) -> Function:
     return _of_row(OPS[name])
 
 
-_of_row = cache(function)
+_of_row = kept_by_first(function)
 
 
 def _help(op: Op) -> str:

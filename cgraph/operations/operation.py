@@ -129,9 +129,8 @@ class Op(Row):
     jumps : callable
         Of an operation that jumps: of the arguments as numbers, what is whole where it does. Default: it does not.
     series : callable
-        Taylor coefficient k of (k, the result's coefficients, each argument's). Default through the partials.
-    rewrite : callable
-        The same by other operations, for their series. Default none.
+        Of the orders of a series, the output's node and the arguments': Taylor coefficient k, see
+        `cgraph/operations/series.py`. Default by `signs`, by `piece`, else through the partials.
 
     Examples
     --------
@@ -146,7 +145,7 @@ class Op(Row):
     # its function and texts
     arguments: str = ""
     about: str = ""
-    ufunc: Any = None
+    ufunc: np.ufunc | str | None = None
     symbol: str = ""
     infix: tuple[str, int] | None = None
     mathml: MathML | None = None
@@ -168,12 +167,11 @@ class Op(Row):
     c_helper: str = ""
     javascript: str = ""
     # values in other numbers than floats
-    operator: Callable[..., Any] | None = None
-    precise: Callable[..., Any] | None = None
+    operator: Callable[..., object] | None = None
+    precise: Callable[..., object] | None = None
     piece: Callable[[int], tuple[int | None, int]] | None = None
     jumps: Callable[..., Any] | None = None
     series: Callable[..., Any] | None = None
-    rewrite: Callable[..., Any] | None = None
 
     def __post_init__(self) -> None:
         if self.arity == 0:  # variable and constant have no texts
@@ -222,7 +220,7 @@ class Op(Row):
 
 
 OPS: dict[str, Op] = {}  # the table; filled by table.py
-BY_UFUNC: dict[Any, Op] = {}  # {ufunc of NumPy, or the name of one: the operation that it makes of nodes}
+BY_UFUNC: dict[np.ufunc | str, Op] = {}  # {ufunc of NumPy, or the name of one: the operation that it makes of nodes}
 _LEAVES = {row.name: Op(row.name, 0, row.scalar, row.array, row.partials) for row in (VARIABLE, CONSTANT)}
 
 

@@ -1,73 +1,116 @@
-"""Taylor recurrences of the operations: coefficient k of a result from those of its arguments.
+"""Taylor rules of the operations: coefficient k > 0 of a result, as a formula that holds for every order.
 
-A rule is called with k, the coefficients 0 .. k - 1 of the result, and those of each argument: 0 .. k, or one where
-the argument is constant. The coefficients are numbers of any kind that have arithmetic.
+A rule is called once, with the orders of a series, the result's node y and those of the arguments. Of a node x,
+`orders.zero(x)` is coefficient 0, `orders.at(x)` is coefficient k, None where x is constant, and `orders.sum(a, b)` the
+sum over 0 < j < k of a_j b_k-j: in them a rule is linear in coefficients k. So it serves series of graphs, whose
+coefficients are nodes, and through these graphs numbers of every kind. Sums and differences have their `signs` for a
+rule, piecewise operations their `piece`; every other operation without a rule of its own has `by_partials`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from operator import mul as product
-from typing import Any
+from typing import Protocol
 
 from ..core.node import Node, apply, as_node
 from .operation import OPS
 
-Coefficients = Sequence[Any]
 POWERS = 2.0**53  # whole exponents up to this size become products
 
 
-def add(k: int, y: Coefficients, a: Coefficients, b: Coefficients) -> Any:
-    """y = a + b."""
-    if k and len(b) == 1:
-        return a[k]
-    return b[k] if k and len(a) == 1 else a[k] + b[k]
+class Orders(Protocol):
+    """The orders of a series, as a rule sees them."""
+
+    k: Node
+
+    def zero(self, node: Node) -> Node:
+        """Coefficient 0."""
+
+    def at(self, node: Node) -> Node | None:
+        """Coefficient k; None of what is constant."""
+
+    def sum(self, a: Node, b: Node) -> Node:
+        """The sum over 0 < j < k of a_j b_k-j."""
+
+    def weighted_sum(self, a: Node, b: Node) -> Node:
+        """The sum over 0 < j < k of j a_j b_k-j."""
+
+    def safe_sum(self, a: Node, b: Node) -> Node:
+        """The sum over 0 < j < k of a_j b_k-j, in which zeros win over what is not finite."""
 
 
-def sub(k: int, y: Coefficients, a: Coefficients, b: Coefficients) -> Any:
-    """y = a - b."""
-    if k and len(b) == 1:
-        return a[k]
-    return -b[k] if k and len(a) == 1 else a[k] - b[k]
-
-
-def neg(k: int, y: Coefficients, a: Coefficients) -> Any:
-    """y = -a."""
-    return -a[k]
-
-
-def mul(k: int, y: Coefficients, a: Coefficients, b: Coefficients) -> Any:
+def mul(orders: Orders, y: Node, a: Node, b: Node) -> Node:
     """y = a * b."""
-    if len(a) == 1:
-        return a[0] * b[k]
-    if len(b) == 1:
-        return a[k] * b[0]
-    if a is not b:
-        return sum(map(product, a, b[::-1]))
-    half = (k + 1) // 2  # of a square, the products that come twice are taken once
-    twice = 2 * sum(map(product, a[:half], a[k : k - half : -1]))
-    return twice if k % 2 else twice + a[half] * a[half]
+    terms = [orders.zero(x) * each for x, each in _crossed(orders, a, b)]
+    return terms[0] if len(terms) == 1 else terms[0] + terms[1] + orders.sum(a, b)
 
 
-def div(k: int, y: Coefficients, a: Coefficients, b: Coefficients) -> Any:
-    """y = a / b, from y b = a."""
-    if len(b) == 1:
-        return a[k] / b[0]
-    known = sum(map(product, b[1:], y[::-1]))
-    return ((a[k] if k < len(a) else 0) - known) / b[0]
-
-
-def zero_safe_mul(k: int, y: Coefficients, a: Coefficients, b: Coefficients) -> Any:
+def zero_safe_mul(orders: Orders, y: Node, a: Node, b: Node) -> Node:
     """y = a * b, in which a zero coefficient wins over an infinite one."""
-    pairs = [(a[i], b[k - i]) for i in range(k + 1) if i < len(a) and k - i < len(b)]
-    return sum([u * v for u, v in pairs if u != 0 and v != 0], type(a[0])(0))
+    terms = [apply(OPS["zero_safe_mul"], orders.zero(x), each) for x, each in _crossed(orders, a, b)]
+    return terms[0] if len(terms) == 1 else terms[0] + terms[1] + orders.safe_sum(a, b)
+
+
+def _crossed(orders: Orders, a: Node, b: Node) -> list[tuple[Node, Node]]:
+    """Each argument with coefficient k of the other, where that moves."""
+    pairs = ((b, orders.at(a)), (a, orders.at(b)))
+    return [(x, each) for x, each in pairs if each is not None]
+
+
+def div(orders: Orders, y: Node, a: Node, b: Node) -> Node:
+    """y = a / b, from y b = a."""
+    above, below = orders.at(a), orders.at(b)
+    if below is not None:
+        known = -orders.zero(y) * below - orders.sum(b, y)
+        above = known if above is None else above + known
+    return _moving(above) * orders.zero(1.0 / b)
+
+
+def sqrt(orders: Orders, y: Node, a: Node) -> Node:
+    """y = sqrt(a), from y y = a."""
+    return (_moving(orders.at(a)) - orders.sum(y, y)) * orders.zero(0.5 / y)
+
+
+def hypot(orders: Orders, y: Node, a: Node, b: Node) -> Node:
+    """y = hypot(a, b), from y y = a a + b b."""
+    total = -0.5 * orders.sum(y, y)
+    for x in (a, b):
+        if (each := orders.at(x)) is not None:
+            total = total + 0.5 * orders.sum(x, x) + orders.zero(x) * each
+    return total * orders.zero(1.0 / y)
+
+
+def pow(orders: Orders, y: Node, a: Node, b: Node) -> Node | None:
+    """y = a ** b with a constant b: ydot a = b y adot. A whole b is products, which have series at a = 0, too."""
+    if orders.at(b) is not None or (b.value is not None and b.value.is_integer()):
+        return orders.at(power(a, b))
+    inner = (orders.zero(b) * orders.weighted_sum(a, y) - orders.weighted_sum(y, a)) / orders.k
+    return inner * orders.zero(1.0 / a) + orders.zero(b * a ** (b - 1.0)) * _moving(orders.at(a))
+
+
+def by_partials(orders: Orders, y: Node, *args: Node) -> Node:
+    """ydot = sum over arguments a of (dy/da) adot, by the table's partials g: of g_0 a_k + 1/k sum j a_j g_k-j.
+
+    Only g_0 .. g_k-1 are asked for, so g may depend on y itself, as for exp, tan or the pair sine and cosine.
+    """
+    terms: list[Node] = []
+    for arg, partial in zip(args, map(as_node, y.op.partials(y, *args)), strict=True):
+        if (each := orders.at(arg)) is not None:
+            terms.append(orders.zero(partial) * each)
+            if partial.value is None:
+                terms.append(orders.weighted_sum(arg, partial) / orders.k)
+    return sum(terms[1:], terms[0])
+
+
+def _moving(coefficient: Node | None) -> Node:
+    assert coefficient is not None  # a rule is asked only where an argument moves
+    return coefficient
 
 
 def power(a: Node, b: Node) -> Node:
     """a ** b by operations that have series: products for a whole exponent, else exp(b log a)."""
     exponent = b.value
     if exponent is None or not abs(exponent) <= POWERS or exponent != int(exponent):
-        return apply(OPS["sqrt"], a) if exponent == 0.5 else apply(OPS["exp"], b * apply(OPS["log"], a))
+        return apply(OPS["exp"], b * apply(OPS["log"], a))
     result: Node | None = None
     square, rest = a, abs(int(exponent))
     while rest:

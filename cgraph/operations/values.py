@@ -1,16 +1,17 @@
-"""Values of operations on floats and on arrays, where Python's or NumPy's own are not IEEE's."""
+"""Value of operations on floats and on arrays, where Python's or NumPy's own are not IEEE's."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
 from functools import wraps
-from typing import Any
 
 import numpy as np
 
+from ..core.evaluation import Array, Value
 
-def ieee(function: Callable[..., float], ufunc: Any) -> Callable[..., float]:
+
+def ieee(function: Callable[..., float], ufunc: Callable[..., Value]) -> Callable[..., float]:
     """`function` of the math module, with NumPy's IEEE result (NaN, infinity) where it would raise."""
 
     @wraps(function)
@@ -24,31 +25,32 @@ def ieee(function: Callable[..., float], ufunc: Any) -> Callable[..., float]:
     return value
 
 
-def flag(ufunc: Any) -> Callable[..., Any]:
+def flag(ufunc: np.ufunc) -> Callable[..., object]:
     """A comparison of arrays as 1.0 and 0.0."""
     return lambda a, b: ufunc(a, b) * 1.0
 
 
-def zero_safe_mul_arrays(a: Any, b: Any) -> Any:
+def zero_safe_mul_arrays(a: Value, b: Value) -> Value:
     """a * b, and 0 where a or b is 0."""
     return np.where((a == 0) | (b == 0), 0.0, np.multiply(a, b))
 
 
-def minimum_arrays(a: Any, b: Any) -> Any:
+def minimum_arrays(a: Value, b: Value) -> Value:
     """The smaller; of two zeros the first, where np.minimum takes either."""
     return np.where((a <= b) | (a != a), a, b)
 
 
-def maximum_arrays(a: Any, b: Any) -> Any:
+def maximum_arrays(a: Value, b: Value) -> Value:
     """The larger; of two zeros the first."""
     return np.where((a >= b) | (a != a), a, b)
 
 
-def power_arrays(a: Any, b: Any) -> Any:
+def power_arrays(a: Value, b: Value) -> Value:
     """a ** b, one rule for every exponent."""
     # With one exponent for all, np.power(a, 0.5) would be a square root: -0.0 at -0.0 and NaN at -inf.
     base, exponent = np.broadcast_arrays(a, b)
-    return np.power(base, exponent.copy())
+    powers: Array = np.power(base, exponent.copy())
+    return powers
 
 
 def hypot(a: float, b: float) -> float:
@@ -62,7 +64,7 @@ def sign(a: float) -> float:
     return a if a != a else float((a > 0) - (a < 0))
 
 
-def by_element(function: Callable[..., float]) -> Callable[..., Any]:
+def by_element(function: Callable[..., float]) -> Callable[..., Value]:
     """A function of floats, on arrays that broadcast, one element after another."""
     return lambda *args: np.asarray(np.frompyfunc(function, len(args), 1)(*args), dtype=np.float64)
 
@@ -92,13 +94,13 @@ def logistic(a: float) -> float:
     return (e if a < 0.0 else 1.0) / (1.0 + e)
 
 
-def logistic_arrays(a: Any) -> Any:
+def logistic_arrays(a: Value) -> Value:
     """1 / (1 + exp(-a))."""
     e = np.exp(-np.abs(a))
     return np.where(a < 0.0, e, 1.0) / (1.0 + e)
 
 
-def precise_cbrt(a: Any) -> Any:
+def precise_cbrt(a: Value) -> Value:
     """The real cube root of a multiprecision number."""
     third = type(a)(1) / 3
     return -((-a) ** third) if a < 0 else a**third if a > 0 else a

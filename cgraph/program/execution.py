@@ -24,15 +24,18 @@ class Execution:
     batch : callable
         (graph, points): the outputs at points (inputs, N), (outputs, N).
     many : int
-        How many memories run side by side; 0 of one alone.
+        How many memories run side by side; -1: one alone.
     """
 
     lengths: Lengths
     values: Callable[[Graph, Sequence[float]], Sequence[float]]
     batch: Callable[[Graph, Array], Array]
-    many: int = 0
+    many: int = -1
 
     def run(self, statements: Sequence[Statement], state: dict[str, Any]) -> None:
         """Statements, one after another."""
         for statement in statements:
-            row_of(statement).run(statement, state, self)
+            row = row_of(statement)
+            rule = row.run if self.many < 0 else row.beside
+            assert rule is not None, "Runner.run_many has asked"
+            rule(statement, state, self)

@@ -170,11 +170,11 @@ class Functions:
             self.definitions += [head, "start:", *inner, "  ret void", "}"]
         return self._names[key]
 
-    def text(self, name: str, text: Callable[[str], Sequence[str]]) -> str:
-        """A function of that name, whose lines `text` writes with the flags of the module's arithmetic."""
+    def text(self, name: str, text: Callable[[Arithmetic], Sequence[str]]) -> str:
+        """A function of that name, whose lines `text` writes for the module's arithmetic."""
         if (name,) not in self._names:
             self._names[name,] = name
-            self.definitions += text(self.arithmetic.flags)
+            self.definitions += text(self.arithmetic)
         return name
 
 

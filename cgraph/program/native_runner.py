@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 import threading
 from collections.abc import Callable
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,7 @@ from ..codegen.batch_code import BatchCode
 from ..core.evaluation import Array
 from ..core.scope import without_collection
 from .fuse import fused
-from .llvm_ir import program_functions, program_ir, require_texts
+from .llvm_ir import offsets, program_functions, program_ir, require_texts
 from .program import Program
 from .rows_ir import program_rows_ir
 from .runner import Record, Runner
@@ -59,12 +59,17 @@ class NativeRunner(Runner):
                 self._one = self._compiled(text).function("run", _RUN)
         return self._one
 
+    @cached_property
+    def _fused_many(self) -> Program:
+        """The program of a vector of memories."""
+        return self._fused if self.masked is self.program else fused(self.masked)
+
     @property
     def _entry_of_lanes(self) -> Any:
         """What runs a vector of memories, made at its first use."""
         with self._lock:
             if self._many is None:
-                text = program_ir(self._fused, self._flags, self._host.lanes, self.width, self._host.registers)
+                text = program_ir(self._fused_many, self._flags, self._host.lanes, self.width, self._host.registers)
                 self._many = self._compiled(text).function("run", _RUN)
         return self._many
 
@@ -95,14 +100,15 @@ class NativeRunner(Runner):
     def _batch_code(self, name: str) -> BatchCode:
         lanes, registers = self._host.lanes, self._host.registers
         with without_collection():
-            text = program_rows_ir(self._fused, name, lanes, self._flags, registers)
+            text = program_rows_ir(self._fused_many, name, lanes, self._flags, registers)
         return BatchCode(self._compiled(text.source, looped=True), lanes, text.size, columns=False)
 
     def _run_many(self, memories: Array, passes: int, every: int, feed: Array) -> Record:
-        lanes = self._host.lanes
+        lanes, size = self._host.lanes, self.size
         entry, total = self._entry_of_lanes, memories.shape[1]
         rows = np.empty((passes // every, self.program.width, total))
-        block, part = np.empty((self.size, lanes)), np.empty((*rows.shape[:2], lanes))
+        block = np.zeros((offsets(self._fused_many, self.width)[""], lanes))  # the registers of masks behind the others
+        part = np.empty((*rows.shape[:2], lanes))
         fed = np.empty((*feed.shape[:2], lanes))
         if feed.shape[2] == 1:
             fed[...] = feed
@@ -111,10 +117,10 @@ class NativeRunner(Runner):
         for start in range(0, total, lanes):
             here = slice(start, min(start + lanes, total))
             width = here.stop - start
-            block[:, :width], block[:, width:] = memories[:, here], memories[:, start : start + 1]
+            block[:size, :width], block[:size, width:] = memories[:, here], memories[:, start : start + 1]
             if feed.shape[2] > 1:
                 fed[:, :, :width], fed[:, :, width:] = feed[:, :, here], feed[:, :, start : start + 1]
             where = ctypes.addressof(done), fed.ctypes.data, feed.shape[1]
             entry(block.ctypes.data, part.ctypes.data, passes, every, *where)
-            memories[:, here], rows[:, :, here] = block[:, :width], part[:, :, :width]
+            memories[:, here], rows[:, :, here] = block[:size, :width], part[:, :, :width]
         return Record(rows, passes)

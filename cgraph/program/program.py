@@ -94,8 +94,8 @@ class Program:
         return sum(self.registers[name] for name in self.feed)
 
     @property
-    def branches(self) -> tuple[str, ...]:
-        """What depends on numbers in it, so that several memories cannot run side by side."""
+    def alone(self) -> tuple[str, ...]:
+        """What keeps several memories from running side by side: kinds of statements, `record_if`, `stop`."""
         kinds = {type(statement).__name__ for statement in self.statements() if row_of(statement).beside is None}
         return (*sorted(kinds), *[name for name in ("record_if", "stop") if getattr(self, name) is not None])
 

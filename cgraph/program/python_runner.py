@@ -14,7 +14,6 @@ from ..core.graph import Graph
 from .execution import Execution
 from .program import Program
 from .runner import Record, Runner
-from .statement import row_of
 
 
 class PythonRunner(Runner):
@@ -45,16 +44,15 @@ class PythonRunner(Runner):
 
     def _run_many(self, memories: Array, passes: int, every: int, feed: Array) -> Record:
         program, count = self.program, memories.shape[1]
-        execution = Execution(program.registers, self._at, self._batch, count)
-        state = {name: memories[place].copy() for name, place in self._slices.items()}
+        masked = self.masked
+        execution = Execution(masked.registers, self._at, self._batch, count)
+        state = {name: np.zeros((length, count)) for name, length in masked.registers.items()}
+        state |= {name: memories[place].copy() for name, place in self._slices.items()}
         rows = np.empty((passes // every, program.width, count))
         for done in range(1, passes + 1):
             fed = np.broadcast_to(feed[done - 1], (program.feed_width, count))
             state.update(_split(fed, program.feed, program.registers))
-            for statement in program.body:
-                beside = row_of(statement).beside
-                assert beside is not None
-                beside(statement, state, execution)
+            execution.run(masked.body, state)
             if done % every == 0 and program.record:
                 np.concatenate([state[name] for name in program.record], out=rows[done // every - 1])
         for name, place in self._slices.items():

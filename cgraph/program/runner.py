@@ -18,8 +18,9 @@ from ..util.real_arrays import real_array
 from ..util.require import require_mapping, require_whole
 from ..util.threads import share, thread_count
 from .llvm_ir import offsets
+from .many import many
 from .program import Program
-from .statement import reads_and_writes
+from .statement import reads_and_writes, row_of
 
 BLOCK = 64  # states of a batch that are run between looks at the keyboard, and that a thread takes at a time
 
@@ -85,6 +86,14 @@ class Runner(ABC):
         places = offsets(program, width)
         self._slices = {name: slice(places[name], places[name] + n) for name, n in program.registers.items()}
         self.size = places[""]
+        self._masked: Program | None = None
+
+    @property
+    def masked(self) -> Program:
+        """The program of memories side by side, see `many`; made at its first use."""
+        if self._masked is None:
+            self._masked = many(self.program)
+        return self._masked
 
     def prepared(self) -> Runner:
         """This runner, with all made that `run` needs, so that its first run takes no longer than the next.
@@ -207,7 +216,7 @@ class Runner(ABC):
         return call
 
     def run_many(self, memories: Array, passes: int, every: int = 1, feed: ArrayLike | None = None) -> Record:
-        """As `run`, for N memories at once, in vectors; the program has to be branch-free.
+        """As `run`, for N memories at once, in vectors: what `run` does of each, whichever course it takes.
 
         Parameters
         ----------
@@ -226,12 +235,13 @@ class Runner(ABC):
         Raises
         ------
         GraphError
-            If the program has branches (`While`, `If`, `Factor`, `Solve`, `record_if`, `stop`), and as for `run`.
+            If the program has `record_if` or `stop`, by which memories would have other numbers of rows or passes, or
+            statements that run one memory alone; and as for `run`.
         """
         if not isinstance(memories, np.ndarray) or memories.ndim != 2:
             raise GraphError(f"memories must have shape ({self.size}, N), got {describe(memories)}")
         self._check(memories, (self.size, memories.shape[1]), passes, every)
-        self._require_branch_free()
+        self._require_beside()
         count = memories.shape[1]
         fed = self._fed(feed, (passes, self.program.feed_width, count))
         with _fitting(passes // every, self.program.width * count):
@@ -259,14 +269,14 @@ class Runner(ABC):
         Raises
         ------
         GraphError
-            For another shape; if the program has branches or a feed; if a pass reads or records a register, other than
-            this one, that it has not set before.
+            For another shape; if the program cannot `run_many`, or has a feed; if a pass reads or records a register,
+            other than this one, that it may not have set before.
         """
         count, rows = thread_count(threads), np.ascontiguousarray(real_array(name, values))
         length = len(self.read(np.empty(self.size), name))
         if rows.ndim != 2 or rows.shape[1] != length:
             raise GraphError(f"register {name!r} needs values of shape (N, {length}), got {rows.shape}")
-        self._require_branch_free()
+        self._require_beside()
         if self.program.feed:
             raise GraphError("a batch takes no feed: give its registers a place in the one that varies")
         if (unset := _first_unset(self.program, name)) is not None:
@@ -292,9 +302,9 @@ class Runner(ABC):
 
         return write
 
-    def _require_branch_free(self) -> None:
-        if branches := self.program.branches:
-            raise GraphError(f"runs side by side need a branch-free program: no {', '.join(branches)}")
+    def _require_beside(self) -> None:
+        if alone := self.program.alone:
+            raise GraphError(f"programs with {', '.join(alone)} run one memory at a time, not side by side")
 
     def _fed(self, feed: ArrayLike | None, shape: tuple[int, ...]) -> Array:
         """The rows of a feed, of that shape; the last dimension may be one for all."""
@@ -320,12 +330,13 @@ class Runner(ABC):
 
 
 def _first_unset(program: Program, known: str) -> str | None:
-    """A register that a pass without branches reads or records before it sets it, if there is one besides `known`."""
+    """A register that a pass reads or records before it is sure to have set it, if there is one besides `known`."""
     is_set = {known}
     for statement in program.body:
         reads, writes = reads_and_writes(statement)
         for name in reads:
             if name not in is_set:
                 return name
-        is_set |= {*writes}
+        if not row_of(statement).bodies:  # which may run no time at all
+            is_set |= {*writes}
     return next((name for name in program.record if name not in is_set), None)

@@ -47,8 +47,11 @@ class StatementRow:
     text : callable, optional
         (statement, writer): LLVM's text, see `writer`'s methods. Default: programs with it run in Python.
     beside : callable, optional
-        As `run`, of N memories: `state` is {register: array (length, N)}. Default: it depends on numbers what is done,
-        so that memories cannot run side by side.
+        As `run`, of N memories: `state` is {register: array (length, N)}; with it, `text` has to write for vectors of
+        numbers, too. Default: programs with it run one memory at a time.
+    masked : callable, optional
+        (statement, masked): adds what does the same in the lanes of a mask and leaves the others as they are, see
+        `Masked`. Default: the statement, what it writes being put back in the other lanes.
     assign : callable, optional
         (statement, assigned): the assignment of registers that no other statement writes. Default: by `reads` and
         `writes`; a kind with bodies needs it to have derivatives.
@@ -74,6 +77,7 @@ class StatementRow:
     graph: str = ""
     text: Rule | None = None
     beside: Rule | None = None
+    masked: Rule | None = None
     assign: Callable[..., Any] | None = None
     jvp: Rule | None = None
     transpose: Rule | None = None

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
+from .masks import masked_if, masked_push, masked_while
 from .statement import StatementRow, register_statement
 from .statements import call, control, matrix, memory
 
@@ -54,6 +55,7 @@ ROWS = [
         run=matrix.run_factor,
         check=matrix.check_matrix,
         text=matrix.factor_text,
+        beside=matrix.factor_beside,
         jvp=_later("matrix_rules", "push_factor"),
         transpose=_later("matrix_rules", "pull_factor"),
     ),
@@ -64,6 +66,7 @@ ROWS = [
         run=matrix.run_solve,
         check=matrix.check_matrix,
         text=matrix.solve_text,
+        beside=matrix.solve_beside,
         jvp=_later("matrix_rules", "push_solve"),
         transpose=_later("matrix_rules", "pull_solve"),
     ),
@@ -75,6 +78,8 @@ ROWS = [
         check=control.check_control,
         bodies=("body", "otherwise"),
         text=control.if_text,
+        beside=control.if_beside,
+        masked=masked_if,
         assign=_later("control_rules", "assign_if"),
         jvp=_later("control_rules", "push_if"),
         transpose=_later("control_rules", "pull_if"),
@@ -87,6 +92,8 @@ ROWS = [
         check=control.check_control,
         bodies=("body",),
         text=control.while_text,
+        beside=control.while_beside,
+        masked=masked_while,
         assign=_later("control_rules", "assign_while"),
         jvp=_later("control_rules", "push_while"),
         transpose=_later("control_rules", "pull_while"),
@@ -100,6 +107,8 @@ ROWS = [
         check=control.check_control,
         bodies=("body",),
         text=control.while_text,
+        beside=control.while_beside,
+        masked=masked_while,
         assign=_later("fixed_point_rules", "assign_fixed_point"),
         jvp=_later("fixed_point_rules", "push_fixed_point"),
         transpose=_later("fixed_point_rules", "pull_fixed_point"),
@@ -122,6 +131,8 @@ ROWS = [
         run=memory.run_push,
         check=memory.check_stack,
         text=memory.push_text,
+        beside=memory.push_beside,
+        masked=masked_push,
         jvp=_later("memory_rules", "push_push"),
         transpose=_later("memory_rules", "pull_push"),
     ),
@@ -132,6 +143,7 @@ ROWS = [
         run=memory.run_pop,
         check=memory.check_stack,
         text=memory.pop_text,
+        beside=memory.pop_beside,
         jvp=_later("memory_rules", "push_pop"),
         transpose=_later("memory_rules", "pull_pop"),
     ),

@@ -63,13 +63,18 @@ class Writer:
         """The address of a register."""
         return self.pointers[register]
 
-    def load(self, register: str) -> str:
-        """The one number of a register."""
-        return self.value(f"load double, ptr {self.pointer(register)}, align 8")
+    def place(self, register: str, k: int) -> str:
+        """The address of number k of a register."""
+        pointer = self.pointer(register)
+        return self.value(f"getelementptr {self.type}, ptr {pointer}, i64 {k}") if k else pointer
 
-    def store(self, value: str, register: str) -> None:
-        """register = value, a number."""
-        self.line(f"store double {value}, ptr {self.pointer(register)}, align 8")
+    def load(self, register: str, k: int = 0) -> str:
+        """Number k of a register."""
+        return self.value(f"load {self.type}, ptr {self.place(register, k)}, align 8")
+
+    def store(self, value: str, register: str, k: int = 0) -> None:
+        """register[k] = value, a number."""
+        self.line(f"store {self.type} {value}, ptr {self.place(register, k)}, align 8")
 
     def copy(self, target: str, source: str, count: int) -> None:
         """So many numbers from one address to another."""
@@ -97,7 +102,7 @@ class Writer:
         self.line(f"br i1 {condition}, label %{yes}, label %{no}")
 
     def branch(self, register: str, yes: str, no: str) -> None:
-        """Go on where register > 0, where NaN is not, and where it is not."""
+        """Go on where register > 0, where NaN is not, and where it is not; of lanes, where any is."""
         self.written += self.positive(f"%{yes}.on", register)
         self.branch_on(f"%{yes}.on", yes, no)
 
@@ -127,10 +132,16 @@ class Writer:
         return tuple([self.registers[name] for name in names])
 
     def positive(self, result: str, register: str) -> list[str]:
-        """result = register > 0, where NaN is not."""
+        """result = register > 0, where NaN is not; of lanes, whether any is."""
+        lanes, t = self.functions.arithmetic.lanes, self.type
+        lines = [f"  {result}.value = load {t}, ptr {self.pointers[register]}, align 8"]
+        if lanes == 1:
+            return [*lines, f"  {result} = fcmp ogt double {result}.value, 0.0"]
         return [
-            f"  {result}.value = load double, ptr {self.pointers[register]}, align 8",
-            f"  {result} = fcmp ogt double {result}.value, 0.0",
+            *lines,
+            f"  {result}.each = fcmp ogt {t} {result}.value, {self.number(0.0)}",
+            f"  {result}.bits = bitcast <{lanes} x i1> {result}.each to i{lanes}",
+            f"  {result} = icmp ne i{lanes} {result}.bits, 0",
         ]
 
 

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from functools import cache
-from typing import Any
-
 import numpy as np
 
+from ..core.evaluation import Array, Value
 from ..core.node import CONSTANT, Node
 from ..core.traversal import topological
 from ..operations.operation import columns
-from ..util.real_arrays import Array
 
 UNIT = 2.0**-30  # in place of 2^-53: errors that double precision can show
 MORE = 8.0  # times the error, that another form may have
@@ -30,8 +27,7 @@ def as_accurate(old: Node, new: Node) -> bool:
     return not np.any(usable & worse)
 
 
-@cache
-def _points(count: int) -> Any:
+def _points(count: int) -> Array:
     """Samples of so many variables, (count, points)."""
     rng = np.random.default_rng(count)
     noise = rng.normal(size=(4, count, 6))
@@ -41,10 +37,10 @@ def _points(count: int) -> Any:
 
 def _errors(node: Node, points: dict[str, Array]) -> tuple[Array, Array]:
     """The value, and a bound of its error with operations that round to a part of `UNIT`, to first order."""
-    known: dict[Node, tuple[Any, Any]] = {}
+    known: dict[Node, tuple[Value, Value]] = {}
     for inner in topological([node]):
         if not inner.args:
-            value = inner.value if inner.op is CONSTANT else points[inner.name or ""]
+            value = points[inner.name or ""] if inner.value is None else inner.value
             known[inner] = (value, 0.0)
             continue
         values = [known[arg][0] for arg in inner.args]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Collection
-from functools import cache
 from importlib import import_module
 
 Homes = dict[str, tuple[str, str | None]]  # {name: (module that has it, its name there; None for the module itself)}
@@ -47,7 +46,12 @@ def doors(
     >>> "jvp" in dir(cg)
     True
     """
-    homes = cache(lambda: _homes(file))
+    found: Homes = {}
+
+    def homes() -> Homes:
+        if not found:
+            found.update(_homes(file))
+        return found
 
     def load(name: str) -> object:
         if name not in homes():

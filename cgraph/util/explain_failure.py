@@ -11,7 +11,7 @@ from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_
 
 from .real_arrays import is_finite
 
-T = TypeVar("T", bound=Callable[..., Any])
+T = TypeVar("T", bound=Callable[..., object])
 # What Python raises; a subclass, such as GraphError, is a sentence already.
 _STUMBLES = (TypeError, ValueError, AttributeError, KeyError, IndexError, AssertionError, OverflowError)
 
@@ -35,9 +35,9 @@ def explain_failure(called: T) -> T:
     return called
 
 
-def _explained(function: Callable[..., Any], who: str) -> Callable[..., Any]:
+def _explained(function: Callable[..., object], who: str) -> Callable[..., object]:
     @wraps(function)
-    def call(*args: Any, **named: Any) -> Any:
+    def call(*args: object, **named: Any) -> Any:
         try:
             return function(*args, **named)
         except Exception as error:
@@ -53,7 +53,7 @@ def _explained(function: Callable[..., Any], who: str) -> Callable[..., Any]:
     return call
 
 
-def misfits(value: Any, kind: Any) -> list[Any]:
+def misfits(value: Any, kind: Any) -> list[object]:
     """The parts of a value that are not what an annotation says; the value itself where it is another kind of thing."""
     origin, parts = get_origin(kind) or kind, get_args(kind)
     if origin in (Union, UnionType):
@@ -67,7 +67,7 @@ def misfits(value: Any, kind: Any) -> list[Any]:
     fits = isinstance(value, origin) or (origin is float and is_finite(value))
     if not fits or isinstance(value, refused):
         return [value]
-    inside: list[tuple[Any, Any]] = []
+    inside: list[tuple[object, object]] = []
     if is_dataclass(value) or hasattr(value, "_fields"):
         inside = [(getattr(value, name), each) for name, each in get_type_hints(type(value)).items()]
     elif issubclass(origin, Mapping) and parts:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -37,7 +36,7 @@ def input_values(names: Sequence[str], values: object) -> dict[str, Value]:
     return read
 
 
-def _as_value(name: str, value: Any) -> Value:
+def _as_value(name: str, value: object) -> Value:
     if type(value) is float:
         return value
     array = real_array(f"input {name!r}", value)

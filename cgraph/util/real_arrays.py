@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 import numbers
-from typing import Any
 
 import numpy as np
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
+from ..core.evaluation import Array
+
 _KINDS = {"c": "complex numbers", "U": "text", "S": "text", "M": "dates", "m": "time spans"}
 
 
-def real_array(what: str, value: Any) -> Array:
+def real_array(what: str, value: object) -> Array:
     """The value as an array of float64, but not from what NumPy would silently make numbers of.
 
     Parameters
@@ -65,7 +65,7 @@ def real_array(what: str, value: Any) -> Array:
         raise ValueError(f"{what} must be real numbers, got one that is too large for float64") from None
 
 
-def real_number(what: str, value: Any) -> float:
+def real_number(what: str, value: object) -> float:
     """The value as a float.
 
     Parameters

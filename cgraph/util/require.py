@@ -15,7 +15,7 @@ from ..core.node import Node
 from .explain_failure import explain_failure
 
 
-def require_flag(what: str, value: Any) -> bool:
+def require_flag(what: str, value: object) -> bool:
     """The value as a bool.
 
     Parameters
@@ -47,7 +47,7 @@ def require_flag(what: str, value: Any) -> bool:
 
 
 @explain_failure
-def require_whole(what: str, value: Any, least: int = 0) -> int:
+def require_whole(what: str, value: object, least: int = 0) -> int:
     """The value as an int.
 
     Parameters
@@ -88,7 +88,7 @@ def require_whole(what: str, value: Any, least: int = 0) -> int:
 
 
 @explain_failure
-def require_choice(what: str, value: Any, choices: Collection[str]) -> str:
+def require_choice(what: str, value: object, choices: Collection[str]) -> str:
     """The value, if it is one of the choices.
 
     Parameters
@@ -121,7 +121,7 @@ def require_choice(what: str, value: Any, choices: Collection[str]) -> str:
     raise ValueError(f"{what} must be one of {', '.join(choices)}, got {value!r:.60}")
 
 
-def require_sequence(what: str, value: Any, of: str, kind: type | tuple[type, ...] = object) -> tuple[Any, ...]:
+def require_sequence(what: str, value: object, of: str, kind: type | tuple[type, ...] = object) -> tuple[Any, ...]:
     """The members of a sequence; an iterator is read once.
 
     Parameters
@@ -160,7 +160,7 @@ def require_sequence(what: str, value: Any, of: str, kind: type | tuple[type, ..
     return members
 
 
-def require_mapping(what: str, value: Any, of: str) -> Mapping[Any, Any]:
+def require_mapping(what: str, value: object, of: str) -> Mapping[Any, Any]:
     """The value, if it is a mapping.
 
     Parameters
@@ -193,7 +193,7 @@ def require_mapping(what: str, value: Any, of: str) -> Mapping[Any, Any]:
     return value
 
 
-def require_texts(what: str, value: Any) -> Mapping[str, str]:
+def require_texts(what: str, value: object) -> Mapping[str, str]:
     """The value, if it is a mapping of names to texts; an empty one for None.
 
     Parameters
@@ -227,7 +227,7 @@ def require_texts(what: str, value: Any) -> Mapping[str, str]:
     return texts
 
 
-def require_path(what: str, value: Any) -> Path:
+def require_path(what: str, value: object) -> Path:
     """The value as a path, a leading ~ read as the home.
 
     Parameters

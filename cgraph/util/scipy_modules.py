@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Any
+from types import ModuleType
 
 from .extras import install
 
 
-def scipy_sparse(what: str) -> Any:
+def scipy_sparse(what: str) -> ModuleType:
     """The module `scipy.sparse`. Raises ImportError, saying that `what` needs SciPy, where there is none."""
     try:
         from scipy import sparse
     except ImportError:
         raise ImportError(f"{what} needs SciPy: {install('scipy')}") from None
-    return sparse
+    found: ModuleType = sparse  # it has no types for everybody
+    return found
 
 
-def scipy_integrate(what: str) -> Any:
+def scipy_integrate(what: str) -> ModuleType:
     """The module `scipy.integrate`.
 
     Parameters
@@ -44,4 +45,5 @@ def scipy_integrate(what: str) -> Any:
         from scipy import integrate
     except ImportError:
         raise ImportError(f"{what} needs SciPy: {install('scipy')}") from None
-    return integrate
+    found: ModuleType = integrate  # it has no types for everybody
+    return found

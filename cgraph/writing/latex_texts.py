@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import cache
 from xml.etree import ElementTree
 
 from ..operations.operation import FUNCTION, LEAF, PRODUCT, SUM, Op
+from ..util.caches import OPERATIONS, memo
 from .formulas import Text
 
 _GREEK = frozenset(
@@ -75,7 +75,7 @@ def operation_text(op: Op, args: Sequence[Text]) -> Text:
     inside = [
         _fenced(text) if binds < least else text for (text, binds), least in zip(args, op.mathml.least, strict=True)
     ]
-    text = _template(op.mathml.text)(inside)
+    text = _template(op)(inside)
     return re.sub(r"\\cdot (?=[^0-9\-.])", r"\\, ", text), op.mathml.binding
 
 
@@ -83,9 +83,10 @@ def _fenced(text: str) -> str:
     return rf"\left({text}\right)"
 
 
-@cache
-def _template(mathml: str) -> Callable[[Sequence[str]], str]:
-    """The function that puts arguments into a formula."""
+@memo(OPERATIONS)
+def _template(op: Op) -> Callable[[Sequence[str]], str]:
+    """The function that puts arguments into an operation's formula."""
+    mathml = "" if op.mathml is None else op.mathml.text
     try:
         root = ElementTree.fromstring(f"<mrow>{mathml}</mrow>")  # noqa: S314 (the table's own text)
     except ElementTree.ParseError as error:

@@ -14,7 +14,7 @@ from ..operations.table import OPS
 Record = tuple[str, tuple[int, ...], Any, Any, tuple[Any, ...]]  # operation, arguments, value, name, label
 
 
-def reduced(graph: Graph) -> tuple[Callable[..., Graph], tuple[Any, ...]]:
+def reduced(graph: Graph) -> tuple[Callable[..., Graph], tuple[object, ...]]:
     """What `Graph.__reduce__` gives: the function that makes the graph again, and its arguments."""
     number = {node: i for i, node in enumerate(graph.nodes)}
     outputs = {name: number[node] for name, node in graph.outputs.items()}

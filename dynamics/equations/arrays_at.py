@@ -6,18 +6,18 @@ import math
 import re
 import warnings
 from collections.abc import Mapping
-from functools import lru_cache
 from itertools import groupby
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Compiled, Graph
+from cgraph.extend import Array, kept_by_first
 
 from ..systems.model import Model, as_system
 from ..systems.system import System
 from .constraint_rank import ConstraintWarning
-from .evaluate_at import Array, InputRows, evaluate_at
+from .evaluate_at import InputRows, evaluate_at
 from .nearly_redundant_rows import lost_rank
 
 _ENTRY = re.compile(r"(.*?[^\d_])((?:_\d+)+|\d+)")  # M_0_1, h_2, tau0
@@ -88,7 +88,7 @@ def arrays_at(
     _warn_of_lost_rank(system, flat, state, t, parameters)
     arrays: dict[str, Array] = {}
     start = 0
-    for name, shape in _shapes(tuple(graph.outputs)):
+    for name, shape in _shapes(graph):
         end = start + math.prod(shape)
         arrays[name] = flat[..., start:end].reshape((*flat.shape[:-1], *shape))
         start = end
@@ -109,11 +109,11 @@ def _warn_of_lost_rank(
         warnings.warn(f"values{where} are not finite: {lost}", ConstraintWarning, stacklevel=3)
 
 
-@lru_cache(maxsize=64)
-def _shapes(outputs: tuple[str, ...]) -> list[tuple[str, tuple[int, ...]]]:
-    """Name and shape of the arrays that names of outputs spell, one after another."""
+@kept_by_first
+def _shapes(graph: Graph) -> list[tuple[str, tuple[int, ...]]]:
+    """Name and shape of the arrays that the names of a graph's outputs spell, one after another."""
     arrays: list[tuple[str, tuple[int, ...]]] = []
-    for stem, run in groupby(outputs, key=lambda name: _split(name)[0]):
+    for stem, run in groupby(graph.outputs, key=lambda name: _split(name)[0]):
         names = list(run)
         indices = [_split(name)[1] for name in names]
         if len({len(index) for index in indices}) == 1:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import cgraph as cg
 from cgraph import Counts, Graph
+from cgraph.extend import Array
 
 from ..systems.model import Model, as_system
 from .equations_of_motion import momentum
@@ -51,6 +52,6 @@ def form_agreement(model: Model, forms: Mapping[str, Graph], at: Mapping[str, fl
     return Agreement(_apart(found, moved, q), _apart(found, rates, p))
 
 
-def _apart(found: Mapping[str, Any], expected: Mapping[str, Any], names: Sequence[str]) -> float:
-    largest = max([abs(expected[name]) for name in names])
-    return float(max([abs(found[name] - expected[name]) for name in names]) / (largest or 1.0))
+def _apart(found: Mapping[str, float | Array], expected: Mapping[str, float | Array], names: Sequence[str]) -> float:
+    largest = max([abs(float(expected[name])) for name in names])
+    return max([abs(float(found[name]) - float(expected[name])) for name in names]) / (largest or 1.0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from copy import copy
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 from cgraph import Node
 from cgraph.extend import Builder, cotangents, topological
@@ -15,6 +15,9 @@ from ..systems.model import Model, as_system
 from ..systems.system import System
 from .formulations import ONE
 from .integrability import integrable_rows
+
+if TYPE_CHECKING:
+    from cgraph.extend import Json
 
 
 @dataclass(frozen=True)
@@ -61,7 +64,7 @@ class ConstraintLint:
         lines = [f"velocity constraint {name!r} {rows[said]}" for name, said in self.integrable.items()]
         return "\n".join(lines + [f"coordinate {name!r} {multipliers[said]}" for name, said in self.vakonomic.items()])
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Json]:
         """For JSON."""
         return {"ok": self.ok, "integrable": dict(self.integrable), "vakonomic": dict(self.vakonomic)}
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import warnings
-from functools import lru_cache
 
 import numpy as np
 
-from cgraph.extend import Array
+from cgraph.extend import Array, kept_by_first
 
 from ..systems.constraints import Constraints
-from .row_numbers import KEPT, row_numbers
+from .row_numbers import row_numbers
 
 STATES = 8  # states that meet the constraints and whose rank is clear, at which rows are compared, at most
 DEPENDENT = 1e-9  # of the largest row of a loop, or of a row of no loop: one of the others if no more of it is left
@@ -35,7 +34,7 @@ class ConstraintWarning(UserWarning):
     """
 
 
-@lru_cache(KEPT)
+@kept_by_first
 def independent_rows(constraints: Constraints) -> tuple[int, ...]:
     """Indices of the rows that do not follow from those before them, at all states seen.
 

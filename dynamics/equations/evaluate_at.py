@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Graph
-from cgraph.extend import real_array, real_number, require_mapping
+from cgraph.extend import Array, real_array, real_number, require_mapping
 
 from ..systems.arguments import TIME
 from ..systems.system import System
 
 STATE = ("q", "qd", "qdd", "tau")  # the prefixes of a graph's inputs, each an array of one number a coordinate
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
 def evaluate_at(
@@ -38,13 +36,13 @@ def input_values(
     state: Mapping[str, ArrayLike | None],
     t: float = 0.0,
     parameters: Mapping[str, float] | None = None,
-) -> tuple[dict[str, Any], tuple[int, ...]]:
+) -> tuple[dict[str, float | Array], tuple[int, ...]]:
     """Values of those inputs at a state {"q": .., "qd": .., "qdd": .., "tau": ..}, (n,) or (N, n) each; and () or (N,).
 
     What of the state is None or missing is zero, coordinates neutral. Parameters have the system's values unless given.
     Raises ValueError for another shape, what is not finite, or a parameter that the system does not have.
     """
-    values: dict[str, Any] = _numbers(system, t, parameters)
+    values: dict[str, float | Array] = {**_numbers(system, t, parameters)}
     arrays, shape = _arrays(system, state)
     for name, rows in arrays.items():
         values |= {f"{name}{i}": column if rows.ndim == 2 else float(column) for i, column in enumerate(rows.T)}

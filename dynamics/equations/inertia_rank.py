@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from cgraph import Graph
-from cgraph.extend import Array, certain_digits
+from cgraph import Graph, extend
+from cgraph.extend import Array
 
 STATES = 3
 TORQUE = 2.0**200  # so large that no other force counts
@@ -51,7 +51,7 @@ def without_inertia(accelerations: Graph, mass_matrix: Callable[[], Graph], n: i
             continue
         if np.linalg.cond(balanced(inverse), 1) * np.finfo(float).eps * n < SPARE:
             return []
-        digits = certain_digits(accelerations, point)
+        digits = extend.certain_digits(accelerations, point)
         lost = {i for i in range(n) if digits[f"qdd{i}"] == 0.0}
         if not lost:
             return []

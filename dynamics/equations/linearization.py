@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Graph
-from cgraph.extend import require_choice
+from cgraph.extend import Array, require_choice
 
 from ..systems.model import Model, as_system
 from ..systems.system import System
 from .equations_of_motion import forward_dynamics
-from .evaluate_at import Array, evaluate_at
+from .evaluate_at import evaluate_at
 from .hamiltonian import FORMS
 from .initial_value import normalized
 from .linearization_parts import LinearizationParts, linearization_parts

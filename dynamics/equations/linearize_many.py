@@ -3,19 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Call, Map, Program, Statement, require_choice, runner, share, thread_count
+from cgraph.extend import (
+    Array,
+    Call,
+    Map,
+    Program,
+    Statement,
+    kept_by_first,
+    require_choice,
+    runner,
+    share,
+    thread_count,
+)
 
 from ..systems.model import Model, as_system
 from ..systems.system import System
 from .equations_of_motion import forward_dynamics
-from .evaluate_at import Array, InputRows
+from .evaluate_at import InputRows
 from .formulations import ONE, ZERO
 from .hamiltonian import FORMS
 from .linearization_parts import ColumnGraphs, LinearizationParts, linearization_parts
@@ -30,7 +40,6 @@ LONGER = 5
 SHARE = 3  # of the nodes of all entries, at most one in so many is forward dynamics
 MATRICES = 1024  # states whose parts are in memory at a time, before they are matrices
 BLOCK = 64  # states that are run between looks at the keyboard, and that a thread takes at a time
-_functions: WeakKeyDictionary[System, dict[str, _Function]] = WeakKeyDictionary()
 
 
 def linearize_many(
@@ -113,11 +122,7 @@ class _Function:
         return matrices[:, :, : 2 * self._n], matrices[:, :, 2 * self._n :]
 
 
-def _function(system: System, form: str) -> _Function:
-    functions = _functions.setdefault(system, {})
-    if form not in functions:
-        functions[form] = _Function(system, form)
-    return functions[form]
+_function = kept_by_first(_Function)
 
 
 Write = Callable[[Array, Array, int], None]

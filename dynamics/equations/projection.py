@@ -10,13 +10,12 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
-from functools import lru_cache
 
 import numpy as np
 
 import cgraph as cg
-from cgraph import Graph, Node
-from cgraph.extend import Array, Builder, building, certain_digits, folded, solve_nodes
+from cgraph import Graph, Node, extend
+from cgraph.extend import Array, Builder, building, folded, kept_by_first, solve_nodes
 
 from ..systems.constraints import ConstraintError
 from ..systems.system import System
@@ -28,11 +27,10 @@ from .row_numbers import FOLLOWS, RowNumbers, step_names
 from .substitute import substitute
 
 ITERATIONS = 20  # of Newton's method
-KEPT = 16  # systems whose graphs stay for another state
 SPARE = 1.5  # certain digits of a row that is not 0: a start that is off by 30 roundings is moved and said to be
 
 
-@lru_cache(KEPT)
+@kept_by_first
 def projection(system: System) -> Graph | None:
     """A state nearer to one that meets the constraints, by one step of Newton; None without constraints.
 
@@ -124,7 +122,7 @@ def projected_start(system: System, x: Array, t: float, parameters: Mapping[str,
     return moved
 
 
-@lru_cache(KEPT)
+@kept_by_first
 def _all_rows(system: System) -> Graph:
     """phi and the rates of all constraints at x + step; inputs x, t if needed, parameters, and the steps."""
     state = [*system.q, *system.qd]
@@ -147,7 +145,7 @@ def _open_rows(system: System, x: Array, before: Array, t: float, parameters: Ma
     names, n = graph.input_names, len(x)
     point = {name: others[name] for name in names if name in others}
     point |= dict(zip([*names[:n], *names[-n:]], [*before.tolist(), *(x - before).tolist()], strict=True))
-    values, digits = graph.evaluate(point), certain_digits(graph, point)
+    values, digits = graph.evaluate(point), extend.certain_digits(graph, point)
     kept, left = independent_rows(system.constraints), set[int]()
     for name, value in values.items():
         k = int(name.removeprefix("phi").removeprefix("rate"))

@@ -8,13 +8,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import Builder
+from cgraph.extend import Array, Builder
 
 from ..systems.constraints import ConstraintError
 from ..systems.model import Model, as_system
 from ..systems.system import System
 from .constraint_rank import DEPENDENT, independent_rows
-from .evaluate_at import Array, evaluate_at
+from .evaluate_at import evaluate_at
 from .initial_value import initial_value
 from .inverse_dynamics_derivatives import state_slopes
 from .linearization import linearize

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from functools import cached_property, lru_cache
-from typing import Any, NamedTuple
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 import cgraph as cg
-from cgraph import Graph
-from cgraph.extend import Array, Builder, building, certain_digits, cotangents
+from cgraph import Graph, extend
+from cgraph.extend import Array, Builder, building, cotangents, kept_by_first
 
 from ..systems.constraints import ConstraintError, Constraints
 from ..systems.kinematics import ZERO
@@ -23,12 +24,11 @@ LAST, LONGEST = 1e-9, 0.5  # steps there, of displacements
 SMALL = 1e-6  # of the first gap: what Newton's method closes to rounding in a step or two
 OPEN = 0.5  # certain digits of a row that is not 0
 FOLLOWS = 4.0  # more digits of one that follows from others: the rounding of axes and lengths that it has in common
-KEPT = 16  # constraints whose rank stays known
 ROUNDS = 4  # of scaling
 NEAR = 3  # states about another one, at which rows are as large as they usually are
 SIZES = 10.0 ** np.arange(-10.0, 11.0)  # of displacements
 BENT, TURNED = 1e-3, 0.3  # of a row of J, by which it changes if it is not constant; of that, by which it has changed
-Indices = np.ndarray[Any, np.dtype[np.intp]]
+Indices = NDArray[np.intp]
 
 
 class RowNumbers:
@@ -153,7 +153,7 @@ class RowNumbers:
         m = len(self.constraints)
         matrix = self.matrix(point)
         for k in range(m):
-            digits = certain_digits(self.columns, {**point, **{f"lambda{j}": float(j == k) for j in range(m)}})
+            digits = extend.certain_digits(self.columns, {**point, **{f"lambda{j}": float(j == k) for j in range(m)}})
             matrix[k] = np.where(np.array(list(digits.values())) >= 1.0, matrix[k], 0.0)
         return matrix
 
@@ -209,7 +209,7 @@ class RowNumbers:
         if self.landed is None:
             return np.zeros(0, dtype=np.intp)
         point = {**before, **dict(zip(self.steps, step.tolist(), strict=True))}
-        values, digits = self.landed.evaluate(point), certain_digits(self.landed, point)
+        values, digits = self.landed.evaluate(point), extend.certain_digits(self.landed, point)
         wrong = [x != 0.0 and not (digits[name] < most and np.isfinite(x)) for name, x in values.items()]
         return np.flatnonzero(wrong)
 
@@ -217,14 +217,14 @@ class RowNumbers:
         """Values of q0.., of t and parameters, from these and others."""
         return dict(shown) | {f"q{i}": float(x) for i, x in enumerate(q)}
 
-    def moved_by(self, point: Mapping[str, float], step: Any) -> Array:
+    def moved_by(self, point: Mapping[str, float], step: Array) -> Array:
         """q after a step along the velocities, (nq,)."""
         at = {name: point[name] for name in self.moved.input_names if name in point}
         at |= dict(zip(self.steps, step.tolist(), strict=True))
         return np.array(list(self.moved.evaluate(at).values()), dtype=np.float64)
 
 
-row_numbers = lru_cache(KEPT)(RowNumbers)
+row_numbers = kept_by_first(RowNumbers)
 
 
 class Closing(NamedTuple):

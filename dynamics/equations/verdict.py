@@ -9,18 +9,21 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from cgraph import Edge, Graph, Node
-from cgraph.extend import Builder, Names, building, certain_digits, cotangents, folded, require_mapping, shortened
+from cgraph import Edge, Graph, Node, extend
+from cgraph.extend import Builder, Names, building, cotangents, folded, require_mapping, shortened
 
 from ..systems.display_names import display_names
 from ..systems.model import Model, as_system
 from ..systems.system import System
 from .blame import blame
 from .formulations import ONE, THROUGH_STEP, inverse_dynamics, torques
+
+if TYPE_CHECKING:
+    from cgraph.extend import Json
 
 STATES = 24  # tried where c does not fold to 0: a third of size 1, the rest of sizes from 1e-6 to 1e6
 WRITTEN = 200  # nodes of c that identities are tried on
@@ -131,7 +134,7 @@ class Verdict:
         if self.terms is None:
             return {}
         known = {name: given[name] for name in self.terms.input_names if name in given}
-        digits, values = certain_digits(self.terms, known), self.terms.evaluate(known)
+        digits, values = extend.certain_digits(self.terms, known), self.terms.evaluate(known)
         return {name: float(value) for name, value in values.items() if value and digits[name] >= 1.0}
 
     def __str__(self) -> str:
@@ -177,7 +180,7 @@ class Verdict:
         what = "this edge" if len(edges) == 1 else f"these {len(edges)} edges"
         return f"There by mistake: {what}, {alone if count else 'and no node by itself'}: {texts}."
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Json]:
         """The same for JSON; nodes are numbered as in `graph.nodes`, an edge is [source, target, argument slot]."""
         number = {node: i for i, node in enumerate(self.graph.nodes)}
         return {

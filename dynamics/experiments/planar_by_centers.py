@@ -3,13 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Protocol
 
 import cgraph as cg
 from cgraph import Node
 
 
-def by_centers(q: Sequence[Node], qd: Sequence[Node], links: Sequence[Any], gravity: Any) -> list[Node]:
+class PlainLink(Protocol):
+    """Numbers or nodes of a link, as `PlanarLink` says them."""
+
+    @property
+    def mass(self) -> float | Node:
+        """Of the link [kg]."""
+
+    @property
+    def length(self) -> float | Node:
+        """From joint to joint [m]."""
+
+    @property
+    def center(self) -> float | Node:
+        """From the joint to the center of mass [m]."""
+
+    @property
+    def inertia(self) -> float | Node:
+        """About the center of mass [kg m^2]."""
+
+
+def by_centers(q: Sequence[Node], qd: Sequence[Node], links: Sequence[PlainLink], gravity: float | Node) -> list[Node]:
     """The partial Lagrangians, K = m v.v / 2 + I w^2 / 2.
 
     links: with mass, length, center and inertia. These and gravity are numbers or nodes.

@@ -43,7 +43,7 @@ def _inputs(graph: Graph) -> set[str]:
     return {part for name in graph.input_names for part in (name, name.rstrip("0123456789"))}
 
 
-def _account(pruned: PruneResult) -> dict[str, Any]:
+def _account(pruned: PruneResult) -> dict[str, object]:
     full, left = pruned.full.counts().by_tag, pruned.graph.counts().by_tag
     return {
         "full": _size(pruned.full),
@@ -60,5 +60,5 @@ def _size(graph: Graph) -> dict[str, int]:
     return {"nodes": counts.nodes, "edges": counts.edges, "depth": counts.depth}
 
 
-def _row(each: OmittedTerm) -> dict[str, Any]:
+def _row(each: OmittedTerm) -> dict[str, object]:
     return {"what": each.what, "why": each.why, "nodes": each.nodes, "edges": each.edges}

@@ -6,7 +6,6 @@ import csv
 import io
 import math
 from collections.abc import Iterable, Sequence
-from typing import Any
 
 WIDTH = 120  # characters of a terminal
 GAPS = ("  ", " ")  # between columns: the second where the first is too wide
@@ -46,7 +45,7 @@ def _column(head: str, cells: Sequence[tuple[str, str]], flush_left: bool) -> li
     return [head.rjust(before).ljust(before + len(space) + after), *lines]
 
 
-def csv_text(columns: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
+def csv_text(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     """CSV with a line of names; None gives an empty cell."""
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows([columns, *rows])

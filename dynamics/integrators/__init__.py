@@ -1,10 +1,12 @@
 """Integrators: methods for xdot = f(x, t), as programs over the graphs of a model."""
 
-from functools import cache, partial
+from functools import partial
 
-from .composition import COMPOSITIONS, Composition
+from cgraph.extend import memo
+
+from .composition import COMPOSITIONS
 from .dop853 import DOP853
-from .explicit import explicit, explicit_step
+from .explicit import explicit_step
 from .jacobian_statements import jacobian_statements
 from .method import Method
 from .momentum_form import in_form, momentum_form
@@ -21,13 +23,13 @@ from .problem import (
     time_derivative,
     total_energy,
 )
-from .radau import ORDER as RADAU_ORDER, radau, radau_step
-from .rosenbrock import RODAS5P, rosenbrock, rosenbrock_step
+from .radau import ORDER as RADAU_ORDER, radau_step
+from .rosenbrock import RODAS5P, rosenbrock_step
 from .step import Step
-from .step_control import embedded
-from .symplectic import composed, composed_step, partitioned, partitioned_step
+from .step_control import measured
+from .symplectic import composed_step, partitioned_step
 from .tableau import TABLEAUS, Tableau
-from .taylor import ORDER as TAYLOR_ORDER, taylor
+from .taylor import ORDER as TAYLOR_ORDER, taylor_step
 
 MOST_STAGES = 12  # of Gauss's methods: order 24, beyond which float64 gains nothing
 
@@ -36,19 +38,12 @@ def runge_kutta(tableau: Tableau) -> Method:
     """An explicit Runge-Kutta method: equal steps, or steps by error where the tableau has weights of an estimate."""
     step = partial(explicit_step, tableau)
     if tableau.error:
-        degree = len(tableau.interpolant[0])
-        return Method(tableau.order, partial(embedded, tableau), adaptive=True, degree=degree, step=step)
-    return Method(tableau.order, lambda problem, _: explicit(tableau, problem), adaptive=False, step=step)
+        return Method(tableau.order, step, adaptive=True, degree=len(tableau.interpolant[0]))
+    return Method(tableau.order, step)
 
 
 def _symplectic(method: Partitioned) -> Method:
-    step = partial(partitioned_step, method)
-    return Method(method.order, lambda problem, _: partitioned(method, problem), adaptive=False, step=step)
-
-
-def _composition(composition: Composition) -> Method:
-    step = partial(composed_step, composition)
-    return Method(composition.order, lambda problem, _: composed(composition, problem), adaptive=False, step=step)
+    return Method(method.order, partial(partitioned_step, method))
 
 
 class Methods(dict[str, Method]):
@@ -63,7 +58,7 @@ class Methods(dict[str, Method]):
         return super().__contains__(name) or (isinstance(name, str) and _names_gauss(name))
 
 
-@cache
+@memo(MOST_STAGES)
 def _gauss(stages: int) -> Method:
     return _symplectic(gauss(stages))
 
@@ -76,24 +71,19 @@ METHODS: dict[str, Method] = Methods(
     {
         **{name: runge_kutta(tableau) for name, tableau in TABLEAUS.items()},
         "dop853": runge_kutta(DOP853),
-        "rodas": Method(
-            RODAS5P.order,
-            partial(rosenbrock, RODAS5P),
-            adaptive=True,
-            degree=len(RODAS5P.dense) + 1,
-            step=partial(rosenbrock_step, RODAS5P),
-        ),
-        "radau": Method(RADAU_ORDER, radau, adaptive=True, degree=3, step=radau_step),
+        "rodas": Method(RODAS5P.order, partial(rosenbrock_step, RODAS5P), adaptive=True, degree=len(RODAS5P.dense) + 1),
+        "radau": Method(RADAU_ORDER, radau_step, adaptive=True, degree=3),
         "taylor": Method(
             TAYLOR_ORDER,
-            partial(taylor, TAYLOR_ORDER),
+            partial(taylor_step, TAYLOR_ORDER),
             adaptive=True,
             degree=TAYLOR_ORDER,
             finest=2.0**-52,
             starts=True,
+            derived=False,
         ),
         **{name: _symplectic(method) for name, method in PARTITIONED.items()},
-        **{name: _composition(composition) for name, composition in COMPOSITIONS.items()},
+        **{name: Method(each.order, partial(composed_step, each)) for name, each in COMPOSITIONS.items()},
     }
 )
 
@@ -109,6 +99,7 @@ __all__ = [
     "force",
     "in_form",
     "jacobian_statements",
+    "measured",
     "mechanics",
     "momentum_form",
     "quantity",

@@ -1,47 +1,51 @@
-"""Programs of steps of equal size: the registers that all of them have, and explicit Runge-Kutta methods.
-
-Registers: x the state, t = start + count * h, p the parameters, evaluations of the rate, and `nonfinite`, which
-is not 0 after a step whose state is not finite.
-"""
+"""Explicit Runge-Kutta methods: a tableau's step, with the estimates and the dense output of an embedded one."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import Call, Map, Program, Statement, Sum
+from cgraph.extend import Call, Map, Statement, Sum
 
-from .elementwise import ahead
+from .elementwise import SAME, ahead, compensated, scaled, weighted
 from .problem import Problem
 from .step import Step
-from .tableau import Tableau
+from .step_control import SAFETY, SCALE, scale
+from .tableau import Tableau, real_stability
 
 
-def registers(problem: Problem) -> dict[str, int]:
-    """What every program has."""
-    single = dict.fromkeys(("t", "h", "start", "count", "evaluations", "nonfinite"), 1)
-    return {"x": problem.size, "p": len(problem.parameters), **single}
-
-
-def advance(evaluations: int) -> list[Statement]:
-    """After a step: the next time, computed from the start so that it does not drift; whether the state is finite."""
-    names = ("start", "count", "h", "evaluations")
-    start, count, h, done = inputs = cg.variables(names)
-    outputs = {"t": start + (count + 1.0) * h, "count": count + 1.0, "evaluations": done + float(evaluations)}
-    x = cg.variable("x")
-    return [Call(Graph(inputs, outputs), names, tuple(outputs)), Sum(Graph([x], {"none": x - x}), ("x",), "nonfinite")]
-
-
-def stage(problem: Problem, tableau: Tableau, k: int) -> list[Statement]:
-    """Slope k of an explicit method: register slope{k}, from registers x, t, h and the slopes before."""
-    if k == 0:
-        return [Call(problem.rate, ("x", "t", "p"), ("slope0",))]
-    return [
-        stage_state("at", tableau.a[k]),
-        stage_time("at_t", tableau.c[k]),
-        Call(problem.rate, ("at", "at_t", "p"), (f"slope{k}",)),
-    ]
+def explicit_step(tableau: Tableau, problem: Problem) -> Step:
+    """The step; where the tableau has weights of an estimate, with it: the slope at its end is the next one's first."""
+    m, stages = problem.size, len(tableau.b)
+    lengths = {f"slope{k}": m for k in range(stages)} | {"at": m, "at_t": 1}
+    rates = [Call(problem.rate, ("x", "t", "p"), ("slope0",))]
+    body: list[Statement] = []
+    for k in range(1, stages):
+        body += _stage(problem, k, tableau.c[k], tableau.a[k], ("at", "at_t"))
+    if not tableau.error:
+        return Step(lengths, [*body, stage_state("x_new", tableau.b)], rates)
+    last, extra = f"slope{stages}", len(tableau.extra)
+    degree, estimates = len(tableau.interpolant[0]), len(tableau.error)
+    lengths |= {last: m, "rounding": m, "rounding_new": m, "lost": 1, "rise": 1, "reach": 1}
+    lengths |= {f"sum{k}": 1 for k in range(estimates)}
+    error: list[Statement] = [stage_time("at_t", 1.0), Call(problem.rate, ("x_new", "at_t", "p"), (last,))]
+    error += [_squared(weights, f"sum{k}") for k, weights in enumerate(tableau.error)]
+    return Step(
+        lengths,
+        [*body, _arrival(tableau.b)],
+        rates,
+        kept=[Map(SAME, ("rounding_new",), ("rounding",))],
+        fixed=("rounding", "rounding_new"),
+        error=[*error, _whole(last), _estimate(estimates, m)],
+        estimate=tableau.estimate,
+        handed=[*_held(tableau), Map(SAME, (last,), ("slope0",))],
+        dense=_dense(tableau, problem),
+        dense_lengths={f"slope{stages + 1 + k}": m for k in range(extra)}
+        | {f"dense{k + 1}": m for k in range(degree)}
+        | {"inside": m, "inside_t": 1},
+    )
 
 
 def stage_time(target: str, c: float) -> Call:
@@ -57,17 +61,73 @@ def stage_state(target: str, weights: Sequence[float]) -> Map:
     return Map(ahead([weights[k] for k in used]), ("x", "h", *slopes), (target,))
 
 
-def explicit_step(tableau: Tableau, problem: Problem) -> Step:
-    """One explicit step, embedded or not."""
+def _stage(problem: Problem, k: int, c: float, weights: Sequence[float], at: tuple[str, str]) -> list[Statement]:
+    """Register slope{k}, from registers x, t, h and the slopes before, at a state and a time that are kept in `at`."""
+    rate = Call(problem.rate, (*at, "p"), (f"slope{k}",))
+    return [stage_state(at[0], weights), stage_time(at[1], c), rate]
+
+
+def _arrival(weights: tuple[float, ...]) -> Map:
+    """x_new = x + h * (sum of weight * slope) + what rounding took off the step before; rounding_new, what off this."""
+    used = [k for k, weight in enumerate(weights) if weight]
+    x, before, h, *slopes = cg.variables(["x", "rounding", "h", *(f"s{k}" for k in used)])
+    total, rounding = compensated(x, h * weighted(slopes, [weights[k] for k in used]) + before)
+    graph = Graph([x, before, h, *slopes], {"x": total, "rounding": rounding})
+    return Map(graph, ("x", "rounding", "h", *[f"slope{k}" for k in used]), ("x_new", "rounding_new"))
+
+
+def _whole(last: str) -> Sum:
+    """Register `lost`: 0 where the trial arrived at a finite state with a finite rate, else NaN."""
+    x_new, slope = cg.variables("x_new slope")
+    return Sum(Graph([x_new, slope], {"none": (x_new - x_new) + (slope - slope)}), ("x_new", last), "lost")
+
+
+def _squared(weights: tuple[float, ...], target: str) -> Sum:
+    """Sum over the state of (h * (sum of weight * slope) / scale)^2."""
+    used = [k for k, weight in enumerate(weights) if weight]
+    *sizes, h = inputs = cg.variables((*SCALE, "h"))
+    nodes = cg.variables([f"s{k}" for k in used])
+    part = h * weighted(nodes, [weights[k] for k in used]) / scale(*sizes)
+    return Sum(Graph([*inputs, *nodes], {"y": part * part}), (*SCALE, "h", *[f"slope{k}" for k in used]), target)
+
+
+def _estimate(count: int, m: int) -> Call:
+    """The root mean square; of two estimates, that of DOP853 (Hairer, Norsett and Wanner I, section II.10)."""
+    if count == 1:
+        total, none = cg.variables("sum0 lost")
+        return Call(Graph([total, none], {"error": cg.sqrt(total / m) + none}), ("sum0", "lost"), ("error",))
+    fifth, third, none = inputs = cg.variables("sum0 sum1 lost")
+    both = fifth + 0.01 * third
+    error = cg.where(cg.equal(both, 0.0), 0.0, cg.where(both < math.inf, fifth / cg.sqrt(both * m), both))
+    return Call(Graph(inputs, {"error": error + none}), ("sum0", "sum1", "lost"), ("error",))
+
+
+def _held(tableau: Tableau) -> list[Statement]:
+    """Counts accepted steps beyond the stability limit on the negative real axis (Hairer and Wanner II, section IV.2).
+
+    h |f(x_new) - f(y)| / |x_new - y|, with y the state of the last stage, which like x_new stands at t + h.
+    """
+    if tableau.c[-1] != 1.0:
+        return []
+    stages, limit = len(tableau.b), real_stability(tableau)
+    *sizes, a, b = inputs = cg.variables((*SCALE, "a", "b"))
+    part = (a - b) / scale(*sizes)
+    graph = Graph(inputs, {"y": part * part})
+    rise = Sum(graph, (*SCALE, f"slope{stages}", f"slope{stages - 1}"), "rise")
+    reach = Sum(graph, (*SCALE, "x_new", "at"), "reach")
+    h, up, along, held = inputs = cg.variables("h rise reach held")
+    beyond = h * h * up > (SAFETY * limit) ** 2 * along
+    return [rise, reach, Call(Graph(inputs, {"sum": held + beyond}), ("h", "rise", "reach", "held"), ("held",))]
+
+
+def _dense(tableau: Tableau, problem: Problem) -> list[Statement]:
+    """The coefficients of the dense output of an accepted step, with the stages that only they need."""
     body: list[Statement] = []
-    for k in range(len(tableau.b)):
-        body += stage(problem, tableau, k)
-    slopes = {f"slope{k}": problem.size for k in range(len(tableau.b))}
-    return Step({"at": problem.size, "at_t": 1, **slopes}, [], [*body, stage_state("x", tableau.b)])
-
-
-def explicit(tableau: Tableau, problem: Problem) -> Program:
-    """One explicit step a pass."""
-    step = explicit_step(tableau, problem)
-    body = [*step.body, *advance(len(tableau.b))]
-    return Program({**registers(problem), **step.lengths}, body, record=["t", "x"], stop="nonfinite")
+    for k, (c, weights) in enumerate(tableau.extra, start=len(tableau.b) + 1):
+        body += _stage(problem, k, c, weights, ("inside", "inside_t"))
+    for power in range(len(tableau.interpolant[0])):
+        weights = tuple([row[power] for row in tableau.interpolant])
+        used = [k for k, weight in enumerate(weights) if weight]
+        slopes = tuple([f"slope{k}" for k in used])
+        body.append(Map(scaled([weights[k] for k in used]), ("h", *slopes), (f"dense{power + 1}",)))
+    return body

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 from cgraph import Graph
-from cgraph.extend import Call, CompressedJacobian, Map, Statement, compressed_jacobian
+from cgraph.extend import Call, CompressedJacobian, Map, Statement, compressed_jacobian, kept_by_first
 
-from .problem import KEPT, Problem, state_jacobian
+from .problem import Problem, state_jacobian
 
 
 def jacobian_statements(problem: Problem) -> tuple[list[Statement], dict[str, int]]:
@@ -26,6 +24,6 @@ def jacobian_statements(problem: Problem) -> tuple[list[Statement], dict[str, in
     return statements, {"known": len(parts.primal.outputs)} | dict.fromkeys(("color", *rows), parts.colors)
 
 
-@lru_cache(KEPT)
+@kept_by_first
 def _compressed(problem: Problem) -> CompressedJacobian | None:
     return compressed_jacobian(problem.rate, list(problem.states))

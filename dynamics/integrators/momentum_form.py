@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import lru_cache
 
-from cgraph.extend import require_choice
+from cgraph.extend import kept_by_first, require_choice
 
 from ..equations.equations_of_motion import momentum
 from ..equations.hamiltonian import FORMS, hamilton_equations, missing_momenta, velocities
 from ..systems.model import as_system
-from .problem import KEPT, Problem
+from .problem import Problem
 
 
 def in_form(problem: Problem, form: str) -> Problem:
@@ -22,7 +21,7 @@ def in_form(problem: Problem, form: str) -> Problem:
     return momentum_form(problem)
 
 
-@lru_cache(KEPT)
+@kept_by_first
 def momentum_form(problem: Problem) -> Problem:
     """The same motion in q and p = dL/dqd.
 

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import NamedTuple
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Builder, SingularError, building, cotangents, hessian_nodes, solve_nodes
+from cgraph.extend import Builder, SingularError, building, cotangents, hessian_nodes, kept_by_first, solve_nodes
 
 from ..equations.singular_mass_matrix import SingularMassMatrixError
 from ..systems.arguments import new_variables
 from ..systems.system import System
-from .problem import KEPT, Problem, reaches
+from .problem import Problem, reaches
 
 ONE = cg.constant(1.0)
 
@@ -29,7 +28,7 @@ class Mechanics(NamedTuple):
     separable: bool  # p = M qd with a constant M, and the forces do not depend on the velocities
 
 
-@lru_cache(KEPT)
+@kept_by_first
 def mechanics(problem: Problem) -> Mechanics:
     """The graphs of momenta of a problem.
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from fractions import Fraction
-from functools import cache
 
 Row = tuple[Fraction, ...]
 
@@ -25,7 +24,6 @@ class Partitioned:
     c: Row
 
 
-@cache
 def gauss(stages: int) -> Partitioned:
     """Gauss's method of s stages, of order 2 s: collocation at the roots x of Legendre's polynomial P_s.
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
 from typing import Any
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import topological
+from cgraph.extend import kept_by_first, memo, topological
 
 from ..equations.energies import energy
 from ..equations.projection import projection
@@ -19,7 +18,7 @@ from ..systems.arguments import TIME, Parameters, call_user_function
 from ..systems.model import Model, as_ode, as_system
 from ..systems.system import System
 
-KEPT = 16  # problems whose graphs stay for another run
+KEPT = 16  # problems that stay for another run, with what was derived from them
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +133,7 @@ class _Request:
     bound: Mapping[str, float] = field(compare=False)
 
 
-@lru_cache(KEPT)
+@memo(KEPT)
 def _derived(request: _Request) -> Problem:
     model, bound = request.model, dict(request.bound)
     inputs, system = state_inputs(model), model.system
@@ -160,13 +159,13 @@ def _bind(graph: Graph, first: Sequence[str], parameters: Sequence[str], bound: 
     return Graph(cg.variables([*first, TIME, *parameters]), specialized.outputs)
 
 
-@lru_cache(KEPT)
+@kept_by_first
 def total_energy(problem: Problem) -> Graph | None:
     """The energy E of a mechanical system: inputs the states, t, parameters. None for a first-order system."""
     return None if problem.system is None else problem.bind(problem.states, energy(problem.system))
 
 
-@lru_cache(KEPT)
+@kept_by_first
 def force(problem: Problem) -> Graph | None:
     """tau + forces - damping qd: inputs the states, t, parameters. None for a first-order system."""
     system = problem.system
@@ -177,13 +176,13 @@ def force(problem: Problem) -> Graph | None:
     return problem.bind(problem.states, Graph(quantity_inputs(problem), outputs))
 
 
-@lru_cache(KEPT)
+@kept_by_first
 def state_jacobian(problem: Problem) -> Graph:
     """df/dx, row by row: inputs the states, t, parameters."""
     return cg.simplify(cg.jacobian(problem.rate, list(problem.states)))
 
 
-@lru_cache(KEPT)
+@kept_by_first
 def time_derivative(problem: Problem) -> Graph:
     """df/dt at fixed x: inputs the states, t, parameters."""
     return cg.simplify(cg.jacobian(problem.rate, [TIME]))
@@ -218,12 +217,12 @@ def state_arguments(problem: Problem) -> tuple[Any, ...]:
     return problem.system.q, problem.system.qd, problem.system.t, p
 
 
-@lru_cache(KEPT)
+@kept_by_first
 def _parameters(problem: Problem) -> Parameters:
     return Parameters(state_inputs(problem.model).parameters)
 
 
-@lru_cache(KEPT)
+@kept_by_first
 def _known(problem: Problem) -> frozenset[Node]:
     return frozenset(quantity_inputs(problem))
 

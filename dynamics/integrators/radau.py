@@ -14,26 +14,14 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Call, Factor, FixedPoint, If, Map, Program, Solve, Statement, Sum
+from cgraph.extend import Call, Factor, FixedPoint, If, Map, Solve, Statement, Sum
 
 from .elementwise import SAME, identity, weighted
 from .explicit import stage_time
 from .jacobian_statements import jacobian_statements
 from .problem import Problem
 from .step import Step
-from .step_control import (
-    SCALE,
-    accept_step,
-    control,
-    count,
-    first_pass,
-    lost,
-    measured,
-    recorded,
-    registers,
-    scale,
-    trial,
-)
+from .step_control import SCALE, lost, measured, scale
 from .tableau import Row
 
 _R6 = math.sqrt(6.0)
@@ -49,8 +37,10 @@ _REAL = 3.0 + 3.0 ** (2 / 3) - 3.0 ** (1 / 3)  # eigenvalues of the inverse of A
 _COMPLEX = complex(3.0 + 0.5 * (3.0 ** (1 / 3) - 3.0 ** (2 / 3)), 0.5 * (3.0 ** (5 / 6) + 3.0 ** (7 / 6)))
 _ERROR = ((-13 - 7 * _R6) / 3, (-13 + 7 * _R6) / 3, -1 / 3)  # weights of Z / h in the estimate
 HALVES = (0.9 / 0.5) ** 4  # the error at which a step of estimate h^4 is halved
-TURNS = 8  # of Newton's iteration, at most
-MOST_TURNS = 60  # where it goes on to rounding
+TURNS = 8.0  # of Newton's iteration, at most
+MOST_TURNS = 100.0  # where it goes on to rounding
+ROUNDING = 2.0**-52  # relative
+STALLS = 3.0  # turns that come no nearer: the rest is rounding
 SMALL = 1e-6  # of the largest coordinate or velocity, below which a component is measured by it
 CHANGES = ("right0", "F1", "F2")  # of W in a turn
 ORDER = 5
@@ -73,70 +63,49 @@ _T, _T_INVERSE = _transformation()
 _POWERS = [tuple(row) for row in (np.linalg.inv(np.vander(_C, 3, increasing=True)) / np.array(_C)).tolist()]
 
 
-def radau(problem: Problem, dense: bool) -> Program:
-    """A trial of one step."""
+def radau_step(problem: Problem) -> Step:
+    """The step, with a guess from the polynomial of the one before."""
     m = problem.size
     z, w, f = (tuple([f"{name}{k}" for k in range(3)]) for name in ("Z", "W", "F"))
-    powers = tuple([f"dense{k + 1}" for k in range(3)])
-
+    powers = tuple([f"power{k + 1}" for k in range(3)])
     slopes, on_the_way = jacobian_statements(problem)
     body: list[Statement] = [
-        first_pass(identity(m), *[Call(Graph([], {f"{k}": 0.0 for k in range(m)}), (), (name,)) for name in powers]),
-        If("accepted", (*slopes, Call(problem.rate, ("x", "t", "p"), ("rate",)), count(1))),
-        trial(),
+        _sizes(problem),
         *_matrices(m),
         *[stage_time(f"time{k}", _C[k]) for k in range(3)],
         *_guess(z, powers),
         *_combined(_T_INVERSE, z, w),
         _begin(),
         FixedPoint("going", (*_turn(problem, z, w, f), *_compared(m))),
-        *_estimate(problem, z),
-        control(4, 0),
-        accept_step(*_dense(z, powers), Call(SAME, ("h",), ("h_old",))),
+        _unsolved(),
     ]
-    lengths = _lengths(m) | on_the_way | dict.fromkeys((*powers, "error_vector"), m)
-    lengths |= dict.fromkeys("newton sum converged h_old again".split(), 1)
-    return Program({**registers(problem), **lengths}, body, recorded(dense, 3), record_if="accepted", stop="status")
+    controls = "h_old lost lost2 going turns stalled change change_old exact newton converged failed again sum".split()
+    lengths = _lengths(m) | on_the_way | dict.fromkeys((*powers, "error_vector", "size", "least"), m)
+    lengths |= {"rtol": 1, "atol": m, "leap": 1, "evaluations": 1} | dict.fromkeys(controls, 1)
+    zeros = Graph([], {f"{k}": 0.0 for k in range(m)})
+    return Step(
+        lengths,
+        body,
+        prepare=[*slopes, Call(problem.rate, ("x", "t", "p"), ("rate",))],
+        start=[identity(m), *[Call(zeros, (), (name,)) for name in (*powers, "size")]],
+        kept=[*_combined(_POWERS, z, powers), Call(SAME, ("h",), ("h_old",))],
+        fixed=("jacobian", "real", "complex", "size", "least", "rtol", "atol", "leap", *powers, *on_the_way, *controls),
+        failed="failed",
+        error=_estimate(problem, z),
+        estimate=4,
+        dense=_combined(_POWERS, z, ("dense1", "dense2", "dense3")),
+    )
 
 
 def _lengths(m: int) -> dict[str, int]:
     lengths = {"unit": m * m, "jacobian": m * m, "real": m * m, "complex": 4 * m * m, "pivots": m, "pivots2": 2 * m}
     lengths |= dict.fromkeys([f"{name}{k}" for name in "ZWF" for k in range(3)], m)
     lengths |= dict.fromkeys(("rate", "at", "right0"), m) | {"right12": 2 * m}
-    return lengths | dict.fromkeys("lost lost2 going turns change change_old time0 time1 time2".split(), 1)
-
-
-def radau_step(problem: Problem) -> Step:
-    """One step, whose stages are iterated until they no longer come nearer."""
-    m = problem.size
-    z, w, f = (tuple([f"{name}{k}" for k in range(3)]) for name in ("Z", "W", "F"))
-    zeros = Graph([], {f"{k}": 0.0 for k in range(m)})
-    begin = Graph([], {"going": 1.0, "turns": 0.0, "change_old": math.inf, "stalled": 0.0})
-    slopes, on_the_way = jacobian_statements(problem)
-    body: list[Statement] = [
-        *slopes,
-        Call(problem.rate, ("x", "t", "p"), ("rate",)),
-        *_matrices(m),
-        *[stage_time(f"time{k}", _C[k]) for k in range(3)],
-        *[Call(zeros, (), (name,)) for name in (*z, *w)],
-        _sizes(problem),
-        Call(begin, (), tuple(begin.outputs)),
-        FixedPoint("going", (*_turn(problem, z, w, f), *_to_rounding())),
-        Map(SAME, ("x_new",), ("x",)),
-    ]
-    lengths = (
-        _lengths(m)
-        | on_the_way
-        | dict.fromkeys(("x_new", "size", "scale"), m)
-        | {"stalled": 1, "failed": 1, "evaluations": 1}
-    )
-    controls = "lost lost2 going turns change change_old stalled failed"
-    fixed = ("jacobian", "real", "complex", "size", "scale", *on_the_way, *controls.split())
-    return Step(lengths, [identity(m), Call(zeros, (), ("size",))], body, fixed, "failed")
+    return lengths | dict.fromkeys("time0 time1 time2".split(), 1)
 
 
 def _sizes(problem: Problem) -> Call:
-    """How large each component has been so far, and what a change is measured by: no less than 1e-6 of its kind."""
+    """How large each component has been so far, and its rounding: of no less than 1e-6 of the largest of its kind."""
     m, nq = problem.size, problem.nq
     names = ["size", "x", "rate"]
     size, x, rate = ([cg.variable(f"{name}{k}") for k in range(m)] for name in names)
@@ -146,30 +115,9 @@ def _sizes(problem: Problem) -> Call:
     scales: list[Node] = []
     for kind in kinds:
         most = reduce(cg.maximum, [largest[k] for k in kind], cg.constant(0.0))
-        scales += [cg.maximum(largest[k], SMALL * most) for k in kind]
+        scales += [ROUNDING * cg.maximum(largest[k], SMALL * most) for k in kind]
     outputs = {f"{k}": node for k, node in enumerate([*largest, *scales])}
-    return Call(Graph([*size, *x, *rate, h], outputs), (*names, "h"), ("size", "scale"))
-
-
-def _to_rounding() -> list[Statement]:
-    """Go on while changes get smaller by half; three that do not are rounding."""
-    size, *changes = cg.variables(["size", "d0", "d1", "d2"])
-    parts = [cg.where(size, change / size, 0.0) for change in changes]
-    graph = Graph([size, *changes], {"y": parts[0] * parts[0] + parts[1] * parts[1] + parts[2] * parts[2]})
-    change, old, turns, stalled, failed = inputs = cg.variables("change change_old turns stalled failed")
-    stalls = stalled + cg.where(4.0 * change < old, 0.0, 1.0)
-    lost = 1.0 - (change < math.inf)
-    most = turns + 1.0 >= MOST_TURNS
-    going = (1.0 - lost) * (1.0 - most) * (stalls < 3.0) * (change > 0.0)
-    outputs = {
-        "going": going,
-        "change_old": change,
-        "turns": turns + 1.0,
-        "stalled": stalls,
-        "failed": failed + cg.maximum(lost, most * (stalls < 3.0)),
-    }
-    names = ("change", "change_old", "turns", "stalled", "failed")
-    return [Sum(graph, ("scale", *CHANGES), "change"), Call(Graph(inputs, outputs), names, tuple(outputs))]
+    return Call(Graph([*size, *x, *rate, h], outputs), (*names, "h"), ("size", "least"))
 
 
 def _matrices(m: int) -> list[Statement]:
@@ -191,9 +139,8 @@ def _matrices(m: int) -> list[Statement]:
         rows.append([*diagonal(-b, row), *same])
     entries: dict[str, Node | float] = {f"{k}": entry for k, entry in enumerate(entry for row in rows for entry in row)}
     both = Graph([*(entry for row in jacobian for entry in row), h], entries)
-    body: list[Statement] = [real, Factor("real", "pivots"), lost("real", "lost")]
-    body += [Call(both, ("jacobian", "h"), ("complex",)), Factor("complex", "pivots2"), lost("complex", "lost2")]
-    return body
+    both_factored: list[Statement] = [Call(both, ("jacobian", "h"), ("complex",)), Factor("complex", "pivots2")]
+    return [real, Factor("real", "pivots"), *both_factored]
 
 
 def _guess(z: tuple[str, ...], powers: tuple[str, ...]) -> list[Statement]:
@@ -216,15 +163,20 @@ def _combined(rows: list[Row], sources: tuple[str, ...], targets: tuple[str, ...
 
 
 def _begin() -> Call:
-    """Newton's iteration starts; it ends where a change is small beside the tolerance of the step."""
+    """Newton's iteration starts; it ends where a change is small beside the tolerance of the step.
+
+    Without a tolerance, where the step cannot be halved: beside rounding, after as many turns as it takes.
+    """
     rtol = cg.variable("rtol")
-    newton = cg.maximum(10.0 * 2.0**-52 / rtol, cg.minimum(0.03, cg.sqrt(rtol)))
+    newton = cg.maximum(10.0 * ROUNDING / rtol, cg.minimum(0.03, cg.sqrt(rtol)))
     outputs: dict[str, Node | float] = {
         "going": 1.0,
         "turns": 0.0,
+        "stalled": 0.0,
         "change_old": math.inf,
         "converged": 0.0,
-        "newton": newton,
+        "exact": cg.equal(rtol, 0.0),
+        "newton": cg.where(rtol, newton, 10.0),
     }
     return Call(Graph([rtol], outputs), ("rtol",), tuple(outputs))
 
@@ -256,18 +208,23 @@ def _turn(problem: Problem, z: tuple[str, ...], w: tuple[str, ...], f: tuple[str
 
 
 def _compared(m: int) -> list[Statement]:
-    """The change of a turn beside the tolerance of the step, and what follows from it."""
-    sizes, changes = cg.variables(SCALE), cg.variables("d0 d1 d2")
-    size = scale(*sizes)
-    squares = [(change / size) * (change / size) for change in changes]
-    graph = Graph([*sizes, *changes], {"y": squares[0] + squares[1] + squares[2]})
-    return [Sum(graph, (*SCALE, *CHANGES), "change"), _judged(3 * m)]
+    """The change of a turn beside the tolerance of the step, or rounding, and what follows from it."""
+    names = (*SCALE, "least")
+    *sizes, least = inputs = cg.variables(names)
+    changes = cg.variables("d0 d1 d2")
+    size = cg.where(sizes[SCALE.index("rtol")], scale(*sizes), least)
+    squares = [cg.where(change, (change / size) * (change / size), 0.0) for change in changes]
+    graph = Graph([*inputs, *changes], {"y": squares[0] + squares[1] + squares[2]})
+    return [Sum(graph, (*names, *CHANGES), "change"), _judged(3 * m)]
 
 
 def _judged(numbers: int) -> Call:
-    """Whether Newton's iteration goes on, and whether it has converged."""
-    names = ("change", "change_old", "turns", "newton", "evaluations")
-    total, old, turns, newton, done = inputs = cg.variables(names)
+    """Whether Newton's iteration goes on, and whether it has converged.
+
+    One that will not come to the tolerance in time has not; beside rounding, one that comes no nearer has.
+    """
+    names = ("change", "change_old", "turns", "stalled", "exact", "newton", "evaluations")
+    total, old, turns, stalled, exact, newton, done = inputs = cg.variables(names)
     change = cg.sqrt(total / numbers)
     rate = change / old  # 0 in the first turn
     left = rate / (1.0 - rate) * change
@@ -275,15 +232,25 @@ def _judged(numbers: int) -> Call:
     first = cg.equal(turns, 0.0)
     settled = cg.maximum(cg.equal(change, 0.0), (1.0 - first) * (rate < 1.0) * (left < newton))
     finite = change < math.inf
-    going = finite * (1.0 - settled) * cg.maximum(first, hopeful) * (turns + 1.0 < TURNS)
+    stalls = stalled + (1.0 - (rate < 1.0))
+    hope = cg.where(exact, stalls < STALLS, cg.maximum(first, hopeful))
+    going = finite * (1.0 - settled) * hope * (turns + 1.0 < cg.where(exact, MOST_TURNS, TURNS))
     outputs = {
         "going": going,
-        "converged": settled,
+        "converged": cg.maximum(settled, exact * finite * (stalls >= STALLS)),
         "turns": turns + 1.0,
+        "stalled": stalls,
         "change_old": change,
         "evaluations": done + 3.0,
     }
     return Call(Graph(inputs, outputs), names, tuple(outputs))
+
+
+def _unsolved() -> Call:
+    """Register `failed`, of a step that cannot be halved."""
+    failed, converged = cg.variables("failed converged")
+    graph = Graph([failed, converged], {"failed": failed + (1.0 - converged)})
+    return Call(graph, ("failed", "converged"), ("failed",))
 
 
 def _sum_of(base: str, parts: tuple[str, ...], weights: Row, target: str) -> Map:
@@ -312,13 +279,10 @@ def _estimate(problem: Problem, z: tuple[str, ...]) -> list[Statement]:
     none, none2 = cg.variables("lost lost2")
     halved = Graph([error, converged, none, none2], {"error": cg.where(converged, error + none + none2, HALVES)})
     return [
+        lost("real", "lost"),
+        lost("complex", "lost2"),
         *once,
         Call(doubt, ("error", "accepted", "h_old"), ("again",)),
         If("again", twice),
         Call(halved, ("error", "converged", "lost", "lost2"), ("error",)),
     ]
-
-
-def _dense(z: tuple[str, ...], powers: tuple[str, ...]) -> list[Statement]:
-    """The collocation polynomial through x and the stages, for dense output and the next guess."""
-    return _combined(_POWERS, z, powers)

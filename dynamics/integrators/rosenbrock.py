@@ -11,14 +11,14 @@ from dataclasses import dataclass
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import Call, Factor, If, Map, Program, Solve, Statement
+from cgraph.extend import Call, Factor, Map, Solve, Statement
 
-from .elementwise import SAME, function, identity, weighted
+from .elementwise import SAME, identity, weighted
 from .explicit import stage_time
 from .jacobian_statements import jacobian_statements
 from .problem import Problem, state_jacobian, time_derivative
 from .step import Step
-from .step_control import accept_step, control, first_pass, lost, measured, recorded, registers, trial
+from .step_control import lost, measured
 from .tableau import Row
 
 
@@ -85,37 +85,23 @@ RODAS5P = Rosenbrock(
 )
 
 
-def rosenbrock(method: Rosenbrock, problem: Problem, dense: bool) -> Program:
-    """A trial of one step."""
-    m, stages = problem.size, len(method.c)
-    slopes = tuple([f"U{k}" for k in range(stages)])
-    now, on_the_way = jacobian_statements(problem)
-    now += _time_slope(problem)
-    body: list[Statement] = [first_pass(identity(m)), If("accepted", tuple(now)), trial()]
-    body += [_matrix(method.gamma), Factor("matrix", "pivots"), lost("matrix", "lost")]
-    body += _stages(method, problem)
-    body += [
-        *measured(slopes[-1], m),
-        Call(function("error lost", error=cg.variable("error") + cg.variable("lost")), ("error", "lost"), ("error",)),
-        control(method.order, stages),
-        accept_step(*(_dense(method, slopes) if dense else ())),
-    ]
-    degree = len(method.dense) + 1
-    lengths = {**_lengths(method, problem), **on_the_way, "sum": 1, "lost": 1}
-    if dense:
-        lengths |= {
-            f"{name}{k + 1}": m for name, count in (("h_", degree - 1), ("dense", degree)) for k in range(count)
-        }
-    record = recorded(dense, degree)
-    return Program({**registers(problem), **lengths}, body, record, record_if="accepted", stop="status")
-
-
 def rosenbrock_step(method: Rosenbrock, problem: Problem) -> Step:
-    """One step, with the Jacobian written out, since it has derivatives."""
-    slope = Call(state_jacobian(problem), ("x", "t", "p"), ("jacobian",))
-    body = [slope, *_time_slope(problem), _matrix(method.gamma), Factor("matrix", "pivots"), *_stages(method, problem)]
-    body.append(Map(SAME, ("x_new",), ("x",)))
-    return Step({**_lengths(method, problem), "x_new": problem.size}, [identity(problem.size)], body)
+    """The step; where it has derivatives, its Jacobian is written out."""
+    m, last, degree = problem.size, f"U{len(method.c) - 1}", len(method.dense) + 1
+    now, on_the_way = jacobian_statements(problem)
+    both = Graph(cg.variables("error lost"), {"error": cg.variable("error") + cg.variable("lost")})
+    names = [("h_", degree - 1), ("dense", degree)]
+    return Step(
+        {**_lengths(method, problem), **on_the_way, "sum": 1, "lost": 1},
+        [_matrix(method.gamma), Factor("matrix", "pivots"), *_stages(method, problem)],
+        prepare=[*now, *_time_slope(problem)],
+        start=[identity(m)],
+        error=[*measured(last, m), lost("matrix", "lost"), Call(both, ("error", "lost"), ("error",))],
+        estimate=method.order,
+        dense=_dense(method),
+        dense_lengths={f"{name}{k + 1}": m for name, count in names for k in range(count)},
+        smooth=[Call(state_jacobian(problem), ("x", "t", "p"), ("jacobian",)), *_time_slope(problem)],
+    )
 
 
 def _time_slope(problem: Problem) -> list[Statement]:
@@ -172,8 +158,9 @@ def _sum(target: str, base: str, weights: Row) -> Map:
     return Map(graph, (base, *[f"U{j}" for j in used]), (target,))
 
 
-def _dense(method: Rosenbrock, slopes: tuple[str, ...]) -> list[Statement]:
+def _dense(method: Rosenbrock) -> list[Statement]:
     """The powers of s in x + s (x_new - x) + s (1 - s) (h_1 + s h_2 + ..)."""
+    slopes = tuple([f"U{k}" for k in range(len(method.c))])
     x, x_new, *parts = cg.variables(["x", "x_new", *(f"h_{k + 1}" for k in range(len(method.dense)))])
     powers = [x_new - x + parts[0]]
     powers += [after - before for before, after in itertools.pairwise(parts)]

@@ -1,32 +1,144 @@
-"""Step: one step of a size that is handed in, as statements, which is what derivatives of motions are taken of."""
+"""Step: one step of a method as statements, of which equal steps, chosen steps and derivatives are wrappers."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
-from cgraph.extend import STATEMENTS, Statement
+from cgraph.extend import STATEMENTS, Call, Map, Statement
+
+from .elementwise import SAME
+from .problem import Problem
+
+# What a step may read of a run; in equal steps and derivatives those for which it has lengths are 0.
+SHARED = ("x", "x_new", "t", "h", "p", "rtol", "atol", "leap", "next", "evaluations", "error", "held", "accepted")
 
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """One step from the state x at t, of h: registers x, t, h, p as in `Method`, and those that it needs besides.
+    """One step of a method: from the state x at t, of the length h, to x_new, and what is known of it besides.
 
-    Whether a step is accepted, and how long the next one is, is not its business.
+    It is statements over registers. Every step has x (m), x_new (m), t, h and p, the values of the problem's
+    parameters; whatever else it needs it names in `lengths`. Whether it is accepted, how long the next one is, which
+    forces act in it and what its derivatives are is the business of `equal`, `chosen` and `dyn.gradient`.
 
-    lengths: of the registers besides.  start: what is done before the first step, with x at the start in `x`.
-    body: the step itself, with no `If`; what it hands on to the next one is in registers that it both reads and writes.
-    fixed: registers whose values have no derivatives: guesses, roundings, matrices of an iteration.
-    failed: a register that is not 0 after a step whose equations were not solved; empty where nothing is iterated.
+    Parameters
+    ----------
+    lengths : dict
+        Of the registers that it needs besides.
+    body : sequence of Statement
+        x_new of x, t, h, p and what comes before.
+    rates : sequence of Statement, optional
+        Before all else, from x, t and p.
+    prepare : sequence of Statement, optional
+        Before the body, after `rates`: done once for a state, however many lengths are tried from it.
+    start : sequence of Statement, optional
+        Before the first step.
+    kept : sequence of Statement, optional
+        After an accepted step, with x still the state before: what the next one reads, such as a guess. Its value must
+        not matter where a step starts anew: applied forces may change between two steps.
+    fixed : tuple of str, optional
+        Registers whose values have no derivatives: guesses, roundings, matrices of an iteration.
+    failed : str, optional
+        A register that is not 0 after a step whose equations were not solved. Equations are solved by a `FixedPoint`,
+        to the tolerance of register rtol, and to rounding where that is 0.
+    error : sequence of Statement, optional
+        After the body: the estimated error of x_new in register `error`, 1 at the tolerance; see
+        `step_control.measured`. Without it steps cannot be chosen.
+    estimate : int, optional
+        q, where the estimate falls as h^q.
+    handed : sequence of Statement, optional
+        After an accepted step that was chosen, in place of `rates` before the next: the same from what `error` knows.
+    dense : sequence of Statement, optional
+        After an accepted step: registers dense1, dense2, .. (m), with x(t + s h) = x + sum_k dense_k s^k. Without it
+        the cubic through states and rates at both ends.
+    dense_lengths : dict, optional
+        Of the registers that only `dense` needs, those of its result included.
+    smooth : sequence of Statement, optional
+        In place of `prepare` where derivatives are taken of it. Default `prepare`.
+
+    Examples
+    --------
+    Heun's method, which goes by the mean of the slopes at both ends:
+
+    >>> import dynamics as dyn
+    >>> import cgraph as cg
+    >>> from cgraph.extend import Call, Map
+    >>> from dynamics.integrators import Method, Step
+    >>> def heun(problem):
+    ...     x, h, a, b = cg.variables("x h a b")
+    ...     along, mean = cg.Graph([x, h, a], {"x": x + h * a}), cg.Graph([x, h, a, b], {"x": x + h * (a + b) / 2})
+    ...     t, later = cg.variables("t h")
+    ...     body = [
+    ...         Map(along, ("x", "h", "slope"), ("at",)),
+    ...         Call(cg.Graph([t, later], {"t": t + later}), ("t", "h"), ("end",)),
+    ...         Call(problem.rate, ("at", "end", "p"), ("slope_at_end",)),
+    ...         Map(mean, ("x", "h", "slope", "slope_at_end"), ("x_new",)),
+    ...     ]
+    ...     lengths = dict.fromkeys(("slope", "at", "slope_at_end"), problem.size) | {"end": 1}
+    ...     return Step(lengths, body, rates=[Call(problem.rate, ("x", "t", "p"), ("slope",))])
+    >>> dyn.METHODS["heun"] = Method(2, heun)
+    >>> decay = dyn.OdeSystem(lambda x, t: [-x[0]], ["x"])
+    >>> dyn.simulate(decay, [1.0], None, 1.0, "heun", dt=0.01).q[-1].round(4)
+    array([0.3679])
+    >>> del dyn.METHODS["heun"]
     """
 
-    lengths: dict[str, int]
-    start: Sequence[Statement]
+    lengths: Mapping[str, int]
     body: Sequence[Statement]
+    rates: Sequence[Statement] = ()
+    prepare: Sequence[Statement] = ()
+    start: Sequence[Statement] = ()
+    kept: Sequence[Statement] = ()
     fixed: tuple[str, ...] = ()
     failed: str = ""
+    error: Sequence[Statement] = ()
+    estimate: int = 0
+    handed: Sequence[Statement] = ()
+    dense: Sequence[Statement] = ()
+    dense_lengths: Mapping[str, int] = field(default_factory=dict)
+    smooth: Sequence[Statement] | None = None
 
     @property
-    def branches(self) -> bool:
-        """Whether what is done depends on numbers, so that steps from several states cannot go side by side."""
-        return any(STATEMENTS[type(each)].beside is None for each in (*self.start, *self.body))
+    def derived(self) -> list[Statement]:
+        """The statements of a step whose derivatives are taken, from x to the new x."""
+        prepare = self.prepare if self.smooth is None else self.smooth
+        return arriving([*self.rates, *prepare, *self.body, *self.kept])
+
+
+def arriving(statements: Sequence[Statement]) -> list[Statement]:
+    """The statements with x_new as the new x: where the last one makes it, written there, else copied."""
+    *before, last = statements
+    if isinstance(last, Map | Call) and last.outputs == ("x_new",):
+        return [*before, replace(last, outputs=("x",))]
+    return [*statements, Map(SAME, ("x_new",), ("x",))]
+
+
+def with_registers(step: Step, own: Mapping[str, int]) -> dict[str, int]:
+    """All registers: a step's, and those of what wraps it.
+
+    Raises ValueError where one name has two meanings, and for a step that does not make x_new of x.
+    """
+    written = set(_outputs([*step.rates, *step.prepare, *step.body, *step.kept]))
+    if "x_new" not in written or "x" in written:
+        raise ValueError("a step has to write register 'x_new', and to leave 'x' as it is")
+    twice = [name for name in (*step.lengths, *step.dense_lengths) if name in own and name not in SHARED]
+    if twice:
+        raise ValueError(f"a step cannot have a register {twice[0]!r}: a run has another of that name")
+    return {**step.lengths, **own}
+
+
+def _outputs(statements: Sequence[Statement]) -> Iterator[str]:
+    """The registers that statements write."""
+    for each in statements:
+        row = STATEMENTS[type(each)]
+        for name in row.writes:
+            registers: str | tuple[str, ...] = getattr(each, name)
+            yield from [registers] if isinstance(registers, str) else registers
+        for name in row.bodies:
+            yield from _outputs(getattr(each, name))
+
+
+def rate_calls(problem: Problem, *statements: Sequence[Statement]) -> int:
+    """How often statements evaluate the rate; those inside an iteration count themselves."""
+    return sum(isinstance(each, Call) and each.graph is problem.rate for part in statements for each in part)

@@ -1,4 +1,4 @@
-"""Programs that choose their steps: the registers that all of them have, step control, and explicit embedded methods.
+"""Chosen steps: a method's step, tried until its error is within the tolerance; the registers, and step control.
 
 A pass is a trial of one step, from t to t_new = t + h exactly. Registers: x the state, t, p the parameters,
 evaluations, as with equal steps; `h` the step, negative for a run back in time; `tried` its size before t_new was
@@ -17,15 +17,15 @@ next is at most `still`.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import Call, If, Map, Program, Statement, Sum
 
-from .elementwise import SAME, compensated, function, scaled, weighted
-from .explicit import stage, stage_state, stage_time
+from .elementwise import SAME, function
 from .problem import Problem
-from .tableau import Tableau, real_stability
+from .step import Step, rate_calls, with_registers
 
 RUNNING, DONE, TOO_SMALL = 0.0, 1.0, 2.0  # register `status`
 SAFETY, SMALLEST, LARGEST = 0.9, 0.2, 5.0  # factors from one step to the next
@@ -34,6 +34,7 @@ RESOLUTION = 4.0 * 2.0**-52  # steps below this share of t hardly move t
 SCALE = ("x", "x_new", "rtol", "atol", "leap")
 FORGOTTEN = 0.9  # of the longest step, in every step that is shorter
 COLLAPSE = 2.0**-200  # steps below this share of a run never end it
+HERMITE = 3  # degree of the dense output of a step that has none of its own
 SMALLEST_ATOL = 2.0**-1022  # in place of 0: a state that is 0 and stays 0 has no error
 
 
@@ -123,36 +124,48 @@ def first_pass(*statements: Statement) -> If:
     return If("fresh", (*statements, Call(function("fresh", none=0.0), ("fresh",), ("fresh",))))
 
 
-def embedded(tableau: Tableau, problem: Problem, dense: bool) -> Program:
-    """A trial of one step by an explicit embedded method; the slope at its end is the first slope of the next."""
-    m, stages = problem.size, len(tableau.b)
-    last = f"slope{stages}"
-    slopes = tuple([f"slope{k}" for k in range(stages + 1)])
-    body: list[Statement] = [first_pass(Call(problem.rate, ("x", "t", "p"), ("slope0",)), count(1)), trial()]
-    for k in range(1, stages):
-        body += stage(problem, tableau, k)
-    body += [_arrival(tableau.b), stage_time("at_t", 1.0), Call(problem.rate, ("x_new", "at_t", "p"), (last,))]
-    body += [_squared(weights, slopes, f"sum{k}") for k, weights in enumerate(tableau.error)]
-    body += [_whole(last), _estimate(len(tableau.error), m), control(tableau.estimate, stages)]
-    kept = (Map(SAME, (last,), ("slope0",)), Map(SAME, ("rounding_new",), ("rounding",)))
-    body.append(accept_step(*_held(tableau), *(_dense(tableau, problem) if dense else ()), *kept))
-    degree = len(tableau.interpolant[0])
-    lengths = {f"slope{k}": m for k in range(stages + 1 + (len(tableau.extra) if dense else 0))}
-    lengths |= {f"sum{k}": 1 for k in range(len(tableau.error))} | dict.fromkeys(("at_t", "lost", "rise", "reach"), 1)
-    lengths |= dict.fromkeys(("at", "rounding", "rounding_new"), m)
+def chosen(step: Step, problem: Problem, *, dense: bool, degree: int, starts: bool) -> Program:
+    """A trial of one step a pass. starts: whether the next step is at most what the derivatives at its start allow."""
+    lengths = with_registers(step, registers(problem))
+    rates, prepare = ([*part, *_counted(problem, part)] for part in (step.rates, step.prepare))
+    first, again = ([*step.start, *rates], prepare) if step.handed else (step.start, [*rates, *prepare])
+    body: list[Statement] = [first_pass(*first)] if first else []
+    if again:
+        body.append(If("accepted", tuple(again)))
+    body += [trial(), *step.body, *step.error]
+    body.append(control(step.estimate, rate_calls(problem, step.body, step.error)))
+    after: list[Statement] = []
     if dense:
-        lengths |= {f"dense{k + 1}": m for k in range(degree)}
-    record = recorded(dense, degree)
-    return Program({**registers(problem), **lengths}, body, record, record_if="accepted", stop="status")
+        polynomial, more = (step.dense, step.dense_lengths) if step.dense else _hermite(problem)
+        after += [*polynomial, *_counted(problem, polynomial)]
+        lengths |= {**dict.fromkeys([f"dense{k + 1}" for k in range(degree)], problem.size), **more}
+    body.append(accept_step(*after, *step.kept, *step.handed))
+    if starts:
+        body.append(If("accepted", (Call(Graph([], {"next": math.inf}), (), ("next",)),)))
+    return Program(lengths, body, recorded(dense, degree), record_if="accepted", stop="status")
 
 
-def _arrival(weights: tuple[float, ...]) -> Map:
-    """x_new = x + h * (sum of weight * slope) + what rounding took off the step before; rounding_new, what off this."""
-    used = [k for k, weight in enumerate(weights) if weight]
-    x, before, h, *slopes = cg.variables(["x", "rounding", "h", *(f"s{k}" for k in used)])
-    total, rounding = compensated(x, h * weighted(slopes, [weights[k] for k in used]) + before)
-    graph = Graph([x, before, h, *slopes], {"x": total, "rounding": rounding})
-    return Map(graph, ("x", "rounding", "h", *[f"slope{k}" for k in used]), ("x_new", "rounding_new"))
+def _counted(problem: Problem, statements: Sequence[Statement]) -> list[Call]:
+    """Register `evaluations`, with those of the statements."""
+    calls = rate_calls(problem, statements)
+    return [count(calls)] if calls else []
+
+
+def _hermite(problem: Problem) -> tuple[list[Statement], dict[str, int]]:
+    """The cubic through states and rates at both ends."""
+    x, x_new, h, a, b = inputs = cg.variables("x x_new h a b")
+    way, first, last = x_new - x, h * a, h * b
+    powers = {"1": first, "2": 3.0 * way - 2.0 * first - last, "3": first + last - 2.0 * way}
+    statements: list[Statement] = [
+        Call(problem.rate, ("x", "t", "p"), ("rate_before",)),
+        Call(problem.rate, ("x_new", "t_new", "p"), ("rate_after",)),
+        Map(
+            Graph(inputs, powers),
+            ("x", "x_new", "h", "rate_before", "rate_after"),
+            tuple([f"dense{k + 1}" for k in range(HERMITE)]),
+        ),
+    ]
+    return statements, dict.fromkeys(("rate_before", "rate_after"), problem.size)
 
 
 def measured(error: str, m: int) -> list[Statement]:
@@ -182,66 +195,3 @@ def lost(register: str, target: str) -> Sum:
     """
     a = cg.variable("a")
     return Sum(Graph([a], {"none": a - a}), (register,), target)
-
-
-def _whole(last: str) -> Sum:
-    """Register `lost`: 0 where the trial arrived at a finite state with a finite rate, else NaN."""
-    x_new, slope = cg.variables("x_new slope")
-    return Sum(Graph([x_new, slope], {"none": (x_new - x_new) + (slope - slope)}), ("x_new", last), "lost")
-
-
-def _held(tableau: Tableau) -> list[Statement]:
-    """Counts accepted steps beyond the stability limit on the negative real axis (Hairer and Wanner II, section IV.2).
-
-    h |f(x_new) - f(y)| / |x_new - y|, with y the state of the last stage, which like x_new stands at t + h.
-    """
-    if tableau.c[-1] != 1.0:
-        return []
-    stages, limit = len(tableau.b), real_stability(tableau)
-    *sizes, a, b = inputs = cg.variables((*SCALE, "a", "b"))
-    part = (a - b) / scale(*sizes)
-    graph = Graph(inputs, {"y": part * part})
-    rise = Sum(graph, (*SCALE, f"slope{stages}", f"slope{stages - 1}"), "rise")
-    reach = Sum(graph, (*SCALE, "x_new", "at"), "reach")
-    h, up, along, held = inputs = cg.variables("h rise reach held")
-    beyond = h * h * up > (SAFETY * limit) ** 2 * along
-    return [rise, reach, Call(Graph(inputs, {"sum": held + beyond}), ("h", "rise", "reach", "held"), ("held",))]
-
-
-def _squared(weights: tuple[float, ...], slopes: tuple[str, ...], target: str) -> Sum:
-    """Sum over the state of (h * (sum of weight * slope) / scale)^2."""
-    used = [k for k, weight in enumerate(weights) if weight]
-    *sizes, h = inputs = cg.variables((*SCALE, "h"))
-    nodes = cg.variables([f"s{k}" for k in used])
-    part = h * weighted(nodes, [weights[k] for k in used]) / scale(*sizes)
-    return Sum(Graph([*inputs, *nodes], {"y": part * part}), (*SCALE, "h", *[slopes[k] for k in used]), target)
-
-
-def _estimate(count: int, m: int) -> Call:
-    """The root mean square; of two estimates, that of DOP853 (Hairer, Norsett and Wanner I, section II.10)."""
-    if count == 1:
-        total, none = cg.variables("sum0 lost")
-        return Call(Graph([total, none], {"error": cg.sqrt(total / m) + none}), ("sum0", "lost"), ("error",))
-    fifth, third, none = inputs = cg.variables("sum0 sum1 lost")
-    both = fifth + 0.01 * third
-    error = cg.where(cg.equal(both, 0.0), 0.0, cg.where(both < math.inf, fifth / cg.sqrt(both * m), both))
-    return Call(Graph(inputs, {"error": error + none}), ("sum0", "sum1", "lost"), ("error",))
-
-
-def _dense(tableau: Tableau, problem: Problem) -> tuple[Statement, ...]:
-    """The coefficients of the dense output of an accepted step, with the stages that only they need."""
-    body: list[Statement] = []
-    for k, (c, weights) in enumerate(tableau.extra, start=len(tableau.b) + 1):
-        body += [
-            stage_state("at", weights),
-            stage_time("at_t", c),
-            Call(problem.rate, ("at", "at_t", "p"), (f"slope{k}",)),
-        ]
-    if tableau.extra:
-        body.append(count(len(tableau.extra)))
-    for power in range(len(tableau.interpolant[0])):
-        weights = tuple([row[power] for row in tableau.interpolant])
-        used = [k for k, weight in enumerate(weights) if weight]
-        slopes = tuple([f"slope{k}" for k in used])
-        body.append(Map(scaled([weights[k] for k in used]), ("h", *slopes), (f"dense{power + 1}",)))
-    return tuple(body)

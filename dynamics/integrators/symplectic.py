@@ -22,33 +22,23 @@ from fractions import Fraction
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Call, FixedPoint, Map, Program, Statement, Sum
+from cgraph.extend import Call, FixedPoint, Map, Statement, Sum
 
 from ..systems.arguments import TIME
 from .composition import Composition
 from .elementwise import SAME, compensated, function, weighted
-from .explicit import advance, registers, stage_time
+from .explicit import stage_time
 from .momentum_graphs import Mechanics, mechanics
 from .partitioned_tableau import MIDPOINT, SYMPLECTIC_EULER, VERLET, Partitioned, Row, over
 from .problem import Problem, reaches
 from .step import Step
-from .step_control import count, first_pass
+from .step_control import count
 
 TURNS = 60.0  # of the iteration for the stages, at most
 ENOUGH = 2.0**-53  # a change below this, relative, is rounding
 LOOSE = 1e-9  # one above this, when the turns are over, is no convergence: the step is too long
 REPEATS = 8  # Newton steps for the velocity of a momentum that is not linear in it
 ONCE = Composition(2, (1.0,))
-
-
-def composed(composition: Composition, problem: Problem) -> Program:
-    """One step a pass, of steps of `verlet` where it is explicit, else of `midpoint`."""
-    return _program(composed_step(composition, problem), problem)
-
-
-def partitioned(method: Partitioned, problem: Problem) -> Program:
-    """One step a pass: of coordinates and momenta; where there are none, of the state by a method of Gauss's."""
-    return _program(partitioned_step(method, problem), problem)
 
 
 def composed_step(composition: Composition, problem: Problem) -> Step:
@@ -92,7 +82,7 @@ def _of_momenta(method: Partitioned, problem: Problem, composition: Composition)
         body = _iterated(method, turn)
         body += [_added("q", "q_rounding", "V", method.w), _added("momentum", "momentum_rounding", "F", method.w)]
         body += [stage_time("later", 1.0), *_settled(graphs)]
-    body = [*_in_turn(composition, body), _copied(problem.size, ("q", "v"), ("x",))]
+    body = [*_in_turn(composition, body), _copied(problem.size, ("q", "v"), ("x_new",))]
     return _step(method, lengths, [*start, *_guess_at_rest(method, "v")], body)
 
 
@@ -121,7 +111,6 @@ def _of_phase(method: Partitioned, problem: Problem, composition: Composition) -
         ]
         if half:
             body += [Call(problem.rate, ("q", "momentum", "later", "p"), both), kick]
-        body.append(count(3 if half else 2))
     else:
         turn: list[Statement] = [count(len(stages))]
         for velocity in ("V", "W"):  # twice, since an error of V comes back to V by F
@@ -133,7 +122,7 @@ def _of_phase(method: Partitioned, problem: Problem, composition: Composition) -
             ]
         body = _iterated(method, turn)
         body += [_added("q", "q_rounding", "V", method.w), _added("momentum", "momentum_rounding", "F", method.w)]
-    body = [*_in_turn(composition, body), _copied(problem.size, ("q", "momentum"), ("x",))]
+    body = [*_in_turn(composition, body), _copied(problem.size, ("q", "momentum"), ("x_new",))]
     return _step(method, lengths, start, body)
 
 
@@ -157,11 +146,12 @@ def _of_states(method: Partitioned, problem: Problem, composition: Composition) 
     lengths = {"x_rounding": m} | {f"{name}{i}": m for name in ("Q", "V", "W") for i in stages}
     turn: list[Statement] = []
     for i in stages:
-        turn.append(_stage(method.a[i], "x", "V", f"Q{i}"))
+        turn.append(_stage(method.a[i], "x_new", "V", f"Q{i}"))
         turn.append(Call(problem.rate, (f"Q{i}", f"time{i}", "p"), (f"W{i}",)))
-    body = [*_iterated(method, turn), _added("x", "x_rounding", "V", method.w)]
+    body = [*_iterated(method, turn), _added("x_new", "x_rounding", "V", method.w)]
     rate = Call(problem.rate, ("x", "t", "p"), ("W0",))
-    return _step(method, lengths, [rate, *_guess_at_rest(method, "W0")], _in_turn(composition, body))
+    body = [Map(SAME, ("x",), ("x_new",)), *_in_turn(composition, body)]
+    return _step(method, lengths, [rate, *_guess_at_rest(method, "W0")], body)
 
 
 def _step(method: Partitioned, lengths: dict[str, int], start: list[Statement], body: list[Statement]) -> Step:
@@ -170,17 +160,7 @@ def _step(method: Partitioned, lengths: dict[str, int], start: list[Statement], 
     single |= {f"{name}{i}": 1 for name in ("time", "change", "speed") for i in range(len(method.w))}
     fixed = [name for name in lengths if name.endswith("rounding")]
     fixed += [name for name in single if not name.startswith(("time", "whole", "begin", "later"))]
-    return Step({**lengths, **single}, start, body, tuple(fixed), "failures")
-
-
-def _program(step: Step, problem: Problem) -> Program:
-    nonfinite, failures, singular = inputs = cg.variables("nonfinite failures singular")
-    bad = nonfinite + failures  # of what goes on, an inertia that is negative says nothing
-    either = Graph(inputs, {"nonfinite": bad, "failures": 0.0, "singular": cg.where(bad, singular, 0.0)})
-    judged = Call(either, ("nonfinite", "failures", "singular"), ("nonfinite", "failures", "singular"))
-    body = [first_pass(*step.start), *step.body, *advance(0), judged]
-    lengths = {**registers(problem), "fresh": 1, **step.lengths}
-    return Program(lengths, body, record=["t", "x"], stop="nonfinite")
+    return Step({**lengths, **single}, body, start=start, fixed=tuple(fixed), failed="failures")
 
 
 def _in_turn(composition: Composition, body: list[Statement]) -> list[Statement]:

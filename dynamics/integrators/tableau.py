@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import dataclass
-from functools import cache
+
+from cgraph.extend import kept_by_first
 
 Row = tuple[float, ...]
 
@@ -106,7 +107,7 @@ DOPRI5 = Tableau(
 )
 
 
-@cache
+@kept_by_first
 def real_stability(tableau: Tableau) -> float:
     """Where on the negative real axis stability ends: the smallest z > 0 with |R(-z)| > 1, to a sixty-fourth."""
     for k in itertools.count(1):

@@ -12,46 +12,66 @@ import math
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import Call, If, Map, Program, Statement, Sum
+from cgraph.extend import Call, If, Jets, Map, NoSeriesError, Statement, Sum, jets
 
+from ..systems.arguments import TIME
 from .elementwise import SAME, compensated, function
 from .explicit import stage_time
-from .jets import Jets, jets
 from .problem import Problem
-from .step_control import accept_step, control, count, first_pass, recorded, registers, trial
+from .step import Step
+from .step_control import count
 
 ORDER = 20  # of a tolerance of 2^-52
 LEAST = 3  # order
 CHECKED = 2.0**-46  # relative: rounding of the rates, below which a defect says nothing
 
 
-def taylor(order: int, problem: Problem, dense: bool) -> Program:
-    """A trial of one step of at most that order."""
-    m, graphs = problem.size, jets(problem.rate, problem.size)
+def taylor_step(order: int, problem: Problem) -> Step:
+    """The step, of at most that order."""
+    m, graphs = problem.size, _jets(problem)
     orders = range(1, order + 1)
-    begin = Call(graphs.start, ("x", "t", "p"), ("rate", "zeros"))
-    none = Graph([], {f"order{k}": float(k) for k in orders})
-    numbers = Call(none, (), tuple([f"order{k}" for k in orders]))
-    body: list[Statement] = [first_pass(begin, count(1), numbers, _orders(order), Map(SAME, ("next",), ("unit",)))]
+    numbers = Graph([], {f"order{k}": float(k) for k in orders})
     series: list[Statement] = [Map(SAME, ("rate",), ("rates0",))]
     for k in orders:
         series += [If(f"takes{k}", tuple(_coefficients(k, graphs)))]
-    body.append(If("accepted", (*series, _wish())))
-    body += [trial(), Call(function("h unit", s=cg.variable("h") / cg.variable("unit")), ("h", "unit"), ("s",))]
-    body += [_arrival(order), stage_time("at_t", 1.0)]
-    body += [Call(graphs.start, ("x_new", "at_t", "p"), ("rate_new", "zeros_new")), *_checked(m), control(order, 1)]
-    kept = [Map(SAME, (f"{name}_new",), (name,)) for name in ("rounding", "rate", "zeros")]
-    kept.append(Map(SAME, ("h",), ("unit",)))
-    body.append(accept_step(*((_dense(order),) if dense else ()), *kept))
-    body.append(If("accepted", (Call(Graph([], {"next": math.inf}), (), ("next",)),)))
-    names = [f"{name}{k}" for name in ("c", "dense") for k in orders]
+    unit, h = cg.variables("unit h")
+    share = Call(function("h unit", s=h / unit), ("h", "unit"), ("s",))
+    at_all = Call(function("unit h", unit=cg.where(unit, unit, h)), ("unit", "h"), ("unit",))  # where nothing is wished
+    names = [f"c{k}" for k in orders]
     lengths = dict.fromkeys([*names, "rates0", "rates1", "rate", "rate_new", "rounding", "rounding_new", "slope"], m)
     lengths |= {f"{side}{k}": graphs.sums for side in ("left", "right") for k in orders}
     lengths |= {"sums": graphs.sums, "none": graphs.sums, "zeros": graphs.zeros, "zeros_new": graphs.zeros}
-    single = ["unit", "s", "at_t", "last", "before", "highest"]
-    lengths |= dict.fromkeys([*single, *[f"{name}{k}" for name in ("order", "takes") for k in orders]], 1)
-    record = recorded(dense, order)
-    return Program({**registers(problem), **lengths}, body, record, record_if="accepted", stop="status")
+    lengths |= {"next": 1, "rtol": 1, "atol": m}
+    controls = ["unit", "last", "before", "highest", *[f"{name}{k}" for name in ("order", "takes") for k in orders]]
+    lengths |= dict.fromkeys(["s", "at_t", *controls], 1)
+    return Step(
+        lengths,
+        [share, _arrival(order)],
+        [_rates(graphs, "x", "t", ""), count(1)],
+        [at_all, *series, _wish()],
+        [Call(numbers, (), tuple(numbers.outputs)), _orders(order), Map(SAME, ("next",), ("unit",))],
+        kept=[Map(SAME, ("rounding_new",), ("rounding",)), Map(SAME, ("h",), ("unit",))],
+        fixed=("rounding", "rounding_new", "next", "rtol", "atol", *controls),
+        error=[stage_time("at_t", 1.0), _rates(graphs, "x_new", "at_t", "_new"), count(1), *_checked(m)],
+        estimate=order,
+        handed=[Map(SAME, (f"{name}_new",), (name,)) for name in ("rate", "zeros")],
+        dense=[_dense(order)],
+        dense_lengths={f"dense{k}": m for k in orders},
+    )
+
+
+def _rates(graphs: Jets, x: str, t: str, suffix: str) -> Call:
+    """The rates and coefficients 0 at a state."""
+    return Call(graphs.start, (x, t, "p"), (f"rate{suffix}", f"zeros{suffix}"))
+
+
+def _jets(problem: Problem) -> Jets:
+    try:
+        return jets(problem.rate, TIME)
+    except NoSeriesError as error:
+        raise NoSeriesError(
+            f"method 'taylor' needs equations that are smooth, and {error}: take another method, such as 'dop853'"
+        ) from None
 
 
 def _orders(order: int) -> Call:

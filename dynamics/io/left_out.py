@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from cgraph.extend import require_flag
 
@@ -13,7 +12,7 @@ from ..multibody.mechanism import Mechanism, MechanismError, MechanismWarning
 from ..systems.constraints import ConstraintError
 
 
-def present(what: Mapping[str, Any]) -> list[str]:
+def present(what: Mapping[str, object]) -> list[str]:
     """The sentences of what is there."""
     return [sentence for sentence, is_there in what.items() if is_there]
 

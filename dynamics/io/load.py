@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, TypeAlias
 from xml.etree import ElementTree
 
 import numpy as np
@@ -19,9 +20,14 @@ from .read_urdf import add_floating_base, origin_of, read_urdf
 from .smooth_forces import smooth
 from .source import called, root_of, urdf_root
 
+if TYPE_CHECKING:
+    from mujoco import MjModel
+
+    Source: TypeAlias = str | os.PathLike[str] | MjModel
+
 
 def load_mjcf(
-    source: Any,
+    source: Source,
     *,
     ignore: bool = False,
     limits: Sequence[float] | None = None,
@@ -79,7 +85,7 @@ def load_mjcf(
 
 
 def load_urdf(
-    source: Any,
+    source: str | os.PathLike[str],
     *,
     ignore: bool = False,
     floating: bool = False,
@@ -132,7 +138,9 @@ def load_urdf(
     return warned(read_urdf(urdf_root(source), called(source), ignore, floating, taken), called(source))
 
 
-def load_at_start(source: Any, *, ignore: bool = False, floating: bool = False) -> tuple[Mechanism, tuple[float, ...]]:
+def load_at_start(
+    source: Source, *, ignore: bool = False, floating: bool = False
+) -> tuple[Mechanism, tuple[float, ...]]:
     """The mechanism of MJCF or URDF, by the root element, and the coordinates (nq,) at which the file has it.
 
     Of MJCF these are the references of joints and the places of free bodies; of URDF they are neutral. Raises as
@@ -149,7 +157,7 @@ def load_at_start(source: Any, *, ignore: bool = False, floating: bool = False) 
     return warned(read_mjcf(mj, ignore), called(source)), tuple(mj.qpos0.tolist())
 
 
-def compiled(source: Any, *, floating: bool = False) -> Any:
+def compiled(source: Source, *, floating: bool = False) -> MjModel:
     """MuJoCo's own model, an MjModel, of a model, MJCF or URDF, read as `load_at_start` does.
 
     Raises MechanismError for what MuJoCo cannot read, and for joints with other coordinates there; and ImportError.

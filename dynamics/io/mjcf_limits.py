@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 from xml.parsers import expat
 
 from ..multibody.mechanism import MechanismError
@@ -15,7 +14,7 @@ COPIES = 10_000  # of replicated elements: MuJoCo's time grows with their square
 _FILES = {f"file{side}" for side in ("", "right", "left", "up", "down", "front", "back")}
 
 
-def require_modest(source: Any, called: str) -> None:
+def require_modest(source: object, called: str) -> None:
     """Raises MechanismError for a text that names another file or is not XML, too many copies, and a blank anchor.
 
     called: what errors call the source.

@@ -5,20 +5,23 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from contextlib import suppress
-from typing import Any
+from types import ModuleType
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cgraph.extend import install
+from cgraph.extend import Array, install
 
 from ..multibody.mechanism import Mechanism, MechanismError, require_mechanism
 from ..multibody.planar_arm import planar_links
-from ..multibody.spatial import Array
 from ..systems.model import Model
 from .write_mjcf import moving_alone, to_mjcf
 
+if TYPE_CHECKING:
+    from mujoco import MjModel
 
-def mujoco() -> Any:
+
+def mujoco() -> ModuleType:
     """The mujoco module. Raises ImportError naming the extra when it is not installed."""
     try:
         import mujoco as module
@@ -26,7 +29,8 @@ def mujoco() -> Any:
         raise ImportError(f"MuJoCo is not installed: {install('mujoco')}") from error
     if module.get_mju_user_warning() is None:  # by itself it adds a warning to a file in the current folder
         module.set_mju_user_warning(_warn)
-    return module
+    found: ModuleType = module  # it has no types
+    return found
 
 
 def _warn(text: str) -> None:
@@ -35,7 +39,7 @@ def _warn(text: str) -> None:
         warnings.warn(f"MuJoCo: {' '.join(text.split())}", stacklevel=2)
 
 
-def joint_order(mj: Any, mechanism: Mechanism) -> tuple[list[int], list[int]]:
+def joint_order(mj: MjModel, mechanism: Mechanism) -> tuple[list[int], list[int]]:
     """Where our coordinates stand in qpos, (nq,), and our velocities in qvel, (n,), by the names of the joints."""
     joints = [(mj.joint(body.coordinate), body.joint.type) for body in mechanism.moving]
     q = [int(joint.qposadr[0]) + k for joint, kind in joints for k in range(len(kind.coordinates))]
@@ -43,7 +47,7 @@ def joint_order(mj: Any, mechanism: Mechanism) -> tuple[list[int], list[int]]:
     return q, u
 
 
-def rollout(mj: Any, starts: Array, states: Array) -> Callable[[], None]:
+def rollout(mj: MjModel, starts: Array, states: Array) -> Callable[[], None]:
     """A run of MuJoCo's own native loop of steps, one thread, from every start.
 
     starts: (N, 1 + 2n), the time, positions and velocities in MuJoCo's order.  states: (N, steps, 1 + 2n), which each

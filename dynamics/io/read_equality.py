@@ -4,18 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.polynomial import Polynomial
 
+from cgraph.extend import Array
+
 from ..multibody import spatial
 from ..multibody.body import WORLD, Body, MechanismError
 from ..multibody.loops import Loop
-from ..multibody.spatial import Array
 from .left_out import listed, present
 from .mujoco_twin import mujoco
 from .smooth_forces import disabled
+
+if TYPE_CHECKING:
+    from mujoco import MjModel
 
 _MODELLED = ("joint", "connect", "weld")
 
@@ -28,7 +32,7 @@ class End(NamedTuple):
     orientation: Array  # (3, 3)
 
 
-def read_loops(mj: Any, moving: Sequence[Body], ends: Sequence[tuple[str, Array]]) -> list[Loop]:
+def read_loops(mj: MjModel, moving: Sequence[Body], ends: Sequence[tuple[str, Array]]) -> list[Loop]:
     """The loops of MuJoCo's model.
 
     moving: the bodies on its joints, in their order.  ends: for each of its bodies ours, and the origin of its frame in
@@ -45,7 +49,7 @@ def read_loops(mj: Any, moving: Sequence[Body], ends: Sequence[tuple[str, Array]
     return loops
 
 
-def other_equalities(mj: Any) -> list[str]:
+def other_equalities(mj: MjModel) -> list[str]:
     """Those that no loop is, and that act."""
     others: dict[str, list[int]] = {}
     for i in _active(mj):
@@ -54,7 +58,7 @@ def other_equalities(mj: Any) -> list[str]:
     return [f"equality constraints of the type {kind} ({_names(mj, which)})" for kind, which in others.items()]
 
 
-def left_of_equalities(mj: Any) -> list[str]:
+def left_of_equalities(mj: MjModel) -> list[str]:
     """What is left out of those that are loops, and those that do not act."""
     inactive = [i for i in range(mj.neq) if not (mj.eq_active0[i] or disabled(mj, "CONSTRAINT", "EQUALITY"))]
     return present(
@@ -65,25 +69,25 @@ def left_of_equalities(mj: Any) -> list[str]:
     )
 
 
-def _names(mj: Any, which: Sequence[int]) -> str:
+def _names(mj: MjModel, which: Sequence[int]) -> str:
     return listed([mj.equality(i).name or f"number {i}" for i in which])
 
 
-def _active(mj: Any) -> list[int]:
+def _active(mj: MjModel) -> list[int]:
     return [] if disabled(mj, "CONSTRAINT", "EQUALITY") else [i for i in range(mj.neq) if mj.eq_active0[i]]
 
 
-def _modelled(mj: Any) -> list[int]:
+def _modelled(mj: MjModel) -> list[int]:
     """Those that act and are loops."""
     return [i for i in _active(mj) if _kind(mj, i) in _MODELLED]
 
 
-def _kind(mj: Any, i: int) -> str:
+def _kind(mj: MjModel, i: int) -> str:
     kind: str = mujoco().mjtEq(int(mj.eq_type[i])).name
     return kind.removeprefix("mjEQ_").lower()
 
 
-def _loop(mj: Any, i: int, moving: Sequence[Body], ends: Sequence[tuple[str, Array]]) -> Loop:
+def _loop(mj: MjModel, i: int, moving: Sequence[Body], ends: Sequence[tuple[str, Array]]) -> Loop:
     kind, name = _kind(mj, i), mj.equality(i).name
     if kind == "joint":
         return _coupling(mj, i, name, moving)
@@ -99,7 +103,7 @@ def _loop(mj: Any, i: int, moving: Sequence[Body], ends: Sequence[tuple[str, Arr
     return Loop("weld", body.body, to.body, at, to_at, orientation=orientation, name=name)
 
 
-def _coupling(mj: Any, i: int, name: str, moving: Sequence[Body]) -> Loop:
+def _coupling(mj: MjModel, i: int, name: str, moving: Sequence[Body]) -> Loop:
     """q - q0 = c0 + c1 (q_to - q0_to) + .., as a polynomial of q_to; c0 alone without another joint."""
     one, other = int(mj.eq_obj1id[i]), int(mj.eq_obj2id[i])
     starts = mj.qpos0[mj.jnt_qposadr]
@@ -111,7 +115,7 @@ def _coupling(mj: Any, i: int, name: str, moving: Sequence[Body]) -> Loop:
     return Loop("coupling", moving[one].name, moving[other].name, coefficients=coefficients or [0.0], name=name)
 
 
-def _sites(mj: Any, i: int, ends: Sequence[tuple[str, Array]]) -> tuple[End, End] | None:
+def _sites(mj: MjModel, i: int, ends: Sequence[tuple[str, Array]]) -> tuple[End, End] | None:
     """The sites that are held together; None where the constraint is of bodies."""
     kinds = getattr(mj, "eq_objtype", None)
     if kinds is None or int(kinds[i]) != int(mujoco().mjtObj.mjOBJ_SITE):
@@ -123,7 +127,7 @@ def _sites(mj: Any, i: int, ends: Sequence[tuple[str, Array]]) -> tuple[End, End
     return sites[0], sites[1]
 
 
-def _frames(mj: Any, i: int, ends: Sequence[tuple[str, Array]]) -> tuple[End, End]:
+def _frames(mj: MjModel, i: int, ends: Sequence[tuple[str, Array]]) -> tuple[End, End]:
     """The frames of two bodies that are held together: points, and of a weld the second's axes in the first."""
     (body, origin), (to, to_origin) = (ends[int(each[i])] for each in (mj.eq_obj1id, mj.eq_obj2id))
     data, turn = np.array(mj.eq_data[i]), np.eye(3)

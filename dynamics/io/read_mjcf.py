@@ -5,14 +5,15 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+
+from cgraph.extend import Array
 
 from ..multibody import spatial
 from ..multibody.joints import TYPES
 from ..multibody.mechanism import WORLD, Body, Joint, Mechanism, MechanismError, MechanismWarning
-from ..multibody.spatial import Array
 from .left_out import listed, present, refused_or_left_out
 from .mjcf_limits import require_modest
 from .mujoco_twin import mujoco
@@ -20,6 +21,9 @@ from .read_equality import left_of_equalities, other_equalities, read_loops
 from .smooth_forces import NONE, Smooth, actuators, disabled, first_output, inputs, mjcf_forces, modelled, single
 from .source import is_text, path_of, root_of, text_of
 from .stand_ins import zeros_again
+
+if TYPE_CHECKING:
+    from mujoco import MjModel
 
 # Fields of MuJoCo's model that say so when they are not zero.
 _OF_A_TENDON = ("stiffness", "stiffnesspoly", "damping", "dampingpoly", "armature")
@@ -34,7 +38,7 @@ class _Names(NamedTuple):
     joints: list[str]
 
 
-def read_mjcf(mj: Any, ignore: bool, smooth: Smooth = NONE) -> Mechanism:
+def read_mjcf(mj: MjModel, ignore: bool, smooth: Smooth = NONE) -> Mechanism:
     """The mechanism of MuJoCo's model. Raises MechanismError for what a mechanism cannot have."""
     names = _Names(_body_names(mj), [mj.joint(j).name for j in range(mj.njnt)])
     left_out = refused_or_left_out(_not_modelled(mj), _acting_from_outside(mj, smooth), ignore)
@@ -51,7 +55,7 @@ def read_mjcf(mj: Any, ignore: bool, smooth: Smooth = NONE) -> Mechanism:
     return Mechanism(bodies, gravity, forces, left_out=left_out, loops=loops)
 
 
-def compiled_mjcf(source: Any, called: str) -> Any:
+def compiled_mjcf(source: object, called: str) -> MjModel:
     """MuJoCo's model of a path or text.  called: what errors call it.
 
     MuJoCo by itself prints its warnings and adds them to a file in the current folder; a handler takes them instead.
@@ -77,7 +81,7 @@ def compiled_mjcf(source: Any, called: str) -> Any:
     return mj
 
 
-def _body_names(mj: Any) -> list[str]:
+def _body_names(mj: MjModel) -> list[str]:
     """Names of MuJoCo's bodies; one without gets one that no other has."""
     names = [mj.body(i).name for i in range(mj.nbody)]
     for i, name in enumerate(names):
@@ -89,7 +93,7 @@ def _unused(name: str, names: Sequence[str]) -> str:
     return name if name not in names else _unused(name + "'", names)
 
 
-def _chain(mj: Any, body: int, names: _Names, parent: str, origin: Array) -> tuple[list[Body], Array]:
+def _chain(mj: MjModel, body: int, names: _Names, parent: str, origin: Array) -> tuple[list[Body], Array]:
     """One of MuJoCo's bodies as a chain with one joint each, and the origin of its frame in that of the chain's last.
 
     MuJoCo turns a body about a point (its joint's `pos`) other than its origin; here the body's origin is that point.
@@ -123,7 +127,7 @@ def _chain(mj: Any, body: int, names: _Names, parent: str, origin: Array) -> tup
     return chain, position
 
 
-def _joint(mj: Any, j: int, position: Array, orientation: Array) -> Joint:
+def _joint(mj: MjModel, j: int, position: Array, orientation: Array) -> Joint:
     """The joint, with the frame where it is at q = 0: MuJoCo's stands at q = qpos0 (`ref`)."""
     kind, axis, dof = _kind(mj, j), np.array(mj.jnt_axis[j]), mj.jnt_dofadr[j]
     single = len(TYPES[kind].coordinates) == 1
@@ -145,14 +149,14 @@ def _joint(mj: Any, j: int, position: Array, orientation: Array) -> Joint:
     )
 
 
-def _kind(mj: Any, j: int) -> str:
+def _kind(mj: MjModel, j: int) -> str:
     """Our kind of a joint, "" for the kinds that a mechanism has not."""
     types = mujoco().mjtJoint
     kinds = {int(getattr(types, f"mjJNT_{each.mjcf.upper()}")): kind for kind, each in TYPES.items() if each.mjcf}
     return kinds.get(int(mj.jnt_type[j]), "")
 
 
-def _not_modelled(mj: Any) -> list[str]:
+def _not_modelled(mj: MjModel) -> list[str]:
     """What belongs to the mechanism of the model and a mechanism cannot have."""
     sprung = [] if disabled(mj, "SPRING") else sorted(j for j in _where(mj, "jnt_stiffness") if _elsewhere(mj, j))
     pulling = sorted(set().union(*(_where(mj, f"tendon_{what}") for what in _OF_A_TENDON)))
@@ -173,7 +177,7 @@ def _not_modelled(mj: Any) -> list[str]:
     return [*others, *other_equalities(mj)]
 
 
-def _acting_from_outside(mj: Any, smooth: Smooth) -> list[str]:
+def _acting_from_outside(mj: MjModel, smooth: Smooth) -> list[str]:
     """What acts on the mechanism of the model, inputs and forces that are not smooth, and is not taken."""
     limited = not disabled(mj, "CONSTRAINT", "LIMIT")
     limits = [j for j in sorted(_where(mj, "jnt_limited")) if smooth.limits is None or not single(mj, j)]
@@ -197,7 +201,7 @@ def _acting_from_outside(mj: Any, smooth: Smooth) -> list[str]:
     return [*others, *left_of_equalities(mj)]
 
 
-def _at_rest(mj: Any, i: int) -> str:
+def _at_rest(mj: MjModel, i: int) -> str:
     """The force of an actuator whose input is 0, "" for none."""
     kind: str = mujoco().mjtBias(int(mj.actuator_biastype[i])).name.removeprefix("mjBIAS_").lower()
     if kind not in ("none", "affine"):
@@ -211,36 +215,36 @@ def _at_rest(mj: Any, i: int) -> str:
     return " ".join([*terms, *([f"times gear {gear:g}"] if terms and gear != 1.0 else [])])
 
 
-def _where(mj: Any, field: str) -> set[int]:
+def _where(mj: MjModel, field: str) -> set[int]:
     """Rows of a model's field that are not all zero; none for a field that this version of MuJoCo has not."""
     values = np.asarray(getattr(mj, field, []))
     return {int(i) for i in np.flatnonzero(values.reshape(len(values), -1).any(axis=1))} if values.size else set()
 
 
-def _elsewhere(mj: Any, j: int) -> bool:
+def _elsewhere(mj: MjModel, j: int) -> bool:
     """Whether a joint's spring is one that ours cannot have, or pulls where ours does not."""
     kind, at = TYPES[_kind(mj, j)], mj.jnt_qposadr[j]
     count = len(kind.coordinates)
     return not kind.sprung or (count > 1 and mj.qpos_spring[at : at + count].tolist() != [*kind.neutral])
 
 
-def _uneven(mj: Any) -> list[int]:
+def _uneven(mj: MjModel) -> list[int]:
     """Joints of which one degree of freedom has another damping or armature than the first."""
     first = mj.jnt_dofadr[mj.dof_jntid]
     dofs = (mj.dof_damping != mj.dof_damping[first]) | (mj.dof_armature != mj.dof_armature[first])
     return sorted({int(j) for j in mj.dof_jntid[dofs]})
 
 
-def _any(mj: Any, *fields: str) -> bool:
+def _any(mj: MjModel, *fields: str) -> bool:
     return any([_where(mj, field) for field in fields])
 
 
-def _joint_names(mj: Any, joints: Sequence[int]) -> list[str]:
+def _joint_names(mj: MjModel, joints: Sequence[int]) -> list[str]:
     """Names of joints; of one that has none, the body's."""
     bodies = _body_names(mj)
     return [mj.joint(j).name or f"of body {bodies[mj.jnt_bodyid[j]]!r}" for j in joints]
 
 
-def _coordinate(mj: Any, dof: int) -> str:
+def _coordinate(mj: MjModel, dof: int) -> str:
     """The name of the joint of a degree of freedom."""
     return _joint_names(mj, [int(mj.dof_jntid[dof])])[0]

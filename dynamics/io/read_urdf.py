@@ -10,7 +10,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
-from cgraph.extend import require_flag
+from cgraph.extend import Array, require_flag
 
 from ..multibody import spatial
 from ..multibody.body import moment_rounding
@@ -18,7 +18,6 @@ from ..multibody.joint_force import JointForce, JointFriction
 from ..multibody.joints import TYPES, SpatialJoint
 from ..multibody.loops import Loop
 from ..multibody.mechanism import WORLD, Body, Joint, Mechanism, MechanismError
-from ..multibody.spatial import Array
 from .left_out import listed, present, refused_or_left_out
 from .read_mimic import read_mimics
 from .smooth_forces import NONE, Smooth

@@ -5,15 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cgraph.extend import real_array, real_number, require_flag
+from cgraph.extend import Array, real_array, real_number, require_flag
 
 from ..multibody.body import Body, MechanismError
 from ..multibody.joint_force import Actuator, JointForce, JointFriction, JointLimit, Range
 from .mujoco_twin import mujoco
+
+if TYPE_CHECKING:
+    from mujoco import MjModel
 
 
 @dataclass(frozen=True)
@@ -50,20 +53,20 @@ def smooth(limits: Sequence[float] | None, friction: float | None, actuators: bo
     return Smooth(springs, friction, require_flag("actuators", actuators))
 
 
-def disabled(mj: Any, *what: str) -> bool:
+def disabled(mj: MjModel, *what: str) -> bool:
     """Whether the model's options switch off any of `what`; older MuJoCo has one switch for all passive force."""
     bits = mujoco().mjtDisableBit.__members__
     names = [*what, *(["PASSIVE"] if set(what) & {"DAMPER", "SPRING"} else [])]
     return any([mj.opt.disableflags & int(bits.get(f"mjDSBL_{name}", 0)) for name in names])
 
 
-def single(mj: Any, j: int) -> bool:
+def single(mj: MjModel, j: int) -> bool:
     """Whether a joint of MuJoCo's model is a hinge or slide."""
     types = mujoco().mjtJoint
     return int(mj.jnt_type[j]) in (int(types.mjJNT_HINGE), int(types.mjJNT_SLIDE))
 
 
-def modelled(mj: Any, i: int) -> bool:
+def modelled(mj: MjModel, i: int) -> bool:
     """Whether an actuator of MuJoCo's model is an `Actuator`: on a hinge or slide, affine, without memory.
 
     Of several on a joint whose whole force has a range, none is.
@@ -82,39 +85,39 @@ def modelled(mj: Any, i: int) -> bool:
     )
 
 
-def actuators(mj: Any) -> int:
+def actuators(mj: MjModel) -> int:
     """The number of actuators, which may have several inputs each in newer versions of MuJoCo."""
     return len(mj.actuator_trntype)
 
 
-def _called(kind: str, value: Any) -> str:
+def _called(kind: str, value: int) -> str:
     """MuJoCo's word for a type of a transmission, gain, ..."""
     word: str = getattr(mujoco(), f"mjt{kind}")(int(value)).name
     return word.removeprefix(f"mj{kind.upper()}_").lower()
 
 
-def _on_joint(mj: Any, i: int) -> bool:
+def _on_joint(mj: MjModel, i: int) -> bool:
     return _called("Trn", mj.actuator_trntype[i]) in ("joint", "jointinparent")
 
 
-def inputs(mj: Any, i: int) -> range:
+def inputs(mj: MjModel, i: int) -> range:
     """Where the inputs of an actuator stand among all; newer versions of MuJoCo have several of one."""
     first = int(getattr(mj, "actuator_ctrladr", range(i + 1))[i])
     return range(first, first + int(getattr(mj, "actuator_ctrlnum", [1] * (i + 1))[i]))
 
 
-def first_output(mj: Any, i: int) -> int:
+def first_output(mj: MjModel, i: int) -> int:
     """Where the first output of an actuator stands among all."""
     return int(getattr(mj, "actuator_outadr", range(i + 1))[i])
 
 
-def _delayed(mj: Any, i: int) -> bool:
+def _delayed(mj: MjModel, i: int) -> bool:
     """Whether an actuator acts later than its input, as in newer versions of MuJoCo."""
     delays = np.asarray(getattr(mj, "actuator_delay", []))
     return bool(delays.size and delays[i] > 0.0)
 
 
-def mjcf_forces(mj: Any, moving: Sequence[Body], taken: Smooth) -> list[JointForce]:
+def mjcf_forces(mj: MjModel, moving: Sequence[Body], taken: Smooth) -> list[JointForce]:
     """The forces of MuJoCo's model that are taken.  moving: the bodies on its joints, in their order."""
     forces: list[JointForce] = []
     for j, body in enumerate(moving):
@@ -132,13 +135,13 @@ def mjcf_forces(mj: Any, moving: Sequence[Body], taken: Smooth) -> list[JointFor
     return forces
 
 
-def _switched_off(mj: Any, i: int) -> bool:
+def _switched_off(mj: MjModel, i: int) -> bool:
     """Whether the model's options switch the group of an actuator off."""
     group = int(mj.actuator_group[i])
     return 0 <= group < 31 and bool(int(mj.opt.disableactuator) >> group & 1)
 
 
-def _input_names(mj: Any) -> list[str]:
+def _input_names(mj: MjModel) -> list[str]:
     """Names of the parameters that control the actuators, all different."""
     names: list[str] = []
     for i in range(actuators(mj)):
@@ -149,7 +152,7 @@ def _input_names(mj: Any) -> list[str]:
     return names
 
 
-def _actuator(mj: Any, i: int, name: str, moving: Sequence[Body]) -> Actuator:
+def _actuator(mj: MjModel, i: int, name: str, moving: Sequence[Body]) -> Actuator:
     j, ctrl = int(mj.actuator_trnid[i, 0]), inputs(mj, i)[0]
     gain, bias = mj.actuator_gainprm[i, :3].tolist(), mj.actuator_biasprm[i, :3].tolist()
     if _called("Gain", mj.actuator_gaintype[i]) == "fixed":
@@ -168,5 +171,5 @@ def _actuator(mj: Any, i: int, name: str, moving: Sequence[Body]) -> Actuator:
     )
 
 
-def _range(limited: Any, ends: Any) -> Range | None:
+def _range(limited: int, ends: Array) -> Range | None:
     return (float(ends[0]), float(ends[1])) if limited else None

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 from xml.etree import ElementTree
 from xml.parsers import expat
 
@@ -14,17 +13,17 @@ from ..multibody.mechanism import MechanismError
 _BEFORE_XML = "\ufeff \t\r\n"  # what editors leave there
 
 
-def is_text(source: Any) -> bool:
+def is_text(source: object) -> bool:
     """Whether the source is XML text and no path."""
     return isinstance(source, str) and source.lstrip(_BEFORE_XML).startswith("<")
 
 
-def called(source: Any) -> str:
+def called(source: object) -> str:
     """What errors call a source."""
     return "the given text" if is_text(source) else f"{str(source)!r}"
 
 
-def path_of(source: Any) -> Path:
+def path_of(source: object) -> Path:
     """The path of a file that is there. Raises MechanismError."""
     if not isinstance(source, str | os.PathLike):
         raise MechanismError(f"a model is a path or XML text, and of MJCF an MjModel, too, got {type(source).__name__}")
@@ -40,7 +39,7 @@ def path_of(source: Any) -> Path:
     return path
 
 
-def text_of(source: Any) -> bytes:
+def text_of(source: object) -> bytes:
     """The XML of a source, in the encoding that it declares. Raises MechanismError."""
     try:
         if is_text(source):
@@ -52,7 +51,7 @@ def text_of(source: Any) -> bytes:
         raise MechanismError(f"{called(source)} cannot be read: {error.strerror}") from None
 
 
-def root_of(source: Any) -> str:
+def root_of(source: object) -> str:
     """The name of the root element; "" for what is not XML."""
     tags: list[str] = []
     parser = expat.ParserCreate("utf-8" if is_text(source) else None)
@@ -63,7 +62,7 @@ def root_of(source: Any) -> str:
     return tags[0] if tags else ""
 
 
-def urdf_root(source: Any) -> ElementTree.Element:
+def urdf_root(source: object) -> ElementTree.Element:
     """The root element of a URDF. Raises MechanismError for other sources.
 
     Prefixes of namespaces stay parts of names, so that one that is nowhere declared, left by a macro, does no harm.

@@ -9,12 +9,11 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from cgraph.extend import real_number
+from cgraph.extend import Array, real_number
 
 from ..multibody import spatial
 from ..multibody.joints import AxialJoint
 from ..multibody.mechanism import WORLD, Body, Mechanism, MechanismError, require_mechanism
-from ..multibody.spatial import Array
 from ..systems.model import Model
 from .stand_ins import ROUNDING, with_stand_ins
 from .write_loops import equality_lines, site_lines

@@ -8,10 +8,11 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cgraph.extend import Array
+
 from ..multibody.joints import AxialJoint
 from ..multibody.mechanism import WORLD, Body, MechanismError, require_mechanism
 from ..multibody.parameters import vanishes
-from ..multibody.spatial import Array
 from ..systems.model import Model
 from .read_urdf import FAR, GRAVITY
 from .write_loops import mimic_lines

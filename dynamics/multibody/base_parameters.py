@@ -16,12 +16,12 @@ from typing import Any
 
 import numpy as np
 
-from cgraph.extend import Builder, building
+from cgraph.extend import Array, Builder, building
 
 from . import spatial
 from .inertial_numbers import Link
 from .joints import JointType
-from .spatial import Array, Triple
+from .spatial import Triple
 
 
 def base_parameter_links(

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Node
-from cgraph.extend import check_name, is_finite
+from cgraph.extend import Array, check_name, is_finite
 
 from . import spatial
 from .errors import (
@@ -21,7 +21,6 @@ from .errors import (
 )
 from .joints import COMPOSITIONS, TYPES, JointType
 from .parameters import Quantities, Quantity, entries, evaluated, names_in, symbol, vanishes
-from .spatial import Array
 
 WORLD = "world"
 ROUNDING = 1e-9  # of the largest entry: what is left of an inertia or a rotation that came through text
@@ -168,7 +167,7 @@ class Body:
         return self.joint.name or self.name
 
 
-def vector(what: str, value: Any, shape: tuple[int, ...] = (3,)) -> Array:
+def vector(what: str, value: object, shape: tuple[int, ...] = (3,)) -> Array:
     """The value as an array of that shape. Raises MechanismError, naming `what`, unless it is finite numbers."""
     try:
         array = np.asarray(value, dtype=np.float64)
@@ -180,7 +179,7 @@ def vector(what: str, value: Any, shape: tuple[int, ...] = (3,)) -> Array:
     return array
 
 
-def checked_rotation(what: str, value: Any) -> Array:
+def checked_rotation(what: str, value: object) -> Array:
     """The value as a rotation, (3, 3). Raises MechanismError, naming `what`, unless it is one."""
     matrix = vector(what, value, (3, 3))
     if np.abs(matrix.T @ matrix - np.eye(3)).max() > ROUNDING or np.linalg.det(matrix) < 0:
@@ -196,7 +195,7 @@ def shape_of(value: Any) -> tuple[int, ...]:
         return ()
 
 
-def quantities(what: str, value: Any, shape: tuple[int, ...] = (3,)) -> Array:
+def quantities(what: str, value: object, shape: tuple[int, ...] = (3,)) -> Array:
     """As `vector`, or an array of objects: floats, and nodes where there are parameters."""
     known = entries(value)
     if not any([isinstance(each, str | Node) for each in known]):
@@ -229,11 +228,11 @@ def _check_names(what: str, value: str | Node) -> None:
             raise MechanismError(str(error)) from None
 
 
-def _mass(what: str, value: Any) -> float | Node:
+def _mass(what: str, value: object) -> float | Node:
     return _number(what, value, " kg")
 
 
-def _any_number(what: str, value: Any) -> float | Node:
+def _any_number(what: str, value: object) -> float | Node:
     return _number(what, value, minimum=-math.inf)
 
 
@@ -257,7 +256,7 @@ def checked(body: Body) -> Body:
     return replace(body, mass=mass, center=center, inertia=inertia, joint=_checked_joint(where, joint))
 
 
-def unit_axis(what: str, value: Any) -> Array:
+def unit_axis(what: str, value: object) -> Array:
     """The value at length 1. Raises MechanismError, naming `what`, unless it is three finite numbers and not zero."""
     axis = vector(what, value)
     if not axis.any():
@@ -301,7 +300,7 @@ def _check_name(what: str, name: str) -> None:
         raise MechanismError(str(error)) from None
 
 
-def _inertia(what: str, given: Any, beside: float = 0.0) -> Array:
+def _inertia(what: str, given: object, beside: float = 0.0) -> Array:
     """Symmetric, and with principal moments that are not negative; a warning where no rigid body has them.
 
     Kinetic energy is positive all the same, so that all equations of a tree hold.
@@ -333,12 +332,12 @@ def moment_rounding(scale: float, beside: float) -> float:
     return ROUNDING * scale + spatial.SNAP * beside
 
 
-BODY_QUANTITIES: dict[str, Callable[[str, Any], Any]] = {
+BODY_QUANTITIES: dict[str, Callable[[str, object], Any]] = {
     "mass": _mass,
     "center": quantities,
     "inertia": _inertia,
 }
-JOINT_QUANTITIES: dict[str, Callable[[str, Any], Any]] = {
+JOINT_QUANTITIES: dict[str, Callable[[str, object], Any]] = {
     "position": quantities,
     "damping": _number,
     "stiffness": _number,

@@ -9,12 +9,12 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import Builder, as_node, building
+from cgraph.extend import Array, Builder, as_node, building
 
 from . import spatial
 from .inertial_numbers import Link
 from .joints import AxialJoint, MovingJoint, SpatialJoint
-from .spatial import STILL, ZERO, Array, Triple
+from .spatial import STILL, ZERO, Triple
 
 
 class PlaneAngle(NamedTuple):

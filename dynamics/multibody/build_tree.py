@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cgraph.extend import Array
+
 from .body import WORLD, Body, Joint, MechanismError, shape_of, vector
 from .mechanism import Mechanism
 from .parameters import Quantities
-from .spatial import Array
 
 _FIELDS = [each.name for each in fields(Body) if each.name not in ("name", "parent")]
 
@@ -131,7 +132,7 @@ def _check_link(i: int, link: object) -> None:
         raise MechanismError(f"link {i + 1} needs a joint, got {', '.join(link) or 'nothing'}")
 
 
-def _rod(axis: Array, parent: int) -> dict[str, Any]:
+def _rod(axis: Array, parent: int) -> dict[str, object]:
     joint = Joint("revolute", axis, (0.0, 0.0, 0.0 if parent < 0 else -1.0))
     return {"joint": joint, "mass": 1.0, "center": (0.0, 0.0, -0.5), "inertia": (1.0 / 12.0, 1.0 / 12.0, 0.0)}
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import check_name, is_finite, require_mapping
+from cgraph.extend import Array, check_name, is_finite, require_mapping
 
 from . import spatial
 from .body import (
@@ -27,7 +27,6 @@ from .body import (
 )
 from .joints import COMPOSITIONS
 from .joints.composition import AXIS
-from .spatial import Array
 
 _NUMBERS = ("damping", "stiffness", "spring_reference", "armature")
 

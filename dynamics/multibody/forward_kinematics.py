@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph, Node
+from cgraph.extend import Array
 
 from . import spatial
 from .body import Body
@@ -19,7 +20,7 @@ from .inertial_numbers import Link, axes_of
 from .joint_coordinates import parts
 from .joints import AxialJoint, MovingJoint, moving_type
 from .kinematic_tree import Carrier
-from .spatial import STILL, Array, Triple
+from .spatial import STILL, Triple
 
 
 class Step(NamedTuple):

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Builder, building, cotangents, require_choice, tangents
+from cgraph.extend import Array, Builder, building, cotangents, require_choice, tangents
 
 from ..equations.formulations import ONE
 from ..systems.model import Model
@@ -24,7 +24,7 @@ from . import spatial
 from .body import vector
 from .forward_kinematics import KinematicChain
 from .mechanism import require_mechanism
-from .spatial import ZERO, Array
+from .spatial import ZERO
 
 AXES = ("world", "body")
 

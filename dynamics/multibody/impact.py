@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import real_array
+from cgraph.extend import Array, real_array
 
 from ..equations.equations_of_motion import forward_dynamics, momentum
 from .body import Body, MechanismError, vector
 from .mechanism import Mechanism, require_mechanism
 from .parameter_values import bound_body
-from .spatial import Array
 
 _COMPONENTS = ("x y z", "vx vy vz", "wx wy wz")
 
@@ -240,5 +239,5 @@ def _inertia_alone(mechanism: Mechanism) -> Mechanism:
     return replace(mechanism, bodies=bodies, gravity=(0.0, 0.0, 0.0), forces=(), parameters={})
 
 
-def _named(**groups: Array) -> dict[str, Any]:
+def _named(**groups: Array) -> dict[str, float | Array]:
     return {f"{name}{i}": value for name, values in groups.items() for i, value in enumerate(values)}

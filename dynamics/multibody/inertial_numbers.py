@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from cgraph import Node
-from cgraph.extend import Builder, building
+from cgraph.extend import Array, Builder, building
 
 from . import spatial
 from .body import Body
 from .joints import AxialJoint
 from .parameters import symbol
-from .spatial import Array, Matrix, Triple
+from .spatial import Matrix, Triple
 
 
 @dataclass(frozen=True, eq=False)

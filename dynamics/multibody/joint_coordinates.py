@@ -9,11 +9,11 @@ from typing import NamedTuple, TypeVar
 import numpy as np
 
 from cgraph import Node
+from cgraph.extend import Array
 
 from ..systems.quasi_velocities import QuasiVelocities
 from .body import WORLD, Body
 from .parameters import Quantities
-from .spatial import Array
 
 Value = TypeVar("Value")
 

@@ -6,7 +6,6 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -270,7 +269,7 @@ def _check_joint_force(force: JointForce, bodies: Sequence[Body]) -> None:
 
 def add_joint_forces(
     total: Sequence[Node],
-    forces: Sequence[Any],
+    forces: Sequence[object],
     moving: Sequence[Body],
     state: tuple[Sequence[Node], Sequence[Node]],
     parameters: Mapping[str, Node],

@@ -10,12 +10,11 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import real_array
+from cgraph.extend import Array, real_array
 
 from .body import Body
 from .joint_coordinates import coordinate_names, places
 from .loops import Loop
-from .spatial import Array
 
 _SEEN = 1e-6  # of the way that points go: how near to the plane of the picture they turn
 _FLAT = 1e-9  # of the largest extent: a direction in which nothing moves or lies

@@ -10,13 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import Builder, building, is_finite
+from cgraph.extend import Array, Builder, building, is_finite
 
 from . import spatial
 from .body import WORLD, Body, Joint, MechanismError, vector
 from .inertial_numbers import MergedBody, axes_of, inertia_in
 from .parameters import entries, names_in, vanishes
-from .spatial import Array
 
 
 @dataclass(frozen=True, eq=False)

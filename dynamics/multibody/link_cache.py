@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -33,8 +33,8 @@ class SharedParts:
     def __init__(self) -> None:
         self._bodies: WeakKeyDictionary[Body, tuple[Body, ...]] = WeakKeyDictionary()
         self._links: WeakKeyDictionary[Body, tuple[Body | None, Link]] = WeakKeyDictionary()  # with the parent
-        self._grounds: dict[tuple[Any, ...], Motion] = {}
-        self._moved: dict[tuple[Any, ...], Moved] = {}
+        self._grounds: dict[tuple[object, ...], Motion] = {}
+        self._moved: dict[tuple[object, ...], Moved] = {}
 
     def __reduce__(self) -> tuple[type[SharedParts], tuple[()]]:
         return SharedParts, ()  # a copy in another process computes its own

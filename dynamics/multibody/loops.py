@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import Builder, building, check_name, is_finite
+from cgraph.extend import Array, Builder, building, check_name, is_finite
 
 from . import spatial
 from .body import WORLD, Body, Joint, MechanismError, checked_rotation, vector
@@ -19,7 +19,7 @@ from .joint_coordinates import places
 from .joints import COMPOSITIONS
 from .kinematic_tree import locked_at
 from .relative_placement import RelativePlacement
-from .spatial import ZERO, Array, Triple
+from .spatial import ZERO, Triple
 
 ROWS = {
     "point": ("x", "y", "z"),

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Builder, building, require_flag, require_mapping
+from cgraph.extend import Array, Builder, building, require_flag, require_mapping
 
 from ..systems.arguments import parameter_value
 from ..systems.body_system import BodySystem
@@ -33,7 +33,6 @@ from .mechanism_summary import summary
 from .modification import attach_subtree, detach_subtree, lock_joint, map_state, subtree_of, unlock_joint
 from .parameter_values import bound_body, bound_force, require_values, used_names
 from .parameters import bound, entries, names_in, symbol
-from .spatial import Array
 from .subtree import Subtree
 from .tree_equations import TreeEquations
 

@@ -32,7 +32,7 @@ class Structure:
     loops: Sequence[Loop] = ()
     shared: SharedParts = field(default_factory=SharedParts, repr=False, kw_only=True)
 
-    def __getstate__(self) -> dict[str, Any]:
+    def __getstate__(self) -> dict[str, object]:
         """The fields alone: what was derived from them is derived again where it is needed."""
         return {each.name: getattr(self, each.name) for each in fields(self)}
 
@@ -56,7 +56,7 @@ def changed(
     return replace(structure, parameters=parameters, **changes)
 
 
-def listed(what: str, kinds: tuple[type, ...], given: Any) -> tuple[Any, ...]:
+def listed(what: str, kinds: tuple[type, ...], given: object) -> tuple[Any, ...]:
     """The entries of a field. Raises MechanismError for what is no sequence, and for entries of another type."""
     names = " or ".join([kind.__name__ for kind in kinds])
     if isinstance(given, str) or not isinstance(given, Iterable):

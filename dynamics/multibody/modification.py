@@ -8,13 +8,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import real_array
+from cgraph.extend import Array, real_array
 
 from .body import Body, MechanismError
 from .joint_coordinates import coordinate_names, neutral, places, velocity_names
 from .mechanism_fields import AnyStructure, Structure, changed
 from .parameter_values import used_names
-from .spatial import Array
 from .subtree import Subtree, as_subtree, descendants, inserted
 
 

@@ -4,62 +4,59 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import Any, NamedTuple
-from weakref import WeakKeyDictionary
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cgraph.extend import kept_by_first
+
 from .body import BODY_QUANTITIES, JOINT_QUANTITIES, Body, MechanismError, quantities
 from .external_force import Force
 from .joint_force import JointForce
-from .parameters import bound, entries, evaluated, names_in
+from .parameters import Quantities, bound, entries, evaluated, names_in
 
 
 class Use(NamedTuple):
     """A number, or an array of numbers, that is made of parameters."""
 
     what: str
-    value: Any
+    value: object
     names: dict[str, None]
-    check: Callable[[str, Any], Any]
+    check: Callable[[str, object], object]
 
 
-_KNOWN: WeakKeyDictionary[Body, tuple[Use, ...]] = WeakKeyDictionary()  # bodies are not to be altered
-
-
-def uses(bodies: Sequence[Body], gravity: Any) -> Iterator[Use]:
+def uses(bodies: Sequence[Body], gravity: Quantities) -> Iterator[Use]:
     """The quantities of bodies, their joints and gravity in which there are parameters."""
     yield from _of_parameters([("gravity", gravity, quantities)])
     for body in bodies:
         yield from _uses_of(body)
 
 
+@kept_by_first
 def _uses_of(body: Body) -> tuple[Use, ...]:
-    if body not in _KNOWN:
-        tables = (body, BODY_QUANTITIES), (body.joint, JOINT_QUANTITIES)
-        rows = [
-            (f"body {body.name!r}: {name}", getattr(owner, name), check)
-            for owner, table in tables
-            for name, check in table.items()
-        ]
-        _KNOWN[body] = tuple(_of_parameters(rows))
-    return _KNOWN[body]
+    tables = (body, BODY_QUANTITIES), (body.joint, JOINT_QUANTITIES)
+    rows = [
+        (f"body {body.name!r}: {name}", getattr(owner, name), check)
+        for owner, table in tables
+        for name, check in table.items()
+    ]
+    return tuple(_of_parameters(rows))
 
 
-def _of_parameters(rows: Iterable[tuple[str, Any, Callable[[str, Any], Any]]]) -> Iterator[Use]:
+def _of_parameters(rows: Iterable[tuple[str, object, Callable[[str, object], object]]]) -> Iterator[Use]:
     for what, value, check in rows:
         if names := names_in(entries(value)):
             yield Use(what, value, names, check)
 
 
-def used_names(bodies: Sequence[Body], gravity: Any, forces: Iterable[Force | JointForce]) -> dict[str, None]:
+def used_names(bodies: Sequence[Body], gravity: Quantities, forces: Iterable[Force | JointForce]) -> dict[str, None]:
     """The names that occur in forces, and then those in bodies and gravity."""
     result = dict.fromkeys([name for force in forces for name in force.names])
     return result | {name: None for use in uses(bodies, gravity) for name in use.names}
 
 
-def require_values(bodies: Sequence[Body], gravity: Any, values: Mapping[str, ArrayLike]) -> None:
+def require_values(bodies: Sequence[Body], gravity: Quantities, values: Mapping[str, ArrayLike]) -> None:
     """Raises MechanismError for a parameter without value, and for a value, or one of N, that makes no body or joint.
 
     A parameter of a force is 0 by default; a mass or length that is would be another mechanism.

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import as_node, topological
+from cgraph.extend import Array, as_node, topological
 
 from ..equations.substitute import substitute
 
@@ -18,7 +18,7 @@ Quantity = float | Node | str  # a number, a node over parameters, or a paramete
 Quantities = ArrayLike | Sequence[Quantity] | Sequence[Sequence[Quantity]]
 
 
-def entries(value: Any) -> list[Any]:
+def entries(value: object) -> list[Any]:
     """The entries of a quantity, of an array or of nested sequences of them."""
     if isinstance(value, str | Node | float):
         return [value]
@@ -33,7 +33,7 @@ def entries(value: Any) -> list[Any]:
     return flat
 
 
-def names_in(values: Iterable[Any]) -> dict[str, None]:
+def names_in(values: Iterable[object]) -> dict[str, None]:
     """Names of the parameters and variables of quantities, in order."""
     result: dict[str, None] = {}
     for each in values:
@@ -49,12 +49,12 @@ def symbol(value: Quantity) -> float | Node:
     return cg.variable(value) if isinstance(value, str) else value
 
 
-def vanishes(value: Any) -> bool:
+def vanishes(value: object) -> bool:
     """Whether the quantities are zero whatever the parameters are."""
     return all([each == 0.0 for each in entries(value)])  # a node equals itself alone
 
 
-def bound(value: Any, values: Mapping[str, float]) -> Any:
+def bound(value: object, values: Mapping[str, float]) -> Any:
     """The quantity, or the array of them, with numbers in place of these parameters."""
     known = entries(value)
     used = names_in(known)
@@ -73,7 +73,7 @@ def bound(value: Any, values: Mapping[str, float]) -> Any:
     return result.reshape(np.shape(np.asarray(value, dtype=object)))
 
 
-def evaluated(value: Any, values: Mapping[str, ArrayLike]) -> Any:
+def evaluated(value: object, values: Mapping[str, ArrayLike]) -> Array:
     """The quantities as numbers at these values, or at N of them: an array of their shape, or (N, ..)."""
     nodes = [as_node(symbol(each)) for each in entries(value)]
     graph = Graph(cg.variables(list(values)), {f"{k}": node for k, node in enumerate(nodes)})

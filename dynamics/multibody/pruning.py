@@ -5,11 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import check_name, many, real_number, require_flag, require_graph, require_mapping, require_sequence
+from cgraph.extend import (
+    check_name,
+    counted,
+    real_number,
+    require_flag,
+    require_graph,
+    require_mapping,
+    require_sequence,
+)
 
 from ..equations.formulations import inverse_dynamics
 from ..systems.model import Model, as_system
@@ -19,7 +26,7 @@ from .switched_effects import EFFECTS as EFFECTS, absent_parts, has_effect, with
 GROUPS = ("q", "qd", "qdd", "tau")
 NEVER = "unobservable inertial numbers"
 
-Equations = Callable[[Any], Graph]
+Equations = Callable[[Model], Graph]
 
 
 @dataclass(frozen=True)
@@ -47,7 +54,7 @@ class OmittedTerm:
     edges: int
 
     def __str__(self) -> str:
-        return f"{self.what}: {self.why} ({many(self.nodes, 'node')}, {many(self.edges, 'edge')})"
+        return f"{self.what}: {self.why} ({counted(self.nodes, 'node')}, {counted(self.edges, 'edge')})"
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,23 +246,23 @@ def _steps(
 ) -> list[_Step]:
     """From the model as given, one thing after another taken out."""
     steps = [_Step(model, {}, None)]
-
-    def take(what: str, why: str, **changes: Any) -> None:
-        steps.append(replace(steps[-1], what=what, why=why, **changes))
-
     for effect in EFFECTS:
         if effect not in kept and has_effect(steps[-1].model, effect):
-            take(effect, "switched off", model=without_effect(steps[-1].model, effect))
+            less = without_effect(steps[-1].model, effect)
+            steps.append(replace(steps[-1], what=effect, why="switched off", model=less))
     for body, at in lock.items():
         mechanism = as_mechanism(steps[-1].model)
         if mechanism is None:
             raise ValueError(f"a joint can be locked of a Mechanism, got {type(model).__name__}")
-        take(f"joint of {body}", f"locked at {at:g}", model=mechanism.lock(body, at))
+        locked = mechanism.lock(body, at)
+        steps.append(replace(steps[-1], what=f"joint of {body}", why=f"locked at {at:g}", model=locked))
     for name, value in values.items():
-        take(f"input {name}", f"is {value:g}", values={**steps[-1].values, name: value})
+        known = {**steps[-1].values, name: value}
+        steps.append(replace(steps[-1], what=f"input {name}", why=f"is {value:g}", values=known))
     if outputs is not None:
         outputs = list(require_sequence("outputs", outputs, "names", str))
-        take("other outputs", f"only {', '.join(outputs)} asked for", outputs=tuple(outputs))
+        why = f"only {', '.join(outputs)} asked for"
+        steps.append(replace(steps[-1], what="other outputs", why=why, outputs=tuple(outputs)))
     return steps
 
 
@@ -273,4 +280,4 @@ def _saved(before: Graph, after: Graph) -> tuple[int, int]:
 
 
 def _size(graph: Graph) -> str:
-    return f"{many(len(graph.nodes), 'node')} and {many(len(graph.edges), 'edge')}"
+    return f"{counted(len(graph.nodes), 'node')} and {counted(len(graph.edges), 'edge')}"

@@ -9,7 +9,6 @@ one of its joints, makes no new graph and no new code.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cache
 from typing import NamedTuple
 
 import numpy as np
@@ -17,14 +16,13 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Compiled, Graph, Node
-from cgraph.extend import Builder, building, cotangents, real_array, tangents
+from cgraph.extend import Array, Builder, building, cotangents, memo, real_array, tangents
 
 from .body_motion import Motion, energy, ground, propagate_motion
 from .inertial_numbers import Link
 from .joint_coordinates import places
 from .joints import MovingJoint, moving_type
 from .mechanism import Mechanism, require_mechanism
-from .spatial import Array
 
 ONE = cg.constant(1.0)
 MOTION = 10  # numbers in a Motion
@@ -99,7 +97,7 @@ class _Kernels(NamedTuple):
     backwards: Compiled  # the same, cotangents of the motion and their rates -> those of the parent's motion; tau
 
 
-@cache
+@memo(64)
 def _kernels(joint: MovingJoint) -> _Kernels:
     """What a link with that type of joint needs, whatever its numbers are."""
     parent, rates, bars, bar_rates = (_variables(name, MOTION) for name in ("s", "s_dot", "bar", "bar_dot"))

@@ -8,7 +8,7 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Builder, building
+from cgraph.extend import Array, Builder, building
 
 from ..equations.formulations import inverse_dynamics
 from ..systems.model import Model
@@ -20,7 +20,6 @@ from .inertial_numbers import Link, axes_of, link
 from .joint_coordinates import parts, quasi_velocities
 from .joints import moving_type
 from .mechanism import Mechanism, as_mechanism
-from .spatial import Array
 
 PARAMETERS = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")  # the order of Pinocchio
 _LOWER = ((0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2))  # entries of I in that order

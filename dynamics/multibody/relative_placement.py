@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Node
+from cgraph.extend import Array
 
 from . import spatial
 from .body import Body
@@ -19,7 +20,7 @@ from .inertial_numbers import Link, axes_of
 from .joint_coordinates import parts
 from .joints import AxialJoint, SpatialJoint, moving_type
 from .kinematic_tree import Carrier
-from .spatial import STILL, ZERO, Array, Triple
+from .spatial import STILL, ZERO, Triple
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,16 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import reduce
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import as_node
+from cgraph.extend import Array, as_node
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
 Triple = tuple[Node, Node, Node]
 Matrix = Sequence[Sequence[float | Node]]  # (3, 3)
 ZERO = cg.constant(0.0)
@@ -70,7 +68,7 @@ def without_rounding(total: Array, terms: Array) -> Array:
     return np.where(np.abs(total) <= ROUNDING * terms, 0.0, total) + 0.0
 
 
-def plain(value: Any) -> float | Node:
+def plain(value: float | Node) -> float | Node:
     """The number of a constant, else the node."""
     if isinstance(value, Node):
         return value if value.value is None else value.value

@@ -9,7 +9,7 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import Builder, building
+from cgraph.extend import Array, Builder, building
 
 from ..systems.momentum_derivatives import MomentumDerivatives
 from ..systems.system import BiasForce
@@ -26,7 +26,6 @@ from .joints import AxialJoint, moving_type
 from .link_cache import Moved
 from .mechanism_fields import Structure
 from .momentum_columns import momentum_derivatives
-from .spatial import Array
 
 
 class TreeEquations:

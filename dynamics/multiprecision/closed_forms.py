@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING
 
 from cgraph.extend import install
 
 from .solution import Reference, from_text
 
+if TYPE_CHECKING:
+    from mpmath import mpf
+    from mpmath.ctx_mp import MPContext
+
 DIGITS = 30  # of the texts; the stated error is 10^-DIGITS
 GUARD = 40  # more digits in the arithmetic: a phase of 10^15 rad, or a modulus next to 1, costs some of them
 
 
-def _solution(times: Sequence[float], state: Callable[[Any, Any], Sequence[Any]], how: str) -> Reference:
+def _solution(times: Sequence[float], state: Callable[[MPContext, mpf], Sequence[mpf]], how: str) -> Reference:
     """state(mp, t): the state at time t, in mpmath numbers."""
     try:
         import mpmath
@@ -35,7 +39,7 @@ def oscillator(
 ) -> Reference:
     """M xdd + damping xd + stiffness x = 0 from (x, v), for any damping but the critical one. States (x, v)."""
 
-    def state(mp: Any, t: Any) -> list[Any]:
+    def state(mp: MPContext, t: mpf) -> list[mpf]:
         decay = mp.mpf(damping) / (2 * mp.mpf(mass))
         root = mp.sqrt(mp.mpc(decay**2 - mp.mpf(stiffness) / mp.mpf(mass)))
         fast, slow = -decay - root, -decay + root
@@ -52,7 +56,7 @@ def oscillator(
 def free_fall(times: Sequence[float], q: Sequence[float], qd: Sequence[float], qdd: Sequence[float]) -> Reference:
     """Constant accelerations qdd from (q, qd). States (q, qd)."""
 
-    def state(mp: Any, t: Any) -> list[Any]:
+    def state(mp: MPContext, t: mpf) -> list[mpf]:
         x, v, a = ([mp.mpf(value) for value in row] for row in (q, qd, qdd))
         places = [p + s * t + b * t * t / 2 for p, s, b in zip(x, v, a, strict=True)]
         return [*places, *[s + b * t for s, b in zip(v, a, strict=True)]]
@@ -67,7 +71,7 @@ def kepler(times: Sequence[float], eccentricity: float, mu: float = 1.0) -> Refe
     """
     x0, _, _, v0 = kepler_start(eccentricity, mu)
 
-    def state(mp: Any, t: Any) -> list[Any]:
+    def state(mp: MPContext, t: mpf) -> list[mpf]:
         r, v, g = mp.mpf(x0), mp.mpf(v0), mp.mpf(mu)
         a = 1 / (2 / r - v * v / g)
         e = 1 - r / a
@@ -100,7 +104,7 @@ def pendulum(times: Sequence[float], angle: float, stiffness: float) -> Referenc
     w^2 = stiffness.
     """
 
-    def state(mp: Any, t: Any) -> list[Any]:
+    def state(mp: MPContext, t: mpf) -> list[mpf]:
         w = mp.sqrt(mp.mpf(stiffness))
         hanging = 2 * mp.pi * mp.nint(mp.mpf(angle) / (2 * mp.pi))
         k = mp.sin((mp.mpf(angle) - hanging) / 2)
@@ -126,7 +130,7 @@ def free_rotor(times: Sequence[float], inertia: Sequence[float], omega: Sequence
     that axis as its angular velocity says (E. T. Whittaker, "Analytical Dynamics", section 69).
     """
 
-    def state(mp: Any, t: Any) -> list[Any]:
+    def state(mp: MPContext, t: mpf) -> list[mpf]:
         rotor = _Rotor(mp, inertia, omega)
         first, here, angle = rotor.frame(mp.mpf(0)), rotor.frame(t), rotor.precession(t)
         s, c = mp.sin(angle), mp.cos(angle)
@@ -140,7 +144,7 @@ def free_rotor(times: Sequence[float], inertia: Sequence[float], omega: Sequence
 class _Rotor:
     """A rigid body without torque from a start: w_a = first cn(u), w_1 = middle sn(u), w_c = last dn(u)."""
 
-    def __init__(self, mp: Any, inertia: Sequence[float], omega: Sequence[float]) -> None:
+    def __init__(self, mp: MPContext, inertia: Sequence[float], omega: Sequence[float]) -> None:
         i, w = [mp.mpf(value) for value in inertia], [mp.mpf(value) for value in omega]
         energy = sum(a * b * b for a, b in zip(i, w, strict=True))  # twice
         square = sum((a * b) ** 2 for a, b in zip(i, w, strict=True))
@@ -155,7 +159,7 @@ class _Rotor:
         self.start = mp.ellipf(mp.atan2(w[1] / self.middle, w[a] / self.first), self.m)
         self.mp, self.inertia, self.energy, self.square, self.a, self.c = mp, i, energy, square, a, c
 
-    def velocity(self, t: Any) -> list[Any]:
+    def velocity(self, t: mpf) -> list[mpf]:
         """Angular velocity in the body's axes."""
         u = self.start + self.rate * t
         sn, cn, dn = (self.mp.ellipfun(name, u=u, m=self.m) for name in ("sn", "cn", "dn"))
@@ -163,7 +167,7 @@ class _Rotor:
         result[self.a], result[1], result[self.c] = self.first * cn, self.middle * sn, self.last * dn
         return result
 
-    def frame(self, t: Any) -> list[Any]:
+    def frame(self, t: mpf) -> list[mpf]:
         """In the body's axes: those whose z is the angular momentum, and whose x leans towards axis c."""
         momentum = [i * w for i, w in zip(self.inertia, self.velocity(t), strict=True)]
         z = self.mp.matrix(momentum) / self.mp.sqrt(self.square)
@@ -172,7 +176,7 @@ class _Rotor:
         y = [z[1] * x[2] - z[2] * x[1], z[2] * x[0] - z[0] * x[2], z[0] * x[1] - z[1] * x[0]]
         return [x, self.mp.matrix(y), z]
 
-    def precession(self, t: Any) -> Any:
+    def precession(self, t: mpf) -> mpf:
         """How far axis c has turned about L: the integral of L (2T - I_c w_c^2) / (L^2 - I_c^2 w_c^2) [rad]."""
         mp, moment = self.mp, self.inertia[self.c]
         across = self.square - (moment * self.last) ** 2  # L^2 - I_c^2 w_c^2 = across (1 - n sn^2)
@@ -180,7 +184,7 @@ class _Rotor:
         share = self._third(n, self.start + self.rate * t) - self._third(n, self.start)
         return mp.sqrt(self.square) / moment * (t + (self.energy * moment - self.square) / across * share / self.rate)
 
-    def _third(self, n: Any, u: Any) -> Any:
+    def _third(self, n: mpf, u: mpf) -> mpf:
         """The integral of 1 / (1 - n sn^2) from 0 to u."""
         mp, m = self.mp, self.m
         turns = mp.nint(u / (2 * mp.ellipk(m)))
@@ -192,7 +196,7 @@ class _Rotor:
 def cyclotron(times: Sequence[float], start: Sequence[float], frequency: float) -> Reference:
     """A charge in a uniform field along z: (vx, vy)' = frequency (vy, -vx). States (x, y, vx, vy)."""
 
-    def state(mp: Any, t: Any) -> list[Any]:
+    def state(mp: MPContext, t: mpf) -> list[mpf]:
         x, y, u, v = (mp.mpf(value) for value in start)
         w = mp.mpf(frequency)
         s, c = mp.sin(w * t), mp.cos(w * t)
@@ -209,7 +213,7 @@ def cosine(times: Sequence[float]) -> Reference:
 def two_modes(times: Sequence[float], q: Sequence[float], stiffness: Sequence[float]) -> Reference:
     """(q0 + q1)'' = -stiffness_0 (q0 + q1) and q1'' = -stiffness_1 q1, from rest at q. States (q0, q1, qd0, qd1)."""
 
-    def state(mp: Any, t: Any) -> list[Any]:
+    def state(mp: MPContext, t: mpf) -> list[mpf]:
         w, v = (mp.sqrt(mp.mpf(value)) for value in stiffness)
         both, second = mp.mpf(q[0]) + mp.mpf(q[1]), mp.mpf(q[1])
         place, speed = second * mp.cos(v * t), -second * v * mp.sin(v * t)

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,6 +22,9 @@ from ..systems.arguments import TIME
 from .flint_numbers import Number, flint, log2_size, working
 from .taylor_integrator import ReferenceFailedError, step_size
 from .taylor_series import Series
+
+if TYPE_CHECKING:
+    from flint import arb_mat
 
 GUARD = 40  # digits of arithmetic beyond the tolerance: a stiff rate is a small difference of large terms
 SETTLED = 24  # digits beyond the tolerance to which the stages are solved for: a stiff rate loses most of them
@@ -35,8 +38,8 @@ class Radau:
     """The s Radau points c in (0, 1], and matrices over the rates there: (s, s) each."""
 
     c: list[Number]
-    integral: Any  # rates at the points -> integrals from 0 to the points, for a step of 1
-    legendre: Any  # rates at the points -> coefficients of Legendre's polynomials
+    integral: arb_mat  # rates at the points -> integrals from 0 to the points, for a step of 1
+    legendre: arb_mat  # rates at the points -> coefficients of Legendre's polynomials
 
 
 def radau(stages: int, digits: int) -> Radau:
@@ -67,7 +70,7 @@ def _guesses(stages: int) -> list[float]:
     return sorted(np.real(roots).tolist())[:-1] + [1.0]
 
 
-def _radau_point(number: Any, s: int, guess: float) -> Number:
+def _radau_point(number: Callable[[object], Number], s: int, guess: float) -> Number:
     x = number(guess)
     if guess == 1.0:
         return x
@@ -82,9 +85,9 @@ def _radau_point(number: Any, s: int, guess: float) -> Number:
 def collocation(
     graph: Graph,
     states: Sequence[str],
-    start: Sequence[Any],
+    start: Sequence[object],
     times: Sequence[float],
-    values: Mapping[str, Any],
+    values: Mapping[str, object],
     digits: int,
 ) -> tuple[list[list[Number]], str]:
     """The states at `times` from `start` at t = 0, each step resolved to about a relative 10^-digits.
@@ -203,7 +206,7 @@ def _growth(method: Radau, rates: list[list[Number]], x: list[Number], h: Number
     return math.exp2((-digits * math.log2(10.0) - worst) / len(table))
 
 
-def _jacobian(graph: Graph, states: Sequence[str], values: Mapping[str, Any]) -> Callable[[Array, Array], Array]:
+def _jacobian(graph: Graph, states: Sequence[str], values: Mapping[str, Number]) -> Callable[[Array, Array], Array]:
     """df/dx in float64 at points x, (s, m), and times t, (s,): (s, m, m)."""
     bound = cg.specialize(graph, {name: float(value) for name, value in values.items()})
     compiled = cg.compile(cg.jacobian(bound, list(states)), "numpy")

@@ -6,7 +6,6 @@ import hashlib
 import json
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from cgraph import Graph
 from cgraph.extend import atomic_write
@@ -60,7 +59,7 @@ class Store:
         return solution
 
 
-def _signed(solution: Reference) -> dict[str, Any]:
+def _signed(solution: Reference) -> dict[str, object]:
     content = {
         "t": [t.hex() for t in solution.t],
         "x": [list(row) for row in solution.decimal],
@@ -70,7 +69,7 @@ def _signed(solution: Reference) -> dict[str, Any]:
     return content | {"sum": _sum(content)}
 
 
-def _sum(content: Mapping[str, Any]) -> str:
+def _sum(content: Mapping[str, object]) -> str:
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 

@@ -6,26 +6,31 @@ import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
-from typing import Any
+from types import ModuleType
+from typing import TYPE_CHECKING, TypeAlias
 
 from cgraph.extend import Op, install
 
-Number = Any  # flint.arb: a midpoint of the working precision with a bound on its rounding error
+if TYPE_CHECKING:
+    from flint import arb
+
+Number: TypeAlias = "arb"  # a midpoint of the working precision with a bound on its rounding error
 
 BITS_PER_DIGIT = math.log2(10.0)
 
 
-def flint() -> Any:
+def flint() -> ModuleType:
     """The package. Raises ImportError that names the extra."""
     try:
         import flint
     except ImportError:
         raise ImportError(f"reference solutions need python-flint: {install('reference')}") from None
-    return flint
+    found: ModuleType = flint  # it has no types
+    return found
 
 
 @contextmanager
-def working(digits: int) -> Iterator[Callable[[Any], Number]]:
+def working(digits: int) -> Iterator[Callable[[object], Number]]:
     """Arithmetic with so many decimal digits; gives the constructor of numbers."""
     package = flint()
     with package.ctx.workprec(math.ceil(digits * BITS_PER_DIGIT) + 8):

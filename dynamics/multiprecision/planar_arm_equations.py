@@ -12,7 +12,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -42,7 +42,7 @@ class Pair(NamedTuple):
 def torques(arm: Mechanism, q: Array, qd: Array, qdd: Array) -> Pair:
     """tau [N m] of a planar arm for accelerations qdd, (n,). Raises ImportError without python-flint."""
 
-    def solved(terms: _Equations, number: Callable[[Any], Number]) -> Vector:
+    def solved(terms: _Equations, number: Callable[[object], Number]) -> Vector:
         alpha = _running(number, qdd)
         force = [_dot(row, alpha) - right for row, right in zip(terms.matrix, terms.right, strict=True)]
         above = list(itertools.accumulate(reversed(force)))[::-1]
@@ -54,7 +54,7 @@ def torques(arm: Mechanism, q: Array, qd: Array, qdd: Array) -> Pair:
 def accelerations(arm: Mechanism, q: Array, qd: Array, tau: Array) -> Pair:
     """qdd [rad/s^2] of a planar arm under torques tau, (n,). Raises ImportError without python-flint."""
 
-    def solved(terms: _Equations, number: Callable[[Any], Number]) -> Vector:
+    def solved(terms: _Equations, number: Callable[[object], Number]) -> Vector:
         torque = [number(value) - c for value, c in zip(tau.tolist(), terms.damping, strict=True)]
         beyond = [*torque[1:], number(0)]
         right = [[a - b + r] for a, b, r in zip(torque, beyond, terms.right, strict=True)]
@@ -75,7 +75,7 @@ class _Equations(NamedTuple):
 
 
 def _bounded(
-    arm: Mechanism, q: Array, qd: Array, solved: Callable[[_Equations, Callable[[Any], Number]], Vector]
+    arm: Mechanism, q: Array, qd: Array, solved: Callable[[_Equations, Callable[[object], Number]], Vector]
 ) -> Pair:
     """The numbers, computed with so many digits that the bound on their error is at most LOST."""
     digits = DIGITS
@@ -94,7 +94,7 @@ def _bounded(
     raise ArithmeticError(f"{MOST} digits are not enough for an arm of {len(arm.moving)} links")
 
 
-def _terms(number: Callable[[Any], Number], arm: Mechanism, q: Array, qd: Array) -> _Equations:
+def _terms(number: Callable[[object], Number], arm: Mechanism, q: Array, qd: Array) -> _Equations:
     n = len(arm.moving)
     gravity = number(np.asarray(arm.gravity)[2])
     theta, omega = _running(number, q), _running(number, qd)
@@ -121,7 +121,7 @@ def _terms(number: Callable[[Any], Number], arm: Mechanism, q: Array, qd: Array)
     return _Equations(matrix, right, damping)
 
 
-def _running(number: Callable[[Any], Number], values: Array) -> Vector:
+def _running(number: Callable[[object], Number], values: Array) -> Vector:
     return list(itertools.accumulate([number(value) for value in values.tolist()]))
 
 

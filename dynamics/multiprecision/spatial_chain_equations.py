@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
 
+from cgraph.extend import Array
+
 from ..multibody.mechanism import Mechanism
 from .flint_numbers import Number, flint, working
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
 Vector = list[Number]
 DIGITS = 66
 LOST = 1e-30  # a bound on the relative error of the results, or there were too few bits
@@ -72,7 +73,9 @@ def chain_accelerations(chain: Mechanism, q: Array, qd: Array, tau: Array) -> Ar
         return _solved(matrix, rhs)
 
 
-def _inertia_about_origin(arb: Any, body: Any, place: Vector, turn: list[Vector]) -> list[Vector]:
+def _inertia_about_origin(
+    arb: Callable[[object], Number], body: Any, place: Vector, turn: list[Vector]
+) -> list[Vector]:
     """6 x 6, of (angular, linear) velocity: [[J - m [c][c], m [c]], [-m [c], m 1]], [c] the matrix of c x."""
     mass = arb(body.mass)
     c = _plus(place, _times(turn, [arb(float(x)) for x in body.center]))
@@ -86,7 +89,7 @@ def _inertia_about_origin(arb: Any, body: Any, place: Vector, turn: list[Vector]
     return top + [[-mass * x for x in skew[i]] + [mass * int(i == j) for j in range(3)] for i in range(3)]
 
 
-def _sum(values: Any) -> Number:
+def _sum(values: Iterable[Number]) -> Number:
     return sum(values, 0)
 
 

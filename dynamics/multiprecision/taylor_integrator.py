@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
@@ -32,9 +31,9 @@ class ReferenceFailedError(ArithmeticError):
 def taylor(
     graph: Graph,
     states: Sequence[str],
-    start: Sequence[Any],
+    start: Sequence[object],
     times: Sequence[float],
-    values: Mapping[str, Any],
+    values: Mapping[str, object],
     digits: int,
 ) -> tuple[list[list[Number]], str]:
     """The states at `times` from `start` at t = 0, with a relative truncation error of 10^-digits a step.
@@ -111,9 +110,8 @@ def _until_switch(series: Series, h: Number, digits: int) -> tuple[Number, dict[
     """The step to the first switch of a piecewise operation, and the sides to take after it."""
     forced: dict[int, int] = {}
     first = h
-    for node, switch in series.switches.items():
-        d, side = series.coefficients[switch], series.sides[node]
-        if not side or not series.moving(switch):
+    for piece, (d, side) in enumerate(zip(series.switches, series.sides, strict=True)):
+        if not side:
             continue
         low = first * 0
         for j in range(1, SAMPLES + 1):
@@ -132,5 +130,5 @@ def _until_switch(series: Series, h: Number, digits: int) -> tuple[Number, dict[
         if (first - high) > 0:
             forced = {}
         first = high
-        forced[node] = -side
+        forced[piece] = -side
     return first, forced

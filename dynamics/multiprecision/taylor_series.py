@@ -1,68 +1,73 @@
-"""Taylor series: the coefficients of a solution of xdot = f(x, t), from the graph of f.
-
-Sums, products, quotients and the piecewise operations have recurrences of their own. For every other operation the
-table's partials are the recurrence: with y = op(a, b), ydot = (dy/da) adot + (dy/db) bdot, so coefficient k of y is
-
-    y_k = (1/k) sum over arguments a, sum i = 1..k, of  i a_i g_{k-i},     g the series of the node dy/da.
-
-Only g_0 .. g_{k-1} are asked for, so g may depend on y itself, as for exp, tan or the pair sine and cosine.
-"""
+"""Taylor series: the coefficients of a solution of xdot = f(x, t) in numbers of any precision, by its jets."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from operator import mul
-from typing import Any
 
 from cgraph import Graph, Node
-from cgraph.extend import OPS, Op, as_node, columns, topological
+from cgraph.extend import NoSeriesError, columns, jets, topological
 
 from ..systems.arguments import TIME
 from .flint_numbers import Number, sign, value
 
-Push = Callable[[int], None]  # appends coefficient k of one series, those of its arguments being there
-Key = tuple[Any, ...]
+Step = tuple[int, Callable[..., Number], list[int]]  # where the result goes, of which function, of the numbers where
 
 
 class Series:
-    """The recurrences of a state equation, and its coefficients at a point.
+    """The series of a state equation, and its coefficients at a point.
 
     graph: inputs the states, then others; outputs the rates in the order of `states`.
     constants: {name of an input: number} for all inputs but the states and t.
     number: the constructor of numbers, at the precision at which the series will be used.
 
-    switches: {piecewise node: series whose sign chooses its piece}.  forced: {piecewise node: that sign}, imposed in
-    the next expansion where the value at the point does not tell, as just after a switch.
+    switches: of each piecewise operation, coefficients 0, 1, .. of what chooses its piece by its sign.  sides: that
+    sign.  forced: {piecewise operation: the sign}, imposed in the next expansion where the value at the point does not
+    tell, as just after a switch.
     """
 
-    def __init__(self, graph: Graph, states: Sequence[str], constants: Mapping[str, Any], number: Any) -> None:
-        self.number = number
-        self.coefficients: list[list[Number]] = []  # of each series; those of the last expansion
-        self.switches: dict[int, int] = {}
+    def __init__(
+        self, graph: Graph, states: Sequence[str], constants: Mapping[str, object], number: Callable[..., Number]
+    ) -> None:
+        self.number, self._m = number, len(states)
+        try:
+            self._jets = jets(graph, TIME, exact=True)
+        except NoSeriesError as error:
+            raise NotImplementedError(f"a reference solution needs Taylor series, and {error}") from None
+        self._pieces = {node: k for k, node in enumerate(self._jets.pieces)}
+        self.switches: list[list[Number]] = [[] for _ in self._pieces]
+        self.sides = [0] * len(self._pieces)
         self.forced: dict[int, int] = {}
-        self.sides: dict[int, int] = {}  # {piecewise node: the sign that it took}
-        self._number_of: dict[Key, int] = {}  # (operation, arguments): which series
-        self._of_node: dict[Node, int] = {}
-        self._moving: list[bool] = []  # whether a series depends on the state or on t
-        self._slopes: dict[int, list[Number]] = {}  # series: i a_i for i = 1, 2, ..
-        self._push: list[Push] = []
-        for name in graph.input_names:
-            self._append(("variable", name), number(constants[name]) if name in constants else None)
-        self._states = [self._number_of["variable", name] for name in states]
-        self._time = self._number_of.get(("variable", TIME))
-        self._rates = [self._intern(node) for node in graph.outputs.values()]
+        self._start = _Evaluation(self._jets.start, constants, number, self._value)
+        self._order = _Evaluation(self._jets.order, {}, number, self._value)
+        self._timed = TIME in graph.input_names
+
+    def _value(self, node: Node) -> Callable[..., Number]:
+        """The value of an operation; of a piecewise one, of the piece of its side, which it chooses here."""
+        if node not in self._pieces:
+            return value(columns(node.op))
+        k, piece = self._pieces[node], columns(node.op).piece
+        assert piece is not None
+
+        def chosen(*args: Number) -> Number:
+            side = sign(args[0] - args[1] if len(args) == 2 else args[0])
+            self.sides[k] = side = self.forced.get(k, side)
+            slot, factor = piece(side)
+            return self.number(factor) if slot is None else args[slot] if factor == 1 else factor * args[slot]
+
+        return chosen
 
     def expand(self, x: Sequence[Number], t: Number, order: int) -> list[list[Number]]:
         """Coefficients 0 .. order >= 1 of each state, around the state x at time t."""
         while True:
-            self._run(x, t, order)
+            coefficients = self._run(x, t, order)
             wrong = {
-                node: side
-                for node, switch in self.switches.items()
-                if node not in self.forced and (side := self._side(switch)) != self.sides[node]
+                k: side
+                for k, switch in enumerate(self.switches)
+                if k not in self.forced and (side := _side(switch)) != self.sides[k]
             }
             if not wrong:
-                return [self.coefficients[i] for i in self._states]
+                return coefficients
             self.forced |= wrong
 
     def rate(self, x: Sequence[Number], t: Number) -> list[Number]:
@@ -70,139 +75,75 @@ class Series:
         self.forced = {}
         return [coefficients[1] for coefficients in self.expand(x, t, 1)]
 
-    def _side(self, switch: int) -> int:
-        """The sign of a series just after the point: that of its first coefficient that is not zero."""
-        return next((side for each in self.coefficients[switch] if (side := sign(each))), 0)
+    def _run(self, x: Sequence[Number], t: Number, order: int) -> list[list[Number]]:
+        m, sums = self._m, self._jets.sums
+        first = self._start([*x, t] if self._timed else x)
+        rates, zeros = first[:m], first[m : m + self._jets.zeros]
+        coefficients = [[each] for each in x]
+        self.switches = [[each] for each in first[m + self._jets.zeros :]]
+        left: list[list[Number]] = [[] for _ in range(sums)]
+        right: list[list[Number]] = [[] for _ in range(sums)]
+        for k in range(1, order + 1):
+            for row, rate in zip(coefficients, rates, strict=True):
+                row.append(rate / k)
+            if k == order:
+                break
+            known = map(self._sum, left, right, self._jets.safe)
+            now = self._order([*rates, self.number(1), self.number(k), *zeros, *known, *map(self.number, self.sides)])
+            rates = now[m : 2 * m]
+            for row, each in zip((*left, *right, *self.switches), now[2 * m :], strict=True):
+                row.append(each)
+        return coefficients
 
-    def _run(self, x: Sequence[Number], t: Number, order: int) -> None:
-        for moving, coefficients in zip(self._moving, self.coefficients, strict=True):
-            if moving:
-                coefficients.clear()
-        for slopes in self._slopes.values():
-            slopes.clear()
-        for i, number in zip(self._states, x, strict=True):
-            self.coefficients[i].append(number)
-        for k in range(order):
-            if self._time is not None:
-                self.coefficients[self._time].append(t if k == 0 else self.number(int(k == 1)))
-            for push in self._push:
-                push(k)
-            for i, rate in zip(self._states, self._rates, strict=True):
-                self.coefficients[i].append(self.get(rate, k) / (k + 1))
+    def _sum(self, left: Sequence[Number], right: Sequence[Number], safe: bool) -> Number:
+        """The sum over 0 < j < k of left_j right_k-j."""
+        if safe:
+            return sum([a * b for a, b in zip(left, right[::-1], strict=True) if a != 0 and b != 0], self.number(0))
+        return sum(map(mul, left, right[::-1]), self.number(0))
 
-    def get(self, i: int, k: int) -> Number:
-        """Coefficient k of series i; a constant has one coefficient only."""
-        return self.coefficients[i][k] if k == 0 or self._moving[i] else self.number(0)
 
-    def moving(self, i: int) -> bool:
-        """Whether series i depends on the state or on t."""
-        return self._moving[i]
+def _side(switch: Sequence[Number]) -> int:
+    """The sign of a series just after the point: that of its first coefficient that is not zero."""
+    return next((side for each in switch if (side := sign(each))), 0)
 
-    def shared(self, op: Op, *args: int) -> int:
-        """The series of an operation on series, made when it is not there."""
-        key = (op.name, *args)
-        if key in self._number_of:
-            return self._number_of[key]
-        if not any(self._moving[i] for i in args):
-            return self._append(key, value(op)(*[self.coefficients[i][0] for i in args]))
-        if op.piece is not None:
-            switch = self.shared(OPS["sub"], *args) if len(args) == 2 else args[0]
-            i = self._append(key, None)
-            self.switches[i] = switch
-            self._push.append(_piecewise(self, i, op, switch, *args))
-        else:
-            i = self._append(key, None)
-            self._push.append(self._recurrence(i, op, *args))
-        return i
 
-    def _recurrence(self, i: int, op: Op, *args: int) -> Push:
-        own, rule, known = self.coefficients[i], op.series, [self.coefficients[arg] for arg in args]
-        assert rule is not None
-        return lambda k: own.append(rule(k, own, *known))
+class _Evaluation:
+    """A graph over numbers of any precision; what its constants alone decide is computed once."""
 
-    def slopes(self, i: int) -> list[Number]:
-        """The list of k a_k, k = 1, 2, .., of series i."""
-        if i not in self._slopes:
-            own, result = self.coefficients[i], self._slopes.setdefault(i, [])
-            self._push.append(lambda k: result.append(k * own[k]) if k else None)
-        return self._slopes[i]
-
-    def _intern(self, root: Node) -> int:
-        """The series of a node, with all it needs. Nothing is folded: a folded constant would be rounded to float64."""
-        waiting = [root]
-        while waiting:
-            for node in topological([waiting.pop()]):
-                if node not in self._of_node:
-                    self._of_node[node] = self._made(node, waiting)
-        return self._of_node[root]
-
-    def _made(self, node: Node, waiting: list[Node]) -> int:
-        name, args = node.op.name, [self._of_node[arg] for arg in node.args]
-        if name == "variable":
-            return self._number_of["variable", node.name]
-        if name == "constant":
-            made = self._number_of.get(("constant", node.value))
-            return self._append(("constant", node.value), self.number(node.value)) if made is None else made
-        if columns(node.op).series or columns(node.op).piece or not any(self._moving[i] for i in args):
-            return self.shared(columns(node.op), *args)
-        if columns(node.op).jumps is not None:
-            raise NotImplementedError(f"a reference solution needs Taylor series, and {name} of what moves jumps")
-        key = (name, *args)
-        if key not in self._number_of:
-            if (rewrite := columns(node.op).rewrite) is not None:
-                self._number_of[key] = self._intern(rewrite(*node.args))
+    def __init__(
+        self,
+        graph: Graph,
+        constants: Mapping[str, object],
+        number: Callable[..., Number],
+        value_of: Callable[[Node], Callable[..., Number]],
+    ) -> None:
+        self._numbers: list[Number] = []
+        self._steps: list[Step] = []
+        places: dict[Node, int] = {}
+        moving: set[int] = set()
+        for node in (*graph.inputs, *topological(graph.outputs.values())):
+            if node in places:
+                continue
+            k = places[node] = len(self._numbers)
+            args = [places[arg] for arg in node.args]
+            known = None
+            if node.value is not None:
+                known = number(node.value)
+            elif node.name in constants and not args:
+                known = number(constants[str(node.name)])
+            elif args and moving.isdisjoint(args):
+                known = value_of(node)(*[self._numbers[arg] for arg in args])
             else:
-                self._integral(self._append(key, None), node, args, waiting)
-        return self._number_of[key]
+                moving.add(k)
+                self._steps += [(k, value_of(node), args)] if args else []
+            self._numbers.append(known)
+        self._inputs = [places[node] for node in graph.inputs if node.name not in constants]
+        self._outputs = [places[node] for node in graph.outputs.values()]
 
-    def _append(self, key: Key, still: Number | None) -> int:
-        i = self._number_of[key] = len(self.coefficients)
-        self._moving.append(still is None)
-        self.coefficients.append([] if still is None else [still])
-        return i
-
-    def _integral(self, i: int, node: Node, args: Sequence[int], waiting: list[Node]) -> None:
-        """The recurrence by the table's partials. They may depend on the node itself, so they are made after it."""
-        self._of_node[node] = i
-        own, at_point = self.coefficients[i], value(columns(node.op))
-        at = [self.coefficients[arg] for arg in args]
-        terms = []
-        for arg, partial in zip(args, map(as_node, node.op.partials(node, *node.args)), strict=True):
-            if self._moving[arg]:
-                terms.append((self.slopes(arg), partial))
-                waiting.append(partial)
-        slopes = [slope for slope, _ in terms]
-        series: list[int] = []
-
-        def push(k: int) -> None:
-            if k == 0:
-                own.append(at_point(*[coefficients[0] for coefficients in at]))
-                return
-            if not series:
-                series.extend([self._of_node[partial] for _, partial in terms])
-            total = self.number(0)
-            for slope, j in zip(slopes, series, strict=True):
-                if self._moving[j]:
-                    total = sum(map(mul, slope, self.coefficients[j][k - 1 :: -1]), total)
-                else:
-                    total += slope[k - 1] * self.coefficients[j][0]
-            own.append(total / k)
-
-        self._push.append(push)
-
-
-def _piecewise(s: Series, i: int, op: Op, switch: int, *args: int) -> Push:
-    own, piece = s.coefficients[i], op.piece
-    assert piece is not None
-
-    def push(k: int) -> None:
-        if k == 0:
-            s.sides[i] = s.forced[i] if i in s.forced else sign(s.coefficients[switch][0])
-        slot, factor = piece(s.sides[i])
-        if slot is None:
-            own.append(s.number(0 if k else factor))
-        else:
-            coefficient = s.get(args[slot], k)
-            own.append(coefficient if factor == 1 else factor * coefficient)
-
-    return push
+    def __call__(self, inputs: Sequence[Number]) -> list[Number]:
+        numbers = self._numbers
+        for k, each in zip(self._inputs, inputs, strict=True):
+            numbers[k] = each
+        for k, function, args in self._steps:
+            numbers[k] = function(*[numbers[arg] for arg in args])
+        return [numbers[k] for k in self._outputs]

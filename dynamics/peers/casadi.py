@@ -6,18 +6,21 @@ import os
 import shutil
 import subprocess
 import tempfile
-from functools import cache
 from pathlib import Path
-from typing import Any
+from types import ModuleType
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cgraph.extend import install
+from cgraph.extend import Array, install, kept_by_first
 
-from .case import BATCH, DERIVATIVES, MOTIONS, NUDGE, PASSES, Array, Case, rk4_step
+from .case import BATCH, DERIVATIVES, MOTIONS, NUDGE, PASSES, Case, rk4_step
 from .contender import Contender, Peer, UnavailableError
 from .ours import rate_graph, task_graph
 from .translate import lagrangian, quasi_velocities, translated
+
+if TYPE_CHECKING:
+    from casadi import Function
 
 FLAGS = ("-O3", "-march=native", "-shared", "-fPIC")
 # Of our operations, where CasADi has another name.
@@ -34,9 +37,14 @@ class CasadiPeer(Peer):
         super().__init__(case)
         self.casadi, self.native = casadi(), native
         self.compiler = os.environ.get("CC") or shutil.which("gcc") or shutil.which("cc")
-        self.function = cache(self._lagrange if own_graph else self._ours)
+        self._own_graph = own_graph
 
-    def _lagrange(self, task: str) -> Any:
+    @kept_by_first
+    def function(self, task: str) -> Function:
+        """The task, x -> y."""
+        return self._lagrange(task) if self._own_graph else self._ours(task)
+
+    def _lagrange(self, task: str) -> Function:
         """The task from the Lagrangian, x -> y."""
         ca, n = self.casadi, self.case.n
         if task == "rk4":
@@ -62,7 +70,7 @@ class CasadiPeer(Peer):
             return ca.Function(task, [x], [ca.cse(y)])
         return ca.Function(task, [ca.vertcat(q, qd, last)], [ca.cse(y)])
 
-    def _slopes(self, task: str) -> Any:
+    def _slopes(self, task: str) -> Function:
         """The derivatives of a task, by CasADi's Jacobian; those by q along the velocities."""
         ca, nq, n = self.casadi, self.case.nq, self.case.n
         function = self.function(DERIVATIVES[task])
@@ -74,7 +82,7 @@ class CasadiPeer(Peer):
         rows = ca.horzcat(ca.mtimes(rows[:, :nq], along), rows[:, nq:])
         return ca.Function("slopes", [x], [ca.cse(ca.densify(ca.vec(rows.T)))])
 
-    def _ours(self, task: str) -> Any:
+    def _ours(self, task: str) -> Function:
         """Our graph of the task, node for node."""
         ca = self.casadi
         if task == "rk4":
@@ -86,7 +94,7 @@ class CasadiPeer(Peer):
             task.replace("-", "_"), [x], [ca.vertcat(*[values[node] for node in graph.outputs.values()])]
         )
 
-    def _step(self, rate: Any) -> Any:
+    def _step(self, rate: Function) -> Function:
         """One RK4 step that calls the rate of the state four times."""
         ca = self.casadi
         state = ca.MX.sym("x", self.case.width("rk4"))
@@ -94,7 +102,7 @@ class CasadiPeer(Peer):
         step = ca.Function("rk4", [state], [after])
         return step if self.native else step.expand()  # the virtual machine is faster on scalars; gcc inlines by itself
 
-    def _motion(self, task: str) -> Any:
+    def _motion(self, task: str) -> Function:
         """Steps of RK4 by `mapaccum`, a row of torques a step; or the gradient of |q|^2 after them, by its adjoint."""
         ca, n, width = self.casadi, self.case.n, self.case.width("rk4")
         y, state, force = ca.SX.sym("y", width + n), ca.MX.sym("state", width), ca.MX.sym("force", n)
@@ -106,7 +114,7 @@ class CasadiPeer(Peer):
         end = steps(x[:width], ca.reshape(x[width:], n, PASSES))[:, -1]
         return ca.Function(task, [x], [end if task == "motion" else ca.gradient(ca.sumsqr(end[:n]), x)])
 
-    def _pass(self, task: str) -> Any:
+    def _pass(self, task: str) -> Function:
         """One pass of a loop: the carry to the carry."""
         function = self.function(task)
         if task == "rk4":
@@ -128,7 +136,7 @@ class CasadiPeer(Peer):
         many = function.map(BATCH, "serial")
         return self._contender(many, np.ascontiguousarray(self.case.points(task).T), BATCH, size)
 
-    def _contender(self, function: Any, x: Array, evaluations: int, size: int | None) -> Contender:
+    def _contender(self, function: Function, x: Array, evaluations: int, size: int | None) -> Contender:
         """Through CasADi's buffers, which call on fixed memory."""
         if self.native:
             function = self._through_c(function)
@@ -137,7 +145,7 @@ class CasadiPeer(Peer):
         buffer.set_arg(0, x.data)
         buffer.set_res(0, y.data)
 
-        def result(_: Any) -> Array:
+        def result(_: object) -> Array:
             return y.reshape(-1, function.size1_out(0)).T.copy() if evaluations == BATCH else y.copy()
 
         held = (x, buffer)  # the buffer holds bare pointers
@@ -148,7 +156,7 @@ class CasadiPeer(Peer):
 
         return Contender(run, result, evaluations, size)
 
-    def _through_c(self, function: Any) -> Any:
+    def _through_c(self, function: Function) -> Function:
         """The function compiled by the C compiler and loaded again. Raises UnavailableError when that fails."""
         assert self.compiler is not None
         with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:  # Windows keeps what is loaded
@@ -163,10 +171,11 @@ class CasadiPeer(Peer):
             return self.casadi.external(function.name(), str(library))
 
 
-def casadi() -> Any:
+def casadi() -> ModuleType:
     """The module. Raises ImportError naming the extra when it is not installed."""
     try:
         import casadi as module
     except ImportError as error:
         raise ImportError(f"CasADi is not installed: {install('bench')}") from error
-    return module
+    found: ModuleType = module  # it has no types
+    return found

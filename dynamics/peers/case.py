@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import topological
+from cgraph.extend import Array, topological
 
 from ..equations.state_equation import normalization
 from ..integrators.tableau import RK4
@@ -18,8 +19,6 @@ from ..multibody.mechanism import as_mechanism
 from ..systems.arguments import TIME
 from ..systems.model import Model, as_system
 from ..systems.system import System
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 # Each task takes one vector, the blocks end to end. Derivatives are n rows of 3 n columns; those by q are by
 # displacements where velocities are no rates of coordinates.
@@ -83,12 +82,15 @@ class Case:
         """How many numbers go into a task."""
         return self.nq + {"rk4": 1, **dict.fromkeys(MOTIONS, PASSES + 1)}.get(task, 2) * self.n
 
-    def nudges(self, task: str) -> np.ndarray[Any, np.dtype[np.intp]]:
+    def nudges(self, task: str) -> NDArray[np.intp]:
         """Which result moves each input from one pass of a loop to the next."""
         return np.arange(self.width(task)) % self.n
 
 
-def rk4_step(rate: Callable[[Any], Any], x: Any, dt: float = DT) -> Any:
+AnyState = TypeVar("AnyState")
+
+
+def rk4_step(rate: Callable[[AnyState], AnyState], x: AnyState, dt: float = DT) -> AnyState:
     """The state after one RK4 step of dt [s] from x, where xdot = rate(x); x: anything with sums and multiples."""
     slopes: list[Any] = []
     for weights in (*RK4.a, RK4.b):

@@ -7,7 +7,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from .case import Array, Case
+from cgraph.extend import Array
+
+from .case import Case
 
 # How a task is asked for.
 MODES = {
@@ -30,7 +32,7 @@ class Contender:
     evaluations: of the task, in one run.  size: instructions or nodes of one evaluation, where they can be counted.
     """
 
-    run: Callable[[], Any]
+    run: Callable[[], object]
     result: Callable[[Any], Array]
     evaluations: int = 1
     size: int | None = None

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from types import ModuleType
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -11,6 +13,9 @@ from cgraph.extend import install, ldl_elimination
 from .case import BATCH, Case
 from .contender import Contender, Peer
 from .translate import lagrangian, require_rates
+
+if TYPE_CHECKING:
+    from heyoka import expression
 
 COMPACT = 15  # coordinates; beyond, code written out takes longer to compile than its `compact_mode`
 
@@ -23,7 +28,7 @@ class HeyokaPeer(Peer):
         require_rates(case)
         self.heyoka = heyoka()
         leave_cache(self.heyoka)
-        self.functions: dict[str, Any] = {}
+        self.functions: dict[str, Callable[..., object]] = {}
 
     def prepare(self, task: str, mode: str) -> Contender:
         """heyoka's compiled function of the task."""
@@ -36,22 +41,23 @@ class HeyokaPeer(Peer):
         return Contender(lambda: function(x, outputs=y), lambda _: y.copy(), BATCH if many else 1)
 
 
-def heyoka() -> Any:
+def heyoka() -> ModuleType:
     """The module. Raises ImportError naming the extra when it is not installed."""
     try:
         import heyoka as module
     except ImportError as error:
         raise ImportError(f"heyoka is not installed: {install('bench')}") from error
-    return module
+    found: ModuleType = module  # it has no types
+    return found
 
 
-def leave_cache(hy: Any) -> None:
+def leave_cache(hy: ModuleType) -> None:
     """Let this process compile all by itself; else a second run finds on disk what the first one has compiled."""
     if hasattr(hy.llvm_state, "set_diskcache_enabled"):
         hy.llvm_state.set_diskcache_enabled(False)
 
 
-def expressions(case: Case, task: str) -> tuple[list[Any], list[Any]]:
+def expressions(case: Case, task: str) -> tuple[list[expression], list[expression]]:
     """Outputs and inputs of inverse or forward dynamics in heyoka's expressions, by its own derivatives."""
     hy, n = heyoka(), case.n
     inputs = hy.make_vars(*[f"{block}_{i}" for block in ("q", "qd", "last") for i in range(n)])

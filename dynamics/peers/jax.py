@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cgraph.extend import install, ldl_elimination
+from cgraph.extend import Array, install, ldl_elimination
 
-from .case import BATCH, DERIVATIVES, MOTIONS, NUDGE, PASSES, Array, Case, rk4_step
+from .case import BATCH, DERIVATIVES, MOTIONS, NUDGE, PASSES, Case, rk4_step
 from .contender import Contender, Peer
 from .translate import lagrangian, quasi_velocities
+
+if TYPE_CHECKING:
+    from jax import Array as JaxArray
 
 SHORT = 10  # coordinates; beyond, a solve written out takes longer to compile than it gains on LAPACK's Cholesky
 NAMES = {f"a{name}": f"arc{name}" for name in ("sin", "cos", "tan")} | {"atan2": "arctan2"}
@@ -31,10 +34,10 @@ class JaxPeer(Peer):
         jax.config.update("jax_cpu_enable_async_dispatch", False)  # a queue and a thread more than one core needs
         self.jax, self.np = jax, jax.numpy
 
-    def _energy(self, q: Any, qd: Any) -> Any:
+    def _energy(self, q: JaxArray, qd: JaxArray) -> JaxArray:
         return lagrangian(self.case, q, qd, self.np, NAMES)[0]
 
-    def _known(self, q: Any, qd: Any) -> Any:
+    def _known(self, q: JaxArray, qd: JaxArray) -> JaxArray:
         """dL/dq, applied forces and damping."""
         forces = self.np.stack([self.np.asarray(f) for f in lagrangian(self.case, q, qd, self.np, NAMES)[1]])
         damping = self.np.array(self.case.system.damping) * qd
@@ -43,20 +46,20 @@ class JaxPeer(Peer):
         (pulled,) = self.jax.vjp(lambda u: self._rate(q, u), qd)[1](slope)
         return pulled + forces - damping - self.np.stack([self.np.asarray(f) for f in taken])
 
-    def _rate(self, q: Any, qd: Any) -> Any:
+    def _rate(self, q: JaxArray, qd: JaxArray) -> JaxArray:
         """The rates of the coordinates."""
         rates = quasi_velocities(self.case, q, qd, qd, self.np, NAMES)[0]
         return self.np.stack([self.np.asarray(rate) for rate in rates])
 
-    def _split(self, x: Any) -> Any:
+    def _split(self, x: JaxArray) -> JaxArray:
         return self.np.split(x, [self.case.nq, self.case.nq + self.case.n])
 
-    def _inverse(self, x: Any) -> Any:
+    def _inverse(self, x: JaxArray) -> JaxArray:
         q, qd, qdd = self._split(x)
         _, rate = self.jax.jvp(self.jax.grad(self._energy, 1), (q, qd), (self._rate(q, qd), qdd))
         return rate - self._known(q, qd)
 
-    def _forward(self, x: Any) -> Any:
+    def _forward(self, x: JaxArray) -> JaxArray:
         q, qd, tau = self._split(x)
         momentum = self.jax.grad(self._energy, 1)
         _, moved = self.jax.jvp(lambda q: momentum(q, qd), (q,), (self._rate(q, qd),))
@@ -65,25 +68,25 @@ class JaxPeer(Peer):
             return self.np.stack(ldl_elimination(mass, rhs)[0])
         return self.jax.scipy.linalg.solve(mass, rhs, assume_a="pos")
 
-    def rate(self, x: Any) -> Any:
+    def rate(self, x: JaxArray) -> JaxArray:
         """xdot of a state (q, qd) without applied torque."""
         join = self.np.concatenate
         q, qd, _ = self._split(x)
         return join([self._rate(q, qd), self._forward(join([x, self.np.zeros(self.case.n)]))])
 
-    def _step(self, x: Any) -> Any:
+    def _step(self, x: JaxArray) -> JaxArray:
         return rk4_step(self.rate, x)
 
-    def _motion(self, x: Any) -> Any:
+    def _motion(self, x: JaxArray) -> JaxArray:
         """Steps of RK4 by `scan`, a row of torques a step."""
         join, n = self.np.concatenate, self.case.n
 
-        def step(state: Any, tau: Any) -> tuple[Any, None]:
+        def step(state: JaxArray, tau: JaxArray) -> tuple[JaxArray, None]:
             return rk4_step(lambda at: join([at[n:], self._forward(join([at, tau]))]), state), None
 
         return self.jax.lax.scan(step, x[: 2 * n], x[2 * n :].reshape(PASSES, n))[0]
 
-    def _function(self, task: str) -> Callable[[Any], Any]:
+    def _function(self, task: str) -> Callable[[JaxArray], JaxArray]:
         if task in DERIVATIVES:
             return self._slopes(self._function(DERIVATIVES[task]))
         if task in MOTIONS:
@@ -94,10 +97,10 @@ class JaxPeer(Peer):
             )
         return {"inverse": self._inverse, "forward": self._forward, "rk4": self._step}[task]
 
-    def _slopes(self, function: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    def _slopes(self, function: Callable[[JaxArray], JaxArray]) -> Callable[[JaxArray], JaxArray]:
         """Its derivatives, row by row; those by q along the velocities."""
 
-        def slopes(x: Any) -> Any:
+        def slopes(x: JaxArray) -> JaxArray:
             q, qd, _ = self._split(x)
             rows, along = self.jax.jacfwd(function)(x), self.jax.jacfwd(lambda u: self._rate(q, u))(qd)
             return self.np.hstack([rows[:, : self.case.nq] @ along, rows[:, self.case.nq :]]).ravel()
@@ -116,14 +119,14 @@ class JaxPeer(Peer):
 
         nudges = self.case.nudges(task)
 
-        def one_pass(carry: Any, _: None) -> tuple[Any, None]:
+        def one_pass(carry: JaxArray, _: None) -> tuple[JaxArray, None]:
             return (function(carry) if task == "rk4" else carry + NUDGE * function(carry)[nudges]), None
 
         return _contender(self.jax.jit(lambda x: self.jax.lax.scan(one_pass, x, None, PASSES)[0]), x, PASSES)
 
 
-def _contender(function: Callable[[Any], Any], x: Any, evaluations: int) -> Contender:
-    def result(y: Any) -> Array:
+def _contender(function: Callable[[JaxArray], JaxArray], x: JaxArray, evaluations: int) -> Contender:
+    def result(y: JaxArray) -> Array:
         values: Array = np.asarray(y)
         return values.T if evaluations == BATCH else values
 

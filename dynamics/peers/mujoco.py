@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
+
+from cgraph.extend import Array
 
 from ..io.mujoco_twin import MujocoTwin, joint_order, rollout
 from ..multibody.mechanism import Mechanism, as_mechanism
-from .case import BATCH, DT, PASSES, Array, Case
+from .case import BATCH, DT, PASSES, Case
 from .contender import Contender, Peer, UnavailableError
 
 
@@ -61,7 +61,7 @@ class MujocoPeer(Peer):
         q, qd = data.qpos.copy(), data.qvel.copy()
         data.qfrc_applied[:] = 0.0
 
-        def step(_: Any) -> Array:  # the timed steps have gone on from the start
+        def step(_: object) -> Array:  # the timed steps have gone on from the start
             data.qpos[:], data.qvel[:] = q, qd
             m.mj_step(model, data)
             return np.concatenate([data.qpos[self.q_order], data.qvel[self.order]])
@@ -77,7 +77,7 @@ class MujocoPeer(Peer):
         states = np.empty((len(starts), steps, starts.shape[1]))
         taken = np.concatenate([1 + self.q_order, 1 + nq + self.order])
 
-        def result(_: Any) -> Array:
+        def result(_: object) -> Array:
             last: Array = states[:, -1, taken].T
             return last.copy() if mode == "batch" else last[:, 0].copy()
 

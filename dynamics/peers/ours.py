@@ -2,26 +2,26 @@
 
 from __future__ import annotations
 
-from functools import cache
-from typing import Any
+from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 
 import cgraph as cg
-from cgraph import Graph
-from cgraph.extend import Call, Program, runner
+from cgraph import Compiled, Graph, Node
+from cgraph.extend import Array, Call, Program, kept_by_first, runner
 
 from ..equations.equations_of_motion import forward_dynamics
 from ..equations.formulations import inverse_dynamics
 from ..equations.inverse_dynamics_derivatives import inverse_dynamics_derivatives
 from ..equations.linearization import state_space
-from ..equations.linearization_parts import linearization_parts
+from ..equations.linearization_parts import LinearizationParts, linearization_parts
 from ..equations.linearize_many import WRITTEN_OUT, linearization_program, linearize_many
 from ..equations.state_equation import state_equation
 from ..multibody.mechanism import as_mechanism
 from ..simulation.gradients.gradient import gradient
 from ..systems.model import Model
-from .case import DT, MOTIONS, NUDGE, PASSES, Array, Case, rk4_step
+from .case import DT, MOTIONS, NUDGE, PASSES, Case, rk4_step
 from .contender import Contender, Peer, UnavailableError
 from .inertial_parameters import with_inertial_parameters
 
@@ -78,11 +78,20 @@ def carried(case: Case, task: str, graph: Graph) -> tuple[Graph, dict[str, str]]
 class Ours(Peer):
     """Our graph, compiled by LLVM: the calls `bind`, `cg.loop` and `batch`."""
 
-    def __init__(self, case: Case) -> None:
-        super().__init__(case)
-        self.graph = cache(lambda task: task_graph(case, task))
-        self.parts = cache(lambda: linearization_parts(case.system))
-        self.function = cache(lambda task: cg.compile(self.graph(task)))
+    @kept_by_first
+    def graph(self, task: str) -> Graph:
+        """The graph of a task."""
+        return task_graph(self.case, task)
+
+    @cached_property
+    def parts(self) -> LinearizationParts:
+        """Of the derivatives of forward dynamics."""
+        return linearization_parts(self.case.system)
+
+    @kept_by_first
+    def function(self, task: str) -> Compiled:
+        """The graph of a task, compiled."""
+        return cg.compile(self.graph(task))
 
     def prepare(self, task: str, mode: str) -> Contender:
         """The compiled graph of the task."""
@@ -90,7 +99,7 @@ class Ours(Peer):
             return self._motion() if task == "motion" else self._gradient(task)
         if task == "derivatives" and mode == "batch":
             return self._many()
-        if task == "derivatives" and self.parts().size >= WRITTEN_OUT:
+        if task == "derivatives" and self.parts.size >= WRITTEN_OUT:
             return self._jacobian() if self.case.system.kinematics.quasi is None else self._columns()
         graph, points = self.graph(task), self.case.points(task)
         size = len(graph.nodes)
@@ -114,13 +123,13 @@ class Ours(Peer):
         case = self.case
         x = np.ascontiguousarray(case.points("derivatives").T)
         states = np.split(x, [case.nq, case.nq + case.n], axis=1)
-        size = self.parts().size
+        size = self.parts.size
         return Contender(lambda: linearize_many(case.model, *states), lambda found: _slopes(*found), len(x), size)
 
     def _columns(self) -> Contender:
         """Derivatives of a large model: one piece of code for all columns, as `linearize_many` has it."""
         case, n = self.case, self.case.n
-        graphs = self.parts().in_columns()
+        graphs = self.parts.in_columns()
         size = len(graphs.shared.nodes) + len(graphs.column.nodes)
         run = runner(linearization_program(graphs._replace(shared=case.bound(graphs.shared)), n))
         memory, row = run.memory({"state": case.point("derivatives")}), np.empty((1, run.program.width))
@@ -157,8 +166,8 @@ class Ours(Peer):
         )
 
 
-def _square(q: Any, qd: Any, t: Any) -> Any:
-    return sum([x * x for x in q])
+def _square(q: Sequence[Node], qd: Sequence[Node], t: Node) -> Node:
+    return sum([x * x for x in q], start=cg.constant(0.0))
 
 
 def _slopes(a: Array, b: Array) -> Array:
@@ -176,6 +185,6 @@ class OurNumpy(Peer):
         return Contender(lambda: function.batch(points), _same, points.shape[1], len(function.graph.nodes))
 
 
-def _same(values: Any) -> Array:
+def _same(values: Array) -> Array:
     array: Array = values
     return array

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
+from cgraph.extend import Array
+
 from ..multibody.joint_coordinates import per_velocity, places
-from .case import BATCH, DERIVATIVES, Array, Case, rk4_step
+from .case import BATCH, DERIVATIVES, Case, rk4_step
 from .contender import Contender, Peer, UnavailableError
 from .mujoco import bodies
 from .pinocchio_model import PinocchioModel, pinocchio
@@ -94,7 +95,7 @@ class PinocchioPeer(Peer):
         x = self.case.point(task) if mode == "call" else self.case.points(task)
         arguments = self.arguments(x, task)
 
-        def result(y: Any) -> Array:
+        def result(y: Array) -> Array:
             return self._result(x, *arguments[:2], y, task)
 
         if mode == "call":
@@ -103,7 +104,7 @@ class PinocchioPeer(Peer):
             return Contender(lambda: algorithm(twin, data, *arguments), result)
         return self._many("abaInParallel" if task == "forward" else "rneaInParallel", arguments, result)
 
-    def _many(self, name: str, arguments: tuple[Array, ...], result: Callable[[Any], Array]) -> Contender:
+    def _many(self, name: str, arguments: tuple[Array, ...], result: Callable[[Array], Array]) -> Contender:
         """Its loop over the columns of a batch, on one thread. Builds without OpenMP lack it."""
         algorithm = getattr(self.pinocchio, name, None)
         if algorithm is None:
@@ -147,12 +148,12 @@ class PinocchioPeer(Peer):
 
         return Contender(run, result, len(states))
 
-    def _derivatives(self, task: str) -> Callable[..., Any]:
+    def _derivatives(self, task: str) -> Callable[..., object]:
         """Pinocchio's function. Raises UnavailableError for a model that has more than it knows."""
         stretched = self.stiffness != 0.0
         if any([stretched[place.u].any() for place in self.balls]):
             raise UnavailableError("has no slopes of the springs of ball joints")
-        derivatives: Callable[..., Any] = getattr(
+        derivatives: Callable[..., object] = getattr(
             self.pinocchio, f"compute{'ABA' if task == 'derivatives' else 'RNEA'}Derivatives"
         )
         return derivatives

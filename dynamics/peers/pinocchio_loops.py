@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
+
+from cgraph.extend import Array
 
 from ..multibody.body import WORLD
 from ..multibody.loops import Loop
 from ..multibody.mechanism import Mechanism
-from .case import Array, Case
+from .case import Case
 from .contender import UnavailableError
 from .pinocchio import PinocchioPeer
+
+if TYPE_CHECKING:
+    from pinocchio import SE3
 
 _KINDS = {"point": "CONTACT_3D", "weld": "CONTACT_6D"}
 _PROXIMAL = 1e-14, 1e-8, 200  # what is left of the constraints, its regularization, and iterations
@@ -42,7 +48,9 @@ def constrained_accelerations(mechanism: Mechanism, q: Array, qd: Array, tau: Ar
     return np.array(rows)
 
 
-def _frame(peer: PinocchioPeer, mechanism: Mechanism, body: str, at: Any, loop: Loop | None = None) -> tuple[int, Any]:
+def _frame(
+    peer: PinocchioPeer, mechanism: Mechanism, body: str, at: ArrayLike, loop: Loop | None = None
+) -> tuple[int, SE3]:
     """Pinocchio's joint of a body, and the frame of a loop there.  loop: whose orientation the frame has."""
     carrier = mechanism.carriers[body]
     names = {each.name: each.coordinate for each in mechanism.moving}

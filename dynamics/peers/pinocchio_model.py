@@ -3,18 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any, cast
+from types import ModuleType
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from cgraph.extend import install
+from cgraph.extend import Array, install
 
 from ..multibody.body import WORLD, Body
 from ..multibody.joint_coordinates import places
 from ..multibody.joints import quaternion
 from ..multibody.mechanism import Mechanism
-from .case import Array
 from .contender import UnavailableError
+
+if TYPE_CHECKING:
+    from pinocchio import Inertia, JointModel
 
 # Pinocchio's joints for ours; of the first two it has quicker ones where the axis is one of the coordinate axes.
 _JOINTS = {
@@ -28,13 +31,14 @@ _ALIGNED = {"revolute": "JointModelR", "prismatic": "JointModelP"}
 _WORLD_AXES = "free"  # whose linear velocity is in the axes of the joint, and Pinocchio's in the body's
 
 
-def pinocchio() -> Any:
+def pinocchio() -> ModuleType:
     """The pinocchio module. Raises ImportError naming the extra when it is not installed."""
     try:
         import pinocchio as module
     except ImportError as error:
         raise ImportError(f"Pinocchio is not installed: {install('bench')}") from error
-    return module
+    found: ModuleType = module  # it has no types
+    return found
 
 
 class PinocchioModel:
@@ -160,7 +164,7 @@ def _depth_first(bodies: Sequence[Body]) -> Iterator[Body]:
         stack += [each for each in reversed(bodies) if each.parent == body.name]
 
 
-def _joint(module: Any, body: Body) -> Any:
+def _joint(module: ModuleType, body: Body) -> JointModel:
     """Pinocchio's joint. Raises UnavailableError for a kind that has none."""
     kind = body.joint.kind
     if kind not in _JOINTS:
@@ -174,7 +178,7 @@ def _joint(module: Any, body: Body) -> Any:
     return getattr(module, _JOINTS[kind])(axis)
 
 
-def _inertia(module: Any, body: Body) -> Any:
+def _inertia(module: ModuleType, body: Body) -> Inertia:
     """Pinocchio's inertia. Raises UnavailableError for one that it does not take, as with a moment of -1e-20."""
     try:
         return module.Inertia(body.mass, np.array(body.center), np.array(body.inertia))

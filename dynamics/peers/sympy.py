@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from .case import BATCH, Array, Case
+from cgraph.extend import Array
+
+from .case import BATCH, Case
 from .contender import Contender, Peer
 from .translate import lagrangian, require_rates
 
+Values = Sequence[float | Array]
+Lambdified = Callable[..., Values]
 NAMES = {"abs": "Abs", "minimum": "Min", "maximum": "Max"}
 
 
@@ -22,7 +26,7 @@ class SympyPeer(Peer):
         import sympy
 
         self.sympy = sympy
-        self.functions: dict[str, Any] = {}
+        self.functions: dict[str, Lambdified] = {}
 
     def prepare(self, task: str, mode: str) -> Contender:
         """SymPy's lambdified function of the task."""
@@ -32,7 +36,7 @@ class SympyPeer(Peer):
         x = self.case.points(task) if many else self.case.point(task)
         return Contender(lambda: self._solved(task, function(*x), many), _array, BATCH if many else 1)
 
-    def _lambdified(self, task: str) -> Any:
+    def _lambdified(self, task: str) -> Lambdified:
         sp, n = self.sympy, self.case.n
         inputs = sp.symbols([f"{block}_{i}" for block in ("q", "qd", "last") for i in range(n)])
         q, qd, last = inputs[:n], inputs[n : 2 * n], inputs[2 * n :]
@@ -47,9 +51,10 @@ class SympyPeer(Peer):
         else:
             outputs = [last[i] + known[i] - moved[i] for i in range(n)]
             outputs += [sp.diff(p[i], qd[k]) for i in range(n) for k in range(n)]
-        return sp.lambdify(inputs, outputs, modules="numpy", cse=True)
+        function: Lambdified = sp.lambdify(inputs, outputs, modules="numpy", cse=True)
+        return function
 
-    def _solved(self, task: str, values: Any, many: bool) -> Any:
+    def _solved(self, task: str, values: Values, many: bool) -> Values | Array:
         if task == "inverse":
             return values
         n = self.case.n
@@ -60,6 +65,6 @@ class SympyPeer(Peer):
         return np.linalg.solve(mass, columns[:n].T[:, :, None])[:, :, 0].T
 
 
-def _array(values: Any) -> Array:
+def _array(values: Values | Array) -> Array:
     array: Array = np.array(values)
     return array

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import Any
+from types import ModuleType
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,6 +15,9 @@ from ..systems.system import System
 from .case import Case
 from .contender import Contender, Peer, UnavailableError
 from .translate import require_rates
+
+if TYPE_CHECKING:
+    from torch import Tensor
 
 
 class TorchPeer(Peer):
@@ -32,7 +36,7 @@ class TorchPeer(Peer):
         return Contender(lambda: self.evaluate(x), lambda taus: np.array([float(tau.detach()) for tau in taus]))
 
 
-def eager_evaluations(system: System, formulations: Iterable[str]) -> dict[str, Callable[[np.ndarray], Any]]:
+def eager_evaluations(system: System, formulations: Iterable[str]) -> dict[str, Callable[[np.ndarray], list[Tensor]]]:
     """{formulation: function of its inputs} by torch.autograd on the same Lagrangian; empty without torch."""
     try:
         import torch
@@ -43,7 +47,7 @@ def eager_evaluations(system: System, formulations: Iterable[str]) -> dict[str, 
     return {name: ways[name] for name in formulations}
 
 
-def _value(torch: Any, node: Node, env: dict[Node, Any]) -> Any:
+def _value(torch: ModuleType, node: Node, env: dict[Node, Tensor]) -> Tensor:
     """The value of a node, each operation a torch call."""
     env = dict(env)
     for each in topological([node]):
@@ -54,19 +58,19 @@ def _value(torch: Any, node: Node, env: dict[Node, Any]) -> Any:
     return env[node]
 
 
-def _gradient(torch: Any, y: Any, x: list[Any]) -> list[Any]:
+def _gradient(torch: ModuleType, y: Tensor, x: list[Tensor]) -> list[Tensor]:
     slopes = torch.autograd.grad(y, x, create_graph=True, allow_unused=True)
     return [torch.zeros((), dtype=torch.float64) if slope is None else slope for slope in slopes]
 
 
-def _leaves(torch: Any, x: np.ndarray) -> list[Any]:
+def _leaves(torch: ModuleType, x: np.ndarray) -> list[Tensor]:
     return [torch.tensor(value, dtype=torch.float64, requires_grad=True) for value in x]
 
 
-def _chain_rule(torch: Any, system: System) -> Callable[[np.ndarray], Any]:
+def _chain_rule(torch: ModuleType, system: System) -> Callable[[np.ndarray], list[Tensor]]:
     n = system.n
 
-    def evaluate(x: np.ndarray) -> Any:
+    def evaluate(x: np.ndarray) -> list[Tensor]:
         leaves = _leaves(torch, x)
         q, qd, qdd = leaves[:n], leaves[n : 2 * n], leaves[2 * n :]
         lagrangian = _value(torch, system.lagrangian, dict(zip([*system.q, *system.qd], [*q, *qd], strict=True)))
@@ -81,10 +85,10 @@ def _chain_rule(torch: Any, system: System) -> Callable[[np.ndarray], Any]:
     return evaluate
 
 
-def _embedded(torch: Any, system: System, energy: Node) -> Callable[[np.ndarray], Any]:
+def _embedded(torch: ModuleType, system: System, energy: Node) -> Callable[[np.ndarray], list[Tensor]]:
     n = system.n
 
-    def evaluate(x: np.ndarray) -> Any:
+    def evaluate(x: np.ndarray) -> list[Tensor]:
         leaves = _leaves(torch, x)
         q_old, qd_old, qdd, dt = leaves[:n], leaves[n : 2 * n], leaves[2 * n : 3 * n], leaves[3 * n]
         qd = [a * dt + old for a, old in zip(qdd, qd_old, strict=True)]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 import cgraph as cg
 from cgraph import Node
@@ -12,14 +12,17 @@ from cgraph.extend import Builder, columns, topological
 from .case import Case
 from .contender import UnavailableError
 
+Expression = TypeVar("Expression")
+Constant = Callable[[float], Any]  # of an expression
+
 
 def translated(
     order: Sequence[Node],
-    env: Mapping[Node, Any],
-    functions: Any,
+    env: Mapping[Node, Expression],
+    functions: object,
     names: Mapping[str, str] | None = None,
-    number: Callable[[float], Any] = float,
-) -> dict[Node, Any]:
+    number: Constant = float,
+) -> dict[Node, Expression]:
     """Every node of a topological order as an expression, from those of the variables in `env`.
 
     functions: the module that has sin, cos, ..., by the names of our operations or those in `names`.
@@ -43,12 +46,12 @@ def translated(
 
 def lagrangian(
     case: Case,
-    q: Sequence[Any],
-    qd: Sequence[Any],
-    functions: Any,
+    q: Sequence[Expression],
+    qd: Sequence[Expression],
+    functions: object,
     names: Mapping[str, str] | None = None,
-    number: Callable[[float], Any] = float,
-) -> tuple[Any, list[Any]]:
+    number: Constant = float,
+) -> tuple[Expression, list[Expression]]:
     """L and the applied forces at q and qd, without damping, in the other software's expressions."""
     system = case.system
     env = dict(zip([*system.q, *system.qd], [*q, *qd], strict=True))
@@ -59,13 +62,13 @@ def lagrangian(
 
 def quasi_velocities(
     case: Case,
-    q: Sequence[Any],
-    qd: Sequence[Any],
-    momenta: Sequence[Any],
-    functions: Any,
+    q: Sequence[Expression],
+    qd: Sequence[Expression],
+    momenta: Sequence[Expression],
+    functions: object,
     names: Mapping[str, str] | None = None,
-    number: Callable[[float], Any] = float,
-) -> tuple[list[Any], list[Any]]:
+    number: Constant = float,
+) -> tuple[list[Expression], list[Expression]]:
     """The rates of the coordinates, G(q) qd, and what brackets of velocities take of the force, ad(qd; p)."""
     kinematics = case.system.kinematics
     p = cg.variables([f"p{i}" for i in range(case.n)])

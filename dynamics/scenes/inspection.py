@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 import cgraph as cg
 from cgraph import Edge, Graph, Node
-from cgraph.extend import PRIMAL, TANGENT, real_number
+from cgraph.extend import PRIMAL, TANGENT, Array, real_number
 
 from ..equations.both_forms import HAMILTON, LAGRANGE, VELOCITIES_ALONE, both_forms, form_sizes
 from ..equations.equations_of_motion import forward_dynamics
@@ -40,7 +40,6 @@ from ..systems.system import System
 from .elimination import EliminationStep, elimination
 from .scenes import Scene
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
 FORMULATIONS = ("euler_embedded", "kinetic_only", "chain_rule")  # those of the paper, the flawed ones first
 FRAMES, RATE = 150, 30.0  # most instants shown, and how many a second
 # Rows of the picture by classes of both forms. Of what is solved for, the way back out is a row above the way in.
@@ -94,7 +93,7 @@ class Inspection:
     versions: tuple[Equations, ...]
     t: Array
     skeleton: Skeleton | None
-    at: Mapping[str, Any]
+    at: Mapping[str, float | Array]
     derived: Graph | None = None
     shares: Shares | None = None
     stopped: str = ""
@@ -160,7 +159,7 @@ def _along(
     scene: Scene,
     run: Trajectory,
     versions: Sequence[Equations],
-    state: Mapping[str, Any],
+    state: Mapping[str, float | Array],
     derived: Graph | None,
     shares: Shares | None = None,
     *,
@@ -258,7 +257,7 @@ def _version(scene: Scene, name: str) -> Equations:
     return Equations(name, verdict.graph, about, wrong, blamed=edges, flawed=verdict.differs)
 
 
-def _named(**tables: Array) -> dict[str, Any]:
+def _named(**tables: Array) -> dict[str, float | Array]:
     return {f"{name}{i}": table[:, i] for name, table in tables.items() for i in range(table.shape[1])}
 
 

@@ -14,14 +14,18 @@ from importlib.machinery import SourceFileLoader
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import CodeType, ModuleType
-from typing import Any
+from typing import TypeGuard, TypeVar
 
 from cgraph.extend import or_nearest
+
+from ..systems.model import Model
 
 SUFFIX = ".py"
 NEEDED = "a System, an OdeSystem, a Mechanism, a Scene, or a function without arguments that returns one"
 _FILE = re.compile(r"(?P<source>.+\.py)(?::(?P<name>.*))?", re.DOTALL)
 _MODULE = re.compile(r"(?P<source>[^\W\d]\w*(?:\.[^\W\d]\w*)*):(?P<name>[^\W\d]\w*)")
+
+Made = TypeVar("Made")
 
 
 def is_python(name: str) -> bool:
@@ -35,7 +39,7 @@ def short_name(name: str) -> str:
     return f"{Path(source).stem if source.endswith(SUFFIX) else source.rpartition('.')[2]}.{what}"
 
 
-def python_model(name: str) -> Any:
+def python_model(name: str) -> Model:
     """The model of FILE.py:NAME or MODULE:NAME; the file is executed, as Python would.
 
     What it prints goes to standard error: standard output is for the answer of a command.
@@ -60,7 +64,7 @@ def python_model(name: str) -> Any:
         return _model(module, source, what)
 
 
-def _model(module: ModuleType, source: str, what: str) -> Any:
+def _model(module: ModuleType, source: str, what: str) -> Model:
     known = vars(module)
     if what not in known:
         public = [name for name, value in known.items() if name[0] != "_" and not inspect.ismodule(value)]
@@ -81,7 +85,7 @@ def _model(module: ModuleType, source: str, what: str) -> Any:
     return found
 
 
-def _is_model(value: Any) -> bool:
+def _is_model(value: object) -> TypeGuard[Model]:
     return not isinstance(value, type) and hasattr(value, "coordinates") and hasattr(value, "velocities")
 
 
@@ -109,7 +113,7 @@ def _executed(path: Path) -> ModuleType:
     return module
 
 
-def _told(source: str, function: Callable[[], Any]) -> Any:
+def _told(source: str, function: Callable[[], Made]) -> Made:
     """What a function of the user's gives. Raises ValueError, with the line in the source, for what it raises."""
     try:
         return function()

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from cgraph.extend import Array, many
+from cgraph.extend import Array, counted
 
 from .run_options import RunOptions
 from .stepping import Integration
@@ -39,7 +39,7 @@ def advise(
                     t = float(block.t[-1]) if len(block.t) else t
         except KeyboardInterrupt:  # of a run that is done
             return
-        text = f"; try method={name!r}, which comes to t = {t:.6g} s in {many(trial.steps, 'step')}"
+        text = f"; try method={name!r}, which comes to t = {t:.6g} s in {counted(trial.steps, 'step')}"
         if run.slope and not trial.status:
             run.status += text
             return

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any, TypeAlias
 
 import cgraph as cg
 from cgraph import Graph, Node
+from cgraph.extend import kept_by_first
 
 from ..equations.state_equation import state_inputs
 from ..integrators import Problem, quantity_inputs
@@ -16,8 +16,6 @@ from ..systems.controller import with_closed_form
 from ..systems.model import Model, as_ode, as_system
 from .run_options import RunOptions
 from .sampled_controller import Hold, SampledController
-
-KEPT = 16  # compiled velocities that stay for another run
 
 Constant: TypeAlias = float | Sequence[float]
 Tau: TypeAlias = Constant | Callable[..., Sequence[Node | float]] | SampledController
@@ -63,9 +61,9 @@ class Applied:
         return problem.bind(problem.states, Graph(quantity_inputs(problem), outputs))
 
 
-@lru_cache(KEPT)
+@kept_by_first
 def _compiled(velocities: Graph, backend: str) -> cg.Compiled:
-    """The velocities of momenta, for a controller; of the last few, those compiled before."""
+    """The velocities of momenta, for a controller."""
     return cg.compile(velocities, backend)
 
 

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
 import cgraph as cg
 from cgraph import Compiled, Graph
-from cgraph.extend import Array
+from cgraph.extend import Array, kept_by_first
 
 UNIT = 2.0**-53  # relative error of one rounding
-KEPT = 16  # compiled rates that stay for another block
 
 Indices = np.ndarray[Any, np.dtype[np.intp]]
 
@@ -93,7 +91,7 @@ def _with_times(normalization: Graph, states: Array, times: Array) -> Array:
     return np.concatenate([states, times[:, None]], axis=1) if timed else states
 
 
-@lru_cache(KEPT)
+@kept_by_first
 def _tangent(graph: Graph, m: int) -> Graph:
     """Of the outputs, from the inputs and the tangents of the first m."""
     return cg.jvp(graph, list(graph.input_names[:m]))
@@ -106,9 +104,9 @@ def _table(graph: Graph, columns: Array) -> Array:
     return np.stack(np.broadcast_arrays(*values.values()), axis=1)
 
 
-@lru_cache(KEPT)
+@kept_by_first
 def _compiled(rate: Graph) -> Compiled:
-    """The rate, for states at many times; of the last few, the one compiled before."""
+    """The rate, for states at many times."""
     return cg.compile(rate)
 
 

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import pickle
 from dataclasses import dataclass, replace
-from functools import lru_cache
 
 from cgraph import Graph
-from cgraph.extend import Call, Factor, If, Program, Runner, runner
+from cgraph.extend import Call, Factor, If, Program, Runner, kept_by_first, runner
 
 from ..integrators import Method, Problem
 from ..integrators.step_control import moved
-
-KEPT = 16  # programs that stay ready for another run
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,9 +51,9 @@ class CompiledSteps:
     runner: Runner
 
 
-@lru_cache(KEPT)
+@kept_by_first
 def step_program(problem: Problem, method: Method, *, dense: bool) -> StepProgram:
-    """The steps of a method on a problem, all graphs that they need derived; of the last few, those written before.
+    """The steps of a method on a problem, all graphs that they need derived; the problem keeps them.
 
     dense: whether a method that chooses its steps records its dense output.
     Raises SingularMassMatrixError for a coordinate without inertia, ValueError for a method that the model has not.
@@ -124,13 +121,13 @@ def between(problem: Problem) -> Graph | None:
     return problem.projection
 
 
-@lru_cache(KEPT)
+@kept_by_first
 def pickled_steps(program: StepProgram) -> bytes:
-    """The steps as other processes are sent them; of the last few, those pickled before."""
+    """The steps as other processes are sent them."""
     return pickle.dumps(program)
 
 
-@lru_cache(KEPT)
+@kept_by_first
 def compile_steps(program: StepProgram, backend: str) -> CompiledSteps:
-    """The steps, ready to run; of the last few, those compiled before."""
+    """The steps, ready to run."""
     return CompiledSteps(program, runner(program.steps, backend).prepared())

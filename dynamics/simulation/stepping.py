@@ -246,12 +246,21 @@ class FixedStepIntegration(NativeIntegration):
 
     def _failure(self, memory: Array, before: Array) -> str:
         """Why the step from a state (m,) failed."""
-        t = self._number(memory, "t")
-        if "singular" in self.runner.program.registers and (index := int(self._number(memory, "singular"))):
-            return f"stopped at t = {t:.6g} s: {self.components[index - 1]} has an inertia that is not positive"
-        if reason := nonfinite(self.components, self.runner.read(memory, "x")):
-            return f"stopped at t = {t:.6g} s: {reason}"
-        return f"stopped at t = {t:.6g} s: {unsolved(self.components, before, self.runner.read(memory, 'x'))}"
+        singular = self._number(memory, "singular") if "singular" in self.runner.program.registers else 0.0
+        after = self.runner.read(memory, "x")
+        return failed_step(self.components, self._number(memory, "t"), before, after, int(singular))
+
+
+def failed_step(components: Sequence[str], t: float, before: Array, x: Array, singular: int) -> str:
+    """Why a step from one state to another, (m,), at t, failed.
+
+    singular: the number of the component whose inertia is not positive, from 1 on; else 0.
+    """
+    if singular:
+        reason = f"{components[singular - 1]} has an inertia that is not positive"
+    else:
+        reason = nonfinite(components, x) or unsolved(components, before, x)
+    return f"stopped at t = {t:.6g} s: {reason}"
 
 
 def begin_equal(runner: Runner, memory: Array, begin: float, h: float) -> None:

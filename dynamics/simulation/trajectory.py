@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Graph
-from cgraph.extend import Array, many, or_nearest, picture
+from cgraph.extend import Array, counted, or_nearest, picture
 
 from .row_values import row_values
 from .sampled_controller import HeldForces
@@ -343,7 +343,7 @@ class Trajectory:
     def __repr__(self) -> str:
         n, stats = self.q.shape[1], self.stats
         what = f"{n} coordinate(s)" if self.qd.shape[1] else f"{n} state(s)"
-        rows = f"{many(len(self.t), 'row')}, t = {self.t[0]:g} .. {self.t[-1]:g} s" if len(self.t) else "no rows"
+        rows = f"{counted(len(self.t), 'row')}, t = {self.t[0]:g} .. {self.t[-1]:g} s" if len(self.t) else "no rows"
         happened = "".join([f", {len(crossings.t)} of event {name}" for name, crossings in self.events.items()])
         said = "; ".join([stats.message, *[f"warning: {text}" for text in stats.warnings]])
-        return f"<Trajectory of {what}: {rows}{happened}; {stats.method}, {many(stats.steps, 'step')}, {said}>"
+        return f"<Trajectory of {what}: {rows}{happened}; {stats.method}, {counted(stats.steps, 'step')}, {said}>"

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
 from cgraph import Graph, Node, floor, less, variable, where
-from cgraph.extend import Array, Builder, building
+from cgraph.extend import Array, Builder, building, kept_by_first
 
 from ..systems.arguments import TIME
 from .state_sizes import Flags
 
-KEPT = 8  # rates whose graphs stay ready
 PARTS, TIMES = 16, 10  # into which the way from one state to the next is divided, and again, to find a branch's change
 BURST = (
     4  # steps, by which changes of branches are apart that are those of one passage, as where friction comes to rest
@@ -58,7 +56,7 @@ class Unresolved(NamedTuple):
     sides: Graph | None
 
 
-@lru_cache(KEPT)
+@kept_by_first
 def unresolved(rate: Graph) -> Unresolved:
     """Of a rate; None in place of what it has not."""
     timed = {node for node in rate.inputs if node.name == TIME}

@@ -91,7 +91,7 @@ def new_variables(stem: str, count: int, taken: Collection[str]) -> list[Node]:
     return cg.variables([f"{stem}{k}" for k in range(count)])
 
 
-def call_user_function(what: str, function: Callable[..., Any], *arguments: Any, state: str = "x") -> Any:
+def call_user_function(what: str, function: Callable[..., object], *arguments: object, state: str = "x") -> Any:
     """function(*arguments), or without the last of them, the parameters, where it does not take them.
 
     An argument with a default, as in `lambda q, qd, t, i=i: ..`, is the caller's own unless it is called t or p.
@@ -107,7 +107,7 @@ def call_user_function(what: str, function: Callable[..., Any], *arguments: Any,
     raise TypeError(f"{what} must take {names}, got {inspect.signature(function)}")
 
 
-def _takes(function: Callable[..., Any], count: int) -> bool:
+def _takes(function: Callable[..., object], count: int) -> bool:
     """Whether it can be called with so many arguments."""
     if type(function) is FunctionType and not hasattr(function, "__wrapped__"):
         code = function.__code__
@@ -120,7 +120,7 @@ def _takes(function: Callable[..., Any], count: int) -> bool:
     return True
 
 
-def _keeps(function: Callable[..., Any], place: int, name: str) -> bool:
+def _keeps(function: Callable[..., object], place: int, name: str) -> bool:
     """Whether its argument at this place has a default and another name: a value that it keeps."""
     taken = [*inspect.signature(function).parameters.values()][place : place + 1]
     return any([each.default is not each.empty and each.name != name for each in taken])

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from cgraph import Node
 from cgraph.extend import Builder, check_name, cotangents, tangents, topological
@@ -14,7 +14,7 @@ from cgraph.extend import Builder, check_name, cotangents, tangents, topological
 from .arguments import Parameters, call_user_function, node_or_number, sequence
 from .kinematics import ONE, ZERO, Kinematics
 
-Function = Callable[..., Any]
+Function = Callable[..., object]
 
 
 class ConstraintError(ValueError):
@@ -118,7 +118,7 @@ class Constraints:
                 raise ValueError(f"velocity constraint {name!r} must be linear in the velocities")
 
 
-def _rows(what: str, given: Any) -> dict[str, Node]:
+def _rows(what: str, given: object) -> dict[str, Node]:
     """{name: node}, names from a mapping, or numbered."""
     if isinstance(given, Node):
         given = [given]

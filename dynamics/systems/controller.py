@@ -4,19 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import topological
+from cgraph.extend import memo, topological
 
 from .arguments import Parameters, parameter_items, parameter_value
 from .model import Model, as_ode, as_system
 from .system import System, generalized_forces, require_known
 
 KEPT = 16  # systems that stay for another run
-
-_kept: dict[tuple[object, ...], Controlled] = {}
 
 
 class Controlled(NamedTuple):
@@ -88,12 +87,20 @@ def controlled(
         has = ", ".join(system.parameters) or "none"
         raise ValueError(f"neither the system nor the controller has a parameter {unused[0]!r} (the system has {has})")
     graph = Graph([*system.q, *system.qd, system.t, *p.values()], _numbered(forces))
-    key = (system, cg.structure_hash(graph), *gains.items())
-    if key not in _kept:
-        _kept[key] = Controlled(_with_forces(system, forces, gains), tuple(forces))
-        while len(_kept) > KEPT:
-            del _kept[next(iter(_kept))]
-    return _kept[key]
+    return _controlled(_Request(system, cg.structure_hash(graph), tuple(gains.items()), tuple(forces)))
+
+
+@dataclass(frozen=True)
+class _Request:
+    system: System
+    structure: str
+    gains: tuple[tuple[str, float], ...]
+    forces: tuple[Node, ...] = field(compare=False)
+
+
+@memo(KEPT)
+def _controlled(request: _Request) -> Controlled:
+    return Controlled(_with_forces(request.system, request.forces, dict(request.gains)), request.forces)
 
 
 def with_closed_form(model: Model, tau: Any, parameters: object) -> tuple[Model, Any, Sequence[Node] | None]:
@@ -115,7 +122,7 @@ def _numbered(forces: Sequence[Node]) -> dict[str, Node]:
 
 def _with_forces(system: System, forces: Sequence[Node], parameters: Mapping[str, float]) -> System:
     """The system with these forces besides its own, and these parameters."""
-    changes: dict[str, Any] = {"parameters": system.parameters | dict(parameters)}
+    changes: dict[str, object] = {"parameters": system.parameters | dict(parameters)}
     pairs = zip(system.forces, forces, strict=True)
     changes["forces"] = tuple([more if own.value == 0.0 else own + more for own, more in pairs])
     other = copy(system)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -152,7 +151,7 @@ class Kinematics:
                 raise ValueError(f"{what} uses {node.name!r}, which is none of its arguments")
         return nodes
 
-    def _numbers(self, what: str, given: Any, default: Sequence[float]) -> tuple[float, ...]:
+    def _numbers(self, what: str, given: object, default: Sequence[float]) -> tuple[float, ...]:
         values = sequence(f"{what} must be", default if given is None else given)
         if len(values) != len(self.coordinates) or not all(map(is_finite, values)):
             raise ValueError(f"{what} must be {len(self.coordinates)} finite numbers, got {values!r:.60}")

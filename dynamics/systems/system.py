@@ -6,7 +6,6 @@ import numbers
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from functools import cached_property
-from typing import Any
 
 from numpy.typing import ArrayLike
 
@@ -86,8 +85,8 @@ class System:
         forces: Callable[..., Sequence[Node | float]] | None = None,
         damping: float | Node | Sequence[float | Node] = 0.0,
         quasi_velocities: QuasiVelocities | None = None,
-        constraints: Callable[..., Any] | None = None,
-        velocity_constraints: Callable[..., Any] | None = None,
+        constraints: Callable[..., object] | None = None,
+        velocity_constraints: Callable[..., object] | None = None,
     ) -> None:
         self.kinematics = Kinematics(coordinates, quasi_velocities)
         self._require_consistent()
@@ -301,7 +300,7 @@ class System:
         return f"<System of {self.nq} coordinate(s) {', '.join(self.coordinates[:6])}{parameters}>"
 
 
-def generalized_forces(what: str, function: Callable[..., Any], system: System, p: Parameters) -> list[Node]:
+def generalized_forces(what: str, function: Callable[..., object], system: System, p: Parameters) -> list[Node]:
     """What a function of (q, qd, t) or (q, qd, t, p) gives: a node for each velocity. Raises what is wrong with it."""
     value = call_user_function(what, function, system.q, system.qd, system.t, p)
     applied = sequence(f"{what} must give", value)

@@ -5,19 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import Builder, cotangents, real_number, require_whole, tangents
+from cgraph.extend import Array, Builder, cotangents, real_number, require_whole, tangents
 
 from ..equations.coriolis import coriolis, require_quadratic
 from ..equations.energies import energy
 from ..equations.equations_of_motion import bias, forward_dynamics, gravity_force, mass_matrix
-from ..equations.evaluate_at import Array, evaluate_at
+from ..equations.evaluate_at import evaluate_at
 from ..equations.formulations import ONE, ZERO, inverse_dynamics
 from ..equations.inertia_rank import balanced
 from ..equations.torque_decomposition import torque_by_joint_motion, torque_by_link
@@ -29,13 +29,18 @@ from .derivatives import derivative_residuals
 from .held_states import Held, random_states
 from .residual import DIFFERENCES, POSITIVE, ROUNDING, Certificate, Residual, worst
 
+if TYPE_CHECKING:
+    from ..io.load import Source
+
 STEP = 1e-3  # of differences, in units of the coordinates
 
 
 MOST_STATES = 1_000_000  # of a certificate, some of whose matrices are kept for all states
 
 
-def certify(model: Model, states: int = 20, seed: int = 0, *, speed: float = 1.0, twin: Any = None) -> Certificate:
+def certify(
+    model: Model, states: int = 20, seed: int = 0, *, speed: float = 1.0, twin: Source | None = None
+) -> Certificate:
     """Check the model's graphs against each other, against differences of L, and against MuJoCo and Pinocchio.
 
     With constraints the states meet them; the equations are those of the whole, J^T lambda in them, and of the rows.

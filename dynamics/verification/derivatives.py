@@ -8,10 +8,9 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import tangents
+from cgraph.extend import Array, tangents
 
 from ..equations.equations_of_motion import forward_dynamics
-from ..equations.evaluate_at import Array
 from ..equations.formulations import ZERO
 from ..equations.inverse_dynamics_derivatives import inverse_dynamics_derivatives
 from ..equations.linearization import state_space

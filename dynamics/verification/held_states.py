@@ -9,10 +9,9 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import Builder, cotangents, tangents
+from cgraph.extend import Array, Builder, cotangents, tangents
 
 from ..equations.consistent_state import nearest_state
-from ..equations.evaluate_at import Array
 from ..equations.formulations import ONE, ZERO
 from ..systems.constraints import ConstraintError
 from ..systems.system import System

@@ -7,12 +7,14 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from itertools import combinations
-from typing import Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
+from cgraph.extend import Array
+
 from ..equations.equations_of_motion import forward_dynamics
-from ..equations.evaluate_at import Array, evaluate_at
+from ..equations.evaluate_at import evaluate_at
 from ..equations.formulations import inverse_dynamics
 from ..io.load import compiled
 from ..io.mujoco_twin import joint_order, mujoco
@@ -25,6 +27,11 @@ from ..peers.pinocchio import PinocchioPeer
 from ..peers.pinocchio_loops import constrained_accelerations
 from ..systems.model import Model, as_system
 from .residual import PEERS, PROXIMAL, Residual
+
+if TYPE_CHECKING:
+    from mujoco import MjModel
+
+    from ..io.load import Source
 
 ASKED = 4  # states at which a disagreement is explained
 TAKEN = 2  # terms at most that are taken out together
@@ -58,7 +65,7 @@ class Term(NamedTuple):
 
     body: Callable[[Body, Sizes], Body]
     rest: Callable[[Mechanism], Mechanism]
-    theirs: Callable[[Any, Sizes], None]
+    theirs: Callable[[MjModel, Sizes], None]
 
 
 def _same(body: Body, sizes: Sizes) -> Body:
@@ -73,10 +80,10 @@ def _joint(**changes: Any) -> Callable[[Body, Sizes], Body]:
     return lambda body, sizes: replace(body, joint=replace(body.joint, **changes))
 
 
-def _zeroed(*fields: str) -> Callable[[Any, Sizes], None]:
+def _zeroed(*fields: str) -> Callable[[MjModel, Sizes], None]:
     """MuJoCo's fields to zero, those that its version has."""
 
-    def change(mj: Any, sizes: Sizes) -> None:
+    def change(mj: MjModel, sizes: Sizes) -> None:
         for name in fields:
             if hasattr(mj, name):
                 getattr(mj, name)[...] = 0.0
@@ -88,7 +95,7 @@ def _still(mechanism: Mechanism) -> Mechanism:
     return replace(mechanism, gravity=(0.0, 0.0, 0.0))
 
 
-def _floating(mj: Any, sizes: Sizes) -> None:
+def _floating(mj: MjModel, sizes: Sizes) -> None:
     mj.opt.gravity[:] = 0.0
 
 
@@ -96,7 +103,7 @@ def _alike(body: Body, sizes: Sizes) -> Body:
     return replace(body, inertia=(sizes.inertia,) * 3) if float(body.mass) > sizes.mass else body
 
 
-def _alike_there(mj: Any, sizes: Sizes) -> None:
+def _alike_there(mj: MjModel, sizes: Sizes) -> None:
     mj.body_inertia[mj.body_mass > sizes.mass] = sizes.inertia
 
 
@@ -104,15 +111,15 @@ def _weightless(body: Body, sizes: Sizes) -> Body:
     return replace(body, mass=sizes.mass) if float(body.mass) > sizes.mass else body
 
 
-def _weightless_there(mj: Any, sizes: Sizes) -> None:
+def _weightless_there(mj: MjModel, sizes: Sizes) -> None:
     mj.body_mass[mj.body_mass > sizes.mass] = sizes.mass
 
 
-def _thin(mj: Any, sizes: Sizes) -> None:
+def _thin(mj: MjModel, sizes: Sizes) -> None:
     mj.opt.density = mj.opt.viscosity = 0.0
 
 
-def _unbound(mj: Any, sizes: Sizes) -> None:
+def _unbound(mj: MjModel, sizes: Sizes) -> None:
     mj.opt.disableflags |= mujoco().mjtDisableBit.mjDSBL_EQUALITY
 
 
@@ -184,7 +191,7 @@ class Translation:
 class Original:
     """MuJoCo on a model of its own: of a file, say.  q_order, order: of our coordinates and velocities in its."""
 
-    def __init__(self, mj: Any, q_order: Sequence[int], order: Sequence[int]) -> None:
+    def __init__(self, mj: MjModel, q_order: Sequence[int], order: Sequence[int]) -> None:
         self.mj, self.q_order, self.order = mj, list(q_order), list(order)
 
     def inverse(self, at: Mapping[str, Array]) -> Array:
@@ -289,7 +296,7 @@ def _translated(make: Callable[[Case], Peer], model: Model) -> Translation:
         raise NotComparableError(str(error)) from None
 
 
-def original(twin: Any, model: Model) -> Original:
+def original(twin: Source, model: Model) -> Original:
     """MuJoCo on a model, MJCF or URDF, with the coordinates of the model.
 
     Raises ValueError for a twin that cannot be read or has another number of coordinates, and for a model that is not

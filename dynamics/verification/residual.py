@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from cgraph.extend import Array, html_lines, html_table
+
+if TYPE_CHECKING:
+    from cgraph.extend import Json
 
 
 @dataclass(frozen=True)
@@ -95,7 +98,7 @@ class Certificate:
         lines += [f"  {each.name}, {each.value:g}: {each.reason}" for each in bounds]
         return lines + [f"left out: {each}" for each in self.left_out]
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Json]:
         """For JSON."""
         return (
             {"passed": self.passed}

@@ -6,17 +6,18 @@ import io
 import shutil
 import subprocess
 from collections.abc import Callable, Sequence
-from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from types import ModuleType
+from typing import TYPE_CHECKING
 
-from cgraph.extend import install
+from cgraph.extend import install, memo
 
 from .. import theme
 
 if TYPE_CHECKING:
     from PIL.Image import Image
+    from PIL.ImageFont import FreeTypeFont, ImageFont
 
 RATE = 25  # frames a second: a GIF counts in hundredths, and browsers slow down what is faster than 50
 KINDS = (".gif", ".png", ".apng", ".mp4")
@@ -143,15 +144,15 @@ def _ffmpeg() -> str:
     return found
 
 
-@cache
-def _font(size: int) -> Any:
+@memo(16)
+def _font(size: int) -> FreeTypeFont | ImageFont:
     fonts, folder = _pillow()[2], theme.font_folder()
-    if folder is None:
-        return fonts.load_default(size)
-    return fonts.truetype(str(folder / "DejaVuSans.ttf"), size)
+    font: FreeTypeFont | ImageFont
+    font = fonts.load_default(size) if folder is None else fonts.truetype(str(folder / "DejaVuSans.ttf"), size)
+    return font
 
 
-def _pillow() -> tuple[Any, Any, Any]:
+def _pillow() -> tuple[ModuleType, ModuleType, ModuleType]:
     try:
         from PIL import Image, ImageDraw, ImageFont
     except ImportError as error:

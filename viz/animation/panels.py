@@ -6,14 +6,13 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from cgraph.extend import Array
+
 from .canvas import RATE, Canvas, Point
 from .colors import DARK, LIGHT, Colors
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 SIDE, TITLE, CLOCK, MARGIN = 340, 30, 26, 14  # pixels: of a panel, its title, the time below, and around
 SIZE, SMALL = 14, 12  # of letters

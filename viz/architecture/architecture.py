@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 from .import_rule import PACKAGES, may_import
 from .imports import Module, modules, uses
+
+if TYPE_CHECKING:
+    from cgraph.extend import Json
 
 WHOLE = ("cgraph", "viz")  # each is one room where all packages are seen at once
 
@@ -50,7 +53,7 @@ class Architecture:
             if start == importer != step != imported
         )
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Json]:
         """Everything as plain data."""
         return {
             "rooms": [{"name": room, "floor": self.floors[room]} for room in self.rooms],
@@ -133,7 +136,7 @@ def _listed(what: str, lines: Sequence[str]) -> list[str]:
     return [f"{what}: {len(lines) or 'none'}", *[f"  {line}" for line in lines]]
 
 
-Arrows = Mapping[tuple[str, str], Any] | Sequence[tuple[str, str]]
+Arrows = Mapping[tuple[str, str], object] | Sequence[tuple[str, str]]
 
 
 def _heads(arrows: Arrows) -> dict[str, list[str]]:

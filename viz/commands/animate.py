@@ -56,7 +56,7 @@ def run(options: argparse.Namespace) -> int:
     say(f"{scene.name}: a motion of {end:g} s")
     motions: dict[str, dyn.Trajectory] = {}
     marked: list[str] = []
-    wanted: Callable[[library.Array], library.Array] | None = None
+    wanted: Callable[[extend.Array], extend.Array] | None = None
     if options.driven:
         for name in options.formulations or DRIVEN:
             words = f"torque {WORDS.get(name, name.replace('_', ' '))}"

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
+from typing import TYPE_CHECKING
 
 import dynamics as dyn
 
 from . import library
 from .arguments import answer, counting, say, scene_of, takes_a_scene, unless_json, whole
 from .command import Command
+
+if TYPE_CHECKING:
+    from mujoco import MjModel
 
 
 def add(parser: Command) -> None:
@@ -33,7 +36,7 @@ def run(options: argparse.Namespace) -> int:
     return 1
 
 
-def _twin(scene: str, floating: bool) -> Any:
+def _twin(scene: str, floating: bool) -> MjModel | None:
     """MuJoCo's own model of a file; None for other scenes, and where MuJoCo cannot read the file."""
     if not dyn.scenes.is_model_file(scene):
         return None

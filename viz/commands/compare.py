@@ -5,11 +5,11 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import TYPE_CHECKING
 
 import cgraph as cg
 import dynamics as dyn
-from cgraph.extend import many
+from cgraph import extend
 
 from . import library
 from .arguments import (
@@ -26,6 +26,9 @@ from .arguments import (
 from .command import Command
 from .point_arguments import filled
 from .sizes import size_data, size_table
+
+if TYPE_CHECKING:
+    from cgraph.extend import Json
 
 
 def add(parser: Command) -> None:
@@ -62,7 +65,7 @@ def run(options: argparse.Namespace) -> int:
     sizes = {"left_nodes": len(left.nodes), "right_nodes": len(right.nodes), "in_both": both}
     only = comparison.only_left, comparison.only_right
     lines = [
-        f"{side}: {named[side]}, {many(len(graph.nodes), 'node')} = {both} in both + {len(rest)} only {side}"
+        f"{side}: {named[side]}, {extend.counted(len(graph.nodes), 'node')} = {both} in both + {len(rest)} only {side}"
         for side, graph, rest in zip(named, (left, right), only, strict=True)
     ]
     data = {"scene": scene.name} | named | sizes | comparison.to_dict()
@@ -84,7 +87,7 @@ def run(options: argparse.Namespace) -> int:
     return 1 if any(only) else 0
 
 
-def _forms(scene: dyn.scenes.Scene, graphs: Mapping[str, cg.Graph]) -> tuple[dict[str, Any], str]:
+def _forms(scene: dyn.scenes.Scene, graphs: Mapping[str, cg.Graph]) -> tuple[dict[str, Json], str]:
     """Sizes of both forms, and how far they agree at a state, as data and as text."""
     sizes, apart = size_data(graphs), library.form_agreement(scene, graphs, filled(graphs[library.LAGRANGE], scene, {}))
     agreement = (

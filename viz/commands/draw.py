@@ -50,7 +50,7 @@ def run(options: argparse.Namespace) -> None:
     content = _listed(graph, scene) if kind == ".txt" else _drawn(*drawn)
     counts = graph.counts()
     answer(
-        f"{options.out}: {extend.many(counts.nodes, 'node')}, {extend.many(counts.edges, 'edge')}",
+        f"{options.out}: {extend.counted(counts.nodes, 'node')}, {extend.counted(counts.edges, 'edge')}",
         {options.out: content},
     )
 

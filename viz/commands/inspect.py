@@ -43,7 +43,7 @@ def run(options: argparse.Namespace) -> int:
         scene, forward=options.forward, momentum=options.momentum, t_end=options.t_end, say=say
     )
     count = sum(len(each.graph.nodes) for each in content.versions)
-    say(f"{scene.name}: writing the page of {extend.many(count, 'node')}")
+    say(f"{scene.name}: writing the page of {extend.counted(count, 'node')}")
     text = library.inspection_page(scene, content, moved)
     sizes = {
         version.name: {
@@ -56,7 +56,7 @@ def run(options: argparse.Namespace) -> int:
         for version in content.versions
     }
     size = len(text.encode())
-    counts = ", ".join(f"{name} {extend.many(version['nodes'], 'node')}" for name, version in sizes.items())
+    counts = ", ".join(f"{name} {extend.counted(version['nodes'], 'node')}" for name, version in sizes.items())
     data = {"scene": scene.name, "bytes": size, "stopped": content.stopped, "versions": sizes}
     answer(unless_json(options, data, f"{options.out}: {counts}; {size / 1e6:.2f} MB"), {options.out: text})
     return 1 if content.stopped else 0

@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from ..graph_drawing.dot import to_dot
     from ..graph_drawing.render import check_can_draw, render_png, render_svg, tags_to_collapse
     from ..lessons.lesson import SCREENS, lesson
-    from ..models.animate import Array, animate, frames
+    from ..models.animate import animate, frames
     from ..models.constant_momenta import constant_momentum
     from ..models.inspect import inspection_page
     from ..models.live import live_page

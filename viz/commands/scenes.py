@@ -6,7 +6,7 @@ import argparse
 from typing import Any
 
 import dynamics as dyn
-from cgraph.extend import many
+from cgraph import extend
 
 from .arguments import answer, unless_json
 from .command import Command
@@ -35,7 +35,8 @@ def run(options: argparse.Namespace) -> None:
         )
     lines = [
         f"{row['name']:16} {row['about']}\n{'':16} coordinates: {row['coordinates']}, inverse dynamics "
-        f"{many(row['inverse_nodes'], 'node')}, forward dynamics {many(row['forward_nodes'], 'node')}"
+        f"{extend.counted(row['inverse_nodes'], 'node')}, "
+        f"forward dynamics {extend.counted(row['forward_nodes'], 'node')}"
         for row in rows
     ]
     answer(unless_json(options, rows, "\n".join(lines)))

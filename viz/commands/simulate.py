@@ -98,7 +98,7 @@ def _text(run: dyn.Trajectory, data: dict[str, Any]) -> str:
     at_end = ", ".join([f"{name} = {value:.6g}" for name, value in [*data["end"].items()][:SHOWN]])
     more = len(data["end"]) - SHOWN
     of = ", of coordinates and momenta" if data["form"] == "momentum" else ""
-    steps, evaluations = extend.many(data["steps"], "step"), extend.many(data["evaluations"], "evaluation")
+    steps, evaluations = extend.counted(data["steps"], "step"), extend.counted(data["evaluations"], "evaluation")
     work = f"{steps}{of}, {data['rejected']} rejected, {evaluations}"
     lines = [
         f"{data['message']}, {data['t_end']:g} s" if run.success else f"{data['message']}",

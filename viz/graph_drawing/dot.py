@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 from cgraph import Edge, Graph, Node
 from cgraph.extend import (
-    many,
+    counted,
     require_choice,
     require_flag,
     require_graph,
@@ -120,7 +120,7 @@ def to_dot(
     )
     drawing = digraph(rankdir)
     if caption is not None:
-        counts = f"{many(len(graph.nodes), 'node')}, {many(len(graph.edges), 'edge')}"
+        counts = f"{counted(len(graph.nodes), 'node')}, {counted(len(graph.edges), 'edge')}"
         drawing.attr(label=literal(f"{caption}\n{counts}" if caption else counts), labelloc="b", fontsize="16")
     draw_boxes(drawing, plan.boxes)
     if legend is not False:

@@ -8,7 +8,7 @@ from html import escape
 from itertools import pairwise
 
 from cgraph import Graph, Node
-from cgraph.extend import columns, many
+from cgraph.extend import columns, counted
 
 from .. import theme
 
@@ -122,7 +122,7 @@ def _spread(at: dict[Node, float], row: Sequence[Node], wish: Sequence[float], g
 
 def _sizes(graph: Graph) -> str:
     counts = graph.counts()
-    return f"{many(counts.nodes, 'node')}, {many(counts.edges, 'edge')}, {counts.depth} deep, {counts.width} wide"
+    return f"{counted(counts.nodes, 'node')}, {counted(counts.edges, 'edge')}, {counts.depth} deep, {counts.width} wide"
 
 
 def _words(panel: LevelPanel, x: float, width: float, marks: Mapping[str, float]) -> list[str]:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from functools import lru_cache
 from typing import NamedTuple
 from xml.etree import ElementTree
+
+from cgraph.extend import memo
 
 from .render import render_svg
 
@@ -35,7 +36,7 @@ def positions(drawings: Sequence[tuple[Sequence[Size], Sequence[Line]]]) -> list
     return list(_positions(tuple((tuple(sizes), tuple(lines)) for sizes, lines in drawings)))
 
 
-@lru_cache(maxsize=64)
+@memo(64)
 def _positions(drawings: tuple[tuple[tuple[Size, ...], tuple[Line, ...]], ...]) -> tuple[Positions, ...]:
     root = ElementTree.fromstring(render_svg(_dot(drawings), timeout=20.0))  # noqa: S314 (Graphviz's own text)
     shapes = {group.get("id", ""): group for group in root.iter(f"{_SVG}g")}

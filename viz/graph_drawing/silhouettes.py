@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from cgraph import Graph
-from cgraph.extend import many
+from cgraph.extend import counted
 
 from .. import theme
 from .levels import FONT, FOOT, HEAD, SIDE, LevelPanel, label, levels_of, picture, rule
@@ -26,7 +26,7 @@ def silhouettes_svg(panels: Sequence[LevelPanel], row: float = 1.0, node: float 
     drawn, x = list[str](), SIDE
     for panel in panels:
         counts = panel.graph.counts()
-        sizes = f"{many(counts.nodes, 'node')}, {counts.depth} deep"
+        sizes = f"{counted(counts.nodes, 'node')}, {counts.depth} deep"
         width = max(node * counts.width, *[0.62 * FONT * len(text) for text in (panel.title, sizes)])
         top = y(counts.depth) - 24
         drawn += [label(x, top, panel.title, "start", 'font-weight="bold"'), label(x, top + 17, sizes, "start")]

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from cgraph import Edge, Graph, Node
-from cgraph.extend import real_array
+from cgraph.extend import Array, real_array
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
+if TYPE_CHECKING:
+    pass
+
 UNKNOWN = 0.5  # an input's value where none is given: a product with 0 would show nothing
 
 
@@ -63,7 +65,7 @@ class State:
     derived: a graph from inputs of the state to inputs of versions, such as q0_old = q0 - dt qd0; these have no value.
     """
 
-    at: Mapping[str, Any]
+    at: Mapping[str, float | Array]
     derived: Graph | None = None
 
     def inputs(self, graphs: Sequence[Graph]) -> list[str]:

@@ -9,16 +9,19 @@ from collections.abc import Collection, Mapping, Sequence
 from html import escape
 from importlib.resources import files
 from string import Template
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from cgraph import Graph, Node, __version__
-from cgraph.extend import require_graph, require_mapping, require_sequence, require_texts
+from cgraph.extend import Array, require_graph, require_mapping, require_sequence, require_texts
 
 from .. import theme
 from ..pages import html
 from .content import Motion, State, StateTable, Table, Version
 from .operations import operations
 from .record import record
+
+if TYPE_CHECKING:
+    from cgraph.extend import Json
 
 SCRIPTS = (
     "elements.js", "values.js", "state.js", "paths.js", "formula.js", "layers.js", "places.js",
@@ -65,7 +68,7 @@ def page(
     *,
     title: str = "Computational graph",
     about: str = "",
-    at: Mapping[str, Any] | None = None,
+    at: Mapping[str, float | Array] | None = None,
     marked: Collection[Node] = frozenset(),
     motion: Motion | None = None,
     tables: Sequence[Table | StateTable] = (),
@@ -150,13 +153,13 @@ def page(
             raise TypeError(f"motion must be a Motion, got {type(motion).__name__}: {motion!r:.60}")
         motion.check()
     introduction = "" if isinstance(graph, Graph) else about
-    data = {"title": title, "introduction": introduction, "notices": list(notices)}
+    data: dict[str, Json] = {"title": title, "introduction": introduction, "notices": list(notices)}
     live = [table for table in tables if isinstance(table, StateTable)]
     data |= record(versions, motion, *texts, state=State(at or {}, derived), columns=columns, tables=live)
     return Page(compose(title, data, [table for table in tables if isinstance(table, Table)], panels))
 
 
-def compose(title: str, data: Mapping[str, Any] | None, tables: Sequence[Table], panels: Sequence[Panel] = ()) -> str:
+def compose(title: str, data: Mapping[str, Json] | None, tables: Sequence[Table], panels: Sequence[Panel] = ()) -> str:
     """The file: its policy, style, body, data and script. Without data a panel says what is shown first."""
     first = "".join([panel.first for panel in panels])
     begin = "".join([f"\n{panel.run}" for panel in panels])

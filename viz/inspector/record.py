@@ -23,7 +23,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING
 
 import cgraph as cg
 from cgraph import Graph, Node
@@ -33,6 +33,9 @@ from .. import theme
 from ..graph_drawing.positions import Positions, positions
 from ..graph_drawing.render import RenderError
 from .content import Motion, State, StateTable, Version
+
+if TYPE_CHECKING:
+    from cgraph.extend import Json
 
 STAGES = {PRIMAL: "as written", ADJOINT: "reverse sweep", TANGENT: "forward sweep"}
 SMALL = 60  # nodes of a graph that is laid out by Graphviz
@@ -50,7 +53,7 @@ def record(
     state: State | None = None,
     columns: Mapping[str, str | None] | None = None,
     tables: Sequence[StateTable] = (),
-) -> dict[str, Any]:
+) -> dict[str, Json]:
     """All that the page's script reads, as JSON can hold it.
 
     names, units: {name in a graph: what a person calls it, and its unit}.  columns: {tag: tag of its parent}.
@@ -94,7 +97,7 @@ def _stages(versions: Sequence[Version]) -> list[str]:
     return list(*titles)
 
 
-def _motion(motion: Motion, letters: Letters) -> dict[str, Any]:
+def _motion(motion: Motion, letters: Letters) -> dict[str, Json]:
     return {
         "t": [_short(t) for t in motion.t],
         "points": None
@@ -107,7 +110,7 @@ def _motion(motion: Motion, letters: Letters) -> dict[str, Any]:
     }
 
 
-def slopes(op: Op) -> dict[str, Any]:
+def slopes(op: Op) -> dict[str, Json]:
     """The partials of an operation as a small program, from its row: 0 is the output, 1.. the arguments, then `code`.
 
     A line of code is a number, or an operation and the numbers of its arguments; `out` names one result an argument.
@@ -116,7 +119,7 @@ def slopes(op: Op) -> dict[str, Any]:
     partials = [cg.constant(each) if not isinstance(each, Node) else each for each in op.partials(y, *args)]
     graph = Graph([y, *args], {str(i): node for i, node in enumerate(partials)})
     number = {node: i for i, node in enumerate([y, *args])}
-    code: list[Any] = []
+    code: list[Json] = []
     for node in graph.nodes:
         if node not in number:
             number[node] = op.arity + 1 + len(code)
@@ -130,7 +133,7 @@ def _letters(names: Mapping[str, str]) -> Letters:
     return lambda name: shown.get(name) or theme.pretty(name)
 
 
-def _graph(graph: Graph, letters: Letters) -> dict[str, Any]:
+def _graph(graph: Graph, letters: Letters) -> dict[str, Json]:
     number = {node: i for i, node in enumerate(graph.nodes)}
     return {
         "ops": [node.op.name for node in graph.nodes],
@@ -138,13 +141,13 @@ def _graph(graph: Graph, letters: Letters) -> dict[str, Any]:
             _number(node.value) if node.value is not None else [number[arg] for arg in node.args]
             for node in graph.nodes
         ],
-        "names": {i: [node.name, letters(node.name)] for node, i in number.items() if node.name},
+        "names": {str(i): [node.name, letters(node.name)] for node, i in number.items() if node.name},
         "inputs": [[name, number.get(node, -1)] for name, node in zip(graph.input_names, graph.inputs, strict=True)],
         "outputs": [[name, letters(name), number[node]] for name, node in graph.outputs.items()],
     }
 
 
-def _version(version: Version, letters: Letters) -> dict[str, Any]:
+def _version(version: Version, letters: Letters) -> dict[str, Json]:
     labels: dict[tuple[tuple[str, ...], str, str], int] = {}
     label = []
     row = {node: title for title, nodes in version.rows.items() for node in nodes}
@@ -175,7 +178,7 @@ def _version(version: Version, letters: Letters) -> dict[str, Any]:
     }
 
 
-def _drawings(graphs: Sequence[Graph], letters: Letters) -> list[dict[str, Any] | None]:
+def _drawings(graphs: Sequence[Graph], letters: Letters) -> list[dict[str, Json] | None]:
     """Small graphs as Graphviz lays them out, if it is there: {width, height, nodes, outputs, lines}.
 
     nodes: [x, y, width] of every node, null for a constant, which is written where it is used; outputs the same.
@@ -209,7 +212,7 @@ def _planned(graph: Graph, letters: Letters) -> _Plan:
 
 def _drawing(
     graph: Graph, shown: list[Node | str], sizes: list[tuple[float, float]], lines: object, where: Positions
-) -> dict[str, Any]:
+) -> dict[str, Json]:
     boxes = {each: [x, y, w] for each, (x, y), (w, _) in zip(shown, where.centers, sizes, strict=True)}
     number = {node: f"n{i}" for i, node in enumerate(graph.nodes)}
     ids = [number[each] if isinstance(each, Node) else f"o{each}" for each in shown]
@@ -248,7 +251,7 @@ def _stage(node: Node) -> str:
     return next((stage for role, stage in STAGES.items() if role in roles), STAGES[PRIMAL])
 
 
-def _table(table: StateTable, letters: Letters) -> dict[str, Any]:
+def _table(table: StateTable, letters: Letters) -> dict[str, Json]:
     number = {name: i for i, name in enumerate(table.graph.outputs)}
     return {
         "caption": table.caption,

@@ -7,7 +7,6 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
-from typing import Any
 
 from ..pages import html
 
@@ -31,7 +30,7 @@ class Screen:
     answer: int
     reveal: str
     play_words: str
-    play: Mapping[str, Any] | None
+    play: Mapping[str, object] | None
     note: str
     picture: str = ""  # what the play is about
 

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from html import escape
-from typing import Any
 
 import numpy as np
 
@@ -70,7 +69,7 @@ class Subject:
         found = graph.evaluate({name: values[name] for name in graph.input_names})
         return np.array([float(value) for value in found.values()])
 
-    def graph(self, graph: Graph) -> dict[str, Any]:
+    def graph(self, graph: Graph) -> dict[str, object]:
         """A graph for the page's script: inputs, and nodes as a number, an input's name or [operation, places]."""
         place = {node: k for k, node in enumerate(graph.nodes)}
         nodes = [
@@ -80,7 +79,7 @@ class Subject:
         ]  # fmt: skip
         return {"nodes": nodes, "outputs": {name: place[node] for name, node in graph.outputs.items()}}
 
-    def sliders(self, names: Sequence[str], low: float, high: float) -> list[dict[str, Any]]:
+    def sliders(self, names: Sequence[str], low: float, high: float) -> list[dict[str, object]]:
         """Sliders for inputs, with what they are called."""
         return [
             {"name": name, "shown": self.shown(name), "low": low, "high": high, "value": self.values[name]}

@@ -6,13 +6,16 @@ import base64
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import cgraph as cg
 from cgraph import Graph, GraphError
 from cgraph.extend import is_finite, real_number, require_graph, require_mapping, require_sequence, require_texts
 
 from .. import theme
+
+if TYPE_CHECKING:
+    from cgraph.extend import Json
 
 TIME = "t"  # the input that is the time, if there is one
 GROUPS = (
@@ -115,7 +118,7 @@ class Live:
         for what in ("names", "units"):
             require_texts(what, getattr(self, what))
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Json]:
         """What the script of the page reads."""
         called = theme.called(self.names)
         return {
@@ -135,7 +138,7 @@ class Live:
             "dt": float(self.dt),
         }
 
-    def _input(self, name: str, called: str) -> dict[str, Any]:
+    def _input(self, name: str, called: str) -> dict[str, Json]:
         value = float(self.start[name])
         scale = float(self.scales.get(name, 3.0 * abs(value) or 1.0))
         kinds = [group for start, group in GROUPS if name.startswith(start) and name.removeprefix(start).isdecimal()]

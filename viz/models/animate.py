@@ -7,11 +7,12 @@ import math
 import os
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
-from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from cgraph.extend import (
+    Array,
     check_writable,
     real_array,
     real_number,
@@ -29,7 +30,6 @@ from dynamics.systems.model import Model
 from ..animation.canvas import KINDS, RATE, check_can_animate, encode
 from ..animation.panels import FINE, Curves, Motion, Panel, Sticks, film
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
 MOST_FRAMES, MOST_MOTIONS = 1000, 4
 FILM = 10.0  # s, a length that is offered
 
@@ -51,7 +51,7 @@ def animate(
     path: str | os.PathLike[str] | None = None,
     *,
     kind: str | None = None,
-    wanted: Callable[[Array], Any] | None = None,
+    wanted: Callable[[Array], ArrayLike] | None = None,
     marked: Collection[str] = (),
     speed: float = 1.0,
     dark: bool = False,
@@ -136,7 +136,7 @@ def animate(
 def _motions(model: Model, motions: object) -> dict[str, Trajectory]:
     """The motions by their words, checked."""
     if isinstance(motions, Trajectory):
-        known: dict[Any, Any] = {"": motions}
+        known: dict[str, Trajectory] = {"": motions}
     elif isinstance(motions, Mapping):
         known = dict(motions)
     else:
@@ -182,7 +182,7 @@ def _panel(
     model: Model,
     known: Mapping[str, Trajectory],
     times: Array,
-    wanted: Callable[[Array], Any] | None,
+    wanted: Callable[[Array], ArrayLike] | None,
     wrong: Collection[str],
 ) -> Panel:
     rows = [_at(each, times) for each in known.values()]
@@ -198,7 +198,7 @@ def _panel(
     return make(motions, None if wanted is None else shown[-1])
 
 
-def _wanted(wanted: Callable[[Array], Any], times: Array, nq: int) -> Array:
+def _wanted(wanted: Callable[[Array], ArrayLike], times: Array, nq: int) -> Array:
     if not callable(wanted) or isinstance(wanted, type):
         raise TypeError(f"wanted must be a function of times, got {type(wanted).__name__}: {wanted!r:.60}")
     found = real_array("wanted", wanted(times))

@@ -8,9 +8,12 @@ from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import Any
+from typing import TYPE_CHECKING
 
 from .document import Document, to_html, to_markdown
+
+if TYPE_CHECKING:
+    from cgraph.extend import Json
 
 
 def check_folder(folder: Path) -> None:
@@ -35,7 +38,7 @@ def check_folder(folder: Path) -> None:
 
 
 def document_files(
-    folder: Path, name: str, document: Document, data: Mapping[str, Any], rows: str | None = None, *, kind: str = ""
+    folder: Path, name: str, document: Document, data: Mapping[str, Json], rows: str | None = None, *, kind: str = ""
 ) -> dict[Path, str]:
     """The files of one document in a folder, {path: text}, the page last.
 

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from cgraph import Graph, Node
-from cgraph.extend import Array, many, require_graph, topological
+from cgraph.extend import Array, counted, require_graph, topological
 
 from .. import theme
 from ..graph_drawing.dot import to_dot
@@ -57,7 +57,9 @@ def graph_html(graph: Graph) -> str:
     """
     require_graph("graph_html", graph)
     tags = tags_to_collapse(graph)
-    said = f"{many(len(graph.nodes), 'node')}; <code>viz.page(graph)</code> unfolds them, and shows values and paths."
+    said = (
+        f"{counted(len(graph.nodes), 'node')}; <code>viz.page(graph)</code> unfolds them, and shows values and paths."
+    )
     if len(graph.nodes) > LARGE and not tags:
         return f"<p>{escape(repr(graph))}: {said}</p>"
     svg = render_svg(to_dot(graph, collapse=tags), timeout=SECONDS)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Content = Mapping[str, Any]  # what `to_dict()` of the report gives, or its JSON file
-Row = Mapping[str, Any]
+Row = Content
 FROM, TO = 1e-12, 1e13  # shares of a bound that are drawn; what is outside is drawn at the border
 WIDTH, LINE, FRAME = 10.0, 0.17, 1.0  # inches: of a picture, of each case, and for the axis
 
@@ -67,7 +67,7 @@ def _limits(content: Content) -> Section:
 _HEADER = ["case", "method", "verdict", "figure", "value", "bound", "steps", "time [s]"]
 
 
-def _section(section: Mapping[str, Any]) -> Section:
+def _section(section: Row) -> Section:
     name, rows = section["name"], section["rows"]
     anchor = re.sub(r"[^a-z]+", "-", name.lower())
     svg = to_adaptive_svg(shares(rows))
@@ -103,7 +103,7 @@ def _lines(row: Row, missed: bool = False) -> list[list[str]]:
     ]
 
 
-def _unit(figure: Mapping[str, Any]) -> str:
+def _unit(figure: Row) -> str:
     """The unit, in brackets; none for a share of what the section names."""
     return "" if str(figure["unit"]).startswith("of ") else f" [{figure['unit']}]"
 
@@ -147,7 +147,7 @@ def shares(rows: Sequence[Row]) -> Figure:
     return figure
 
 
-def _share(figure: Mapping[str, Any]) -> float:
+def _share(figure: Row) -> float:
     """The figure over its bound, within what is drawn; what is no number at the far end."""
     value, bound = float(figure["value"]), float(figure["bound"])
     if value != value:

@@ -11,6 +11,7 @@ from ..plots.plot import to_adaptive_svg
 from .document import Block, Document, Paragraph, Picture, Section, Table, left_out
 
 Content = Mapping[str, Any]  # what `to_dict()` of the report gives, or its JSON file
+Row = Content
 EQUAL, CHOSEN = "equal steps", "chosen steps"
 DRAWN = 3.0  # errors above are no motion of this kind any more
 
@@ -71,7 +72,7 @@ def _fastest(content: Content) -> Section:
     return Section("fastest", "Fastest for an error", [table, Paragraph(note)])
 
 
-def _target(target: Mapping[str, Any] | None) -> str:
+def _target(target: Row | None) -> str:
     if target is None:
         return "-"
     ratio = "" if target["group"] == "ours" or target["ratio"] is None else f" [{_digits(target['ratio'])}]"
@@ -126,7 +127,7 @@ def _maker(name: str) -> str:
     return next((color for begin, color in theme.MAKERS.items() if name.startswith(begin)), theme.GRAY)
 
 
-def _best(ours: Sequence[Mapping[str, Any]], content: Content) -> list[Mapping[str, Any]]:
+def _best(ours: Sequence[Row], content: Content) -> list[Row]:
     """The one of ours that is fastest at the smallest error that any of them reaches within a factor of a hundred."""
     reached = [(min(point["error"] for point in curve["points"]), curve) for curve in ours if curve["points"]]
     if not reached:
@@ -140,14 +141,14 @@ def _best(ours: Sequence[Mapping[str, Any]], content: Content) -> list[Mapping[s
     return [reached[min(times)[1]][1]]
 
 
-def _line(curve: Mapping[str, Any], x: str, y: str, color: int | str, dashed: bool, before: str = "") -> Line:
+def _line(curve: Row, x: str, y: str, color: int | str, dashed: bool, before: str = "") -> Line:
     """A curve's points in two of their columns, those without a number or far off left out."""
     shown = [(point[x], point[y]) for point in curve["points"] if point[x] and point[y] and _drawn(point)]
     name = before + curve["name"].removeprefix("MuJoCo ")
     return Line(name, [a for a, _ in shown], [b for _, b in shown], color, dashed)
 
 
-def _look(curve: Mapping[str, Any]) -> tuple[int | str, bool]:
+def _look(curve: Row) -> tuple[int | str, bool]:
     """Color and dashes of a curve, the same on every page: one for every method of ours, and every maker of others."""
     if not curve["ours"]:
         return _maker(curve["name"]), False
@@ -156,7 +157,7 @@ def _look(curve: Mapping[str, Any]) -> tuple[int | str, bool]:
     return number, number >= len(COLORS)
 
 
-def _drawn(point: Mapping[str, Any]) -> bool:
+def _drawn(point: Row) -> bool:
     return point["error"] < DRAWN and point["largest"] is not None and point["largest"] < 10.0 * DRAWN
 
 

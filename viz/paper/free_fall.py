@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,6 +17,9 @@ from dynamics.experiments.text_table import csv_text
 from ..pages import html
 from ..plots import plot
 from .part import Part, pictures
+
+if TYPE_CHECKING:
+    from cgraph.extend import Json
 
 SNAPSHOTS = 6
 
@@ -35,7 +38,7 @@ def figures4_and_5() -> Part:
     drawn4 = pictures("fig4", ours)
     files = dict(drawn4.files)
     section = html.figure(drawn4.svg, caption4, adapts=True)
-    data: dict[str, Any] = {"q_end": run.trajectory.q[-1].tolist()}
+    data: dict[str, Json] = {"q_end": run.trajectory.q[-1].tolist()}
     try:
         other = mujoco_free_fall(run)
     except ImportError as error:

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from ..graph_drawing.render import check_can_draw
 from ..pages import html
@@ -20,6 +20,9 @@ from .part import Part
 from .scaling import scaling_of_counts
 from .timing import figure6
 
+if TYPE_CHECKING:
+    from cgraph.extend import Json
+
 QUICK_EVALUATIONS = 100  # of each formulation, for Figure 6
 QUICK_ARMS = (1, 3)  # links, for the law of the embedding
 QUICK_LINKS = (1, 3, 6, 10, 20)  # of the chains of the scaling
@@ -29,7 +32,7 @@ class Paper(NamedTuple):
     """files: {path: content}, the page last.  data: all figures as plain data."""
 
     files: dict[Path, str | bytes]
-    data: dict[str, Any]
+    data: Mapping[str, Json]
 
 
 def paper(folder: Path, say: Callable[[str], None], *, quick: bool = False) -> Paper:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, NamedTuple
 
 from ..graph_drawing.render import render_png
 from ..plots import plot
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from cgraph.extend import Json
 
 SCALE = 160 / 96  # of a plot as PNG: 160 pixels an inch
 
@@ -19,7 +22,7 @@ class Part(NamedTuple):
     name: str
     heading: str
     files: dict[str, str | bytes]
-    data: dict[str, Any]
+    data: Mapping[str, Json]
     section: str
 
 

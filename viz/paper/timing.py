@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from dynamics.experiments.paper_numbers.table_1 import PAPER_MS, Row, table_1
 from dynamics.experiments.text_table import csv_text
@@ -15,6 +15,8 @@ from .part import Part, pictures
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from cgraph.extend import Json
 
 EVALUATIONS = 1000  # as in the paper
 
@@ -89,13 +91,13 @@ def _times(rows: Sequence[Row]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]
     return header, table
 
 
-def _figures(row: Row) -> dict[str, Any]:
+def _figures(row: Row) -> dict[str, Json]:
     """A row as plain data."""
     times = {
         way: {"median_us": timing.median, "lower_quartile_us": timing.lower, "upper_quartile_us": timing.upper}
         for way, timing in row.timings.items()
     }
-    return {"nodes": row.counts.nodes, "edges": row.counts.edges, "depth": row.counts.depth} | times
+    return {"nodes": row.counts.nodes, "edges": row.counts.edges, "depth": row.counts.depth, **times}
 
 
 def _why(rows: Sequence[Row]) -> str:

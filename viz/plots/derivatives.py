@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cgraph.extend import Array
+
 from .. import theme
-from .plot import GRID, Array, empty_figure, painted_line, style
+from .plot import GRID, empty_figure, painted_line, style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from cgraph.extend import Array as Points
+
 from .. import theme
-from .plot import GRID, Array as Points, empty_figure, style
+from .plot import GRID, empty_figure, style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

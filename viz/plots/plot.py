@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import io
 from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cgraph.extend import install
+from cgraph.extend import Array, install
 
 from .. import theme
 
@@ -16,7 +17,6 @@ if TYPE_CHECKING:
     from matplotlib.collections import LineCollection
     from matplotlib.figure import Figure
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
 STYLE: dict[Any, Any] = {
     "font.family": theme.FONT,
     "font.size": 10,
@@ -44,7 +44,7 @@ def check_can_plot() -> None:
     empty_figure(1.0, 1.0)
 
 
-def style() -> Any:
+def style() -> AbstractContextManager[None]:
     """A context in which matplotlib draws as all pictures look."""
     from matplotlib import rc_context
 

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Collection, Iterable
-from functools import cache
 
 from ...operations.operation import Op
+from ...util.caches import memo
 from .elementary_functions import DIGITS, TEXT
 from .instructions import INTRINSICS
 from .other_functions import TEXT as OTHERS
@@ -20,8 +20,7 @@ PRIMITIVES = {*INTRINSICS, "load", "store", "word", "address"}
 HOST = "math."  # before the name of a function that the host supplies
 
 
-@cache
-def table() -> bytes:
+def _table() -> bytes:
     """What `wave` reads at TABLE: the digits of 2/pi, the last ones first."""
     one = 1 << 1300
     pi = 4 * (4 * _arctan_of_inverse(5, one) - _arctan_of_inverse(239, one))
@@ -37,7 +36,10 @@ def _arctan_of_inverse(n: int, one: int) -> int:
     return total
 
 
-@cache
+WAVE_TABLE = _table()
+
+
+@memo(8)
 def library(at: int) -> dict[str, ast.FunctionDef]:
     """{name: function}, for a table at this place in memory."""
     found = ast.parse((TEXT + OTHERS).replace("TABLE", str(at))).body

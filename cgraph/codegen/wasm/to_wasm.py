@@ -11,7 +11,7 @@ from ...util.require import require_graph, require_mapping, require_sequence
 from . import instructions as ins
 from .elementary_functions import ROOM
 from .evaluation import evaluation
-from .functions import HOST, called, library, table, text_of
+from .functions import HOST, WAVE_TABLE, called, library, text_of
 from .instructions import F64, I32
 from .steps import Layout, Tableau, chosen_steps, equal_steps
 from .translate import Body, Signature, types_of
@@ -90,7 +90,7 @@ def to_wasm(
     needed = called(texts.values(), place)
     imported = [name for name in needed if name.startswith(HOST)]
     own = [text for name, text in library(place).items() if name in needed]
-    data = table() if "wave" in needed else b""
+    data = WAVE_TABLE if "wave" in needed else b""
     free = place + (ROOM + 7) // 8 * 8 * bool(data)
     at = graph.input_names.index(time) if time in graph.input_names else None
     layout = Layout(inputs, states, at, free)

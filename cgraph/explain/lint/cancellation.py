@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from ...core.graph import Graph
 from ...core.node import Node, as_node
@@ -12,6 +13,9 @@ from ...util.explain_failure import explain_failure
 from ..edge_partials import Point, node_values
 from ..names import Names
 from .finding import Finding
+
+if TYPE_CHECKING:
+    from ...util.json_type import Json
 
 UNIT = 2.0**-53  # relative error of one rounding
 DIGITS = -math.log10(UNIT)  # 15.95 decimal digits of a float64
@@ -109,7 +113,7 @@ def _finding(names: Names, node: Node, found: Rounded, lost: float, left: float)
         f"{names.line(node)}: {first} {sign} {f'({second})' if b < 0 else second} leaves {found.values[node]:.3g}; "
         f"{lost:.0f} digits are lost here, {left:.0f} remain."
     )
-    data = {
+    data: dict[str, Json] = {
         "number": names.number[node],
         "tags": sorted(node.tags),
         "value": found.values[node],

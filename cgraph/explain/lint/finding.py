@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING
 
 from ...core.graph import Edge
 from ...core.node import Node
+
+if TYPE_CHECKING:
+    from ...util.json_type import Json
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,11 +35,11 @@ class Finding:
     text: str
     nodes: tuple[Node, ...] = ()
     edges: tuple[Edge, ...] = ()
-    data: Mapping[str, Any] = field(default_factory=dict)
+    data: Mapping[str, Json] = field(default_factory=dict)
 
     def __str__(self) -> str:
         return self.text
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Json]:
         """The same for JSON."""
         return {"kind": self.kind, "text": self.text, **self.data}

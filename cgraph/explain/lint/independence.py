@@ -11,7 +11,7 @@ from ...core.forward import tangents
 from ...core.graph import Edge, Graph
 from ...core.label import ADJOINT
 from ...core.node import Node, constant
-from ...util.many import many
+from ...util.counted import counted
 from ...writing.networkx_queries import minimum_cut
 from ...writing.source_lines import lines_text
 from ..names import Name, Names, joined
@@ -125,7 +125,7 @@ def _report(
     if through:
         affected = descendants(names.graph.nodes, through)
         outputs = [names.shown(name) for name, node in names.graph.outputs.items() if node in affected]
-        alone = f"{many(len(wrong), 'node')} of {len(names.graph.nodes)} {_verb(wrong, 'serve')} nothing else."
+        alone = f"{counted(len(wrong), 'node')} of {len(names.graph.nodes)} {_verb(wrong, 'serve')} nothing else."
         lines.append(f"{joined(outputs)} {_verb(outputs, 'contain')} what was gained; {alone}")
     elif through is not None:
         lines.append("No derivative in this graph was taken that way.")

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 from ...core.graph import Edge, Graph
 from ...core.node import Node
+from ...util.counted import counted
 from ...util.html_text import html_table, html_text
-from ...util.many import many
 from ...util.require import require_graph, require_mapping, require_sequence
 from ..edge_partials import Point
 from ..names import Name, Names
@@ -19,6 +19,9 @@ from .dependence import missing_dependences, unused_inputs
 from .finding import Finding
 from .independence import Group, check_independence
 from .singular import Box, singular_nodes
+
+if TYPE_CHECKING:
+    from ...util.json_type import Json
 
 Pair = tuple[Group, Group]
 
@@ -78,7 +81,7 @@ class Lint:
         rows += [("Note", str(each)) for each in self.notes]
         return html_table(("", ""), rows, texts=2) if rows else html_text(str(self))
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> dict[str, Json]:
         """The same for JSON; nodes are numbered as in `graph.nodes`, an edge is (source, target, argument slot)."""
         return {
             "ok": self.ok,
@@ -166,7 +169,7 @@ def lint(
         singular = singular_nodes(known, box)
         findings += singular
         if not singular:
-            proofs.append(f"no slope is unbounded in the box, of {many(len(known.number), 'operation')}.")
+            proofs.append(f"no slope is unbounded in the box, of {counted(len(known.number), 'operation')}.")
     if at is not None:
         losses = cancellations(known, at, digits)
         findings += losses
@@ -182,7 +185,7 @@ def _pairs(independent: Pair | Sequence[Pair]) -> list[Pair]:
     """
     if isinstance(independent, (str, Node)):
         raise TypeError(f"independent: expected pairs of groups, got {independent!r:.60}")
-    pairs: list[Any] = list(require_sequence("independent", independent, "pairs of groups"))
+    pairs = list(require_sequence("independent", independent, "pairs of groups"))
     if len(pairs) == 2 and isinstance(independent, tuple):
         if all([isinstance(each, tuple) and len(each) == 2 for each in pairs]):
             raise ValueError(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import numbers
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 from ...core.graph import Graph
 from ...core.node import CONSTANT, VARIABLE, Node
@@ -14,6 +15,9 @@ from ...util.real_arrays import real_number
 from ...util.require import require_mapping
 from ..names import Names
 from .finding import Finding
+
+if TYPE_CHECKING:
+    from ...util.json_type import Json
 
 Box = Mapping[str, float | tuple[float, float]]
 
@@ -63,7 +67,7 @@ def singular_nodes(names: Names, box: Box) -> list[Finding]:
         if reason is not None:
             arguments = {names.text(arg): bounds[arg] for arg in node.args if arg.value is None}
             within = " and ".join([f"{name} is within {_shown(bound)}" for name, bound in arguments.items()])
-            data = {
+            data: dict[str, Json] = {
                 "number": names.number[node],
                 "operation": node.op.name,
                 "tags": sorted(node.tags),

@@ -245,7 +245,7 @@ def elements_beside(statement: Map | Sum, state: dict[str, Array], execution: Ex
     rows = [row for name in statement.shared for row in state[name]]
     rows += [state[name] for name in statement.inputs]
     inputs = np.array([np.broadcast_to(row, shape) for row in rows]).reshape(len(rows), shape[0] * shape[1])
-    results = execution.batch(statement.graph, inputs).reshape(-1, *shape)
+    results = execution.batch(statement.graph, inputs).reshape(len(statement.graph.outputs), *shape)
     if isinstance(statement, Map):
         state.update(zip(statement.outputs, results, strict=True))
         return

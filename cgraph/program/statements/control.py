@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from ...core.evaluation import Array
 from ..statement import Lengths, Statement, require_length
 
 if TYPE_CHECKING:
@@ -102,6 +105,18 @@ def run_while(statement: While | FixedPoint, state: State, execution: Execution)
 def run_if(statement: If, state: State, execution: Execution) -> None:
     """In Python."""
     positive = state[statement.register][0] > 0.0
+    execution.run(statement.body if positive else statement.otherwise, state)
+
+
+def while_beside(statement: While | FixedPoint, state: dict[str, Array], execution: Execution) -> None:
+    """Of many memories: as long as it is positive in any."""
+    while np.any(state[statement.register] > 0.0):
+        execution.run(statement.body, state)
+
+
+def if_beside(statement: If, state: dict[str, Array], execution: Execution) -> None:
+    """Of many memories: the body if it is positive in any."""
+    positive = np.any(state[statement.register] > 0.0)
     execution.run(statement.body if positive else statement.otherwise, state)
 
 

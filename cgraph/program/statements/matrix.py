@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...core.evaluation import Array
 from ..statement import Lengths, Statement, length_of, require_length
 from . import lu_solve
 
@@ -87,10 +89,30 @@ def run_factor(statement: Factor, state: State, _: Execution) -> None:
 def run_solve(statement: Solve, state: State, _: Execution) -> None:
     """In Python."""
     n = len(state[statement.pivots])
-    a, b = np.array(state[statement.matrix]).reshape(n, n), np.array(state[statement.vector])
-    solve = lu_solve.solve_transposed if statement.transposed else lu_solve.solve
-    solve(a, np.array(state[statement.pivots]), b)
+    a, p, b = np.array(state[statement.matrix]), np.array(state[statement.pivots]), np.array(state[statement.vector])
+    _solve(statement)(a.reshape(n, n), p, b)
     state[statement.vector] = b.tolist()
+
+
+def factor_beside(statement: Factor, state: dict[str, Array], _: Execution) -> None:
+    """Of many memories, each with pivots of its own."""
+    pivots = np.empty_like(state[statement.pivots])
+    n, count = pivots.shape
+    a = np.array(state[statement.matrix])
+    lu_solve.factor(a.reshape(n, n, count), pivots)
+    state[statement.matrix], state[statement.pivots] = a, pivots
+
+
+def solve_beside(statement: Solve, state: dict[str, Array], _: Execution) -> None:
+    """Of many memories."""
+    pivots, b = state[statement.pivots], np.array(state[statement.vector])
+    n, count = b.shape
+    _solve(statement)(state[statement.matrix].reshape(n, n, count), pivots, b)
+    state[statement.vector] = b
+
+
+def _solve(statement: Solve) -> Callable[[Array, Array, Array], None]:
+    return lu_solve.solve_transposed if statement.transposed else lu_solve.solve
 
 
 def factor_text(statement: Factor, writer: Writer) -> None:

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 import cgraph as cg
+from cgraph.extend import Array
 
 from ...equations.formulations import inverse_dynamics
 from ...multibody.planar_arm import planar_arm
 from ...systems.model import Model, as_system
 from .fit import exponent
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
 STEPS = tuple(10.0 ** (-k / 2) for k in range(4, 13))  # s, 1e-2 to 1e-6
 
 

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
+
+from cgraph.extend import Array
 
 from ...io.mujoco_twin import MujocoTwin
 from ...multibody.mechanism import require_mechanism
 from ...scenes.scenes import Scene
 from ...simulation.simulate import simulate
 from ...simulation.trajectory import Trajectory
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,7 +44,7 @@ def table_1(evaluations: int = 1000, seed: int = 0) -> list[Row]:
     """
     scene = triple_pendulum()
     graphs = {name: inverse_dynamics(scene, name) for name in PAPER_MS}
-    runs: dict[str, dict[str, Callable[[np.ndarray], object]]] = {
+    runs: dict[str, Mapping[str, Callable[[np.ndarray], object]]] = {
         "interpreted": {name: _interpreted(graph) for name, graph in graphs.items()},
         "compiled": {name: cg.compile(graph, "python") for name, graph in graphs.items()},
     }

@@ -9,9 +9,11 @@ from functools import partial
 
 import numpy as np
 
+from cgraph.extend import Array
+
 from ...multibody.mechanism import as_mechanism
 from ...peers import PEERS, Case
-from ...peers.case import MOTIONS, TASKS, Array
+from ...peers.case import MOTIONS, TASKS
 from ...peers.contender import MODES
 from .bench_scenes import QUICK, SCENES, load
 from .worker import Load, Prepared, Worker

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
 
@@ -23,6 +23,8 @@ TITLE = """\
 Seconds of the processor from the model to a first result, every chain in a process of its own.
 graph, code: forward dynamics as a graph, and compiled.  Jacobian: by q, qd and tau, of the compiled function.
 A and B: `linearize_many`, 6 n^2 entries.  a body, an entry: in ms, of graph and code, the Jacobian, and A and B."""
+
+Made = TypeVar("Made")
 
 
 def compile_time(links: int | None = None) -> Iterator[str]:
@@ -42,7 +44,7 @@ def cost(kind: str, n: int) -> None:
     model, seconds = MODELS[kind](n), []
     cg.compile(cg.Graph([cg.variable("x")], {"y": cg.variable("x")}))([0.0])  # LLVM is loaded
 
-    def stage(function: Callable[[], Any]) -> Any:
+    def stage(function: Callable[[], Made]) -> Made:
         begin = time.process_time()
         result = function()
         seconds.append(time.process_time() - begin)
@@ -51,7 +53,7 @@ def cost(kind: str, n: int) -> None:
     graph = stage(lambda: forward_dynamics(model))
     x = np.random.default_rng(n).normal(size=len(graph.inputs))
 
-    def called() -> Any:
+    def called() -> cg.Compiled:
         function = cg.compile(graph)
         function(x)
         return function

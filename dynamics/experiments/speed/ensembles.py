@@ -10,13 +10,14 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Iterator
-from typing import Any
 
 import numpy as np
 
+from cgraph.extend import Array
+
 from ... import scenes
 from ...io.mujoco_twin import rollout
-from ...peers.case import Array, Case, rk4_step
+from ...peers.case import AnyState, Case, rk4_step
 from ...peers.jax import JaxPeer
 from ...peers.mujoco import MujocoPeer
 from ...simulation.ensembles.simulate_many import simulate_many
@@ -70,7 +71,7 @@ def jax(q: Array, qd: Array) -> Run:
     """JAX's own derivatives of the same Lagrangian: jit of vmap of lax.scan, in double precision."""
     peer = JaxPeer(Case(SCENE, scenes.load(SCENE)))
 
-    def step(x: Any, _: None) -> tuple[Any, None]:
+    def step(x: AnyState, _: None) -> tuple[AnyState, None]:
         return rk4_step(peer.rate, x, DT), None
 
     many = peer.jax.jit(peer.jax.vmap(lambda x: peer.jax.lax.scan(step, x, None, STEPS)[0]))

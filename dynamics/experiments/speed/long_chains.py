@@ -5,12 +5,12 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import TypeVar
 
 import numpy as np
 
 import cgraph as cg
-from cgraph.extend import ldl_elimination
+from cgraph.extend import Array, ldl_elimination
 
 from ...equations.equations_of_motion import bias, forward_dynamics, mass_matrix
 from ...multibody.mechanism import Mechanism
@@ -22,12 +22,12 @@ from ..fresh_process import run_fresh
 from ..text_table import table
 from .bench_scenes import turned_arm
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
-
 LINKS = 1000
 STATES = 3  # of each chain
 SIZES = (("planar", 10), ("planar", 100), ("planar", 300), ("3D", 10), ("3D", 100))
 DENSE = {"planar": 30, "3D": 10}  # links; beyond, the graph of the dense solve, which grows with n^3, takes long
+
+Made = TypeVar("Made")
 
 
 def planar(n: int) -> Mechanism:
@@ -36,7 +36,7 @@ def planar(n: int) -> Mechanism:
     return planar_arm(masses, lengths, damping=0.1)
 
 
-MODELS: dict[str, Callable[[int], Any]] = {"planar": planar, "3D": turned_arm}
+MODELS: dict[str, Callable[[int], Mechanism]] = {"planar": planar, "3D": turned_arm}
 EXACT: dict[str, Callable[..., Array]] = {
     "planar": lambda *at: accelerations(*at).high,
     "3D": chain_accelerations,
@@ -62,7 +62,7 @@ def cost(kind: str, n: int) -> None:
 
     rows: list[list[str]] = []
 
-    def stage(what: str, function: Callable[[], Any]) -> Any:
+    def stage(what: str, function: Callable[[], Made]) -> Made:
         begin, worked = time.perf_counter(), time.process_time()
         result = function()
         seconds, worked = time.perf_counter() - begin, time.process_time() - worked
@@ -97,19 +97,19 @@ def accuracy(kind: str, n: int, spread: float) -> dict[str, float]:
         q, qd, tau = rng.uniform(-spread, spread, n), rng.normal(size=n), rng.normal(size=n)
         exact = EXACT[kind](model, q, qd, tau)
         state = dict(zip(graphs["elimination"].input_names, [*q, *qd, *tau], strict=True))
-        solved: dict[str, Any] = {name: values(graph, state) for name, graph in graphs.items()}
+        solved: dict[str, Array] = {name: values(graph, state) for name, graph in graphs.items()}
         if matrix is not None:
             m = values(matrix, state).reshape(n, n)
             rhs = tau - values(biases, state) - np.array(as_system(model).damping) * qd
             solved |= {
-                "numpy.linalg.solve": np.linalg.solve(m, rhs),
-                "LDL of the same, floats": ldl_elimination(m.tolist(), rhs.tolist())[0],
+                "numpy.linalg.solve": np.asarray(np.linalg.solve(m, rhs), dtype=np.float64),
+                "LDL of the same, floats": np.array(ldl_elimination(m.tolist(), rhs.tolist())[0]),
             }
         for name, x in solved.items():
             worst[name] = max(worst.get(name, 0.0), float(np.abs(x - exact).max() / np.abs(exact).max()))
     return worst
 
 
-def values(graph: cg.Graph, state: dict[str, Any]) -> Array:
+def values(graph: cg.Graph, state: dict[str, float]) -> Array:
     """The outputs, from what of the state the graph needs."""
     return np.array(list(graph.evaluate({name: state[name] for name in graph.input_names}).values()))

@@ -12,11 +12,11 @@ from __future__ import annotations
 import statistics
 import time
 from collections.abc import Callable, Iterator
-from typing import Any
 
 import numpy as np
 
 import cgraph as cg
+from cgraph.extend import Array
 
 from ...equations.formulations import inverse_dynamics
 from ...io.mujoco_twin import mujoco
@@ -28,7 +28,6 @@ from ...multibody.spatial import rotation
 from ..text_table import table
 from .bench_scenes import turned_arm
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
 Torque = Callable[[Array], Array]  # of q, where qd = q / 2 and qdd = -q
 
 LINKS, REPEATS = 30, 30

@@ -20,9 +20,10 @@ from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
 from typing import Any
 
+from cgraph.extend import Array
+
 from ...multibody.mechanism import MechanismWarning
 from ...peers import PEERS, Case, Contender, UnavailableError
-from ...peers.case import Array
 from ...scenes import Scene
 
 Load = Callable[[], Scene]  # makes the model anew in the worker; lambdas do not travel

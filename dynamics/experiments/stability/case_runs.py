@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from typing import Any
+from functools import partial
 
 import numpy as np
+
+from cgraph.extend import Array
 
 from ...equations.state_equation import state_inputs
 from ...integrators import METHODS
@@ -61,11 +63,11 @@ def result(case: StabilityCase, method: str) -> CaseResult:
 
 def trajectory(case: StabilityCase, method: str) -> Trajectory:
     """The run of a case."""
-    options: dict[str, Any] = {"rtol": RTOL, "atol": case.atol}
-    if not (method.startswith(SCIPY) or METHODS[method].adaptive):
-        options = {"dt": EQUAL_STEPS.get(case.name, {}).get(method), "estimate_error": False}  # the error is measured
-    options |= {"max_steps": MOST_STEPS, "progress": False}
-    return simulate(case.model, case.q, case.qd or None, case.t_end, method, **options)
+    start = case.model, case.q, case.qd or None
+    run = partial(simulate, *start, case.t_end, method, max_steps=MOST_STEPS, progress=False)
+    if method.startswith(SCIPY) or METHODS[method].adaptive:
+        return run(rtol=RTOL, atol=case.atol)
+    return run(dt=EQUAL_STEPS.get(case.name, {}).get(method), estimate_error=False)  # the error is measured
 
 
 def errors(case: StabilityCase, run: Trajectory, solution: Reference) -> dict[str, float]:
@@ -93,7 +95,7 @@ def changes(case: StabilityCase, run: Trajectory, wanted: set[str]) -> dict[str,
     first: dict[str, float] = {}
     for start in range(0, len(run.t), BLOCK):
         part = slice(start, start + BLOCK)
-        values: dict[str, Any] = dict(zip(inputs.states, states[part].T, strict=True)) | inputs.parameters
+        values: dict[str, float | Array] = dict(zip(inputs.states, states[part].T, strict=True)) | inputs.parameters
         values[TIME] = run.t[part]
         rows = graph.evaluate({name: values[name] for name in graph.input_names})
         for name in wanted:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
+
+from cgraph.extend import Array
 
 from ...multibody.planar_arm import planar_arm
 from ...scenes import Scene
@@ -14,8 +16,6 @@ from ...simulation.simulate import simulate
 from .case_result import CaseResult, Measurement
 from .cases.orbits import kepler
 from .known_limits import reason
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 STEPS, QUICK = 10**6, 10**5
 BLOCKS = 16  # whose means are taken as independent; their residuals show how far they are that

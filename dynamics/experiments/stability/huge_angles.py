@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any
 
 import numpy as np
 
 import cgraph as cg
+from cgraph.extend import Array
 
 from ...multiprecision.flint_numbers import working
 from ...multiprecision.planar_arm_equations import Pair
 from .case_result import CaseResult, Measurement
 from .known_limits import reason
 from .single_evaluations import SEED, available
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 SECTION, CASE = "Sine and cosine", "sine and cosine"
 BOUND = 2.0  # ulp, what cgraph promises of its polynomials; a correctly rounded value is within half of one

@@ -16,12 +16,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 import cgraph as cg
 from cgraph import Compiled, Graph, Node
+from cgraph.extend import Array
 
 from ...equations.equations_of_motion import forward_dynamics
 from ...equations.formulations import inverse_dynamics
@@ -32,8 +33,6 @@ from ...systems.system import System
 from ..planar_by_centers import by_centers
 from .case_result import CaseResult, Measurement
 from .known_limits import reason
-
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
 SECTION = "Single evaluations"
 ULP = 2.0**-52

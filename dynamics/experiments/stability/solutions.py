@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterable
-from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ...multiprecision import Reference
 from ...multiprecision.solution import from_text
 from . import cases
 from .cases import StabilityCase
+
+if TYPE_CHECKING:
+    from cgraph.extend import Json
 
 FILE = Path(__file__).with_name("solutions.json")
 
@@ -39,10 +41,9 @@ def renew(names: Iterable[str] | None = None, say: Callable[[str], None] = lambd
     known = [name for name, case in cases.table().items() if name in entries and (case.exact or case.method)]
     ordered = {name: entries[name] for name in known}
     FILE.write_text(json.dumps(ordered, indent=1) + "\n", encoding="utf-8")
-    _kept.cache_clear()
 
 
-def entry(case: StabilityCase, result: Reference) -> dict[str, Any]:
+def entry(case: StabilityCase, result: Reference) -> dict[str, Json]:
     """What the file says of a case."""
     return {
         "start": _hex(case.start),
@@ -57,7 +58,5 @@ def _hex(values: Iterable[float]) -> list[str]:
     return [float(each).hex() for each in values]
 
 
-@cache
 def _kept() -> dict[str, Any]:
-    entries: dict[str, Any] = json.loads(FILE.read_text(encoding="utf-8")) if FILE.exists() else {}
-    return entries
+    return dict(json.loads(FILE.read_text(encoding="utf-8"))) if FILE.exists() else {}

@@ -6,9 +6,8 @@ import json
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -22,6 +21,9 @@ from ..setting import Setting
 from ..work_precision.trajectory_runs import problem_of
 from .random_lagrangians import LAGRANGIANS
 from .random_starts import EACH, FAMILIES, random_motion
+
+if TYPE_CHECKING:
+    from cgraph.extend import Json
 
 FILE = Path(__file__).with_name("answers.json")
 COUNT = LAGRANGIANS + EACH * len(FAMILIES)
@@ -99,7 +101,7 @@ def renew(numbers: Iterable[int], say: Callable[[str], None] = lambda line: None
     for number in numbers:
         setting = random_motion(number)
         result = compute(setting)
-        entry: dict[str, Any] = {"start": _hex(setting.start), "t": setting.t_end.hex()}
+        entry: dict[str, Json] = {"start": _hex(setting.start), "t": setting.t_end.hex()}
         entry |= {"size": list(result.size), "growth": result.growth, "how": result.how}
         if result.end is not None:
             entry |= {"x": list(result.end.decimal[0]), "error": result.end.error}
@@ -109,21 +111,18 @@ def renew(numbers: Iterable[int], say: Callable[[str], None] = lambda line: None
 
 
 @contextmanager
-def _changed() -> Iterator[dict[str, Any]]:
+def _changed() -> Iterator[dict[str, Json]]:
     entries = json.loads(FILE.read_text(encoding="utf-8")) if FILE.exists() else {}
     yield entries
     ordered = {str(number): entries[str(number)] for number in sorted(map(int, entries))}
     FILE.write_text(json.dumps(ordered, indent=0) + "\n", encoding="utf-8")
-    _kept.cache_clear()
 
 
 def _hex(values: Iterable[float]) -> list[str]:
     return [float(value).hex() for value in values]
 
 
-@cache
 def _kept() -> dict[str, Any]:
     if not FILE.exists():
         return {}
-    entries: dict[str, Any] = json.loads(FILE.read_text(encoding="utf-8"))
-    return entries
+    return dict(json.loads(FILE.read_text(encoding="utf-8")))

@@ -7,13 +7,13 @@ import warnings
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from cgraph.extend import NoSeriesError
+
 from ...integrators import METHODS
-from ...integrators.jets import NoSeriesError
-from ...simulation.run_options import RunOptions
+from ...simulation.run_options import METHOD, RunOptions
 from ...simulation.simulate import simulate
 from ...simulation.trajectory import Trajectory
 from ..setting import Setting
@@ -51,10 +51,9 @@ def judge(number: int, method: str | None = None) -> Verdict:
     setting, truth = random_motion(number), answer(number)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        arguments: dict[str, Any] = {} if method is None else {"method": method}
         start = setting.q, setting.qd or None
         try:
-            run = simulate(setting.model, *start, setting.t_end, progress=False, **arguments)
+            run = simulate(setting.model, *start, setting.t_end, method or METHOD, progress=False)
         except NoSeriesError as error:
             return Verdict(setting.name, method or DEFAULT, SAID, math.nan, str(error), 0, 0.0)
     words = "; ".join([str(each.message) for each in caught])

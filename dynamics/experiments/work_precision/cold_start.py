@@ -51,14 +51,14 @@ class ColdStart:
 class _Start:
     about: str
     packages: tuple[str, ...]
-    run: Callable[[Setting], Any]
+    run: Callable[[Setting], object]
     primed: bool = False  # the first start is there to fill a cache, and does not count
 
 
 def _ours(setting: Setting, method: str | None = None) -> None:
     method = method or ("radau" if setting.stiff else "dop853")
-    tolerances: dict[str, Any] = {"rtol": RTOL, "atol": RTOL}
-    run = simulate(setting.model, setting.q, setting.qd or None, setting.t_end, method, progress=False, **tolerances)
+    start = setting.q, setting.qd or None
+    run = simulate(setting.model, *start, setting.t_end, method, rtol=RTOL, atol=RTOL, progress=False)
     if not run.stats.success:
         raise RuntimeError(run.stats.message)
 

@@ -207,7 +207,7 @@ def numpy_rate() -> Callable[[float, Array], Array]:
 class SolveIvp(Solver):
     """SciPy's solve_ivp with DOP853 on a rate in Python. Raises ImportError without SciPy."""
 
-    def __init__(self, rate: Callable[[float, Array], Any], setting: Setting, smallest: float, _: Problem) -> None:
+    def __init__(self, rate: Callable[[float, Array], object], setting: Setting, smallest: float, _: Problem) -> None:
         super().__init__("solve_ivp", "SciPy's solve_ivp, DOP853", setting, smallest)
         self.rate, self.solve = rate, solve_ivp()
 
@@ -233,7 +233,7 @@ def loops(folder: str) -> Iterator[str]:
     x = np.array([0.3, -0.5, 0.7, 1.0, -2.0, 0.5])
     apart = np.abs(plain(0.0, x) - compiled([*x, 0.0])).max()
     yield f"rates in NumPy against the graph: largest difference {apart:.1e}"
-    rates: dict[str, Callable[[float, Array], Any]] = {
+    rates: dict[str, Callable[[float, Array], object]] = {
         "solve_ivp, rate in NumPy": plain,
         "solve_ivp, our generated Python": lambda t, x: python.values([*x.tolist(), t]),
         "solve_ivp, our compiled rate": lambda t, x: compiled([*x, t]),
@@ -258,8 +258,8 @@ def energy(folder: str, steps: int = STEPS, starts: int = STARTS) -> Iterator[st
     q = np.array([0.4, 0.2, 0.1]) * np.random.default_rng(1).uniform(0.5, 1.5, (starts, 3))
     rows = []
     for method in (*SYMPLECTIC, "rk4"):
-        equal: dict[str, Any] = {"dt": STEP, "estimate_error": False, "progress": False}
-        runs = [simulate(arm, start, [0.0] * 3, STEP * steps, method, **equal) for start in q]
+        equal = partial(simulate, arm, method=method, dt=STEP, estimate_error=False, progress=False)
+        runs = [equal(q=start, qd=[0.0] * 3, t_end=STEP * steps) for start in q]
         drifts = [drift(run.energy, float(run.energy[0] - hanging)) for run in runs]
         slopes = np.array([each.drift for each in drifts])
         mean, deviation = slopes.mean(), slopes.std(ddof=1) / np.sqrt(starts)

@@ -8,7 +8,6 @@ import statistics
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -92,7 +91,7 @@ class Entry:
         difference = None
         if theirs is not None:
             names, x = problem.rate.input_names, metrics.exact.x
-            inputs: dict[str, Any] = dict.fromkeys(names, 0.0) | dict(zip(names, x.T, strict=False))
+            inputs: dict[str, float | Array] = dict.fromkeys(names, 0.0) | dict(zip(names, x.T, strict=False))
             ours = np.array(np.broadcast_arrays(*problem.rate.evaluate(inputs).values(), x[:, 0])[:-1]).T
             largest = np.max(np.abs(ours), axis=0)
             difference = float(np.max(np.abs(theirs - ours) / np.where(largest > 0.0, largest, 1.0)))

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
-from types import SimpleNamespace
-from typing import Any
+from types import ModuleType, SimpleNamespace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -23,6 +23,10 @@ from ...simulation.run_options import SCIPY, SCIPY_SOLVERS
 from ...systems.arguments import TIME
 from ..setting import INTERVALS, Setting
 from .trajectory_runs import EQUAL, Outcome, Scipy, Solver
+
+if TYPE_CHECKING:
+    from casadi import SX, Function
+    from heyoka import expression, taylor_adaptive
 
 EPSILON = 2.0**-52
 COMPACT = 300  # nodes of the rate; beyond, heyoka's code written out takes minutes to compile
@@ -70,7 +74,7 @@ class Mujoco(Solver):
         ours: Array = np.vstack([self.start, states[0, every - 1 :: every][:, self.taken]])
         return ours
 
-    def _states(self, steps: int) -> tuple[Array, Callable[[], Any]]:
+    def _states(self, steps: int) -> tuple[Array, Callable[[], object]]:
         """Where the states of a run go, (1, steps, ..), and the run."""
         states = np.empty((1, steps, self.begin.shape[1]))
         native = rollout(self.model, self.begin, states)
@@ -102,9 +106,9 @@ class Heyoka(Solver):
         self.heyoka = heyoka()
         hy = self.heyoka
         self.system = heyoka_derivatives(hy, setting) if derivatives else heyoka_equations(hy, problem)
-        self._made: dict[float, Any] = {}
+        self._made: dict[float, taylor_adaptive] = {}
 
-    def integrator(self, knob: float) -> Any:
+    def integrator(self, knob: float) -> taylor_adaptive:
         """Compiled for a tolerance, at the start."""
         if knob not in self._made:
             options = {} if knob == EPSILON else {"tol": knob}
@@ -161,7 +165,7 @@ class Cvodes(Solver):
         self.options = CVODES[kind]
         self.equations = casadi_equations(self.casadi, problem)
 
-    def _function(self, knob: float, times: Sequence[float]) -> Any:
+    def _function(self, knob: float, times: Sequence[float]) -> Function:
         options = {"reltol": knob, "abstol": self.absolute(knob), "max_num_steps": MOST, "show_eval_warnings": False}
         return self.casadi.integrator("run", "cvodes", self.equations, 0.0, list(times), options | self.options)
 
@@ -189,7 +193,7 @@ class Cvodes(Solver):
         return np.array([np.array(rate(row, 0.0)).ravel() for row in x])
 
 
-def heyoka_equations(hy: Any, problem: Problem) -> list[tuple[Any, Any]]:
+def heyoka_equations(hy: ModuleType, problem: Problem) -> list[tuple[expression, expression]]:
     """Our rate as heyoka's pairs of variable and expression. Raises UnavailableError for an operation it has not."""
     graph = problem.rate
     env = {node: hy.time if node.name == TIME else hy.make_vars(f"x_{node.name}") for node in graph.inputs}
@@ -199,7 +203,7 @@ def heyoka_equations(hy: Any, problem: Problem) -> list[tuple[Any, Any]]:
     return list(zip(states, [hy.expression(values[rate]) for rate in graph.outputs.values()], strict=True))
 
 
-def heyoka_derivatives(hy: Any, setting: Setting) -> list[tuple[Any, Any]]:
+def heyoka_derivatives(hy: ModuleType, setting: Setting) -> list[tuple[expression, expression]]:
     """heyoka's own equations, from the Lagrangian. Raises UnavailableError for what it cannot derive."""
     if not setting.mechanical:
         raise UnavailableError("derives equations of a Lagrangian alone")
@@ -210,7 +214,7 @@ def heyoka_derivatives(hy: Any, setting: Setting) -> list[tuple[Any, Any]]:
     return list(zip(state, [*state[case.n :], *rates], strict=True))
 
 
-def casadi_equations(ca: Any, problem: Problem) -> dict[str, Any]:
+def casadi_equations(ca: ModuleType, problem: Problem) -> dict[str, SX]:
     """Our rate as CasADi's x, t and ode. Raises UnavailableError for an operation it has not."""
     graph, x, t = problem.rate, ca.SX.sym("x", problem.size), ca.SX.sym("t")
     env = dict(zip(graph.inputs, [*ca.vertsplit(x), t], strict=True))

@@ -7,9 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from cgraph import Node
+from cgraph.extend import Array
 
 from .. import spatial
-from ..spatial import STILL, Array, Triple
+from ..spatial import STILL, Triple
 from . import quaternion
 from .joint_type import NodeMatrix, SpatialJoint
 

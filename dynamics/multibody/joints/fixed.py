@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..spatial import Array
+from cgraph.extend import Array
+
 from .joint_type import AxialJoint
 
 

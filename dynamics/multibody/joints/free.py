@@ -7,9 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from cgraph import Node
+from cgraph.extend import Array
 
 from .. import spatial
-from ..spatial import STILL, ZERO, Array, Triple
+from ..spatial import STILL, ZERO, Triple
 from . import quaternion
 from .joint_type import NodeMatrix, SpatialJoint
 

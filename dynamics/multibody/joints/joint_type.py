@@ -9,9 +9,9 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import tangents, topological
+from cgraph.extend import Array, tangents, topological
 
-from ..spatial import STILL, ZERO, Array, Triple, cross, plus
+from ..spatial import STILL, ZERO, Triple, cross, plus
 
 NodeMatrix = Sequence[Sequence[Node]]  # (3, 3), rows
 ONE = cg.constant(1.0)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from cgraph import Node
+from cgraph.extend import Array
 
-from ..spatial import Array
 from .joint_type import AxialJoint
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from cgraph import Node
+from cgraph.extend import Array
 
 from .. import spatial
-from ..spatial import Array
 from .joint_type import AxialJoint
 
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from cgraph import Node
+from cgraph.extend import Array
 
 from .. import spatial
-from ..spatial import Array
 from .joint_type import AxialJoint, JointType
 
 

@@ -33,7 +33,6 @@ from ..run_options import METHOD, RunOptions, time_span
 from ..sampled_controller import SampledController
 from ..step_program import StepProgram, pickled_steps, step_program
 from ..trajectory import SimulationWarning
-from .branch_free import branch_free
 from .chunk import INTERRUPTED, Chunk, Part, empty
 from .ensemble import Ensemble, EnsembleStats
 from .step_grid import StepGrid, step_grids
@@ -75,8 +74,7 @@ def simulate_many(
 ) -> Ensemble:
     """The motions of a system from N starts at t0 to t_end, by one program that is compiled once.
 
-    Where the steps do not branch on the state (euler, rk4; verlet and symplectic_euler of a constant mass matrix and
-    forces that do not depend on qd), trajectories run side by side, a vector of them at a time; else one by one. One
+    In equal steps trajectories run side by side, a vector of them at a time; in chosen ones one by one. One
     whose state is not finite is NaN from there on, `stats.message` and a `SimulationWarning` name the time and the
     coordinate, and the others go on. Ctrl-C keeps the chunks that are done, without a warning.
 
@@ -253,7 +251,7 @@ def _check_room(x: Array, rows: int) -> None:
 
 def _grids(program: StepProgram, options: RunOptions) -> list[StepGrid]:
     """The equal steps of trajectories side by side; empty where they have to go one after another."""
-    if program.adaptive or branch_free(program) is None:
+    if program.adaptive:
         return []
     grids = step_grids(options)
     return grids if sum(grid.steps * grid.rows for grid in grids) <= options.max_steps else []

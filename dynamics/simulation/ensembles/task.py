@@ -6,11 +6,11 @@ import pickle
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import partial
 
 import numpy as np
 
-from cgraph.extend import Array, runner
+from cgraph.extend import Array, memo, runner
 
 from ..equal_steps import equal_steps
 from ..error_estimate import ErrorEstimate, Estimator
@@ -22,8 +22,8 @@ from ..run_options import RunOptions
 from ..step_program import CompiledSteps, StepProgram, compile_steps
 from ..stepping import Integration, StoppedError
 from ..watched import WatchedIntegration
-from .branch_free import branch_free
 from .chunk import Chunk, Part, empty
+from .lane_steps import lane_steps
 from .step_grid import StepGrid
 from .vectorized import VectorCode, VectorizedIntegration, beside
 
@@ -116,25 +116,24 @@ class Task:
 _lock = threading.Lock()  # threads that come at the same time wait for one to make the code
 
 
-@lru_cache(KEPT)
+@memo(KEPT)
 def _vector_code(pickled: bytes, backend: str) -> VectorCode:
     program: StepProgram = pickle.loads(pickled)  # noqa: S301  # it came with the task itself
-    programs = branch_free(program)
-    assert programs is not None
+    programs = lane_steps(program)
     start = None if programs.start is None else runner(programs.start, backend)
     one_pass = runner(programs.one_pass, backend)
     for code in (start, one_pass):
         if code is not None:
             code.run_many(np.zeros((code.size, 0)), 0)  # the code for vectors is compiled at its first use
-    return VectorCode(program, start, one_pass)
+    return VectorCode(program, start, one_pass, programs.stops)
 
 
-@lru_cache(KEPT)
+@memo(KEPT)
 def _compiled(pickled: bytes, backend: str) -> CompiledSteps:
     return compile_steps(pickle.loads(pickled), backend)  # noqa: S301  # it came with the task itself
 
 
-@lru_cache(KEPT)
+@memo(KEPT)
 def _event_program(pickled: bytes) -> EventProgram:
     program: EventProgram = pickle.loads(pickled)  # noqa: S301  # it came with the task itself
     return program

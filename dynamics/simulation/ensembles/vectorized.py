@@ -1,4 +1,4 @@
-"""Vectorized integration: steps of many trajectories at once, by a program in which all take the same course."""
+"""Vectorized integration: steps of many trajectories at once, each in a lane."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..courses import Course
 from ..error_estimate import Estimator
 from ..state_difference import States
 from ..step_program import StepProgram
-from ..stepping import begin_equal, nonfinite
+from ..stepping import begin_equal, failed_step, nonfinite
 from .chunk import INTERRUPTED, Chunk, Part
 from .step_grid import StepGrid
 
@@ -29,6 +29,7 @@ class VectorCode(NamedTuple):
     program: StepProgram
     start: Runner | None  # over the same memory
     one_pass: Runner
+    stops: bool  # see `LaneSteps`
 
 
 def _start_memories(code: VectorCode, x: Array, p: Array) -> Array:
@@ -95,7 +96,7 @@ class VectorizedIntegration:
         """Make steps; those after every `every`th are rows if they are due."""
         if not self._live.any():
             return
-        before, m = self._memories.copy(), self.program.size
+        before, at, m = self._memories.copy(), self._at, self.program.size
         if self.estimator is None:
             record = self.runner.run_many(self._memories, steps, every).rows
         else:
@@ -110,7 +111,10 @@ class VectorizedIntegration:
         failed = self._live & (self.runner.read(self._memories, "nonfinite")[0] != 0.0)
         if failed.any():
             for k in np.flatnonzero(failed).tolist():
-                self._locate_failure(k, before[:, [k]], steps)
+                if self.code.stops:
+                    self._failed_step(k, before[:, [k]], at, every if due else 0)
+                else:
+                    self._locate_failure(k, before[:, [k]], steps)
             self._live &= ~failed
             if self._live.any():
                 self._memories[:, ~self._live] = self._memories[:, np.flatnonzero(self._live)[:1]]
@@ -130,6 +134,18 @@ class VectorizedIntegration:
         self.part.steps[live], self.part.evaluations[live] = self._done, evaluations[live]
         for k in range(len(live)) if self._interrupted else np.flatnonzero(~live):
             self.part.rows[k, self._good[k] :] = np.nan
+
+    def _failed_step(self, k: int, memory: Array, at: int, every: int) -> None:
+        """Of trajectory k, which stopped in the block that began with this memory, (size, 1), and row `at`."""
+        runner, after = self.runner, self._memories[:, [k]]
+        t, count, evaluations = (runner.read(after, name)[0, 0] for name in ("t", "count", "evaluations"))
+        steps = int(count - runner.read(memory, "count")[0, 0]) - 1
+        self._good[k] = at + steps // every if every else at
+        self.part.steps[k], self.part.evaluations[k] = self._done + steps, evaluations
+        runner.run_many(memory, steps, max(1, steps))
+        singular = runner.read(after, "singular")[0, 0] if "singular" in runner.program.registers else 0.0
+        before, x = (runner.read(each, "x")[:, 0] for each in (memory, after))
+        self.part.status[k] = failed_step(self.program.components, t, before, x, int(singular))
 
     def _locate_failure(self, k: int, memory: Array, steps: int) -> None:
         """Where trajectory k stopped being finite in the block that began with this memory, (size, 1)."""

@@ -20,6 +20,7 @@ from .motion_run import MotionRun
 ROUNDING = 1e-10  # of the largest component of its kind: where one is that small, rounding is no error of it
 LAWLESS = 0.1  # of the size of a component: a difference above it follows no power of the step
 LOOKS = 64  # at least, if there are so many steps, at which two motions are compared
+LOOSE = 1e-3  # a relative tolerance above it tells of a motion's growth no more than this
 ASIDE = 1.0 + 2.0**-52  # by which the other motion starts aside: what a rounding grows to is part of the error
 
 
@@ -77,7 +78,7 @@ def _grown(legs: Legs, start: Array, end: Array) -> list[str]:
     """
     motion, options = legs.motion, legs.motion.options
     count = max(motion.many, 1)
-    left = options.relative if motion.method.adaptive else ASIDE - 1.0
+    left = min(options.relative, LOOSE) if motion.method.adaptive else ASIDE - 1.0
     at_start = np.maximum(np.abs(motion.x), np.abs(legs.end)).reshape(-1, count)
     at_end = np.max([np.abs(run.states()[1]).max(axis=0).reshape(-1, count) for run in legs.runs], axis=0)
     with np.errstate(all="ignore"):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Array, Builder
+from cgraph.extend import Array, Builder, kept_by_first
 
 from ...integrators import quantity
 from ...systems.model import Model
@@ -25,7 +24,6 @@ from .doubts import doubts
 from .legs import Bars, Legs, legs_of
 from .loss_function import loss_graph, with_slopes
 from .motion import START, TORQUE, VELOCITY, MotionOf, motion_of
-from .motion_programs import KEPT
 from .point_functions import at
 
 Loss = Callable[..., Node]
@@ -229,7 +227,7 @@ def _displaced(motion: MotionOf, bar: Array) -> Array:
     return at(_by_displacements(system, motion.backend), np.concatenate([motion.x[:nq], bar[:nq]]))
 
 
-@lru_cache(KEPT)
+@kept_by_first
 def _by_displacements(system: System, backend: str) -> Any:
     """(q, q_bar) -> G^T q_bar as a function."""
     bars = cg.variables([f"bar{k}" for k in range(system.nq)])

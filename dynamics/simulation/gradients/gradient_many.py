@@ -83,9 +83,9 @@ def gradient_many(
 ) -> MotionGradients:
     """Losses of N motions and their gradients, each by its own start, forces and parameters: `gradient`, N times.
 
-    Motions go side by side, a vector of them at a time, where the steps do not branch on the state: in equal steps of
-    explicit methods, and "verlet" of a constant mass matrix; else one by one. One that does not stay finite, or does
-    not reach its end, is NaN, and a `SimulationWarning` says how many are, and of the first when and why.
+    Motions in equal steps go side by side, a vector of them at a time; those that choose their steps go one by one. One
+    that does not stay finite, whose equations are not solved, or which does not reach its end, is NaN, and a
+    `SimulationWarning` says how many are, and of the first when and why.
 
     Parameters
     ----------
@@ -122,23 +122,23 @@ def gradient_many(
     """
     options = {"dt": dt, "max_step": max_step, "rtol": rtol, "atol": atol, "first_step": first_step, "backend": backend}
     options["estimate_error"] = estimate_error
-    span = (t_end, t0, t_span)
-    motions = motion_of(model, q, qd, span, method, tau, parameters, wrt, options, form, many=True)
+    motions = motion_of(model, q, qd, (t_end, t0, t_span), method, tau, parameters, wrt, options, form, many=True)
     count, problem, run = motions.many, motions.problem, motions.options
-    step = motions.method.step
-    assert step is not None
-    one_by_one = run.adaptive or step(problem).branches
-    parts: list[int | slice] = [*range(count)] if one_by_one else [slice(k, k + WIDE) for k in range(0, count, WIDE)]
+    parts: list[int | slice] = [*range(count)]
+    if not run.adaptive:
+        parts = [slice(k, min(k + WIDE, count)) for k in range(0, count, WIDE)]
     value, end = np.full(count, np.nan), np.full((count, problem.size), np.nan)
     by_name = {name: np.full((count, *shape), np.nan) for name, shape in _shapes(motions).items()}
-    early: dict[int, str] = {}
-    said: dict[int, str] = {}
+    early, said = dict[int, str](), dict[int, str]()
     for part in parts:
         first = part if isinstance(part, int) else part.start
         try:
             losses, slopes, legs, ends = differentiated(_some(motions, part), loss, running)
         except MotionError as error:
-            early[first] = str(error)
+            if isinstance(part, int):
+                early[first] = str(error)
+            else:  # one of them has no derivative
+                parts += range(first, part.stop)
             continue
         arrived, texts = np.atleast_1d(np.isfinite(legs.end).all(axis=0)), doubts(legs, losses, slopes, ends)
         rows = first + np.flatnonzero(arrived)

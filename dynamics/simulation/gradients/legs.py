@@ -9,19 +9,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import Array
+from cgraph.extend import Array, kept_by_first
 
 from ..event import Event
 from ..event_program import WatchedEvent, event_program
 from .motion import TORQUE, Leg, MotionError, MotionOf
-from .motion_programs import KEPT, MotionPrograms, Request, motion_programs
+from .motion_programs import MotionPrograms, Request, motion_programs
 from .motion_run import MotionRun
 from .motion_steps import LOSS
 
@@ -179,7 +178,7 @@ def leg_slopes(leg: Leg) -> tuple[Array, Array]:
     return np.where(first, 1.0, 0.0), np.where(first, -1.0, 0.0)
 
 
-@lru_cache(KEPT)
+@kept_by_first
 def _pullback(graph: Graph) -> Graph:
     return cg.vjp(graph)
 

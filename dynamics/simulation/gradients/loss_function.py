@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from functools import lru_cache
 from typing import Any
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import topological
+from cgraph.extend import kept_by_first, memo, topological
 
 from ...integrators import Problem
-from .point_functions import KEPT
+
+KEPT = 64  # losses whose graphs stay for another run
 
 
 @dataclass(frozen=True)
@@ -36,12 +36,12 @@ def loss_graph(problem: Problem, node: Node) -> Graph:
     return _bound(_Quantity(problem, tuple(key), node))
 
 
-@lru_cache(KEPT)
+@memo(KEPT)
 def _bound(quantity: _Quantity) -> Graph:
     return quantity.problem.observed({"loss": quantity.node})
 
 
-@lru_cache(KEPT)
+@kept_by_first
 def with_slopes(graph: Graph, backend: str) -> Any:
     """The loss, and its slopes by all inputs, as a function."""
     slopes = cg.gradient(graph)

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Node
-from cgraph.extend import Array, real_array, require_sequence
+from cgraph.extend import Array, memo, real_array, require_sequence
 
 from ...equations.initial_value import initial_values
 from ...equations.state_equation import state_inputs
@@ -23,9 +22,10 @@ from ..event import Event
 from ..run_options import METHOD, RunOptions, time_span
 from ..sampled_controller import SampledController
 from .accepted_steps import AcceptedSteps, accepted_steps
-from .motion_equations import KEPT, PARAMETERS, MotionEquations, motion_equations
+from .motion_equations import PARAMETERS, MotionEquations, motion_equations
 
 START, VELOCITY, TORQUE = "q", "qd", "tau"
+KEPT = 16  # options and equal steps that stay for another run
 EQUAL = "rk4"  # by which equal steps are, unless another method is asked for
 _PLAIN = (float, int, str, bool, type(None))
 
@@ -216,16 +216,16 @@ def options_of(
     """
     if method is None:
         method = EQUAL if rows or options["dt"] is not None else METHOD
-    given = (t_end, method, t0, *options.items())
     plain = all([type(each) in _PLAIN for each in (t_end, method, t0, *options.values())])
-    return _checked_options(*given) if plain else _checked_options.__wrapped__(*given)
+    checked = _checked_options if plain else _checked_options.__wrapped__
+    return checked(t_end, method, t0, *options.items())
 
 
-@lru_cache(KEPT)
+@memo(KEPT)
 def _checked_options(t_end: float, method: str, t0: float, *options: tuple[str, Any]) -> RunOptions:
     run = RunOptions(t_end, method, t0=t0, **dict(options))
-    if run.scipy_solver is not None or METHODS[method].step is None:
-        names = ", ".join([name for name, each in METHODS.items() if each.step is not None])
+    if run.scipy_solver is not None or not METHODS[method].derived:
+        names = ", ".join([name for name, each in METHODS.items() if each.derived])
         raise ValueError(f"motions by method {method!r} have no derivatives here; those by {names} have")
     return run
 
@@ -270,7 +270,7 @@ def equal_leg(run: RunOptions, rows: int | None) -> Leg:
     return _equal_leg(run.t0, run.t_end, count)
 
 
-@lru_cache(KEPT)
+@memo(KEPT)
 def _equal_leg(t0: float, t_end: float, count: int) -> Leg:
     t = np.append(t0 + np.arange(count) * ((t_end - t0) / count), t_end)
     t.flags.writeable = False  # of all who have it

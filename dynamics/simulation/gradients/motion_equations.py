@@ -8,13 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 
 import numpy as np
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Array, Builder, folded, topological
+from cgraph.extend import Array, Builder, folded, kept_by_first, topological
 
 from ...integrators import Problem
 from ...systems.arguments import new_variables
@@ -23,7 +22,6 @@ from .rate_pullback import RatePullback, rate_pullback, rebuilt
 
 ARITHMETIC = ("add", "sub", "mul", "neg")
 PARAMETERS = ("tau", "p", "c")  # registers: what the parameters of the problem are, end to end
-KEPT = 16  # problems whose equations stay for another run
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +72,7 @@ class MotionEquations:
         return np.concatenate([unit, compiled(self.numbers, backend).jacobian(p)])
 
 
-@lru_cache(KEPT)
+@kept_by_first
 def motion_equations(problem: Problem, forces: int) -> MotionEquations:
     """The equations of a problem whose first `forces` parameters are applied forces."""
     names, pullback = problem.parameters[forces:], rate_pullback(problem)

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import Linearization, Linearized, Map, Runner, runner
+from cgraph.extend import Linearization, Linearized, Map, Runner, memo, runner
 
 from ...integrators import Method
 from .motion_equations import MotionEquations
@@ -56,7 +55,7 @@ class Request:
     running: Graph | None = None
 
 
-@lru_cache(KEPT)
+@memo(KEPT)
 def motion_programs(request: Request) -> MotionPrograms:
     """The programs; of the last few requests, those made before."""
     steps = motion_steps(
@@ -83,4 +82,4 @@ def motion_programs(request: Request) -> MotionPrograms:
 
 def _along(passes: Linearization, linear: Linearized, results: list[str], backend: str) -> Along:
     forward = passes.forward([*linear.program.feed, passes.handed["x"]], results)
-    return Along(passes, runner(forward, backend).prepared(), linear, runner(linear.program, backend).prepared())
+    return Along(passes, runner(forward, backend), linear, runner(linear.program, backend))

@@ -6,6 +6,7 @@ import itertools
 import math
 from collections.abc import Mapping
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -28,7 +29,7 @@ class MotionRun:
     x: (m,), the end.  loss: the running loss.
     arrives: whether the last step is still to be fitted, by `tried`, and then made, by `finish`.
     Raises MotionError for a motion that does not stay finite, or whose equations are not solved; of motions side by
-    side, one that does not stay finite has an end that is not.
+    side, such a one has an end that is not finite.
     """
 
     def __init__(self, motion: MotionOf, programs: MotionPrograms, *, arrives: bool = False, every: int = 0) -> None:
@@ -79,17 +80,17 @@ class MotionRun:
         forward, handed, memory = self.step.forward, self.step.passes.handed, self._memory
         self.x = forward.read(memory, handed["x"]).copy()
         self.loss = forward.read(memory, handed[LOSS])[0].copy() if LOSS in handed else np.zeros(self.x.shape[1:])
-        if not self.motion.many and self._bad(memory):
+        bad = self._bad(memory)
+        if not self.motion.many and bad.any():
             raise MotionError(f"the motion {self.stopped()}")
+        self.x[..., bad] = np.nan
         self._constants = {name: forward.read(memory, name).copy() for name in self.step.passes.constants}
 
-    def _bad(self, memory: Array, k: int | None = None) -> bool:
-        """Whether the steps so far, of motion k of many, left the numbers, or have equations that were not solved."""
-        handed, lane = self.step.passes.handed, slice(None) if k is None else k
-        x = self.step.forward.read(memory, handed["x"])
-        if not np.isfinite(x[..., lane] if self.motion.many else x).all():
-            return True
-        return bool(self.failed) and k is None and self.step.forward.read(memory, handed[self.failed])[0] != 0.0
+    def _bad(self, memory: Array) -> Any:
+        """Whether the steps so far left the numbers, or have equations that were not solved; () or (N,)."""
+        forward, handed = self.step.forward, self.step.passes.handed
+        bad = ~np.isfinite(forward.read(memory, handed["x"])).all(axis=0)
+        return bad | (forward.read(memory, handed[self.failed])[0] != 0.0) if self.failed else bad
 
     def stopped(self, k: int | None = None) -> str:
         """Where a motion that went wrong, the k-th of many, did so: the first step after which it is, in words."""
@@ -98,7 +99,7 @@ class MotionRun:
         while first < len(motion.h):
             before, last = memory.copy(), min(first + size, len(motion.h))
             run_passes(forward, memory, last - first, last - first, _fed(motion, first, last))
-            if not self._bad(memory, k):
+            if not self._bad(memory)[() if k is None else k]:
                 first = last
             elif last - first == 1:
                 break
@@ -157,7 +158,7 @@ class MotionRun:
         back, names = self.step.back, self.step.linear.vectors
         if self.start is not None:
             memory = self._linear_memory(self.start, self._start_constants, directions)
-            _run_all(self.start.back, memory, self._start_tape)
+            run_passes(self.start.back, memory, 1, 1, self._start_tape)
             directions = {**directions, **self._vectors(self.start, memory)}
         memory = self._linear_memory(self.step, self._constants, directions)
         m, width = len(self.x), back.program.feed_width
@@ -168,7 +169,8 @@ class MotionRun:
             for begin, end in itertools.pairwise([first, *[k for k in range(first + 1, last) if k in changes], last]):
                 if len(lengths):
                     back.write(memory, names["h"], lengths[None, begin])
-                tangents.append(_run_all(back, memory, tape[begin - first : end - first, :width]))
+                rows = tape[begin - first : end - first, :width]
+                tangents.append(run_passes(back, memory, end - begin, 1, rows).rows)
         self._vectors(self.step, memory)
         return np.concatenate(states), np.concatenate(tangents)
 
@@ -181,21 +183,10 @@ class MotionRun:
         return _memory(along.back, {**constants, **placed}, max(many, default=0))
 
     def _vectors(self, along: Along, memory: Array) -> dict[str, Array]:
-        if np.any(along.back.read(memory, along.linear.unsolved)):
+        unsolved = along.back.read(memory, along.linear.unsolved)[0] != 0.0
+        if np.any(unsolved & np.isfinite(self.x).all(axis=0) if self.motion.many else unsolved):
             raise MotionError("the equations of a step's derivative were not solved: the step is too long")
         return {name: along.back.read(memory, register).copy() for name, register in along.linear.vectors.items()}
-
-
-def _run_all(ready: Runner, memories: Array, feed: Array) -> Array:
-    """The rows (passes, width, k) of k memories that are fed the same: side by side, unless the passes branch."""
-    if not ready.program.branches:
-        return run_passes(ready, memories, len(feed), 1, feed).rows
-    rows = np.empty((len(feed), ready.program.width, memories.shape[1]))
-    for k in range(memories.shape[1]):
-        memory = memories[:, k].copy()
-        rows[:, :, k] = ready.run(memory, len(feed), 1, feed).rows
-        memories[:, k] = memory
-    return rows
 
 
 def _memory(ready: Runner, values: Mapping[str, Array], many: int) -> Array:

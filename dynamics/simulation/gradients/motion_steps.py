@@ -12,7 +12,8 @@ from cgraph import Graph
 from cgraph.extend import STATEMENTS, Call, Linearization, Program, Statement
 
 from ...integrators import Method, Problem
-from ...integrators.explicit import registers
+from ...integrators.equal import registers
+from ...integrators.step import with_registers
 from ...systems.arguments import TIME, new_variables
 from .motion_equations import PARAMETERS, MotionEquations
 
@@ -47,16 +48,14 @@ def motion_steps(
     new in every step.  sharing: whether the rate records what its pullback needs of it.
     """
     problem = equations.problem
-    assert method.step is not None
     made = method.step(problem)
-    lengths = {**registers(problem), **made.lengths, **equations.lengths, "arrival": 1}
-    body: list[Statement] = [*made.body, *_arrival(problem)]
+    lengths = with_registers(made, {**registers(problem), **equations.lengths, "arrival": 1, LOSS: 1})
+    body: list[Statement] = [*made.derived, *_arrival(problem)]
     carried = ["x"]
     if running is not None:
         (before,) = new_variables(LOSS, 1, running.input_names)
         total = Graph([*running.inputs, before], {LOSS: running.only_output() + before})
         body.insert(0, Call(total, ("x", "t", "p", LOSS), (LOSS,)))
-        lengths[LOSS] = 1
         carried.append(LOSS)
     pullbacks = {id(problem.rate): equations.pullback, id(equations.sharing_rate): equations.sharing_pullback}
     if sharing and equations.sharing_pullback is not None:

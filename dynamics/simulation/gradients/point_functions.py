@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import Any
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import Array
-
-KEPT = 64  # graphs
+from cgraph.extend import Array, kept_by_first
 
 
-@lru_cache(KEPT)
+@kept_by_first
 def compiled(graph: Graph, backend: str) -> Any:
     """The graph as a function."""
     return cg.compile(graph, backend)
 
 
-@lru_cache(KEPT)
+@kept_by_first
 def pulled_back(graph: Graph, backend: str) -> Any:
     """J^T y_bar as a function of the inputs, then y_bar."""
     return cg.compile(cg.simplify(cg.vjp(graph)), backend)

@@ -23,8 +23,7 @@ from dynamics.experiments.stability import (
     stability_table,
 )
 from dynamics.experiments.stability.case_result import CaseResult, Measurement
-from dynamics.integrators import METHODS, Method
-from dynamics.integrators.step_control import embedded
+from dynamics.integrators import METHODS, Method, runge_kutta
 from dynamics.integrators.tableau import DOPRI5
 from tests.early_end import stops
 
@@ -129,7 +128,7 @@ def test_a_case_with_another_start_is_computed_anew() -> None:
 def broken() -> Method:
     """Dormand and Prince with a weight off by 1e-4, in the step and not in the estimate of its error."""
     wrong = replace(DOPRI5, b=(DOPRI5.b[0] + 1e-4, *DOPRI5.b[1:]))
-    return Method(5, lambda problem, dense: embedded(wrong, problem, dense), adaptive=True, degree=4)
+    return runge_kutta(wrong)
 
 
 @mark.parametrize("name", [SMOOTH, "next to the upright", "exponential growth", "smallest velocity"])

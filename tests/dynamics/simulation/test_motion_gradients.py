@@ -342,7 +342,9 @@ def test_a_stopping_time_is_differentiated() -> None:
     assert result["q"] == approx([1.0 / math.sqrt(4.0 * 9.81)], rel=SHORT_SUM)
 
 
-@mark.parametrize(("method", "backend"), [("rk4", "python"), ("rk4", "llvm"), *slow(("gauss4", "python"))])
+@mark.parametrize(
+    ("method", "backend"), [("rk4", "python"), ("rk4", "llvm"), ("gauss4", "llvm"), *slow(("gauss4", "python"))]
+)
 def test_many_gradients_are_those_one_by_one(method: str, backend: str) -> None:
     if backend == "llvm":
         pytest.importorskip("llvmlite")
@@ -359,6 +361,26 @@ def test_many_gradients_are_those_one_by_one(method: str, backend: str) -> None:
         assert (many.q[row], many.qd[row]) == (approx(one.q, rel=SHORT_SUM), approx(one.qd, rel=SHORT_SUM))
         for name in WRT:
             assert many[name][row] == approx(one[name], rel=LONG_SUM, abs=LONG_SUM)
+
+
+def test_motions_side_by_side_whose_equations_are_not_solved_are_told_as_alone() -> None:
+    """Steps of x' = k sin(40 x) that are too long where k is large: the others have their gradients."""
+    model = dyn.OdeSystem(lambda x, t, p: [p["k"] * cg.sin(40.0 * x[0])], ["x"], parameters={"k": 1.0})
+    given = {"t_end": 0.5, "dt": 0.1, "method": "midpoint", "estimate_error": False, "wrt": ["q", "k"]}
+    end, strengths = (lambda x, t: x[0] ** 2), [0.01, 30.0, 0.02, 0.04]
+    with pytest.warns(
+        dyn.SimulationWarning, match="1 of 4 motions stopped early: motion 1: the motion stopped at t = "
+    ) as words:
+        many = dyn.gradient_many(model, end, [0.3], None, parameters={"k": strengths}, **given)
+    with raises(dyn.MotionError) as error:
+        dyn.gradient(model, end, [0.3], None, parameters={"k": strengths[1]}, **given)
+    assert str(words[0].message) == f"1 of 4 motions: of 1, {error.value}"
+    assert "did not converge" in str(error.value)
+    assert np.isnan([many.value[1], many["q"][1, 0], many["k"][1], many.q[1, 0]]).all()
+    for k in (0, 2, 3):
+        one = dyn.gradient(model, end, [0.3], None, parameters={"k": strengths[k]}, **given)
+        assert (many.value[k], many["q"][k]) == (approx(one.value, rel=SHORT_SUM), approx(one["q"], rel=LONG_SUM))
+        assert many["k"][k] == approx(one["k"], rel=LONG_SUM)
 
 
 def test_many_gradients_with_what_is_the_same_for_all() -> None:

@@ -25,6 +25,7 @@ VERLET_ERROR = 1e-6  # (w dt)^2 w t / 24
 TOLERANCE_ERROR = 1e-6  # of steps chosen with rtol = 1e-8
 ROUNDING = 1e-12  # of a thousand steps of an arm that swings
 CHAOS = 1e-9  # what chaos makes of rounding in 500 steps of three links
+TURNS = 0.05  # relative, of iterations down to rounding: sines in vectors are rounded otherwise
 SPACING = 1e-12  # relative, of differences of rounded times
 INSTANT = 1e-14  # of sums of rounded times, relative
 TIMES = [0.0, 0.1, 0.25, 1.0]
@@ -83,8 +84,10 @@ def test_every_method_gives_what_simulate_gives(model: Any, method: str) -> None
     for k in (0, 4, 8):  # the first and the last vector, and what is over
         one = dyn.simulate(model, q[k], qd[k], 0.3, method, **step(method, 0.01), t_eval=[0.1, 0.2, 0.3])
         assert np.hstack([result.q[k], result.qd[k]]) == approx(np.hstack([one.q, one.qd]), abs=ROUNDING)
-        found = [int(each[k]) for each in (result.stats.steps, result.stats.rejected, result.stats.nfev)]
-        assert found == [one.stats.steps, one.stats.rejected, one.stats.nfev]
+        found = [int(each[k]) for each in (result.stats.steps, result.stats.rejected)]
+        assert found == [one.stats.steps, one.stats.rejected]
+        iterated = not METHODS[method].adaptive and method not in ("euler", "rk4")
+        assert result.stats.nfev[k] == approx(one.stats.nfev, rel=TURNS if iterated else 0.0)
         assert result.stats.dt[k] == approx(one.stats.dt, rel=SPACING)
 
 

@@ -31,7 +31,7 @@ def test_a_trajectory() -> None:
     assert repr(run) == said
     decay = dyn.OdeSystem(lambda x, t: [-x[0]], ["x"])
     run = dyn.simulate(decay, [1.0], None, 1.0, "rk4", dt=0.5, t_eval=[1.0], estimate_error=False)
-    assert repr(run) == "<Trajectory of 1 state(s): 1 rows, t = 1 .. 1 s; rk4, 2 steps, reached t_end>"
+    assert repr(run) == "<Trajectory of 1 state(s): 1 row, t = 1 .. 1 s; rk4, 2 steps, reached t_end>"
 
 
 def test_an_ensemble() -> None:

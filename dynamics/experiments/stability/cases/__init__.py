@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache
+from cgraph.extend import memo
 
 from . import chains, extremes, fields, orbits, rotation, stiff
 from .case import RTOL, Criterion, StabilityCase
@@ -10,7 +10,7 @@ from .case import RTOL, Criterion, StabilityCase
 __all__ = ["RTOL", "Criterion", "StabilityCase", "load", "names", "table"]
 
 
-@cache
+@memo(1)
 def table() -> dict[str, StabilityCase]:
     """{name: case}, made when first asked for: to import the package need not build a chain of a thousand links."""
     return {case.name: case for rows in (stiff, chains, orbits, rotation, fields, extremes) for case in rows.cases()}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import cgraph as cg
 from cgraph import Graph, Node
@@ -50,7 +49,7 @@ class StabilityCase(Setting):
     criteria: tuple[Criterion, ...] = ()
     atol: float | tuple[float, ...] = ATOL
     growth: float | None = None
-    invariants: Callable[[Any], Graph] | None = None
+    invariants: Callable[[Model], Graph] | None = None
 
 
 def error_criterion(growth: float, why: str = GROWN, quantity: str = "error") -> Criterion:
@@ -63,7 +62,7 @@ def energy_criterion(scale: float, why: str = "nothing takes energy in or out") 
     return Criterion("energy", SLACK * RTOL, why, scale)
 
 
-def conserved(**others: Callable[..., Node]) -> Callable[[Any], Graph]:
+def conserved(**others: Callable[..., Node]) -> Callable[[Model], Graph]:
     """The energy of a mechanical model, and others: functions of (q, qd) that give a node."""
 
     def graph(model: Model) -> Graph:
@@ -76,7 +75,7 @@ def conserved(**others: Callable[..., Node]) -> Callable[[Any], Graph]:
     return graph
 
 
-def conserved_states(**functions: Callable[..., Node]) -> Callable[[Any], Graph]:
+def conserved_states(**functions: Callable[..., Node]) -> Callable[[Model], Graph]:
     """Functions of the states of an OdeSystem that do not change."""
 
     def graph(model: Model) -> Graph:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Sequence
 
 import cgraph as cg
 
@@ -75,7 +75,7 @@ def length_ratio(ratio: float, growth: float | None) -> StabilityCase:
 def nearly_singular(small: float) -> StabilityCase:
     """M = [[1, 1], [1, 1 + small]], and yet slow modes: q0 + q1 and q1 swing by themselves."""
 
-    def lagrangian(q: Any, qd: Any, t: Any) -> list[cg.Node]:
+    def lagrangian(q: Sequence[cg.Node], qd: Sequence[cg.Node], t: cg.Node) -> list[cg.Node]:
         both, apart = q[0] + q[1], q[1]
         return [
             0.5 * (qd[0] + qd[1]) ** 2 - 0.5 * (4.0 * both**2),
@@ -143,7 +143,7 @@ def zero_gravity() -> StabilityCase:
     """Three rods without gravity, spinning: beside energy, the momentum of the first joint stays."""
     arm = planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7], gravity=0.0)
 
-    def spin(q: Any, qd: Any) -> cg.Node:
+    def spin(q: Sequence[cg.Node], qd: Sequence[cg.Node]) -> cg.Node:
         return momentum(arm).outputs["p0"]
 
     growth = 110.0

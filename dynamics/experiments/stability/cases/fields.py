@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Sequence
 
 import cgraph as cg
 
@@ -19,7 +19,7 @@ def charged_particle(growth: float) -> StabilityCase:
     """A charge in a uniform magnetic field: terms linear in the velocity, which do no work."""
     frequency, start = 10.0, (0.0, 0.0, 1.0, 0.5)
 
-    def lagrangian(q: Any, qd: Any, t: Any) -> list[cg.Node]:
+    def lagrangian(q: Sequence[cg.Node], qd: Sequence[cg.Node], t: cg.Node) -> list[cg.Node]:
         return [0.5 * (qd[0] ** 2 + qd[1] ** 2), 0.5 * frequency * (q[0] * qd[1] - q[1] * qd[0])]
 
     return StabilityCase(
@@ -59,7 +59,7 @@ def driven_pendulum(growth: float) -> StabilityCase:
     """Kapitza's pendulum, 1 m: its pivot shakes up and down 5 cm at 150 rad/s, which holds it upright."""
     height, frequency = 0.05, 150.0
 
-    def lagrangian(q: Any, qd: Any, t: Any) -> list[cg.Node]:
+    def lagrangian(q: Sequence[cg.Node], qd: Sequence[cg.Node], t: cg.Node) -> list[cg.Node]:
         pivot = -height * frequency * cg.sin(frequency * t)
         return [0.5 * qd[0] ** 2 + qd[0] * pivot * cg.sin(q[0]), GRAVITY * cg.cos(q[0])]
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from collections.abc import Sequence
 
 import cgraph as cg
 
@@ -12,7 +12,7 @@ from ....systems.system import System
 from .case import RTOL, SLACK, Criterion, StabilityCase, conserved, energy_criterion, error_criterion
 
 
-def _lagrangian(q: Any, qd: Any, t: Any) -> list[cg.Node]:
+def _lagrangian(q: Sequence[cg.Node], qd: Sequence[cg.Node], t: cg.Node) -> list[cg.Node]:
     return [0.5 * (qd[0] ** 2 + qd[1] ** 2), 1.0 / cg.hypot(q[0], q[1])]
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import cgraph as cg
 
@@ -28,7 +27,7 @@ HEAVY = (0.05, 0.05, 0.02)  # kg m^2, of the top about its tip
 PULL = 1.0  # N m, m g l of the top
 
 
-def spin(q: Any, qd: Any) -> tuple[cg.Node, cg.Node, cg.Node]:
+def spin(q: Sequence[cg.Node], qd: Sequence[cg.Node]) -> tuple[cg.Node, cg.Node, cg.Node]:
     """Angular velocity in the body's axes, of Euler angles (precession, tilt, spin) about z, x', z''."""
     sine, cosine, tilt = cg.sin(q[2]), cg.cos(q[2]), cg.sin(q[1])
     return (
@@ -41,7 +40,7 @@ def spin(q: Any, qd: Any) -> tuple[cg.Node, cg.Node, cg.Node]:
 def rotor(inertia: Sequence[float], pull: float) -> System:
     """A body with a fixed point. pull: weight times the distance of the centre of mass, along the third axis [N m]."""
 
-    def lagrangian(q: Any, qd: Any, t: Any) -> list[cg.Node]:
+    def lagrangian(q: Sequence[cg.Node], qd: Sequence[cg.Node], t: cg.Node) -> list[cg.Node]:
         parts = [0.5 * (moment * omega**2) for moment, omega in zip(inertia, spin(q, qd), strict=True)]
         return [*parts, -pull * cg.cos(q[1])] if pull else parts
 
@@ -61,7 +60,7 @@ def _start(inertia: Sequence[float], omega: Sequence[float]) -> tuple[float, ...
     return 0.0, tilt, angle, precession, tilting, omega[2] - precession * math.cos(tilt)
 
 
-def _total(q: Any, qd: Any) -> cg.Node:
+def _total(q: Sequence[cg.Node], qd: Sequence[cg.Node]) -> cg.Node:
     """The square of the angular momentum of the free body."""
     x, y, z = ((moment * omega) ** 2 for moment, omega in zip(INERTIA, spin(q, qd), strict=True))
     return x + y + z
@@ -70,7 +69,7 @@ def _total(q: Any, qd: Any) -> cg.Node:
 def euler_equations(growth: float) -> StabilityCase:
     """Euler's equations alone: angular velocity in the body's axes."""
 
-    def rate(w: Any, t: Any) -> list[cg.Node]:
+    def rate(w: Sequence[cg.Node], t: cg.Node) -> list[cg.Node]:
         i = INERTIA
         return [
             ((i[1] - i[2]) / i[0]) * (w[1] * w[2]),
@@ -124,7 +123,7 @@ def middle_axis(growth: float) -> StabilityCase:
 def heavy_top(growth: float) -> StabilityCase:
     """Lagrange's top, fast, let go without precession: its axis nods with cusps."""
 
-    def precession(q: Any, qd: Any) -> cg.Node:
+    def precession(q: Sequence[cg.Node], qd: Sequence[cg.Node]) -> cg.Node:
         x, y, z = (moment * omega for moment, omega in zip(HEAVY, spin(q, qd), strict=True))
         return cg.sin(q[1]) * (x * cg.sin(q[2]) + y * cg.cos(q[2])) + z * cg.cos(q[1])
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
 
 import cgraph as cg
 
@@ -21,7 +20,7 @@ RATIO = 10.0  # of damping to the critical one
 def spring_pendulum(stiffness: float, damping: float) -> System:
     """1 kg on a spring of rest length 1 m; q = (extension [m], angle [rad]). Damping [N s/m] along the spring."""
 
-    def lagrangian(q: Any, qd: Any, t: Any) -> list[cg.Node]:
+    def lagrangian(q: Sequence[cg.Node], qd: Sequence[cg.Node], t: cg.Node) -> list[cg.Node]:
         length = 1.0 + q[0]
         return [
             0.5 * (qd[0] ** 2 + (length * qd[1]) ** 2),

@@ -7,7 +7,7 @@ from .require import require_whole
 
 
 @explain_failure
-def many(number: int, noun: str) -> str:
+def counted(number: int, noun: str) -> str:
     """The number and the noun, in the plural of all but 1.
 
     Parameters
@@ -24,8 +24,8 @@ def many(number: int, noun: str) -> str:
 
     Examples
     --------
-    >>> from cgraph.extend import many
-    >>> many(1, "node"), many(2, "node")
+    >>> from cgraph.extend import counted
+    >>> counted(1, "node"), counted(2, "node")
     ('1 node', '2 nodes')
     """
     return f"{require_whole('number', number)} {noun}{'' if number == 1 else 's'}"

@@ -1,0 +1,158 @@
+"""Caches: results that functions keep, the last few of a process or those of an object, all emptied by one call."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable
+from functools import lru_cache, wraps
+from typing import TYPE_CHECKING, Concatenate, ParamSpec, Protocol, TypeVar, cast
+from weakref import WeakSet, ref
+
+if TYPE_CHECKING:
+    from functools import _CacheInfo
+
+Arguments = ParamSpec("Arguments")
+First = TypeVar("First")
+Result = TypeVar("Result")
+
+
+class Memo(Protocol[Arguments, Result]):
+    """A function that keeps its last results, and the function that makes them."""
+
+    __wrapped__: Callable[Arguments, Result]
+
+    def __call__(self, *args: Arguments.args, **named: Arguments.kwargs) -> Result:
+        """The result, kept or made."""
+
+    def cache_info(self) -> _CacheInfo:
+        """How many results were made, and how many are kept."""
+
+    def cache_clear(self) -> None:
+        """Keep none."""
+
+
+class _Results:
+    """Results of calls whose first argument is one object. A copy of the object has none of them, here or pickled."""
+
+    def __init__(self, owner: object = None) -> None:
+        self.owner = ref(_Results if owner is None else owner)
+        self.known: dict[Hashable, object] = {}
+
+    def __reduce__(self) -> tuple[type[_Results], tuple[()]]:
+        return _Results, ()
+
+
+OPERATIONS = 128  # of which results are kept: thrice the table of operations
+_memos: list[Memo[..., object]] = []
+_kept: WeakSet[_Results] = WeakSet()
+
+
+def memo(size: int) -> Callable[[Callable[Arguments, Result]], Memo[Arguments, Result]]:
+    """The decorator of a function that keeps its last results, for as long as the process or until `clear_caches`.
+
+    Its arguments must be hashable, and those that are compared by identity are kept alive. docs/design.md lists every
+    function that has it.
+
+    Parameters
+    ----------
+    size : int
+        How many results are kept at most: the last ones used.
+
+    Returns
+    -------
+    callable
+        Takes the function, and gives the one that keeps.
+
+    Examples
+    --------
+    >>> from cgraph.extend import memo
+    >>> @memo(16)
+    ... def square(x):
+    ...     print("made")
+    ...     return x * x
+    >>> square(3.0), square(3.0)
+    made
+    (9.0, 9.0)
+    """
+
+    def decorate(function: Callable[Arguments, Result]) -> Memo[Arguments, Result]:
+        keeping = cast("Memo[Arguments, Result]", lru_cache(size)(function))
+        _memos.append(cast("Memo[..., object]", keeping))
+        return keeping
+
+    return decorate
+
+
+def kept_by_first(
+    function: Callable[Concatenate[First, Arguments], Result],
+) -> Callable[Concatenate[First, Arguments], Result]:
+    """The function, whose results its first argument keeps: a `cached_property` that is written elsewhere.
+
+    They go when that object goes, so the other arguments should be few: flags, names, a method.
+
+    Parameters
+    ----------
+    function : callable
+        Of an object that is not altered, has a `__dict__` and can be referred to weakly, and of hashable arguments.
+
+    Returns
+    -------
+    callable
+        Of the same arguments.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> from cgraph.extend import kept_by_first
+    >>> @kept_by_first
+    ... def pullback(graph):
+    ...     return cg.vjp(graph)
+    >>> x = cg.variable("x")
+    >>> graph = cg.Graph([x], {"y": x * x})
+    >>> pullback(graph) is pullback(graph)
+    True
+    """
+
+    @wraps(function)
+    def call(first: First, /, *others: Arguments.args, **named: Arguments.kwargs) -> Result:
+        results: _Results | None = first.__dict__.get("_results")
+        if results is None or results.owner() is not first:
+            results = first.__dict__["_results"] = _Results(first)
+            _kept.add(results)
+        key = (function, others, *named.items()) if named else (function, others)
+        found = results.known.get(key, results)
+        if found is results:
+            found = results.known[key] = function(first, *others, **named)
+        return cast("Result", found)
+
+    return call
+
+
+def clear_caches() -> int:
+    """Forget the results that functions keep in memory: derived graphs, programs, machine code.
+
+    What is asked for again is made again, to the same bits. Objects that somebody has stay as they are. Of machine code
+    on disk see `clear_cache`.
+
+    Returns
+    -------
+    int
+        How many results were kept.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> forgotten = cg.clear_caches()
+    >>> cg.clear_caches()
+    0
+    """
+    count = kept_results()
+    for each in _memos:
+        each.cache_clear()
+    for results in list(_kept):
+        results.known.clear()
+    return count
+
+
+def kept_results() -> int:
+    """How many results functions keep at present."""
+    return sum([each.cache_info().currsize for each in _memos]) + sum([len(results.known) for results in list(_kept)])

@@ -1,0 +1,179 @@
+"""`many`: memories side by side take the course of each of them, to the bit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import cgraph as cg
+from cgraph.extend import (
+    Array,
+    Call,
+    Factor,
+    If,
+    Pop,
+    Program,
+    Push,
+    Solve,
+    While,
+    many,
+    program_jvp,
+    program_vjp,
+    runner,
+)
+from tests.cgraph.program.test_program_derivatives import LENGTHS, PASSES, START, RandomProgram
+from tests.slow import slow
+
+COUNT = 11  # more than one vector, and not a whole number of them
+EDGES = {3: np.inf, 5: np.nan, 8: 0.0}  # {memory: what one of its numbers is}
+X, N = cg.variables("x n")
+LESS = Call(cg.Graph([N], {"n": N - 1.0}), ("n",), ("n",))
+HALVE = Call(cg.Graph([X], {"x": 0.5 * X}), ("x",), ("x",))
+
+
+def side_by_side(program: Program, values: dict[str, Array], feed: Array, backend: str, passes: int = PASSES) -> Array:
+    """The rows, which one by one are the same to the bit, as is what registers hold at the end."""
+    ready = runner(program, backend, fma=False)
+    memories = ready.memory(values, COUNT)
+    together = memories.copy()
+    rows = ready.run_many(together, passes, 1, feed).rows
+    for k in range(COUNT):
+        alone = memories[:, k].copy()
+        own = ready.run(alone, passes, 1, feed[:, :, k]).rows
+        assert np.array_equal(own, rows[:, :, k], equal_nan=True)
+        for name in program.registers:
+            assert np.array_equal(ready.read(alone, name), ready.read(together, name)[:, k], equal_nan=True), name
+    return rows
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("seed", [*range(36), *slow(*range(36, 600))])
+def test_random_programs_and_their_derivatives_are_the_same_side_by_side(seed: int) -> None:
+    program, rng = RandomProgram(seed).program, np.random.default_rng(seed)
+    backend = "python" if seed % 3 else "auto"
+    values = {name: rng.uniform(-2.0, 2.0, (LENGTHS[name], COUNT)) for name in START}
+    for lane, edge in EDGES.items():
+        values["x"][seed % 3, lane] = edge
+    feed = rng.uniform(-1.0, 1.0, (PASSES, 1, COUNT))
+    side_by_side(program, values, feed, backend)
+
+    moved = program_jvp(program, [*START, "f"], constant=["turns", "count"])
+    dots = {dot: rng.normal(size=(LENGTHS[name], COUNT)) for name, dot in moved.vectors.items()}
+    side_by_side(moved.program, values | dots, feed, backend)
+
+    ends = ["x", "y", "z", "s"]
+    pulled = program_vjp(program, ends, [*START, "f"], constant=["turns", "count"], backend="python")
+    starts = {pulled.handed.get(name, name): value for name, value in values.items()}
+    tape = side_by_side(pulled.forward.program, starts, feed, backend)
+    back = pulled.backward.program
+    seeds = {pulled.vectors[name]: rng.normal(size=(LENGTHS[name], COUNT)) for name in ends}
+    known = {name: value for name, value in values.items() if name in back.registers}
+    side_by_side(back, known | seeds, tape[::-1, : back.feed_width], backend)
+
+
+@pytest.mark.parametrize("backend", ["python", "llvm"])
+def test_a_lane_that_is_done_keeps_its_bits_while_others_go_on(backend: str) -> None:
+    """x halved n times; where n is not positive, infinite or NaN, x stays, and so does its sign."""
+    if backend == "llvm":
+        pytest.importorskip("llvmlite")
+    program = Program({"x": 1, "n": 1}, [While("n", (HALVE, LESS))], record=["x"])
+    n = np.array([[0.0, 1.0, 2.0, 1060.0, -3.0, np.nan, 7.0, 0.5, -0.0, 3.0, -np.inf]])
+    rows = side_by_side(program, {"x": np.full((1, COUNT), -1.0), "n": n}, np.empty((1, 0, COUNT)), backend, 1)
+    assert rows[0, 0].tolist() == [-1.0, -0.5, -0.25, -(0.5**1060), -1.0, -1.0, -(0.5**7), -0.5, -1.0, -0.125, -1.0]
+
+
+@pytest.mark.parametrize("backend", ["python", "llvm"])
+def test_a_loop_that_one_lane_never_enters_does_not_run_on_for_it(backend: str) -> None:
+    """Of x <= 0 the loop inside would have no end: x doubled until it is above 1."""
+    if backend == "llvm":
+        pytest.importorskip("llvmlite")
+    short = Call(cg.Graph([X], {"n": 1.0 - X}), ("x",), ("n",))
+    double = Call(cg.Graph([X], {"x": 2.0 * X}), ("x",), ("x",))
+    program = Program({"x": 1, "n": 1}, [If("x", (short, While("n", (double, short))))], record=["x"])
+    x = np.linspace(-1.0, 1.0, COUNT)[None]
+    rows = side_by_side(program, {"x": x}, np.empty((1, 0, COUNT)), backend, 1)
+    assert (rows[0, 0, x[0] <= 0.0] == x[0, x[0] <= 0.0]).all()
+    assert (rows[0, 0, x[0] > 0.0] >= 1.0).all()
+
+
+@pytest.mark.parametrize("backend", ["python", "llvm"])
+@pytest.mark.parametrize("transposed", [False, True])
+def test_every_lane_has_pivots_of_its_own(backend: str, transposed: bool) -> None:
+    if backend == "llvm":
+        pytest.importorskip("llvmlite")
+    rng, n = np.random.default_rng(1), 5
+    registers = {"A": n * n, "p": n, "b": n, "test": 1}
+    solve = Factor("A", "p"), Solve("A", "p", "b", transposed)
+    matrices = np.stack([rng.permutation(np.eye(n)) + 0.2 * rng.normal(size=(n, n)) for _ in range(COUNT)], axis=2)
+    matrices[2, 2, 4] = np.nan
+    matrices[:, :, 6] = 0.0
+    b = rng.normal(size=(n, COUNT))
+    test = (np.arange(COUNT)[None] % 4 > 0) * 1.0
+    for body in (solve, (If("test", solve),), (If("test", solve[:1]), solve[1])):
+        values = {"A": matrices.reshape(n * n, COUNT), "b": b, "test": test, "p": np.full((n, COUNT), 3.0)}
+        program = Program(registers, body, record=["b"])
+        rows = side_by_side(program, values, np.empty((1, 0, COUNT)), backend, 1)
+    program = Program(registers, [If("test", solve)], record=["b"])
+    rows = side_by_side(program, {**values, "p": np.full((n, COUNT), np.nan)}, np.empty((1, 0, COUNT)), backend, 1)
+    for k in (1, 2, 3, 5, 7):
+        matrix = matrices[:, :, k].T if transposed else matrices[:, :, k]
+        assert rows[0, :, k] == pytest.approx(np.linalg.solve(matrix, b[:, k]), rel=1e-12)
+    assert rows[0, :, 0].tolist() == b[:, 0].tolist()
+
+
+@pytest.mark.parametrize("backend", ["python", "llvm"])
+def test_every_lane_has_rows_of_its_own_on_a_stack(backend: str) -> None:
+    """n rows on a stack of 4, and m off it: the full and the empty ones count NaN."""
+    if backend == "llvm":
+        pytest.importorskip("llvmlite")
+    a = cg.variables("a0 a1 a2")
+    turned = cg.Graph(a, {"a": a[1] + 1.0, "b": a[2] * 2.0, "c": a[0]})
+    registers = {"x": 1, "y": 2, "stack": 12, "count": 1, "n": 1, "m": 1}
+    less = Call(cg.Graph([X], {"m": X - 1.0}), ("m",), ("m",))
+    turn = Call(turned, ("x", "y"), ("x", "y"))
+    rows = ("y", "x")
+    body = [
+        While("n", (Push("stack", "count", rows), turn, LESS)),
+        While("m", (Pop("stack", "count", rows), less)),
+    ]
+    values = {"n": np.arange(COUNT)[None] % 6 * 1.0, "m": np.arange(COUNT)[None] % 4 * 1.0}
+    values |= {"x": np.arange(COUNT)[None] * 1.0, "y": np.ones((2, COUNT)) + np.arange(COUNT)}
+    program = Program(registers, body, record=["x", "y", "stack", "count"])
+    side_by_side(program, values, np.empty((2, 0, COUNT)), backend)
+
+
+@pytest.mark.parametrize("backend", ["python", "llvm"])
+def test_a_batch_of_a_program_with_a_loop(backend: str) -> None:
+    """From each value of a register of x and n, x halved n times."""
+    if backend == "llvm":
+        pytest.importorskip("llvmlite")
+    x, n = cg.variables("x n")
+    apart = Call(cg.Graph([x, n], {"x": x, "n": n}), ("both",), ("x", "n"))
+    registers = {"both": 2, "x": 1, "n": 1}
+    values = np.stack([np.linspace(-1.0, 1.0, 37), np.arange(37) % 7.0], axis=1)
+    run = runner(Program(registers, [apart, While("n", (HALVE, LESS))], record=["x"]), backend)
+    assert run.batch("both", values)[:, 0].tolist() == (values[:, 0] * 0.5 ** values[:, 1]).tolist()
+    unsure = runner(Program(registers, [apart, If("n", (HALVE,))], record=["x"]), backend)
+    assert unsure.batch("both", values[:2])[:, 0].tolist() == [-1.0, values[1, 0] / 2.0]
+    seldom = If("n", (Call(HALVE.graph, ("x",), ("y",)),))
+    sometimes = runner(Program({**registers, "y": 1}, [apart, seldom], record=["y"]), backend)
+    with pytest.raises(cg.GraphError, match="register 'y' is read before"):
+        sometimes.batch("both", values)
+
+
+def test_what_runs_one_memory_at_a_time_is_told() -> None:
+    for control in ({"stop": "n"}, {"record_if": "n"}):
+        run = runner(Program({"n": 1}, [LESS], record=["n"], **control), "python")  # type: ignore[arg-type]
+        with pytest.raises(cg.GraphError, match=f"programs with {next(iter(control))} run one memory at a time"):
+            run.run_many(np.zeros((1, 3)), 1)
+
+
+def test_a_program_that_takes_one_course_is_as_it_was() -> None:
+    straight = Program({"n": 1}, [LESS], record=["n"])
+    assert many(straight) is straight
+    twice = many(many(Program({"n": 1, "x": 1}, [While("n", (HALVE, LESS))], record=["x"])))
+    values = {"n": np.arange(COUNT)[None] * 1.0, "x": np.ones((1, COUNT))}
+    rows = side_by_side(twice, values, np.empty((1, 0, COUNT)), "python", 1)
+    assert rows[0, 0].tolist() == [0.5**k for k in range(COUNT)]
+    with pytest.raises(TypeError, match="program must be a Program, got int"):
+        many(3)  # type: ignore[arg-type]
