@@ -122,8 +122,7 @@ def gradient_many(
     """
     options = {"dt": dt, "max_step": max_step, "rtol": rtol, "atol": atol, "first_step": first_step, "backend": backend}
     options["estimate_error"] = estimate_error
-    span = (t_end, t0, t_span)
-    motions = motion_of(model, q, qd, span, method, tau, parameters, wrt, options, form, many=True)
+    motions = motion_of(model, q, qd, (t_end, t0, t_span), method, tau, parameters, wrt, options, form, many=True)
     count, problem, run = motions.many, motions.problem, motions.options
     step = motions.method.step
     assert step is not None
