@@ -71,11 +71,9 @@ def normalization(model: Model) -> Graph | None:
 
     Inputs and outputs the states.
     """
-    if as_ode(model) is not None:
-        return None
-    system = as_system(model)
-    quasi = system.kinematics.quasi
-    if quasi is None or quasi.normalized is None:
+    system = model.system
+    quasi = None if system is None else system.kinematics.quasi
+    if system is None or quasi is None or quasi.normalized is None:
         return None
     states = [*system.kinematics.normalized(system.q), *system.qd]
     return Graph([*system.q, *system.qd], {f"x{k}": node for k, node in enumerate(states)})

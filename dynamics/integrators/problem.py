@@ -136,7 +136,7 @@ class _Request:
 @memo(KEPT)
 def _derived(request: _Request) -> Problem:
     model, bound = request.model, dict(request.bound)
-    inputs, system = state_inputs(model), None if as_ode(model) else as_system(model)
+    inputs, system = state_inputs(model), model.system
     parameters = tuple([name for name in (*inputs.applied, *inputs.parameters) if name not in bound])
     if system is None:
         components = [f"state {name!r}" for name in inputs.states]

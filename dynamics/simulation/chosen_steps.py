@@ -17,7 +17,7 @@ from .run_options import RunOptions
 from .sampled_controller import Hold
 from .state_sizes import StateSizes
 from .step_program import CompiledSteps
-from .stepping import FIRST_PASSES, NativeIntegration
+from .stepping import FIRST_PASSES, NativeIntegration, nonfinite
 
 ROUNDS = 4  # of a first step, by which the sizes of the states are known
 HALVINGS = 100  # of a look ahead
@@ -155,7 +155,7 @@ class AdaptiveIntegration(NativeIntegration):
         self.slope = _lacking(self.runner, memory, self.components)
         if self.slope:
             return f"{where}{self.slope} is not finite, and method {self.options.method!r} takes it"
-        if reason := self.nonfinite(self.runner.read(memory, "x_new")):
+        if reason := nonfinite(self.components, self.runner.read(memory, "x_new")):
             return f"{where}{reason}, however small"
         fastest = self.components[int(np.argmax(np.abs(rate) / self._scale(x, x)))]
         h = self._number(memory, "tried")

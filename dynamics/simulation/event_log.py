@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from cgraph.extend import Array
 
@@ -246,7 +247,7 @@ class EventLog:
 
 
 def split_crossings(
-    program: EventProgram, happened: Sequence[Happening], nq: int, parameters: Array | None = None
+    program: EventProgram, happened: Sequence[Happening], nq: int, parameters: ArrayLike = 0.0
 ) -> dict[str, Crossings]:
     """Of each event by name, (number, t, x) as times and states, split after nq numbers into q and qd."""
     result = {}

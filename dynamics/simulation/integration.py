@@ -13,7 +13,7 @@ from .run_options import RunOptions
 from .sampled_controller import Hold
 from .scipy_solvers import ScipyIntegration, scipy_solver
 from .step_program import CompiledSteps, compile_steps, step_program
-from .stepping import FixedStepIntegration, Integration, NativeIntegration
+from .stepping import FixedStepIntegration, Integration
 from .watched import WatchedIntegration
 
 
@@ -27,15 +27,13 @@ def integration_of(
     between: bool,
 ) -> Integration:
     """A run of a problem, before its first step. between: with all steps, and the dense output of chosen ones."""
-    leg: Callable[[RunOptions], Integration]
     if (name := options.scipy_solver) is not None:
         leg = partial(ScipyIntegration, scipy_solver(problem, name, options.backend), between=between)
-    else:
-        method = METHODS[options.method]
-        program = step_program(problem, method, dense=method.adaptive and (between or options.times is not None))
-        compiled = compile_steps(program, options.backend)
-        leg = partial(integration, compiled, parameters=parameters, control=hold, every_step=between)
-    return leg(options) if events is None else WatchedIntegration(leg, options, EventLog(events))
+        return leg(options) if events is None else WatchedIntegration(leg, options, EventLog(events))
+    method = METHODS[options.method]
+    program = step_program(problem, method, dense=method.adaptive and (between or options.times is not None))
+    compiled = compile_steps(program, options.backend)
+    return integration(compiled, options, parameters, control=hold, every_step=between, events=events)
 
 
 def integration(
@@ -46,8 +44,12 @@ def integration(
     control: Hold | None = None,
     *,
     every_step: bool = False,
-) -> NativeIntegration:
+    events: EventProgram | None = None,
+) -> Integration:
     """A run, before its first step.  every_step: of equal steps, keep those between times of t_eval too."""
+    if events is not None:
+        leg = partial(integration, compiled, parameters=parameters, stopped=stopped, control=control, every_step=True)
+        return WatchedIntegration(leg, options, EventLog(events))
     if compiled.program.adaptive:
         return AdaptiveIntegration(compiled, options, parameters, stopped, control)
     every_step = every_step or options.times is None or options.estimated

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from cgraph.extend import Array
 
@@ -18,7 +19,7 @@ def missed_momenta(
     problem: Problem,
     times: Array,
     rows: Array,
-    parameters: Array | None = None,
+    parameters: ArrayLike = 0.0,
     *,
     start: tuple[float, Array, Array],
 ) -> list[str]:
@@ -30,9 +31,7 @@ def missed_momenta(
     if problem.missing is None or not len(rows):
         return []
     said = _other_velocities(problem, *start, parameters)
-    count = len(problem.missing.inputs) - rows.shape[1] - 1
-    held = np.broadcast_to(0.0 if parameters is None else np.asarray(parameters), (len(times), count))
-    momenta, missing = rows[:, problem.nq :], row_values(problem.missing, times, rows, held)
+    momenta, missing = rows[:, problem.nq :], row_values(problem.missing, times, rows, parameters)
     sizes = np.abs(momenta).max(axis=0, initial=0.0)
     bad = np.argwhere(~(np.abs(missing) <= LOOSE * np.maximum(sizes, OTHERS * sizes.max(initial=0.0))))
     if not len(bad):
@@ -43,10 +42,10 @@ def missed_momenta(
     return [*said, f"{text}; take form='velocity'"]
 
 
-def _other_velocities(problem: Problem, t: float, start: Array, x: Array, parameters: Array | None) -> list[str]:
+def _other_velocities(problem: Problem, t: float, start: Array, x: Array, parameters: ArrayLike) -> list[str]:
     """Whether the state that a start makes has other velocities: of an L that is not convex there are several."""
     nq = problem.nq
-    qd, back = start[nq:], converted(problem.velocities, np.array([t]), x[None], parameters)[0, nq:]
+    qd, back = start[nq:], converted(problem.velocities, t, x, parameters)[nq:]
     bad = np.flatnonzero(np.abs(back - qd) > LOOSE * np.maximum(np.abs(qd), SLOW * np.abs(qd).max(initial=0.0)))
     if not len(bad) or not qd.any():
         return []

@@ -13,31 +13,30 @@ from cgraph.extend import Array
 BLOCK = 4096  # rows that are taken at once
 
 
-def converted(graph: Graph | None, times: Array, states: Array, parameters: ArrayLike | None = None) -> Array:
-    """States (T, m) with what a graph gives of them in place of their last numbers, as qd of p; without one the same.
+def converted(graph: Graph | None, times: ArrayLike, states: Array, parameters: ArrayLike = 0.0) -> Array:
+    """States (.., m) with what a graph gives of them in place of their last numbers, as qd of p; without one the same.
 
-    parameters: its further inputs, (T, k), or (k,) for all rows; without them 0, of forces that it does not depend on.
+    times, parameters: see `row_values`; parameters are 0 where they are forces that it does not depend on.
     """
     if graph is None:
         return states
-    count = len(graph.inputs) - states.shape[1] - 1
-    held = np.broadcast_to(0.0 if parameters is None else np.asarray(parameters), (len(times), count))
-    last = row_values(graph, times, states, held)
-    return np.concatenate([states[:, : -last.shape[1]], last], axis=1)
+    last = row_values(graph, times, states, parameters)
+    return np.concatenate([states[..., : -last.shape[-1]], last], axis=-1)
 
 
-def row_values(graph: Graph, times: Array, states: Array, held: Array | None = None) -> Array:
-    """The outputs (T, k) of a graph over the states and t, at times (T,) and states (T, m).
+def row_values(graph: Graph, times: ArrayLike, states: Array, parameters: ArrayLike = ()) -> Array:
+    """The outputs (.., k) of a graph over the states, t and parameters, at states (.., m).
 
-    held: (T, n), the values of further inputs, which are forces that are held over periods.
+    times: (..), or as many as go along the last axes.  parameters: (.., p) in the same way.
     """
-    result = np.empty((len(times), len(graph.outputs)))
-    names = graph.input_names
-    held = np.empty((len(times), 0)) if held is None else held
+    *shape, m = states.shape
+    rows, t, count = states.reshape(-1, m), np.broadcast_to(times, shape).reshape(-1), len(graph.inputs) - m - 1
+    held = np.broadcast_to(parameters, (*shape, count)).reshape(len(rows), count)
+    names, result = graph.input_names, np.empty((len(rows), len(graph.outputs)))
     with np.errstate(all="ignore"):
-        for start in range(0, len(times), BLOCK):
+        for start in range(0, len(rows), BLOCK):
             part = slice(start, start + BLOCK)
-            values: dict[str, Any] = dict(zip(names, [*states[part].T, times[part], *held[part].T], strict=True))
+            values: dict[str, Any] = dict(zip(names, [*rows[part].T, t[part], *held[part].T], strict=True))
             for column, value in enumerate(graph.evaluate(values).values()):
                 result[part, column] = value
-    return result
+    return result.reshape(*shape, len(graph.outputs))

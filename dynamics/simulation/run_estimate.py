@@ -20,7 +20,7 @@ from .watched import WatchedIntegration
 
 
 class RunEstimate:
-    """Is told the blocks of a run from x as they come.
+    """Is told the blocks of a run from x as they come; of a run whose error is not estimated it forgets them.
 
     Runs beside have resets of their own. The forces of a controller answer the states of the run, and would be others
     beside it: there each stretch of steps under the same forces is compared by itself, from where the run is.
@@ -35,6 +35,8 @@ class RunEstimate:
 
     def add(self, block: StepBlock) -> None:
         """The next steps of the run, or a reset."""
+        if not self._options.estimated:
+            return
         begin = time.perf_counter()
         self._add(block)
         self.seconds += time.perf_counter() - begin

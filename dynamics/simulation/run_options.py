@@ -28,44 +28,12 @@ SCIPY_SOLVERS = ("Radau", "BDF", "LSODA", "DOP853", "RK45")
 
 @dataclass(frozen=True)
 class RunOptions:
-    """The options that `simulate` and `simulate_many` share, checked when they are put together.
+    """The options that `simulate`, `simulate_many` and gradients share, checked when they are put together.
 
     Parameters
     ----------
-    t_end : float
-        Where the run ends [s], before t0 for a run back in time.
-    method : str
-        A name of `dyn.METHODS`, or one of SciPy's solvers, "scipy:Radau", "scipy:BDF", "scipy:LSODA",
-        "scipy:DOP853", "scipy:RK45".
-    dt : float, optional
-        The step of methods of equal steps [s], 1e-3 by default. The steps between two recorded times are equal and at
-        most dt, so that the last row is at t_end exactly.
-    max_step : float, optional
-        The longest step of methods that choose their steps [s]; no limit by default.
-    rtol, atol : float, float or array_like, optional
-        The error of a chosen step, relative to each component of the state, and absolute: one number for all, or (m,),
-        one for each of q and then qd. By default 1e-9, and for atol rtol times the largest value that the
-        component has had so far, or a ten-thousandth of the largest coordinate or velocity, in whatever unit: of a
-        mechanism an angle counts as the way that it moves its bodies by. All entries of a quaternion are as large as 1.
-        A jump of a force in time is passed then, as well as a hundredth of the longest of the last steps allows. For
-        SciPy's solvers 1e-10, and a warning where that is more than 1e-4 of the largest component of a kind. Of equal
-        steps the estimated error that is no cause of a warning, relative to the largest of a component over
-        the run; 1e-3 and 0 by default.
-    t_eval : array_like, optional
-        Times from t0 to t_end to record, in this order, (T,) [s]; by default every step. Chosen steps are not changed
-        by it.
-    first_step : float, optional
-        The first chosen step [s], in place of one chosen by trial.
-    max_steps : float
-        Steps, rejected ones included, after which the run stops.
-    backend : str
-        "llvm", "python", or "auto" for machine code where llvmlite is installed; the steps are the same.
-    progress : bool, optional
-        A progress line on standard error; None shows it on a terminal, for runs over a second.
-    t0 : float
-        Where the run starts [s].
-    estimate_error : bool, optional
-        Whether runs of other steps beside it estimate the error of equal steps; by default they do.
+    t_end, method, dt, max_step, rtol, atol, t_eval, first_step, max_steps, backend, progress, t0, estimate_error
+        As for `simulate`.
 
     Raises
     ------

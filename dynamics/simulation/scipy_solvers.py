@@ -21,7 +21,7 @@ from .dense_output import StepBlock, normalized
 from .run_options import SCIPY, RunOptions
 from .state_sizes import StateSizes
 from .step_program import between, state_kinds
-from .stepping import BLOCK_TIME, Clock, Integration
+from .stepping import BLOCK_TIME, Clock, Integration, nonfinite
 
 IMPLICIT = ("Radau", "BDF", "LSODA")
 DEGREES = {"RK45": 4, "DOP853": 7, "Radau": 3, "BDF": 5, "LSODA": 12}  # at most, of the dense output
@@ -155,7 +155,7 @@ class ScipyIntegration(Integration):
             self.status = where + self._gave_up(solver, [str(error)])
             return False
         self.evaluations, self._jacobians, self._factorizations = solver.nfev, solver.njev, solver.nlu
-        if reason := self.nonfinite(solver.y):
+        if reason := nonfinite(self.components, solver.y):
             self.status = f"stopped at t = {solver.t:.6g} s: {reason}"
         elif solver.status == "failed":
             self.status = where + self._gave_up(solver, [message, *[str(one.message) for one in said]])

@@ -174,22 +174,21 @@ def simulate(
 
     # Write the steps of the method over these graphs, and compile them
     made = partial(integration_of, stepped, events=program, between=bool(watched) or dense_output)
-    run, x = made(options, hold=hold), converted(stepped.momentum, np.array([t0]), start.x[np.newaxis])[0]
+    run, x = made(options, hold=hold), converted(stepped.momentum, t0, start.x)
 
     # Integrate, noting rows and events
     recorder = Recorder(x, options.times, options.t0, options.direction)
     steps: list[StepBlock] | None = [] if dense_output else None
-    outcome = _integrate(run, x, recorder, options, steps)
-    outcome = _advised(outcome, run, recorder.last, options, x, made if hold is None else None)
+    outcome = _integrate(run, x, recorder, options, steps, made if hold is None else None)
 
     # Put the result together
     rows, held = recorder.table(), None if hold is None else hold.held
     stats = _stats(run, options.method, outcome, missed_momenta(stepped, *rows, start=(t0, start.x, x)))
-    table, momenta = _table(stepped, energy, *rows, held)
     for text in [*outcome.early, *stats.warnings]:
         warnings.warn(text, SimulationWarning, stacklevel=2)
     dense = None if steps is None else Solution(options.t0, x, steps, problem.nq, stepped.velocities)
     kept = run.crossings(problem.nq), _graphs(problem, applied), dense, held
+    table, momenta = _table(stepped, energy, *rows, held)
     return Trajectory(*table, stats, *kept, model.coordinates, model.velocities, momenta)
 
 
@@ -212,47 +211,35 @@ def _integrate(
     recorder: Recorder,
     options: RunOptions,
     steps: list[StepBlock] | None,
+    again: Callable[[RunOptions], Integration] | None,
 ) -> _Outcome:
     """Run from x to t_end, an event, a failure, the end of the memory, or Ctrl-C, and estimate the error.
 
-    steps: receives the steps with their dense output.
+    steps: receives the steps with their dense output.  again: the same run by other options, see `advise`.
     """
-    begin, error, early = time.perf_counter(), None, tuple[str, ...]()
-    estimate = RunEstimate(run, x, options) if options.estimated else None
+    begin, error, interrupted = time.perf_counter(), None, False
+    estimate = RunEstimate(run, x, options)
     try:
         with np.errstate(all="ignore"), Progress("simulate", options.length, options.progress) as report:
             _run(run, x, recorder, estimate, steps, lambda t: report(abs(t - options.t0)))
-            if estimate is not None and not run.status:
-                error = estimate.result()
-        early = (f"the run {run.status}",) if run.status else ()
+            error = None if run.status else estimate.result()
     except KeyboardInterrupt:
-        run.status = f"interrupted after t = {recorder.last:.6g} s"
+        run.status, interrupted = f"interrupted after t = {recorder.last:.6g} s", True
     if run.status:
         recorder.add_last()
-    seconds = time.perf_counter() - begin - (0.0 if estimate is None else estimate.seconds)
+    seconds = time.perf_counter() - begin - estimate.seconds
+    advise(run, recorder.last, options, x, again)
     if run.event and not run.status:
         return _Outcome(seconds, 1, run.event, error)
+    early = (f"the run {run.status}",) if run.status and not interrupted else ()
     return _Outcome(seconds, -1 if run.status else 0, run.status or "reached t_end", error, early)
-
-
-def _advised(
-    outcome: _Outcome,
-    run: Integration,
-    reached: float,
-    options: RunOptions,
-    x: Array,
-    again: Callable[[RunOptions], Integration] | None,
-) -> _Outcome:
-    """The same, with the method that a run should have had; see `advise`."""
-    advise(run, reached, options, x, again)
-    return outcome._replace(message=run.status, early=(f"the run {run.status}",)) if outcome.early else outcome
 
 
 def _run(
     run: Integration,
     x: Array,
     recorder: Recorder,
-    estimate: RunEstimate | None,
+    estimate: RunEstimate,
     steps: list[StepBlock] | None,
     report: Callable[[float], None],
 ) -> None:
@@ -262,8 +249,7 @@ def _run(
         if steps is not None and block.dense is None:
             block = run.with_dense(block)
         recorder.add(block)
-        if estimate is not None:
-            estimate.add(block)
+        estimate.add(block)
         if steps is not None:
             steps.append(block)
             kept += block.nbytes
@@ -283,7 +269,7 @@ def _table(
     states, nq = converted(stepped.velocities, times, rows), stepped.nq
     energies = np.full(len(times), math.nan)
     if energy is not None:
-        energies = row_values(energy, times, states, None if held is None else held.at(times))[:, 0]
+        energies = row_values(energy, times, states, () if held is None else held.at(times))[:, 0]
     return (times, states[:, :nq], states[:, nq:], energies), rows[:, nq:] if stepped.momenta else None
 
 

@@ -9,8 +9,9 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from cgraph.extend import Array
+from cgraph.extend import Array, Runner
 
 from .dense_output import StepBlock, inside_nodes, with_hermite
 from .equal_steps import EqualSteps, equal_steps
@@ -82,17 +83,13 @@ class Integration(ABC):
     def blocks(self, x: Array) -> Iterator[StepBlock]:
         """The steps from x (m,) on, some at a time."""
 
-    def crossings(self, nq: int, parameters: Array | None = None) -> dict[str, Crossings]:
+    def crossings(self, nq: int, parameters: ArrayLike = 0.0) -> dict[str, Crossings]:
         """Of each event by name, where it happened, with states split after nq numbers; parameters: of the problem."""
         return {}
 
     def with_dense(self, block: StepBlock) -> StepBlock:
         """The block that has come last, with dense output."""
         return block
-
-    def nonfinite(self, state: Array) -> str:
-        """The first component that is not finite, in words; empty if all are."""
-        return nonfinite(self.components, state)
 
     def too_many(self, t: float, most: float) -> str:
         """The status of a run that may not go on."""
@@ -191,8 +188,7 @@ class FixedStepIntegration(NativeIntegration):
         memory = self.runner.memory(start)
         for stretch in self.stretches:
             self.stretch = stretch
-            for name, value in (("start", stretch.begin), ("t", stretch.begin), ("count", 0.0), ("h", stretch.h)):
-                self.runner.write(memory, name, value)
+            begin_equal(self.runner, memory, stretch.begin, stretch.h)
             if self.control is not None:
                 self.parameters = self.control.at(stretch.begin, self.runner.read(memory, "x"))
                 self.runner.write(memory, "p", self.parameters)
@@ -265,6 +261,12 @@ def failed_step(components: Sequence[str], t: float, before: Array, x: Array, si
     else:
         reason = nonfinite(components, x) or unsolved(components, before, x)
     return f"stopped at t = {t:.6g} s: {reason}"
+
+
+def begin_equal(runner: Runner, memory: Array, begin: float, h: float) -> None:
+    """The steps that follow are of h [s], from `begin` on."""
+    for name, value in (("start", begin), ("t", begin), ("count", 0.0), ("h", h)):
+        runner.write(memory, name, value)
 
 
 def nonfinite(components: Sequence[str], state: Array) -> str:

@@ -304,7 +304,7 @@ class Trajectory:
         if name not in self.graphs:
             return np.empty_like(self.qd)
         states = np.concatenate([self.q, self.qd], axis=1)
-        return row_values(self.graphs[name], self.t, states, None if self.held is None else self.held.at(self.t))
+        return row_values(self.graphs[name], self.t, states, () if self.held is None else self.held.at(self.t))
 
     @property
     def success(self) -> bool:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from cgraph.extend import Array
 
@@ -57,7 +58,7 @@ class WatchedIntegration(Integration):
         """LU factorizations of matrices."""
         return sum(run.factorizations for run in self._legs)
 
-    def crossings(self, nq: int, parameters: Array | None = None) -> dict[str, Crossings]:
+    def crossings(self, nq: int, parameters: ArrayLike = 0.0) -> dict[str, Crossings]:
         """Of each event by name, where it happened, with states split after nq numbers; parameters: of the problem."""
         return split_crossings(self.log.program, self.log.happened, nq, parameters)
 

@@ -26,7 +26,7 @@ class Chunk:
 
 @dataclass(frozen=True)
 class Part:
-    """What a chunk gives: rows (k, T, m), NaN from where a trajectory stopped on; then its `status` says so."""
+    """What a chunk gives, or all: rows (k, T, m), NaN from where a trajectory stopped on; then its `status` says so."""
 
     first: int
     rows: Array
@@ -39,6 +39,15 @@ class Part:
     warnings: list[list[str]]  # what speaks against a trajectory
     ended: list[bool]  # whether an event has ended it; then its status says which
     happened: list[list[Happening]]  # the events of each
+
+    def put(self, part: Part) -> None:
+        """What a part gives, in its place."""
+        here = slice(part.first, part.first + len(part.rows))
+        if not np.may_share_memory(part.rows, self.rows):  # from another process
+            self.rows[here] = part.rows
+        self.errors[:, here] = part.errors
+        for name in ("steps", "rejected", "evaluations", "dt", "status", "warnings", "ended", "happened"):
+            getattr(self, name)[here] = getattr(part, name)
 
     def tell(self, k: int, error: ErrorEstimate) -> None:
         """The error of trajectory k."""
@@ -57,13 +66,13 @@ class Part:
         return any(status.startswith(INTERRUPTED) for status in self.status)
 
 
-def empty(chunk: Chunk, rows: Array) -> Part:
-    """The part of a chunk before its first step."""
-    k = len(chunk.x)
+def empty(first: int, rows: Array) -> Part:
+    """The part of the chunk whose rows are to be here, before its first step."""
+    k = len(rows)
     steps, rejected, evaluations = np.zeros((3, k), dtype=np.int64)
     counts, errors = (steps, rejected, evaluations), np.full((2, k), np.nan)
     return Part(
-        chunk.first,
+        first,
         rows,
         *counts,
         np.zeros(k),

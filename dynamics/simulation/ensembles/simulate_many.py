@@ -17,12 +17,14 @@ from numpy.typing import ArrayLike
 from cgraph import Node
 from cgraph.extend import Array, require_whole
 
+from ...equations.initial_value import initial_values
 from ...integrators import METHODS, Problem, derive, in_form
 from ...systems.controller import with_closed_form
 from ...systems.model import Model
 from ..equal_steps import step_count
 from ..event import Event, as_events
-from ..event_program import event_program
+from ..event_log import split_crossings
+from ..event_program import EventProgram, event_program
 from ..free_memory import room
 from ..missed_momenta import missed_momenta
 from ..progress_bar import Progress
@@ -31,10 +33,8 @@ from ..run_options import METHOD, RunOptions, time_span
 from ..sampled_controller import SampledController
 from ..step_program import StepProgram, pickled_steps, step_program
 from ..trajectory import SimulationWarning
-from .chunk import INTERRUPTED, Chunk
+from .chunk import INTERRUPTED, Chunk, Part, empty
 from .ensemble import Ensemble, EnsembleStats
-from .ensemble_rows import EnsembleRows
-from .initial_states import Starts, starts
 from .lane_steps import iterates
 from .step_grid import StepGrid, step_grids
 from .task import Task
@@ -43,6 +43,7 @@ from .workers import Map, Workers, checked, finished
 VECTOR = 8  # lanes, or a multiple of them, of every processor: a chunk of trajectories side by side is whole vectors
 LARGEST = 256  # trajectories in a chunk, unless asked for
 SHARES = 4  # chunks for each worker, so that workers of unlike speed finish together
+REACHED = "reached t_end"
 UNKNOWN = 16  # workers behind a map, which does not say
 
 
@@ -138,33 +139,33 @@ def simulate_many(
     options = RunOptions(t_end, method, *arguments, t0, estimate_error)
     watched, team = as_events(events), checked(workers)
     model, tau = _closed(model, tau, parameters)
-    start = starts(model, q, qd, tau, parameters, t0)
+    start = initial_values(model, q, qd, tau, parameters, t0)
     options.check(start.states)
     count = _row_count(options)
     _check_room(start.x, count)
 
     # Derive the equations as graphs, and write the steps of the method over them
     begin = time.perf_counter()
-    problem = in_form(derive(model, start.same), form)
+    problem = in_form(derive(model, start.bound), form)
     program, watch = step_program(problem, METHODS[method], dense=True), event_program(problem, watched)
 
     # Share out the work: what a worker is sent, and the starts of chunks of trajectories
     grids = [] if watched else _grids(program, options, len(start.x))
     sent = replace(options, t_eval=options.row_times) if watched else options
     task = Task(pickled_steps(program), sent, count, tuple(grids), pickle.dumps(watch) if watched else b"")
-    x, p = _steps_from(start, problem, t0)
+    p = np.array([start.varied[name] for name in problem.parameters]).reshape(-1, len(start.x)).T.copy()
+    x = converted(problem.momentum, t0, start.x, p)
     chunks = _chunks(x, p, _width(len(x), chunk, team, whole=bool(grids)))
 
     # Integrate, by whoever takes the chunks and compiles the steps
-    result = EnsembleRows(len(start.x), count, problem.size)
-    _run(task, chunks, team, result)
+    whole = empty(0, np.empty((len(x), count, problem.size)))
+    _run(task, chunks, team, whole)
 
     # Put the result together
-    stats = _judged(result.stats(method, time.perf_counter() - begin), problem, options, result.rows, start)
-    for text in _warnings(stats):
+    result = _ensemble(problem, watch, options, whole, (start.x, x, p), time.perf_counter() - begin)
+    for text in _warnings(result.stats):
         warnings.warn(text, SimulationWarning, stacklevel=2)
-    table, momenta = _table(problem, options.row_times, result.rows, p)
-    return Ensemble(options.row_times, *table, stats, result.events(watch, problem.nq, p), momenta)
+    return result
 
 
 def _closed(model: Model, tau: Any, parameters: object) -> tuple[Model, ArrayLike]:
@@ -189,14 +190,28 @@ def _row_count(options: RunOptions) -> int:
     return step_count(options.t_end - options.t0, options.step) + 1
 
 
-def _judged(stats: EnsembleStats, problem: Problem, options: RunOptions, rows: Array, start: Starts) -> EnsembleStats:
-    """The same, with what speaks against the velocities of momenta."""
-    if problem.missing is None:
-        return stats
-    t0, times = options.t0, options.row_times
-    x, p = _steps_from(start, problem, t0)
-    missed = [missed_momenta(problem, times, rows[k], p[k], start=(t0, start.x[k], x[k])) for k in range(len(x))]
-    return replace(stats, warnings=tuple([(*a, *b) for a, b in zip(stats.warnings, missed, strict=True)]))
+def _ensemble(
+    problem: Problem,
+    watch: EventProgram,
+    options: RunOptions,
+    whole: Part,
+    starts: tuple[Array, Array, Array],
+    seconds: float,
+) -> Ensemble:
+    """All that has come.  starts: q and qd, the states (N, m) that they make, and the parameters of the problem."""
+    times, rows, nq, each = options.row_times, whole.rows, problem.nq, [*zip(*starts, strict=True)]
+    found = [split_crossings(watch, log, nq, p) for log, (*_, p) in zip(whole.happened, each, strict=True)]
+    crossings = {event.name: tuple([named[event.name] for named in found]) for event in watch.events}
+    missed = [missed_momenta(problem, times, rows[k], p, start=(options.t0, q, x)) for k, (q, x, p) in enumerate(each)]
+    texts = tuple([(*a, *b) for a, b in zip(whole.warnings, missed, strict=True)])
+    message, ended = tuple([status or REACHED for status in whole.status]), np.array(whole.ended)
+    success = ended | np.array([status == REACHED for status in message])
+    status, (largest, last) = np.where(ended, 1, np.where(success, 0, -1)), whole.errors
+    counts = (whole.steps, whole.rejected, whole.evaluations, whole.dt, seconds, success)
+    stats = EnsembleStats(options.method, *counts, message, status, largest, last, texts)
+    states = converted(problem.velocities, times, rows, starts[2][:, None])
+    momenta = rows[:, :, nq:] if problem.momenta else None
+    return Ensemble(times, states[:, :, :nq], states[:, :, nq:], stats, crossings, momenta)
 
 
 def _warnings(stats: EnsembleStats) -> list[str]:
@@ -244,23 +259,6 @@ def _grids(program: StepProgram, options: RunOptions, count: int) -> list[StepGr
     return grids if sum(grid.steps * grid.rows for grid in grids) <= options.max_steps else []
 
 
-def _steps_from(start: Starts, problem: Problem, t: float) -> tuple[Array, Array]:
-    """What the steps start from, states (N, m) and the parameters of the problem, (N, k)."""
-    names = problem.parameters
-    p = np.stack([start.varied[name] for name in names], axis=1) if names else start.x[:, :0]
-    return converted(problem.momentum, np.full(len(start.x), t), start.x, p), p
-
-
-def _table(problem: Problem, times: Array, rows: Array, p: Array) -> tuple[tuple[Array, Array], Array | None]:
-    """q and qd of the rows (N, T, m) that steps gave; and their momenta, if they are of these."""
-    count, many, m = rows.shape
-    states, nq = rows, problem.nq
-    if problem.momenta:
-        flat = (np.tile(times, count), rows.reshape(-1, m), np.repeat(p, many, axis=0))
-        states = converted(problem.velocities, *flat).reshape(rows.shape)
-    return (states[:, :, :nq], states[:, :, nq:]), rows[:, :, nq:] if problem.momenta else None
-
-
 def _chunks(x: Array, p: Array, width: int) -> list[Chunk]:
     return [Chunk(k, x[k : k + width], p[k : k + width]) for k in range(0, len(x), width)]
 
@@ -272,16 +270,26 @@ def _width(count: int, chunk: int | None, workers: int | Map, *, whole: bool) ->
     return math.ceil(chunk / VECTOR) * VECTOR if whole else int(chunk)
 
 
-def _run(task: Task, chunks: Sequence[Chunk], workers: int | Map, result: EnsembleRows) -> None:
-    """Run the chunks, by whoever shares them, until all parts have come, or Ctrl-C."""
+def _run(task: Task, chunks: Sequence[Chunk], workers: int | Map, whole: Part) -> None:
+    """Run the chunks, by whoever shares them, until all parts have come, or Ctrl-C; rows that have not are NaN.
+
+    Raises ValueError unless all parts come.
+    """
+    arrived = np.zeros(len(whole.rows), dtype=bool)
+    whole.status[:] = [INTERRUPTED] * len(arrived)
     try:
         with (
-            Progress("simulate", len(result.rows), task.options.progress) as report,
-            closing(finished(task, chunks, workers, result.rows)) as parts,
+            Progress("simulate", len(arrived), task.options.progress) as report,
+            closing(finished(task, chunks, workers, whole.rows)) as parts,
         ):
             for part in parts:
-                result.add(part)
-                report(int(result.arrived.sum()))
-        result.check()
+                whole.put(part)
+                arrived[part.first : part.first + len(part.rows)] = True
+                report(int(arrived.sum()))
+        if not arrived.all():
+            raise ValueError(
+                "workers must give a result for each item, as map does: of "
+                f"{len(arrived)} trajectories came back {arrived.sum()}"
+            )
     except KeyboardInterrupt:
-        pass
+        whole.rows[~arrived] = math.nan

@@ -14,7 +14,6 @@ from cgraph.extend import Array, memo, runner
 
 from ..equal_steps import equal_steps
 from ..error_estimate import ErrorEstimate, Estimator
-from ..event_log import EventLog, Happening
 from ..event_program import EventProgram
 from ..integration import integration
 from ..recorder import Recorder
@@ -50,7 +49,7 @@ class Task:
 
     def run(self, chunk: Chunk, rows: Array, stopped: Callable[[], bool]) -> Part:
         """Run the chunk into rows (k, T, m), to its end, or until soon after Ctrl-C or `stopped`: see the part."""
-        part = empty(chunk, rows)
+        part = empty(chunk.first, rows)
         with np.errstate(all="ignore"):
             (self._side_by_side if self.grids else self._one_by_one)(chunk, part, stopped)
         return part
@@ -84,8 +83,11 @@ class Task:
     def _one_by_one(self, chunk: Chunk, part: Part, stopped: Callable[[], bool]) -> None:
         with _lock:
             compiled = _compiled(self.pickled, self.options.backend)
+        events = _event_program(self.events) if self.events else None
         for k, x in enumerate(chunk.x):
-            run = self._run(compiled, chunk.p[k].tolist(), stopped, part.happened[k])
+            run = integration(compiled, self.options, chunk.p[k].tolist(), stopped, events=events)
+            if isinstance(run, WatchedIntegration):
+                part.happened[k] = run.log.happened
             recorder = Recorder(x, self.options.times, self.options.t0, self.options.direction)
             interrupted, error = self._interrupted(run, x, recorder)
             states = recorder.table()[1]
@@ -101,33 +103,14 @@ class Task:
 
     def _interrupted(self, run: Integration, x: Array, recorder: Recorder) -> tuple[bool, ErrorEstimate | None]:
         """Run one trajectory; whether it was interrupted, and its error where that is estimated."""
-        estimate = RunEstimate(run, x, self.options) if self.options.estimated else None
+        estimate = RunEstimate(run, x, self.options)
         try:
             for block in run.blocks(x):
                 recorder.add(block)
-                if estimate is not None:
-                    estimate.add(block)
-            return False, estimate.result() if estimate is not None and not run.status else None
+                estimate.add(block)
+            return False, None if run.status else estimate.result()
         except (KeyboardInterrupt, StoppedError):
             return True, None
-
-    def _run(
-        self,
-        compiled: CompiledSteps,
-        parameters: list[float],
-        stopped: Callable[[], bool],
-        happened: list[Happening],
-    ) -> Integration:
-        """One trajectory before its first step; its events will be in `happened`."""
-
-        def leg(options: RunOptions) -> Integration:
-            return integration(compiled, options, parameters, stopped, every_step=bool(self.events))
-
-        if not self.events:
-            return leg(self.options)
-        log = EventLog(_event_program(self.events))
-        log.happened = happened
-        return WatchedIntegration(leg, self.options, log)
 
 
 _lock = threading.Lock()  # threads that come at the same time wait for one to make the code

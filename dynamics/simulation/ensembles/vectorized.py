@@ -14,7 +14,7 @@ from ..courses import Course
 from ..error_estimate import Estimator
 from ..state_difference import States
 from ..step_program import StepProgram
-from ..stepping import failed_step
+from ..stepping import begin_equal, failed_step, nonfinite
 from .chunk import INTERRUPTED, Chunk, Part
 from .step_grid import StepGrid
 
@@ -48,12 +48,6 @@ def _block_limits(code: VectorCode, count: int) -> tuple[int, int]:
     return SEEN * max(1, limits[0] // SEEN), SEEN * max(1, limits[1] // SEEN)
 
 
-def _begin(code: VectorCode, memories: Array, begin: float, h: float) -> None:
-    """The steps that follow are of h [s], from `begin` on."""
-    for name, value in (("start", begin), ("t", begin), ("count", 0.0), ("h", h)):
-        code.one_pass.write(memories, name, value)
-
-
 def _advanced(code: VectorCode, memories: Array, steps: int, every: int) -> tuple[Array, States]:
     """So many steps: the record of each `every`th, and its states."""
     record = code.one_pass.run_many(memories, steps, every).rows
@@ -65,7 +59,7 @@ def beside(code: VectorCode, course: Course, x: Array, p: Array) -> Iterator[Sta
     """The states of runs from x (k, m) with parameters p (k, ..) on another course."""
     memories, most = _start_memories(code, x, p), min(_block_limits(code, len(x)))
     for number, stretch in enumerate(course.stretches):
-        _begin(code, memories, stretch.begin, stretch.h)
+        begin_equal(code.one_pass, memories, stretch.begin, stretch.h)
         for done in range(0, stretch.steps, most):
             steps = min(most, stretch.steps - done)
             yield _advanced(code, memories, steps, math.gcd(steps, 1 if number else course.every))[1]
@@ -95,7 +89,7 @@ class VectorizedIntegration:
 
     def begin(self, grid: StepGrid) -> None:
         """The steps that follow are of this grid."""
-        _begin(self.code, self._memories, grid.begin, grid.h)
+        begin_equal(self.runner, self._memories, grid.begin, grid.h)
         self.part.dt[self._live] = np.maximum(self.part.dt[self._live], abs(grid.h))
 
     def advance(self, steps: int, every: int, due: bool) -> None:
@@ -163,7 +157,5 @@ class VectorizedIntegration:
         row = int(np.argmax(~np.isfinite(rows).all(axis=1)))
         self.part.steps[k] = self._done + row
         self.part.evaluations[k] = so_far + (row + 1) * (evaluations[0, 0] - so_far) / steps
-        t, state = rows[row, 0], rows[row, 1 : 1 + self.program.size]
-        first = int(np.argmax(~np.isfinite(state)))
-        where = f"{self.program.components[first]} is {state[first]} after the step"
-        self.part.status[k] = f"stopped at t = {t:.6g} s: {where}"
+        what = nonfinite(self.program.components, rows[row, 1 : 1 + self.program.size])
+        self.part.status[k] = f"stopped at t = {rows[row, 0]:.6g} s: {what}"

@@ -42,7 +42,7 @@ def accepted_steps(
     """The motion from a start (q, qd), with values of the parameters of the problem. Ctrl-C is KeyboardInterrupt."""
     program = event_program(problem, events) if events else None
     made = partial(integration_of, problem, parameters=parameters.tolist(), events=program, between=bool(events))
-    x = converted(problem.momentum, np.array([options.t0]), start[None], parameters[None])[0]
+    x = converted(problem.momentum, options.t0, start, parameters)
     run, recorder = made(options), Recorder(x, None, options.t0, options.direction)
     with np.errstate(all="ignore"):
         for block in run.blocks(x):

@@ -19,13 +19,11 @@ from ...systems.model import Model
 from ...systems.system import System
 from ..applied_forces import Constant
 from ..event import Event, as_events
-from ..event_program import event_program
 from ..trajectory import SimulationWarning
 from .doubts import doubts
-from .legs import Bars, Legs
+from .legs import Bars, Legs, legs_of
 from .loss_function import loss_graph, with_slopes
 from .motion import START, TORQUE, VELOCITY, MotionOf, motion_of
-from .motion_programs import Request, motion_programs
 from .point_functions import at
 
 Loss = Callable[..., Node]
@@ -111,7 +109,7 @@ def gradient(
     loss : callable, optional
         (q, qd, t) or (q, qd, t, p) of the state and time where the motion ends, to a node; of an OdeSystem (x, t) or
         (x, t, p). None for a running loss alone.
-    q, qd, t_end, t0, t_span, dt, max_step, rtol, atol, first_step, backend, form
+    q, qd, t_end, t0, t_span, dt, max_step, rtol, atol, first_step, parameters, backend, form
         As for `simulate`.
     method : str, optional
         A name of `dyn.METHODS`, of equal or chosen steps, but "taylor". By default that of `simulate`, "dop853", which
@@ -125,8 +123,6 @@ def gradient(
     tau : float, array_like or callable
         Applied force [N m or N]: constant, (n,); of equal steps one row a step, (steps, n), which says how many there
         are; or a controller in closed form, as for `simulate`, whose parameters may be in `wrt`.
-    parameters : mapping, optional
-        {name: value} in place of the model's own, and of those that a controller has besides.
     events : Event or iterable of Event
         Those of `simulate`: where one ends the motion or resets its state depends on all before, and so do the steps
         after it. Not with a row of forces a step.
@@ -163,7 +159,7 @@ def gradient(
     options = {"dt": dt, "max_step": max_step, "rtol": rtol, "atol": atol, "first_step": first_step, "backend": backend}
     options["estimate_error"] = estimate_error
     watched = as_events(events)
-    motion = motion_of(model, q, qd, (t_end, t0, t_span), method, tau, parameters, wrt, options, watched, form)
+    motion = motion_of(model, q, qd, (t_end, t0, t_span), method, tau, parameters, wrt, options, form, watched)
     value, gradients, legs, slopes = differentiated(motion, loss, running, watched)
     for text in doubts(legs, value, gradients, slopes)[0]:
         warnings.warn(text, SimulationWarning, stacklevel=2)
@@ -184,21 +180,7 @@ def differentiated(
         raise ValueError("a loss is needed: of the end of the motion, `loss`, of how it goes, `running`, or both")
     final = None if loss is None else loss_graph(problem, quantity(problem, "loss", loss))
     total = None if running is None else loss_graph(problem, quantity(problem, "running", running, motion.applied))
-    by = [TORQUE] if TORQUE in motion.wrt else []
-    by += ["p", "c"] if motion.by_parameters else []
-    by += ["t", "h"] if watched else []
-    request = Request(
-        motion.equations,
-        motion.method,
-        motion.each_step,
-        tuple(by),
-        forwards=False,
-        backend=motion.backend,
-        many=motion.many > 0,
-        running=total,
-    )
-    program = event_program(problem, watched)
-    legs = Legs(motion, motion_programs(request), {event.name: event for event in program.events})
+    legs = legs_of(motion, watched, total, forwards=False)
     value, end = _final(final, motion, legs)
     start, inputs, rows = legs.pulled(end)
     return value + legs.loss, _gradients(motion, start, inputs, rows, end), legs, (start, end.x)

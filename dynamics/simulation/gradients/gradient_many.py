@@ -11,30 +11,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Node
-from cgraph.extend import Array, real_array
+from cgraph.extend import Array
 
-from ...integrators import METHODS, Problem, derive, in_form
 from ...systems.model import Model
-from ..applied_forces import with_applied
-from ..ensembles.initial_states import starts
-from ..run_options import time_span
-from ..sampled_controller import SampledController
 from ..trajectory import SimulationWarning
 from .doubts import doubts
 from .gradient import Loss, differentiated
-from .motion import (
-    START,
-    TORQUE,
-    VELOCITY,
-    MotionError,
-    MotionOf,
-    changing_forces,
-    equal_leg,
-    legs_of,
-    names_of,
-    options_of,
-)
-from .motion_equations import motion_equations
+from .motion import START, TORQUE, VELOCITY, MotionError, MotionOf, motion_of
 
 FEW = 4  # motions: fewer by a method that iterates are done sooner one by one
 WIDE = 16  # motions side by side: whole vectors of any processor, of which what is recorded stays in its caches
@@ -140,8 +123,8 @@ def gradient_many(
     """
     options = {"dt": dt, "max_step": max_step, "rtol": rtol, "atol": atol, "first_step": first_step, "backend": backend}
     options |= {"estimate_error": estimate_error}
-    motions, problem = _motions(model, q, qd, time_span(t_end, t0, t_span), method, tau, parameters, wrt, options, form)
-    count, nq, run = motions.many, problem.nq, motions.options
+    motions = motion_of(model, q, qd, (t_end, t0, t_span), method, tau, parameters, wrt, options, form, many=True)
+    count, problem, run = motions.many, motions.problem, motions.options
     parts = _parts(motions)
     value, end = np.full(count, np.nan), np.full((count, problem.size), np.nan)
     by_name = {name: np.full((count, *shape), np.nan) for name, shape in _shapes(motions).items()}
@@ -149,8 +132,7 @@ def gradient_many(
     for part in parts:
         first = part if isinstance(part, int) else part.start
         try:
-            motion = _some(motions, problem, part)
-            losses, slopes, legs, ends = differentiated(motion, loss, running)
+            losses, slopes, legs, ends = differentiated(_some(motions, part), loss, running)
         except MotionError as error:
             if isinstance(part, int):
                 early[first] = str(error)
@@ -173,7 +155,7 @@ def gradient_many(
             text = f"{len(sentences)} of {count} motions {what}: motion {first}: {text}"
             warnings.warn(text, SimulationWarning, stacklevel=2)
     t = motions.legs[0].t.copy() if motions.legs else np.array([run.t0, run.t_end])
-    return MotionGradients(value, by_name, t, end[:, :nq], end[:, nq:])
+    return MotionGradients(value, by_name, t, end[:, : problem.nq], end[:, problem.nq :])
 
 
 def _parts(motions: MotionOf) -> list[int | slice]:
@@ -198,76 +180,7 @@ def _by_motion(array: Any, part: int | slice) -> Array:
     return np.moveaxis(rows, -1, 0) if isinstance(part, slice) else rows[None]
 
 
-def _some(motions: MotionOf, problem: Problem, part: int | slice) -> MotionOf:
-    """One of the motions, or some of them; one by chosen steps with these. problem: without numbers of parameters."""
-    some = replace(motions, x=motions.x[:, part], tau=motions.tau[..., part], values=motions.values[:, part])
-    if motions.legs:
-        return some
-    parameters = np.concatenate([some.tau, some.values])[: len(problem.parameters)]
-    legs, said = legs_of(problem, motions.options, (), some.x, parameters)
-    return replace(some, legs=legs, said=said)
-
-
-def _motions(
-    model: Model,
-    q: ArrayLike,
-    qd: ArrayLike | None,
-    span: tuple[float, float],
-    method: str | None,
-    tau: Any,
-    parameters: Mapping[str, ArrayLike] | None,
-    wrt: str | Iterable[str] | None,
-    options: Mapping[str, Any],
-    form: str,
-) -> tuple[MotionOf, Problem]:
-    """The motions of checked arguments, side by side, those by chosen steps without legs; and their problem."""
-    t0, t_end = span
-    if isinstance(tau, SampledController):
-        raise TypeError("tau must be numbers or a controller in closed form, got a SampledController")
-    rows = _rows(tau)
-    run = options_of(t_end, method, t0, options, rows=rows is not None)
-    if run.adaptive and rows is not None:
-        needed = f"equal steps: method {method!r} chooses its steps"
-        raise ValueError(f"tau of shape {rows.shape} is one row a step, which needs {needed}")
-    moving, applied = with_applied(model, 0.0 if rows is not None or not callable(tau) else tau, parameters)
-    constant = 0.0 if rows is not None or callable(tau) else tau
-    if rows is not None:  # a motion for each of their first forces
-        constant = rows[:, 0]
-    start = starts(moving, q, qd, constant, parameters, t0)
-    run.check(start.states)
-    chosen, count = names_of(moving, wrt, closed=callable(tau)), len(start.x)
-    forced = rows is not None or TORQUE in chosen or np.ndim(constant) == 2
-    inputs = changing_forces(moving, start.same, forced=forced)
-    free = {*inputs, *chosen, *start.varied, *(parameters or ())}
-    problem = in_form(derive(moving, {name: value for name, value in start.same.items() if name not in free}), form)
-    columns, equations = start.same | start.varied, motion_equations(problem, len(inputs))
-    forces, values = (
-        np.array([np.broadcast_to(columns[name], count) for name in names], dtype=np.float64).reshape(len(names), count)
-        for names in (inputs, equations.names)
-    )
-    if rows is not None:
-        forces = np.broadcast_to(np.moveaxis(rows, 0, -1), (*rows.shape[1:], count))
-    motions = MotionOf(
-        equations,
-        METHODS[run.method],
-        start.x.T.copy(),
-        () if run.adaptive else (equal_leg(run, None if rows is None else rows.shape[1]),),
-        np.empty(0),
-        np.empty(0),
-        forces,
-        rows is not None,
-        equations.values(values, run.backend),
-        chosen,
-        applied.nodes,
-        run,
-    )
-    return motions, problem
-
-
-def _rows(tau: Any) -> Array | None:
-    """tau where it is one row a step, (N, steps, n)."""
-    if callable(tau) or (rows := real_array("tau", tau)).ndim != 3:
-        return None
-    if not rows.size or not np.isfinite(rows).all():
-        raise ValueError(f"tau must be finite numbers of the shape (N, steps, n), got shape {rows.shape}")
-    return rows
+def _some(motions: MotionOf, part: int | slice) -> MotionOf:
+    """One of the motions, or some of them; one by chosen steps with these."""
+    x, tau, values = (array[..., part] for array in (motions.x, motions.tau, motions.values))
+    return replace(motions, x=x, tau=tau, values=values).with_legs()

@@ -17,9 +17,10 @@ import cgraph as cg
 from cgraph import Graph
 from cgraph.extend import Array, kept_by_first
 
-from ..event_program import WatchedEvent
-from .motion import Leg, MotionError, MotionOf
-from .motion_programs import MotionPrograms
+from ..event import Event
+from ..event_program import WatchedEvent, event_program
+from .motion import TORQUE, Leg, MotionError, MotionOf
+from .motion_programs import MotionPrograms, Request, motion_programs
 from .motion_run import MotionRun
 from .motion_steps import LOSS
 
@@ -140,6 +141,17 @@ class Legs:
         share = -(run.last_slope(end.x) + end.t) / slope
         inputs += share * g.inputs
         return Bars(end.x + share * g.x, 0.0, inputs), end.t + share * g.t
+
+
+def legs_of(motion: MotionOf, watched: Sequence[Event], running: Graph | None = None, *, forwards: bool) -> Legs:
+    """The legs of a motion, along which tangents are to be pushed forwards, or cotangents pulled back."""
+    by = [TORQUE] if TORQUE in motion.wrt else []
+    by += ["p", "c"] if motion.by_parameters else []
+    by += ["t", "h"] if watched else []
+    many, backend = motion.many > 0, motion.backend
+    request = Request(motion.equations, motion.method, motion.each_step, tuple(by), forwards, backend, many, running)
+    events = {event.name: event for event in event_program(motion.problem, watched).events}
+    return Legs(motion, motion_programs(request), events)
 
 
 def _steps(leg: Leg, begin: float) -> tuple[Array, Array]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike
 from cgraph import Node
 from cgraph.extend import Array, memo, real_array, require_sequence
 
-from ...equations.initial_value import initial_value
+from ...equations.initial_value import initial_values
 from ...equations.state_equation import state_inputs
 from ...integrators import METHODS, Method, Problem, derive, in_form
-from ...systems.model import Model, as_ode, as_system
+from ...systems.model import Model
 from ..applied_forces import with_applied
 from ..equal_steps import step_count
 from ..event import Event
@@ -97,6 +97,20 @@ class MotionOf:
         """How many of the applied forces are inputs."""
         return self.equations.forces
 
+    def with_legs(self, events: Sequence[Event] = ()) -> MotionOf:
+        """The same with the legs that chosen steps and events make, and what speaks against these steps.
+
+        Raises MotionError for a motion that does not reach its end.
+        """
+        if self.legs:
+            return self
+        problem, run = self.equations.given, self.options
+        parameters = np.concatenate([self.tau, self.values])[: len(problem.parameters)]
+        motion = accepted_steps(problem, run, events, self.x, parameters)
+        if motion.status:
+            raise MotionError(f"the motion did not reach t_end, {motion.status}")
+        return replace(self, legs=_legs(motion, run, events), said=motion.said)
+
     def at_end(self, x: Array, t: float) -> Array:
         """The inputs of a graph over the states, t and parameters, at a state and an instant of the last step."""
         return np.concatenate([x, np.full((1, *x.shape[1:]), t), self.force_at_end, self.values])
@@ -134,14 +148,17 @@ def motion_of(
     span: tuple[float | None, float, ArrayLike | None],
     method: str | None,
     tau: Any,
-    parameters: Mapping[str, float] | None,
+    parameters: Mapping[str, ArrayLike] | None,
     wrt: str | Iterable[str] | None,
     options: Mapping[str, Any],
+    form: str,
     events: Sequence[Event] = (),
-    form: str = "velocity",
+    *,
+    many: bool = False,
 ) -> MotionOf:
     """The motion of checked arguments.  span: t_end, t0, t_span.  options: those of `simulate` besides.
 
+    many: N motions side by side, of which those by chosen steps have no legs yet.
     Raises TypeError or ValueError naming the argument, and MotionError for a motion that does not reach its end.
     """
     if isinstance(tau, SampledController):
@@ -149,34 +166,35 @@ def motion_of(
             "tau must be numbers or a controller in closed form: a SampledController calls Python, which has no "
             "derivative"
         )
-    t0, t_end = time_span(span[0], span[1], span[2])
-    rows = None if callable(tau) else _rows(model, tau)
+    t0, t_end = time_span(*span)
+    rows = None if callable(tau) else _rows(model, tau, many=many)
     run = options_of(t_end, method, t0, options, rows=rows is not None)
-    moving, applied = with_applied(model, 0.0 if rows is not None else tau, parameters)
-    start = initial_value(moving, q, qd, applied.constant, parameters, t0)
+    if rows is not None and (run.adaptive or events):
+        needed = "equal steps without events" if events else f"equal steps: method {method!r} chooses its steps"
+        raise ValueError(f"tau of shape {np.shape(tau)} is one row a step, which needs {needed}")
+    moving, applied = with_applied(model, tau if rows is None else 0.0, parameters)
+    constant = rows[:, 0] if many and rows is not None else applied.constant  # a motion for each of their first forces
+    start = initial_values(moving, q, qd, constant, parameters, t0, many=many)
     run.check(start.states)
-    chosen = names_of(moving, wrt, closed=callable(tau))
-    forced = rows is not None or TORQUE in chosen
-    inputs = changing_forces(moving, start.bound, forced=forced)
+    chosen, names = names_of(moving, wrt, closed=callable(tau)), state_inputs(moving).applied
+    forced = rows is not None or TORQUE in chosen or not start.varied.keys().isdisjoint(names)
+    inputs = names if forced or any([start.bound[name] != 0.0 for name in names]) else ()
     free = {*inputs, *chosen, *(parameters or ())}  # what a caller changes from call to call stays an input
     problem = in_form(derive(moving, {name: value for name, value in start.bound.items() if name not in free}), form)
-    constant = np.array([start.bound[name] for name in inputs])
-    equations = motion_equations(problem, len(inputs))
-    values = np.array([start.bound[name] for name in equations.names])
-    said: tuple[str, ...] = ()
-    if run.adaptive or events:
-        if rows is not None:
-            needed = "equal steps without events" if events else f"equal steps: method {method!r} chooses its steps"
-            raise ValueError(f"tau of shape {rows.shape} is one row a step, which needs {needed}")
-        legs, said = legs_of(problem, run, events, start.x, np.concatenate([constant, values]))
-    else:
-        legs = (equal_leg(run, None if rows is None else len(rows)),)
-    forces = constant if rows is None else rows
-    return MotionOf(
+    equations, columns = motion_equations(problem, len(inputs)), start.bound | start.varied
+    ones = np.ones(start.x.shape[:1] if many else ())
+    forces, values = (
+        np.array([columns[name] * ones for name in each]).reshape(len(each), *ones.shape)
+        for each in (inputs, equations.names)
+    )
+    if rows is not None:
+        forces = np.broadcast_to(np.moveaxis(rows, 0, -1), (*rows.shape[1:], len(start.x))) if many else rows[0]
+    chosen_steps = run.adaptive or events
+    motion = MotionOf(
         equations,
         METHODS[run.method],
-        start.x,
-        legs,
+        start.x.T.copy() if many else start.x[0],
+        () if chosen_steps else (equal_leg(run, None if rows is None else rows.shape[1]),),
         np.empty(0),  # of steps, before the legs are run
         np.empty(0),
         forces,
@@ -185,14 +203,8 @@ def motion_of(
         chosen,
         applied.nodes,
         run,
-        said,
     )
-
-
-def changing_forces(model: Model, bound: Mapping[str, float], *, forced: bool) -> tuple[str, ...]:
-    """The applied forces that are inputs: none where they are 0, unless `forced`."""
-    applied = state_inputs(model).applied
-    return applied if forced or any([bound.get(name, 0.0) != 0.0 for name in applied]) else ()
+    return motion if many else motion.with_legs(events)
 
 
 def options_of(
@@ -218,23 +230,24 @@ def _checked_options(t_end: float, method: str, t0: float, *options: tuple[str, 
     return run
 
 
-def _rows(model: Model, tau: Any) -> Array | None:
-    """tau where it is one row a step, (steps, n)."""
+def _rows(model: Model, tau: Any, *, many: bool) -> Array | None:
+    """tau where it is one row a step, (steps, n), or of many motions (N, steps, n), with the axis N in both."""
     rows = real_array("tau", tau)
-    if rows.ndim != 2:
+    if rows.ndim != (3 if many else 2):
         return None
-    n = 0 if as_ode(model) is not None else as_system(model).n
-    if not n or rows.shape[1] != n or not len(rows):
-        raise ValueError(f"tau must have shape (n,) or (steps, n) with n = {n} velocities, got {rows.shape}")
+    n = len(state_inputs(model).applied)
+    if not rows.size or rows.shape[-1] != n:
+        shapes = "(N, n) or (N, steps, n)" if many else "(n,) or (steps, n)"
+        raise ValueError(f"tau must have shape {shapes} with n = {n} velocities, got {rows.shape}")
     if not np.isfinite(rows).all():
         raise ValueError("tau must be finite")
-    return rows
+    return rows if many else rows[None]
 
 
 def names_of(model: Model, wrt: str | Iterable[str] | None, *, closed: bool) -> tuple[str, ...]:
     """What to differentiate by. By default the start, and the applied force where it is numbers."""
-    ode, inputs = as_ode(model) is not None, state_inputs(model)
-    usual = [START] if ode else [START, VELOCITY] if closed else [START, VELOCITY, TORQUE]
+    inputs = state_inputs(model)
+    usual = [START] if not inputs.applied else [START, VELOCITY] if closed else [START, VELOCITY, TORQUE]
     if wrt is None:
         return tuple(usual)
     names = [wrt] if isinstance(wrt, str) else require_sequence("wrt", wrt, "names")
@@ -262,19 +275,6 @@ def _equal_leg(t0: float, t_end: float, count: int) -> Leg:
     t = np.append(t0 + np.arange(count) * ((t_end - t0) / count), t_end)
     t.flags.writeable = False  # of all who have it
     return Leg(t, equal=count, end=t_end)
-
-
-def legs_of(
-    problem: Problem, run: RunOptions, events: Sequence[Event], start: Array, parameters: Array
-) -> tuple[tuple[Leg, ...], tuple[str, ...]]:
-    """The legs of a motion from a start (q, qd), and what speaks against its steps.
-
-    Raises MotionError for one that does not reach its end.
-    """
-    motion = accepted_steps(problem, run, events, start, parameters)
-    if motion.status:
-        raise MotionError(f"the motion did not reach t_end, {motion.status}")
-    return _legs(motion, run, events), motion.said
 
 
 def _legs(motion: AcceptedSteps, run: RunOptions, events: Sequence[Event]) -> tuple[Leg, ...]:

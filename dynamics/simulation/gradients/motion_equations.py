@@ -26,7 +26,7 @@ PARAMETERS = ("tau", "p", "c")  # registers: what the parameters of the problem 
 
 @dataclass(frozen=True, eq=False)
 class MotionEquations:
-    """A problem whose parameters are applied forces, p, and c.
+    """A problem whose parameters are applied forces, p, and c.  given: the one without c.
 
     forces: how many of the parameters are applied forces.  names: of p.  numbers: c, a graph over p, if there are any.
     pullback: of the rate, where there is one.
@@ -34,6 +34,7 @@ class MotionEquations:
     start, end: (q, qd) to a state of the steps and back, over states, t, parameters; None where they are the same.
     """
 
+    given: Problem
     problem: Problem
     forces: int
     names: tuple[str, ...]
@@ -92,7 +93,7 @@ def motion_equations(problem: Problem, forces: int) -> MotionEquations:
     made = replace(problem, parameters=parameters, rate=rate, projection=projected, multipliers=None)
     over_p = Graph(cg.variables(list(names)), outputs) if outputs else None
     ways = _whole(made, made.momentum), _whole(made, made.velocities)
-    return MotionEquations(made, forces, names, over_p, pullback, *_sharing(rate, pullback), *ways)
+    return MotionEquations(problem, made, forces, names, over_p, pullback, *_sharing(rate, pullback), *ways)
 
 
 def _whole(problem: Problem, last: Graph | None) -> Graph | None:

@@ -13,7 +13,7 @@ import numpy as np
 from cgraph.extend import Array, Runner, Tape, run_passes
 
 from ..dense_output import Indices
-from ..stepping import unsolved
+from ..stepping import nonfinite, unsolved
 from .motion import MotionError, MotionOf
 from .motion_programs import Along, MotionPrograms
 from .motion_steps import LOSS
@@ -108,11 +108,11 @@ class MotionRun:
                 memory, size = before, max(1, (last - first) // 16)
         x = forward.read(memory, self.step.passes.handed["x"])
         x = x if k is None else x[:, k]
-        where, bad = f"stopped at t = {motion.t[first + 1]:.6g} s", np.flatnonzero(~np.isfinite(x))
-        if len(bad):
-            return f"{where}: {motion.problem.components[bad[0]]} is {x[bad[0]]} after the step"
+        where, names = f"stopped at t = {motion.t[first + 1]:.6g} s", motion.problem.components
+        if what := nonfinite(names, x):
+            return f"{where}: {what}"
         old = forward.read(before, self.step.passes.handed["x"])
-        return f"{where}: {unsolved(motion.problem.components, old if k is None else old[:, k], x)}"
+        return f"{where}: {unsolved(names, old if k is None else old[:, k], x)}"
 
     def states(self) -> tuple[Indices, Array]:
         """After how many steps (T,), and states (T, m), from the start to the end: all that are kept."""

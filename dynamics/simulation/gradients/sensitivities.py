@@ -16,12 +16,10 @@ from cgraph.extend import Array
 from ...systems.model import Model
 from ..applied_forces import Constant
 from ..event import Event, as_events
-from ..event_program import event_program
 from ..trajectory import SimulationWarning
 from .doubts import doubts
-from .legs import Legs
+from .legs import legs_of
 from .motion import START, TORQUE, VELOCITY, MotionOf, motion_of
-from .motion_programs import Request, motion_programs
 from .pushed_legs import pushed_legs
 
 
@@ -128,16 +126,11 @@ def sensitivities(
     options = {"dt": dt, "max_step": max_step, "rtol": rtol, "atol": atol, "first_step": first_step, "backend": backend}
     options["estimate_error"] = estimate_error
     watched = as_events(events)
-    motion = motion_of(model, q, qd, (t_end, t0, t_span), method, tau, parameters, wrt, options, watched, form)
+    motion = motion_of(model, q, qd, (t_end, t0, t_span), method, tau, parameters, wrt, options, form, watched)
     if motion.each_step:
         raise ValueError(f"tau must be constant, (n,), got shape {motion.tau.shape}: gradient takes a row a step")
-    by = [TORQUE] if TORQUE in motion.wrt else []
-    by += ["p", "c"] if motion.by_parameters else []
-    by += ["t", "h"] if watched else []
-    request = Request(motion.equations, motion.method, False, tuple(by), forwards=True, backend=backend)
     directions, columns = _directions(motion)
-    program = event_program(motion.problem, watched)
-    legs = Legs(motion, motion_programs(request), {event.name: event for event in program.events})
+    legs = legs_of(motion, watched, forwards=True)
     for text in doubts(legs, 0.0, {})[0]:
         warnings.warn(text, SimulationWarning, stacklevel=2)
     t, x, t_dot, x_dot = pushed_legs(legs, directions)

@@ -193,7 +193,7 @@ Q = np.zeros((4, 2))
     [
         (np.zeros((4, 3)), Q, {}, r"q must have shape \(N, 2\), or \(2,\) for all trajectories, got \(4, 3\)"),
         (Q, 0.0, {}, r"qd must have shape \(N, 2\), or \(2,\) for all trajectories, got \(\)"),
-        (Q, None, {}, r"qd must have shape \(N, 2\) or \(2,\), got None"),
+        (Q, None, {}, r"qd must have shape \(N, 2\), or \(2,\) for all trajectories, got None"),
         (Q, Q[:3], {}, "must have the same number of trajectories, got: q has 4, qd has 3"),
         (Q, Q, {"tau": np.zeros((5, 2))}, "got: q has 4, qd has 4, tau has 5"),
         (Q, Q, {"tau": [1.0]}, "tau needs one number for each of .*: 2, got 1"),
