@@ -22,7 +22,7 @@ class _Buffers(NamedTuple):
     directions: Array
     results: Array
     tiles: memoryview
-    check: Array | None
+    check: memoryview | None
     run: Callable[[], None]
 
 
@@ -72,19 +72,17 @@ class DirectionProducts:
             _in_tiles(result[: full * lanes], lanes)[...] = y[:full]
         if rest:
             result[full * lanes :] = y[full, :, :rest].T
-        lost = False
-        if buffers.check is not None:
-            check = buffers.check[:count]
-            lost = math.isnan(check.dot(check))
+        found = b"" if buffers.check is None else buffers.check[: 8 * count].tobytes()
         self._free.append(buffers)
-        if lost:
+        if found.count(0) < len(found):  # zeros, but NaN where a result is infinite or NaN
             self._in_guard(x, directions, result)
 
     def _buffers(self) -> _Buffers:
         x, y = np.empty(self._runner.program.registers["x"]), aligned(math.prod(self._results))
         run, registers = self._runner._bind_pass(("x", x), ("y", y))
-        s = registers["s0"].reshape(self._tiles)
-        return _Buffers(x.data, s, y.reshape(self._results), registers["tiles0"].data, registers.get("check0"), run)
+        s, check = registers["s0"].reshape(self._tiles), registers.get("check0")
+        found = None if check is None else check.data.cast("B")
+        return _Buffers(x.data, s, y.reshape(self._results), registers["tiles0"].data, found, run)
 
     def _in_guard(self, x: Array, directions: Array, result: Array) -> None:
         """By the split in which zeros win, made at its first use."""

@@ -64,7 +64,13 @@ class PythonRunner(Runner):
 
     def _bind_pass(self, x: tuple[str, Array], y: tuple[str, Array]) -> tuple[Callable[[], None], Mapping[str, Array]]:
         arrays = {name: np.zeros(length) for name, length in self.program.registers.items() if name not in (x[0], y[0])}
-        arrays[y[0]] = y[1].reshape(-1)
+        flat = arrays[y[0]] = y[1].reshape(-1)
+        if (graph := self.program.whole_graph(x[0])) is not None:
+
+            def call() -> None:
+                flat[:] = self._at(graph, x[1].tolist())
+
+            return call, arrays
         execution = Execution(self.program.registers, self._at, self._batch)
 
         def run() -> None:
