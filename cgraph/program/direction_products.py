@@ -47,10 +47,12 @@ class DirectionProducts:
 
     def __call__(self, x: Array, directions: Array, result: Array) -> None:
         """The results, (k, results), along directions, (k, entries), at a point."""
-        tiles, _, lanes = self._tiles
-        for start in range(0, len(directions), tiles * lanes):  # between blocks, Ctrl-C is heard
-            stop = start + tiles * lanes
-            self._block(x, directions[start:stop], result[start:stop])
+        size = self._tiles[0] * self._tiles[2]
+        if len(directions) <= size:
+            self._block(x, directions, result)
+            return
+        for start in range(0, len(directions), size):  # between blocks, Ctrl-C is heard
+            self._block(x, directions[start : start + size], result[start : start + size])
 
     def _block(self, x: Array, directions: Array, result: Array) -> None:
         try:
@@ -62,14 +64,14 @@ class DirectionProducts:
         s, y = buffers.directions, buffers.results
         buffers.x[:] = x
         if full:
-            s[:full] = _in_tiles(directions[: full * lanes], lanes)
+            s[:full] = directions[: full * lanes].reshape(full, lanes, s.shape[1]).transpose(0, 2, 1)
         if rest:  # the last tile is filled up with zeros
             s[full, :, :rest] = directions[full * lanes :].T
             s[full, :, rest:] = 0.0
         buffers.tiles[0] = full + bool(rest)
         buffers.run()
         if full:
-            _in_tiles(result[: full * lanes], lanes)[...] = y[:full]
+            result[: full * lanes].reshape(full, lanes, y.shape[1]).transpose(0, 2, 1)[...] = y[:full]
         if rest:
             result[full * lanes :] = y[full, :, :rest].T
         found = b"" if buffers.check is None else buffers.check[: 8 * count].tobytes()
@@ -89,8 +91,3 @@ class DirectionProducts:
         if self._careful is None:
             self._careful = DirectionProducts(self._derivative.careful, *self._how)
         self._careful(x, directions, result)
-
-
-def _in_tiles(rows: Array, lanes: int) -> Array:
-    """Rows, contiguous or read, as tiles: (tiles, numbers in a row, lanes)."""
-    return rows.reshape(len(rows) // lanes, lanes, rows.shape[1]).transpose(0, 2, 1)

@@ -8,7 +8,7 @@ from ..codegen.arithmetic import REGISTERS, Arithmetic
 from ..codegen.llvm_engine import MissingFunctionError
 from ..codegen.llvm_ir import libm_functions, point_arithmetic, preamble, scalar_ir
 from .llvm_functions import Functions
-from .program import Program
+from .program import Program, whole_graph
 from .statement import row_of
 from .writer import Writer, copy_text
 
@@ -67,7 +67,7 @@ def point_ir(
 
     The others lie in `memory`, at the places that come with it, see `offsets`.
     """
-    graph = program.whole_graph(x)
+    graph = whole_graph(program, x)
     if graph is not None:
         return scalar_ir(graph, flags, registers), {"": 0}
     functions = Functions(point_arithmetic(flags, registers), width)

@@ -20,7 +20,7 @@ from ..core.scope import without_collection
 from ..util.memory import aligned
 from .fuse import fused
 from .llvm_ir import point_ir, program_functions, program_ir, require_texts
-from .program import Program
+from .program import Program, whole_graph
 from .rows_ir import program_rows_ir
 from .runner import Record, Runner
 
@@ -131,14 +131,14 @@ class NativeRunner(Runner):
         lanes = self._host.lanes
         with self._lock:
             if name not in self._batches:
-                text, alone = self.batch_text(name), self._fused.whole_graph(name) is not None
+                text, alone = self.batch_text(name), whole_graph(self._fused, name) is not None
                 code = self._compiled(text.source, looped=not alone)
                 self._batches[name] = BatchCode(code, lanes, text.size, columns=alone)
             return max(WORK // max(1, self._nodes) // lanes, 1) * lanes, self._batches[name]
 
     def batch_text(self, name: str) -> Batch:
         """The text in LLVM's language of the function for batches of a register."""
-        lanes, how, graph = self._host.lanes, (self._flags, self._host.registers), self._fused.whole_graph(name)
+        lanes, how, graph = self._host.lanes, (self._flags, self._host.registers), whole_graph(self._fused, name)
         with without_collection():
             if graph is not None:
                 return batch_ir(graph, lanes, *how)

@@ -109,9 +109,10 @@ class Program:
                 graphs.setdefault(id(graph), graph)
         return list(graphs.values())
 
-    def whole_graph(self, x: str) -> Graph | None:
-        """The graph, if a pass is one call of it: of the register x, giving the record."""
-        call = self.body[0] if len(self.body) == 1 else None
-        if isinstance(call, Call) and call.inputs == (x,) and call.outputs == tuple(self.record):
-            return call.graph
-        return None
+
+def whole_graph(program: Program, x: str) -> Graph | None:
+    """The graph, if a pass is one call of it: of the register x, giving the record."""
+    call = program.body[0] if len(program.body) == 1 else None
+    if isinstance(call, Call) and call.inputs == (x,) and call.outputs == tuple(program.record):
+        return call.graph
+    return None

@@ -11,7 +11,7 @@ from ..codegen.python_function import OnArrays, OnFloats
 from ..core.evaluation import Array
 from ..core.graph import Graph
 from .execution import Execution
-from .program import Program
+from .program import Program, whole_graph
 from .runner import Record, Runner
 from .statement import row_of
 
@@ -65,7 +65,7 @@ class PythonRunner(Runner):
     def _bind_pass(self, x: tuple[str, Array], y: tuple[str, Array]) -> tuple[Callable[[], None], Mapping[str, Array]]:
         arrays = {name: np.zeros(length) for name, length in self.program.registers.items() if name not in (x[0], y[0])}
         flat = arrays[y[0]] = y[1].reshape(-1)
-        if (graph := self.program.whole_graph(x[0])) is not None:
+        if (graph := whole_graph(self.program, x[0])) is not None:
 
             def call() -> None:
                 flat[:] = self._at(graph, x[1].tolist())
