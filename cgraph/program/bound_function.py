@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from struct import Struct
 from typing import Any
@@ -18,15 +19,15 @@ _Buffers = tuple[Any, Array, memoryview, Callable[[], None]]  # memory of x; y, 
 
 
 class BoundFunction:
-    """A function of n_in numbers that gives n_out; any number of threads may call it at once.
+    """A function of n_in numbers that gives an array of some shape; any number of threads may call it at once.
 
     What `bind` gives may leave numbers of y as they are, zeros.
     """
 
-    def __init__(self, bind: Bind, n_in: int, n_out: int) -> None:
-        self._bind, self._sizes = bind, (n_in, n_out)
+    def __init__(self, bind: Bind, n_in: int, shape: tuple[int, ...]) -> None:
+        self._bind, self._sizes = bind, (n_in, shape)
         self._free: list[_Buffers] = []  # pop and append are atomic: no lock, and a call inside a call is safe
-        self._pack, self._unpack = Struct(f"{n_in}d").pack_into, Struct(f"{n_out}d").unpack_from
+        self._pack, self._unpack = Struct(f"{n_in}d").pack_into, Struct(f"{math.prod(shape)}d").unpack_from
 
     def __call__(self, x: ArrayLike) -> Array:
         """The outputs at one point, through buffers that a call at a time has for itself."""

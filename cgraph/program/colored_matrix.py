@@ -87,9 +87,8 @@ class ColoredMatrix:
         self._lanes, self._ready = lanes, ready
         self._made: dict[tuple[bool, bool], Runner] = {}
         self._making = threading.Lock()
-        size, (m, n) = len(entries.rows), entries.shape
-        self._entries = BoundFunction(self.bind, points, size)
-        self._dense = BoundFunction(lambda x, y: self.bind(x, y.reshape(m, n)), points, m * n)
+        self._entries = BoundFunction(self.bind, points, (len(entries.rows),))
+        self._dense = BoundFunction(self.bind, points, entries.shape)
 
     @cached_property
     def compressed(self) -> tuple[Indices32, Indices32]:
@@ -102,7 +101,7 @@ class ColoredMatrix:
             return self._entries(x)
         m, n = self.entries.shape
         if m * n <= LARGE:
-            return self._dense(x).reshape(m, n)
+            return self._dense(x)
         matrix = np.zeros((m, n))
         matrix[self.entries.rows, self.entries.columns] = self._entries(x)
         return matrix

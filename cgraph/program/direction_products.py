@@ -22,7 +22,7 @@ class _Buffers(NamedTuple):
     directions: Array
     results: Array
     tiles: memoryview
-    check: Array | None
+    check: memoryview | None
     run: Callable[[], None]
 
 
@@ -47,10 +47,12 @@ class DirectionProducts:
 
     def __call__(self, x: Array, directions: Array, result: Array) -> None:
         """The results, (k, results), along directions, (k, entries), at a point."""
-        tiles, _, lanes = self._tiles
-        for start in range(0, len(directions), tiles * lanes):  # between blocks, Ctrl-C is heard
-            stop = start + tiles * lanes
-            self._block(x, directions[start:stop], result[start:stop])
+        size = self._tiles[0] * self._tiles[2]
+        if len(directions) <= size:
+            self._block(x, directions, result)
+            return
+        for start in range(0, len(directions), size):  # between blocks, Ctrl-C is heard
+            self._block(x, directions[start : start + size], result[start : start + size])
 
     def _block(self, x: Array, directions: Array, result: Array) -> None:
         try:
@@ -62,37 +64,30 @@ class DirectionProducts:
         s, y = buffers.directions, buffers.results
         buffers.x[:] = x
         if full:
-            s[:full] = _in_tiles(directions[: full * lanes], lanes)
+            s[:full] = directions[: full * lanes].reshape(full, lanes, s.shape[1]).transpose(0, 2, 1)
         if rest:  # the last tile is filled up with zeros
             s[full, :, :rest] = directions[full * lanes :].T
             s[full, :, rest:] = 0.0
         buffers.tiles[0] = full + bool(rest)
         buffers.run()
         if full:
-            _in_tiles(result[: full * lanes], lanes)[...] = y[:full]
+            result[: full * lanes].reshape(full, lanes, y.shape[1]).transpose(0, 2, 1)[...] = y[:full]
         if rest:
             result[full * lanes :] = y[full, :, :rest].T
-        lost = False
-        if buffers.check is not None:
-            check = buffers.check[:count]
-            lost = math.isnan(check.dot(check))
+        found = b"" if buffers.check is None else buffers.check[: 8 * count].tobytes()
         self._free.append(buffers)
-        if lost:
+        if found.count(0) < len(found):  # zeros, but NaN where a result is infinite or NaN
             self._in_guard(x, directions, result)
 
     def _buffers(self) -> _Buffers:
         x, y = np.empty(self._runner.program.registers["x"]), aligned(math.prod(self._results))
         run, registers = self._runner._bind_pass(("x", x), ("y", y))
-        s = registers["s0"].reshape(self._tiles)
-        return _Buffers(x.data, s, y.reshape(self._results), registers["tiles0"].data, registers.get("check0"), run)
+        s, check = registers["s0"].reshape(self._tiles), registers.get("check0")
+        found = None if check is None else check.data.cast("B")
+        return _Buffers(x.data, s, y.reshape(self._results), registers["tiles0"].data, found, run)
 
     def _in_guard(self, x: Array, directions: Array, result: Array) -> None:
         """By the split in which zeros win, made at its first use."""
         if self._careful is None:
             self._careful = DirectionProducts(self._derivative.careful, *self._how)
         self._careful(x, directions, result)
-
-
-def _in_tiles(rows: Array, lanes: int) -> Array:
-    """Rows, contiguous or read, as tiles: (tiles, numbers in a row, lanes)."""
-    return rows.reshape(len(rows) // lanes, lanes, rows.shape[1]).transpose(0, 2, 1)

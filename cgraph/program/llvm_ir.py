@@ -7,11 +7,9 @@ from collections.abc import Mapping
 from ..codegen.arithmetic import REGISTERS, Arithmetic
 from ..codegen.llvm_engine import MissingFunctionError
 from ..codegen.llvm_ir import libm_functions, point_arithmetic, preamble, scalar_ir
-from ..core.graph import Graph
 from .llvm_functions import Functions
-from .program import Program
+from .program import Program, whole_graph
 from .statement import row_of
-from .statements.call import Call
 from .writer import Writer, copy_text
 
 
@@ -60,14 +58,6 @@ def program_ir(program: Program, flags: str = "", lanes: int = 1, width: int = 1
     functions = Functions(arithmetic, width)
     run = _RunFunction(program, functions).lines()
     return "\n".join([*preamble(program.graphs(), arithmetic), *functions.definitions, *run, ""])
-
-
-def whole_graph(program: Program, x: str) -> Graph | None:
-    """The graph, if a pass is one call of it, of the register x."""
-    call = program.body[0] if len(program.body) == 1 else None
-    if isinstance(call, Call) and call.inputs == (x,) and call.outputs == tuple(program.record):
-        return call.graph
-    return None
 
 
 def point_ir(

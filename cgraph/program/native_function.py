@@ -24,7 +24,7 @@ class Native(BoundFunction, Compiled):
 
     def __init__(self, graph: Graph, backend: str, options: Options) -> None:
         Compiled.__init__(self, graph, backend, options)
-        BoundFunction.__init__(self, self._bound, self.n_in, self.n_out)
+        BoundFunction.__init__(self, self._bound, self.n_in, (self.n_out,))
         self._flags = flags_of(options["fast"], options["fma"])
         self._cache = open_cache(options["cache"])
         self._runner = self._ready(Program({"x": self.n_in, "y": self.n_out}, [Call(graph, ("x",), ("y",))], ["y"]))

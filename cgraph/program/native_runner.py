@@ -19,8 +19,8 @@ from ..core.evaluation import Array
 from ..core.scope import without_collection
 from ..util.memory import aligned
 from .fuse import fused
-from .llvm_ir import offsets, point_ir, program_functions, program_ir, require_texts, whole_graph
-from .program import Program
+from .llvm_ir import offsets, point_ir, program_functions, program_ir, require_texts
+from .program import Program, whole_graph
 from .rows_ir import program_rows_ir
 from .runner import Record, Runner
 
@@ -63,7 +63,7 @@ class NativeRunner(Runner):
         self._one: Any = None  # what runs one memory, and a vector of them
         self._many: Any = None
         self._points: dict[tuple[str, str], PointCode] = {}  # by the registers that lie apart
-        self._batches: dict[str, BatchCode] = {}  # by the register that varies
+        self._batches: dict[str, tuple[int, BatchCode]] = {}  # by the register that varies
 
     def prepared(self) -> NativeRunner:
         """The machine code of one memory, which is otherwise made at its first use."""
@@ -133,13 +133,18 @@ class NativeRunner(Runner):
             return self._points[x, y]
 
     def _columns(self, name: str) -> tuple[int, Callable[[Array, Array], None]]:
-        lanes = self._host.lanes
-        with self._lock:
-            if name not in self._batches:
-                text, alone = self.batch_text(name), whole_graph(self._fused, name) is not None
-                code = self._compiled(text.source, looped=not alone)
-                self._batches[name] = BatchCode(code, lanes, text.size, columns=alone)
-            return max(WORK // max(1, self._nodes) // lanes, 1) * lanes, self._batches[name]
+        if name not in self._batches:
+            with self._lock:
+                if name not in self._batches:
+                    self._batches[name] = self._batch(name)
+        return self._batches[name]
+
+    def _batch(self, name: str) -> tuple[int, BatchCode]:
+        """The points in a block, and the machine code."""
+        lanes, text, alone = self._host.lanes, self.batch_text(name), whole_graph(self._fused, name) is not None
+        code = self._compiled(text.source, looped=not alone)
+        width = max(WORK // max(1, self._nodes) // lanes, 1) * lanes
+        return width, BatchCode(code, lanes, text.size, columns=alone)
 
     def batch_text(self, name: str) -> Batch:
         """The text in LLVM's language of the function for batches of a register."""

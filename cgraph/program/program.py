@@ -10,6 +10,7 @@ from ..core.graph import Graph
 from ..util.explain_failure import explain_failure
 from . import table  # noqa: F401 (which fills the table)
 from .statement import Statement, bodies_of, length_of, reads_and_writes, require_length, require_once, row_of
+from .statements.call import Call
 
 
 @explain_failure
@@ -107,3 +108,11 @@ class Program:
                 graph = getattr(statement, name)
                 graphs.setdefault(id(graph), graph)
         return list(graphs.values())
+
+
+def whole_graph(program: Program, x: str) -> Graph | None:
+    """The graph, if a pass is one call of it: of the register x, giving the record."""
+    call = program.body[0] if len(program.body) == 1 else None
+    if isinstance(call, Call) and call.inputs == (x,) and call.outputs == tuple(program.record):
+        return call.graph
+    return None

@@ -11,7 +11,7 @@ from ..codegen.python_function import OnArrays, OnFloats
 from ..core.evaluation import Array
 from ..core.graph import Graph
 from .execution import Execution
-from .program import Program
+from .program import Program, whole_graph
 from .runner import Record, Runner
 
 BLOCK = 4096  # points that NumPy takes at once: temporaries stay in the cache
@@ -62,7 +62,13 @@ class PythonRunner(Runner):
 
     def _bind_pass(self, x: tuple[str, Array], y: tuple[str, Array]) -> tuple[Callable[[], None], Mapping[str, Array]]:
         arrays = {name: np.zeros(length) for name, length in self.program.registers.items() if name not in (x[0], y[0])}
-        arrays[y[0]] = y[1].reshape(-1)
+        flat = arrays[y[0]] = y[1].reshape(-1)
+        if (graph := whole_graph(self.program, x[0])) is not None:
+
+            def call() -> None:
+                flat[:] = self._at(graph, x[1].tolist())
+
+            return call, arrays
         execution = Execution(self.program.registers, self._at, self._batch)
 
         def run() -> None:

@@ -13,7 +13,8 @@ from numpy.typing import ArrayLike
 from cgraph.extend import Array, real_array
 
 from ..systems.arguments import parameter_value, per_coordinate
-from ..systems.model import Model
+from ..systems.model import Model, as_ode, as_system
+from ..systems.system import System
 from .projection import projected_start
 from .state_equation import StateInputs, normalization, state_inputs
 
@@ -76,7 +77,7 @@ def initial_values(
     many: else one motion, whose arguments have no axis N.
     """
     start = _given(model, q, qd, tau, parameters, many=many)
-    system = model.system
+    system = _system(model)
     if system is None or not len(system.constraints):
         return start
     rows = []
@@ -98,6 +99,11 @@ def given_start(
     return InitialValue(x[0], states, bound)
 
 
+def _system(model: Model) -> System | None:
+    """The Lagrangian system of a model; None of one of first order."""
+    return as_system(model) if as_ode(model) is None else None
+
+
 def _given(
     model: Model,
     q: ArrayLike,
@@ -108,7 +114,7 @@ def _given(
     many: bool,
 ) -> InitialValues:
     """The starts as they are given."""
-    inputs, system = state_inputs(model), model.system
+    inputs, system = state_inputs(model), _system(model)
     n = len(inputs.applied)
     nq = len(inputs.states) - n
     bound, varied = _parameters(inputs, parameters, many=many)

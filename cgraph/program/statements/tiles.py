@@ -56,10 +56,12 @@ def run_tiled_map(statement: TiledMap, state: dict[str, Any], execution: Executi
     """In Python, all elements as one batch, in place."""
     graph, tiles, lanes = statement.graph, int(state[statement.tiles][0]), statement.lanes
     shared = np.array([value for name in statement.shared for value in state[name]])
-    numbers = tiles * (len(graph.inputs) - len(shared)) * lanes
-    rows = np.array(state[statement.inputs][:numbers]).reshape(tiles, -1, lanes).transpose(1, 0, 2)
-    points = np.concatenate([np.repeat(shared[:, None], tiles * lanes, axis=1), rows.reshape(-1, tiles * lanes)])
-    results = execution.batch(graph, points).reshape(-1, tiles, lanes)
+    known, size = len(shared), len(graph.inputs) - len(shared)
+    points = np.empty((known + size, tiles, lanes))
+    points[:known] = shared[:, None, None]
+    rows = np.asarray(state[statement.inputs][: tiles * size * lanes])
+    points[known:] = rows.reshape(tiles, size, lanes).transpose(1, 0, 2)
+    results = execution.batch(graph, points.reshape(-1, tiles * lanes)).reshape(-1, tiles, lanes)
     state[statement.outputs][: results.size] = results.transpose(1, 0, 2).reshape(-1)
 
 
