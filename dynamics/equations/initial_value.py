@@ -13,8 +13,7 @@ from numpy.typing import ArrayLike
 from cgraph.extend import Array, real_array
 
 from ..systems.arguments import parameter_value, per_coordinate
-from ..systems.model import Model, as_ode, as_system
-from ..systems.system import System
+from ..systems.model import Model, system_of
 from .projection import projected_start
 from .state_equation import StateInputs, normalization, state_inputs
 
@@ -77,7 +76,7 @@ def initial_values(
     many: else one motion, whose arguments have no axis N.
     """
     start = _given(model, q, qd, tau, parameters, many=many)
-    system = _system(model)
+    system = system_of(model)
     if system is None or not len(system.constraints):
         return start
     rows = []
@@ -99,11 +98,6 @@ def given_start(
     return InitialValue(x[0], states, bound)
 
 
-def _system(model: Model) -> System | None:
-    """The Lagrangian system of a model; None of one of first order."""
-    return as_system(model) if as_ode(model) is None else None
-
-
 def _given(
     model: Model,
     q: ArrayLike,
@@ -114,7 +108,7 @@ def _given(
     many: bool,
 ) -> InitialValues:
     """The starts as they are given."""
-    inputs, system = state_inputs(model), _system(model)
+    inputs, system = state_inputs(model), system_of(model)
     n = len(inputs.applied)
     nq = len(inputs.states) - n
     bound, varied = _parameters(inputs, parameters, many=many)

@@ -8,7 +8,7 @@ from cgraph import Graph
 from cgraph.extend import require_choice
 
 from ..systems.arguments import TIME
-from ..systems.model import Model, as_ode, as_system
+from ..systems.model import Model, as_ode, as_system, system_of
 from .constraints import held_still
 from .equations_of_motion import SOLUTIONS, forward_dynamics
 from .formulations import ZERO
@@ -71,7 +71,7 @@ def normalization(model: Model) -> Graph | None:
 
     Inputs and outputs the states.
     """
-    system = model.system
+    system = system_of(model)
     quasi = None if system is None else system.kinematics.quasi
     if system is None or quasi is None or quasi.normalized is None:
         return None

@@ -15,7 +15,7 @@ from ..equations.projection import projection
 from ..equations.state_equation import normalization, state_inputs, with_multipliers
 from ..equations.substitute import substitute
 from ..systems.arguments import TIME, Parameters, call_user_function
-from ..systems.model import Model, as_ode, as_system
+from ..systems.model import Model, as_ode, as_system, system_of
 from ..systems.system import System
 
 KEPT = 16  # problems that stay for another run, with what was derived from them
@@ -136,7 +136,7 @@ class _Request:
 @memo(KEPT)
 def _derived(request: _Request) -> Problem:
     model, bound = request.model, dict(request.bound)
-    inputs, system = state_inputs(model), model.system
+    inputs, system = state_inputs(model), system_of(model)
     parameters = tuple([name for name in (*inputs.applied, *inputs.parameters) if name not in bound])
     if system is None:
         components = [f"state {name!r}" for name in inputs.states]

@@ -85,6 +85,11 @@ def as_ode(model: Model) -> OdeSystem | None:
     return ode
 
 
+def system_of(model: Model) -> System | None:
+    """The Lagrangian system of a model; None of one of first order."""
+    return as_system(model) if as_ode(model) is None else None
+
+
 def _made(model: object) -> object:
     """The model. Raises TypeError for a class of models, which has no coordinates before one is made."""
     if isinstance(model, type):
