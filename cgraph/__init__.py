@@ -60,8 +60,8 @@ if TYPE_CHECKING:
         tanh,
         where,
     )
-    from .program.compile import compile
-    from .program.compiled import Compiled
+    from .program.functions.compile import compile
+    from .program.functions.compiled import Compiled
     from .program.loop import Loop, loop
     from .simplification.balanced_sums import balanced_sums
     from .simplification.double_double import double_double

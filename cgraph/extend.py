@@ -70,13 +70,13 @@ if TYPE_CHECKING:
     from .operations.operation import MathML, Op, columns
     from .operations.register import register
     from .operations.table import OPS
-    from .program.choose_runner import runner
     from .program.derivatives.linearization import Linearization, Linearized
     from .program.derivatives.tape import Tape, run_passes
     from .program.derivatives.transforms import ProgramVjp, Pulled, program_jvp, program_vjp
     from .program.many import many
     from .program.program import Program
-    from .program.runner import Record, Runner
+    from .program.runners.choose_runner import runner
+    from .program.runners.runner import Record, Runner
     from .program.statement import STATEMENTS, Statement, StatementRow, register_statement, require_length
     from .program.statements.call import Call, Map, Sum
     from .program.statements.control import FixedPoint, If, While

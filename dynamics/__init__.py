@@ -59,7 +59,7 @@ if TYPE_CHECKING:
     from .scenes.scenes import Scene
     from .simulation.ensembles.ensemble import Ensemble, EnsembleStats
     from .simulation.ensembles.simulate_many import simulate_many
-    from .simulation.event import Event
+    from .simulation.events.event import Event
     from .simulation.gradients.gradient import MotionGradient, gradient
     from .simulation.gradients.gradient_many import MotionGradients, gradient_many
     from .simulation.gradients.motion import MotionError

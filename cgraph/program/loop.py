@@ -15,8 +15,8 @@ from ..core.node import CONSTANT, Node, variable
 from ..core.traversal import rebuild, topological
 from ..util.real_arrays import real_array
 from ..util.require import require_graph, require_mapping, require_sequence
-from .choose_runner import runner
 from .program import Program
+from .runners.choose_runner import runner
 from .statements.call import Call
 
 

@@ -8,8 +8,8 @@ from numpy.typing import ArrayLike
 from cgraph.extend import Array
 
 from ..integrators import Problem
+from .estimates.state_sizes import OTHERS
 from .row_values import converted, row_values
-from .state_sizes import OTHERS
 
 LOOSE = 1e-6  # of a momentum, or so much of the largest: what an iteration may leave of it; of a velocity the same
 SLOW = 1e-2  # of the largest velocity: below, one counts as no smaller

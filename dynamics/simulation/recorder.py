@@ -6,7 +6,7 @@ import numpy as np
 
 from cgraph.extend import Array
 
-from .dense_output import StepBlock
+from .steps.dense_output import StepBlock
 
 
 class Recorder:

@@ -14,8 +14,8 @@ from cgraph.extend import Array, real_array, real_number
 from ..equations.initial_value import times_to_record
 from ..integrators import METHODS
 from ..integrators.step_control import RESOLUTION
-from .equal_steps import step_count
 from .free_memory import room
+from .steps.equal_steps import step_count
 
 METHOD = "dop853"  # unless another is asked for
 RTOL, ATOL = 1e-9, 1e-10  # of chosen steps

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from cgraph.extend import Array, real_array, real_number
 
-from .equal_steps import SAME
+from .steps.equal_steps import SAME
 
 
 @dataclass(frozen=True)

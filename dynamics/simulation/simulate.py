@@ -18,23 +18,23 @@ from cgraph.extend import Array, require_flag
 from ..equations.initial_value import initial_value
 from ..integrators import Problem, derive, force, in_form, total_energy
 from ..systems.model import Model
-from .advice import advise
 from .applied_forces import Applied, Tau, with_applied
-from .dense_output import StepBlock
-from .error_estimate import ErrorEstimate
-from .event import Event, as_events
-from .event_program import event_program
+from .estimates.advice import advise
+from .estimates.error_estimate import ErrorEstimate
+from .estimates.run_estimate import RunEstimate
+from .events.event import Event, as_events
+from .events.event_program import event_program
 from .free_memory import room
-from .integration import integration_of
 from .missed_momenta import missed_momenta
 from .progress_bar import Progress
 from .recorder import Recorder
 from .row_values import converted, row_values
-from .run_estimate import RunEstimate
 from .run_options import METHOD, TABLES, RunOptions, time_span
 from .sampled_controller import HeldForces
 from .solution import Solution
-from .stepping import Integration
+from .steps.dense_output import StepBlock
+from .steps.integration import integration_of
+from .steps.stepping import Integration
 from .trajectory import SimulationWarning, Stats, Trajectory
 
 

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 from cgraph import Graph
 from cgraph.extend import Array, real_array
 
-from .dense_output import StepBlock
 from .row_values import converted
+from .steps.dense_output import StepBlock
 
 
 @dataclass(frozen=True, eq=False)

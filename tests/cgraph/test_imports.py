@@ -38,7 +38,7 @@ ARM = "import dynamics as dyn; arm = dyn.planar_arm([1.0, 1.0], [1.0, 1.0])"
         ("import dynamics", 10),
         ("import viz", 10),
         (f"{ARM}; dyn.inverse_dynamics(arm)", 110),
-        (f"{ARM}; dyn.simulate(arm, [0.0, 1.0], [0.0, 0.0], 0.1)", 236),
+        (f"{ARM}; dyn.simulate(arm, [0.0, 1.0], [0.0, 0.0], 0.1)", 240),
     ],
 )
 def test_a_program_loads_what_it_uses(code: str, most: int) -> None:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core.evaluation import Array
-from ..runner import Record, Runner
+from ..runners.runner import Record, Runner
 
 Feed = Callable[[int, int], Array]  # first and last pass: what those from the first to before the last are fed
 

@@ -12,9 +12,9 @@ from ...core.checks import GraphError
 from ...core.evaluation import Array
 from ...util.real_arrays import real_array
 from ...util.require import require_mapping, require_whole
-from ..choose_runner import runner
 from ..program import Program
-from ..runner import Runner
+from ..runners.choose_runner import runner
+from ..runners.runner import Runner
 from .linearization import TURNS, Linearization, Linearized, require_program
 from .tape import Tape
 

@@ -16,7 +16,7 @@ from cgraph.extend import Array
 
 from ...multiprecision import Reference, ReferenceFailedError
 from ...multiprecision.solution import from_text
-from ...simulation.scipy_solvers import solve_ivp
+from ...simulation.steps.scipy_solvers import solve_ivp
 from ..setting import Setting
 from ..work_precision.trajectory_runs import problem_of
 from .random_lagrangians import LAGRANGIANS

@@ -22,7 +22,7 @@ from cgraph.extend import Array
 
 from ...integrators import METHODS
 from ...simulation.ensembles.simulate_many import simulate_many
-from ...simulation.event import Event
+from ...simulation.events.event import Event
 from ...simulation.simulate import simulate
 from ...systems.system import System
 from ..text_table import table

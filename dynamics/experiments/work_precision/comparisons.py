@@ -20,8 +20,8 @@ from ...equations.energies import energy as energy_graph
 from ...integrators import METHODS, Problem
 from ...multibody.planar_arm import planar_arm
 from ...peers import UnavailableError
-from ...simulation.scipy_solvers import solve_ivp
 from ...simulation.simulate import simulate
+from ...simulation.steps.scipy_solvers import solve_ivp
 from ..setting import Setting
 from ..stability.energy_drift import SYMPLECTIC, drift
 from ..text_table import table

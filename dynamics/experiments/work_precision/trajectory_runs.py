@@ -15,12 +15,12 @@ from cgraph.extend import Array
 
 from ...equations.state_equation import state_inputs
 from ...integrators import METHODS, Problem, derive
-from ...simulation.integration import integration
 from ...simulation.recorder import Recorder
 from ...simulation.run_options import SCIPY, RunOptions
-from ...simulation.scipy_solvers import ScipyIntegration, scipy_solver
-from ...simulation.step_program import CompiledSteps, compile_steps, step_program
-from ...simulation.stepping import Integration
+from ...simulation.steps.integration import integration
+from ...simulation.steps.scipy_solvers import ScipyIntegration, scipy_solver
+from ...simulation.steps.step_program import CompiledSteps, compile_steps, step_program
+from ...simulation.steps.stepping import Integration
 from ..setting import Setting
 
 EQUAL, CHOSEN = "equal steps", "chosen steps"

@@ -8,8 +8,8 @@ import numpy as np
 
 from cgraph.extend import Array
 
-from ..error_estimate import ErrorEstimate
-from ..event_log import Happening
+from ..estimates.error_estimate import ErrorEstimate
+from ..events.event_log import Happening
 from .ensemble import Counts
 
 INTERRUPTED = "interrupted"  # what the status of a trajectory that Ctrl-C ended begins with

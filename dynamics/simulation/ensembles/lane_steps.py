@@ -9,7 +9,7 @@ import cgraph as cg
 from cgraph import Graph
 from cgraph.extend import Call, FixedPoint, If, Program, While
 
-from ..step_program import StepProgram
+from ..steps.step_program import StepProgram
 
 
 class LaneSteps(NamedTuple):

@@ -21,17 +21,17 @@ from ...equations.initial_value import initial_values
 from ...integrators import METHODS, Problem, derive, in_form
 from ...systems.controller import with_closed_form
 from ...systems.model import Model
-from ..equal_steps import step_count
-from ..event import Event, as_events
-from ..event_log import split_crossings
-from ..event_program import EventProgram, event_program
+from ..events.event import Event, as_events
+from ..events.event_log import split_crossings
+from ..events.event_program import EventProgram, event_program
 from ..free_memory import room
 from ..missed_momenta import missed_momenta
 from ..progress_bar import Progress
 from ..row_values import converted
 from ..run_options import METHOD, RunOptions, time_span
 from ..sampled_controller import SampledController
-from ..step_program import StepProgram, pickled_steps, step_program
+from ..steps.equal_steps import step_count
+from ..steps.step_program import StepProgram, pickled_steps, step_program
 from ..trajectory import SimulationWarning
 from .chunk import INTERRUPTED, Chunk, Part, empty
 from .ensemble import Ensemble, EnsembleStats

@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..equal_steps import step_count
 from ..run_options import RunOptions
+from ..steps.equal_steps import step_count
 
 SAME = 4.0  # units of the last bit of the time, by which instants may miss an even spacing
 

@@ -12,16 +12,16 @@ import numpy as np
 
 from cgraph.extend import Array, memo, runner
 
-from ..equal_steps import equal_steps
-from ..error_estimate import ErrorEstimate, Estimator
-from ..event_program import EventProgram
-from ..integration import integration
+from ..estimates.error_estimate import ErrorEstimate, Estimator
+from ..estimates.run_estimate import RunEstimate
+from ..events.event_program import EventProgram
+from ..events.watched import WatchedIntegration
 from ..recorder import Recorder
-from ..run_estimate import RunEstimate
 from ..run_options import RunOptions
-from ..step_program import CompiledSteps, StepProgram, compile_steps
-from ..stepping import Integration, StoppedError
-from ..watched import WatchedIntegration
+from ..steps.equal_steps import equal_steps
+from ..steps.integration import integration
+from ..steps.step_program import CompiledSteps, StepProgram, compile_steps
+from ..steps.stepping import Integration, StoppedError
 from .chunk import Chunk, Part, empty
 from .lane_steps import lane_steps
 from .step_grid import StepGrid

@@ -10,11 +10,11 @@ import numpy as np
 
 from cgraph.extend import Array, Runner
 
-from ..courses import Course
-from ..error_estimate import Estimator
-from ..state_difference import States
-from ..step_program import StepProgram
-from ..stepping import begin_equal, failed_step, nonfinite
+from ..estimates.courses import Course
+from ..estimates.error_estimate import Estimator
+from ..estimates.state_difference import States
+from ..steps.step_program import StepProgram
+from ..steps.stepping import begin_equal, failed_step, nonfinite
 from .chunk import INTERRUPTED, Chunk, Part
 from .step_grid import StepGrid
 

@@ -11,14 +11,14 @@ import numpy as np
 from cgraph.extend import Array
 
 from ...integrators import Problem
-from ..advice import advise
-from ..event import Event
-from ..event_program import event_program
-from ..integration import integration_of
+from ..estimates.advice import advise
+from ..events.event import Event
+from ..events.event_program import event_program
 from ..missed_momenta import missed_momenta
 from ..recorder import Recorder
 from ..row_values import converted
 from ..run_options import RunOptions
+from ..steps.integration import integration_of
 
 
 class AcceptedSteps(NamedTuple):

@@ -10,9 +10,9 @@ import numpy as np
 
 from cgraph.extend import Array
 
+from ..estimates.state_sizes import StateSizes
 from ..missed_momenta import missed_momenta
-from ..state_sizes import StateSizes
-from ..step_program import state_kinds
+from ..steps.step_program import state_kinds
 from .legs import Legs
 from .motion import Leg, MotionError
 from .motion_run import MotionRun

@@ -18,7 +18,7 @@ from ...integrators import quantity
 from ...systems.model import Model
 from ...systems.system import System
 from ..applied_forces import Constant
-from ..event import Event, as_events
+from ..events.event import Event, as_events
 from ..trajectory import SimulationWarning
 from .doubts import doubts
 from .legs import Bars, Legs, legs_of

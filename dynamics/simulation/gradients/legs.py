@@ -17,8 +17,8 @@ import cgraph as cg
 from cgraph import Graph
 from cgraph.extend import Array, kept_by_first
 
-from ..event import Event
-from ..event_program import WatchedEvent, event_program
+from ..events.event import Event
+from ..events.event_program import WatchedEvent, event_program
 from .motion import TORQUE, Leg, MotionError, MotionOf
 from .motion_programs import MotionPrograms, Request, motion_programs
 from .motion_run import MotionRun

@@ -17,10 +17,10 @@ from ...equations.state_equation import state_inputs
 from ...integrators import METHODS, Method, Problem, derive, in_form
 from ...systems.model import Model
 from ..applied_forces import with_applied
-from ..equal_steps import step_count
-from ..event import Event
+from ..events.event import Event
 from ..run_options import METHOD, RunOptions, time_span
 from ..sampled_controller import SampledController
+from ..steps.equal_steps import step_count
 from .accepted_steps import AcceptedSteps, accepted_steps
 from .motion_equations import PARAMETERS, MotionEquations, motion_equations
 

@@ -12,8 +12,8 @@ import numpy as np
 
 from cgraph.extend import Array, Runner, Tape, run_passes
 
-from ..dense_output import Indices
-from ..stepping import nonfinite, unsolved
+from ..steps.dense_output import Indices
+from ..steps.stepping import nonfinite, unsolved
 from .motion import MotionError, MotionOf
 from .motion_programs import Along, MotionPrograms
 from .motion_steps import LOSS

@@ -15,7 +15,7 @@ from cgraph.extend import Array
 
 from ...systems.model import Model
 from ..applied_forces import Constant
-from ..event import Event, as_events
+from ..events.event import Event, as_events
 from ..trajectory import SimulationWarning
 from .doubts import doubts
 from .legs import legs_of

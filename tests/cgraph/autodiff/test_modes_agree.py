@@ -16,7 +16,7 @@ import cgraph as cg
 from cgraph.core.node import apply
 from cgraph.extend import cotangents
 from cgraph.operations.operation import OPS
-from cgraph.program import differentiable
+from cgraph.program.functions import differentiable
 from tests.tolerances import LONG_SUM
 
 NAMES = ("x", "y", "z")

@@ -12,7 +12,7 @@ from hypothesis import given, settings, strategies as st
 import cgraph as cg
 from cgraph import GraphError
 from cgraph.codegen import parts
-from cgraph.program import colored_matrix, differentiable, generated_function, native_function
+from cgraph.program.functions import colored_matrix, differentiable, generated_function, native_function
 from tests import high_precision
 from tests.strategies import cases, examples
 from tests.tolerances import LAST_BITS, LONG_SUM, SHORT_SUM

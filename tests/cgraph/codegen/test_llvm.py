@@ -256,7 +256,7 @@ def test_a_batch_in_which_rows_lie_apart_by_a_power_of_two():
 
 
 def test_auto_says_when_a_graph_is_too_large_for_machine_code(monkeypatch):
-    monkeypatch.setattr(sys.modules["cgraph.program.compile"], "LARGE", 5)
+    monkeypatch.setattr(sys.modules["cgraph.program.functions.compile"], "LARGE", 5)
     with pytest.warns(RuntimeWarning, match=r"has more than 5; backend='llvm' makes machine code"):
         function = cg.compile(chain())
     assert function.source == cg.compile(chain(), "python").source

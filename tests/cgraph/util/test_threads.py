@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import cgraph as cg
-from cgraph.program import generated_function as generated, native_runner
+from cgraph.program.functions import generated_function as generated
+from cgraph.program.runners import native_runner
 from cgraph.util import threads
 from cgraph.util.threads import share, thread_count
 

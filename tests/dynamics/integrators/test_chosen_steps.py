@@ -13,9 +13,9 @@ import dynamics as dyn
 from dynamics.integrators import METHODS, derive
 from dynamics.integrators.dop853 import DOP853
 from dynamics.integrators.tableau import DOPRI5, EULER, real_stability
-from dynamics.simulation.integration import integration
 from dynamics.simulation.run_options import RunOptions
-from dynamics.simulation.step_program import compile_steps, step_program
+from dynamics.simulation.steps.integration import integration
+from dynamics.simulation.steps.step_program import compile_steps, step_program
 from tests.dynamics.linkages import windows
 from tests.early_end import stops
 from tests.slow import slow

@@ -12,7 +12,7 @@ from pytest import approx, mark, raises, warns
 import cgraph as cg
 import dynamics as dyn
 from dynamics.integrators import METHODS
-from dynamics.simulation.equal_steps import doubled, equal_steps, joined
+from dynamics.simulation.steps.equal_steps import doubled, equal_steps, joined
 from tests.dynamics.models import random_arm
 from tests.dynamics.step_options import LIKE_OTHERS
 from tests.slow import slow

@@ -14,7 +14,7 @@ import dynamics as dyn
 from cgraph.util.caches import kept_results
 from dynamics.integrators import METHODS
 from dynamics.simulation.gradients import motion_run
-from dynamics.simulation.stepping import NativeIntegration
+from dynamics.simulation.steps.stepping import NativeIntegration
 from tests.slow import slow
 
 SLOPES = 1e-3  # relative: of what 1e-9 in every step leaves of the slopes of a motion through a pericentre

@@ -25,8 +25,8 @@ class Clock:
 def printed(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tick: float, **options: Any) -> str:
     """What a run of ten rows, in blocks of one, writes to standard error, on a clock of that tick."""
     monkeypatch.setattr("dynamics.simulation.progress_bar.time", Clock(tick))
-    monkeypatch.setattr("dynamics.simulation.stepping.FIRST_PASSES", 1)
-    monkeypatch.setattr("dynamics.simulation.stepping.BLOCK_TIME", 0.0)
+    monkeypatch.setattr("dynamics.simulation.steps.stepping.FIRST_PASSES", 1)
+    monkeypatch.setattr("dynamics.simulation.steps.stepping.BLOCK_TIME", 0.0)
     dyn.simulate(oscillator(), [1.0], [0.0], 1.0, "rk4", dt=0.1, **{"estimate_error": False, **options})
     out, err = capsys.readouterr()
     assert out == ""

@@ -112,7 +112,7 @@ def test_what_a_reset_has_to_be() -> None:
 
 
 def test_ctrl_c_in_a_later_leg_keeps_the_legs_before(monkeypatch: pytest.MonkeyPatch) -> None:
-    from dynamics.simulation.event_log import EventLog
+    from dynamics.simulation.events.event_log import EventLog
 
     real, calls = EventLog.__call__, []
 

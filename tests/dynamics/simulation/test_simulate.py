@@ -12,7 +12,7 @@ import cgraph as cg
 import dynamics as dyn
 from dynamics.integrators import METHODS, derive
 from dynamics.simulation.run_options import RunOptions
-from dynamics.simulation.stepping import NativeIntegration
+from dynamics.simulation.steps.stepping import NativeIntegration
 from dynamics.systems.system import System
 from tests.dynamics.models import oscillator, random_arm
 from tests.dynamics.step_options import step
@@ -154,7 +154,7 @@ def test_ctrl_c_keeps_the_rows(method: str, monkeypatch: pytest.MonkeyPatch) -> 
             raise KeyboardInterrupt
         return real(*args, **options)
 
-    monkeypatch.setattr("dynamics.simulation.stepping.BLOCK_TIME", 0.0)  # a pass at a time, after the first block
+    monkeypatch.setattr("dynamics.simulation.steps.stepping.BLOCK_TIME", 0.0)  # a pass at a time, after the first block
     monkeypatch.setattr(NativeIntegration, "_advance", advance)
     result = dyn.simulate(oscillator(), [1.0], [0.0], 10.0, method, **step(method, 0.01))
     kept = len(result.t)

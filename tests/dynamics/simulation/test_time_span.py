@@ -10,7 +10,7 @@ from pytest import approx, mark
 import cgraph as cg
 import dynamics as dyn
 from dynamics.integrators import METHODS
-from dynamics.simulation.stepping import NativeIntegration
+from dynamics.simulation.steps.stepping import NativeIntegration
 from tests.dynamics.models import oscillator
 from tests.dynamics.step_options import EVERY_METHOD, LIKE_OTHERS, step
 from tests.early_end import stops
@@ -134,7 +134,7 @@ def test_ctrl_c_says_where_a_run_of_few_rows_was(method: str, monkeypatch: pytes
         return real(*args, **options)
 
     whole = dyn.simulate(oscillator(), [1.0], [0.0], 10.0, method, dt=0.01)
-    monkeypatch.setattr("dynamics.simulation.stepping.BLOCK_TIME", 0.0)
+    monkeypatch.setattr("dynamics.simulation.steps.stepping.BLOCK_TIME", 0.0)
     monkeypatch.setattr("dynamics.simulation.progress_bar.Progress.__call__", lambda self, done: seen.append(done))
     monkeypatch.setattr(NativeIntegration, "_advance", advance)
     run = dyn.simulate(oscillator(), [1.0], [0.0], 10.0, method, dt=0.01, t_eval=[0.0, 10.0])

@@ -1,0 +1,217 @@
+"""A matrix of derivatives as a program: products along few directions, colors, and where they hold the entries."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from ...autodiff.coloring import NONE, Coloring, star_coloring
+from ...autodiff.direction_split import DirectionSplit
+from ...autodiff.sparsity import Indices, Indices32, Pattern
+from ...core.evaluation import Array
+from ...core.graph import Graph
+from ...core.node import as_node, variable
+from ..program import Program
+from ..runners.runner import Runner
+from ..statement import Statement
+from ..statements.call import Call
+from ..statements.tiles import Scatter, TiledMap
+from .bound_function import BoundFunction
+
+LARGE = 2**16  # numbers in a matrix, of which no copy is kept for another call
+
+
+class Derivative(NamedTuple):
+    """A derivative along directions. Where an entry of a direction is zero, an infinite slope counts for nothing.
+
+    To look at the entries makes the directions' part longer, of second derivatives by a half. With `guarded`, the split
+    that does, the other one need not: `guarded` runs only where a result is infinite or NaN, and elsewhere it would
+    give the same.
+    """
+
+    split: DirectionSplit
+    guarded: DirectionSplit | None = None
+
+    @property
+    def careful(self) -> Derivative:
+        """The one whose results are right wherever slopes are infinite."""
+        return Derivative(self.guarded or self.split)
+
+
+class Part(NamedTuple):
+    """Some of the entries, by a derivative along sums of unit vectors.
+
+    colors: of each unit vector the sum that it is in.  color, result: of each entry, the sum and the number in its
+    results that holds it.  entries: their numbers in the pattern.
+    """
+
+    derivative: Derivative
+    colors: Sequence[int]
+    color: Indices
+    result: Indices
+    entries: Indices
+
+    def tiles(self, lanes: int) -> int:
+        """Of directions."""
+        return -(-(max(self.colors) + 1) // lanes)
+
+    def write_seeds(self, directions: Array, lanes: int) -> None:
+        """Of each color the sum of its unit vectors."""
+        seeds = directions.reshape(-1, len(self.colors), lanes)
+        for k, color in enumerate(self.colors):
+            if color != NONE:
+                seeds[color // lanes, k, color % lanes] = 1.0
+
+
+class ColoredMatrix:
+    """A matrix that depends on a point x, as a program.
+
+    entries: those that can be other than zero, in the order in which `values` gives them.
+    source: the graph that gives them all, or the parts that do.  points: the numbers in a point.
+    lanes: the directions in a tile.  ready: makes a program ready to run.
+    """
+
+    def __init__(
+        self,
+        entries: Pattern,
+        source: Graph | Sequence[Part],
+        points: int,
+        lanes: int,
+        ready: Callable[[Program], Runner],
+    ) -> None:
+        self.entries, self._source, self._points = entries, source, points
+        self._lanes, self._ready = lanes, ready
+        self._made: dict[tuple[bool, bool], Runner] = {}
+        self._making = threading.Lock()
+        self._entries = BoundFunction(self.bind, points, (len(entries.rows),))
+        self._dense = BoundFunction(self.bind, points, entries.shape)
+
+    @cached_property
+    def compressed(self) -> tuple[Indices32, Indices32]:
+        """The columns and the starts of rows, see `Pattern.compressed`."""
+        return self.entries.compressed()
+
+    def values(self, x: Array, dense: bool) -> Array:
+        """The entries, or with `dense` the whole matrix."""
+        if not dense:
+            return self._entries(x)
+        m, n = self.entries.shape
+        if m * n <= LARGE:
+            return self._dense(x)
+        matrix = np.zeros((m, n))
+        matrix[self.entries.rows, self.entries.columns] = self._entries(x)
+        return matrix
+
+    def bind(self, x: Array, values: Array) -> Callable[[], None]:
+        """A function of nothing that reads x and writes the values: entries, (count,), or into a matrix of zeros."""
+
+        def bound(careful: bool) -> Callable[[], None]:
+            runner = self._runner(values.ndim == 2 and values.size > len(self.entries.rows), careful)
+            run, registers = runner._bind_pass(("x", x), ("y", values))
+            for k, part in enumerate(() if isinstance(self._source, Graph) else self._source):
+                part.write_seeds(registers[f"s{k}"], self._lanes)
+                registers[f"tiles{k}"][0] = part.tiles(self._lanes)
+            if "nonfinite" not in registers:
+                return run
+            nonfinite = registers["nonfinite"].data
+
+            def checked() -> None:
+                run()
+                if nonfinite[0]:
+                    bound(careful=True)()
+
+            return checked
+
+        return bound(careful=False)
+
+    def _runner(self, dense: bool, careful: bool) -> Runner:
+        """What runs the program, made at the first use."""
+        with self._making:
+            if (dense, careful) not in self._made:
+                self._made[dense, careful] = self._ready(self._program(dense, careful))
+            return self._made[dense, careful]
+
+    def _program(self, dense: bool, careful: bool) -> Program:
+        """x -> y, the entries, or with `dense` the whole matrix."""
+        (m, n), lanes = self.entries.shape, self._lanes
+        places = self.entries.rows * n + self.entries.columns if dense else np.arange(len(self.entries.rows))
+        registers = {"x": self._points, "y": m * n if dense else len(places)}
+        if isinstance(self._source, Graph):
+            if not dense:
+                return Program(registers, [Call(self._source, ("x",), ("y",))], ["y"])
+            body = [Call(self._source, ("x",), ("e",)), Scatter("e", "y", tuple(range(len(places))), _tuple(places))]
+            return Program(registers | {"e": len(places)}, body, ["y"])
+        statements: list[Statement] = []
+        checks: dict[str, int] = {}
+        for k, part in enumerate(self._source):
+            derivative = part.derivative.careful if careful else part.derivative
+            (primal, linear), tiles = derivative.split, part.tiles(lanes)
+            sizes = len(primal.outputs), tiles * len(part.colors) * lanes, tiles * len(linear.outputs) * lanes, 1
+            registers |= {f"{letter}{k}": size for letter, size in zip(("p", "s", "t", "tiles"), sizes, strict=True)}
+            taken = ((part.color // lanes) * len(linear.outputs) + part.result) * lanes + part.color % lanes
+            statements += product_statements(derivative, k, f"t{k}", lanes)
+            statements.append(Scatter(f"t{k}", "y", _tuple(taken), _tuple(places[part.entries])))
+            if derivative.guarded is not None:
+                checks[f"check{k}"] = tiles * lanes
+        if checks:
+            registers |= {**checks, "nonfinite": 1}
+            statements.append(Call(_nonfinite(sum(checks.values())), (*checks,), ("nonfinite",)))
+        return Program(registers, statements, ["y"])
+
+
+def product_statements(derivative: Derivative, k: int, results: str, lanes: int) -> list[Statement]:
+    """A register of results: of the point x along `tiles` of directions s; the number k stands behind names.
+
+    With a guard a register `check` has NaN for a direction of which a result is infinite or NaN, else 0.
+    """
+    (primal, linear), p, tiles = derivative.split, f"p{k}", f"tiles{k}"
+    statements: list[Statement] = [Call(primal, ("x",), (p,)), TiledMap(linear, f"s{k}", results, (p,), lanes, tiles)]
+    if derivative.guarded is not None:
+        statements.append(TiledMap(_nonfinite(len(linear.outputs)), results, f"check{k}", (), lanes, tiles))
+    return statements
+
+
+def _tuple(numbers: Indices) -> tuple[int, ...]:
+    return tuple(numbers.tolist())
+
+
+def _nonfinite(count: int) -> Graph:
+    """0, or NaN where one of so many numbers is infinite or NaN."""
+    values = [variable(f"v{k}") for k in range(count)]
+    terms = [value - value for value in values] or [as_node(0.0)]
+    while len(terms) > 1:  # in pairs, which do not wait for each other
+        terms = [*[a + b for a, b in zip(terms[::2], terms[1::2], strict=False)], *terms[len(terms) & ~1 :]]
+    return Graph(values, {"nonfinite": terms[0]})
+
+
+def jacobian_parts(
+    entries: Pattern, coloring: Coloring, forward: Callable[[], Derivative], reverse: Callable[[], Derivative]
+) -> list[Part]:
+    """The Jacobian: forward along sums of columns, reverse along sums of rows, asked for where needed."""
+    parts = []
+    for make, colors, mine, keys, others in (
+        (forward, coloring.columns, ~coloring.by_row, entries.columns, entries.rows),
+        (reverse, coloring.rows, coloring.by_row, entries.rows, entries.columns),
+    ):
+        numbers = np.flatnonzero(mine)
+        if len(numbers):
+            parts.append(Part(make(), colors, np.array(colors)[keys[numbers]], others[numbers], numbers))
+    return parts
+
+
+def hessian_parts(entries: Pattern, derivative: Derivative) -> list[Part]:
+    """A Hessian, symmetric, by products with sums of its columns."""
+    n = entries.shape[1]
+    if not len(entries.rows):
+        return []
+    colors = np.array(star_coloring(entries), dtype=np.int64)
+    count = int(colors.max(initial=NONE)) + 1
+    rows, columns = np.maximum(entries.rows, entries.columns), np.minimum(entries.rows, entries.columns)
+    company = np.bincount(entries.rows * count + colors[entries.columns], minlength=n * count)  # of a color in a row
+    alone = company[rows * count + colors[columns]] == 1
+    row, color = np.where(alone, rows, columns), np.where(alone, colors[columns], colors[rows])
+    return [Part(derivative, colors.tolist(), color, row, np.arange(len(row)))]

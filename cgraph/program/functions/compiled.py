@@ -1,0 +1,129 @@
+"""Compiled: the function object that `cg.compile` gives, whatever runs behind it."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Callable
+from typing import TypedDict
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...codegen.bound_call import bound
+from ...core.checks import GraphError
+from ...core.evaluation import Array
+from ...core.graph import Graph
+from ...util.html_text import html_table, html_text
+from ...util.memory import lies_in_rows, require_memory, require_out, require_target
+from ...util.real_arrays import real_array
+from ...util.threads import thread_count
+from ..runners.write_batch import write_batch
+from .bound_function import point_of
+from .differentiable import Differentiable
+
+
+class Options(TypedDict):
+    """The choices of `compile`, besides the backend."""
+
+    fast: bool
+    fma: bool
+    cache: bool | str
+
+
+class Compiled(Differentiable):
+    """A graph compiled by `cg.compile`. Inputs and outputs are in the order of the graph's.
+
+    Attributes
+    ----------
+    graph : Graph
+        What was compiled.
+    backend : str
+        The back end that was asked for.
+    options : dict
+        The keyword arguments of `compile`.
+    n_in, n_out : int
+        Numbers of inputs and outputs.
+    source : str
+        The generated text: Python, NumPy or LLVM.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> x = cg.variable("x")
+    >>> f = cg.compile(cg.Graph([x], {"y": x + 1.0}), "python")
+    >>> f.n_in, f.n_out, f([2.0]).tolist()
+    (1, 1, [3.0])
+    >>> f.jacobian([2.0]).tolist(), f.jvp([2.0], [[5.0], [7.0]]).tolist()
+    ([[1.0]], [[5.0], [7.0]])
+    """
+
+    source: str
+    takes_rows = False  # whether batches of points that lie one after another are read and written as they lie
+
+    def __init__(self, graph: Graph, backend: str, options: Options) -> None:
+        super().__init__()
+        self.graph = graph
+        self.backend, self.options = backend, options
+        self.n_in, self.n_out = len(graph.inputs), len(graph.outputs)
+
+    @abstractmethod
+    def __call__(self, x: ArrayLike) -> Array:
+        """Values of the outputs, (n_out,), at one point x, (n_in,). Raises GraphError for another shape."""
+
+    @abstractmethod
+    def values(self, x: list[float]) -> tuple[float, ...]:
+        """The outputs as floats at a list of n_in floats: the fastest way in from lists; nothing is checked."""
+
+    def batch(self, X: ArrayLike, threads: int | None = 1, *, out: Array | None = None) -> Array:
+        """Values of the outputs, (n_out, N), at N points X, (n_in, N).
+
+        Machine code reads and writes points that lie one after another, such as `rows.T` of rows (N, n_in), as they
+        lie: `.T` of the result then is rows, too.
+        out: where they go, an array of float64 (n_out, N) that shares no memory with X; a new one by default.
+        threads: how many may share the work; None: one for each core. A batch too small to gain by it takes fewer, and
+        generated Python (backend "python") takes one. They change nothing in the values.
+        Raises GraphError for another shape or an `out` that is none, ValueError for less than one thread.
+        """
+        count = thread_count(threads)
+        points = real_array("X", X)
+        if points.ndim != 2 or points.shape[0] != self.n_in:
+            raise GraphError(f"X must have shape ({self.n_in}, N), one row for each input, got {points.shape}")
+        total = points.shape[1]
+        order = "F" if self.takes_rows and lies_in_rows(points) else "C"
+        result = np.empty((self.n_out, total), order=order) if out is None else out  # type: ignore[call-overload]
+        if out is not None:
+            require_out(out, (self.n_out, total), points)
+        write_batch(*self._columns(), points, result, count)
+        return result
+
+    def bind(self, x: Array, y: Array) -> Callable[[], None]:
+        """A function of nothing that reads x, (n_in,), and writes y, (n_out,): the fastest call there is.
+
+        The arrays are checked here and never again; the function keeps them alive. One thread at a time may call it,
+        and Python's other threads wait meanwhile.
+        Raises GraphError unless both are contiguous arrays of float64 in these shapes, y can be written and they
+        share no memory.
+        """
+        require_memory("x", x, (self.n_in,))
+        require_memory("y", y, (self.n_out,))
+        require_target("y", y, "x", x)
+        return bound(self._bound(x, y))
+
+    @abstractmethod
+    def _columns(self) -> tuple[int, Callable[[Array, Array], None]]:
+        """What writes the results, (n_out, k), of points, (n_in, k), and the k that is worth handing to a thread."""
+
+    @abstractmethod
+    def _bound(self, x: Array, y: Array) -> Callable[[], None]:
+        """`bind`, after its checks."""
+
+    def _point(self, x: ArrayLike) -> Array:
+        return point_of(x, self.n_in)
+
+    def _repr_html_(self) -> str:
+        rows = [("back end", self.backend), ("inputs", str(self.n_in)), ("outputs", str(self.n_out))]
+        rows += [("nodes", str(len(self.graph.nodes))), ("lines of generated text", str(self.source.count("\n")))]
+        return html_text("A compiled graph") + html_table(("", ""), rows)
+
+    def __repr__(self) -> str:
+        return f"<compiled {self.graph!r}, backend {self.backend!r}>"

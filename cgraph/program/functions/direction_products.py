@@ -1,0 +1,93 @@
+"""Products of a derivative with many directions at one point."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...core.evaluation import Array
+from ...util.memory import aligned
+from ..program import Program
+from ..runners.runner import Runner
+from .colored_matrix import Derivative, product_statements
+
+
+class _Buffers(NamedTuple):
+    """What one call at a time has for itself: memory of a point, directions and results in tiles, how many, checks."""
+
+    x: Any  # memory
+    directions: Array
+    results: Array
+    tiles: memoryview
+    check: memoryview | None
+    run: Callable[[], None]
+
+
+class DirectionProducts:
+    """What writes products; any number of threads may call it at once.
+
+    ready: makes a program ready to run.  lanes, tiles: directions in a tile, and tiles in a block.
+    """
+
+    def __init__(self, derivative: Derivative, ready: Callable[[Program], Runner], lanes: int, tiles: int) -> None:
+        self._derivative, self._how = derivative, (ready, lanes, tiles)
+        split = derivative.split
+        sizes = {"x": len(split.primal.inputs), "p0": len(split.primal.outputs), "tiles0": 1}
+        self._tiles = tiles, split.directions, lanes
+        self._results = tiles, len(split.linear.outputs), lanes
+        if derivative.guarded is not None:
+            sizes["check0"] = tiles * lanes
+        sizes |= {"s0": math.prod(self._tiles), "y": math.prod(self._results)}
+        self._runner = ready(Program(sizes, product_statements(derivative, 0, "y", lanes), ["y"]))
+        self._careful: DirectionProducts | None = None
+        self._free: list[_Buffers] = []  # pop and append are atomic
+
+    def __call__(self, x: Array, directions: Array, result: Array) -> None:
+        """The results, (k, results), along directions, (k, entries), at a point."""
+        size = self._tiles[0] * self._tiles[2]
+        if len(directions) <= size:
+            self._block(x, directions, result)
+            return
+        for start in range(0, len(directions), size):  # between blocks, Ctrl-C is heard
+            self._block(x, directions[start : start + size], result[start : start + size])
+
+    def _block(self, x: Array, directions: Array, result: Array) -> None:
+        try:
+            buffers = self._free.pop()
+        except IndexError:
+            buffers = self._buffers()
+        count, lanes = len(directions), self._tiles[2]
+        full, rest = divmod(count, lanes)
+        s, y = buffers.directions, buffers.results
+        buffers.x[:] = x
+        if full:
+            s[:full] = directions[: full * lanes].reshape(full, lanes, s.shape[1]).transpose(0, 2, 1)
+        if rest:  # the last tile is filled up with zeros
+            s[full, :, :rest] = directions[full * lanes :].T
+            s[full, :, rest:] = 0.0
+        buffers.tiles[0] = full + bool(rest)
+        buffers.run()
+        if full:
+            result[: full * lanes].reshape(full, lanes, y.shape[1]).transpose(0, 2, 1)[...] = y[:full]
+        if rest:
+            result[full * lanes :] = y[full, :, :rest].T
+        found = b"" if buffers.check is None else buffers.check[: 8 * count].tobytes()
+        self._free.append(buffers)
+        if found.count(0) < len(found):  # zeros, but NaN where a result is infinite or NaN
+            self._in_guard(x, directions, result)
+
+    def _buffers(self) -> _Buffers:
+        x, y = np.empty(self._runner.program.registers["x"]), aligned(math.prod(self._results))
+        run, registers = self._runner._bind_pass(("x", x), ("y", y))
+        s, check = registers["s0"].reshape(self._tiles), registers.get("check0")
+        found = None if check is None else check.data.cast("B")
+        return _Buffers(x.data, s, y.reshape(self._results), registers["tiles0"].data, found, run)
+
+    def _in_guard(self, x: Array, directions: Array, result: Array) -> None:
+        """By the split in which zeros win, made at its first use."""
+        if self._careful is None:
+            self._careful = DirectionProducts(self._derivative.careful, *self._how)
+        self._careful(x, directions, result)

@@ -1,0 +1,1 @@
+"""Runners: programs in Python and as machine code."""

@@ -1,0 +1,60 @@
+"""`runner`: the choice of what runs a program."""
+
+from __future__ import annotations
+
+from ...codegen.llvm_engine import MissingFunctionError
+from ...util.explain_failure import explain_failure
+from ...util.require import require_choice, require_flag
+from ..program import Program
+from .native_runner import NativeRunner, flags_of
+from .python_runner import PythonRunner
+from .runner import Runner
+
+BACKENDS = ("auto", "python", "llvm")
+
+
+@explain_failure
+def runner(program: Program, backend: str = "auto", *, fast: bool = False, fma: bool = True) -> Runner:
+    """A program made ready to run.
+
+    Parameters
+    ----------
+    program : Program
+        What to run.
+    backend : {"auto", "llvm", "python"}
+        "llvm" is machine code (extra `native`), "python" Python over lists; "auto" takes machine code where llvmlite is
+        installed.
+    fast, fma : bool
+        Liberties with rounding, as in `cg.compile`.
+
+    Returns
+    -------
+    Runner
+        Its `memory` holds the registers, its `run` the passes.
+
+    Raises
+    ------
+    ValueError
+        If the backend is unknown.
+    ImportError
+        If the backend is "llvm" and llvmlite is not installed.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> from cgraph.extend import Call, Program, runner
+    >>> x = cg.variable("x")
+    >>> halve = Call(cg.Graph([x], {"next": 0.5 * x}), ("x",), ("x",))
+    >>> run = runner(Program({"x": 1}, [halve], record=["x"]))
+    >>> run.run(run.memory({"x": 8.0}), passes=3).rows.ravel().tolist()
+    [4.0, 2.0, 1.0]
+    """
+    require_choice("backend", backend, BACKENDS)
+    fast, fma = require_flag("fast", fast), require_flag("fma", fma)
+    if backend != "python":
+        try:
+            return NativeRunner(program, flags_of(fast, fma))
+        except (ImportError, MissingFunctionError):
+            if backend == "llvm":
+                raise
+    return PythonRunner(program, fma=fma)

@@ -1,0 +1,104 @@
+"""A program in Python: over lists for one memory, over arrays for many."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ...codegen.python_function import OnArrays, OnFloats
+from ...core.evaluation import Array
+from ...core.graph import Graph
+from ..execution import Execution
+from ..program import Program, whole_graph
+from .runner import Record, Runner
+
+BLOCK = 4096  # points that NumPy takes at once: temporaries stay in the cache
+
+
+class PythonRunner(Runner):
+    """A program in Python over lists, and many at once over arrays."""
+
+    def __init__(self, program: Program, *, fma: bool = True) -> None:
+        super().__init__(program)
+        self._fma = fma
+        self._functions: dict[int, OnFloats] = {}
+        self._arrays: dict[int, OnArrays] = {}
+
+    def _run(self, memory: Array, passes: int, every: int, feed: Array) -> Record:
+        program = self.program
+        execution = Execution(program.registers, self._at, self._batch)
+        state = {name: memory[place].tolist() for name, place in self._slices.items()}
+        rows: list[list[float]] = []
+        done = 0
+        for done in range(1, passes + 1):
+            state.update(_split(feed[done - 1].tolist(), program.feed, program.registers))
+            execution.run(program.body, state)
+            if done % every == 0 and (program.record_if is None or state[program.record_if][0] > 0.0):
+                rows.append([value for name in program.record for value in state[name]])
+            if program.stop is not None and state[program.stop][0] != 0.0:
+                break
+        for name, place in self._slices.items():
+            memory[place] = state[name]
+        return Record(np.array(rows).reshape(len(rows), program.width), done)
+
+    def _run_many(self, memories: Array, passes: int, every: int, feed: Array) -> Record:
+        program, count = self.program, memories.shape[1]
+        masked = self.masked
+        execution = Execution(masked.registers, self._at, self._batch, count)
+        state = {name: np.zeros((length, count)) for name, length in masked.registers.items()}
+        state |= {name: memories[place].copy() for name, place in self._slices.items()}
+        rows = np.empty((passes // every, program.width, count))
+        for done in range(1, passes + 1):
+            fed = np.broadcast_to(feed[done - 1], (program.feed_width, count))
+            state.update(_split(fed, program.feed, program.registers))
+            execution.run(masked.body, state)
+            if done % every == 0 and program.record:
+                np.concatenate([state[name] for name in program.record], out=rows[done // every - 1])
+        for name, place in self._slices.items():
+            memories[place] = state[name]
+        return Record(rows, passes)
+
+    def _bind_pass(self, x: tuple[str, Array], y: tuple[str, Array]) -> tuple[Callable[[], None], Mapping[str, Array]]:
+        arrays = {name: np.zeros(length) for name, length in self.program.registers.items() if name not in (x[0], y[0])}
+        flat = arrays[y[0]] = y[1].reshape(-1)
+        if (graph := whole_graph(self.program, x[0])) is not None:
+
+            def call() -> None:
+                flat[:] = self._at(graph, x[1].tolist())
+
+            return call, arrays
+        execution = Execution(self.program.registers, self._at, self._batch)
+
+        def run() -> None:
+            state: dict[str, Any] = {**arrays, x[0]: x[1].tolist()}
+            execution.run(self.program.body, state)
+            for name, array in arrays.items():
+                if state[name] is not array:
+                    array[:] = state[name]
+
+        return run, arrays
+
+    def _at(self, graph: Graph, x: Sequence[float]) -> Sequence[float]:
+        if id(graph) not in self._functions:
+            self._functions[id(graph)] = OnFloats(graph)
+        return self._functions[id(graph)](x)
+
+    def _batch(self, graph: Graph, points: Array) -> Array:
+        if id(graph) not in self._arrays:
+            self._arrays[id(graph)] = OnArrays(graph, exact=not self._fma)
+        result = np.empty((len(graph.outputs), points.shape[1]))
+        for start in range(0, points.shape[1], BLOCK):
+            here = slice(start, start + BLOCK)
+            self._arrays[id(graph)](points[:, here], result[:, here])
+        return result
+
+
+def _split(values: Any, names: Sequence[str], lengths: Mapping[str, int]) -> dict[str, Any]:
+    """The values, end to end, by the registers that they go to."""
+    at, parts = 0, {}
+    for name in names:
+        parts[name] = values[at : at + lengths[name]]
+        at += lengths[name]
+    return parts

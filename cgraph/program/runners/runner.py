@@ -1,0 +1,344 @@
+"""Runner: what a program made ready to run can do, whatever runs it."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...core.checks import GraphError
+from ...core.evaluation import Array
+from ...util.memory import describe, require_memory, require_out
+from ...util.real_arrays import real_array
+from ...util.require import require_mapping, require_whole
+from ...util.threads import thread_count
+from ..many import many
+from ..program import Program
+from ..statement import reads_and_writes, row_of
+from .llvm_ir import offsets
+from .write_batch import write_batch
+
+BLOCK = 64  # states of a batch in Python that are run between looks at the keyboard
+
+
+class Record(NamedTuple):
+    """The result of a run.
+
+    Attributes
+    ----------
+    rows : ndarray, shape (rows, width), or (rows, width, N) of N runs at once
+        The recorded registers, a row for each pass that recorded.
+    passes : int
+        How many were run: fewer than asked for where the program stopped.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> from cgraph.extend import Call, Program, runner
+    >>> x = cg.variable("x")
+    >>> halve = Call(cg.Graph([x], {"next": 0.5 * x}), ("x",), ("x",))
+    >>> run = runner(Program({"x": 1}, [halve], record=["x"]))
+    >>> run.run(run.memory({"x": 8.0}), passes=4, every=2)
+    Record(rows=array([[2. ],
+           [0.5]]), passes=4)
+    """
+
+    rows: Array
+    passes: int
+
+
+@contextmanager
+def _fitting(rows: int, width: int) -> Iterator[None]:
+    """Within, memory that does not suffice for the rows of a record is told in a sentence."""
+    try:
+        yield
+    except MemoryError:
+        raise MemoryError(f"{rows} rows of {width} numbers do not fit in memory: record fewer passes (every)") from None
+
+
+class Runner(ABC):
+    """A program ready to run; made by `runner`.
+
+    Attributes
+    ----------
+    program : Program
+        What it runs.
+    width : int
+        Numbers in a vector of `Map`: registers are padded to a multiple of it.
+    size : int
+        Numbers in a memory.
+
+    Examples
+    --------
+    >>> from cgraph.extend import Program, runner
+    >>> run = runner(Program({"x": 1}, [], record=["x"]), "python")
+    >>> memory = run.memory({"x": 8.0})
+    >>> run.read(memory, "x").tolist()
+    [8.0]
+    """
+
+    def __init__(self, program: Program, width: int = 1) -> None:
+        self.program, self.width = program, width
+        places = offsets(program.registers, width)
+        self._slices = {name: slice(places[name], places[name] + n) for name, n in program.registers.items()}
+        self.size = places[""]
+        self._masked: Program | None = None
+
+    @property
+    def masked(self) -> Program:
+        """The program of memories side by side, see `many`; made at its first use."""
+        if self._masked is None:
+            self._masked = many(self.program)
+        return self._masked
+
+    def prepared(self) -> Runner:
+        """This runner, with all made that `run` needs, so that its first run takes no longer than the next.
+
+        Returns
+        -------
+        Runner
+            Itself.
+
+        Examples
+        --------
+        >>> from cgraph.extend import Program, runner
+        >>> runner(Program({"x": 1}, [], record=["x"]), "python").prepared().size
+        1
+        """
+        return self
+
+    def memory(self, values: Mapping[str, ArrayLike], count: int | None = None) -> Array:
+        """A memory with these values of registers, 0 elsewhere.
+
+        Parameters
+        ----------
+        values : mapping of str to array_like
+            {register: a number or an array of its length, or (length, count)}.
+        count : int, optional
+            How many memories, for `run_many`.
+
+        Returns
+        -------
+        ndarray, shape (size,) or (size, count)
+            The memory.
+
+        Raises
+        ------
+        GraphError
+            If a register is unknown or a value has another length.
+        """
+        memory = np.zeros(self.size if count is None else (self.size, require_whole("count", count)))
+        for name, value in require_mapping("values", values, "register: numbers").items():
+            self.write(memory, name, value)
+        return memory
+
+    def read(self, memory: Array, name: str) -> Array:
+        """The register in a memory, a view (length,). Raises GraphError for an unknown one."""
+        if not isinstance(name, str) or name not in self._slices:
+            raise GraphError(f"the program has no register {name!r} (it has {', '.join(self._slices) or 'none'})")
+        return memory[self._slices[name]]
+
+    def write(self, memory: Array, name: str, value: ArrayLike) -> None:
+        """Set a register. Raises GraphError for an unknown one, or a value of another length."""
+        register = self.read(memory, name)
+        try:
+            numbers = np.asarray(value, dtype=np.float64)
+        except (TypeError, ValueError, OverflowError):
+            numbers = real_array(f"register {name!r}", value)
+        if numbers.ndim and numbers.shape != register.shape:
+            raise GraphError(f"register {name!r} needs shape {register.shape}, got {numbers.shape}")
+        register[...] = numbers
+
+    def run(self, memory: Array, passes: int, every: int = 1, feed: ArrayLike | None = None) -> Record:
+        """Run passes, fewer if the program stops, and record a row after each `every`th.
+
+        Parameters
+        ----------
+        memory : ndarray of float64, shape (size,)
+            Changed in place: the next run continues from it.
+        passes, every : int
+            At least 0 and at least 1.
+        feed : array_like, shape (passes, feed_width), optional
+            Of a program with a feed, what its registers are before each pass.
+
+        Returns
+        -------
+        Record
+            The rows, and the number of passes that were run.
+
+        Raises
+        ------
+        GraphError
+            If the memory or the feed has another shape or type, or `passes` or `every` is out of range.
+        """
+        self._check(memory, (self.size,), passes, every)
+        fed = self._fed(feed, (passes, self.program.feed_width))
+        with _fitting(passes // every, self.program.width):
+            return self._run(memory, passes, every, fed)
+
+    def bind(self, memory: Array, rows: Array) -> Callable[[], None]:
+        """A function of nothing: `run` on this memory, len(rows) passes, which writes the rows.
+
+        The arrays are checked here and never again; the function keeps them alive. One thread at a time may call it.
+
+        Parameters
+        ----------
+        memory : ndarray of float64, shape (size,)
+            Changed in place: write registers, such as through `read`, between calls.
+        rows : ndarray of float64, shape (passes, width)
+            A pass that records nothing leaves the last ones as they were.
+
+        Returns
+        -------
+        callable
+
+        Raises
+        ------
+        GraphError
+            If an array has another shape or type, or the program has a feed.
+        """
+        if self.program.feed:
+            raise GraphError("a bound run takes no feed: give its registers a place in the memory")
+        passes = len(rows) if isinstance(rows, np.ndarray) and rows.ndim else 0
+        require_memory("rows", rows, (passes, self.program.width))
+        self._check(memory, (self.size,), passes, 1)
+        return self._bound(memory, rows)
+
+    def _bound(self, memory: Array, rows: Array) -> Callable[[], None]:
+        def call() -> None:
+            found = self.run(memory, len(rows)).rows
+            rows[: len(found)] = found
+
+        return call
+
+    @abstractmethod
+    def _bind_pass(self, x: tuple[str, Array], y: tuple[str, Array]) -> tuple[Callable[[], None], Mapping[str, Array]]:
+        """A function of nothing: one pass, of which a register x that is read and a y that is written lie in arrays.
+
+        The arrays, contiguous and of as many numbers, are not checked; no `Map` may write y. With it come the other
+        registers, zeros.
+        """
+
+    def run_many(self, memories: Array, passes: int, every: int = 1, feed: ArrayLike | None = None) -> Record:
+        """As `run`, for N memories at once, in vectors: what `run` does of each, whichever course it takes.
+
+        Parameters
+        ----------
+        memories : ndarray of float64, shape (size, N)
+            Changed in place.
+        passes, every : int
+            At least 0 and at least 1.
+        feed : array_like, shape (passes, feed_width, N) or (passes, feed_width, 1), optional
+            As for `run`, for each memory or one for all.
+
+        Returns
+        -------
+        Record
+            With rows (rows, width, N).
+
+        Raises
+        ------
+        GraphError
+            If the program has `record_if` or `stop`, by which memories would have other numbers of rows or passes, or
+            statements that run one memory alone; and as for `run`.
+        """
+        if not isinstance(memories, np.ndarray) or memories.ndim != 2:
+            raise GraphError(f"memories must have shape ({self.size}, N), got {describe(memories)}")
+        self._check(memories, (self.size, memories.shape[1]), passes, every)
+        self._require_beside()
+        count = memories.shape[1]
+        fed = self._fed(feed, (passes, self.program.feed_width, count))
+        with _fitting(passes // every, self.program.width * count):
+            return self._run_many(memories, passes, every, fed)
+
+    def batch(self, name: str, values: ArrayLike, threads: int | None = 1, *, out: Array | None = None) -> Array:
+        """What one pass records at each of N values of a register, side by side in vectors.
+
+        Parameters
+        ----------
+        name : str
+            The register.
+        values : array_like, shape (N, length)
+            A value a row.
+        threads : int, optional
+            How many may share the work; None: one for each core.
+        out : ndarray of float64, shape (N, width), optional
+            Where they go, sharing no memory with `values`; a new one by default.
+
+        Returns
+        -------
+        ndarray, shape (N, width)
+            A row of the record for each value.
+
+        Raises
+        ------
+        GraphError
+            For another shape; if the program cannot `run_many`, or has a feed; if a pass reads or records a register,
+            other than this one, that it may not have set before.
+        """
+        count, rows = thread_count(threads), np.ascontiguousarray(real_array(name, values))
+        length = len(self.read(np.empty(self.size), name))
+        if rows.ndim != 2 or rows.shape[1] != length:
+            raise GraphError(f"register {name!r} needs values of shape (N, {length}), got {rows.shape}")
+        self._require_beside()
+        if self.program.feed:
+            raise GraphError("a batch takes no feed: give its registers a place in the one that varies")
+        if (unset := _first_unset(self.program, name)) is not None:
+            raise GraphError(f"a batch needs a pass that sets what it reads: register {unset!r} is read before")
+        shape = len(rows), self.program.width
+        result = np.empty(shape) if out is None else out
+        require_out(result, shape, rows)
+        write_batch(*self._columns(name), rows.T, result.T, count)
+        return result
+
+    def _columns(self, name: str) -> tuple[int, Callable[[Array, Array], None]]:
+        """What writes records, (width, k), of values of a register, (length, k); and the k worth a thread's start."""
+
+        def write(values: Array, records: Array) -> None:
+            memories = self.memory({name: values}, values.shape[1])
+            records[...] = self._run_many(memories, 1, 1, np.empty((1, 0, values.shape[1]))).rows[0]
+
+        return BLOCK, write
+
+    def _require_beside(self) -> None:
+        if alone := self.program.alone:
+            raise GraphError(f"programs with {', '.join(alone)} run one memory at a time, not side by side")
+
+    def _fed(self, feed: ArrayLike | None, shape: tuple[int, ...]) -> Array:
+        """The rows of a feed, of that shape; the last dimension may be one for all."""
+        if feed is None and not self.program.feed:
+            return np.empty(shape)
+        rows = real_array("feed", () if feed is None else feed)
+        if rows.shape not in (shape, (*shape[:2], 1)[: len(shape)]):
+            raise GraphError(f"the program needs a feed of shape {shape}, got {rows.shape}")
+        return rows
+
+    def _check(self, memory: Array, shape: tuple[int, ...], passes: int, every: int) -> None:
+        fits = isinstance(memory, np.ndarray) and memory.dtype == np.float64 and memory.shape == shape
+        if not fits or not memory.flags.c_contiguous:
+            raise GraphError(f"a memory must be contiguous float64 of shape {shape}, got {describe(memory)}")
+        require_whole("passes", passes)
+        require_whole("every", every, 1)
+
+    @abstractmethod
+    def _run(self, memory: Array, passes: int, every: int, feed: Array) -> Record: ...
+
+    @abstractmethod
+    def _run_many(self, memories: Array, passes: int, every: int, feed: Array) -> Record: ...
+
+
+def _first_unset(program: Program, known: str) -> str | None:
+    """A register that a pass reads or records before it is sure to have set it, if there is one besides `known`."""
+    is_set = {known}
+    for statement in program.body:
+        reads, writes = reads_and_writes(statement)
+        for name in reads:
+            if name not in is_set:
+                return name
+        if not row_of(statement).bodies:  # which may run no time at all
+            is_set |= {*writes}
+    return next((name for name in program.record if name not in is_set), None)

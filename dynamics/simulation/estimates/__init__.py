@@ -1,0 +1,1 @@
+"""Estimates: how far a run may be off, and advice on methods."""

@@ -1,0 +1,109 @@
+"""Difference: by how much the states of runs differ from those of runs beside them, as both go on."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from cgraph.extend import Array
+
+from ..steps.dense_output import Indices
+from ..steps.equal_steps import SAME
+from .state_sizes import Flags
+
+
+class States(NamedTuple):
+    """Of k runs side by side: instants (r,) and states (k, r, m), after so many resets."""
+
+    t: Array
+    x: Array
+    resets: int = 0
+
+
+def matches(times: Array, others: Array) -> tuple[Indices, Indices]:
+    """Where two courses of time have the same instants but for rounding: indices into both. Both go the same way."""
+    direction = 1.0 if len(times) < 2 or times[-1] > times[0] else -1.0
+    near = np.searchsorted(direction * times, direction * others)
+    near = np.clip(near, 0, len(times) - 1)
+    before = np.maximum(near - 1, 0)
+    near = np.where(np.abs(times[before] - others) < np.abs(times[near] - others), before, near)
+    same = np.flatnonzero(np.abs(times[near] - others) <= SAME * np.spacing(np.abs(others)))
+    return near[same], same
+
+
+def even(rows: Indices) -> slice | Indices:
+    """The same rows; as a slice, which copies nothing, where they are evenly spaced."""
+    if not len(rows):
+        return slice(0)
+    apart = int(rows[1] - rows[0]) if len(rows) > 1 else 1
+    even = bool((np.diff(rows) == apart).all())
+    return slice(int(rows[0]), int(rows[-1]) + 1, apart) if even else rows
+
+
+class Difference:
+    """Between two streams of states at the instants of both, (k, m): the largest so far, and the last.
+
+    lost: the time since which it is infinite, for one of the runs is not finite or takes another course, (k,); NaN
+    before.
+    """
+
+    def __init__(self, k: int, m: int, direction: float) -> None:
+        self.largest, self.last, self._before = np.zeros((3, k, m))
+        self.lost = np.full(k, math.nan)
+        self.compared = 0  # instants
+        self._direction = direction
+        self._streams: tuple[list[States], list[States]] = [], []
+
+    def add(self, which: int, states: States) -> None:
+        """More states of one of the streams."""
+        self._streams[which].append(states)
+
+    def restart(self) -> None:
+        """The streams begin anew, at states that do not differ: what comes is added to the last difference."""
+        self._before = self.last
+        for stream in self._streams:
+            stream.clear()
+
+    def lose(self, t: float, runs: Flags | bool = True) -> None:
+        """From t on nothing is known of these runs."""
+        new = np.isnan(self.lost) & runs
+        self.lost[new] = t
+        self.largest[new] = self.last[new] = math.inf
+
+    def compare(self, resets: int) -> None:
+        """The states that both have of the leg after so many resets."""
+        first, other = (together(stream, resets) for stream in self._streams)
+        if first is None or other is None:
+            return
+        here, there = matches(first.t, other.t)
+        if len(here):
+            self.compared += len(here)
+            change = other.x[:, even(there)] - first.x[:, even(here)]
+            np.abs(change, out=change)
+            most = change.max(axis=1)
+            if len(bad := np.flatnonzero(~np.isfinite(most).all(axis=1))):
+                finite = np.isfinite(change[bad]).all(axis=(0, 2))
+                self.lose(float(first.t[here[np.argmin(finite)]]), np.isin(np.arange(len(most)), bad))
+            known = np.isnan(self.lost)
+            self.last[known] = self._before[known] + change[known, -1]
+            self.largest[known] = np.maximum(self.largest, self._before + most)[known]
+        end = min(self._direction * first.t[-1], self._direction * other.t[-1])
+        for stream, states in zip(self._streams, (first, other), strict=True):
+            left = self._direction * states.t > end
+            stream[:1] = [States(states.t[left], states.x[:, left], resets)] if left.any() else []
+
+
+def together(stream: list[States], resets: int) -> States | None:
+    """The states of a leg as one, which alone stay in the stream with those of later ones; None if there are none."""
+    here = [states for states in stream if states.resets == resets]
+    stream[:] = [states for states in stream if states.resets > resets]
+    if not here:
+        return None
+    whole = here[0]
+    if len(here) > 1:
+        t, x = np.concatenate([each.t for each in here]), np.concatenate([each.x for each in here], axis=1)
+        whole = States(t, x, resets)
+    stream.insert(0, whole)
+    return whole

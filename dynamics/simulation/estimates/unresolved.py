@@ -1,0 +1,152 @@
+"""What steps cannot resolve of a rate, along a run: waves of the time that are too fast, and its jumps and kinks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import NamedTuple
+
+import numpy as np
+
+from cgraph import Graph, Node, floor, less, variable, where
+from cgraph.extend import Array, Builder, building, kept_by_first
+
+from ...systems.arguments import TIME
+from .state_sizes import Flags
+
+PARTS, TIMES = 16, 10  # into which the way from one state to the next is divided, and again, to find a branch's change
+BURST = (
+    4  # steps, by which changes of branches are apart that are those of one passage, as where friction comes to rest
+)
+WAVES = ("sin", "cos", "tan")
+
+
+class Branch(NamedTuple):
+    """Of an operation: a number that changes only across its jump or kink, and its value where that is given."""
+
+    of: Callable[..., Node]
+    given: Callable[..., Node]
+
+
+BRANCHES = {
+    **{
+        name: Branch(lambda node, *args: node, lambda branch, *args: branch)
+        for name in ("floor", "ceil", "round", "sign", "less", "less_equal", "equal", "not_equal")
+    },
+    "minimum": Branch(lambda node, a, b: less(a, b), lambda branch, a, b: where(branch, a, b)),
+    "maximum": Branch(lambda node, a, b: less(a, b), lambda branch, a, b: where(branch, b, a)),
+    "abs": Branch(lambda node, a: less(a, 0.0), lambda branch, a: where(branch, -a, a)),
+    "fmod": Branch(lambda node, a, b: _whole(a / b), lambda branch, a, b: a - branch * b),
+}
+
+
+def _whole(ratio: Node) -> Node:
+    """The whole number next to it towards 0."""
+    return where(less(ratio, 0.0), -floor(-ratio), floor(ratio))
+
+
+class Unresolved(NamedTuple):
+    """What tells, along a run, how well steps can follow a rate. All have its inputs, in its order.
+
+    waves: what changes with time of all that it takes sines, cosines and tangents of.  branches: numbers that are
+    others on the other side of a jump or a kink.  sides: the rate where these are given, as further inputs.
+    """
+
+    waves: Graph | None
+    branches: Graph | None
+    sides: Graph | None
+
+
+@kept_by_first
+def unresolved(rate: Graph) -> Unresolved:
+    """Of a rate; None in place of what it has not."""
+    timed = {node for node in rate.inputs if node.name == TIME}
+    for node in rate.nodes:
+        if not timed.isdisjoint(node.args):
+            timed.add(node)
+    waves = dict.fromkeys(node.args[0] for node in rate.nodes if node.op.name in WAVES and node.args[0] in timed)
+    bent = [node for node in rate.nodes if node.op.name in BRANCHES]
+    phases = Graph(rate.inputs, {f"phase{k}": node for k, node in enumerate(waves)}) if waves else None
+    if not bent:
+        return Unresolved(phases, None, None)
+    word = "branch" + "_" * max(map(len, rate.input_names))  # the name of no input begins so
+    branches = {f"{word}{k}": BRANCHES[node.op.name].of(node, *node.args) for k, node in enumerate(bent)}
+    return Unresolved(phases, Graph(rate.inputs, branches), _sides(rate, dict(zip(bent, branches, strict=True))))
+
+
+def _sides(rate: Graph, names: dict[Node, str]) -> Graph:
+    """The rate where what these nodes branch on is given, by inputs of these names."""
+    given = {node: variable(name) for node, name in names.items()}
+    build, new = Builder(), {node: node for node in rate.inputs}
+    with building(build):
+        for node in rate.nodes:
+            args = tuple([new[arg] for arg in node.args])
+            if node in given:
+                new[node] = BRANCHES[node.op.name].given(given[node], *args)
+            elif node not in new:
+                new[node] = build(node.op, args, node.label) if args else node
+    return Graph([*rate.inputs, *given.values()], {name: new[node] for name, node in rate.outputs.items()})
+
+
+def turning(waves: Graph, t: Array, x: Array, p: Array) -> Array:
+    """How fast sines and cosines turn at most [rad/s], (k,), between states x (k, r, m) at times t (r,)."""
+    phases = _values(waves, t, x, p[:, None])
+    return np.asarray((np.abs(np.diff(phases)) / np.abs(np.diff(t))).max(axis=(0, 2)))
+
+
+def missed(what: Unresolved, order: int, t: Array, x: Array, p: Array) -> tuple[Flags, Array]:
+    """Whether runs pass jumps or kinks of the rate, (k,), and by how much the steps that do are off, added up, (k, m).
+
+    x: the states after all steps, (k, r, m), at times t (r,).  A step across a jump may be off by the jump times the
+    way from there to the nearer end of the step; of order 1, where the rate is that of one end, by all of the step.
+    Farther from its ends than a share 1 / order a step evaluates the rate on both sides, and steps of other lengths
+    differ. Across a kink the two sides differ by what the rate has become since: least at the nearer end, too.
+    """
+    assert what.branches is not None
+    assert what.sides is not None
+    branch = _values(what.branches, t, x, p[:, None])
+    run, row = np.nonzero((branch[:, :, 1:] != branch[:, :, :-1]).any(axis=0))
+    bent, error = np.zeros(len(x), dtype=bool), np.zeros((len(x), x.shape[2]))
+    if not len(run):
+        return bent, error
+    bent[run], p = True, p[run]
+    ends = [_End(t[at], x[run, at], branch[:, run, at]) for at in (row, row + 1)]
+    apart = [
+        np.abs(np.subtract(*[_values(what.sides, end.t, end.x, p, each.branch) for each in ends])).T for end in ends
+    ]
+    way = np.ones(len(run)) if order == 1 else np.minimum(_way(what.branches, ends[0], ends[1], p), 1.0 / order)
+    off = np.fmin(*apart) * (np.abs(ends[1].t - ends[0].t) * way)[:, None]
+    first = np.flatnonzero(np.diff(run, prepend=-1) + (np.diff(row, prepend=row[0]) > BURST))
+    largest = np.maximum.reduceat(np.where(np.isfinite(off), off, 0.0), first)
+    np.add.at(error, run[first], largest)
+    return bent, error
+
+
+class _End(NamedTuple):
+    """Of steps: times (n,), states (n, m) and branches (.., n)."""
+
+    t: Array
+    x: Array
+    branch: Array
+
+
+def _way(branches: Graph, begin: _End, end: _End, p: Array) -> Array:
+    """Of the steps, (n,): how far the first and the last change of a branch are from the nearer end, at most."""
+    low, length = np.array([[0.0], [1.0]]), np.array([[1.0], [-1.0]])  # from both ends
+    sides = np.stack([begin.branch, end.branch], axis=1)[..., None]
+    parts = np.arange(1.0, PARTS + 1.0) / PARTS
+    low = np.broadcast_to(low, (2, len(p)))
+    for _ in range(TIMES):
+        shares = low[..., None] + length[..., None] * parts
+        x = begin.x[:, None] + shares[..., None] * (end.x - begin.x)[:, None]
+        t = begin.t[:, None] + shares * (end.t - begin.t)[:, None]
+        other = (_values(branches, t, x, p[:, None]) != sides).any(axis=0)
+        low = low + length * (np.where(other.any(axis=2), other.argmax(axis=2), PARTS - 1) / PARTS)
+        length = length / PARTS
+    return np.asarray(np.minimum(low, 1.0 - low).clip(0.0).max(axis=0))
+
+
+def _values(graph: Graph, t: Array, x: Array, p: Array, more: Iterable[Array] = ()) -> Array:
+    """Outputs, (.., *shape), at times t, states x (*shape, m) and parameters p (*shape, ..), and further inputs."""
+    columns = [*np.moveaxis(x, -1, 0), t, *np.moveaxis(p, -1, 0), *more]
+    values = graph.evaluate(dict(zip(graph.input_names, columns, strict=True)))
+    return np.stack([np.broadcast_to(value, x.shape[:-1]) for value in values.values()])

@@ -1,0 +1,257 @@
+"""Integration by steps chosen by error: the first step, the tolerances, and what a user should know of the steps."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cgraph.extend import Array, Runner
+
+from ...integrators.step_control import COLLAPSE, DONE, SMALLEST_ATOL, TOO_SMALL
+from ..estimates.state_sizes import StateSizes
+from ..run_options import RunOptions
+from ..sampled_controller import Hold
+from .dense_output import StepBlock
+from .first_step import LEAP, first_step
+from .step_program import CompiledSteps
+from .stepping import FIRST_PASSES, NativeIntegration, nonfinite
+
+ROUNDS = 4  # of a first step, by which the sizes of the states are known
+HALVINGS = 100  # of a look ahead
+FAR = 1e3  # tolerances of a step, by which constraints may move what it arrives at
+JUMP = 1e-2  # of the longest of the last steps: how much of it a jump may take, where atol is chosen by sizes
+SUDDEN = 1e-3  # of a kind of rate: a force that jumps at the start changes it by more
+HELD, SHARE = 100, 0.25  # steps at the stability limit, of all, from which on a run is called stiff
+
+
+class AdaptiveIntegration(NativeIntegration):
+    """Steps chosen by the method."""
+
+    def __init__(
+        self,
+        compiled: CompiledSteps,
+        options: RunOptions,
+        parameters: Sequence[float] = (),
+        stopped: Callable[[], bool] = lambda: False,
+        control: Hold | None = None,
+    ) -> None:
+        super().__init__(compiled, options, parameters, stopped, control)
+        self.relative = max(options.relative, self.program.finest)
+        self.absolute = np.broadcast_to(np.maximum(options.absolute, SMALLEST_ATOL), self.program.size)
+        self.sizes = self._fresh_sizes() if options.atol is None else None
+        self._below_rounding = self._far = False
+
+    def blocks(self, x: Array) -> Iterator[StepBlock]:
+        """The steps from x (m,) on, some at a time."""
+        options, end = self.options, self._hold(self.options.t0, x)
+        wanted, longest = self._first_step(x)
+        start: Mapping[str, float | Array | list[float]] = {
+            "x": x,
+            "p": self.parameters,
+            "t": options.t0,
+            "end": end,
+            "rtol": self.relative,
+            "atol": self.absolute,
+            "next": wanted,
+            "longest": longest,
+            "jump": JUMP if self.sizes else 0.0,
+            "max_step": options.longest_step,
+            "still": LEAP * options.length if self.program.timed else math.inf,
+            "min_step": COLLAPSE * abs(options.t_end - options.t0),
+            "fresh": 1.0,
+            "error_old": 1e-4,
+            "accepted": 1.0,
+        }
+        memory = self.runner.memory(start)
+        seen = FIRST_PASSES  # so many trials, and then twice as many as before, between two looks at the sizes
+        while True:
+            done = self.steps + self.rejected
+            left = options.max_steps - done
+            if left <= 0:
+                self.status = self.too_many(self._number(memory, "t"), options.max_steps)
+                return
+            rows, _ = self._advance(memory, int(min(left, seen - done if self.sizes else 2**31)), whole=False)
+            status = self._number(memory, "status")
+            self.steps += len(rows)
+            self.rejected = int(self._number(memory, "rejected"))
+            self.evaluations = int(self._number(memory, "evaluations"))
+            if len(rows):
+                self._look(memory, rows)
+                yield self._block(rows)
+            if self.sizes:
+                self.sizes.see(rows[:, 2 : 2 + self.program.size])
+                if self.steps + self.rejected >= seen:
+                    seen *= 2
+                    self.absolute = self.sizes.tolerance()
+                    self.runner.write(memory, "atol", self.absolute)
+            if status == TOO_SMALL:
+                self.status = self._too_small(memory)
+            if status == TOO_SMALL or (status == DONE and not self._next_period(memory)):
+                return
+
+    def _hold(self, t: float, x: Array) -> float:
+        """Where the steps from t on end; of a controller, take its forces for this period."""
+        if self.control is None:
+            return self.options.t_end
+        self.parameters = self.control.at(t, x)
+        return next(self.control.ends(t, self.options.t_end))
+
+    def _next_period(self, memory: Array) -> bool:
+        """Whether the run is not over yet; the memory is then at the start of the next period of a controller."""
+        t = self._number(memory, "t")
+        if t == self.options.t_end:
+            return False
+        end, wanted = self._hold(t, self.runner.read(memory, "x")), self._number(memory, "next")
+        wanted = wanted if math.isfinite(wanted) else self.options.length  # Taylor's method chooses it by itself
+        for name, value in (("end", end), ("p", self.parameters), ("next", wanted), ("fresh", 1.0), ("status", 0.0)):
+            self.runner.write(memory, name, value)
+        return True
+
+    def _block(self, rows: Array) -> StepBlock:
+        m = self.program.size
+        t, h, x = rows[:, 0], rows[:, 1], rows[:, 2 : 2 + m]
+        self.largest = max(self.largest, min(float(np.abs(h).max()), self.options.longest_step))
+        if not self.program.dense:
+            return StepBlock(t, x, t - h, h, np.full_like(x, math.nan), None)
+        t_old, x_old, dense = rows[:, 2 + m], rows[:, 3 + m : 3 + 2 * m], rows[:, 3 + 2 * m :]
+        return StepBlock(t, x, t_old, h, x_old, dense.reshape(len(t), -1, m), self.program.normalization)
+
+    def _look(self, memory: Array, rows: Array) -> None:
+        """Note once what a user should know of these steps: stiffness, and tolerances below rounding."""
+        options, held = self.options, int(self._number(memory, "held"))
+        if held >= HELD and held >= SHARE * self.steps and not self.stiff:
+            t, h = rows[-1, :2]
+            self.stiff = (
+                f"the system is stiff: at t = {t:.6g} s the step, {abs(h):.3g} s, is held at the stability limit of "
+                f"method {options.method!r}, not by its tolerance"
+            )
+            self.warnings.append(self.stiff)
+        if not self._far and "farthest" in self.program.steps.registers:
+            way, self._far = self._number(memory, "farthest"), self._number(memory, "farthest") > FAR
+            if self._far:
+                self.warnings.append(
+                    f"by t = {rows[-1, 0]:.6g} s the constraints moved the state by {way:.3g} times the tolerance of a "
+                    "step: near a position where it can go on in two ways the motion is not certain"
+                )
+        if options.relative < self.relative and not self._below_rounding:
+            size = np.abs(rows[:, 2 : 2 + self.program.size])
+            short = (self.absolute + options.relative * size < self.relative * size).any(axis=0)
+            if short.any():
+                self._below_rounding = True
+                self.warnings.append(
+                    f"rtol = {options.relative:g} with the atol of {self.components[int(np.argmax(short))]} is below "
+                    f"the rounding of a step: raised to {self.relative:.3g}"
+                )
+
+    def _too_small(self, memory: Array) -> str:
+        t, x = self._number(memory, "t"), self.runner.read(memory, "x")
+        where, rate = f"stopped at t = {t:.6g} s: ", self._rate(t, x)
+        if not np.isfinite(rate).all():
+            first = self.components[int(np.flatnonzero(~np.isfinite(rate))[0])]
+            return f"{where}the rate of {first} is not finite{' at the start' if t == self.options.t0 else ''}"
+        self.slope = _lacking(self.runner, memory, self.components)
+        if self.slope:
+            return f"{where}{self.slope} is not finite, and method {self.options.method!r} takes it"
+        if reason := nonfinite(self.components, self.runner.read(memory, "x_new")):
+            return f"{where}{reason}, however small"
+        fastest = self.components[int(np.argmax(np.abs(rate) / self._scale(x, x)))]
+        h = self._number(memory, "tried")
+        return f"{where}the step, {h:.3g} s, is below the resolution of the time; fastest is {fastest}"
+
+    def _rate(self, t: float, x: Array) -> Array:
+        rate = self.program.rate
+        values = dict(zip(rate.input_names, [*x.tolist(), t, *self.parameters], strict=True))
+        return np.array(list(rate.evaluate(values).values()), dtype=np.float64)
+
+    def _fresh_sizes(self) -> StateSizes:
+        return StateSizes(self.relative, self.program.kinds, self.program.groups, SMALLEST_ATOL, self.program.lengths)
+
+    def _first_step(self, x: Array) -> tuple[float, float]:
+        """The first step, and how far ahead the sizes of the states were seen, where they choose atol."""
+        options = self.options
+        if self.sizes is None and (options.first_step is not None or self.program.starts):
+            return options.first_step or options.length, 0.0
+        start: dict[str, ArrayLike] = {"x": x, "p": self.parameters}
+        rate = self._rate(options.t0, x)
+        if self.sizes is None:
+            return first_step(self.runner, self.program.order, options, start, rate, self._scale), 0.0
+        given = options.first_step
+        h = min(options.length, options.longest_step) * LEAP if given is None else given
+        after = self._after_start(x, rate)
+        for _ in range(ROUNDS):
+            self.sizes = self._fresh_sizes()
+            states, far = self._ahead(x, rate if after is None else after, h)
+            self.sizes.see(states)
+            self.absolute = self.sizes.tolerance()
+            if given is not None:
+                return given, max(given, far)
+            if after is not None:  # halving steps only leads to the jump; step control passes it, as any later one
+                return far, far
+            before, h = h, first_step(self.runner, self.program.order, options, start, rate, self._scale)
+            if h >= 0.5 * before:
+                break
+        return h, max(h, far)
+
+    def _after_start(self, x: Array, rate: Array) -> Array | None:
+        """The rate right after the start, where a force jumps there: it changes in the first instant, and no more."""
+        assert self.sizes is not None
+        options, largest = self.options, self.sizes.largest_of_kind
+        if not self.program.timed:
+            return None
+        instant = max(float(np.spacing(abs(options.t0))), COLLAPSE * options.length)
+        instant = math.copysign(instant, options.t_end - options.t0)
+        after, later = (self._rate(options.t0 + k * instant, x) for k in (1, 2))
+        with np.errstate(all="ignore"):
+            least = SUDDEN * np.maximum(largest(rate), largest(after))
+            jumps = (np.abs(after - rate) > least) & (np.abs(later - after) <= least)
+        return after if jumps.any() else None
+
+    def _ahead(self, x: Array, rate: Array, h: float) -> tuple[Array, float]:
+        """x and where Euler's steps lead to, (.., m), of h or of so much less that they can be trusted, and their size.
+
+        They move no kind of component by more than its size, and turn no kind of rate: it changes by no more than the
+        larger of before and after.
+        """
+        sign = math.copysign(1.0, self.options.t_end - self.options.t0)
+        with np.errstate(all="ignore"):
+            for _ in range(HALVINGS):
+                if (states := self._euler(x, rate, sign * h)) is not None:
+                    return states, h
+                h *= 0.25
+        return x[None], h
+
+    def _euler(self, x: Array, rate: Array, h: float) -> Array | None:
+        """x and two of Euler's steps, (.., m), or as many as move all that moves; None where they cannot be trusted.
+
+        At rest each step may move one component more, the next of a chain; the first moves none where a force begins
+        at 0.
+        """
+        assert self.sizes is not None
+        largest, states, moved = self.sizes.largest_of_kind, [x], [0, 0]
+        size = largest(x)
+        while len(states) < 3 or (moved[-1] < len(x) and moved[-1] > moved[-3]):
+            states.append(states[-1] + h * rate)
+            moved.append(int(np.count_nonzero(states[-1])))
+            before, rate = rate, self._rate(self.options.t0 + (len(states) - 1) * h, states[-1])
+            fast = np.maximum(largest(before), largest(rate))
+            if not (((largest(states[-1] - x) <= size) | (size == 0.0)) & (largest(rate - before) <= fast)).all():
+                return None
+        return np.stack(states)
+
+    def _scale(self, x: Array, x_new: Array) -> Array:
+        """What the error of a step is measured by."""
+        size: Array = self.absolute + self.relative * np.maximum(np.abs(x), np.abs(x_new))
+        return size
+
+
+def _lacking(runner: Runner, memory: Array, components: Sequence[str]) -> str:
+    """The first derivative of the rate that a method takes and that is not finite; empty if all are."""
+    lengths = runner.program.registers
+    for register, by in (("time_slope", ["the time"]), ("jacobian", components)):
+        if lengths.get(register) and len(bad := np.flatnonzero(~np.isfinite(runner.read(memory, register)))):
+            row, column = divmod(int(bad[0]), len(by))
+            return f"the derivative of the rate of {components[row]} by {by[column]}"
+    return ""

@@ -1,0 +1,133 @@
+"""StepProgram: the steps of a method on the graphs of a problem, as plain data that pickles; and its compiled form."""
+
+from __future__ import annotations
+
+import pickle
+from dataclasses import dataclass, replace
+
+from cgraph import Graph
+from cgraph.extend import Call, Factor, If, Program, Runner, kept_by_first, runner
+
+from ...integrators import Method, Problem
+from ...integrators.step_control import moved
+
+
+@dataclass(frozen=True, eq=False)
+class StepProgram:
+    """What a run reads of a problem and a method."""
+
+    components: tuple[str, ...]  # of the state, in words
+    parameters: tuple[str, ...]  # inputs that are not built in
+    steps: Program
+    rate: Graph
+    timed: bool  # whether it depends on t
+    order: int
+    adaptive: bool
+    dense: bool  # whether its record has dense output
+    finest: float  # relative tolerance
+    starts: bool  # with a first step that the method chooses
+    kinds: tuple[int, ...]  # of the components: the same for those that can be compared, see `System.lengths`
+    lengths: tuple[float, ...]  # of the components: what 1 stands for beside 1 of others of its kind
+    groups: tuple[int, ...]  # of the components: the same for those of one quantity, as a quaternion's
+    ordinary: bool  # of a first-order system, whose states may all round each other
+    normalization: Graph | None  # of states, see Problem; with constraints their projection, over states and t
+
+    @property
+    def factorizations(self) -> int:
+        """LU factorizations in a trial of a step."""
+        return sum(isinstance(statement, Factor) for statement in self.steps.statements())
+
+    @property
+    def size(self) -> int:
+        """Numbers in a state."""
+        return len(self.components)
+
+
+@dataclass(frozen=True, eq=False)
+class CompiledSteps:
+    """A step program and its machine code, or Python."""
+
+    program: StepProgram
+    runner: Runner
+
+
+@kept_by_first
+def step_program(problem: Problem, method: Method, *, dense: bool) -> StepProgram:
+    """The steps of a method on a problem, all graphs that they need derived; the problem keeps them.
+
+    dense: whether a method that chooses its steps records its dense output.
+    Raises SingularMassMatrixError for a coordinate without inertia, ValueError for a method that the model has not.
+    """
+    kinds, groups = state_kinds(problem)
+    return StepProgram(
+        problem.components,
+        problem.parameters,
+        _normalized(method.program(problem, dense), problem, method),
+        problem.rate,
+        problem.timed,
+        method.order,
+        method.adaptive,
+        dense and method.adaptive,
+        method.finest,
+        method.starts,
+        kinds,
+        tuple([size or 1.0 for size in problem.lengths]),
+        groups,
+        problem.system is None,
+        between(problem),
+    )
+
+
+def state_kinds(problem: Problem) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """Kinds and groups of the components.
+
+    Coordinates are a kind, and velocities; those of no known length are others, and so is a group of several
+    coordinates, such as a quaternion.
+    """
+    system, every = problem.system, tuple(range(problem.size))
+    if system is None:
+        return every, every
+    groups = [system.kinematics.groups.index(group) for group in system.kinematics.groups]  # by their first
+    alone = [group if groups.count(group) > 1 else None for group in groups] + [None] * system.n
+    kinds = [
+        (k < problem.nq, not size, group) for k, (size, group) in enumerate(zip(problem.lengths, alone, strict=True))
+    ]
+    return tuple([kinds.index(kind) for kind in kinds]), (*groups, *every[problem.nq :])
+
+
+def _normalized(steps: Program, problem: Problem, method: Method) -> Program:
+    """The steps with every state that a step arrives at normalized, so that errors do not add up along it.
+
+    Where there are constraints it is projected onto them, which normalizes it; of steps by error register `farthest`
+    tells how far, in tolerances.
+    """
+    if problem.projection is not None and method.adaptive:
+        lengths = {**steps.registers, "onto": problem.size, "way": 1, "farthest": 1}
+        onto = Call(problem.projection, ("x", "t", "p"), ("onto",))
+        return replace(steps, registers=lengths, body=[*steps.body, If("accepted", (onto, *moved(problem.size)))])
+    if problem.projection is not None:
+        arrived = Call(problem.projection, ("x", "t", "p"), ("x",))
+    elif problem.normalization is not None:
+        arrived = Call(problem.normalization, ("x",), ("x",))
+    else:
+        return steps
+    return replace(steps, body=[*steps.body, If("accepted", (arrived,)) if method.adaptive else arrived])
+
+
+def between(problem: Problem) -> Graph | None:
+    """What is done to states between the ends of steps: the projection where it needs no more than states and t."""
+    if problem.projection is None or problem.parameters:
+        return problem.normalization
+    return problem.projection
+
+
+@kept_by_first
+def pickled_steps(program: StepProgram) -> bytes:
+    """The steps as other processes are sent them."""
+    return pickle.dumps(program)
+
+
+@kept_by_first
+def compile_steps(program: StepProgram, backend: str) -> CompiledSteps:
+    """The steps, ready to run."""
+    return CompiledSteps(program, runner(program.steps, backend).prepared())
