@@ -60,8 +60,9 @@ class Adjoint(Registers):
         kept: Iterable[str],
         turns: int,
         recording: dict[Assignment, Assignment] | None = None,
+        own: str = "@",
     ) -> None:
-        super().__init__(lengths)
+        super().__init__(lengths, own)
         self.bars, self.active, self.products, self.turns = dict(bars), active, products, turns
         self.statements: list[Statement] = []
         self._kept = set(kept)  # registers of cotangents that must stay as they are
@@ -69,7 +70,8 @@ class Adjoint(Registers):
 
     def inner(self, bars: Mapping[str, str]) -> Adjoint:
         """Of a body, from cotangents of its end, which stay as they are."""
-        return Adjoint(bars, self.active, self.lengths, self.products, bars.values(), self.turns, self.recording)
+        more = bars.values(), self.turns, self.recording, self.own
+        return Adjoint(bars, self.active, self.lengths, self.products, *more)
 
     def pull(self, assignments: Sequence[Assignment]) -> None:
         """Through these assignments, the last first."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 
 from ...core.graph import Graph
 from ...operations.table import maximum, where
@@ -12,12 +12,11 @@ from ..statement import Statement, effects
 from ..statements.call import Call, Sum, added, copied, zeroed
 from ..statements.control import FixedPoint, While
 from .adjoint import Adjoint
-from .single_assignment import Assigned, Assignment
+from .single_assignment import Assigned, Assignment, Registers
 from .tangent import Tangent
 
 MOST_TURNS = 200.0
 STALLS = 3.0  # turns whose change is no smaller than before: the rest is rounding
-UNSOLVED = "unsolved"  # register: how many linear iterations came to no end
 
 
 def assign_fixed_point(statement: FixedPoint, assigned: Assigned) -> Assignment:
@@ -52,7 +51,7 @@ def push_fixed_point(assignment: Assignment, tangent: Tangent) -> None:
     if tangent.values:
         tangent.add(*assignment.flat_parts())
     rows = [(dot, None, inner.dots.get(after[name])) for name, dot in moving.items()]
-    tangent.add(*until_settled(rows, inner.statements, tangent.lengths, tangent.fresh))
+    tangent.add(*until_settled(rows, inner.statements, tangent))
     for name, end in after.items():
         if name in moving:
             tangent.dots[name] = moving[name]
@@ -76,7 +75,7 @@ def pull_fixed_point(assignment: Assignment, adjoint: Adjoint) -> None:
             break
         turning |= {name: adjoint.bar(name) for name in more}
     rows = [(bar, outer.get(name), inner.bars.get(name)) for name, bar in turning.items()]
-    adjoint.add(*until_settled(rows, inner.statements, adjoint.lengths, adjoint.fresh))
+    adjoint.add(*until_settled(rows, inner.statements, adjoint))
     for name, bar in inner.bars.items():
         if name not in after and name not in seeds and name in adjoint.active:
             adjoint.collect(name, bar)
@@ -85,14 +84,14 @@ def pull_fixed_point(assignment: Assignment, adjoint: Adjoint) -> None:
 def until_settled(
     rows: Sequence[tuple[str, str | None, str | None]],
     turn: Sequence[Statement],
-    lengths: Mapping[str, int],
-    fresh: Callable[[str, int], str],
+    registers: Registers,
 ) -> list[Statement]:
     """u = v + A u for all rows (u, v, the result of A u that a turn leaves), to rounding; None is zero.
 
     Changes of registers are measured by their sizes, so that units do not matter.
     """
-    going, turns, stalled, old, total = registers = [
+    fresh, lengths, unsolved = registers.fresh, registers.lengths, registers.unsolved
+    going, turns, stalled, old, total = begun = [
         fresh(name, 1) for name in ("going", "turns", "stalled", "change_old", "change")
     ]
     begin = Graph([], {"going": 1.0, "turns": 0.0, "stalled": 0.0, "old": math.inf})
@@ -106,8 +105,8 @@ def until_settled(
         body.append(copied(result, new) if v is None else added(v, result, new))
         body += [Sum(_SQUARED_CHANGE, (new, u), (change,)), Sum(_SQUARE, (new,), (size,)), copied(new, u)]
         body.append(Call(_SHARE, (total, change, size), (total,)))
-    judged = Call(_JUDGED, (total, old, turns, stalled, UNSOLVED), (going, old, turns, stalled, UNSOLVED))
-    start = Call(begin, (), tuple(registers[:4]))
+    judged = Call(_JUDGED, (total, old, turns, stalled, unsolved), (going, old, turns, stalled, unsolved))
+    start = Call(begin, (), tuple(begun[:4]))
     return [*first, start, While(going, (*body, judged)), *turn]
 
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
+from ...core.checks import GraphError
 from ...util.require import require_mapping, require_sequence, require_whole
 from ..program import Program
 from ..statement import Statement, effects, length_of, needed, reads_and_writes
 from ..statements.call import added, copied, zeroed
 from .adjoint import Adjoint, replayed
-from .fixed_point_rules import UNSOLVED
 from .products import Products, Pullback
 from .single_assignment import Assigned, Assignment, flat
 from .tangent import Tangent
@@ -40,7 +40,7 @@ class Linearized(NamedTuple):
 
     program: Program
     vectors: Mapping[str, str]
-    unsolved: str = UNSOLVED
+    unsolved: str
 
 
 class Linearization:
@@ -99,15 +99,21 @@ class Linearization:
         for what, names in (("of", of), ("wrt", wrt), ("constant", constant)):
             for name in require_sequence(what, names, "registers", str):
                 length_of(program.registers, what, name)
-        if texts := [each for each in (of, wrt) if isinstance(each, str)]:
-            raise TypeError(f"of and wrt must be sequences of registers, got the text {texts[0]!r:.60}")
+            if isinstance(names, str):
+                raise TypeError(f"{what} must be a sequence of registers, got the text {names!r:.60}")
+        of, wrt = list(dict.fromkeys(of)), list(dict.fromkeys(wrt))
+        if both := [name for name in wrt if name in constant]:
+            raise GraphError(f"wrt names register {both[0]!r}, which is constant")
+        if fed := [name for name in of if name in program.feed]:
+            raise GraphError(f"of names register {fed[0]!r}, which is fed: what a pass makes of it is lost in the next")
+        self._at, self._with = _unused("@", program), _unused(":", program)
         self._products = Products({} if rules is None else require_mapping("rules", rules, "id of a graph: rule"))
         self._lengths, self.fed = dict(program.registers), tuple(program.feed)
         self._turns = require_whole("turns", turns, 1)
         self.inputs = tuple([name for name in wrt if name not in self.fed])
         self.varied = tuple([name for name in wrt if name in self.fed])
         written = effects(program.body)[1]
-        assigned = Assigned(self._lengths)
+        assigned = Assigned(self._lengths, self._at)
         kept = [copied(name, name) for name in of if name not in written]
         self._plain = [assigned.assignment(each) for each in [*program.body, *kept]]
         self._recording: dict[Assignment, Assignment] = {}
@@ -118,7 +124,7 @@ class Linearization:
         self.constants = tuple([name for name in reads if name not in self.handed and name not in self.fed])
         moving = {*self.inputs, *self.varied, *[name for name in self.handed if name not in constant]}
         self.wrt = (*self.inputs, *self.varied)
-        self._active = _active(self._plain, moving, frozenset(constant))
+        self._active = _active(self._plain, moving, frozenset(constant), self._at)
 
     def forward(self, tape: Sequence[str], results: Sequence[str] = ()) -> Program:
         """The passes themselves, with what they record for their way back.
@@ -130,7 +136,7 @@ class Linearization:
         assignments = [self._recording.get(each, each) for each in self._plain]
         body = needed([*flat(assignments)], {*self.handed.values(), *ends, *tape})
         used = _names(body)
-        lengths = {name: self._lengths[name] for name in self._lengths if "@" not in name or name in used}
+        lengths = {name: self._lengths[name] for name in self._lengths if self._at not in name or name in used}
         copies = [copied(after, before) for before, after in self.handed.items() if self._lengths[before]]
         return Program(lengths, [*copies, *body], record=list(tape), feed=self.fed)
 
@@ -139,14 +145,16 @@ class Linearization:
 
         It is fed what was recorded, the last pass first, and records the cotangents of `varied`.
         """
-        wanted = list(seeds)
+        wanted = self._among("seeds", seeds, self.handed)
         while True:
             lengths = dict(self._lengths)
-            ends = {name: f"{name}:bar" for name in wanted} | {name: f"{name}:sum" for name in self.inputs}
+            ends = {name: self._called(name, "bar") for name in wanted} | {
+                name: self._called(name, "sum") for name in self.inputs
+            }
             lengths |= {bar: lengths[name] for name, bar in ends.items()}
-            lengths[UNSOLVED] = 1
+            lengths[self.unsolved] = 1
             bars = {self.handed[name]: ends[name] for name in wanted}
-            pulled = Adjoint(bars, self._active, lengths, self._products, ends.values(), self._turns)
+            pulled = Adjoint(bars, self._active, lengths, self._products, ends.values(), self._turns, own=self._at)
             pulled.pull(self._plain)
             more = [name for name in self.handed if name in pulled.bars and name not in wanted and name in self._active]
             if not more:
@@ -156,12 +164,12 @@ class Linearization:
         for recording in pulled.recording.values():
             self._lengths |= {name: lengths[name] for name in _names(recording.statements)}
         after = [added(ends[name], pulled.bars[name], ends[name]) for name in self.inputs if name in pulled.bars]
-        rows = {name: f"{name}:row" for name in self.varied}
+        rows = {name: self._called(name, "row") for name in self.varied}
         lengths |= {row: lengths[name] for name, row in rows.items()}
         for name, end in [*[(name, ends[name]) for name in wanted], *rows.items()]:
             bar = pulled.bars.get(name)
             after.append(zeroed(end) if bar is None else copied(bar, end))
-        results = {*ends.values(), *rows.values(), UNSOLVED}
+        results = {*ends.values(), *rows.values(), self.unsolved}
         return self._program(lengths, [*pulled.statements, *after], results, ends, list(rows.values()))
 
     def tangent(self, directions: Sequence[str], record: Sequence[str], then: Sequence[Statement] = ()) -> Linearized:
@@ -170,14 +178,15 @@ class Linearization:
         It is fed what was recorded, and records the tangents of `record` after a pass.  then: what else it does with
         the tangents, {name}:dot.
         """
-        lengths = {**self._lengths, UNSOLVED: 1}
+        lengths = {**self._lengths, self.unsolved: 1}
         moving = [name for name in self.handed if name in self._active]
-        dots = {name: f"{name}:dot" for name in (*moving, *directions)}
+        dots = {name: self._called(name, "dot") for name in (*moving, *self._among("directions", directions, lengths))}
+        self._among("record", record, dots)
         lengths |= {dot: lengths[name] for name, dot in dots.items()}
-        pushed = Tangent(dots, self._active, lengths, self._products)
+        pushed = Tangent(dots, self._active, lengths, self._products, own=self._at)
         pushed.push(self._plain)
         after = self._dots_after(pushed, dots, moving)
-        results = {*dots.values(), UNSOLVED}
+        results = {*dots.values(), self.unsolved}
         return self._program(
             lengths, [*pushed.statements, *after, *then], results, dots, [dots[name] for name in record]
         )
@@ -188,18 +197,33 @@ class Linearization:
         What is handed on begins, and ends, in the registers of the program itself.
         record: what is recorded after a pass, and then its tangents.
         """
-        lengths = {**self._lengths, UNSOLVED: 1}
+        lengths = {**self._lengths, self.unsolved: 1}
         moving = [name for name in self.handed if name in self._active]
-        dots = {name: f"{name}:dot" for name in (*moving, *directions)}
+        dots = {name: self._called(name, "dot") for name in (*moving, *directions)}
         lengths |= {dot: lengths[name] for name, dot in dots.items()}
-        pushed = Tangent(dots, self._active, lengths, self._products, values=True)
+        pushed = Tangent(dots, self._active, lengths, self._products, values=True, own=self._at)
         pushed.push(self._plain)
         copies = [copied(after, before) for before, after in self.handed.items() if lengths[before]]
         body = [*pushed.statements, *self._dots_after(pushed, dots, moving), *copies]
         rows = [*record, *[dots[name] for name in record if name in dots]]
-        used = {*_names(body), *rows, *dots.values(), *self.fed, UNSOLVED}
-        kept = {name: length for name, length in lengths.items() if "@" not in name or name in used}
-        return Linearized(Program(kept, body, record=rows, feed=self.fed), dots)
+        used = {*_names(body), *rows, *dots.values(), *self.fed, self.unsolved}
+        kept = {name: length for name, length in lengths.items() if self._at not in name or name in used}
+        return Linearized(Program(kept, body, record=rows, feed=self.fed), dots, self.unsolved)
+
+    @property
+    def unsolved(self) -> str:
+        """The register that counts linear iterations which came to no end."""
+        return f"unsolved{self._at}"
+
+    def _called(self, name: str, what: str) -> str:
+        return f"{name}{self._with}{what}"
+
+    @staticmethod
+    def _among(what: str, names: Sequence[str], known: Mapping[str, object]) -> list[str]:
+        """The names. Raises GraphError for one that is not among the known ones."""
+        if unknown := [name for name in names if name not in known]:
+            raise GraphError(f"{what} must be among {', '.join(known) or 'none'}, got {unknown[0]!r:.60}")
+        return list(names)
 
     def _dots_after(self, pushed: Tangent, dots: Mapping[str, str], moving: Sequence[str]) -> list[Statement]:
         """Tangents of what a pass hands on, where the next one reads them."""
@@ -224,9 +248,9 @@ class Linearization:
         starts = [name for name in (*self.fed, *self.handed) if name in values.wanted]
         body = [*values.again, *linear]
         fed = list(dict.fromkeys([*starts, *values.tape]))
-        used = {*_names(body), *fed, *record, *vectors.values(), *self.constants, UNSOLVED}
+        used = {*_names(body), *fed, *record, *vectors.values(), *self.constants, self.unsolved}
         kept = {name: length for name, length in lengths.items() if name in used}
-        return Linearized(Program(kept, body, record=record, feed=fed), vectors)
+        return Linearized(Program(kept, body, record=record, feed=fed), vectors, self.unsolved)
 
 
 def require_program(program: Program) -> None:
@@ -235,27 +259,35 @@ def require_program(program: Program) -> None:
         raise TypeError(f"program must be a Program, got {type(program).__name__}: {program!r:.60}")
 
 
+def _unused(sign: str, program: Program) -> str:
+    """The sign, as often as no register of the program has it in its name."""
+    own = sign
+    while any([own in name for name in program.registers]):
+        own += sign
+    return own
+
+
 def _names(statements: Sequence[Statement]) -> set[str]:
     return {name for statement in statements for names in reads_and_writes(statement) for name in names}
 
 
-def _active(assignments: Sequence[Assignment], moving: set[str], constant: frozenset[str]) -> set[str]:
+def _active(assignments: Sequence[Assignment], moving: set[str], constant: frozenset[str], own: str) -> set[str]:
     """Registers that depend on those that move."""
     active = set(moving)
     for assignment in assignments:
-        outputs = {name for name in reads_and_writes(assignment.statement)[1] if name.partition("@")[0] not in constant}
+        outputs = {name for name in reads_and_writes(assignment.statement)[1] if name.partition(own)[0] not in constant}
         if assignment.carried:  # of an iteration, whose solution depends on what it reads and not on where it began
             outside = set(effects(flat(assignment.parts[0]))[0])
             if active & (outside - set(assignment.carried)):
                 active |= outputs
-                active = _active(assignment.parts[0], active, constant)
+                active = _active(assignment.parts[0], active, constant, own)
             continue
         inputs = {name for statement in assignment.statements for name in reads_and_writes(statement)[0]}
         for copy in assignment.copies:
             if copy.inputs[0] in active:
-                active |= {name for name in copy.outputs if name.partition("@")[0] not in constant}
+                active |= {name for name in copy.outputs if name.partition(own)[0] not in constant}
         if active & inputs:
             active |= outputs
             for part in assignment.parts:
-                active = _active(part, active, constant)
+                active = _active(part, active, constant, own)
     return active

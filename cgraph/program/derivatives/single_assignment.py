@@ -56,13 +56,21 @@ class Registers:
     ----------
     lengths : dict of str to int
         Their lengths.
+    own : str
+        What is in the names of new ones alone.
     """
 
     lengths: dict[str, int]
+    own: str = "@"
+
+    @property
+    def unsolved(self) -> str:
+        """The register that counts linear iterations which came to no end."""
+        return f"unsolved{self.own}"
 
     def fresh(self, name: str, length: int) -> str:
         """A new register, called after another."""
-        new = f"{name.partition('@')[0]}@{len(self.lengths)}"
+        new = f"{name.partition(self.own)[0]}{self.own}{len(self.lengths)}"
         self.lengths[new] = length
         return new
 
@@ -109,7 +117,7 @@ class Assigned(Registers):
     def in_place(self, statement: Statement) -> Statement:
         """With the registers of now, which it also writes. Raises TypeError for one with bodies."""
         if bodies_of(statement):
-            raise TypeError(f"an iteration cannot have a statement of the type {type(statement).__name__}")
+            raise TypeError(f"a FixedPoint with a {type(statement).__name__} in its turns has no derivatives")
         row = row_of(statement)
         return with_names(statement, dict.fromkeys((*row.reads, *row.writes)), self.now)
 

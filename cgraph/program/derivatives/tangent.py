@@ -37,15 +37,16 @@ class Tangent(Registers):
         products: Products,
         *,
         values: bool = False,
+        own: str = "@",
     ) -> None:
-        super().__init__(lengths)
+        super().__init__(lengths, own)
         self.dots, self.active, self.products, self.values = dict(dots), active, products, values
         self.statements: list[Statement] = []
 
     def inner(self, more: Mapping[str, str] | None = None, *, values: bool = False) -> Tangent:
         """Of a body: what has tangents here has them there, and more registers."""
         dots = {**self.dots, **(more or {})}
-        return Tangent(dots, self.active, self.lengths, self.products, values=self.values or values)
+        return Tangent(dots, self.active, self.lengths, self.products, values=self.values or values, own=self.own)
 
     def push(self, assignments: Sequence[Assignment]) -> None:
         """Through these assignments, the first first."""

@@ -152,21 +152,30 @@ class ProgramVjp:
         if unknown := [name for name in require_mapping("seeds", seeds, "register: cotangent") if name not in self._of]:
             raise GraphError(f"seeds must be among {', '.join(self._of)}, got {unknown[0]!r:.60}")
         rows = np.empty((passes, 0)) if feed is None else real_array("feed", feed)
-        placed = {self.handed.get(name, name): value for name, value in values.items()}
+        if feed is not None and len(rows) != passes:
+            raise GraphError(f"the feed needs a row for each of {passes} passes, got {len(rows)}")
+        known = [name for name in self.forward.program.registers if name not in self.handed.values()]
+        if strange := [name for name in require_mapping("values", values, "register: numbers") if name not in known]:
+            raise GraphError(f"values must be of registers among {', '.join(known)}, got {strange[0]!r:.60}")
+        placed = {
+            self.handed.get(name, name): real_array(f"register {name!r}", value) for name, value in values.items()
+        }
         memory = self.forward.memory(placed)
         tape = Tape(self.forward, lambda first, last: rows[first:last], self._checkpoints)
         tape.run(memory, 0, passes, MOST)
         ends = {name: self.forward.read(memory, self.handed.get(name, name)).copy() for name in self._of}
         kept = {name: self.forward.read(memory, name) for name in self._passes.constants}
-        known = {name: value for name, value in kept.items() if name in self.backward.program.registers}
-        back = self.backward.memory({**known, **{self.vectors[name]: value for name, value in seeds.items()}})
+        same = {name: value for name, value in kept.items() if name in self.backward.program.registers}
+        bars = {self.vectors[name]: real_array(f"the seed of {name!r}", value) for name, value in seeds.items()}
+        back = self.backward.memory({**same, **bars})
         width, parts = self.backward.program.feed_width, []
         for first, last, record in tape.recorded(backwards=True):
-            parts.append(self.backward.run(back, last - first, 1, record[::-1, :width]).rows)
+            fed = record[::-1, :width] if width else np.empty((last - first, 0))
+            parts.append(self.backward.run(back, last - first, 1, fed).rows)
         if self.backward.read(back, self._unsolved)[0]:
             raise GraphError("the derivative of a FixedPoint was not solved: its turns do not settle")
         bars = {name: self.backward.read(back, register).copy() for name, register in self.vectors.items()}
-        slopes, at = np.concatenate(parts)[::-1], 0
+        slopes, at = (np.concatenate(parts) if self._passes.varied else np.empty((passes, 0)))[::-1], 0
         by_pass = {}
         for name in self._passes.varied:
             length = self.forward.program.registers[name]

@@ -343,3 +343,60 @@ def test_wrong_registers_are_told() -> None:
     whole = program_vjp(Program({"x": 1}, [], record=["x"]), ["x"])
     with pytest.raises(cg.GraphError, match="seeds must be among x, got 'y'"):
         whole({"x": 1.0}, 1, {"y": 1.0})
+
+
+X, P = cg.variables("x p")
+SQUARE = cg.Graph([X, P], {"x": P * X * X})  # twice from 1.1 with 0.7: p^3 x^4, 4 p^3 x^3, 3 p^2 x^4
+TWICE = (0.7**3 * 1.1**4, 4.0 * 0.7**3 * 1.1**3, 3.0 * 0.7**2 * 1.1**4)
+
+
+@pytest.mark.parametrize(
+    ("a", "b"),
+    [("x", "p"), ("x", "x@2"), ("x@2", "p:dot"), ("x", "x:bar"), ("x", "x:dot"), ("x", "unsolved"), ("x", "unsolved@")],
+)
+def test_registers_may_have_any_name(a: str, b: str) -> None:
+    program = Program({a: 1, b: 1}, [Call(SQUARE, (a, b), (a,))], record=[a])
+    pulled = program_vjp(program, [a, a], [b, b])({a: 1.1, b: 0.7}, 2, {a: 1.0})
+    found = [*pulled.values[a], *pulled.bars[a], *pulled.bars[b]]
+    assert found == pytest.approx(TWICE, rel=EQUATIONS)
+    moved = program_jvp(program, [b, b])
+    run = runner(moved.program, "python")
+    rows = run.run(run.memory({a: 1.1, b: 0.7, moved.vectors[b]: 1.0}), 2).rows[-1]
+    assert rows == pytest.approx([TWICE[0], TWICE[2]], rel=EQUATIONS)
+
+
+@pytest.mark.parametrize("backend", ["python", "auto"])
+@pytest.mark.parametrize("checkpoints", [0, 1])
+def test_what_needs_no_record_has_cotangents_too(backend: str, checkpoints: int) -> None:
+    program = Program({"x": 1, "p": 1, "y": 1}, [Call(cg.Graph([X, P], {"y": P * X}), ("x", "p"), ("y",))], record=())
+    pulled = program_vjp(program, ["y"], ["x", "p"], checkpoints=checkpoints, backend=backend)
+    result = pulled({"x": 2.0, "p": 3.0}, 1, {"y": 1.0})
+    assert (result.bars["x"].tolist(), result.bars["p"].tolist()) == ([3.0], [2.0])
+
+
+def test_a_register_that_is_fed_twice_in_wrt_has_its_rows() -> None:
+    program = Program({"x": 1, "p": 1}, [Call(SQUARE, ("x", "p"), ("x",))], record=(), feed=["p"])
+    rows = program_vjp(program, ["x"], ["p", "p"])({"x": 1.1}, 2, {"x": 1.0}, feed=[[0.7], [0.8]]).rows["p"]
+    first = 0.7 * 1.1**2
+    assert rows.ravel() == pytest.approx([2.0 * 0.8 * first * 1.1**2, first**2], rel=EQUATIONS)
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: program_vjp(FED, ["x", "p"]), "of names register 'p', which is fed"),
+        (lambda: program_vjp(FED, ["x"], ["p"], constant=["p"]), "wrt names register 'p', which is constant"),
+        (lambda: program_vjp(FED, ["x"], constant="p"), "constant must be a sequence of registers, got the text 'p'"),
+        (lambda: program_vjp(FED, ["x"])({"x": 1.0}, 1, {"x": 1.0}, feed=[[1.0], [2.0]]), "a row for each of 1 passes"),
+        (lambda: program_vjp(FED, ["x"])({"z": 1.0}, 1, {"x": 1.0}, feed=[[1.0]]), "values must be of registers among"),
+        (lambda: program_vjp(FED, ["x"])({"x": 1.0}, 1, {"x": None}, feed=[[1.0]]), "the seed of 'x'"),
+        (lambda: Linearization(FED, ["x"], []).adjoint(["z"]), "seeds must be among x, got 'z'"),
+        (lambda: Linearization(FED, ["x"], []).tangent([], ["p"]), "record must be among x, got 'p'"),
+    ],
+)
+def test_what_makes_no_sense_is_told(call: Callable[[], object], said: str) -> None:
+    with pytest.raises((TypeError, cg.GraphError), match=said):
+        call()
+
+
+FED = Program({"x": 1, "p": 1}, [Call(SQUARE, ("x", "p"), ("x",))], record=(), feed=["p"])
