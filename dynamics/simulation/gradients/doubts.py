@@ -79,11 +79,14 @@ def _grown(legs: Legs, start: Array, end: Array) -> list[str]:
     motion, options = legs.motion, legs.motion.options
     count = max(motion.many, 1)
     left = min(options.relative, LOOSE) if motion.method.adaptive else ASIDE - 1.0
-    at_start = np.maximum(np.abs(motion.x), np.abs(legs.end)).reshape(-1, count)
-    at_end = np.max([np.abs(run.states()[1]).max(axis=0).reshape(-1, count) for run in legs.runs], axis=0)
     with np.errstate(all="ignore"):
+        at_start = np.maximum(np.abs(motion.x), np.abs(legs.end)).reshape(-1, count)
         change = left * (np.abs(start).reshape(-1, count) * at_start).sum(axis=0)
-        whole = (np.abs(end).reshape(-1, count) * at_end).sum(axis=0) + np.abs(np.asarray(legs.loss)).reshape(-1)
+        slope, loss = np.abs(end).reshape(-1, count), np.abs(np.asarray(legs.loss)).reshape(-1)
+        if not (change > (slope * np.abs(legs.x).reshape(-1, count)).sum(axis=0) + loss).any():  # the end is enough
+            return [""] * count
+        at_end = np.max([np.abs(run.states()[1]).max(axis=0).reshape(-1, count) for run in legs.runs], axis=0)
+        whole = (slope * at_end).sum(axis=0) + loss
         ratios = np.divide(change, whole, out=np.zeros(count), where=whole > 0.0)
     what = f"rtol = {left:g}" if motion.method.adaptive else "rounding"
     return [
