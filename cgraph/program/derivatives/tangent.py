@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence, Set
 from ..statement import Statement, reads_and_writes, row_of
 from ..statements.call import copied, zeroed
 from .products import Products
-from .single_assignment import Assignment, Registers, flat
+from .single_assignment import Assignment, Registers
 
 
 class Tangent(Registers):
@@ -63,10 +63,6 @@ class Tangent(Registers):
     def add(self, *statements: Statement) -> None:
         """Statements after those that are there."""
         self.statements += statements
-
-    def flat(self, part: Sequence[Assignment]) -> list[Statement]:
-        """The statements of assignments, copies included."""
-        return [*flat(part)]
 
     def dot(self, register: str) -> str:
         """A new register for the tangent of one."""
