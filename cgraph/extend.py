@@ -24,7 +24,7 @@ label may have. `certain_digits` says what rounding leaves of the outputs.
 
 **Run**: a `Program` is graphs over registers of numbers (`Call`, `Map`, `Sum`, `Factor`, `Solve`, `If`, `While`), and
 `runner` makes it machine code or Python. `program_jvp` and `program_vjp` are its derivatives, `many` is what memories
-side by side run, and `register_statement` adds a kind of statement.
+side by side run, and `register_statement` adds a kind of statement. `copied` and `added` are the plainest ones.
 
 **At the edges**: `real_array`, `real_number`, `is_finite`, `check_name`, `require_graph`, `require_flag`,
 `require_whole`, `require_choice`, `require_sequence`, `require_mapping` and `require_path` check what a caller passed,
@@ -78,7 +78,7 @@ if TYPE_CHECKING:
     from .program.runners.choose_runner import runner
     from .program.runners.runner import Record, Runner
     from .program.statement import STATEMENTS, Statement, StatementRow, register_statement, require_length
-    from .program.statements.call import Call, Map, Sum
+    from .program.statements.call import Call, Map, Sum, added, copied
     from .program.statements.control import FixedPoint, If, While
     from .program.statements.matrix import Factor, Solve
     from .program.statements.memory import Pop, Push, Take
@@ -150,6 +150,7 @@ __all__ = [
     "Take",
     "Tape",
     "While",
+    "added",
     "as_node",
     "atomic_write",
     "building",
@@ -158,6 +159,7 @@ __all__ = [
     "check_writable",
     "columns",
     "compressed_jacobian",
+    "copied",
     "cotangents",
     "counted",
     "doors",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -10,7 +10,7 @@ import numpy as np
 
 from cgraph.extend import Array
 
-from ..trajectory import Crossings
+from ..trajectory import Crossings, Stats
 
 Counts = np.ndarray[Any, np.dtype[np.int64]]
 
@@ -60,6 +60,19 @@ class EnsembleStats:
     error: Array
     error_at_end: Array
     warnings: tuple[tuple[str, ...], ...]
+
+
+COLUMNS: dict[str, type] = dict.fromkeys(("steps", "rejected", "nfev", "status"), np.int64) | {"success": np.bool_}
+COLUMNS |= dict.fromkeys(("dt", "error", "error_at_end"), np.float64)  # None is NaN
+
+
+def ensemble_stats(each: Sequence[Stats], more: Sequence[Sequence[str]], seconds: float) -> EnsembleStats:
+    """The statistics of runs side by side.  more: what speaks against each result besides."""
+    columns: dict[str, Any] = {name: [getattr(stats, name) for stats in each] for name in EnsembleStats.__annotations__}
+    arrays: dict[str, Any] = {name: np.array(columns[name], dtype=kind) for name, kind in COLUMNS.items()}
+    said = tuple([(*stats.warnings, *texts) for stats, texts in zip(each, more, strict=True)])
+    same: dict[str, Any] = {"method": each[0].method, "seconds": seconds, "warnings": said}
+    return EnsembleStats(**(columns | arrays | same | {"message": tuple(columns["message"])}))
 
 
 @dataclass(frozen=True)

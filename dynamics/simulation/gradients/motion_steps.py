@@ -12,7 +12,7 @@ from cgraph import Graph
 from cgraph.extend import STATEMENTS, Call, Linearization, Program, Statement
 
 from ...integrators import Method, Problem
-from ...integrators.equal import registers
+from ...integrators.method import equal_registers
 from ...integrators.step import with_registers
 from ...systems.arguments import TIME, new_variables
 from .motion_equations import PARAMETERS, MotionEquations
@@ -49,7 +49,7 @@ def motion_steps(
     """
     problem = equations.problem
     made = method.step(problem)
-    lengths = with_registers(made, {**registers(problem), **equations.lengths, "arrival": 1, LOSS: 1})
+    lengths = with_registers(made, {**equal_registers(problem), **equations.lengths, "arrival": 1, LOSS: 1})
     body: list[Statement] = [*made.derived, *_arrival(problem)]
     carried = ["x"]
     if running is not None:
