@@ -87,10 +87,16 @@ def _block_limits(code: VectorCode, count: int) -> tuple[int, int]:
 
 def _advanced(code: VectorCode, memories: Array, steps: int, every: int) -> tuple[Array, States]:
     """So many steps: the record of each `every`th, and its states."""
-    record = code.one_pass.run_many(memories, steps, every).rows
-    farthest = int(np.argmax(code.one_pass.read(memories, "count")[0]))  # the time of one that has failed stands still
-    states = record[:, 1 : 1 + code.program.size].transpose(2, 0, 1)
-    return record, States(np.ascontiguousarray(record[:, 0, farthest]), states)
+    record, read = code.one_pass.run_many(memories, steps, every).rows, code.one_pass.read
+    farthest = int(np.argmax(read(memories, "count")[0]))  # where one has failed its time stands still
+    times, states = np.ascontiguousarray(record[:, 0, farthest]), record[:, 1 : 1 + code.program.size]
+    failed = np.flatnonzero(read(memories, "nonfinite")[0])
+    if code.stops and len(failed):  # what it leaves may be finite, and is no solution
+        begin, ends = read(memories, "start")[0, failed], read(memories, "t")[0, failed]
+        after = np.abs(times[:, None] - begin) >= np.abs(ends - begin)
+        states = states.copy()
+        states[:, :, failed] = np.where(after[:, None], np.nan, states[:, :, failed])
+    return record, States(times, states.transpose(2, 0, 1))
 
 
 def beside(code: VectorCode, course: Course, x: Array, p: Array) -> Iterator[States]:

@@ -14,7 +14,7 @@ from cgraph.extend import Array, Runner, Tape, run_passes
 
 from ..steps.dense_output import Indices
 from ..steps.stepping import nonfinite, unsolved
-from .motion import MotionError, MotionOf
+from .motion import MotionError, MotionRequest
 from .motion_programs import Along, MotionPrograms
 from .motion_steps import LOSS
 
@@ -33,7 +33,9 @@ class MotionRun:
     side, such a one has an end that is not finite.
     """
 
-    def __init__(self, motion: MotionOf, programs: MotionPrograms, *, arrives: bool = False, every: int = 0) -> None:
+    def __init__(
+        self, motion: MotionRequest, programs: MotionPrograms, *, arrives: bool = False, every: int = 0
+    ) -> None:
         """every: keep the states after every so many steps alone, of which nothing goes along the motion."""
         self.motion, self.start, self.step, self.failed = motion, programs.start, programs.step, programs.failed
         count, width = len(motion.h), self.step.forward.program.width
@@ -212,7 +214,7 @@ def _memory(ready: Runner, values: Mapping[str, Array], many: int) -> Array:
     return ready.memory(wide, many)
 
 
-def _fed(motion: MotionOf, first: int, last: int) -> Array:
+def _fed(motion: MotionRequest, first: int, last: int) -> Array:
     """What the steps first .. last - 1 are fed."""
     part = slice(first, last)
     columns = np.stack([motion.t[:-1][part], motion.h[part]], axis=1)

@@ -78,8 +78,7 @@ class AdaptiveIntegration(NativeIntegration):
                 return
             rows, _ = self._advance(memory, int(min(left, seen - done if self.sizes else 2**31)), whole=False)
             status = self._number(memory, "status")
-            self.steps += len(rows)
-            self.rejected = int(self._number(memory, "rejected"))
+            self._count(len(rows), int(self._number(memory, "rejected")))
             self.evaluations = int(self._number(memory, "evaluations"))
             if len(rows):
                 self._look(memory, rows)

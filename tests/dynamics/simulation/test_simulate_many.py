@@ -1,6 +1,7 @@
 """simulate_many: every trajectory is its own, whoever runs it and whatever its neighbors do."""
 
 import math
+import warnings
 from typing import Any
 
 import numpy as np
@@ -266,3 +267,17 @@ def test_grids_meet_every_instant_in_steps_of_at_most_dt(gaps: list[float], dt: 
         assert all(steps <= limits[0] for steps, _, _ in blocks)
     assert met == approx(instants, rel=INSTANT)
     assert len(even_steps(np.linspace(0.0, 3.0, 1001).tolist(), dt)) == 1
+
+
+@mark.parametrize("method", ["midpoint", "gauss6", "verlet"])
+def test_the_errors_of_an_ensemble_are_those_of_its_runs_when_the_first_of_them_fails(method: str) -> None:
+    arm, starts = dyn.planar_arm([1.0, 0.8], [1.0, 0.8]), [[2.0, 0.5], *[[0.01 * k, 0.0] for k in range(1, 9)]]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", dyn.SimulationWarning)
+        fan = simulate_many(arm, starts, [0.0, 0.2], 2.0, method, dt=0.2)
+        alone = [dyn.simulate(arm, start, [0.0, 0.2], 2.0, method, dt=0.2) for start in starts]
+    assert fan.stats.status.tolist() == [-1, *[0] * 8]
+    assert fan.stats.message == tuple([run.message for run in alone])
+    np.testing.assert_array_equal(fan.stats.error[1:], [run.stats.error for run in alone[1:]])
+    for states, run in zip(fan.q, alone, strict=True):
+        np.testing.assert_array_equal(states[: len(run.q)], run.q)
