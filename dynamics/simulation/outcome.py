@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterable
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
@@ -48,8 +47,8 @@ def outcome(
     seconds = time.perf_counter() - begin - estimate.seconds
     advise(run, recorder.last, options, x, again)
     counts = (run.steps, run.rejected, run.evaluations, run.largest, seconds)
-    stats = ended(options.method, counts, run.status, run.event, run.jacobians, run.factorizations, tuple(run.warnings))
-    return stats if error is None else estimated(stats, error)
+    of_matrices = (run.jacobians, run.factorizations)
+    return ended(options.method, counts, run.status, run.event, of_matrices, run.warnings, error)
 
 
 def ended(
@@ -57,18 +56,23 @@ def ended(
     counts: tuple[int, int, int, float, float],
     status: str,
     event: str = "",
-    jacobians: int = 0,
-    factorizations: int = 0,
-    said: tuple[str, ...] = (),
+    of_matrices: tuple[int, int] = (0, 0),
+    said: Sequence[str] = (),
+    error: ErrorEstimate | None = None,
 ) -> Stats:
-    """How a run went.  counts: steps to seconds of `Stats`.  status, event: why it stopped early, or what ended it."""
-    message, number = status or event or REACHED, -1 if status else int(bool(event))
-    return Stats(method, *counts, not status, message, number, jacobians, factorizations, warnings=said)
+    """How a run went.  counts: steps to seconds of `Stats`.  of_matrices: njev and nlu.
 
-
-def estimated(stats: Stats, error: ErrorEstimate) -> Stats:
-    """With the error of the run, unless nothing could be compared."""
-    if math.isnan(error.largest):
-        return stats
-    said = (*stats.warnings, error.warning) if error.warning else stats.warnings
-    return replace(stats, error=error.largest, error_at_end=error.last, warnings=said)
+    status, event: why it stopped early, or what ended it.  said: what speaks against it besides its error.
+    """
+    known = error if error is not None and not math.isnan(error.largest) else None  # else nothing could be compared
+    return Stats(
+        method,
+        *counts,
+        not status,
+        status or event or REACHED,
+        -1 if status else int(bool(event)),
+        *of_matrices,
+        known and known.largest,
+        known and known.last,
+        (*said, known.warning) if known and known.warning else tuple(said),
+    )

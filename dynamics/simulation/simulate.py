@@ -178,7 +178,8 @@ def simulate(
 
     # Put the result together
     held = None if hold is None else hold.held
-    stats = replace(stats, warnings=(*stats.warnings, *missed_momenta(stepped, *rows, start=(t0, start.x, x))))
+    if missed := missed_momenta(stepped, *rows, start=(t0, start.x, x)):
+        stats = replace(stats, warnings=(*stats.warnings, *missed))
     early = not stats.success and not stats.message.startswith(INTERRUPTED)
     for text in [*([f"the run {stats.message}"] if early else []), *stats.warnings]:
         warnings.warn(text, SimulationWarning, stacklevel=2)

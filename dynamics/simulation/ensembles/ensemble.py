@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
@@ -68,11 +69,11 @@ COLUMNS |= dict.fromkeys(("dt", "error", "error_at_end"), np.float64)  # None is
 
 def ensemble_stats(each: Sequence[Stats], more: Sequence[Sequence[str]], seconds: float) -> EnsembleStats:
     """The statistics of runs side by side.  more: what speaks against each result besides."""
-    columns: dict[str, Any] = {name: [getattr(stats, name) for stats in each] for name in EnsembleStats.__annotations__}
-    arrays: dict[str, Any] = {name: np.array(columns[name], dtype=kind) for name, kind in COLUMNS.items()}
-    said = tuple([(*stats.warnings, *texts) for stats, texts in zip(each, more, strict=True)])
-    same: dict[str, Any] = {"method": each[0].method, "seconds": seconds, "warnings": said}
-    return EnsembleStats(**(columns | arrays | same | {"message": tuple(columns["message"])}))
+    names = [*COLUMNS, "message", "warnings"]
+    *numbers, messages, warnings = zip(*map(attrgetter(*names), each), strict=True)
+    columns: dict[str, Any] = {name: np.array(numbers[k], dtype=kind) for k, (name, kind) in enumerate(COLUMNS.items())}
+    said = tuple([(*texts, *others) for texts, others in zip(warnings, more, strict=True)])
+    return EnsembleStats(each[0].method, seconds=seconds, message=messages, warnings=said, **columns)
 
 
 @dataclass(frozen=True)

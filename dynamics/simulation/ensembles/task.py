@@ -67,7 +67,7 @@ class Task:
                     if stopped():
                         raise StoppedError
                     run.advance(*block)
-            run.end(estimator.estimates() if estimator else [])
+            run.end(errors=estimator.estimates() if estimator else [])
         except (KeyboardInterrupt, StoppedError):
             run.interrupt()
 

@@ -16,7 +16,7 @@ from cgraph.extend import Array, Call, FixedPoint, If, Runner, While, runner
 from ..estimates.courses import Course
 from ..estimates.error_estimate import ErrorEstimate, Estimator
 from ..estimates.state_difference import States
-from ..outcome import INTERRUPTED, ended, estimated
+from ..outcome import INTERRUPTED, ended
 from ..run_options import RunOptions
 from ..steps.equal_steps import EqualSteps
 from ..steps.step_program import StepProgram
@@ -131,7 +131,7 @@ class VectorizedIntegration:
         self.estimator, self._seen = estimator, SEEN if even and estimator and not estimator.every else 1
         count, total = part.rows.shape[:2]
         self._memories = _start_memories(code, chunk.x, chunk.p)
-        self._live = np.ones(count, dtype=bool)
+        self._live, self._method = np.ones(count, dtype=bool), options.method
         self._good = np.full(count, total)  # rows that count
         self._done, self._longest, self._reached = 0, 0.0, options.t0  # steps; s, a step; s, the time of the last block
         self._at = int(options.times is None or options.times[0] == options.t0)  # row
@@ -175,24 +175,19 @@ class VectorizedIntegration:
     def interrupt(self) -> None:
         """Those that have not failed end here, with the rows that they have."""
         self._good[self._live] = self._at
-        self._end(f"{INTERRUPTED} after t = {self._reached:.6g} s")
+        self.end(f"{INTERRUPTED} after t = {self._reached:.6g} s")
 
-    def end(self, errors: Sequence[ErrorEstimate]) -> None:
-        """Those that have not failed have reached their end; errors: of all, if they are estimated."""
-        self._end("")
-        for k in np.flatnonzero(self._live).tolist() if errors else ():
-            self.part.stats[k] = estimated(self.part.stats[k], errors[k])
-
-    def _end(self, status: str) -> None:
+    def end(self, status: str = "", errors: Sequence[ErrorEstimate] = ()) -> None:
+        """Those that have not failed end, at their end or for a reason.  errors: of all, if they are estimated."""
         evaluations = self.runner.read(self._memories, "evaluations")[0]
         for k in np.flatnonzero(self._live).tolist():
-            self._note(k, self._done, int(evaluations[k]), status)
+            self._note(k, self._done, int(evaluations[k]), status, errors[k] if errors else None)
         for k in np.flatnonzero(self._good < self.part.rows.shape[1]).tolist():
             self.part.rows[k, self._good[k] :] = np.nan
 
-    def _note(self, k: int, steps: int, evaluations: int, status: str) -> None:
+    def _note(self, k: int, steps: int, evaluations: int, status: str, error: ErrorEstimate | None = None) -> None:
         counts = (steps, 0, evaluations, self._longest, 0.0)
-        self.part.stats[k] = ended(self.part.stats[k].method, counts, status)
+        self.part.stats[k] = ended(self._method, counts, status, error=error)
 
     def _failed_step(self, k: int, memory: Array, at: int, every: int) -> None:
         """Of trajectory k, which stopped in the block that began with this memory, (size, 1), and row `at`."""

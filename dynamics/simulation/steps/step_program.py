@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from cgraph import Graph
 from cgraph.extend import Call, Factor, If, Program, Runner, kept_by_first, runner
@@ -33,11 +34,6 @@ class StepProgram:
     normalization: Graph | None  # of states, see Problem; with constraints their projection, over states and t
 
     @property
-    def factorizations(self) -> int:
-        """LU factorizations in a trial of a step."""
-        return sum(isinstance(statement, Factor) for statement in self.steps.statements())
-
-    @property
     def size(self) -> int:
         """Numbers in a state."""
         return len(self.components)
@@ -49,6 +45,11 @@ class CompiledSteps:
 
     program: StepProgram
     runner: Runner
+
+    @cached_property
+    def factorizations(self) -> int:
+        """LU factorizations in a trial of a step."""
+        return sum(isinstance(statement, Factor) for statement in self.program.steps.statements())
 
 
 @kept_by_first

@@ -106,7 +106,7 @@ class NativeIntegration(Integration):
         super().__init__(compiled.program.components)
         self.program, self.runner, self.options = compiled.program, compiled.runner, options
         self.parameters, self._stopped, self.control = list(parameters), stopped, control
-        self._passes = FIRST_PASSES
+        self._passes, self._factored = FIRST_PASSES, compiled.factorizations
         self._accepted = True
 
     def _count(self, steps: int, rejected: int = 0) -> None:
@@ -115,9 +115,9 @@ class NativeIntegration(Integration):
         The Jacobian is evaluated for every state that steps are tried from, and factored in every trial.
         """
         self.steps, self.rejected = self.steps + steps, rejected
-        if self.program.factorizations:
+        if self._factored:
             self.jacobians = self.steps + (not self._accepted)
-            self.factorizations = self.program.factorizations * (self.steps + self.rejected)
+            self.factorizations = self._factored * (self.steps + self.rejected)
 
     def _run(self, memory: Array, passes: int, every: int = 1) -> tuple[Array, int]:
         if self._stopped():
