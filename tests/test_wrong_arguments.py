@@ -348,6 +348,8 @@ CALLS |= {
     ),
     "extend.register_statement": call(registered_statement, extend.STATEMENTS[extend.Call]),
     "extend.Factor": call(a_program_of(extend.Factor), "x", "y"),
+    "extend.added": call(a_program_of(extend.added), "x", "y", "z"),
+    "extend.copied": call(a_program_of(extend.copied), "x", "y"),
     "extend.Formulas": call(extend.Formulas, GRAPH.nodes, GRAPH.outputs, PLAIN, called=None),
     "extend.If": call(a_program_of(extend.If), "x", (HALF,), (HALF,)),
     "extend.Map": call(a_program_of(extend.Map), GRAPH, ("x",), ("y",), ("z",)),
