@@ -13,11 +13,9 @@ from ..core.node import Node, Scalar, as_node
 from ..core.reverse import cotangents
 from ..core.scope import building
 from ..core.traversal import topological
-from ..simplification.balanced_sums import balanced
 from ..util.explain_failure import explain_failure
 from ..util.require import require_choice, require_flag, require_graph, require_sequence
-from .balanced_elimination import BalancedElimination, nodes_of, written_rows
-from .elimination_order import Step, elimination_steps
+from .elimination_order import Step, elimination_steps, nodes_of
 from .schur_elimination import EdgePushing
 
 Order = Literal["recursive", "balanced"]
@@ -163,6 +161,8 @@ def solve_nodes(
     equations = _solved(output, wrt, rhs, build, at or {}, multipliers, order)
     x = [equations.dots[node] for node in wrt]
     if order == "balanced":
+        from ..simplification.balanced_sums import balanced
+
         x = balanced(x, build)
     if check:
         with building(build) as set_label:
@@ -228,6 +228,8 @@ def _solved(
         passed = equations.arguments(_rows(output, multipliers, wrt))
         plan = elimination_steps(passed, equations.rotations)
     if order == "balanced":
+        from .balanced_elimination import BalancedElimination, written_rows
+
         if multipliers:
             raise ValueError('order "balanced" needs a function without multipliers')
         fewest = elimination_steps(passed, equations.rotations, fewest=True)

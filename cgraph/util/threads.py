@@ -9,6 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
+from ..core.evaluation import Array
 from .explain_failure import explain_failure
 
 
@@ -89,3 +90,17 @@ def share(work: Callable[[int], None], items: Iterable[int], threads: int) -> No
         run()
         for other in others:
             other.result()
+
+
+def write_batch(
+    width: int, columns: Callable[[Array, Array], None], points: Array, result: Array, threads: int
+) -> None:
+    """What `columns` writes, (n_out, N), of points, (n_in, N), in blocks of that width."""
+
+    def block(start: int) -> None:
+        stop = start + width
+        columns(points[:, start:stop], result[:, start:stop])
+
+    # Blocks begin where they begin whatever `threads` is, so that each column always has the same neighbours.
+    total = points.shape[1]
+    share(block, range(0, total, width), min(threads, total // width))

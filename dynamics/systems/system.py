@@ -10,8 +10,8 @@ from functools import cached_property
 from numpy.typing import ArrayLike
 
 import cgraph as cg
-from cgraph import Graph, Node
-from cgraph.extend import Builder, require_sequence, shortened, topological
+from cgraph import Graph, Node, extend
+from cgraph.extend import Builder, require_sequence, topological
 
 from .arguments import (
     TIME,
@@ -246,7 +246,9 @@ class System:
 
         P, whose sums could lose digits that a product of differences keeps, only where it then depends on less.
         """
-        kinetic, potential, forces = (shortened(part) for part in ([self.kinetic], [self.potential], self.forces))
+        kinetic, potential, forces = (
+            extend.shortened(part) for part in ([self.kinetic], [self.potential], self.forces)
+        )
         if [*kinetic, *potential, *forces] == [self.kinetic, self.potential, *self.forces]:
             return None
         other = copy(self)

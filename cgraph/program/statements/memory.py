@@ -12,6 +12,7 @@ from ...codegen.arithmetic import Arithmetic
 from ...core.checks import GraphError
 from ...core.evaluation import Array
 from ..statement import (
+    Execution,
     Lengths,
     Names,
     Statement,
@@ -22,7 +23,6 @@ from ..statement import (
 from .function_writer import FunctionWriter
 
 if TYPE_CHECKING:
-    from ..execution import Execution
     from ..writer import Writer
 
 State = dict[str, list[float]]
