@@ -62,6 +62,9 @@ class Jets(NamedTuple):
     pieces: tuple[Node, ...]
 
 
+ROUNDS = 100  # of partials of partials; those of the table come back to what is there after 2
+
+
 class NoSeriesError(ValueError):
     """An operation without a Taylor series in the equations."""
 
@@ -87,7 +90,8 @@ def jets(rate: Graph, time: str = "t", *, exact: bool = False) -> Jets:
     Raises
     ------
     NoSeriesError
-        For an operation that jumps; unless `exact`, for a piecewise one, too.
+        For an operation that jumps, or whose partials of partials never come back to what is there; unless `exact`, for
+        a piecewise one, too.
     TypeError
         For what is no graph.
     ValueError
@@ -108,6 +112,9 @@ def jets(rate: Graph, time: str = "t", *, exact: bool = False) -> Jets:
     if len(rate.outputs) > len(rate.inputs):
         raise ValueError(f"jets needs a state for each rate, got {len(rate.outputs)} rates, {len(rate.inputs)} inputs")
     return _Jets(rate, check_name("the time", time), require_flag("exact", exact)).graphs()
+
+
+_ENDLESS = "{op} has no Taylor series: its partials need partials of new nodes, and those again, {rounds} times over"
 
 
 class _Shared:
@@ -144,6 +151,8 @@ class _Jets:
         self.sums: dict[tuple[Node, Node, str], Node] = {}  # {(a, b, kind): the sum of (j) a_j b_k-j}
         self.sides: dict[Node, Node] = {}  # {piecewise node: the variable that holds its side}
         self.switches: list[Node] = []  # what decides them
+        self.rounds: dict[Node, int] = {}  # {partial: how many operations were differentiated one after another for it}
+        self.round = 0
         with self._building():
             self.states = [before * (self.unit / self.k) for before in self.before]
             for k, node in enumerate(rate.inputs):
@@ -153,7 +162,11 @@ class _Jets:
                 self.of[node] = moving
             self.waiting = list(rate.outputs.values())
             while self.waiting:
-                self.at(self.waiting.pop())
+                node = self.waiting.pop()
+                self.round = self.rounds.get(node, 0)
+                if self.round > ROUNDS:
+                    raise NoSeriesError(_ENDLESS.format(op=node.op.name, rounds=ROUNDS))
+                self.at(node)
 
     def _building(self) -> AbstractContextManager[Any]:
         return building(self.build)
@@ -199,6 +212,7 @@ class _Jets:
         for node in (a, b):
             if node not in self.of:
                 self.waiting.append(node)
+                self.rounds.setdefault(node, self.round + 1)
         if kind != "weighted" and (b, a, kind) in self.sums:
             a, b = b, a
         return self.sums.setdefault((a, b, kind), variable(f"sum{len(self.sums)}"))
