@@ -7,8 +7,9 @@ same for all k > 0, the rest, from those sums, which run over many nodes at once
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import AbstractContextManager
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from ..core.builder import Builder
 from ..core.checks import check_name
@@ -121,7 +122,7 @@ class _Shared:
     """Builds nodes as they are written, shared; what is folded of one argument alone, as -(-x), rounds nothing."""
 
     def __init__(self, graph: Graph) -> None:
-        self._made: dict[tuple[Any, ...], Node] = {}
+        self._made: dict[tuple[str | int, ...], Node] = {}
         for node in graph.nodes:
             if node.args:
                 self._made.setdefault(self._key(node.op, node.args), node)
@@ -134,7 +135,7 @@ class _Shared:
             self._made[key] = Node(op, args, label)
         return self._made[key]
 
-    def _key(self, op: Row, args: tuple[Node, ...]) -> tuple[Any, ...]:
+    def _key(self, op: Row, args: tuple[Node, ...]) -> tuple[str | int, ...]:
         return (op.name, *[repr(arg.value) if arg.op is CONSTANT else id(arg) for arg in args])
 
 
@@ -143,7 +144,7 @@ class _Jets:
 
     def __init__(self, rate: Graph, time: str, exact: bool) -> None:
         self.rate, self.exact, m = rate, exact, len(rate.outputs)
-        self.build: Any = _Shared(rate) if exact else Builder()
+        self.build = _Shared(rate) if exact else Builder()
         self.before = variables([f"rate{i}" for i in range(m)])
         self.unit, self.k = variables(["unit", "order"])
         self.of: dict[Node, Node | None] = {}  # {node: its coefficient k, None where it is constant}
@@ -168,7 +169,7 @@ class _Jets:
                     raise NoSeriesError(_ENDLESS.format(op=node.op.name, rounds=ROUNDS))
                 self.at(node)
 
-    def _building(self) -> AbstractContextManager[Any]:
+    def _building(self) -> AbstractContextManager[Callable[[Label], None]]:
         return building(self.build)
 
     def graphs(self) -> Jets:

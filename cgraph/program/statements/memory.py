@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...codegen.arithmetic import Arithmetic
 from ...core.checks import GraphError
@@ -190,7 +191,7 @@ def _row(state: dict[str, Array], names: Names) -> Array:
     return np.concatenate([none, *[state[name] for name in names]])
 
 
-def _places(number: Array, width: int) -> Any:
+def _places(number: Array, width: int) -> NDArray[np.int_]:
     """Where the rows of these numbers lie in a stack, (width, N)."""
     return number.astype(int) * width + np.arange(width)[:, None]
 
