@@ -180,25 +180,10 @@ def solve_tangents(
     *,
     order: Order = "recursive",
 ) -> dict[Node, Node]:
-    """Tangents (dz/dw) x of the nodes z that f is made from, for the x of `solve_nodes`, which has them anyway.
+    """Tangents {z: (dz/dw) x} of the nodes z that f is made from, for the x of `solve_nodes`, which has them anyway.
 
-    Parameters
-    ----------
-    output, wrt, rhs, build, order
-        As of `solve_nodes`.
+    At w it is x itself; a product within a rotation may be left out. Arguments and errors are those of `solve_nodes`.
 
-    Returns
-    -------
-    dict of Node to Node
-        {z: (dz/dw) x}, x itself at w. A product within a rotation may be left out.
-
-    Raises
-    ------
-    SingularError
-        As `solve_nodes`.
-
-    Examples
-    --------
     >>> import cgraph as cg
     >>> from cgraph.extend import solve_tangents
     >>> v, tau = cg.variables("v tau")
