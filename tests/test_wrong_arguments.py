@@ -468,7 +468,7 @@ RECORDS = """
 LEFT_OUT = """cg.recording_lines cg.clear_cache cg.clear_caches cg.Compiled.bind cg.Compiled.values cg.Graph.check
     cg.Graph.counts cg.Graph.listing cg.Graph.only_output cg.Graph.to_networkx dyn.System.bias_forces
     dyn.System.require_values dyn.System.momentum_rates
-    dyn.System.momentum_derivatives dyn.System.torque_derivatives
+    dyn.System.torque_derivatives
     dyn.JointForce.along dyn.JointForce.check dyn.JointLimit.along dyn.JointLimit.check dyn.JointFriction.along
     dyn.JointFriction.check dyn.Actuator.along dyn.Actuator.check
     extend.Array extend.columns extend.doors extend.Order extend.Polynomial extend.Builder extend.Runner

@@ -25,7 +25,6 @@ from .arguments import (
 )
 from .constraints import Constraints
 from .kinematics import Kinematics
-from .momentum_derivatives import MomentumDerivatives
 from .quasi_velocities import QuasiVelocities
 from .torque_derivatives import TorqueDerivatives
 
@@ -283,10 +282,6 @@ class System:
 
     def torque_derivatives(self, qdd: Sequence[Node], build: Builder) -> TorqueDerivatives | None:
         """Torques of a motion and their derivatives, without damping and applied forces; None as for `bias_forces`."""
-        return None
-
-    def momentum_derivatives(self, p: Sequence[Node], build: Builder) -> MomentumDerivatives | None:
-        """How velocities and rates of momenta depend on coordinates and momenta, without damping and applied forces."""
         return None
 
     def _require_consistent(self) -> None:
