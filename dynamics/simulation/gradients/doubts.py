@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -41,6 +42,8 @@ def doubts(
     if slopes is not None:
         for texts, text in zip(said, _grown(legs, *slopes), strict=True):
             texts += [text] if text else []
+    if all([_finite(number) for number in (value, *gradients.values())]):
+        return said
     values = np.broadcast_to(np.asarray(value, dtype=np.float64), (count,))
     for k, texts in enumerate(said):
         if not np.isfinite(values[k]):
@@ -51,6 +54,10 @@ def doubts(
             if not np.isfinite(one).all():
                 texts.append(f"the loss is {values[k]:.6g}, and its gradient by {name!r} is not finite")
     return said
+
+
+def _finite(numbers: Any) -> bool:
+    return math.isfinite(numbers) if isinstance(numbers, float) else bool(np.isfinite(numbers).all())
 
 
 def _missed(legs: Legs) -> list[list[str]]:

@@ -81,10 +81,10 @@ class MotionRun:
         forward, handed, memory = self.step.forward, self.step.passes.handed, self._memory
         self.x = forward.read(memory, handed["x"]).copy()
         self.loss = forward.read(memory, handed[LOSS])[0].copy() if LOSS in handed else np.zeros(self.x.shape[1:])
-        bad = self._bad(memory)
-        if not self.motion.many and bad.any():
-            raise MotionError(f"the motion {self.stopped()}")
-        self.x[..., bad] = np.nan
+        if (bad := self._bad(memory)).any():
+            if not self.motion.many:
+                raise MotionError(f"the motion {self.stopped()}")
+            self.x[:, bad] = np.nan
         self._constants = {name: forward.read(memory, name).copy() for name in self.step.passes.constants}
 
     def _bad(self, memory: Array) -> Any:
@@ -214,10 +214,7 @@ def _memory(ready: Runner, values: Mapping[str, Array], many: int) -> Array:
 
 def _fed(motion: MotionOf, first: int, last: int) -> Array:
     """What the steps first .. last - 1 are fed."""
-    part = slice(first, last)
-    columns = np.stack([motion.t[:-1][part], motion.h[part]], axis=1)
-    if not motion.each_step:
-        return columns
-    tau = motion.tau[part]
-    wide = np.broadcast_to(columns[..., None], (*columns.shape, motion.many)) if motion.many else columns
-    return np.concatenate([wide, tau], axis=1)
+    tau = motion.tau[first:last] if motion.each_step else np.empty((last - first, 0))
+    rows = np.empty((last - first, 2 + tau.shape[1], *tau.shape[2:]))
+    rows[:, 0].T[...], rows[:, 1].T[...], rows[:, 2:] = motion.t[first:last], motion.h[first:last], tau
+    return rows
