@@ -49,6 +49,8 @@ class MotionRun:
         """The memory before the first step."""
         motion, start = self.motion, self.start
         given = {"t": motion.t[:1], **motion.parameters_at(motion.force_at_start)}
+        if not self.failed:  # else rtol = 0, by which equations that are iterated are solved to rounding
+            given |= {"rtol": np.asarray(motion.options.relative), "atol": np.asarray(motion.options.absolute)}
         if start is None:
             self.begin = motion.x
             return _memory(self.step.forward, {**given, self.step.passes.handed["x"]: motion.x}, motion.many)
@@ -184,7 +186,7 @@ class MotionRun:
 
     def _vectors(self, along: Along, memory: Array) -> dict[str, Array]:
         unsolved = along.back.read(memory, along.linear.unsolved)[0] != 0.0
-        if np.any(unsolved & np.isfinite(self.x).all(axis=0) if self.motion.many else unsolved):
+        if unsolved.any() and (unsolved & np.isfinite(self.x).all(axis=0) if self.motion.many else unsolved).any():
             raise MotionError("the equations of a step's derivative were not solved: the step is too long")
         return {name: along.back.read(memory, register).copy() for name, register in along.linear.vectors.items()}
 

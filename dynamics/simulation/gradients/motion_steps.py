@@ -18,6 +18,7 @@ from ...systems.arguments import TIME, new_variables
 from .motion_equations import PARAMETERS, MotionEquations, sharing
 
 LOSS = "loss"  # register: the running loss so far
+GIVEN = (*PARAMETERS, "t", "rtol", "atol")  # registers: what a motion has from without
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +69,7 @@ def motion_steps(
         rules=pullbacks,
     )
     step = make(Program(lengths, _separate(body), record=(), feed=fed), carried, wrt)
-    read = [name for name in (*step.handed, *step.constants) if name not in (*PARAMETERS, "t")]
+    read = [name for name in (*step.handed, *step.constants) if name not in GIVEN]
     begin = _separate([*_normalized(problem, TIME), *made.start])
     start = make(Program(lengths, begin, record=()), read, [name for name in wrt if name != "h"]) if begin else None
     return MotionSteps(start, step, made.failed)
