@@ -37,17 +37,16 @@ def doubts(
     said = [[*legs.motion.said] for _ in range(count)]
     for sentences in (_missed(legs), _half_steps(legs), [] if slopes is None else _grown(legs, *slopes)):
         for texts, more in zip(said, sentences, strict=False):  # no sentences: of no motion
-            texts += [text for text in more if text]
+            texts += more
     if all([_finite(number) for number in (value, *gradients.values())]):
         return said
     values = np.broadcast_to(np.asarray(value, dtype=np.float64), (count,))
     for k, texts in enumerate(said):
         if not np.isfinite(values[k]):
             texts.append(f"the loss is {values[k]} of a motion that is finite")
-            continue
-        for name, gradient in gradients.items():
-            if not _finite(gradient[..., k] if many else gradient):
-                texts.append(f"the loss is {values[k]:.6g}, and its gradient by {name!r} is not finite")
+        else:
+            bad = [name for name, each in gradients.items() if not _finite(each[..., k] if many else each)]
+            texts += [f"the loss is {values[k]:.6g}, and its gradient by {name!r} is not finite" for name in bad]
     return said
 
 
@@ -127,21 +126,17 @@ def _half_steps(legs: Legs) -> list[list[str]]:
     relative = np.divide(difference, scale, out=np.zeros_like(scale), where=difference != 0.0)
     error = np.where(relative > LAWLESS, relative, relative / (1.0 - 0.5**motion.method.order))
     beyond = ~(error * scale <= options.absolute + options.relative * scale)
-    result = []
-    for k in range(count):
-        text = ""
-        if not np.isfinite(size[k]).all():  # of a motion that has no end
-            pass
-        elif not np.isfinite(difference[k]).all():
-            text = f"its error is unknown: in steps of half the length the motion {other.runs[-1].stopped(k)}"
+    said: list[list[str]] = [[] for _ in range(count)]
+    for k in np.flatnonzero(np.isfinite(size).all(axis=1)).tolist():  # of the motions that have an end
+        if not np.isfinite(difference[k]).all():
+            said[k].append(f"its error is unknown: in steps of half the length the motion {other.runs[-1].stopped(k)}")
         elif beyond[k].any():
             worst = int(np.argmax(np.where(beyond[k], error[k], -1.0)))
             off = f"{error[k, worst]:.2g} of the size of {motion.problem.components[worst]}"
             longest = float(np.abs(legs.runs[0].motion.h[0]))
             text = f"the state is off by an estimated {off}; rtol = {options.relative:g} allows less, "
-            text += f"and steps of {longest:.6g} s are too long for that"
-        result.append([text])
-    return result
+            said[k].append(f"{text}and steps of {longest:.6g} s are too long for that")
+    return said
 
 
 def _halved(leg: Leg, run: MotionRun) -> Leg:

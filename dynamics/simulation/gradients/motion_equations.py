@@ -113,8 +113,7 @@ def sharing(equations: MotionEquations) -> tuple[Graph, RatePullback] | None:
     moving, needed = {*rate.inputs[: equations.problem.size]}, set(pullback.solved)
     for node in topological([pullback.power]):
         moves = [arg in moving for arg in node.args]
-        if any(moves):
-            moving.add(node)
+        moving |= {node} if any(moves) else set()
         if node.op.name == "mul":
             needed |= {arg for arg, other in zip(node.args, reversed(moves), strict=True) if other}
         elif any(moves) and node.op.name not in ARITHMETIC:
@@ -124,11 +123,10 @@ def sharing(equations: MotionEquations) -> tuple[Graph, RatePullback] | None:
         if node in needed and node not in here:
             needed |= {*node.args}
     recorded, known = list[Node](), set(rate.inputs)
-    for node in order:
-        if node in here and node in needed:
-            if node.op.name not in ARITHMETIC or not known.issuperset(node.args):
-                recorded.append(node)
-            known.add(node)
+    for node in [node for node in order if node in here and node in needed]:
+        if node.op.name not in ARITHMETIC or not known.issuperset(node.args):
+            recorded.append(node)
+        known.add(node)
     shared = dict(zip(recorded, new_variables("shared", len(recorded), rate.input_names), strict=True))
     more = {str(variable.name): node for node, variable in shared.items()}
     return Graph(rate.inputs, {**rate.outputs, **more}), replace(pullback, shared=shared)

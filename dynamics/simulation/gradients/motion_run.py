@@ -41,7 +41,7 @@ class MotionRun:
         self._every = every or 1
         self.tape = Tape(self.step.forward, partial(_fed, motion), 0 if fits else math.ceil(math.sqrt(count)))
         self._memory = self._begin()
-        self._run(0, count - arrives)
+        self.tape.run(self._memory, 0, count - arrives, PIECE, self._every)
         if not arrives:
             self._end()
 
@@ -49,7 +49,7 @@ class MotionRun:
         """The memory before the first step."""
         motion, start = self.motion, self.start
         given = {"t": motion.t[:1], **motion.parameters_at(motion.force_at_start)}
-        if not self.failed:  # else rtol = 0, by which equations that are iterated are solved to rounding
+        if motion.method.adaptive and not self.failed:  # rtol = 0: what is iterated is solved to rounding
             given |= {"rtol": np.asarray(motion.options.relative), "atol": np.asarray(motion.options.absolute)}
         if start is None:
             self.begin = motion.x
@@ -73,11 +73,8 @@ class MotionRun:
     def finish(self) -> None:
         """Make the last step."""
         count = len(self.motion.h)
-        self._run(count - 1, count)
+        self.tape.run(self._memory, count - 1, count, PIECE, self._every)
         self._end()
-
-    def _run(self, begin: int, end: int) -> None:
-        self.tape.run(self._memory, begin, end, PIECE, self._every)
 
     def _end(self) -> None:
         forward, handed, memory = self.step.forward, self.step.passes.handed, self._memory
