@@ -92,7 +92,6 @@ METHODS: dict[str, Method] = Methods(
             degree=TAYLOR_ORDER,
             finest=2.0**-52,
             starts=True,
-            derived=False,
         ),
         **{name: _symplectic(method) for name, method in PARTITIONED.items()},
         **{

@@ -41,8 +41,6 @@ class Method:
     starts : bool
         Whether steps need no search for the first, and no limit by the one before, since each is at most what the
         derivatives at its start allow: `prepare` makes `next` no larger.
-    derived : bool
-        Whether motions by the method have derivatives.
 
     A run of equal steps makes one in a pass. Before each pass the registers hold
 
@@ -84,7 +82,6 @@ class Method:
     degree: int = HERMITE
     finest: float = ROUNDING
     starts: bool = False
-    derived: bool = True
 
     def program(self, problem: Problem, dense: bool) -> Program:
         """The steps of a run, one after another; dense: with dense output where they are chosen.

@@ -15,6 +15,7 @@ from ...core.evaluation import Array
 from ...core.graph import Graph
 from ...writing.naming import variables
 from ..statement import (
+    Execution,
     Lengths,
     Names,
     Statement,
@@ -24,7 +25,6 @@ from ..statement import (
 )
 
 if TYPE_CHECKING:
-    from ..execution import Execution
     from ..writer import Writer
 
 State = dict[str, list[float]]

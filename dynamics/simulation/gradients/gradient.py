@@ -112,8 +112,8 @@ def gradient(
     q, qd, t_end, t0, t_span, dt, max_step, rtol, atol, first_step, parameters, backend, form
         As for `simulate`.
     method : str, optional
-        A name of `dyn.METHODS`, of equal or chosen steps, but "taylor". By default that of `simulate`, "dop853", which
-        chooses its steps; and "rk4" where `dt` or a row of forces a step asks for equal ones. Equations that are
+        A name of `dyn.METHODS`, of equal or chosen steps. By default that of `simulate`, "dop853", which chooses its
+        steps; and "rk4" where `dt` or a row of forces a step asks for equal ones. Equations that are
         iterated are solved to rounding, of implicit methods and of their derivatives.
     running : callable, optional
         (q, qd, tau, t) or (q, qd, tau, t, p) to a node, summed over the steps, at the state, force and time where each

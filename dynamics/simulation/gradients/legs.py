@@ -210,11 +210,8 @@ def _arrays(values: Mapping[str, Any], motion: MotionRequest) -> Array:
 
 def _inputs(motion: MotionRequest) -> list[Any]:
     """Forces and parameters that stay inputs, at the end."""
-    return [*motion.force_at_end, *motion.values] if motion.many else _numbers(motion.force_at_end, motion.values)
-
-
-def _numbers(*arrays: Array) -> list[float]:
-    return [number for array in arrays for number in array.tolist()]
+    values = np.concatenate([motion.force_at_end, motion.values])
+    return [*values] if motion.many else values.tolist()
 
 
 def point(graph: Graph, motion: MotionRequest, x: Array, t: float) -> dict[str, Any]:

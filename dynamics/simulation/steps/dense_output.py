@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 import cgraph as cg
-from cgraph import Compiled, Graph
+from cgraph import Graph
 from cgraph.extend import Array, kept_by_first
+
+if TYPE_CHECKING:
+    from cgraph import Compiled
 
 UNIT = 2.0**-53  # relative error of one rounding
 
