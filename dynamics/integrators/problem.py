@@ -10,6 +10,7 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import kept_by_first, memo, topological
 
+from ..equations.constraint_rank import independent_rows
 from ..equations.energies import energy
 from ..equations.projection import projection
 from ..equations.state_equation import normalization, state_inputs, with_multipliers
@@ -163,6 +164,17 @@ def _bind(graph: Graph, first: Sequence[str], parameters: Sequence[str], bound: 
 def total_energy(problem: Problem) -> Graph | None:
     """The energy E of a mechanical system: inputs the states, t, parameters. None for a first-order system."""
     return None if problem.system is None else problem.bind(problem.states, energy(problem.system))
+
+
+@kept_by_first
+def constraint_rates(problem: Problem) -> Graph | None:
+    """The rates of the constraints that are kept, by their names: inputs the states, t, parameters. None without."""
+    system = problem.system
+    if system is None or problem.projection is None:
+        return None
+    constraints = system.constraints
+    rates = {constraints.names[k]: constraints.rates[k] for k in independent_rows(constraints)}
+    return problem.bind(problem.states, Graph([*system.q, *system.qd, *system.extra_inputs], rates))
 
 
 @kept_by_first

@@ -10,11 +10,12 @@ from numpy.typing import ArrayLike
 
 from cgraph.extend import Array, Runner
 
-from ...integrators.step_control import COLLAPSE, DONE, RESOLUTION, SMALLEST_ATOL, TOO_SMALL
+from ...integrators.step_control import COLLAPSE, DONE, RESOLUTION, RUNNING, SMALLEST_ATOL, TOO_SMALL
 from ..estimates.state_sizes import StateSizes
 from ..run_options import RunOptions
 from ..sampled_controller import Hold
 from .dense_output import StepBlock
+from .flat_position import FlatPosition
 from .step_program import CompiledSteps
 from .stepping import FIRST_PASSES, NativeIntegration, nonfinite
 
@@ -24,7 +25,6 @@ AHEAD = 3.0  # times the change of a first step: how far its first rate may poin
 HUGE = 1e300  # a tolerance that anything meets
 ROUNDS = 4  # of a first step, by which the sizes of the states are known
 HALVINGS = 100  # of a look ahead
-FAR = 1e3  # tolerances of a step, by which constraints may move what it arrives at
 JUMP = 1e-2  # of the longest of the last steps: how much of it a jump may take, where atol is chosen by sizes
 SUDDEN = 1e-3  # of a kind of rate: a force that jumps at the start changes it by more
 HELD, SHARE = 100, 0.25  # steps at the stability limit, of all, from which on a run is called stiff
@@ -45,7 +45,8 @@ class AdaptiveIntegration(NativeIntegration):
         self.relative = max(options.relative, self.program.finest)
         self.absolute = np.broadcast_to(np.maximum(options.absolute, SMALLEST_ATOL), self.program.size)
         self.sizes = self._fresh_sizes() if options.atol is None else None
-        self._below_rounding = self._far = False
+        self._below_rounding = False
+        self.flat = FlatPosition(self.program)
 
     def blocks(self, x: Array) -> Iterator[StepBlock]:
         """The steps from x (m,) on, some at a time."""
@@ -69,12 +70,13 @@ class AdaptiveIntegration(NativeIntegration):
             "accepted": 1.0,
         }
         memory = self.runner.memory(start)
+        self.flat.begin(options.t0, x, self.parameters)
         seen = FIRST_PASSES  # so many trials, and then twice as many as before, between two looks at the sizes
         while True:
             done = self.steps + self.rejected
             left = options.max_steps - done
             if left <= 0:
-                self.status = self.too_many(self._number(memory, "t"), options.max_steps)
+                self.status = self.too_many(self._number(memory, "t"), left + done) + self.flat.near(self.parameters)
                 return
             rows, _ = self._advance(memory, int(min(left, seen - done if self.sizes else 2**31)), whole=False)
             status = self._number(memory, "status")
@@ -83,6 +85,9 @@ class AdaptiveIntegration(NativeIntegration):
             if len(rows):
                 self._look(memory, rows)
                 yield self._block(rows)
+            self.status = self.flat.creeping(status == RUNNING, self.steps, self.largest, rows, self.parameters)
+            if self.status:
+                return
             if self.sizes:
                 self.sizes.see(rows[:, 2 : 2 + self.program.size])
                 if self.steps + self.rejected >= seen:
@@ -90,7 +95,7 @@ class AdaptiveIntegration(NativeIntegration):
                     self.absolute = self.sizes.tolerance()
                     self.runner.write(memory, "atol", self.absolute)
             if status == TOO_SMALL:
-                self.status = self._too_small(memory)
+                self.status = self._too_small(memory) + self.flat.near(self.parameters)
             if status == TOO_SMALL or (status == DONE and not self._next_period(memory)):
                 return
 
@@ -131,13 +136,8 @@ class AdaptiveIntegration(NativeIntegration):
                 f"method {options.method!r}, not by its tolerance"
             )
             self.warnings.append(self.stiff)
-        if not self._far and "farthest" in self.program.steps.registers:
-            way, self._far = self._number(memory, "farthest"), self._number(memory, "farthest") > FAR
-            if self._far:
-                self.warnings.append(
-                    f"by t = {rows[-1, 0]:.6g} s the constraints moved the state by {way:.3g} times the tolerance of a "
-                    "step: near a position where it can go on in two ways the motion is not certain"
-                )
+        if self.flat.rows is not None:
+            self.warnings += self.flat.look(rows, self._number(memory, "farthest"), self.parameters)
         if options.relative < self.relative and not self._below_rounding:
             size = np.abs(rows[:, 2 : 2 + self.program.size])
             short = (self.absolute + options.relative * size < self.relative * size).any(axis=0)
@@ -245,8 +245,7 @@ class AdaptiveIntegration(NativeIntegration):
 
     def _scale(self, x: Array, x_new: Array) -> Array:
         """What the error of a step is measured by."""
-        size: Array = self.absolute + self.relative * np.maximum(np.abs(x), np.abs(x_new))
-        return size
+        return np.asarray(self.absolute + self.relative * np.maximum(np.abs(x), np.abs(x_new)))
 
 
 def _lacking(runner: Runner, memory: Array, components: Sequence[str]) -> str:
