@@ -94,7 +94,8 @@ def state_inputs(model: Model) -> StateInputs:
     ode = as_ode(model)
     if ode is not None:
         return StateInputs(ode.states, (), ode.extra_inputs[:1] == [ode.t], dict(ode.parameters))
-    return _inputs_of(as_system(model))
+    system = as_system(model)
+    return _inputs_of(system)._replace(parameters=dict(system.parameters))  # which a person may change
 
 
 @kept_by_first
@@ -102,4 +103,4 @@ def _inputs_of(system: System) -> StateInputs:
     states = tuple([str(node.name) for node in (*system.q, *system.qd)])
     applied = tuple([str(node.name) for node in system.tau])
     timed = TIME in [node.name for node in system.extra_inputs[:1]]
-    return StateInputs(states, applied, timed, dict(system.parameters))
+    return StateInputs(states, applied, timed, {})

@@ -166,7 +166,6 @@ def total_energy(problem: Problem) -> Graph | None:
     return None if problem.system is None else problem.bind(problem.states, energy(problem.system))
 
 
-@kept_by_first
 def constraint_rates(problem: Problem) -> Graph | None:
     """The rates of the constraints that are kept, by their names: inputs the states, t, parameters. None without."""
     system = problem.system
