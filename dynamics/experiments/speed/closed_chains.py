@@ -19,13 +19,13 @@ from ...io.write_mjcf import to_mjcf
 from ...multibody.loops import Loop
 from ...multibody.mechanism import Mechanism
 from ...multibody.planar_arm import planar_arm
-from ...peers.case import Case
-from ...peers.pinocchio import PinocchioPeer
+from ...peers.pinocchio_loops import constraint_dynamics
 from ..text_table import table
 
 SIZES, LENGTH = (3, 10, 40), 0.8  # links, m each
 PIN = (1.0, 0.0, 0.0)  # m, where the tip is held
 REPEATS, SECONDS = 50, 0.002  # turns, and how long the calls of one take: short, so that some are not disturbed
+PROXIMAL = 1e-12, 1e-10, 10  # Pinocchio's: what is left of the pin, its regularization, and iterations
 AGREE = 1e-6  # relative: Pinocchio's iteration, which stops before rounding
 
 
@@ -49,22 +49,9 @@ def ours(held: Mechanism, x: Array) -> Solver:
     return Solver(compiled.bind(np.array(x), out), lambda: out[:n])
 
 
-def pinocchio(arm: Mechanism, x: Array) -> Solver:
-    """constraintDynamics, proximal, with a point of the last body held; without its stabilisation."""
-    peer = PinocchioPeer(Case("pinned", arm))
-    pin, model, data, n = peer.pinocchio, peer.twin, peer.data, len(x) // 3
-    models, datas = pin.StdVec_RigidConstraintModel(), pin.StdVec_RigidConstraintData()
-    tip, place = pin.SE3(np.eye(3), np.array([0.0, 0.0, -LENGTH])), pin.SE3(np.eye(3), np.array(PIN))
-    last = model.njoints - 1
-    models.append(pin.RigidConstraintModel(pin.ContactType.CONTACT_3D, model, last, tip, 0, place, pin.LOCAL))
-    datas.append(models[0].createData())
-    pin.initConstraintDynamics(model, data, models, datas)
-    q = peer.of.q(x[:n])
-    qd, tau = (peer.of.v(q, x[k * n : (k + 1) * n]) for k in (1, 2))
-    settings, solve = pin.ProximalSettings(1e-12, 1e-10, 10), pin.constraintDynamics
-    return Solver(
-        lambda: solve(model, data, q, qd, tau, models, datas, settings), lambda: peer.of.our_a(q, qd, data.ddq)
-    )
+def pinocchio(held: Mechanism, x: Array) -> Solver:
+    """constraintDynamics, proximal, without its stabilisation."""
+    return Solver(*constraint_dynamics(held, PROXIMAL)(x))
 
 
 def connected(arm: Mechanism, x: Array) -> Solver:
@@ -86,7 +73,7 @@ def closed_chains(repeats: int = REPEATS) -> Iterator[str]:
         q, qd = nearest_state(held, 0.6 * rng.normal(size=links), rng.normal(size=links))
         x = np.concatenate([q, qd, rng.normal(size=links)])
         calls = {"ours": ours(held, x)}
-        calls |= {"Pinocchio": pinocchio(arm, x)} if find_spec("pinocchio") else {}
+        calls |= {"Pinocchio": pinocchio(held, x)} if find_spec("pinocchio") else {}
         calls |= {"MuJoCo": connected(arm, x)} if find_spec("mujoco") else {}
         if "Pinocchio" in calls:
             _check(links, calls["ours"], calls["Pinocchio"])

@@ -10,9 +10,8 @@ import numpy as np
 import cgraph as cg
 from cgraph import Node
 from cgraph.extend import Array
-
-from ...systems.system import System
-from ..setting import Setting
+from dynamics.experiments.setting import Setting
+from dynamics.systems.system import System
 
 Lagrangian = Callable[[list[Node], list[Node], Node], Node]
 FAMILIES: dict[str, Callable[[np.random.Generator, str], Setting]] = {}
