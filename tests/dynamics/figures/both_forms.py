@@ -25,7 +25,7 @@ from dynamics.systems.model import Model, as_system
 
 ROUNDS = 15  # of all forms in turn; the fastest counts
 SECONDS = 0.02  # of a round
-CALLS = 20  # between two looks at the clock
+CALLS = 200  # between two looks at the clock, which take as long as ten of the shortest
 POINTS = 4096  # of a batch
 STEP, PASSES = 1e-6, 5000  # s, of the steps of a loop, and how many: what is done before the first is not measured
 COMPILED = 50_000  # nodes of a linearization; of more only the count, machine code would take minutes
