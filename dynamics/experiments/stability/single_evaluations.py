@@ -5,7 +5,7 @@ centre and inertia, damping, gravity), the error is
     max_i |y_i - exact_i| / (ulp max_i (|y_i| + sum_j |df_i/dx_j| |x_j|)),    ulp = 2^-52.
 The sum is what a relative change of each x_j makes of y_i: the componentwise condition, in the maximum norm. So 1 is
 what rounding the data once would do, whatever the algorithm. The derivatives are the graph's own (`cg.jvp`, of an arm
-whose parameters are inputs), the exact values come from closed formulas in multiprecision.
+whose parameters are inputs), the exact values come from Newton-Euler equations in multiprecision.
 
 In double-double the parameters are inputs too. Built in, products of them are rounded when the graph is made, each on
 its own, and then m l_1 l_2, m l_1 and m g no longer belong to one m: with a mass of 1e12 that moves the light links.
