@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 
 class BenchFigure(NamedTuple):
-    """A figure.  home: the function that prints it part by part, as module.name.  takes: of links, repeats, count."""
+    """A figure.  home: the function that prints it part by part, folder.module.name.  takes: of links, repeats, count."""
 
     about: str
     home: str
@@ -16,30 +16,40 @@ class BenchFigure(NamedTuple):
 
     def run(self, **numbers: int) -> Iterator[str]:
         """What is printed. The module is imported now."""
-        module, name = self.home.split(".")
-        parts: Iterator[str] = getattr(import_module(f".{module}", __package__), name)(**numbers)
+        module, _, name = self.home.rpartition(".")
+        parts: Iterator[str] = getattr(import_module(f"..{module}", __package__), name)(**numbers)
         return parts
 
 
 FIGURES = {
     "counts": BenchFigure(
-        "nodes of forward dynamics, and what leaving out one idea adds", "node_counts.node_counts", ("links",)
+        "nodes of forward dynamics, and what leaving out one idea adds", "speed.node_counts.node_counts", ("links",)
     ),
-    "build": BenchFigure("time to build the graph of forward dynamics", "stages.build_time", ("links", "repeats")),
-    "compile": BenchFigure("time to compile chains, and derivatives of them", "stages.compile_time", ("links",)),
+    "build": BenchFigure(
+        "time to build the graph of forward dynamics", "speed.stages.build_time", ("links", "repeats")
+    ),
+    "compile": BenchFigure("time to compile chains, and derivatives of them", "speed.stages.compile_time", ("links",)),
     "agreement": BenchFigure(
-        "largest differences from MuJoCo and Pinocchio", "agreement.agreement", ("links", "count")
+        "largest differences from MuJoCo and Pinocchio", "speed.agreement.agreement", ("links", "count")
     ),
     "ensembles": BenchFigure(
-        "many pendulums beside MuJoCo's rollout and JAX's vmap", "ensembles.ensembles", ("count", "repeats")
+        "many pendulums beside MuJoCo's rollout and JAX's vmap", "speed.ensembles.ensembles", ("count", "repeats")
     ),
     "reconfiguration": BenchFigure(
-        "first torque after a change of structure", "reconfiguration.reconfiguration", ("links", "repeats")
+        "first torque after a change of structure", "speed.reconfiguration.reconfiguration", ("links", "repeats")
+    ),
+    "trust": BenchFigure(
+        "random motions with exact answers: runs right, said to be wrong, silent",
+        "trust.cascades.with_cascades",
+        ("count",),
+    ),
+    "tightest": BenchFigure(
+        "random Lagrangians as exactly as float64 has them, beside heyoka", "trust.tightest.tightest", ("count",)
     ),
     "closed-chains": BenchFigure(
-        "chains pinned at the tip beside Pinocchio and MuJoCo", "closed_chains.closed_chains", ("repeats",)
+        "chains pinned at the tip beside Pinocchio and MuJoCo", "speed.closed_chains.closed_chains", ("repeats",)
     ),
     "long-chains": BenchFigure(
-        "cost of a thousand links, and accuracy of long chains", "stages.long_chains", ("links",)
+        "cost of a thousand links, and accuracy of long chains", "speed.stages.long_chains", ("links",)
     ),
 }

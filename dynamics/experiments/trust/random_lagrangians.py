@@ -10,8 +10,9 @@ import numpy as np
 import cgraph as cg
 from cgraph import Node
 from cgraph.extend import Array
-from dynamics.experiments.setting import Setting
-from dynamics.systems.system import System
+
+from ...systems.system import System
+from ..setting import Setting
 
 Lagrangian = Callable[[list[Node], list[Node], Node], Node]
 FAMILIES: dict[str, Callable[[np.random.Generator, str], Setting]] = {}

@@ -19,14 +19,15 @@ import numpy as np
 
 from cgraph import Node
 from cgraph.extend import Array
-from dynamics.experiments.text_table import table
-from dynamics.integrators import METHODS
-from dynamics.simulation.ensembles.simulate_many import simulate_many
-from dynamics.simulation.events.event import Event
-from dynamics.simulation.simulate import simulate
-from dynamics.systems.system import System
-from tests.dynamics.trust.answers import COUNT
-from tests.dynamics.trust.trust import RIGHT, SAID, SILENT, SLACK, Verdict, trust
+
+from ...integrators import METHODS
+from ...simulation.ensembles.simulate_many import simulate_many
+from ...simulation.events.event import Event
+from ...simulation.simulate import simulate
+from ...systems.system import System
+from ..text_table import table
+from .answers import COUNT
+from .trust import RIGHT, SAID, SILENT, SLACK, Verdict, trust
 
 CASCADES = 100
 UNITS = 6.0  # decades of the units of length and time, each way

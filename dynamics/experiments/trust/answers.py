@@ -13,13 +13,14 @@ import numpy as np
 
 import cgraph as cg
 from cgraph.extend import Array
-from dynamics.experiments.setting import Setting
-from dynamics.experiments.work_precision.trajectory_runs import problem_of
-from dynamics.multiprecision import Reference, ReferenceFailedError
-from dynamics.multiprecision.solution import from_text
-from dynamics.simulation.steps.scipy_solvers import solve_ivp
-from tests.dynamics.trust.random_lagrangians import LAGRANGIANS
-from tests.dynamics.trust.random_starts import EACH, FAMILIES, random_motion
+
+from ...multiprecision import Reference, ReferenceFailedError
+from ...multiprecision.solution import from_text
+from ...simulation.steps.scipy_solvers import solve_ivp
+from ..setting import Setting
+from ..work_precision.trajectory_runs import problem_of
+from .random_lagrangians import LAGRANGIANS
+from .random_starts import EACH, FAMILIES, random_motion
 
 if TYPE_CHECKING:
     from cgraph.extend import Json

@@ -9,10 +9,11 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Node
-from dynamics.experiments.setting import Setting
-from dynamics.systems.ode_system import OdeSystem
-from dynamics.systems.system import System
-from tests.dynamics.trust.random_lagrangians import LAGRANGIANS, random_setting
+
+from ...systems.ode_system import OdeSystem
+from ...systems.system import System
+from ..setting import Setting
+from .random_lagrangians import LAGRANGIANS, random_setting
 
 EACH = 100  # of every family
 UNITS = 6.0  # decades of the units of length and time, each way

@@ -11,14 +11,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from cgraph.extend import NoSeriesError
-from dynamics.experiments.setting import Setting
-from dynamics.experiments.text_table import table
-from dynamics.integrators import METHODS
-from dynamics.simulation.run_options import METHOD, RunOptions
-from dynamics.simulation.simulate import simulate
-from dynamics.simulation.trajectory import Trajectory
-from tests.dynamics.trust.answers import COUNT, Answer, answer
-from tests.dynamics.trust.random_starts import jump, random_motion
+
+from ...integrators import METHODS
+from ...simulation.run_options import METHOD, RunOptions
+from ...simulation.simulate import simulate
+from ...simulation.trajectory import Trajectory
+from ..setting import Setting
+from ..text_table import table
+from .answers import COUNT, Answer, answer
+from .random_starts import jump, random_motion
 
 RIGHT, SAID, SILENT = "right", "said", "silent"
 SLACK = 100.0  # times rtol times the growth: an error that is right

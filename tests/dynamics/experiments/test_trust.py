@@ -3,10 +3,10 @@
 import pytest
 from pytest import mark
 
-from tests.dynamics.trust.answers import COUNT, answer, compute
-from tests.dynamics.trust.random_lagrangians import FAMILIES, LAGRANGIANS, random_setting
-from tests.dynamics.trust.random_starts import EACH, FAMILIES as STARTS, random_motion
-from tests.dynamics.trust.trust import ADAPTIVE, RIGHT, SAID, SILENT, judge
+from dynamics.experiments.trust.answers import COUNT, answer, compute
+from dynamics.experiments.trust.random_lagrangians import FAMILIES, LAGRANGIANS, random_setting
+from dynamics.experiments.trust.random_starts import EACH, FAMILIES as STARTS, random_motion
+from dynamics.experiments.trust.trust import ADAPTIVE, RIGHT, SAID, SILENT, judge
 
 QUICK = 8  # of the random Lagrangians: one of each family; of the random starts, too
 SPREAD = 1e-2  # relative: growth is measured by differences

@@ -9,12 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from cgraph.extend import Array
-from dynamics.experiments.text_table import table
-from dynamics.experiments.work_precision.measurement import Tried, in_turns
-from dynamics.experiments.work_precision.trajectory_peers import EPSILON, Heyoka
-from dynamics.experiments.work_precision.trajectory_runs import Ours, Solver, problem_of
-from tests.dynamics.trust.answers import Answer, answer
-from tests.dynamics.trust.random_lagrangians import LAGRANGIANS, random_setting
+
+from ..text_table import table
+from ..work_precision.measurement import Tried, in_turns
+from ..work_precision.trajectory_peers import EPSILON, Heyoka
+from ..work_precision.trajectory_runs import Ours, Solver, problem_of
+from .answers import Answer, answer
+from .random_lagrangians import LAGRANGIANS, random_setting
 
 METHOD, TURNS = "taylor", 5
 FLOOR = EPSILON / 4.0  # of an error in a ratio: less is luck
