@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 
 class BenchFigure(NamedTuple):
-    """A figure.  home: the function that prints it part by part, folder.module.name.  takes: of links, repeats, count."""
+    """A figure.  home: the function that prints it, as folder.module.name.  takes: of links, repeats, count."""
 
     about: str
     home: str
