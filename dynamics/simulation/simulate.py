@@ -8,7 +8,6 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import partial
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Graph
@@ -24,9 +23,8 @@ from .missed_momenta import missed_momenta
 from .outcome import INTERRUPTED, REACHED, outcome
 from .progress_bar import Progress
 from .recorder import Recorder
-from .row_values import converted, row_values
+from .row_values import converted
 from .run_options import METHOD, TABLES, RunOptions, room, time_span
-from .sampled_controller import HeldForces
 from .solution import Solution
 from .steps.dense_output import StepBlock
 from .steps.integration import integration_of
@@ -162,10 +160,10 @@ def simulate(
     options.check(start.states)
     options.check_room(len(start.x))
 
-    # Derive the equations, xdot = f(x, t), the energy and the events as graphs; x is (q, qd), or in `stepped` (q, p)
+    # Derive the equations, xdot = f(x, t), and the events as graphs; x is (q, qd), or in `stepped` (q, p)
     problem = derive(model, applied.bound(start.bound))
     stepped = in_form(problem, form)
-    energy, program = total_energy(problem), event_program(stepped, watched) if watched else None
+    program = event_program(stepped, watched) if watched else None
     hold = applied.hold(options, stepped)
 
     # Write the steps of the method over these graphs, and compile them
@@ -184,9 +182,9 @@ def simulate(
     for text in [*([f"the run {stats.message}"] if early else []), *stats.warnings]:
         warnings.warn(text, SimulationWarning, stacklevel=2)
     dense = None if steps is None else Solution(options.t0, x, steps, problem.nq, stepped.velocities)
-    kept = run.crossings(problem.nq), _graphs(problem, applied), dense, held
-    table, momenta = _table(stepped, energy, *rows, held)
-    return Trajectory(*table, stats, *kept, model.coordinates, model.velocities, momenta)
+    (times, q, qd), momenta = _table(stepped, *rows)
+    crossings, graphs = run.crossings(problem.nq), _graphs(problem, applied)
+    return Trajectory(times, q, qd, stats, crossings, graphs, dense, held, model.coordinates, model.velocities, momenta)
 
 
 def _integrate(
@@ -222,19 +220,15 @@ def _noted(
             report(abs(float(block.t[-1]) - options.t0))
 
 
-def _table(
-    stepped: Problem, energy: Graph | None, times: Array, rows: Array, held: HeldForces | None
-) -> tuple[tuple[Array, Array, Array, Array], Array | None]:
-    """t, q, qd and the energy of the rows that steps gave; and their momenta, if they are of these."""
+def _table(stepped: Problem, times: Array, rows: Array) -> tuple[tuple[Array, Array, Array], Array | None]:
+    """t, q and qd of the rows that steps gave; and their momenta, if they are of these."""
     states, nq = converted(stepped.velocities, times, rows), stepped.nq
-    energies = np.full(len(times), math.nan)
-    if energy is not None:
-        energies = row_values(energy, times, states, () if held is None else held.at(times))[:, 0]
-    return (times, states[:, :nq], states[:, nq:], energies), rows[:, nq:] if stepped.momenta else None
+    return (times, states[:, :nq], states[:, nq:]), rows[:, nq:] if stepped.momenta else None
 
 
 def _graphs(problem: Problem, applied: Applied) -> dict[str, Graph]:
-    """What a trajectory computes accelerations and forces by."""
-    forces = force(problem)
+    """What a trajectory computes accelerations, forces and energies by."""
+    forces, whole = force(problem), total_energy(problem)
     graphs = {"rate": problem.rate} | ({} if forces is None else {"force": forces, "tau": applied.graph(problem)})
+    graphs |= {} if whole is None else {"energy": whole}
     return graphs | ({} if problem.multipliers is None else {"multipliers": problem.multipliers})

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -130,17 +131,15 @@ class Trajectory:
     q, qd : ndarray
         Coordinates, (T, nq), and velocities, (T, n) [rad or m, per second]; quaternions have length 1. Of an OdeSystem
         q holds the states, (T, m), and qd has no columns.
-    energy : ndarray
-        Kinetic and potential energy, (T,) [J]; NaN for an OdeSystem.
     stats : Stats
         How the run went; its `success`, `status`, `message`, `nfev`, `njev` and `nlu` are attributes of the trajectory
         too, as in SciPy.
     events : mapping
         {name of an event: Crossings}.
     graphs : mapping
-        {"rate": xdot, "force": tau + forces - damping qd}: graphs over the states and t, with the numbers of the run
-        built in, by which `qdd` and `forces` are computed, "tau", and, with constraints, "multipliers". Both forces are
-        missing of an OdeSystem. With a SampledController, tau0, .. are inputs too.
+        {"rate": xdot, "force": tau + forces - damping qd, "energy": E}: graphs over the states and t, with the numbers
+        of the run built in, by which `qdd`, `forces` and `energy` are computed, "tau", and, with constraints,
+        "multipliers". An OdeSystem has the rate alone. With a SampledController, tau0, .. are inputs too.
     dense : Solution, optional
         The steps with their dense output, which `solution` reads; of a run with `dense_output=True`.
     held : HeldForces, optional
@@ -163,7 +162,6 @@ class Trajectory:
     t: Array
     q: Array
     qd: Array
-    energy: Array
     stats: Stats
     events: Mapping[str, Crossings] = field(default_factory=dict)
     graphs: Mapping[str, Graph] = field(default_factory=dict)
@@ -294,6 +292,11 @@ class Trajectory:
         if "multipliers" not in self.graphs:
             return {}
         return dict(zip(self.graphs["multipliers"].outputs, self._rows("multipliers").T, strict=True))
+
+    @cached_property
+    def energy(self) -> Array:
+        """Kinetic and potential energy at the rows, (T,) [J]; NaN for an OdeSystem."""
+        return self._rows("energy")[:, 0] if "energy" in self.graphs else np.full(len(self.t), math.nan)
 
     @cached_property
     def tau(self) -> Array:
