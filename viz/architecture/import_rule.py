@@ -24,7 +24,7 @@ TABLE = {
         "theme <- graph_drawing, plots <- pages <- inspector, paper <- models <- commands <- cli <- __main__",
         "theme <- animation <- models",
         "graph_drawing <- architecture <- commands",
-        "theme <- live <- models",
+        "pages <- live <- models",
         "inspector <- lessons <- commands",
         "inspector <- typed <- models, commands",
     ),

@@ -1,6 +1,7 @@
 """The inspector: one page on which a graph is unfolded, stepped through, asked and seen moving."""
 
+from ..pages.html import Page
 from .content import Motion, StateTable, Step, Table, Version
-from .page import Page, Panel, page
+from .page import Panel, page
 
 __all__ = ["Motion", "Page", "Panel", "StateTable", "Step", "Table", "Version", "page"]

@@ -12,11 +12,12 @@ from dynamics.scenes.start import Start, moving_start, with_start
 from dynamics.systems.model import Model
 
 from ..inspector import Panel
-from ..live import EVALUATION, Live, LivePage, page_text, panel
+from ..live import EVALUATION, Live, page_text, panel
+from ..pages.html import Page
 from ..pages.html_target import html_target
 
 
-def live_page(model: Model, path: str | os.PathLike[str] | None = None, *, start: Start | None = None) -> LivePage:
+def live_page(model: Model, path: str | os.PathLike[str] | None = None, *, start: Start | None = None) -> Page:
     """The page on which a model moves as it is watched, computed there: one HTML file that loads nothing.
 
     Sliders and fields set the state, the torques, the parameters and dt; of a small mechanism without parameters,
@@ -35,7 +36,7 @@ def live_page(model: Model, path: str | os.PathLike[str] | None = None, *, start
 
     Returns
     -------
-    LivePage
+    Page
         The HTML text; a notebook shows it in a frame.
 
     Raises
@@ -73,4 +74,4 @@ def live_of(scene: scenes.Scene, *, momentum: bool = False) -> Live:
 def live_panel(scene: scenes.Scene, *, momentum: bool = False) -> Panel:
     """The motion of a scene as a panel at the end of another page, closed at first."""
     live = panel(live_of(scene, momentum=momentum))
-    return Panel(style=live.style, run=live.script, end=live.folded(), allowed=EVALUATION)
+    return Panel(style=live.style, run=live.script, end=live.folded(), allowed=EVALUATION, data=live.data)

@@ -20,7 +20,8 @@ from dynamics.scenes.inspection import Inspection, inspection
 from tests.page_script import run_script
 from tests.tolerances import SUMS
 from viz.inspector.content import Motion, State, StateTable, Version
-from viz.inspector.record import record, slopes
+from viz.inspector.record import record
+from viz.pages.operations import slopes
 
 pytestmark = pytest.mark.usefixtures("without_graphviz")
 JAVASCRIPT_LIBM = 1e-12  # relative: a browser's sin and exp may differ from the C library's in the last bits
@@ -76,7 +77,7 @@ def test_a_sum_that_is_a_result_stands_under_it(pendulum):
     data = record(pendulum, None)
     plan = run_script(PLACES, data)
     for each, places in zip(data["versions"], plan["place"], strict=True):
-        used = {arg for args in each["args"] if isinstance(args, list) for arg in args}
+        used = {arg for node in each["nodes"] if isinstance(node, list) for arg in node[1:]}
         for _, _, node in each["outputs"]:
             assert (plan["cluster"][places[node]] == -2) == (node not in used)
 
@@ -121,7 +122,7 @@ def test_the_script_agrees_where_numbers_are_special():
 POINT = """(record) => {
   const state = makeState(record);
   return state.versions.map((version) => {
-    const values = state.evaluate(version), slopes = slopesAt(version, record.slopes, values);
+    const values = state.evaluate(version), slopes = slopesAt(version, values);
     const out = version.outputs[0][2], bars = adjoints(version, slopes, out);
     const each = (f) => version.inputs.map(([, node]) => (node < 0 ? null : f(node)));
     return { values: version.outputs.map(([, , node]) => values[node]), bars: each((node) => bars[node]),
@@ -261,7 +262,7 @@ def test_what_rounding_leaves_is_told_from_what_is_small():
     )
     program = """(record) => {
       const state = makeState(record), [version] = state.versions, values = state.evaluate(version);
-      const noise = errorBounds(version, slopesAt(version, record.slopes, values), values);
+      const noise = errorBounds(version, slopesAt(version, values), values);
       return version.outputs.map(([, , node]) => [brief(values[node], noise[node]), values[node], noise[node]]);
     }"""
     for unit in (1.0, 1e-9, 1e12):
@@ -284,7 +285,7 @@ def test_a_velocity_of_a_long_arm_is_no_noise_and_what_cancels_is():
     at |= momenta.evaluate(at)
     program = """(record) => {
       const state = makeState(record), [version] = state.versions;
-      const values = state.evaluate(version), slopes = slopesAt(version, record.slopes, values);
+      const values = state.evaluate(version), slopes = slopesAt(version, values);
       const errors = state.errorsOf(version), bounds = errorBounds(version, slopes, values, errors);
       const sharp = sharpened(version, slopes, values, bounds, errors);
       return [state.solved, ...version.outputs.map(([, , node]) => [values[node], bounds[node], sharp[node]])];
@@ -304,7 +305,7 @@ def test_the_free_motion_takes_torques_of_zero_and_the_page_says_0():
       const state = makeState(record), version = state.versions[0];
       state.show(frame);
       const values = state.evaluate(version);
-      const noise = errorBounds(version, slopesAt(version, record.slopes, values), values);
+      const noise = errorBounds(version, slopesAt(version, values), values);
       return version.outputs.map(([, , node]) => brief(values[node], noise[node]));
     })"""
     at = {name: value[::10] if np.ndim(value) else value for name, value in found.at.items()}
