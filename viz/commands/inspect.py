@@ -42,18 +42,18 @@ def run(options: argparse.Namespace) -> int:
     content = library.inspection(
         scene, forward=options.forward, momentum=options.momentum, t_end=options.t_end, say=say
     )
-    count = sum(len(each.graph.nodes) for each in content.versions)
+    count = sum(len(each.graph.nodes) for each in content.versions.values())
     say(f"{scene.name}: writing the page of {extend.counted(count, 'node')}")
     text = library.inspection_page(scene, content, moved)
     sizes = {
-        version.name: {
+        name: {
             "nodes": len(version.graph.nodes),
             "edges": len(version.graph.edges),
             "spurious": len(version.marked),
             "spurious_edges": len(version.blamed),
             "differs": version.flawed,
         }
-        for version in content.versions
+        for name, version in content.versions.items()
     }
     size = len(text.encode())
     counts = ", ".join(f"{name} {extend.counted(version['nodes'], 'node')}" for name, version in sizes.items())

@@ -16,11 +16,11 @@ import viz
 from cgraph.codegen.python_source import source
 from cgraph.extend import Names
 from cgraph.operations.table import OPS
-from dynamics.scenes.inspection import Inspection, inspection
 from tests.page_script import run_script
 from tests.tolerances import SUMS
 from viz.inspector.content import Motion, State, StateTable, Version
 from viz.inspector.record import record
+from viz.models.inspection import Inspection, inspection
 from viz.pages.operations import slopes
 
 pytestmark = pytest.mark.usefixtures("without_graphviz")
@@ -29,7 +29,7 @@ JAVASCRIPT_LIBM = 1e-12  # relative: a browser's sin and exp may differ from the
 
 @pytest.fixture(scope="module")
 def pendulum() -> list[Version]:
-    return [Version(*each) for each in inspection(dyn.scenes.load("triple_pendulum")).versions]
+    return list(inspection(dyn.scenes.load("triple_pendulum")).versions.values())
 
 
 # Where nodes are.
@@ -200,7 +200,7 @@ def found_in_spring() -> Inspection:
 
 def spring(at: dict[str, float]) -> tuple[list[Version], State]:
     found = found_in_spring()
-    return [Version(*each) for each in found.versions], State(dict(found.at) | at, found.derived)
+    return list(found.versions.values()), State(dict(found.at) | at, found.derived)
 
 
 def test_all_versions_are_in_one_state_and_reset_restores_it():
@@ -308,11 +308,12 @@ def test_the_free_motion_takes_torques_of_zero_and_the_page_says_0():
       const noise = errorBounds(version, slopesAt(version, values), values);
       return version.outputs.map(([, , node]) => brief(values[node], noise[node]));
     })"""
+    version = found.versions["chain_rule"]
     at = {name: value[::10] if np.ndim(value) else value for name, value in found.at.items()}
     data = record(
-        [Version(*found.versions[2])],
-        Motion(found.t[::10]),
-        state=State({n: at[n] for n in found.versions[2].graph.input_names}),
+        [version],
+        Motion(found.motion.t[::10]),
+        state=State({n: at[n] for n in version.graph.input_names}),
     )
     assert {text for row in run_script(program, data) for text in row} == {"0"}
 
