@@ -30,13 +30,11 @@ def add(parser: Command) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Write the page; 1 where the motion ends before its time, which the page then says."""
-    if options.out.suffix != ".html":
-        raise ValueError(f"--out must end in .html, got {options.out}")
     if options.t_end is not None and options.t_end > LONGEST:
         raise ValueError(
             f"--t-end must be at most {LONGEST:g} s, got {options.t_end:g} s: a page has {library.FRAMES} times"
         )
-    extend.check_writable(options.out)
+    library.html_target("--out", options.out)
     say(f"reading {options.scene}")
     scene, moved = started(options)
     content = library.inspection(

@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from ..models.open_loops import tree_alone
     from ..pages import pruning as pruning_page, stability as stability_page, work_precision as work_precision_page
     from ..pages.document_files import check_folder, document_files
+    from ..pages.html import html_target
     from ..paper.paper import paper
     from ..plots.plot import check_can_plot
     from ..typed import typed_page

@@ -1,7 +1,8 @@
 """The inspector: one page on which a graph is unfolded, stepped through, asked and seen moving."""
 
+from ..pages.document import Table
 from ..pages.html import Page
-from .content import Motion, StateTable, Step, Table, Version
+from .content import Motion, StateTable, Step, Version
 from .page import Panel, page
 
 __all__ = ["Motion", "Page", "Panel", "StateTable", "Step", "Table", "Version", "page"]

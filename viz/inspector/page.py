@@ -13,9 +13,10 @@ from cgraph.extend import Array, require_graph, require_mapping, require_sequenc
 
 from .. import theme
 from ..pages import html
+from ..pages.document import Table
 from ..pages.html import Page, asset
 from ..pages.operations import operations
-from .content import Motion, State, StateTable, Table, Version
+from .content import Motion, State, StateTable, Version
 from .record import record
 
 if TYPE_CHECKING:

@@ -13,8 +13,7 @@ from dynamics.systems.model import Model
 
 from ..graph_drawing.render import check_can_draw
 from ..pages import html
-from ..pages.html import Page, asset
-from ..pages.html_target import html_target
+from ..pages.html import Page, asset, html_target
 from ..pages.operations import values
 from .closed_loop import closed_loop
 from .elimination import elimination

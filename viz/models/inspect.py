@@ -11,7 +11,7 @@ from dynamics.scenes.start import Start, moving_start, rest_text, with_start
 from dynamics.systems.model import Model
 
 from ..inspector import Page, page
-from ..pages.html_target import html_target
+from ..pages.html import html_target
 from ..typed import box
 from .inspection import Inspection, inspection
 from .live import live_panel

@@ -32,8 +32,7 @@ from dynamics.systems.model import Model
 
 from ..inspector import Panel
 from ..live import EVALUATION, Live, page_text, panel
-from ..pages.html import Page
-from ..pages.html_target import html_target
+from ..pages.html import Page, html_target
 
 MOST_BODIES = 4  # of a mechanism whose masses become parameters by themselves
 SAMPLES = 16  # states at which the extent of a mechanism is looked at

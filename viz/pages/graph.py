@@ -30,5 +30,5 @@ def graph_data(graph: Graph) -> dict[str, Json]:
 
 
 def _number(value: float) -> float | str:
-    """JSON has no infinity, and no NaN."""
-    return value if math.isfinite(value) else str(value).replace("nan", "NaN").replace("inf", "Infinity")
+    """JSON has no infinity."""
+    return value if math.isfinite(value) else str(value).replace("inf", "Infinity")

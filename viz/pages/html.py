@@ -5,10 +5,14 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
+import os
 import re
 from collections.abc import Mapping, Sequence
 from html import escape
 from importlib.resources import files
+from pathlib import Path
+
+from cgraph.extend import check_writable, require_path
 
 from .. import theme
 
@@ -38,6 +42,21 @@ pre {{ background: var(--soft); padding: 0.8rem 1rem; overflow-x: auto; border-r
 .point, .warning {{ background: var(--soft); border-left: 5px solid {theme.BLUE}; padding: 0.6rem 1rem; }}
 .warning {{ border-left-color: {theme.SPURIOUS}; }}
 """
+
+
+def html_target(what: str, path: str | os.PathLike[str] | None) -> Path | None:
+    """The path that a page is to be written to, if there is one, looked at before the work.
+
+    Raises TypeError for what is no path, ValueError for one that does not end in .html, OSError for one that cannot be
+    written.
+    """
+    if path is None:
+        return None
+    target = require_path(what, path)
+    if target.suffix != ".html":
+        raise ValueError(f"{what} must end in .html, got {os.fspath(target)!r:.80}")
+    check_writable(target)
+    return target
 
 
 class Page(str):

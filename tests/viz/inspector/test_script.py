@@ -21,6 +21,7 @@ from tests.tolerances import SUMS
 from viz.inspector.content import Motion, State, StateTable, Version
 from viz.inspector.record import record
 from viz.models.inspection import Inspection, inspection
+from viz.pages.graph import graph_data
 from viz.pages.operations import slopes
 
 pytestmark = pytest.mark.usefixtures("without_graphviz")
@@ -150,6 +151,14 @@ def test_values_adjoints_and_paths_of_the_script_are_those_of_the_library(pendul
             assert [abs(p) for p in found["heaviest"][i]] == pytest.approx(
                 [abs(path.value) for path in why.paths], rel=SUMS
             )
+
+
+def test_infinities_and_the_negative_zero_reach_the_page():
+    x, values = cg.variable("x"), (math.inf, -math.inf, -0.0)
+    graph = cg.Graph([x], {str(i): cg.minimum(x, value) for i, value in enumerate(values)})
+    program = "(graph) => [...evaluator(graph)([0.5])].map((value) => String(value === 0 ? 1 / value : value))"
+    found = run_script(program, graph_data(graph))
+    assert [found[node] for _, node in graph_data(graph)["outputs"]] == ["0.5", "-Infinity", "-Infinity"]
 
 
 def test_huge_numbers_of_paths_are_exact():
