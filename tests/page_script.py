@@ -14,7 +14,7 @@ from viz.inspector.page import scripts
 DOCUMENT = """
 const made = (_, name) => ({ name, at: {}, dataset: {}, inside: [], textContent: "",
   setAttribute(key, value) { this.at[key] = value; }, append(...more) { this.inside.push(...more); },
-  appendChild(each) { this.inside.push(each); }, replaceChildren(...each) { this.inside = each; },
+  appendChild(each) { this.inside.push(each); return each; }, replaceChildren(...each) { this.inside = each; },
   getBoundingClientRect: () => ({ width: 930, height: 580 }) });
 globalThis.document = { createElementNS: made, createElement: (name) => made("", name) };
 """

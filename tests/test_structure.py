@@ -228,7 +228,7 @@ def test_importing_a_package_loads_numpy_and_the_standard_library(tmp_path: Path
 
 
 def test_drawing_knows_nothing_of_mechanics(tmp_path: Path) -> None:
-    drawing = sorted({*viz.__all__} - {"animate", "inspect", "lesson", "live_page", "typed_text"})
+    drawing = sorted({*viz.__all__} - {"animate", "driven", "inspect", "lesson", "live_page", "typed_text"})
     assert "dynamics" not in loaded(f"from viz import {', '.join(drawing)}; step('viz')", tmp_path)["viz"]
 
 

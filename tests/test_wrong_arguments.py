@@ -286,7 +286,7 @@ CALLS = {
         viz.animate, ARM, dyn.simulate(ARM, [0.1], [0.0], 0.04), None, kind=None, wanted=lambda t: t[:, np.newaxis],
         marked=(), speed=1.0, dark=False, title=""
     ),
-    "dyn.scenes.driven": call(dyn.scenes.driven, ARM, "chain_rule", 0.1),
+    "viz.driven": call(viz.driven, ARM, "chain_rule", 0.1),
     "viz.inspect": call(viz.inspect, ARM, None, start=[0.1, 0.0], t_end=0.1, forward=False, title=None, momentum=False),
     "viz.live_page": call(viz.live_page, ARM, None, start=[0.1, 0.0]),
     "viz.page": call(

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from .inspector.page import page
     from .lessons.lesson import lesson
     from .models.animate import animate
+    from .models.driven_motion import driven
     from .models.inspect import inspect
     from .models.live import live_page
     from .models.typed_text import typed_text
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "animate",
+    "driven",
     "graph_svg",
     "inspect",
     "lesson",

@@ -1,12 +1,10 @@
-"""Scenes: named models, models of files and models in Python, with a start; and motions driven by torques."""
+"""Scenes: named models, models of files and models in Python, with a start."""
 
-from .driven_motion import driven
 from .scenes import Scene, chain, is_model_file, load, names, of_file, of_model, spring_mass, triple_pendulum
 
 __all__ = [
     "Scene",
     "chain",
-    "driven",
     "is_model_file",
     "load",
     "names",

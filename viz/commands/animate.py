@@ -60,7 +60,7 @@ def run(options: argparse.Namespace) -> int:
     if options.driven:
         for name in options.formulations or DRIVEN:
             words = f"torque {WORDS.get(name, name.replace('_', ' '))}"
-            motions[words], wanted = dyn.scenes.driven(scene, name, end)
+            motions[words], wanted = library.driven(scene, name, end)
             if dyn.formulation_verdict(scene, name).differs:
                 marked.append(words)
     else:

@@ -30,30 +30,28 @@ def add(parser: Command) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Write the page; 1 where the motion ends before its time, which the page then says."""
-    if options.out.suffix != ".html":
-        raise ValueError(f"--out must end in .html, got {options.out}")
     if options.t_end is not None and options.t_end > LONGEST:
         raise ValueError(
             f"--t-end must be at most {LONGEST:g} s, got {options.t_end:g} s: a page has {library.FRAMES} times"
         )
-    extend.check_writable(options.out)
+    library.html_target("--out", options.out)
     say(f"reading {options.scene}")
     scene, moved = started(options)
     content = library.inspection(
         scene, forward=options.forward, momentum=options.momentum, t_end=options.t_end, say=say
     )
-    count = sum(len(each.graph.nodes) for each in content.versions)
+    count = sum(len(each.graph.nodes) for each in content.versions.values())
     say(f"{scene.name}: writing the page of {extend.counted(count, 'node')}")
     text = library.inspection_page(scene, content, moved)
     sizes = {
-        version.name: {
+        name: {
             "nodes": len(version.graph.nodes),
             "edges": len(version.graph.edges),
             "spurious": len(version.marked),
             "spurious_edges": len(version.blamed),
             "differs": version.flawed,
         }
-        for version in content.versions
+        for name, version in content.versions.items()
     }
     size = len(text.encode())
     counts = ", ".join(f"{name} {extend.counted(version['nodes'], 'node')}" for name, version in sizes.items())

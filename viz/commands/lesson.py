@@ -5,8 +5,6 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from cgraph import extend
-
 from . import library
 from .arguments import answer, say, scene_of, takes_a_scene
 from .command import Command
@@ -23,9 +21,7 @@ def add(parser: Command) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Write the page."""
-    if options.out.suffix != ".html":
-        raise ValueError(f"--out must end in .html, got {options.out}")
-    extend.check_writable(options.out)
+    library.html_target("--out", options.out)
     scene = scene_of(options)
     say(f"{scene.name}: deriving the equations and answers of {len(library.SCREENS)} screens")
     text = library.lesson(scene)

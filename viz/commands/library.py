@@ -29,7 +29,6 @@ if TYPE_CHECKING:
     from dynamics.experiments.work_precision.report import PEERS, to_csv
     from dynamics.integrators import TABLEAUS
     from dynamics.io.load import compiled
-    from dynamics.scenes.inspection import FRAMES, inspection
     from dynamics.scenes.start import Start, moving_start, rest_text, with_start
     from dynamics.verification.certificate import certify
 
@@ -40,11 +39,14 @@ if TYPE_CHECKING:
     from ..lessons.lesson import SCREENS, lesson
     from ..models.animate import animate, frames
     from ..models.constant_momenta import constant_momentum
+    from ..models.driven_motion import driven
     from ..models.inspect import inspection_page
+    from ..models.inspection import FRAMES, inspection
     from ..models.live import live_page
     from ..models.open_loops import tree_alone
     from ..pages import pruning as pruning_page, stability as stability_page, work_precision as work_precision_page
     from ..pages.document_files import check_folder, document_files
+    from ..pages.html import html_target
     from ..paper.paper import paper
     from ..plots.plot import check_can_plot
     from ..typed import typed_page

@@ -5,8 +5,6 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from cgraph import extend
-
 from . import library
 from .arguments import answer, say, takes_a_scene
 from .command import Command
@@ -23,9 +21,7 @@ def add(parser: Command) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Write the page."""
-    if options.out.suffix != ".html":
-        raise ValueError(f"--out must end in .html, got {options.out}")
-    extend.check_writable(options.out)
+    library.html_target("--out", options.out)
     scene, _ = started(options)
     say(f"{scene.name}: deriving what moves and what is shown")
     text = library.live_page(scene)

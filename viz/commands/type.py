@@ -5,8 +5,6 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from cgraph import extend
-
 from . import library
 from .arguments import answer
 from .command import Command
@@ -21,9 +19,7 @@ def add(parser: Command) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Write the page."""
-    if options.out.suffix != ".html":
-        raise ValueError(f"--out must end in .html, got {options.out}")
-    extend.check_writable(options.out)
+    library.html_target("--out", options.out)
     text = None if options.text is None else options.text.read_text(encoding="utf-8")
     page = library.typed_page(text)
     answer(f"{options.out}: a box for a Lagrangian; {len(page.encode()) / 1e6:.2f} MB", {options.out: page})

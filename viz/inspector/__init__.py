@@ -1,6 +1,8 @@
 """The inspector: one page on which a graph is unfolded, stepped through, asked and seen moving."""
 
-from .content import Motion, StateTable, Step, Table, Version
-from .page import Page, Panel, page
+from ..pages.document import Table
+from ..pages.html import Page
+from .content import Motion, StateTable, Step, Version
+from .page import Panel, page
 
 __all__ = ["Motion", "Page", "Panel", "StateTable", "Step", "Table", "Version", "page"]

@@ -22,7 +22,7 @@ function start(first = JSON.parse(byId("data").textContent)) {
   const callbacks = new Set();
   const app = { svg: byId("picture"), callbacks, playing: false, noises: new WeakMap() };
   app.output = () => (app.version.outputs.find(([name]) => name === app.from) ?? app.version.outputs[0])[2];
-  app.partials = () => (app.slopes ??= slopesAt(app.version, app.record.slopes, app.values));
+  app.partials = () => (app.slopes ??= slopesAt(app.version, app.values));
   app.noise = () => (app.bounds ??= boundsIn(app, app.version, app.partials(), app.values));
   app.refresh = () => refresh(app);
   listen(app);
@@ -91,7 +91,7 @@ function noiseIn(app, graph, values) {
   if (app.playing && app.noises.has(graph)) return app.noises.get(graph);
   const small = 1e-6 * largestOf(values);
   const faint = graph.outputs.some(([, , node]) => Math.abs(values[node]) < small);
-  const found = faint ? boundsIn(app, graph, slopesAt(graph, app.record.slopes, values), values)
+  const found = faint ? boundsIn(app, graph, slopesAt(graph, values), values)
     : new Float64Array(values.length);
   app.noises.set(graph, found);
   return found;

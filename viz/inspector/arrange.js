@@ -13,7 +13,7 @@ const widthOf = (words) => Math.max(46, 7.4 * [...words.replace(/[\u0307\u0308]/
 /** What the layout reads and keeps of a record: places, widths of nodes, nodes inside clusters, kinds of leaves. */
 function makePlan(record, versions) {
   const plan = { ...placesOf(record, versions), inner: new Map() };
-  plan.width = plan.first.map(([v, node]) => Math.max(58, widthOf(caption(record, versions[v], node)))); // room for a value
+  plan.width = plan.first.map(([v, node]) => Math.max(58, widthOf(caption(versions[v], node)))); // room for a value
   plan.members = plan.clusters.map(() => []);
   plan.cluster.forEach((c, place) => { if (c >= 0) plan.members[c].push(place); });
   plan.lines = plan.clusters.map(() => new Map());

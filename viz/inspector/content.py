@@ -134,15 +134,6 @@ class Motion:
             raise ValueError(f"places must have the outputs x0, y0, .. of {len(self.parents)} points")
 
 
-@dataclass(frozen=True)
-class Table:
-    """Texts in rows, below the graph; the first column is read to the left, the others to the right."""
-
-    caption: str
-    header: Sequence[str]
-    rows: Sequence[Sequence[str]]
-
-
 @dataclass(frozen=True, eq=False)
 class StateTable:
     """A table of numbers that follow the state: outputs of a graph of its inputs.

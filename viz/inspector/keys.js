@@ -89,6 +89,7 @@ function listen(app) {
   byId("from").onchange = () => { app.from = byId("from").value; refresh(app); stepTo(app, app.sweep); };
   byId("time").oninput = () => { play(app, false); app.state.show(+byId("time").value); };
   document.addEventListener("keydown", (event) => { if (pressed(app, event)) event.preventDefault(); });
+  addEventListener("beforeprint", () => byId("wide").querySelectorAll("details").forEach((each) => { each.open = true; }));
   addEventListener("resize", () => {
     if (!app.chosen) app.view = firstView(app); // what a person unfolded stays
     redraw(app, true);

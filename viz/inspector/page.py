@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import base64
-import hashlib
-import json
 from collections.abc import Collection, Mapping, Sequence
 from html import escape
-from importlib.resources import files
 from string import Template
+from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
 from cgraph import Graph, Node, __version__
@@ -16,42 +13,28 @@ from cgraph.extend import Array, require_graph, require_mapping, require_sequenc
 
 from .. import theme
 from ..pages import html
-from .content import Motion, State, StateTable, Table, Version
-from .operations import operations
+from ..pages.document import Table
+from ..pages.html import Page, asset
+from ..pages.operations import operations
+from .content import Motion, State, StateTable, Version
 from .record import record
 
 if TYPE_CHECKING:
     from cgraph.extend import Json
 
 SCRIPTS = (
-    "elements.js", "values.js", "state.js", "paths.js", "formula.js", "layers.js", "places.js",
+    "texts.js", "values.js", "state.js", "paths.js", "formula.js", "layers.js", "places.js",
     "arrange.js", "picture.js", "view.js", "marks.js", "panels.js", "results.js", "sweeps.js", "lesson.js", "arm.js",
     "motion.js", "keys.js", "app.js",
 )  # fmt: skip
-FRAME_HEIGHT = 720  # pixels in a notebook
-# Nothing may be fetched, and no script or style runs but the page's own, known by its digest.
-_POLICY = (
-    "default-src 'none'; script-src {script}; style-src {style}; img-src data:; base-uri 'none'; form-action 'none'"
-)
-
-
-class Page(str):
-    """The HTML text of a page; a notebook shows it in a frame."""
-
-    __slots__ = ()
-
-    def _repr_html_(self) -> str:
-        return (
-            f'<iframe srcdoc="{escape(self)}" sandbox="allow-scripts" title="cgraph inspector" '
-            f'style="width:100%;height:{FRAME_HEIGHT}px;border:0"></iframe>'
-        )
 
 
 class Panel(NamedTuple):
     """A part that another module adds: markup beside the picture or at the end, style, scripts before and after start.
 
     first: JavaScript for the record that the page shows first, where its own data are none.  run: JavaScript that
-    begins the panel; `inspector` is what app.js lends to other scripts.  allowed: what the policy lets scripts do.
+    begins the panel; `inspector` is what app.js lends to other scripts.  data: as `html.compose` takes them.  allowed:
+    what the policy lets scripts do.
     """
 
     body: str = ""
@@ -61,6 +44,7 @@ class Panel(NamedTuple):
     run: str = ""
     end: str = ""
     allowed: str = ""
+    data: Mapping[str, Json] = MappingProxyType({})
 
 
 def page(
@@ -156,35 +140,27 @@ def page(
     data: dict[str, Json] = {"title": title, "introduction": introduction, "notices": list(notices)}
     live = [table for table in tables if isinstance(table, StateTable)]
     data |= record(versions, motion, *texts, state=State(at or {}, derived), columns=columns, tables=live)
-    return Page(compose(title, data, [table for table in tables if isinstance(table, Table)], panels))
+    return compose(title, data, [table for table in tables if isinstance(table, Table)], panels)
 
 
-def compose(title: str, data: Mapping[str, Json] | None, tables: Sequence[Table], panels: Sequence[Panel] = ()) -> str:
-    """The file: its policy, style, body, data and script. Without data a panel says what is shown first."""
+def compose(title: str, data: Mapping[str, Json] | None, tables: Sequence[Table], panels: Sequence[Panel] = ()) -> Page:
+    """The file. Without data a panel says what is shown first."""
     first = "".join([panel.first for panel in panels])
     begin = "".join([f"\n{panel.run}" for panel in panels])
     added = "\n".join([panel.script for panel in panels])
-    script = f'"use strict";\n{scripts()}\n{added}\nconst inspector = start({first});{begin}'
-    style = f"{_colors()}{_asset('page.css')}{''.join([panel.style for panel in panels])}"
-    allowed = "".join([f" {panel.allowed}" for panel in panels if panel.allowed])
-    policy = _POLICY.format(script=f"{_digest(script)}{allowed}", style=_digest(style))
-    # "<" in the data could end the element that holds it
-    text = json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")
-    shown = "".join(html.table(table.caption, table.header, table.rows) for table in tables)
-    body = Template(_asset("page.html")).substitute(
+    body = Template(asset(__package__, "page.html")).substitute(
         title=escape(title),
-        tables=shown,
+        tables="".join(html.table(table.caption, table.header, table.rows) for table in tables),
         version=f"cgraph {__version__}",
         panels="".join([panel.body for panel in panels]),
     )
-    return (
-        f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n<title>{escape(title)}</title>\n'
-        f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n<link rel="icon" href="data:,">\n'
-        f"<style>{style}</style>\n</head>\n<body>\n{body}\n"
-        f'<script id="data" type="application/json">{text}</script>\n'
-        f"{''.join([panel.end for panel in panels])}<script>{script}</script>\n"
-        "</body>\n</html>\n"
+    return html.compose(
+        title,
+        "\n".join([body, *[panel.end for panel in panels if panel.end]]),
+        f"{_colors()}{asset(__package__, 'page.css')}{''.join([panel.style for panel in panels])}",
+        f'"use strict";\n{scripts()}\n{added}\nconst inspector = start({first});{begin}',
+        {"data": data} | {name: each for panel in panels for name, each in panel.data.items()},
+        " ".join([panel.allowed for panel in panels if panel.allowed]),
     )
 
 
@@ -208,16 +184,8 @@ def _versions(graph: Graph | Sequence[Version], about: str, marked: frozenset[No
 
 def scripts() -> str:
     """The page's JavaScript: operations from their table, then the files."""
-    return "\n".join([operations(), *[_asset(name) for name in SCRIPTS]])
-
-
-def _digest(text: str) -> str:
-    """How a content security policy names an inline script or style."""
-    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
-
-
-def _asset(name: str) -> str:
-    return files(__package__).joinpath(name).read_text(encoding="utf-8")
+    shared = asset(html.__package__, "elements.js", "address.js", "graph.js")
+    return "\n".join([operations(), shared, asset(__package__, *SCRIPTS)])
 
 
 def _colors() -> str:

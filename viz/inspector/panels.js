@@ -14,7 +14,7 @@ function nameOf(app, node) {
 function told(app, node) {
   const operation = app.version.args[node].length > 0;
   const number = operation && !nameOf(app, node).startsWith("%") ? `%${app.version.number[node]}, ` : "";
-  return `${nameOf(app, node)}${operation ? ` (${number}${caption(app.record, app.version, node)})` : ""}`;
+  return `${nameOf(app, node)}${operation ? ` (${number}${caption(app.version, node)})` : ""}`;
 }
 
 function showNode(app, bars) {

@@ -1,9 +1,9 @@
 // The picture: shapes for bodies, clusters, nodes and outputs, and arrows between what is shown.
 
 /** What the operation of a node shows: its symbol, with the constants among its arguments. */
-function caption(record, version, node) {
+function caption(version, node) {
   const name = version.names[node];
-  const symbol = record.ops[version.ops[node]]?.[0] ?? "";
+  const symbol = ROWS[version.ops[node]]?.symbol ?? "";
   if (version.constants.has(node)) return brief(version.constants.get(node));
   if (!version.args[node].length) return name ? name[1] : "";
   const numbers = version.args[node].map((arg) => (version.constants.has(arg) ? brief(version.constants.get(arg)) : ""));
@@ -135,7 +135,7 @@ function drawClusters(canvas) {
 }
 
 function drawNodes(canvas) {
-  const { record, plan, version, layout, shapes, called } = canvas;
+  const { plan, version, layout, shapes, called } = canvas;
   drawBundles(canvas, "i", version.inputs.filter(([, node]) => node >= 0).map(([name, node]) => [name, node]));
   const sums = new Map(); // place a sum under the first output that it is
   for (const [name, , node] of version.outputs) if (!sums.has(node)) sums.set(node, name);
@@ -155,7 +155,7 @@ function drawNodes(canvas) {
       at = { x: box.x + (box.w - innerOf(plan, c).width) / 2 + x[i] - w / 2, y: box.y + BOX.title + y[i] - NODE / 2, w, h: NODE };
     }
     const role = roleOf(version, node);
-    const item = shape(shapes, `n${node}`, at, `${leaf ? "leaf" : "node"} ${role}`, caption(record, version, node), "", !leaf);
+    const item = shape(shapes, `n${node}`, at, `${leaf ? "leaf" : "node"} ${role}`, caption(version, node), "", !leaf);
     item.group.setAttribute("data-node", node);
     const name = version.names[node] && (called.get(version.names[node][0]) ?? version.names[node][0]);
     const words = [leaf ? "" : `%${version.number[node]}`, name ?? op, role === "wrong" ? "spurious" : ""].filter(Boolean).join(", ");

@@ -20,7 +20,7 @@ function placesOf(record, versions) {
   }
   const found = new Map(), meaning = new Map(), keys = new Map(), clusterKeys = [], first = [];
   const place = versions.map((version, v) => {
-    const means = meanings(record, versions, version, meaning), seen = new Map();
+    const means = meanings(versions, version, meaning), seen = new Map();
     return version.ops.map((_, node) => {
       const group = JSON.stringify(groups[v][node]);
       const kind = `${means[node]} ${group}`, again = seen.get(kind) ?? 0;
@@ -70,7 +70,7 @@ function groupOf(version, node, bodies, untagged) {
 }
 
 /** Of every node a number that nodes have in common that compute the same; a named node stands for the input of that name. */
-function meanings(record, versions, version, meaning) {
+function meanings(versions, version, meaning) {
   const inputs = new Set(versions.flatMap((each) => each.inputs.map(([name]) => name)));
   const means = [];
   version.ops.forEach((op, node) => {
@@ -80,7 +80,7 @@ function meanings(record, versions, version, meaning) {
     else if (version.constants.has(node)) key = `value ${Object.is(version.constants.get(node), -0) ? "-0" : version.constants.get(node)}`;
     else {
       const args = version.args[node].map((arg) => means[arg]);
-      key = `${op} ${record.ops[op][1] ? args.sort((a, b) => a - b) : args}`;
+      key = `${op} ${ROWS[op]?.commutative ? args.sort((a, b) => a - b) : args}`;
     }
     if (!meaning.has(key)) meaning.set(key, meaning.size);
     means.push(meaning.get(key));

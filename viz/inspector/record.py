@@ -2,7 +2,6 @@
 
     title, introduction   texts
     notices               texts that stand above everything, such as what a model lacks of its file
-    ops, slopes           {operation: [symbol, commutative]} and {operation: program of its partials}
     called, units         [[name in a graph: what a person calls it, or its unit]]
     inputs, rows          names of the state's values, and these at every instant of the motion (one without a motion)
     derived               null, or a graph that computes other inputs of versions from the state
@@ -12,26 +11,24 @@
     tables                [{caption, header, rows: [[name, [numbers of nodes]]]} and a graph]: they follow the state
     motion                null, or {t, points: null or [[[x, y]]], parents, joints, turns, places: null or a graph}
 
-A graph is {ops, args, names, inputs, outputs}: for every node, arguments before uses, the name of its operation and the
-numbers of its arguments, or the value of a constant; {node: [name, letters]} of named ones; [[name, node or -1 where
-nothing uses it]]; [[name, letters, node]]. labels are the [tags, role, row] that occur, label which of them a node
+A graph is that of `graph_data`, with outputs [[name, letters, number of a node]], and with names, {number of a node:
+[name, letters]}. labels are the [tags, role, row] that occur, label which of them a node
 has, marked the nodes in the color of what is wrong, blamed the edges [source, target] in it, flawed whether the version
 is wrong, steps [{words, nodes, value, joint}]. Where nodes stand is the page's business, but for a `drawing`.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import ADJOINT, OPS, PRIMAL, TANGENT, Op, columns
+from cgraph.extend import ADJOINT, PRIMAL, TANGENT, columns
 
 from .. import theme
 from ..graph_drawing.positions import Positions, positions
 from ..graph_drawing.render import RenderError
+from ..pages.graph import graph_data
 from .content import Motion, State, StateTable, Version
 
 if TYPE_CHECKING:
@@ -71,8 +68,6 @@ def record(
     for table in tables:
         table.check(inputs)
     return {
-        "ops": {op.name: [op.symbol, op.commutative] for op in OPS.values()},
-        "slopes": {op.name: slopes(op) for op in OPS.values()},
         "called": [[name, text] for name, text in theme.called(names or {}).items() if name in known],
         "units": [[name, text] for name, text in (units or {}).items() if name in known],
         "inputs": inputs,
@@ -110,23 +105,6 @@ def _motion(motion: Motion, letters: Letters) -> dict[str, Json]:
     }
 
 
-def slopes(op: Op) -> dict[str, Json]:
-    """The partials of an operation as a small program, from its row: 0 is the output, 1.. the arguments, then `code`.
-
-    A line of code is a number, or an operation and the numbers of its arguments; `out` names one result an argument.
-    """
-    y, *args = cg.variables(["y", *[f"x{slot}" for slot in range(op.arity)]])
-    partials = [cg.constant(each) if not isinstance(each, Node) else each for each in op.partials(y, *args)]
-    graph = Graph([y, *args], {str(i): node for i, node in enumerate(partials)})
-    number = {node: i for i, node in enumerate([y, *args])}
-    code: list[Json] = []
-    for node in graph.nodes:
-        if node not in number:
-            number[node] = op.arity + 1 + len(code)
-            code.append(node.value if node.value is not None else [node.op.name, *[number[arg] for arg in node.args]])
-    return {"code": code, "out": [number[node] for node in partials]}
-
-
 def _letters(names: Mapping[str, str]) -> Letters:
     """What the picture shows of a name: what a person calls it, or letters where that is long."""
     shown = {name: text for name, text in theme.called(names).items() if len(text) <= LONGEST}
@@ -135,14 +113,8 @@ def _letters(names: Mapping[str, str]) -> Letters:
 
 def _graph(graph: Graph, letters: Letters) -> dict[str, Json]:
     number = {node: i for i, node in enumerate(graph.nodes)}
-    return {
-        "ops": [node.op.name for node in graph.nodes],
-        "args": [
-            _number(node.value) if node.value is not None else [number[arg] for arg in node.args]
-            for node in graph.nodes
-        ],
+    return graph_data(graph) | {
         "names": {str(i): [node.name, letters(node.name)] for node, i in number.items() if node.name},
-        "inputs": [[name, number.get(node, -1)] for name, node in zip(graph.input_names, graph.inputs, strict=True)],
         "outputs": [[name, letters(name), number[node]] for name, node in graph.outputs.items()],
     }
 
@@ -259,11 +231,6 @@ def _table(table: StateTable, letters: Letters) -> dict[str, Json]:
         "rows": [[row, [number[name] for name in outputs]] for row, outputs in table.rows.items()],
         **_graph(table.graph, letters),
     }
-
-
-def _number(value: float) -> float | str:
-    """JSON has no infinity."""
-    return value if math.isfinite(value) else ("Infinity" if value > 0 else "-Infinity")
 
 
 def _short(value: float) -> float:

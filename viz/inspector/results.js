@@ -1,6 +1,7 @@
 // Tables of numbers that follow the state: made once for a record, then only their texts change.
 
 const OFF = 0.01; // relative: what differs by more from the right version is marked
+const FITTING = 3; // columns of numbers for which there is room beside the picture
 
 const namedHead = (words, ...unit) => tag("th", { scope: "row", class: words.length > 16 ? "long" : "" }, words, ...unit);
 const largestOf = (values) => values.reduce((most, value) => (Number.isFinite(value) ? Math.max(most, Math.abs(value)) : most), 0);
@@ -24,12 +25,27 @@ function makeResults(app) {
   app.cells = cells;
   byId("results").replaceChildren(shown, ...(app.right < 0 ? []
     : [quiet(`In vermillion: differs from ${versions[app.right].name}. All at one state; 0 is what is below rounding.`)]));
-  byId("statetables").hidden = !tables.length;
-  byId("statetables").replaceChildren(...tables.map((each) => {
-    const [inside, own] = numbers(app, each.header, each.rows.map(([name]) => [name, shownName(app, name)]));
-    each.cells = own;
-    return tag("div", {}, tag("h2", {}, each.caption), inside);
-  }));
+  byId("statetables").replaceChildren();
+  byId("wide").replaceChildren();
+  tables.forEach((each) => showTable(app, each));
+  for (const id of ["statetables", "wide"]) byId(id).hidden = !byId(id).children.length;
+}
+
+/** A table of the record: beside the picture, if need be with rows as columns; below it where both are many. */
+function showTable(app, each) {
+  const names = each.rows.map(([name]) => [name, shownName(app, name)]), wide = each.header.length > FITTING;
+  if (wide && names.length > FITTING) {
+    const [inside, cells] = numbers(app, each.header, names), made = tag("details", {}, tag("summary", {}, each.caption), inside);
+    made.ontoggle = () => dispatchEvent(new Event("resize")); // the picture has other room
+    each.cells = cells;
+    byId("wide").append(made);
+    return;
+  }
+  const unit = (name) => (app.units.has(name) ? ` [${app.units.get(name)}]` : "");
+  const [inside, cells] = wide ? numbers(app, names.map(([name, words]) => words + unit(name)), each.header.map((head) => ["", head]))
+    : numbers(app, each.header, names);
+  each.cells = wide ? names.map((_, i) => cells.map((row) => row[i])) : cells;
+  byId("statetables").append(tag("div", {}, tag("h2", {}, each.caption), inside));
 }
 
 /** Results of all versions at the one state, and what differs from the version that is right. */

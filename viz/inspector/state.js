@@ -15,7 +15,7 @@ function makeState(record, told = () => {}) {
   function settle(given) {
     values = new Map(given);
     if (!derived) return;
-    const found = evaluate(derived, rowOf(derived));
+    const found = derived.run(rowOf(derived));
     for (const [name, , node] of derived.outputs) values.set(name, found[node]);
   }
   /** Errors of a graph's inputs. A state with accelerations was solved for: errors of one kind are those of the largest,
@@ -60,6 +60,6 @@ function makeState(record, told = () => {}) {
     get edited() { return edited; },
     get: (name) => values.get(name),
     values: () => Object.fromEntries(values),
-    evaluate: (graph) => evaluate(graph, rowOf(graph)),
+    evaluate: (graph) => graph.run(rowOf(graph)).slice(),
   };
 }

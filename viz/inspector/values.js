@@ -1,13 +1,9 @@
-// Values of nodes, slopes of edges and adjoints of a version at a point.
+// A graph made ready for the page, and what rounding makes of its values.
 
 /** A graph made ready: constants as numbers, uses of each node, edges in the order of evaluation, numbers as listed. */
 function prepare(version) {
-  const constants = new Map();
-  const args = version.args.map((each, i) => {
-    if (Array.isArray(each)) return each;
-    constants.set(i, Number(each));
-    return [];
-  });
+  const ops = opsOf(version), args = argsOf(version);
+  const constants = new Map(version.nodes.flatMap((node, i) => (ops[i] === "constant" ? [[i, Number(node)]] : [])));
   const users = args.map(() => []);
   const edges = [];
   args.forEach((own, target) => own.forEach((source, slot) => {
@@ -17,48 +13,8 @@ function prepare(version) {
   let operations = 0;
   const number = args.map((own) => (own.length ? ++operations : 0)); // as in Graph.listing(): %1 is the first operation
   const byNumber = new Map(number.map((each, node) => [each, node]).filter(([each]) => each));
-  const functions = version.ops.map((op) => VALUE[op]);
-  return { ...version, args, functions, constants, users, edges, number, byNumber, operations, marked: new Set(version.marked),
+  return { ...version, run: evaluator(version), ops, args, constants, users, edges, number, byNumber, operations, marked: new Set(version.marked),
     crossed: new Set((version.blamed ?? []).map(([source, target]) => `${source} ${target}`)) };
-}
-
-/** The value of every node, inputs in the order of the version's. */
-function evaluate(version, row) {
-  const found = new Float64Array(version.ops.length);
-  version.inputs.forEach(([, node], i) => { if (node >= 0) found[node] = row[i]; });
-  version.constants.forEach((value, node) => { found[node] = value; });
-  for (let i = 0; i < found.length; i++) {
-    const a = version.args[i];
-    if (a.length === 2) found[i] = version.functions[i](found[a[0]], found[a[1]]);
-    else if (a.length === 1) found[i] = version.functions[i](found[a[0]]);
-    else if (a.length) found[i] = version.functions[i](...a.map((arg) => found[arg]));
-  }
-  return found;
-}
-
-/** The local partials of every node, by the programs of the operation table. */
-function slopesAt(version, programs, values) {
-  return version.args.map((args, node) => {
-    if (!args.length) return [];
-    const { code, out } = programs[version.ops[node]];
-    const work = [values[node], ...args.map((arg) => values[arg])];
-    for (const line of code) {
-      work.push(typeof line === "number" ? line : VALUE[line[0]](...line.slice(1).map((i) => work[i])));
-    }
-    return out.map((i) => work[i]);
-  });
-}
-
-/** d output / d node for every node, after the reverse sweep has passed `steps` nodes from the end; zero wins. */
-function adjoints(version, slopes, output, steps = version.ops.length) {
-  const bars = new Float64Array(version.ops.length);
-  bars[output] = 1;
-  const last = version.ops.length - 1;
-  for (let node = last; node > last - steps; node--) {
-    if (bars[node] === 0) continue;
-    version.args[node].forEach((arg, slot) => { bars[arg] += VALUE.zero_safe_mul(bars[node], slopes[node][slot]); });
-  }
-  return bars;
 }
 
 const ROUNDING = 2 ** -53; // relative error of a rounded number

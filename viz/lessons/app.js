@@ -53,22 +53,22 @@ function guess(screen, choice) {
 /** What there is to play with, made when its screen is first seen. */
 function play(k) {
   const board = SCREENS[k].querySelector(".board"), what = LESSON.plays[k];
-  if (what && !board.hasChildNodes()) PLAYS[what.kind](board, what);
+  if (what && !board.hasChildNodes()) PLAYS[what.kind](board, { values: LESSON.values, ...what });
 }
 
 const NAV = document.querySelector("nav");
 const LINKS = SCREENS.map((screen, i) => {
-  const link = element("a", { href: `#${i + 1}`, "aria-label": screen.querySelector("h2").textContent }, String(i + 1));
+  const link = tag("a", { href: `#${i + 1}`, "aria-label": screen.querySelector("h2").textContent }, String(i + 1));
   link.addEventListener("click", (event) => { event.preventDefault(); go(i); });
   screen.querySelectorAll(".choice").forEach((button, k) => button.addEventListener("click", () => guess(i, k)));
-  const turn = element("div", { class: "turn" });
-  if (i) button(turn, "← Back", () => go(i - 1)); else turn.append(element("span"));
+  const turn = tag("div", { class: "turn" });
+  if (i) button(turn, "← Back", () => go(i - 1)); else turn.append(tag("span"));
   if (i + 1 < SCREENS.length) button(turn, "Next →", () => go(i + 1));
   screen.append(turn);
   return link;
 });
-const SCORE = element("output", { "aria-live": "polite" });
-const AGAIN = element("button", { type: "button" }, "Start again");
+const SCORE = tag("output", { "aria-live": "polite" });
+const AGAIN = tag("button", { type: "button" }, "Start again");
 AGAIN.addEventListener("click", () => {
   STATE.guesses = SCREENS.map(() => null);
   SCREENS.forEach((screen) => { screen.querySelector(".reveal").open = false; });

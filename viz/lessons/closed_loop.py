@@ -7,7 +7,9 @@ from html import escape
 from cgraph import Graph, Node
 from dynamics import System, forward_dynamics, gravity_force
 
-from .screen import Screen, number, table
+from ..pages import html
+from ..pages.graph import graph_data
+from .screen import Screen, number
 from .subject import LARGEST, SHOWN, Subject
 
 
@@ -30,8 +32,8 @@ def closed_loop(subject: Subject) -> Screen:
     states = [f"q{i}" for i in range(min(subject.system.n, SHOWN))]
     play = {
         "kind": "loop",
-        "free": subject.graph(free_graph),
-        "held": subject.graph(held_graph),
+        "free": graph_data(free_graph),
+        "held": graph_data(held_graph),
         "values": subject.values | still,
         "sliders": [] if own or subject.system.kinematics.quasi else subject.sliders(states, -3.2, 3.2),
         "joints": subject.joints[:SHOWN],
@@ -51,8 +53,8 @@ def closed_loop(subject: Subject) -> Screen:
         right,
         f"<p>λ = {number(first)}: as much as it takes so that the row stays zero, no more. It does no work, for along what "
         "is still allowed to move, J q̇ = 0.</p>"
-        + table("Accelerations at rest", ["joint", "free", "held"], rows)
-        + table("Multipliers", ["row", "λ"], [[a, number(b)] for a, b in zip(shown, multipliers, strict=True)][:SHOWN]),
+        + html.table("Accelerations at rest", ["joint", "free", "held"], rows)
+        + html.table("Multipliers", ["row", "λ"], [[a, number(b)] for a, b in zip(shown, multipliers, strict=True)][:SHOWN]),
         "Find a place where the clamp has nothing to do. Is it where nothing moves at all?"
         if play["sliders"] else "Accelerations without and with the rows, at rest.",
         play if nodes <= LARGEST else None,

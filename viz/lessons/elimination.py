@@ -9,7 +9,9 @@ import numpy as np
 from cgraph.extend import Array
 from dynamics import forward_dynamics, mass_matrix
 
-from .screen import Screen, number, table
+from ..pages import html
+from ..pages.graph import graph_data
+from .screen import Screen, number
 from .subject import LARGEST, SHOWN, Subject
 
 _SAME = 1e-9  # of an inertia: a smaller difference is rounding
@@ -27,9 +29,8 @@ def elimination(subject: Subject) -> Screen:
     states = [f"q{i}" for i in range(min(n, SHOWN))]
     play = {
         "kind": "elimination",
-        "graph": subject.graph(graph),
+        "graph": graph_data(graph),
         "n": n,
-        "values": subject.values,
         "sliders": subject.sliders(states, -3.2, 3.2) if subject.system.kinematics.quasi is None else [],
         "joints": subject.joints,
     }
@@ -54,7 +55,8 @@ def elimination(subject: Subject) -> Screen:
         + " Each pivot is M<sub>ii</sub> less a square: D<sub>i</sub> = M<sub>ii</sub> − Σ<sub>k</sub> "
         "L<sub>ki</sub>² D<sub>k</sub>. From the tip to the base, a joint has to know the joints beyond it alone, as the "
         "articulated bodies of robotics do. cgraph does this on the graph of L itself: accelerations of this system "
-        f"take {size} nodes.</p>" + table("Inertia felt at a joint", ["joint", "all others locked", "pivot"], rows),
+        f"take {size} nodes.</p>"
+        + html.table("Inertia felt at a joint", ["joint", "all others locked", "pivot"], rows),
         "Take out joint after joint, from the tip. Orange: the pivot. Then bend the system and start again.",
         play if len(graph.nodes) <= LARGEST and n <= 2 * SHOWN else None,
         f"The pivot is {number(free)}. A door with a second door hinged to it is easier to push than one with both in line "

@@ -10,7 +10,9 @@ from cgraph.extend import Array
 from dynamics import SimulationWarning, energy, simulate, state_equation
 
 from .. import theme
-from .screen import Screen, number, table
+from ..pages import html
+from ..pages.graph import graph_data
+from .screen import Screen, number
 from .subject import LARGEST, Subject
 
 FACTORS = (2, 4, 16)
@@ -39,9 +41,8 @@ def energy_and_step(subject: Subject) -> Screen:
     rows = [[f"{t_end / (factor * STEPS):.3g}", number(error)] for factor, error in errors.items()]
     play = {
         "kind": "energy",
-        "rate": subject.graph(rate),
-        "energy": subject.graph(total),
-        "values": subject.values,
+        "rate": graph_data(rate),
+        "energy": graph_data(total),
         "nq": subject.system.nq,
         "n": subject.system.n,
         "t_end": min(subject.scene.t_end, 3.0),
@@ -62,7 +63,7 @@ def energy_and_step(subject: Subject) -> Screen:
         "<p>The slopes of rk4 are weighed so that all terms of the error up to dt⁴ cancel. So half the step leaves about a "
         f"sixteenth of the error, a tenth of the step a ten-thousandth. {told} "
         "Euler's error is only halved.</p>"
-        + table("rk4: largest error of a coordinate", ["dt [s]", "at the end"], rows),
+        + html.table("rk4: largest error of a coordinate", ["dt [s]", "at the end"], rows),
         "Move the number of steps. Orange: Euler's energy over time; blue: that of rk4; dashed: that of rk4 with very small steps.",
         play if len(rate.nodes) <= LARGEST else None,
         "Of a braked system energy falls by right: the line to compare with is the dashed one.",

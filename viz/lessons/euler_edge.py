@@ -14,9 +14,11 @@ from ..graph_drawing.dot import to_dot
 from ..graph_drawing.legend import kinds_in, legend_svg
 from ..graph_drawing.render import render_svg
 from ..graph_drawing.short_formulas import short_formulas
+from ..pages import html
 from ..pages.formulations import TITLES, WHY_FEWER, size_table
+from ..pages.graph import graph_data
 from ..pages.mathml import equations
-from .screen import Screen, image, number, table
+from .screen import Screen, number
 from .subject import LARGEST, SHOWN, Subject, lagrangian_graph
 
 STEPS = (1.0, 0.1, 0.01, 1e-3, 1e-6)  # s
@@ -91,10 +93,10 @@ def _reveal(subject: Subject, errors: list[tuple[float, np.ndarray]], stays: boo
     )
     joints = subject.joints[:SHOWN]
     rows = [[f"{dt:g}", *[number(error) for error in each[: len(joints)]]] for dt, each in errors]
-    steps = table("Error of the torque by definition", ["dt [s]", *joints], rows)
+    steps = html.table("Error of the torque by definition", ["dt [s]", *joints], rows)
     sizes = size_table(formulation_sizes(subject.system))
     why = f"<p>{verdict.lacking or WHY_FEWER}</p>" * verdict.differs
-    return said + _drawing(subject) + steps + table(sizes.caption, sizes.header, sizes.rows) + why
+    return said + _drawing(subject) + steps + html.table(sizes.caption, sizes.header, sizes.rows) + why
 
 
 def _second_try(subject: Subject, right: np.ndarray) -> str:
@@ -128,7 +130,9 @@ def _drawing(subject: Subject) -> str:
         if len(graph.nodes) > DRAWN:
             return ""
         if not pictures:
-            pictures = image(to_adaptive(legend_svg(kinds_in(graph, wrong))), "The colors of both pictures.")
+            pictures = html.figure(
+                to_adaptive(legend_svg(kinds_in(graph, wrong))), "The colors of both pictures.", None
+            )
         dot = to_dot(
             graph,
             names=subject.names,
@@ -141,7 +145,7 @@ def _drawing(subject: Subject) -> str:
         caption = (
             f"The inertial term, {TITLES[formulation]}: {len(wrong)} of {len(graph.nodes)} nodes are there by mistake."
         )
-        pictures += image(to_adaptive(render_svg(dot)), caption)
+        pictures += html.figure(to_adaptive(render_svg(dot)), caption, None)
     return pictures
 
 
@@ -151,9 +155,8 @@ def _play(subject: Subject, right: Graph, wrong: Graph) -> dict[str, object] | N
     states = [f"q{i}" for i in range(min(subject.system.nq, SHOWN))]
     return {
         "kind": "step",
-        "right": subject.graph(right),
-        "wrong": subject.graph(wrong),
-        "values": subject.values,
+        "right": graph_data(right),
+        "wrong": graph_data(wrong),
         "sliders": subject.sliders(states, -3.2, 3.2) if subject.system.kinematics.quasi is None else [],
         "joints": subject.joints[:SHOWN],
         "colors": [theme.FORMULATIONS["chain_rule"], theme.FORMULATIONS["euler_embedded"]],

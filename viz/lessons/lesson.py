@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import base64
-import hashlib
-import json
 import os
 from collections.abc import Sequence
 from html import escape
-from importlib.resources import files
 
 from cgraph import Graph
 from cgraph.extend import write_files
@@ -16,9 +12,9 @@ from dynamics import inverse_dynamics
 from dynamics.systems.model import Model
 
 from ..graph_drawing.render import check_can_draw
-from ..inspector import Page
-from ..inspector.operations import operations
-from ..pages.html_target import html_target
+from ..pages import html
+from ..pages.html import Page, asset, html_target
+from ..pages.operations import values
 from .closed_loop import closed_loop
 from .elimination import elimination
 from .energy_and_step import energy_and_step
@@ -29,7 +25,6 @@ from .sweeps import sweeps
 from .torque_parts import torque_parts
 
 SCREENS = (euler_edge, sweeps, torque_parts, elimination, closed_loop, energy_and_step)
-SCRIPTS = ("evaluate.js", "plays.js", "app.js")
 
 
 def lesson(model: Model, path: str | os.PathLike[str] | None = None) -> Page:
@@ -79,24 +74,24 @@ def lesson(model: Model, path: str | os.PathLike[str] | None = None) -> Page:
 def page(subject: Subject, screens: Sequence[Screen]) -> Page:
     """The page of some screens."""
     title = f"A lesson on {subject.scene.name.replace('_', ' ')}"
-    data = {"answers": [screen.answer for screen in screens], "plays": [screen.play for screen in screens]}
-    # "<" in the data could end the element that holds it
-    text = json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")
-    script = "\n".join(['"use strict";', operations(), *[_asset(name) for name in SCRIPTS]])
-    style = _asset("lesson.css")
-    policy = (
-        f"default-src 'none'; script-src {_digest(script)}; style-src {_digest(style)}; img-src data:; base-uri 'none'; "
-        "form-action 'none'"
-    )
+    data = {
+        "answers": [screen.answer for screen in screens],
+        "plays": [screen.play for screen in screens],
+        "values": subject.values,  # of inputs, where a play has no others
+    }
     body = "\n".join([screen.to_html(k) for k, screen in enumerate(screens, start=1)])
-    return Page(
-        f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n<title>{escape(title)}</title>\n'
-        f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n<link rel="icon" href="data:,">\n'
-        f'<style>{style}</style>\n</head>\n<body>\n<h1>{escape(title)}</h1>\n<nav aria-label="Screens"></nav>\n'
-        f"<main>\n{body}\n{_teacher(subject, screens)}\n</main>\n"
-        f'<script id="data" type="application/json">{text}</script>\n<script>{script}</script>\n</body>\n</html>\n'
+    return html.compose(
+        title,
+        f'<h1>{escape(title)}</h1>\n<nav aria-label="Screens"></nav>\n<main>\n{body}\n{_teacher(subject, screens)}\n</main>',
+        asset(__package__, "lesson.css"),
+        f'"use strict";\n{scripts()}\n{asset(__package__, "app.js")}',
+        {"data": data},
     )
+
+
+def scripts() -> str:
+    """What there is to play with, and what it needs."""
+    return "\n".join([values(), asset(html.__package__, "elements.js", "graph.js"), asset(__package__, "plays.js")])
 
 
 def _teacher(subject: Subject, screens: Sequence[Screen]) -> str:
@@ -115,11 +110,3 @@ def _teacher(subject: Subject, screens: Sequence[Screen]) -> str:
         "bookmark is a score. Printed, every screen has a page for the pupils, and this is the last.</p>\n"
         f"{equations}\n</details>"
     )
-
-
-def _asset(name: str) -> str:
-    return files(__package__).joinpath(name).read_text(encoding="utf-8")
-
-
-def _digest(text: str) -> str:
-    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"

@@ -1,44 +1,76 @@
 // What there is to play with on the screens: sliders, and what the graphs make of them.
 
-function element(name, attributes = {}, ...inside) {
-  const made = document.createElement(name);
-  for (const key in attributes) made.setAttribute(key, attributes[key]);
-  made.append(...inside);
-  return made;
+/** The function from {input: value} to {output: value} of a graph. */
+function named(graph) {
+  const run = evaluator(graph);
+  return (at) => {
+    const found = run(graph.inputs.map(([name]) => at[name]));
+    return Object.fromEntries(graph.outputs.map(([name, node]) => [name, found[node]]));
+  };
 }
-function drawn(name, attributes, ...inside) {
-  const made = document.createElementNS("http://www.w3.org/2000/svg", name);
-  for (const key in attributes) made.setAttribute(key, attributes[key]);
-  made.append(...inside);
-  return made;
+
+/** Names of the numbered outputs of a kind, as tau0, tau1, .. */
+const numbered = (kind, n, end = "") => Array.from({ length: n }, (_, i) => kind + i + end);
+
+/** Pivots of a symmetric matrix, the last first: the matrix before every pivot, and after the last. */
+function stages(matrix) {
+  const left = matrix.map((row) => row.slice());
+  const all = [left.map((row) => row.slice())];
+  for (let k = left.length - 1; k > 0; k--) {
+    for (let i = 0; i < k; i++)
+      for (let j = 0; j < k; j++) left[i][j] -= (matrixAt(left, i, k) * matrixAt(left, k, j)) / left[k][k];
+    all.push(left.map((row) => row.slice()));
+  }
+  return all;
 }
+const matrixAt = (matrix, i, j) => matrix[Math.max(i, j)][Math.min(i, j)];
+
+/** A motion by Euler's method or rk4: states at every step, until one is not finite. */
+function motion(rate, start, names, dt, steps, method) {
+  const at = { ...start }, rows = [];
+  const slope = (state) => {
+    names.forEach((name, i) => { at[name] = state[i]; });
+    const found = rate(at);
+    return names.map((name) => found[name + "_dot"]);
+  };
+  const euler = (state, k = slope(state)) => state.map((x, i) => x + dt * k[i]);
+  let state = names.map((name) => start[name]);
+  for (let k = 0; k <= steps && state.every(Number.isFinite); k++) {
+    rows.push(state);
+    state = method === "euler" ? euler(state) : rk4(slope, state, 0, dt);
+  }
+  return rows;
+}
+
+/** Four digits, with a minus that is one. */
+const digits = (x) => (Number.isFinite(x) ? String(+x.toPrecision(4)) : "—").replace("-", "−");
 
 /** A slider with its name and value. */
 function slider(board, shown, low, high, step, value, change, text = digits) {
-  const input = element("input", { type: "range", min: low, max: high, step, "aria-label": shown });
-  const output = element("output", {}, text(value));
+  const input = tag("input", { type: "range", min: low, max: high, step, "aria-label": shown });
+  const output = tag("output", {}, text(value));
   input.value = value;
   input.addEventListener("input", () => { output.textContent = text(+input.value); change(+input.value); });
-  board.append(element("label", {}, shown, input, output));
+  board.append(tag("label", {}, shown, input, output));
 }
 function sliders(board, play, at, draw) {
   for (const each of play.sliders)
     slider(board, each.shown, each.low, each.high, 0.01, each.value, (x) => { at[each.name] = x; draw(); });
 }
 function button(board, text, press) {
-  const made = element("button", { type: "button" }, text);
+  const made = tag("button", { type: "button" }, text);
   made.addEventListener("click", press);
   board.append(made);
   return made;
 }
 /** A table whose cells can be written anew: {write(rows), cells}. */
 function grid(board, header) {
-  const body = element("tbody");
-  const head = element("thead", {}, element("tr", {}, ...header.map((name) => element("th", {}, name))));
-  board.append(element("div", { class: "scroll" }, element("table", {}, head, body)));
+  const body = tag("tbody");
+  const head = tag("thead", {}, tag("tr", {}, ...header.map((name) => tag("th", {}, name))));
+  board.append(tag("div", { class: "scroll" }, tag("table", {}, head, body)));
   return (rows, classes = () => "") => body.replaceChildren(
-    ...rows.map((row, i) => element("tr", {}, ...row.map((text, j) => {
-      const cell = element("td", {}, text);
+    ...rows.map((row, i) => tag("tr", {}, ...row.map((text, j) => {
+      const cell = tag("td", {}, text);
       const kind = classes(i, j);
       if (kind) cell.className = kind;
       return cell;
@@ -68,7 +100,7 @@ function bars(svg, groups, colors) {
 
 const PLAYS = {
   step(board, play) {
-    const right = evaluator(play.right), wrong = evaluator(play.wrong), at = { ...play.values };
+    const right = named(play.right), wrong = named(play.wrong), at = { ...play.values };
     const names = numbered("tau", play.joints.length), old = Object.keys(at).filter((name) => name.endsWith("_old"));
     const rate = {}; // of what is old, by a second
     for (const name of old) rate[name] = (play.values[name.slice(0, -4)] - play.values[name]) / play.values.dt;
@@ -91,7 +123,7 @@ const PLAYS = {
   sweeps(board, play) {
     const rows = play.rows, count = rows.length;
     let step = 0;
-    const buttons = board.appendChild(element("div", { class: "buttons" }));
+    const buttons = board.appendChild(tag("div", { class: "buttons" }));
     button(buttons, "Next", () => { step = Math.min(step + 1, 2 * count); draw(); });
     button(buttons, "All values", () => { step = Math.max(step, count); draw(); });
     button(buttons, "All slopes", () => { step = 2 * count; draw(); });
@@ -109,7 +141,7 @@ const PLAYS = {
     draw();
   },
   parts(board, play) {
-    const torque = evaluator(play.graph), at = { ...play.values };
+    const torque = named(play.graph), at = { ...play.values };
     const names = numbered("tau", play.joints.length);
     const zero = (kind) => Object.fromEntries(Object.keys(at).filter((name) => new RegExp(`^${kind}\\d+$`).test(name)).map((name) => [name, 0]));
     sliders(board, play, at, () => draw());
@@ -125,10 +157,10 @@ const PLAYS = {
     draw();
   },
   elimination(board, play) {
-    const mass = evaluator(play.graph), at = { ...play.values }, n = play.n;
+    const mass = named(play.graph), at = { ...play.values }, n = play.n;
     let step = 0;
     sliders(board, play, at, () => { step = 0; draw(); });
-    const buttons = board.appendChild(element("div", { class: "buttons" }));
+    const buttons = board.appendChild(tag("div", { class: "buttons" }));
     button(buttons, "Take out the next joint", () => { step = Math.min(step + 1, n - 1); draw(); });
     button(buttons, "Again", () => { step = 0; draw(); });
     const write = grid(board, ["", ...play.joints]);
@@ -142,7 +174,7 @@ const PLAYS = {
     draw();
   },
   loop(board, play) {
-    const free = evaluator(play.free), held = evaluator(play.held), at = { ...play.values };
+    const free = named(play.free), held = named(play.held), at = { ...play.values };
     sliders(board, play, at, () => draw());
     const write = grid(board, ["", "free", "held"]);
     const draw = () => {
@@ -153,7 +185,7 @@ const PLAYS = {
     draw();
   },
   energy(board, play) {
-    const rate = evaluator(play.rate), total = evaluator(play.energy);
+    const rate = named(play.rate), total = named(play.energy);
     const names = [...numbered("q", play.nq), ...numbered("qd", play.n)];
     const energies = (method, steps) => motion(rate, play.values, names, play.t_end / steps, steps, method).map((state) => {
       const at = { ...play.values };
@@ -164,7 +196,7 @@ const PLAYS = {
     let steps = 100;
     slider(board, "steps", 1, 3, 0.05, 2, (x) => { steps = Math.round(10 ** x); draw(); }, (x) => String(Math.round(10 ** x)));
     const svg = board.appendChild(drawn("svg", { role: "img", "aria-label": "Energy over time" }));
-    const words = board.appendChild(element("p", { role: "status" }));
+    const words = board.appendChild(tag("p", { role: "status" }));
     const draw = () => {
       const curves = ["euler", "rk4"].map((method) => energies(method, steps));
       const right = (i) => exact[Math.round((i * fine) / steps)] ?? NaN;

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import base64
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
-
-from ..pages import html
 
 TOO_LARGE = "The graphs of this system are too large to be computed many times a second in a page."
 
@@ -60,21 +57,7 @@ def number(value: float) -> str:
     return f"{value:.4g}".replace("-", "−") if value else "0"
 
 
-def image(svg: str, caption: str) -> str:
-    """A picture with its caption (text) below."""
-    data = base64.b64encode(svg.encode()).decode()
-    return (
-        f'<figure><img src="data:image/svg+xml;base64,{data}" alt="{escape(caption)}">'
-        f"<figcaption>{escape(caption)}</figcaption></figure>"
-    )
-
-
 def inline(svg: str, name: str, about: str) -> str:
     """A drawing of a graph whose nodes the page's script can light up; its ids begin with the name."""
     svg = re.sub(r'\bid="', f'id="{name}-', svg)
     return f'<div class="graph-picture" role="img" aria-label="{escape(about)}">{svg}</div>'
-
-
-def table(caption: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table of texts."""
-    return html.table(caption, header, rows)

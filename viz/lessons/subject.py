@@ -69,16 +69,6 @@ class Subject:
         found = graph.evaluate({name: values[name] for name in graph.input_names})
         return np.array([float(value) for value in found.values()])
 
-    def graph(self, graph: Graph) -> dict[str, object]:
-        """A graph for the page's script: inputs, and nodes as a number, an input's name or [operation, places]."""
-        place = {node: k for k, node in enumerate(graph.nodes)}
-        nodes = [
-            node.value if node.value is not None else [node.op.name, *[place[arg] for arg in node.args]]
-            if node.args else node.name
-            for node in graph.nodes
-        ]  # fmt: skip
-        return {"nodes": nodes, "outputs": {name: place[node] for name, node in graph.outputs.items()}}
-
     def sliders(self, names: Sequence[str], low: float, high: float) -> list[dict[str, object]]:
         """Sliders for inputs, with what they are called."""
         return [

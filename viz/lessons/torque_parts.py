@@ -9,7 +9,9 @@ import numpy as np
 from cgraph.extend import Array
 from dynamics import inverse_dynamics
 
-from .screen import Screen, number, table
+from ..pages import html
+from ..pages.graph import graph_data
+from .screen import Screen, number
 from .subject import LARGEST, SHOWN, Subject
 
 PARTS = ("inertia: what q̈ takes", "velocity: Coriolis, centrifugal, damping", "position: weight and springs")
@@ -33,8 +35,7 @@ def torque_parts(subject: Subject) -> Screen:
     states = [f"{kind}{i}" for i in range(min(system.n, MOVED)) for kind in ("q", "qd", "qdd")]
     play = {
         "kind": "parts",
-        "graph": subject.graph(graph),
-        "values": subject.values,
+        "graph": graph_data(graph),
         "sliders": subject.sliders(states, -3.2, 3.2) if system.kinematics.quasi is None else [],
         "joints": subject.joints[:SHOWN],
         "parts": [part.partition(":")[0] for part in PARTS],
@@ -49,7 +50,7 @@ def torque_parts(subject: Subject) -> Screen:
         PARTS,
         int(sizes.argmax()),
         "<p>The same graph of the torque, asked three times: at rest without acceleration, then with q̈ alone, then with "
-        f"q̇ alone. The three add up to the torque.</p>{table('Parts of the torque', ['joint', 'inertia', 'velocity', 'position', 'torque'], rows)}",
+        f"q̇ alone. The three add up to the torque.</p>{html.table('Parts of the torque', ['joint', 'inertia', 'velocity', 'position', 'torque'], rows)}",
         "Move the joints. Make the velocity part the largest; then find a place where holding still costs nothing.",
         play if len(graph.nodes) <= LARGEST else None,
         f"At {name} the parts are {', '.join(number(value) for value in parts[:, joint])}.",

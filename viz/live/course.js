@@ -8,7 +8,7 @@ function liveCourse(svg, words, machine, data, state) {
   const among = data.inputs.slice(0, data.states);
   const positions = among.filter(({ group }) => group === "positions").length || data.states;
   const indices = among.slice(0, Math.min(positions, COURSES)).map((_, i) => i);
-  const shape = (name, attributes) => liveShape(name, attributes, svg);
+  const shape = (name, attributes) => element(name, attributes, svg);
   const zero = shape("path", { class: "live-rule" }), now = shape("path", { class: "live-rule live-now" });
   const thin = indices.map(() => shape("path", { class: "live-reference live-line" }));
   const thick = indices.map((i) => shape("path", { class: `live-course live-course-${i} live-line` }));
@@ -19,7 +19,7 @@ function liveCourse(svg, words, machine, data, state) {
   words.classList.add("live-legend");
   const rest = positions - indices.length;
   words.replaceChildren(
-    ...indices.map((i) => liveTag("span", { class: `live-course-${i}` }, data.inputs[i].called)),
+    ...indices.map((i) => tag("span", { class: `live-course-${i}` }, data.inputs[i].called)),
     `${rest ? `and ${rest} more ` : ""}over time. Thick: steps of dt. Thin and green: much shorter steps.`,
   );
   let end = 0, from = 0, across, up;

@@ -4,19 +4,6 @@ const DECADES = [-5, 0]; // of dt on its slider
 const KEPT = 240; // instants in the strip of energies
 const TRACE = 120; // places of the tip
 
-/** An element around others; texts stay texts. */
-function liveTag(name, attributes = {}, ...inside) {
-  const made = document.createElement(name);
-  for (const key in attributes) made.setAttribute(key, attributes[key]);
-  made.append(...inside);
-  return made;
-}
-function liveShape(name, attributes, parent) {
-  const made = document.createElementNS("http://www.w3.org/2000/svg", name);
-  for (const key in attributes) made.setAttribute(key, attributes[key]);
-  parent.appendChild(made);
-  return made;
-}
 /** A number with four digits, and a minus that is one. */
 function liveNumber(value) {
   if (!Number.isFinite(value)) return "—";
@@ -26,8 +13,8 @@ function liveNumber(value) {
 }
 
 async function startLive() {
-  const data = JSON.parse(document.getElementById("live-data").textContent);
-  const $ = (id) => document.getElementById(`live-${id}`);
+  const data = JSON.parse(byId("live-data").textContent);
+  const $ = (id) => byId(`live-${id}`);
   const machine = liveMachine(data, await liveModules(data));
   const motion = liveRun(machine, data);
   const { state } = motion;
@@ -39,8 +26,8 @@ async function startLive() {
 
   function control(i, { called, unit, low, high }) {
     const step = (high - low) / 400;
-    const slider = liveTag("input", { type: "range", min: low, max: high, step, "aria-label": `${called}, slider` });
-    const field = liveTag("input", { type: "number", step: "any", "aria-label": called });
+    const slider = tag("input", { type: "range", min: low, max: high, step, "aria-label": `${called}, slider` });
+    const field = tag("input", { type: "number", step: "any", "aria-label": called });
     const take = (text) => { if (text !== "" && motion.set(i, Number(text))) changed(); };
     slider.oninput = () => take(slider.value);
     field.oninput = () => take(field.value);
@@ -49,7 +36,7 @@ async function startLive() {
       if (document.activeElement !== slider) slider.value = known ? value : 0;
       if (document.activeElement !== field) field.value = known ? +value.toPrecision(5) : "";
     });
-    return liveTag("label", { class: "live-control" }, liveTag("span", {}, called, ...(unit ? [liveTag("small", {}, ` [${unit}]`)] : [])), slider, field);
+    return tag("label", { class: "live-control" }, tag("span", {}, called, ...(unit ? [tag("small", {}, ` [${unit}]`)] : [])), slider, field);
   }
   const groups = new Map();
   data.inputs.forEach((input, i) => {
@@ -59,9 +46,9 @@ async function startLive() {
   });
   for (const [group, rows] of groups) {
     const open = rows.length <= 8 ? { open: "" } : {};
-    $("controls").append(liveTag("details", open, liveTag("summary", {}, group), ...rows));
+    $("controls").append(tag("details", open, tag("summary", {}, group), ...rows));
   }
-  $("method").append(...data.methods.map((name) => liveTag("option", { value: name }, name)));
+  $("method").append(...data.methods.map((name) => tag("option", { value: name }, name)));
   $("method").onchange = () => { state.method = $("method").value; changed(); };
   const setStep = (dt) => { if (dt > 0 && Number.isFinite(dt)) { state.dt = dt; state.owed = 0; changed(); } };
   Object.assign($("dt"), { min: DECADES[0], max: DECADES[1], step: 0.01 });
@@ -72,23 +59,16 @@ async function startLive() {
   $("reset").onclick = () => { play(false); motion.reset(); strip.length = 0; changed(); };
   $("link").onclick = () => {
     keep();
-    const done = (said) => { $("said").textContent = said; };
-    if (navigator.clipboard) navigator.clipboard.writeText(location.href).then(() => done("Copied."), () => done("The link is in the address bar."));
-    else done("The link is in the address bar.");
+    copyLink((copied) => { $("said").textContent = copied ? "Copied." : "The link is in the address bar."; });
   };
 
   // The link
 
-  function keep() {
-    const rest = location.hash.slice(1).split("&").filter((part) => part && !part.startsWith("live="));
-    try {
-      history.replaceState(null, "", `#${[...rest, `live=${motion.link()}`].join("&")}`);
-    } catch { /* a frame in a notebook has no address */ }
-  }
+  const keep = () => keepPart("live", motion.link());
   function read() {
-    const part = location.hash.slice(1).split("&").find((each) => each.startsWith("live="));
+    const part = linkPart("live");
     if (part === undefined) return;
-    $("said").textContent = motion.open(part.slice(5)) ? "" : "The link has no state that could be read.";
+    $("said").textContent = motion.open(part) ? "" : "The link has no state that could be read.";
     strip.length = 0;
     anew = true;
     show();
@@ -108,10 +88,10 @@ async function startLive() {
   const svg = $("picture"), points = data.parents.length;
   const first = data.meters.length;
   const place = (values, k) => [values[first + 2 * k], -values[first + 2 * k + 1]];
-  const reference = data.parents.map(() => liveShape("path", { class: "live-reference" }, svg));
-  const trace = liveShape("path", { class: "live-trace" }, svg);
-  const sticks = data.parents.map(() => liveShape("path", { class: "live-stick" }, svg));
-  const joints = data.parents.map(() => liveShape("circle", { class: "live-joint" }, svg));
+  const reference = data.parents.map(() => element("path", { class: "live-reference" }, svg));
+  const trace = element("path", { class: "live-trace" }, svg);
+  const sticks = data.parents.map(() => element("path", { class: "live-stick" }, svg));
+  const joints = data.parents.map(() => element("circle", { class: "live-joint" }, svg));
   let reach = 0;
   const past = [];
   const drawCourse = points ? null : liveCourse(svg, $("words"), machine, data, state);
@@ -141,7 +121,7 @@ async function startLive() {
     trace.setAttribute("d", drawn.length > 1 ? `M${drawn.map(([x, y]) => `${x} ${y}`).join("L")}` : "");
     trace.setAttribute("stroke-width", r / 3);
   }
-  const curves = ["kinetic", "potential", "energy"].map((name) => liveShape("path", { class: `live-${name}` }, $("strip")));
+  const curves = ["kinetic", "potential", "energy"].map((name) => element("path", { class: `live-${name}` }, $("strip")));
   function drawStrip(values) {
     if (playing || !strip.length) strip.push(values.slice(0, 3));
     if (strip.length > KEPT) strip.shift();
@@ -159,13 +139,13 @@ async function startLive() {
   const meterGroups = new Map();
   data.meters.forEach(({ called, unit, group }, k) => {
     if (!meterGroups.has(group)) meterGroups.set(group, []);
-    const cell = liveTag("td", { "data-meter": called });
+    const cell = tag("td", { "data-meter": called });
     cells.push([cell, k]);
-    meterGroups.get(group).push(liveTag("tr", {}, liveTag("th", { scope: "row" }, called), cell, liveTag("td", {}, unit)));
+    meterGroups.get(group).push(tag("tr", {}, tag("th", { scope: "row" }, called), cell, tag("td", {}, unit)));
   });
   for (const [group, rows] of meterGroups) {
     const open = rows.length <= 8 ? { open: "" } : {};
-    $("meters").append(liveTag("details", open, liveTag("summary", {}, group), liveTag("table", {}, liveTag("tbody", {}, ...rows))));
+    $("meters").append(tag("details", open, tag("summary", {}, group), tag("table", {}, tag("tbody", {}, ...rows))));
   }
   const unitOf = (i) => data.inputs[i].unit;
   function error(id, { index, most, share }) {

@@ -5,19 +5,7 @@ const HORIZON = 1500; // steps at most that the error ahead takes
 const COURSE = 300; // first steps that the picture of coordinates over time holds
 const OTHERS = 1e-6; // of the largest state of its group, below which one counts as no smaller: it may be rounding
 
-/** The bytes behind base64. */
-function decoded(text) {
-  const digits = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  const found = new Uint8Array(Math.floor((text.length * 3) / 4) - (text.match(/=*$/)[0].length));
-  let bits = 0, held = 0, at = 0;
-  for (const letter of text.replaceAll("=", "")) {
-    held = (held << 6) | digits.indexOf(letter);
-    bits += 6;
-    if (bits >= 8) found[at++] = (held >> (bits -= 8)) & 255;
-  }
-  return found;
-}
-
+const decoded = (base64) => Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
 const LIVE_IMPORTS = { math: Math };
 
 /** The two modules, of the rate and of what is shown. */

@@ -7,13 +7,13 @@ import os
 from cgraph.extend import require_flag, write_files
 from dynamics import FORMULATIONS, display_names, scenes
 from dynamics.equations.both_forms import HAMILTON
-from dynamics.scenes.inspection import Inspection, Shares, inspection
 from dynamics.scenes.start import Start, moving_start, rest_text, with_start
 from dynamics.systems.model import Model
 
-from ..inspector import Motion, Page, StateTable, Step, Version, page
-from ..pages.html_target import html_target
+from ..inspector import Page, page
+from ..pages.html import html_target
 from ..typed import box
+from .inspection import Inspection, inspection
 from .live import live_panel
 from .open_loops import tree_alone
 from .typed_text import text_or_none
@@ -92,30 +92,27 @@ def inspect(
 
 def inspection_page(scene: scenes.Scene, content: Inspection, moved: str = "", title: str | None = None) -> Page:
     """The page of a scene.  moved: why its start was chosen for it, if it was."""
-    bones, mechanism = content.skeleton, scene.mechanism
+    mechanism, first = scene.mechanism, next(iter(content.versions))
     lively = scene.ode is None and scene.system.n <= LIVELY
-    inverse = content.versions[0].name in FORMULATIONS
-    what = "inverse dynamics" if inverse else content.versions[0].name
+    inverse = first in FORMULATIONS
+    what = "inverse dynamics" if inverse else first
     notices = [f"Left out of the model: {'; '.join(scene.left_out)}."] if scene.left_out else []
     notices += [tree_alone(scene)] if inverse and tree_alone(scene) else []
     notices += [f"{moved[0].upper()}{moved[1:]}."] if moved else []
     return page(
-        [
-            Version(each.name.replace("_", " "), *each[1:4], [Step(*step) for step in each.steps], *each[5:])
-            for each in content.versions
-        ],
+        list(content.versions.values()),
         title=f"{scene.name}: {what}" if title is None else title,
         at=content.at,
         derived=content.derived,
-        motion=Motion(content.t, *bones) if bones else Motion(content.t),
-        tables=[_torques(scene, content.shares)] if content.shares else [],
+        motion=content.motion,
+        tables=[content.shares] if content.shares else [],
         names=display_names(scene),
         units=content.units,
         columns={body.name: body.parent for body in mechanism.moving} if mechanism else None,
         notices=[*notices, *([cut_short(content)] if content.stopped else [])],
         panels=[
             box(text_or_none(scene, scene.q, scene.qd)),
-            *([live_panel(scene, momentum=content.versions[0].name == HAMILTON)] if lively else []),
+            *([live_panel(scene, momentum=first == HAMILTON)] if lively else []),
         ],
     )
 
@@ -123,9 +120,3 @@ def inspection_page(scene: scenes.Scene, content: Inspection, moved: str = "", t
 def cut_short(content: Inspection) -> str:
     """That the motion ends before its time, and why."""
     return f"The motion is not whole: it {content.stopped}."
-
-
-def _torques(scene: scenes.Scene, shares: Shares) -> StateTable:
-    """A row for each velocity, a column for each part."""
-    rows = {f"tau{i}": shares.row(i) for i in range(scene.system.n)}
-    return StateTable("Torques and forces that each part takes", shares.graph, shares.parts, rows)

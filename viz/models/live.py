@@ -2,21 +2,46 @@
 
 from __future__ import annotations
 
+import math
 import os
+import warnings
+from collections.abc import Mapping
+from dataclasses import replace
 
+import numpy as np
+
+import cgraph as cg
+from cgraph import Graph, Node
 from cgraph.extend import write_files
 from dynamics import scenes
+from dynamics.equations.energies import kinetic_energy, potential_energy
+from dynamics.equations.equations_of_motion import gravity_force, momentum
+from dynamics.equations.formulations import momentum_rate
+from dynamics.equations.hamiltonian import hamilton_equations, velocities
+from dynamics.equations.state_equation import state_equation, state_inputs
 from dynamics.integrators import TABLEAUS
-from dynamics.scenes.live_graphs import live_graphs
+from dynamics.multibody.display_units import display_units
+from dynamics.multibody.joint_positions import drawn_points, view
+from dynamics.multibody.mechanism import Mechanism
+from dynamics.scenes import Scene
 from dynamics.scenes.start import Start, moving_start, with_start
+from dynamics.simulation.simulate import simulate
+from dynamics.simulation.trajectory import SimulationWarning
+from dynamics.systems.display_names import display_names
 from dynamics.systems.model import Model
 
 from ..inspector import Panel
-from ..live import EVALUATION, Live, LivePage, page_text, panel
-from ..pages.html_target import html_target
+from ..live import EVALUATION, Live, page_text, panel
+from ..pages.html import Page, html_target
+
+MOST_BODIES = 4  # of a mechanism whose masses become parameters by themselves
+SAMPLES = 16  # states at which the extent of a mechanism is looked at
+MOST_STEPS = 1000  # of the motion by which dt is chosen
+USUAL = {"rad": math.pi, "rad/s": 10.0}  # how far sliders reach at least; 1 of all else
+SHARE = 0.25  # of the steps that a method of order 5 chooses
 
 
-def live_page(model: Model, path: str | os.PathLike[str] | None = None, *, start: Start | None = None) -> LivePage:
+def live_page(model: Model, path: str | os.PathLike[str] | None = None, *, start: Start | None = None) -> Page:
     """The page on which a model moves as it is watched, computed there: one HTML file that loads nothing.
 
     Sliders and fields set the state, the torques, the parameters and dt; of a small mechanism without parameters,
@@ -35,7 +60,7 @@ def live_page(model: Model, path: str | os.PathLike[str] | None = None, *, start
 
     Returns
     -------
-    LivePage
+    Page
         The HTML text; a notebook shows it in a frame.
 
     Raises
@@ -64,13 +89,147 @@ def live_page(model: Model, path: str | os.PathLike[str] | None = None, *, start
     return text
 
 
-def live_of(scene: scenes.Scene, *, momentum: bool = False) -> Live:
-    """What the panel of a scene computes."""
-    graphs = live_graphs(scene, momentum=momentum)
-    return Live(*graphs[:7], TABLEAUS, *graphs[7:])
-
-
-def live_panel(scene: scenes.Scene, *, momentum: bool = False) -> Panel:
+def live_panel(scene: Scene, *, momentum: bool = False) -> Panel:
     """The motion of a scene as a panel at the end of another page, closed at first."""
     live = panel(live_of(scene, momentum=momentum))
-    return Panel(style=live.style, run=live.script, end=live.folded(), allowed=EVALUATION)
+    return Panel(style=live.style, run=live.script, end=live.folded(), allowed=EVALUATION, data=live.data)
+
+
+def live_of(scene: Scene, *, momentum: bool = False) -> Live:
+    """The panel's content for a scene. Masses and gravity of a small mechanism without parameters become parameters.
+
+    momentum: the state is coordinates and momenta.  The step at first is one that is short enough.
+
+    Raises as `state_equation`, `hamilton_equations` and `simulate` do.
+    """
+    model = _adjustable(scene.mechanism) if scene.mechanism is not None else scene.model
+    scene = replace(scene, model=model)
+    rate = hamilton_equations(scene.model) if momentum else state_equation(scene.model)
+    known = state_inputs(scene.model)
+    values = dict(zip(known.states, (*scene.q, *scene.qd), strict=True)) | known.parameters
+    values |= _momenta(scene, values) if momentum else {}
+    start = {name: values.get(name, 0.0) for name in rate.input_names}  # torques and the time are 0
+    outputs, meters = _meters(scene, rate)
+    places_, parents = _places(scene, rate, start)
+    shown = cg.simplify(Graph(rate.inputs, outputs | places_))
+    units = {} if scene.mechanism is None else display_units(scene.mechanism.moving)
+    units |= {name: "kg" for name in start if name.startswith("mass.")} | {"g": "m/s²", "t": "s"}
+    torques = [abs(float(value)) for name, value in shown.evaluate({**start}).items() if name.startswith("gravity")]
+    weight = max(filter(math.isfinite, torques), default=0.0)  # none at a center that attracts
+    scales = {name: _scale(name, value, units.get(name, ""), weight) for name, value in start.items()}
+    if momentum:
+        usual = {f"qd{i}": USUAL.get(units.get(f"qd{i}", ""), 1.0) for i in range(scene.system.n)}
+        reach = {name: abs(p) for name, p in _momenta(scene, values | usual).items()}
+        scales |= {name: _round(p) for name, p in reach.items() if 0.0 < p < math.inf}  # of speeds that are none, NaN
+    return Live(rate, start, shown, meters, parents, scales, _step(scene), TABLEAUS, display_names(scene), units)
+
+
+def _adjustable(mechanism: Mechanism) -> Mechanism:
+    """The mechanism, with its masses (inertias in proportion) and the size of gravity as parameters."""
+    numbers = [*[body.mass for body in mechanism.bodies], *np.ravel(np.array(mechanism.gravity, dtype=object))]
+    if mechanism.parameters or len(mechanism.moving) > MOST_BODIES or not all(map(_is_number, numbers)):
+        return mechanism
+    gravity = np.array(mechanism.gravity, dtype=np.float64)
+    size = float(np.linalg.norm(gravity))
+    bodies, parameters = [], {"g": size} if size else {}
+    for body in mechanism.bodies:
+        inertia = np.array(body.inertia, dtype=object)
+        name = f"mass.{'_'.join(body.name.split())}"
+        if body.mass and name not in parameters and all(map(_is_number, inertia.ravel())):
+            mass, parameters[name] = cg.variable(name), float(body.mass)
+            scaled = [[each and each / body.mass * mass for each in row] for row in np.atleast_2d(inertia)]
+            body = replace(body, mass=mass, inertia=scaled if inertia.ndim == 2 else scaled[0])
+        bodies.append(body)
+    down = [float(part / size) * cg.variable("g") if part else 0.0 for part in gravity]
+    return replace(mechanism, bodies=bodies, gravity=down if size else mechanism.gravity, parameters=parameters)
+
+
+def _is_number(value: object) -> bool:
+    return not isinstance(value, (Node, str))
+
+
+def _meters(scene: Scene, rate: Graph) -> tuple[dict[str, Node], list[tuple[str, str, str]]]:
+    """Energies, momenta and torques over the inputs of the rate."""
+    system = scene.system
+    inputs = dict(zip(rate.input_names, rate.inputs, strict=True))
+    momenta = "p0_dot" in rate.outputs
+    if momenta:
+        moved = velocities(system)
+        inputs |= moved(**{name: inputs[name] for name in moved.input_names})
+    else:
+        inputs |= {f"qdd{i}": rate.outputs[f"qd{i}_dot"] for i in range(system.n)}
+    called, units = display_names(scene), {} if scene.mechanism is None else display_units(scene.mechanism.moving)
+
+    def over(graph: Graph) -> dict[str, Node]:
+        return graph(**{name: inputs[name] for name in graph.input_names})
+
+    (kinetic,) = over(kinetic_energy(system)).values()
+    (potential,) = over(potential_energy(system)).values()
+    outputs = {"kinetic": kinetic, "potential": potential, "energy": kinetic + potential}
+    meters = [(name, "J", "energy") for name in outputs]
+    rates = {kind: {name: node for name, node in rate.outputs.items() if name[0] == kind} for kind in "qp"}
+    groups = {
+        "velocity" if momenta else "momentum": rates["q"] if momenta else over(momentum(system)),
+        "torque": over(gravity_force(system)),
+        "rate": rates["p"] if momenta else over(momentum_rate(system)),
+    }
+    for group, nodes in groups.items():
+        for name, node in nodes.items():
+            outputs[name] = node
+            shown = called.get(name, name).replace("p_dot", "dp/dt").replace("gravity", "holding")
+            meters.append((shown, units.get(name, ""), "torque" if group == "rate" else group))
+    return outputs, meters
+
+
+def _momenta(scene: Scene, values: Mapping[str, float]) -> dict[str, float]:
+    """p0.. at a state (q, qd)."""
+    graph = momentum(scene.system)
+    found = graph.evaluate({name: values.get(name, 0.0) for name in graph.input_names})
+    return {name: float(value) for name, value in found.items()}
+
+
+def _places(scene: Scene, rate: Graph, start: dict[str, float]) -> tuple[dict[str, Node], tuple[int, ...]]:
+    """Where joints and tips are in the picture: x0, y0, x1, .. over the inputs of the state equation."""
+    if scene.mechanism is None:
+        return {}, ()
+    inputs = dict(zip(rate.input_names, rate.inputs, strict=True))
+    marks = drawn_points(scene.mechanism)
+    graphs = [scene.mechanism.position(body, at) for body, at, _ in marks]
+    turns = np.linspace(0.0, 3.0, SAMPLES)
+    at = {name: start[name] + np.sin((k + 2.0) * turns) for k, name in enumerate(start)}
+    points = []
+    for graph in graphs:
+        found = graph.evaluate({name: at[name] for name in graph.input_names})
+        points.append(np.stack([np.broadcast_to(found[axis], SAMPLES) for axis in "xyz"], axis=-1))
+    sides = view(np.stack(points))
+    outputs = {}
+    for k, graph in enumerate(graphs):
+        nodes = [*graph(**{name: inputs[name] for name in graph.input_names}).values()]
+        for name, side in zip("xy", sides, strict=True):
+            terms = [float(part) * node for part, node in zip(side, nodes, strict=True) if part]
+            outputs[f"{name}{k}"] = sum(terms[1:], start=terms[0])
+    return outputs, tuple([parent for _, _, parent in marks])
+
+
+def _scale(name: str, value: float, unit: str, weight: float) -> float:
+    """How far a slider reaches to both sides of 0."""
+    if name.startswith("tau"):
+        return _round(2.0 * weight) if weight else 10.0
+    usual = USUAL.get(unit, 1.0)
+    return max(usual, 3.0 * abs(value)) if name[:1] == "q" else 3.0 * abs(value) or 1.0
+
+
+def _round(value: float) -> float:
+    """The next of 1, 2, 5, 10, .. that is not below."""
+    power = 10.0 ** math.floor(math.log10(value))
+    return next(each * power for each in (1.0, 2.0, 5.0, 10.0) if each * power >= value)
+
+
+def _step(scene: Scene) -> float:
+    """A step that is short enough: a share of those that an adaptive method takes at first, rounded."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SimulationWarning)  # the page shows what an equal step does to a stiff system
+        run = simulate(scene, scene.q, scene.qd, min(scene.t_end, 1.0), "dopri5", rtol=1e-4, max_steps=MOST_STEPS)
+    steps = np.diff(run.t)
+    usual = float(np.median(steps)) if run.stats.steps and steps.size else 1e-2 * scene.t_end
+    return float(f"{_round(SHARE * usual) / 2.0:.3g}")

@@ -1,15 +1,23 @@
-"""Pages: figures, tables and words on one self-contained HTML page."""
+"""Pages: one HTML file from its parts, and the figures, tables and words that are parts."""
 
 from __future__ import annotations
 
 import base64
-from collections.abc import Sequence
+import hashlib
+import json
+import os
+import re
+from collections.abc import Mapping, Sequence
 from html import escape
+from importlib.resources import files
+from pathlib import Path
+
+from cgraph.extend import check_writable, require_path
 
 from .. import theme
 
-# Nothing is fetched and no script runs; pictures and styles are in the page.
-POLICY = "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'"
+FRAME_HEIGHT = 760  # pixels in a notebook
+_COMMENT = re.compile(r"^ *(?://[^\n]*|/\*\*.*?\*/)\n", re.MULTILINE | re.DOTALL)  # that begins a line
 
 _STYLE = f"""
 :root {{ color-scheme: light dark; --text: {theme.TEXT}; --back: #FFFFFF; --soft: #F4F4F2; --line: #D8D8D4; }}
@@ -36,31 +44,94 @@ pre {{ background: var(--soft); padding: 0.8rem 1rem; overflow-x: auto; border-r
 """
 
 
-def page(title: str, introduction: str, sections: Sequence[tuple[str, str, str]]) -> str:
+def html_target(what: str, path: str | os.PathLike[str] | None) -> Path | None:
+    """The path that a page is to be written to, if there is one, looked at before the work.
+
+    Raises TypeError for what is no path, ValueError for one that does not end in .html, OSError for one that cannot be
+    written.
+    """
+    if path is None:
+        return None
+    target = require_path(what, path)
+    if target.suffix != ".html":
+        raise ValueError(f"{what} must end in .html, got {os.fspath(target)!r:.80}")
+    check_writable(target)
+    return target
+
+
+class Page(str):
+    """The HTML text of a page; a notebook shows it in a frame."""
+
+    __slots__ = ()
+
+    def _repr_html_(self) -> str:
+        return (
+            f'<iframe srcdoc="{escape(self)}" sandbox="allow-scripts" title="cgraph page" '
+            f'style="width:100%;height:{FRAME_HEIGHT}px;border:0"></iframe>'
+        )
+
+
+def compose(
+    title: str, body: str, style: str, script: str = "", data: Mapping[str, object] | None = None, allowed: str = ""
+) -> Page:
+    """One file, of which nothing is fetched from anywhere, and whose policy lets its own script and style alone run.
+
+    body: HTML.  data: {id of an element: what scripts read there as JSON}.  allowed: what else scripts may do. A page
+    without a script may have styles at its elements.
+    """
+    run = (
+        f"script-src {_digest(script)} {allowed}; style-src {_digest(style)}" if script else "style-src 'unsafe-inline'"
+    )
+    policy = f"default-src 'none'; {run}; img-src data:; base-uri 'none'; form-action 'none'"
+    # "<" in the data could end the element that holds it
+    texts = {
+        name: json.dumps(each, separators=(",", ":"), ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")
+        for name, each in (data or {}).items()
+    }
+    held = "".join([f'<script id="{name}" type="application/json">{text}</script>\n' for name, text in texts.items()])
+    return Page(
+        f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n<title>{escape(title)}</title>\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n<link rel="icon" href="data:,">\n'
+        f"<style>{style}</style>\n</head>\n<body>\n{body}\n{held}"
+        f"{script and f'<script>{script}</script>'}\n</body>\n</html>\n"
+    )
+
+
+def asset(package: str | None, *names: str) -> str:
+    """The texts of files beside the modules of a package, such as scripts and styles; of scripts without comments."""
+    assert package is not None
+    texts = [files(package).joinpath(name).read_text(encoding="utf-8") for name in names]
+    return "\n".join(
+        [_COMMENT.sub("", text) if name.endswith(".js") else text for name, text in zip(names, texts, strict=True)]
+    )
+
+
+def _digest(text: str) -> str:
+    """The name of an inline script or style in a content security policy."""
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
+
+
+def page(title: str, introduction: str, sections: Sequence[tuple[str, str, str]]) -> Page:
     """A page of sections (anchor, heading, HTML), with a line of links to them. introduction is HTML."""
     links = " ".join(f'<a href="#{escape(anchor)}">{escape(heading)}</a>' for anchor, heading, _ in sections)
     body = "\n".join(
         f'<section id="{escape(anchor)}">\n<h2>{escape(heading)}</h2>\n{content}\n</section>'
         for anchor, heading, content in sections
     )
-    return (
-        f'<!doctype html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        f'<meta http-equiv="Content-Security-Policy" content="{POLICY}">\n<title>{escape(title)}</title>\n'
-        f'<meta name="viewport" content="width=device-width, initial-scale=1">\n<style>{_STYLE}</style>\n</head>\n<body>\n'
-        f"<h1>{escape(title)}</h1>\n{introduction}\n<nav>{links}</nav>\n{body}\n</body>\n</html>\n"
-    )
+    return compose(title, f"<h1>{escape(title)}</h1>\n{introduction}\n<nav>{links}</nav>\n{body}", _STYLE)
 
 
-def figure(svg: str, caption: str, width: str = "100%", *, adapts: bool = False) -> str:
+def figure(svg: str, caption: str, width: str | None = "100%", *, adapts: bool = False) -> str:
     """An SVG picture inside the page, with its caption (text) below; the caption is its alternative text too.
 
-    adapts: the picture has no background, and ink for light and dark pages.
+    adapts: the picture has no background, and ink for light and dark pages.  width: None leaves it to the page's style.
     """
     data = base64.b64encode(svg.encode()).decode()
-    style = f"width:{width};background:none" if adapts else f"width:{width}"
+    style = "" if width is None else f' style="width:{width}{";background:none" if adapts else ""}"'
     kind = ' class="plot"' if width == "100%" else ""
     return (
-        f'<figure><img{kind} src="data:image/svg+xml;base64,{data}" alt="{escape(caption)}" style="{style}">'
+        f'<figure><img{kind} src="data:image/svg+xml;base64,{data}" alt="{escape(caption)}"{style}>'
         f"<figcaption>{escape(caption)}</figcaption></figure>"
     )
 

@@ -1,12 +1,11 @@
 // The box that a Lagrangian is typed into: what it says goes to the inspector, what is wrong under the box.
 
-const TYPED_PART = "text="; // of the fragment of the page's address, between &
+const TYPED_PART = "text"; // of the page's address
 const TYPED_WAIT = 400; // ms after the last key
 
-const linkParts = () => location.hash.slice(1).split("&").filter(Boolean);
 /** The text in the page's address, or nothing. */
 function linkedText() {
-  const part = linkParts().find((each) => each.startsWith(TYPED_PART))?.slice(TYPED_PART.length);
+  const part = linkPart(TYPED_PART);
   try {
     return part === undefined ? null : decodeURIComponent(part);
   } catch {
@@ -60,7 +59,11 @@ function startTyped(inspector, text, shownFirst) {
     event.stopPropagation(); // the page's keys are letters here
   };
   byId("which").onchange = shown;
-  byId("link").onclick = () => copyLink(box.value);
+  const words = (text) => { byId("link").textContent = text; };
+  byId("link").onclick = () => {
+    keepLink(box.value);
+    copyLink((copied) => { words(copied ? "copied" : "it is in the address"); setTimeout(() => words("copy link"), 1500); });
+  };
   byId("back-to").onclick = () => {
     inspector.showRecord(before);
     byId("back-to").hidden = true;
@@ -103,9 +106,8 @@ function showWrong(wrong) {
 /** Counts, lint in words, and how exact the motion is. */
 function showDerived({ system, motion, record }) {
   const rows = record.versions.map((version) => {
-    const { name, ops, args, flawed } = version;
-    const edges = args.reduce((sum, each) => sum + (Array.isArray(each) ? each.length : 0), 0);
-    return tag("tr", {}, rowHead(name), ...[ops.length, edges, spuriousIn(version)].map((count, k) => tag("td", { class: k === 2 && flawed ? "off" : "" }, String(count))));
+    const { name, nodes, flawed } = version, edges = argsOf(version).flat().length;
+    return tag("tr", {}, rowHead(name), ...[nodes.length, edges, spuriousIn(version)].map((count, k) => tag("td", { class: k === 2 && flawed ? "off" : "" }, String(count))));
   });
   const lint = TYPED.FORMULATIONS.map((name) => {
     const found = TYPED.verdict(system, name), words = found.differs ? "differs" : "holds";
@@ -120,7 +122,7 @@ function motionWords(system, motion) {
 }
 /** Coordinates over time. */
 function curves({ coordinates }, { t, q }) {
-  const svg = element("svg", { id: "curves", viewBox: "0 0 320 130", role: "img", "aria-label": `${coordinates.join(", ")} over time` });
+  const svg = drawn("svg", { id: "curves", viewBox: "0 0 320 130", role: "img", "aria-label": `${coordinates.join(", ")} over time` });
   const all = q.flat(), low = Math.min(...all), size = Math.max(...all) - low || 1;
   const place = (k, i) => `${(310 * t[k] / (t.at(-1) || 1) + 5).toFixed(1)} ${(122 - 94 * (q[k][i] - low) / size).toFixed(1)}`;
   coordinates.forEach((name, i) => {
@@ -131,14 +133,4 @@ function curves({ coordinates }, { t, q }) {
   return svg;
 }
 
-function keepLink(text) {
-  if (location.protocol === "about:") return; // a frame in a notebook has no address
-  const rest = linkParts().filter((each) => !each.startsWith(TYPED_PART));
-  history.replaceState(null, "", `#${[...(text === null ? [] : [TYPED_PART + encodeURIComponent(text)]), ...rest].join("&")}`);
-}
-function copyLink(text) {
-  keepLink(text);
-  const told = (words) => { byId("link").textContent = words; setTimeout(() => { byId("link").textContent = "copy link"; }, 1500); };
-  if (!navigator.clipboard) { told("it is in the address"); return; }
-  navigator.clipboard.writeText(location.href).then(() => told("copied"), () => told("it is in the address"));
-}
+const keepLink = (text) => keepPart(TYPED_PART, text === null ? null : encodeURIComponent(text));

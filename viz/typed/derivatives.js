@@ -1,14 +1,7 @@
 // Forward and reverse mode over nodes, with the partials that the operation table ships as small programs.
 
 /** The partials of a node in its arguments: the row's program, each line built as the scope says. */
-function partialsOf(node) {
-  const { code, out } = ROWS[node.op].slopes;
-  const work = [node, ...node.args];
-  for (const line of code) {
-    work.push(typeof line === "number" ? constant(line) : apply(line[0], ...line.slice(1).map((i) => work[i])));
-  }
-  return out.map((i) => work[i]);
-}
+const partialsOf = (node) => partials(ROWS[node.op].slopes, [node, ...node.args], apply, constant);
 
 /** Flags of nodes that one sweep reaches through operations that select, which keep an infinity elsewhere out of it. */
 class Reached {

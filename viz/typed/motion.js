@@ -6,32 +6,16 @@ const TOLERANCE = 1e-6, UNSURE = 1e-2; // relative change by halving the step th
 
 /** Values of nodes for Map {name of a variable: number}. */
 function valuesOf(nodes, at) {
-  const found = new Map();
-  for (const node of topological(nodes)) {
-    const value = node.value ?? (node.op === "variable" ? at.get(node.name) : VALUE[node.op](...node.args.map((arg) => found.get(arg))));
-    found.set(node, value);
-  }
-  return nodes.map((node) => found.get(node));
+  const inputs = topological(nodes).filter(({ op }) => op === "variable");
+  return compiled(inputs, nodes)(inputs.map(({ name }) => at.get(name)));
 }
 
 /** A function from numbers of the inputs, in order, to numbers of some nodes. */
 function compiled(inputs, nodes) {
-  const order = topological(nodes), place = new Map(order.map((node, i) => [node, i]));
-  const work = new Float64Array(order.length), fed = [], steps = [];
-  inputs.forEach((node, i) => { if (place.has(node)) fed.push([place.get(node), i]); });
-  order.forEach((node, i) => {
-    if (node.value !== null) work[i] = node.value;
-    else if (node.args.length) steps.push({ value: VALUE[node.op], i, args: node.args.map((arg) => place.get(arg)) });
-  });
-  const out = nodes.map((node) => place.get(node));
-  const run = (values) => {
-    for (const [i, from] of fed) work[i] = values[from];
-    for (const { value, i, args } of steps) {
-      work[i] = args.length === 1 ? value(work[args[0]]) : args.length === 2 ? value(work[args[0]], work[args[1]]) : value(...args.map((arg) => work[arg]));
-    }
-    return out.map((i) => work[i]);
-  };
-  run.size = steps.length;
+  const order = topological(nodes), { number, ...graph } = numbered(order, inputs), evaluated = evaluator(graph);
+  const out = nodes.map((node) => number.get(node));
+  const run = (values) => { const found = evaluated(values); return out.map((i) => found[i]); };
+  run.size = order.filter(({ args }) => args.length).length;
   return run;
 }
 
@@ -57,7 +41,7 @@ function motionOf(system, parameters = system.parameters) {
   if (infinite && first.slice(n, 2 * n).every((pivot) => pivot > 0)) return { error: `At the start the acceleration of ${infinite} is not finite.` };
   const singular = system.coordinates.findLast((_, i) => !(first[n + i] > 0));
   if (singular) return { error: `At the start ${singular} has no inertia left: the mass matrix is not positive definite.` };
-  const rate = (state, t) => run(at(state, t));
+  const rate = (state, t) => [...state.subarray(n), ...run(at(state, t)).slice(0, n)];
   const most = WORK / (run.size + OVERHEAD) / 4 / FRAMES;
   let each = 1, states = integrate(rate, start, system.time, each), sure;
   do {
@@ -76,24 +60,10 @@ function motionOf(system, parameters = system.parameters) {
 }
 /** States at the frames by RK4 with so many steps a frame, as far as they are finite. */
 function integrate(rate, start, time, each) {
-  const h = time / (FRAMES - 1) / each, n = start.length / 2, states = [start], middle = new Float64Array(2 * n);
-  const moved = (x, k, c) => {
-    for (let i = 0; i < n; i++) { middle[i] = x[i] + c * (k ? k.x[n + i] : 0); middle[n + i] = x[n + i] + c * (k ? k.qdd[i] : 0); }
-    return middle;
-  };
-  const stage = (x, t) => ({ x: Float64Array.from(x), qdd: rate(x, t) });
+  const h = time / (FRAMES - 1) / each, states = [start];
   let x = start;
   for (let frame = 1; frame < FRAMES; frame++) {
-    for (let step = 0; step < each; step++) {
-      const t = ((frame - 1) * each + step) * h;
-      const k1 = stage(x, t), k2 = stage(moved(x, k1, h / 2), t + h / 2), k3 = stage(moved(x, k2, h / 2), t + h / 2), k4 = stage(moved(x, k3, h), t + h);
-      const next = Float64Array.from(x);
-      for (let i = 0; i < n; i++) {
-        next[i] += (h / 6) * (k1.x[n + i] + 2 * (k2.x[n + i] + k3.x[n + i]) + k4.x[n + i]);
-        next[n + i] += (h / 6) * (k1.qdd[i] + 2 * (k2.qdd[i] + k3.qdd[i]) + k4.qdd[i]);
-      }
-      x = next;
-    }
+    for (let step = 0; step < each; step++) x = rk4(rate, x, ((frame - 1) * each + step) * h, h);
     if (!x.every(Number.isFinite)) break;
     states.push(x);
   }

@@ -85,6 +85,13 @@ class Builder {
   }
 }
 
+/** Nodes and inputs as the arrays of a graph that `evaluator` takes, and the number of every node. */
+function numbered(nodes, inputs) {
+  const number = new Map(nodes.map((node, i) => [node, i]));
+  return { number, nodes: nodes.map(({ op, value, args }) => (args.length ? [op, ...args.map((arg) => number.get(arg))] : value)),
+    inputs: inputs.map((node) => [node.name, number.get(node) ?? -1]) };
+}
+
 /** What some nodes reach, arguments first, without recursion. */
 function topological(outputs) {
   const order = [], closed = new Set();

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import json
-from importlib.resources import files
 from string import Template
 
-from ..inspector.page import Page, Panel, compose
+from ..inspector.page import Panel, compose
+from ..pages.html import Page, asset
 from .engine import engine
 
 TITLE = "Your own Lagrangian"
@@ -45,7 +45,7 @@ def typed_page(text: str | None = None) -> Page:
     if text is not None and not isinstance(text, str):
         raise TypeError(f"a Lagrangian is typed as text, got {type(text).__name__}: {text!r:.60}")
     held = 'TYPED.EXAMPLES.get("double pendulum")' if text is None else _literal(text)
-    return Page(compose(TITLE, None, (), [_panel(f"firstTyped({held})", f"{held}, true", "")]))
+    return compose(TITLE, None, (), [_panel(f"firstTyped({held})", f"{held}, true", "")])
 
 
 def box(text: str = "") -> Panel:
@@ -55,9 +55,9 @@ def box(text: str = "") -> Panel:
 
 def _panel(first: str, held: str, hidden: str) -> Panel:
     return Panel(
-        body=Template(_asset("box.html")).substitute(hidden=hidden),
-        style=_asset("box.css"),
-        script=f"{engine()}{_asset('box.js')}",
+        body=Template(asset(__package__, "box.html")).substitute(hidden=hidden),
+        style=asset(__package__, "box.css"),
+        script=f"{engine()}{asset(__package__, 'box.js')}",
         first=first,
         run=f"startTyped(inspector, {held});",
     )
@@ -66,7 +66,3 @@ def _panel(first: str, held: str, hidden: str) -> Panel:
 def _literal(text: str) -> str:
     """The text as JavaScript has it; "<" could end the script."""
     return json.dumps(text).replace("<", "\\u003c")
-
-
-def _asset(name: str) -> str:
-    return files(__package__).joinpath(name).read_text(encoding="utf-8")

@@ -22,8 +22,6 @@ function recordOf(system, motion, forward) {
   return {
     title: "Your Lagrangian", introduction: "",
     notices: noticesOf(system, motion),
-    ops: Object.fromEntries(Object.entries(ROWS).map(([name, { symbol, commutative }]) => [name, [symbol, commutative]])),
-    slopes: Object.fromEntries(Object.entries(ROWS).map(([name, row]) => [name, row.slopes])),
     called: [...calledOf(system)].filter(([name]) => known.has(name)),
     units: [["t", "s"], ["dt", "s"]].filter(([name]) => known.has(name)),
     inputs, rows: rowsOf(system, motion, inputs), columns: [], tables: [],
@@ -55,11 +53,10 @@ function lettersOf(system) {
 }
 
 function listed(graph, letters) {
-  const number = new Map(graph.nodes.map((node, i) => [node, i]));
+  const { number, ...arrays } = numbered(graph.nodes, graph.inputs);
   return {
-    ops: graph.nodes.map(({ op }) => op), args: graph.nodes.map(({ value, args }) => value ?? args.map((arg) => number.get(arg))),
+    ...arrays,
     names: Object.fromEntries(graph.nodes.map((node, i) => [i, node.name]).filter(([, name]) => name).map(([i, name]) => [i, [name, letters(name)]])),
-    inputs: graph.inputs.map((node) => [node.name, number.get(node) ?? -1]),
     outputs: [...graph.outputs].map(([name, node]) => [name, letters(name), number.get(node)]),
   };
 }

@@ -166,7 +166,7 @@ def test_the_page_computes_and_writes_the_formula():
     assert "asinh: Math.asinh ?? (() => NaN)" in text
     program = """(record) => {
       const state = makeState(record), [version] = state.versions, values = state.evaluate(version);
-      const out = version.outputs[0][2], bars = adjoints(version, slopesAt(version, record.slopes, values), out);
+      const out = version.outputs[0][2], bars = adjoints(version, slopesAt(version, values), out);
       return [values[out], bars[version.inputs[0][1]], equation(version, out, 5)];
     }"""
     value, slope, formula = run_script(program, record([Version("deep", DEEP)], None, state=State(at)))

@@ -15,11 +15,11 @@ import dynamics as dyn
 from cgraph import Graph
 from dynamics.multibody.mechanism import Body, Joint, Mechanism, MechanismError
 from dynamics.multibody.spatial import from_quaternion
-from dynamics.scenes.inspection import inspection
 from dynamics.verification.certificate import certify
 from tests.dynamics.mechanisms import FAMILIES, random_body, random_inertia, random_rotation
 from tests.dynamics.models import Array
 from tests.dynamics.parametrized import parametrized
+from viz.models.inspection import inspection
 
 ROUNDING = 1e-12  # of the largest of its kind, in some hundred sums
 GRAPHS: dict[str, Callable[[Any], Graph]] = {
@@ -269,11 +269,9 @@ def test_a_page_shows_them() -> None:
     found, numbers = (
         inspection(dyn.scenes.Scene("arm", "", model, (0.1, 0.2), (0.0, 0.0), 0.1)) for model in (arm, arm.bind())
     )
-    assert found.skeleton is not None
-    assert numbers.skeleton is not None
-    assert found.skeleton.points == approx(numbers.skeleton.points)
+    assert found.motion.points == approx(numbers.motion.points)
     assert found.shares is not None
-    assert "lower" in found.shares.parts
+    assert "lower" in found.shares.header
     assert "load" in found.at
 
 

@@ -9,6 +9,7 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
+import viz
 from tests.hostile_texts import HOSTILE, hostile_page
 from viz import cli, theme
 
@@ -259,6 +260,20 @@ def test_the_motion_moves_the_values_and_the_tables(show):
     assert page.inner_text("#results") != before[0]
     assert page.inner_text("#statetables") != before[1]
     assert page.inner_text("#clock") == f"{80 * 3.0 / 89:.2f} s"
+
+
+@pytest.mark.parametrize("links", [2, 3, 4, 10])
+def test_no_table_is_cut_beside_the_picture_or_below_it(visit, tmp_path, links):
+    """Rows and columns change places where that makes it fit; a table of many of both stands below the picture."""
+    viz.inspect(dyn.scenes.load("chain", n=links), tmp_path / "arm.html", t_end=1.0)
+    page = visit(tmp_path / "arm.html", width=1400, height=1000)
+    for summary in page.locator("#wide summary").all():
+        summary.click()
+    tables = "[...document.querySelectorAll(':is(#results, #statetables, #wide) .scroll')]"
+    assert page.evaluate(f"{tables}.map((each) => each.scrollWidth > each.clientWidth)") == [False, False]
+    found = page.evaluate(f"{tables}[1].innerText.match(/[\\d−.e-]+(?=[\\t\\n]|$)/g).length")
+    assert found >= links * (links + 1)
+    assert page.locator("#wide tbody tr").count() == (links if links > 3 else 0)
 
 
 def test_the_elimination_is_gone_through_joint_by_joint(show, written):

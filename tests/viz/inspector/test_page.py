@@ -17,12 +17,12 @@ import cgraph as cg
 import dynamics as dyn
 import viz
 from dynamics.equations.consistent_state import nearest_state
-from dynamics.scenes.inspection import FORMULATIONS, inspection
 from tests.hostile_texts import HOSTILE, hostile_page
 from viz import cli
 from viz.inspector import Motion, Table, Version
 from viz.inspector.page import SCRIPTS, scripts
 from viz.inspector.record import record
+from viz.models.inspection import FORMULATIONS, inspection
 
 JAVASCRIPT_LIBM = 1e-12  # relative: a browser's sin and exp may differ from the C library's in the last bits
 
@@ -60,8 +60,8 @@ def test_it_has_all_formulations_with_their_counts_and_spurious_nodes(pendulum):
     assert [each["name"] for each in data["versions"]] == [name.replace("_", " ") for name in FORMULATIONS]
     for name, each in zip(FORMULATIONS, data["versions"], strict=True):
         graph = dyn.inverse_dynamics(dyn.scenes.load("triple_pendulum"), name)
-        arguments = sum(len(args) for args in each["args"] if isinstance(args, list))
-        assert (len(each["ops"]), arguments) == (graph.counts().nodes, graph.counts().edges)
+        arguments = sum(len(node) - 1 for node in each["nodes"] if isinstance(node, list))
+        assert (len(each["nodes"]), arguments) == (graph.counts().nodes, graph.counts().edges)
         assert len(each["marked"]) == len(dyn.spurious_nodes(graph))
         names = {name for name, _ in each["inputs"]}
         assert names <= set(data["inputs"]) | {name for name, *_ in data["derived"]["outputs"]}
@@ -190,7 +190,7 @@ def test_a_page_of_coordinates_with_names_shows_these_and_their_units():
     model = dyn.Mechanism([dyn.Body("thigh", hinge, mass=1.0, center=(0.0, 0.0, -0.2)),
                            dyn.Body("shank", ball, "thigh", 1.0, (0.0, 0.0, -0.2), (0.1, 0.2, 0.2))])  # fmt: skip
     found = inspection(dyn.scenes.Scene("leg", "", model, (0.1, 1.0, 0.0, 0.0, 0.0), (0.0,) * 4, 0.1))
-    data = record([Version(*found.versions[2])], None, dyn.display_names(model), found.units)
+    data = record([found.versions["chain_rule"]], None, dyn.display_names(model), found.units)
     called, units = dict(data["called"]), dict(data["units"])
     (version,) = data["versions"]
     names = [name for name, *_ in version["inputs"] + version["outputs"]]
@@ -215,6 +215,6 @@ def test_a_page_of_loops_shows_where_they_close_and_does_not_promise_torques_of_
     pin = dyn.Loop("point", "b", "world", at=(1.0, 0, 0), to_at=(1.0, 0, 0))
     q, qd = nearest_state(model := dyn.Mechanism(bars, loops=[pin]), [0.5, 1.0], [1.0, 0.0])
     found = inspection(dyn.scenes.Scene("truss", "", model, tuple(q), tuple(qd), 0.1))
-    assert "should be 0" not in found.versions[-1].about
-    assert "constraints" in found.versions[-1].about
-    assert np.ptp(found.skeleton.points[:, -1], axis=0) == pytest.approx([0.0, 0.0], abs=1e-6)
+    assert "should be 0" not in found.versions["chain_rule"].about
+    assert "constraints" in found.versions["chain_rule"].about
+    assert np.ptp(found.motion.points[:, -1], axis=0) == pytest.approx([0.0, 0.0], abs=1e-6)

@@ -16,11 +16,13 @@ import viz
 from cgraph.codegen.python_function import source
 from cgraph.extend import Names
 from cgraph.operations.table import OPS
-from dynamics.scenes.inspection import Inspection, inspection
 from tests.page_script import run_script
 from tests.tolerances import SUMS
 from viz.inspector.content import Motion, State, StateTable, Version
-from viz.inspector.record import record, slopes
+from viz.inspector.record import record
+from viz.models.inspection import Inspection, inspection
+from viz.pages.graph import graph_data
+from viz.pages.operations import slopes
 
 pytestmark = pytest.mark.usefixtures("without_graphviz")
 JAVASCRIPT_LIBM = 1e-12  # relative: a browser's sin and exp may differ from the C library's in the last bits
@@ -28,7 +30,7 @@ JAVASCRIPT_LIBM = 1e-12  # relative: a browser's sin and exp may differ from the
 
 @pytest.fixture(scope="module")
 def pendulum() -> list[Version]:
-    return [Version(*each) for each in inspection(dyn.scenes.load("triple_pendulum")).versions]
+    return list(inspection(dyn.scenes.load("triple_pendulum")).versions.values())
 
 
 # Where nodes are.
@@ -76,7 +78,7 @@ def test_a_sum_that_is_a_result_stands_under_it(pendulum):
     data = record(pendulum, None)
     plan = run_script(PLACES, data)
     for each, places in zip(data["versions"], plan["place"], strict=True):
-        used = {arg for args in each["args"] if isinstance(args, list) for arg in args}
+        used = {arg for node in each["nodes"] if isinstance(node, list) for arg in node[1:]}
         for _, _, node in each["outputs"]:
             assert (plan["cluster"][places[node]] == -2) == (node not in used)
 
@@ -121,7 +123,7 @@ def test_the_script_agrees_where_numbers_are_special():
 POINT = """(record) => {
   const state = makeState(record);
   return state.versions.map((version) => {
-    const values = state.evaluate(version), slopes = slopesAt(version, record.slopes, values);
+    const values = state.evaluate(version), slopes = slopesAt(version, values);
     const out = version.outputs[0][2], bars = adjoints(version, slopes, out);
     const each = (f) => version.inputs.map(([, node]) => (node < 0 ? null : f(node)));
     return { values: version.outputs.map(([, , node]) => values[node]), bars: each((node) => bars[node]),
@@ -149,6 +151,14 @@ def test_values_adjoints_and_paths_of_the_script_are_those_of_the_library(pendul
             assert [abs(p) for p in found["heaviest"][i]] == pytest.approx(
                 [abs(path.value) for path in why.paths], rel=SUMS
             )
+
+
+def test_infinities_and_the_negative_zero_reach_the_page():
+    x, values = cg.variable("x"), (math.inf, -math.inf, -0.0)
+    graph = cg.Graph([x], {str(i): cg.minimum(x, value) for i, value in enumerate(values)})
+    program = "(graph) => [...evaluator(graph)([0.5])].map((value) => String(value === 0 ? 1 / value : value))"
+    found = run_script(program, graph_data(graph))
+    assert [found[node] for _, node in graph_data(graph)["outputs"]] == ["0.5", "-Infinity", "-Infinity"]
 
 
 def test_huge_numbers_of_paths_are_exact():
@@ -199,7 +209,7 @@ def found_in_spring() -> Inspection:
 
 def spring(at: dict[str, float]) -> tuple[list[Version], State]:
     found = found_in_spring()
-    return [Version(*each) for each in found.versions], State(dict(found.at) | at, found.derived)
+    return list(found.versions.values()), State(dict(found.at) | at, found.derived)
 
 
 def test_all_versions_are_in_one_state_and_reset_restores_it():
@@ -261,7 +271,7 @@ def test_what_rounding_leaves_is_told_from_what_is_small():
     )
     program = """(record) => {
       const state = makeState(record), [version] = state.versions, values = state.evaluate(version);
-      const noise = errorBounds(version, slopesAt(version, record.slopes, values), values);
+      const noise = errorBounds(version, slopesAt(version, values), values);
       return version.outputs.map(([, , node]) => [brief(values[node], noise[node]), values[node], noise[node]]);
     }"""
     for unit in (1.0, 1e-9, 1e12):
@@ -284,7 +294,7 @@ def test_a_velocity_of_a_long_arm_is_no_noise_and_what_cancels_is():
     at |= momenta.evaluate(at)
     program = """(record) => {
       const state = makeState(record), [version] = state.versions;
-      const values = state.evaluate(version), slopes = slopesAt(version, record.slopes, values);
+      const values = state.evaluate(version), slopes = slopesAt(version, values);
       const errors = state.errorsOf(version), bounds = errorBounds(version, slopes, values, errors);
       const sharp = sharpened(version, slopes, values, bounds, errors);
       return [state.solved, ...version.outputs.map(([, , node]) => [values[node], bounds[node], sharp[node]])];
@@ -304,14 +314,15 @@ def test_the_free_motion_takes_torques_of_zero_and_the_page_says_0():
       const state = makeState(record), version = state.versions[0];
       state.show(frame);
       const values = state.evaluate(version);
-      const noise = errorBounds(version, slopesAt(version, record.slopes, values), values);
+      const noise = errorBounds(version, slopesAt(version, values), values);
       return version.outputs.map(([, , node]) => brief(values[node], noise[node]));
     })"""
+    version = found.versions["chain_rule"]
     at = {name: value[::10] if np.ndim(value) else value for name, value in found.at.items()}
     data = record(
-        [Version(*found.versions[2])],
-        Motion(found.t[::10]),
-        state=State({n: at[n] for n in found.versions[2].graph.input_names}),
+        [version],
+        Motion(found.motion.t[::10]),
+        state=State({n: at[n] for n in version.graph.input_names}),
     )
     assert {text for row in run_script(program, data) for text in row} == {"0"}
 

@@ -20,12 +20,12 @@ import viz
 from cgraph.extend import OPS
 from tests.tolerances import EQUATIONS
 from viz import cli
-from viz.inspector.operations import operations
 from viz.lessons import lesson as module
 from viz.lessons.energy_and_step import energy_and_step
 from viz.lessons.euler_edge import euler_edge
 from viz.lessons.subject import lagrangian_graph, subject_of
 from viz.lessons.torque_parts import torque_parts
+from viz.pages.graph import graph_data
 
 VOID = {"meta", "br", "img", "link", "input", "hr"}
 
@@ -219,7 +219,7 @@ def test_a_chain_that_whips_is_watched_for_a_shorter_time():
 def v8():
     """The page's script for numbers, in a browser's engine."""
     engine = pytest.importorskip("py_mini_racer").MiniRacer()
-    engine.eval(f"{operations()}\n{module._asset('evaluate.js')}")
+    engine.eval(module.scripts())
     return engine
 
 
@@ -235,7 +235,7 @@ def test_the_page_computes_what_the_graphs_do(subject, screens, v8):
         dyn.mass_matrix(subject.system),
     ]
     for sent, graph in zip(graphs, direct, strict=False):
-        found = json.loads(v8.eval(f"JSON.stringify(evaluator({json.dumps(sent)})({json.dumps(subject.values)}))"))
+        found = json.loads(v8.eval(f"JSON.stringify(named({json.dumps(sent)})({json.dumps(subject.values)}))"))
         expected = subject.evaluate(graph)
         scale = np.abs(expected).max()
         assert np.allclose(list(found.values()), expected, rtol=EQUATIONS, atol=EQUATIONS * scale)
@@ -248,10 +248,10 @@ def test_the_page_s_pivots_and_steps_are_the_library_s(v8):
     pivots = [stages[2 - i][i][i] for i in range(3)]
     assert np.prod(pivots) == pytest.approx(np.linalg.det(matrix), rel=EQUATIONS)
     subject = subject_of(arm)
-    rate = subject.graph(dyn.state_equation(arm.system))
+    rate = graph_data(dyn.state_equation(arm.system))
     names = [f"{kind}{i}" for kind in ("q", "qd") for i in range(3)]
     rows = v8.eval(
-        f"JSON.stringify(motion(evaluator({json.dumps(rate)}), {json.dumps(subject.values)}, {names}, 0.01, 50, 'rk4'))"
+        f"JSON.stringify(motion(named({json.dumps(rate)}), {json.dumps(subject.values)}, {names}, 0.01, 50, 'rk4'))"
     )
     run = dyn.simulate(arm.system, subject.q, subject.qd, 0.5, "rk4", dt=0.01)
     assert run.stats.success

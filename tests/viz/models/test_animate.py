@@ -158,7 +158,7 @@ def test_mp4_gets_every_frame_and_ffmpeg_is_heard(monkeypatch, tmp_path):
 def test_the_right_torque_follows_and_the_flawed_one_falls_away(model):
     off = {}
     for formulation in ("chain_rule", "euler_embedded"):
-        run, wanted = scenes.driven(model, formulation, t_end=1.0)
+        run, wanted = viz.driven(model, formulation, t_end=1.0)
         assert run.stats.success
         off[formulation] = np.abs(run.q - wanted(run.t)).max()
     assert off["chain_rule"] < 1e-6 < 0.05 < off["euler_embedded"]
@@ -169,7 +169,7 @@ def test_a_wanted_motion_needs_coordinates_of_its_own():
         lambda q, qd, t: qd[0] ** 2 + qd[1] ** 2, "x y", constraints=lambda q, t: {"rod": q[0] ** 2 + q[1] ** 2 - 1.0}
     )
     with pytest.raises(ValueError, match="has constraints: a wanted motion cannot be chosen"):
-        scenes.driven(rod)
+        viz.driven(rod)
     free = dyn.Mechanism([dyn.Body("b", dyn.Joint("free"), mass=1.0, inertia=np.eye(3))])
     with pytest.raises(ValueError, match="has velocities that are not the rates of its coordinates"):
-        scenes.driven(free)
+        viz.driven(free)

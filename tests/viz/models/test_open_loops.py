@@ -7,10 +7,10 @@ import pytest
 
 import dynamics as dyn
 from dynamics.equations.consistent_state import nearest_state
-from dynamics.scenes.inspection import inspection
 from tests.dynamics.linkages import four_bar
 from viz import cli
 from viz.models.inspect import inspection_page
+from viz.models.inspection import inspection
 from viz.models.open_loops import tree_alone
 
 SCENE = """

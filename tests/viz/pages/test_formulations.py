@@ -9,10 +9,10 @@ import pytest
 import cgraph as cg
 import dynamics as dyn
 from dynamics.equations.formulation_sizes import PAPER, TORQUE, blamed
-from dynamics.scenes.inspection import inspection
 from viz import theme
 from viz.graph_drawing.legend import kinds_in, legend_svg
 from viz.graph_drawing.short_formulas import short_formulas
+from viz.models.inspection import inspection
 from viz.pages.document import Document, to_markdown
 from viz.pages.formulations import COLORS, TITLES, size_table
 
@@ -36,7 +36,7 @@ def test_lint_and_the_inspector_count_what_the_table_has(name: str) -> None:
     assert len(report.findings[0].data["nodes_for_this_alone"]) == size.spurious_nodes
     assert f"{size.spurious_nodes} nodes of {size.nodes} serve nothing else" in str(report)
     versions = inspection(scene, t_end=0.1).versions
-    shown = {each.name: (len(each.graph.nodes), len(each.marked)) for each in versions}
+    shown = {name: (len(each.graph.nodes), len(each.marked)) for name, each in versions.items()}
     assert shown == {name: (sizes[name].nodes, sizes[name].spurious_nodes) for name in PAPER}
 
 

@@ -70,7 +70,7 @@ def test_torques_are_those_of_python(show):
 
 def test_nonsense_gets_one_sentence_and_the_page_stays(show):
     page = show()
-    before = page.evaluate("inspector.record().versions[0].ops.length")
+    before = page.evaluate("inspector.record().versions[0].nodes.length")
     for text, words in (("L = m m", "Between “m” and “m”"), (HOSTILE, "not understood"), (f"L = {HOSTILE}", "“<”")):
         typed(page, text)
         sentence = page.locator("#wrong p").inner_text()
@@ -78,7 +78,7 @@ def test_nonsense_gets_one_sentence_and_the_page_stays(show):
         assert re.fullmatch(r"Line 1: [^.]+(\.|\?)", sentence)
         assert page.locator("#wrong pre").inner_text().strip() in text
         assert page.locator("#text").get_attribute("aria-invalid") == "true"
-        assert page.evaluate("inspector.record().versions[0].ops.length") == before
+        assert page.evaluate("inspector.record().versions[0].nodes.length") == before
     assert page.locator("body script:not([type]) ~ script, img").count() == 0
 
 

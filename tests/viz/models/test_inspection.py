@@ -11,10 +11,10 @@ import pytest
 import dynamics as dyn
 from cgraph import Graph
 from dynamics.multibody.joint_positions import skeleton
-from dynamics.scenes.inspection import DT, FORMULATIONS, Inspection, inspection
 from dynamics.scenes.scenes import Scene
 from tests.early_end import stops
 from tests.tolerances import EQUATIONS
+from viz.models.inspection import DT, FORMULATIONS, Inspection, inspection
 
 ARM = cache(lambda: inspection(dyn.scenes.load("triple_pendulum")))
 INTEGRATED = 1e-9  # N m: the state is one that the equations hold at, whatever the error of the motion
@@ -30,9 +30,9 @@ def values_of(found: Inspection, graph: Graph) -> dict[str, Any]:
 
 def test_the_free_motion_takes_no_torque_by_the_chain_rule_alone():
     found = ARM()
-    assert tuple(each.name for each in found.versions) == FORMULATIONS
+    assert tuple(found.versions) == FORMULATIONS
     wrong = []
-    for each in found.versions:
+    for each in found.versions.values():
         tau = np.stack(list(each.graph.evaluate(values_of(found, each.graph)).values()))
         wrong.append(np.abs(tau).max())
         assert bool(each.marked) == (wrong[-1] > INTEGRATED)
@@ -43,7 +43,7 @@ def test_the_free_motion_takes_no_torque_by_the_chain_rule_alone():
 
 def test_the_embedded_step_ends_in_the_state_of_the_others():
     found = ARM()
-    at = values_of(found, found.versions[0].graph)
+    at = values_of(found, found.versions["euler_embedded"].graph)
     for i in range(3):
         qd = at[f"qd{i}_old"] + DT * at[f"qdd{i}"]
         assert np.allclose(qd, found.at[f"qd{i}"], rtol=0, atol=EQUATIONS)
@@ -52,11 +52,14 @@ def test_the_embedded_step_ends_in_the_state_of_the_others():
 
 def test_shares_of_the_torque_add_up():
     found = ARM()
-    parts, graph = found.shares.parts, found.shares.graph
+    parts, graph = found.shares.header, found.shares.graph
     assert parts == ("link 1", "link 2", "link 3", "damping", "all")
     values = graph.evaluate(values_of(found, graph))
     shares = np.array(
-        [[np.broadcast_to(values[name], found.t.shape) for name in found.shares.row(i)] for i in range(3)]
+        [
+            [np.broadcast_to(values[name], found.motion.t.shape) for name in found.shares.rows[f"tau{i}"]]
+            for i in range(3)
+        ]
     )
     assert np.abs(shares[:, :-1].sum(axis=1) - shares[:, -1]).max() < EQUATIONS
     assert np.abs(shares[:, 3, 0]).max() < EQUATIONS  # no damping at rest
@@ -65,23 +68,23 @@ def test_shares_of_the_torque_add_up():
 
 def test_forward_dynamics_and_a_system_without_places():
     found = inspection(dyn.scenes.load("spring_mass"), forward=True, t_end=np.pi)
-    (version,) = found.versions
-    assert found.skeleton is found.shares is found.derived is None
+    (version,) = found.versions.values()
+    assert found.motion.points is found.shares is found.derived is None
     qdd = version.graph.evaluate(found.at)["qdd0"]
-    assert np.allclose(qdd, -np.cos(found.t), atol=1e-5)  # I = k = 1, let go at 1
+    assert np.allclose(qdd, -np.cos(found.motion.t), atol=1e-5)  # I = k = 1, let go at 1
 
 
 @pytest.mark.parametrize("name", ["spring_mass", "triple_pendulum"])
 def test_both_forms_are_in_one_state_of_coordinates_and_momenta(name):
     scene = dyn.scenes.load(name)
     found = inspection(scene, momentum=True, t_end=0.3)
-    hamilton, lagrange = found.versions
+    hamilton, lagrange = found.versions.values()
     n = scene.system.n
     assert {f"{kind}{i}" for kind in "qp" for i in range(n)} <= found.at.keys()
     assert [*found.derived.outputs] == [f"qd{i}" for i in range(n)]
     rates, expected = (each.graph.evaluate(values_of(found, each.graph)) for each in (hamilton, lagrange))
     for i in range(n):
-        moved = np.gradient(found.at[f"q{i}"], found.t, edge_order=2)
+        moved = np.gradient(found.at[f"q{i}"], found.motion.t, edge_order=2)
         assert np.allclose(rates[f"q{i}_dot"], expected[f"q{i}_dot"], rtol=EQUATIONS, atol=EQUATIONS)
         assert np.allclose(rates[f"q{i}_dot"], moved, atol=0.05 * np.abs(moved).max())
     rows = [*hamilton.rows]
@@ -92,7 +95,7 @@ def test_both_forms_are_in_one_state_of_coordinates_and_momenta(name):
         assert all(at[edge.source] <= at[edge.target] for edge in each.graph.edges)
     assert not hamilton.rows["bias"]
     assert not lagrange.rows["rates"]
-    assert sorted(step.coordinate for step in hamilton.steps) == sorted(3 * [*range(n)])
+    assert sorted(step.joint for step in hamilton.steps) == sorted(3 * [*range(n)])
     with pytest.raises(ValueError, match="exclude one another"):
         inspection(scene, momentum=True, forward=True)
 

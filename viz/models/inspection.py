@@ -1,24 +1,21 @@
-"""What there is to inspect in a scene: its equations as graphs, their inputs along its motion, its joints' places."""
+"""Contents of a model's page: its equations, their inputs along a motion, places of joints, shares of torques."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from types import MappingProxyType
-from typing import NamedTuple
 
 import numpy as np
 
 import cgraph as cg
-from cgraph import Edge, Graph, Node
-from cgraph.extend import PRIMAL, TANGENT, Array, real_number
-
-from ..equations.both_forms import HAMILTON, LAGRANGE, VELOCITIES_ALONE, both_forms, form_sizes
-from ..equations.equations_of_motion import forward_dynamics
-from ..equations.formulations import inverse_dynamics
-from ..equations.hamiltonian import velocities
-from ..equations.legendre import is_quadratic
-from ..equations.node_classes import (
+from cgraph import Graph, Node
+from cgraph.extend import PRIMAL, TANGENT, Array, real_number, topological
+from dynamics.equations.both_forms import HAMILTON, LAGRANGE, VELOCITIES_ALONE, both_forms, form_sizes
+from dynamics.equations.equations_of_motion import forward_dynamics
+from dynamics.equations.formulations import inverse_dynamics
+from dynamics.equations.hamiltonian import velocities
+from dynamics.equations.legendre import is_quadratic
+from dynamics.equations.node_classes import (
     ACCELERATIONS,
     BIAS,
     DAMPING,
@@ -28,17 +25,18 @@ from ..equations.node_classes import (
     VELOCITIES,
     form_classes,
 )
-from ..equations.state_equation import state_equation
-from ..equations.torque_decomposition import torque_by_link
-from ..equations.verdict import formulation_verdict
-from ..multibody.display_units import display_units
-from ..multibody.joint_positions import Skeleton, skeleton
-from ..simulation.simulate import simulate
-from ..simulation.trajectory import Trajectory
-from ..systems.display_names import display_names
-from ..systems.system import System
-from .elimination import EliminationStep, elimination
-from .scenes import Scene
+from dynamics.equations.state_equation import state_equation
+from dynamics.equations.torque_decomposition import torque_by_link
+from dynamics.equations.verdict import formulation_verdict
+from dynamics.multibody.display_units import display_units
+from dynamics.multibody.joint_positions import skeleton
+from dynamics.scenes import Scene
+from dynamics.simulation.simulate import simulate
+from dynamics.simulation.trajectory import Trajectory
+from dynamics.systems.display_names import display_names
+from dynamics.systems.system import System
+
+from ..inspector import Motion, StateTable, Step, Version
 
 FORMULATIONS = ("euler_embedded", "kinetic_only", "chain_rule")  # those of the paper, the flawed ones first
 FRAMES, RATE = 150, 30.0  # most instants shown, and how many a second
@@ -51,37 +49,9 @@ ROWS = {
 DT = 1e-3  # s, the step that the embedded formulations take
 
 
-class Equations(NamedTuple):
-    """A graph of the equations.  about: what to see.  marked: spurious nodes.  steps: of an elimination.
-
-    rows: {title: nodes} of the rows of the picture from the bottom; those of the sweeps where there are none.
-    blamed: edges by which what is spurious enters.  flawed: whether these are not the equations of the chain rule.
-    """
-
-    name: str
-    graph: Graph
-    about: str
-    marked: frozenset[Node]
-    steps: tuple[EliminationStep, ...] = ()
-    rows: Mapping[str, Collection[Node]] = MappingProxyType({})
-    blamed: frozenset[Edge] = frozenset()
-    flawed: bool = False
-
-
-class Shares(NamedTuple):
-    """Torques by partial Lagrangians.  graph: outputs tau0_part0 ..  parts: their names, then the rest and the sum."""
-
-    graph: Graph
-    parts: tuple[str, ...]
-
-    def row(self, i: int) -> list[str]:
-        """The outputs for coordinate i, one a part."""
-        return [f"tau{i}_part{k}" for k in range(len(self.parts))]
-
-
 @dataclass(frozen=True)
 class Inspection:
-    """versions: the equations.  t: (T,) [s].  skeleton: joints along the motion, None where the model has no places.
+    """versions: {name: the equations}.  motion: its instants, and joints where the model has places.
 
     at: {input: (T,) or a number}, the one state of all versions.  derived: the inputs of embedded formulations from it,
     q0_old = q0 - dt q_dot0 and qd0_old = qd0 - dt qdd0; None where there are none.
@@ -90,12 +60,11 @@ class Inspection:
     units: {name in the graphs: unit}, where they are known.
     """
 
-    versions: tuple[Equations, ...]
-    t: Array
-    skeleton: Skeleton | None
+    versions: Mapping[str, Version]
+    motion: Motion
     at: Mapping[str, float | Array]
     derived: Graph | None = None
-    shares: Shares | None = None
+    shares: StateTable | None = None
     stopped: str = ""
     units: Mapping[str, str] = field(default_factory=dict)
 
@@ -137,19 +106,18 @@ def inspection(
     if forward:
         about = "Accelerations from torques: solved joint by joint from the tip to the base, then back out to the tip."
         about += " With them come the forces that hold the constraints." if system.constraints else ""
-        versions = [
-            Equations("forward dynamics", rate, about, frozenset(), tuple(elimination(rate, display_names(scene))))
-        ]
+        steps = elimination(rate, display_names(scene))
+        versions = {"forward dynamics": Version("forward dynamics", rate, about, steps=steps)}
     else:
         found = rate.evaluate({name: state[name] for name in rate.input_names})
         qdd = np.stack([np.broadcast_to(found[f"qdd{i}"], len(run.t)) for i in range(system.n)], axis=1)
         if not np.isfinite(qdd).all():
             raise ValueError(f"{scene.name} has accelerations that are not finite: the motion {run.stats.message}")
         state |= _named(qdd=qdd)
-        versions = []
+        versions = {}
         for name in FORMULATIONS:
             say(f"{scene.name}: deriving inverse dynamics, {name.replace('_', ' ')}")
-            versions.append(_version(scene, name))
+            versions[name] = _version(scene, name)
         derived, shares = _derived(system), _shares(scene)
     stopped = "" if run.stats.success else run.stats.message
     return _along(scene, run, versions, state | {"dt": DT}, derived, shares, stopped=stopped)
@@ -158,22 +126,23 @@ def inspection(
 def _along(
     scene: Scene,
     run: Trajectory,
-    versions: Sequence[Equations],
+    versions: Mapping[str, Version],
     state: Mapping[str, float | Array],
     derived: Graph | None,
-    shares: Shares | None = None,
+    shares: StateTable | None = None,
     *,
     stopped: str,
 ) -> Inspection:
     """The versions along a motion.  state: values of all inputs that a graph may have.  stopped: why it ends early."""
     places = None if scene.mechanism is None else skeleton(scene.mechanism.bind(), run.q)
     units = {} if scene.mechanism is None else display_units(scene.mechanism.moving)
-    graphs = [each.graph for each in versions] + [each for each in (derived,) if each]
+    graphs = [each.graph for each in versions.values()] + [each for each in (derived,) if each]
     graphs += [places.graph] if places is not None else []
     inputs = {name for graph in graphs for name in graph.input_names}
     at = {name: value for name, value in state.items() if name in inputs}
     units = units | {"t": "s", "dt": "s"}
-    return Inspection(tuple(versions), run.t, places, at, derived, shares, stopped, units)
+    motion = Motion(run.t) if places is None else Motion(run.t, *places)
+    return Inspection(versions, motion, at, derived, shares, stopped, units)
 
 
 def _hamilton(scene: Scene, end: float, times: Array | None, say: Callable[[str], None]) -> Inspection:
@@ -195,11 +164,11 @@ def _hamilton(scene: Scene, end: float, times: Array | None, say: Callable[[str]
         "The same motion by accelerations: at the velocities of these momenta, torque less bias, solved. "
         f"{_operations(depth[LAGRANGE])} deep, {len(forms[LAGRANGE].nodes)} nodes."
     )
-    steps = tuple(elimination(hamilton, display_names(scene))) if is_quadratic(system) else ()
-    versions = [
-        Equations(HAMILTON, hamilton, about, frozenset(), steps, _rows(hamilton)),
-        Equations(LAGRANGE, forms[LAGRANGE], beside, frozenset(), (), _rows(forms[LAGRANGE])),
-    ]
+    steps = elimination(hamilton, display_names(scene)) if is_quadratic(system) else ()
+    versions = {
+        HAMILTON: Version(HAMILTON, hamilton, about, steps=steps, rows=_rows(hamilton)),
+        LAGRANGE: Version(LAGRANGE, forms[LAGRANGE], beside, rows=_rows(forms[LAGRANGE])),
+    }
     stopped = "" if run.stats.success else run.stats.message
     return _along(scene, run, versions, state, velocities(system), stopped=stopped)
 
@@ -228,8 +197,8 @@ def _first_order(scene: Scene, end: float, times: Array | None) -> Inspection:
     about = f"The rates of {len(scene.coordinates)} states: {len(graph.nodes)} nodes."
     at = {name: state[name] for name in graph.input_names}
     stopped = "" if run.stats.success else run.stats.message
-    version = Equations("state equation", graph, about, frozenset())
-    return Inspection((version,), run.t, None, at, stopped=stopped, units={"t": "s"})
+    versions = {"state equation": Version("state equation", graph, about)}
+    return Inspection(versions, Motion(run.t), at, stopped=stopped, units={"t": "s"})
 
 
 def _derived(system: System) -> Graph:
@@ -240,7 +209,7 @@ def _derived(system: System) -> Graph:
     return Graph([*system.q, *system.qd, *qdd, dt], old)
 
 
-def _version(scene: Scene, name: str) -> Equations:
+def _version(scene: Scene, name: str) -> Version:
     verdict = formulation_verdict(scene, name)
     wrong, edges, about = verdict.nodes, verdict.edges, verdict.summary
     if verdict.differs:
@@ -254,20 +223,86 @@ def _version(scene: Scene, name: str) -> Equations:
         about += " Nothing drives the joints here: these torques are those of the constraints alone."
     else:
         about += " Nothing drives the joints here, so the torques should be 0."
-    return Equations(name, verdict.graph, about, wrong, blamed=edges, flawed=verdict.differs)
+    return Version(name.replace("_", " "), verdict.graph, about, wrong, blamed=edges, flawed=verdict.differs)
 
 
 def _named(**tables: Array) -> dict[str, float | Array]:
     return {f"{name}{i}": table[:, i] for name, table in tables.items() for i in range(table.shape[1])}
 
 
-def _shares(scene: Scene) -> Shares | None:
+def _shares(scene: Scene) -> StateTable | None:
     """What each partial Lagrangian takes of the torques, and damping and forces where there are any; the sum of all."""
     system, mechanism = scene.system, scene.mechanism
     if len(system.partial_lagrangians) < 2 or (mechanism is not None and mechanism.base_parameters):
         return None
     table, whole = torque_by_link(system), inverse_dynamics(system)
-    columns = [[table.graph.outputs[f"tau{i}_{k}"] for i in range(system.n)] for k in range(len(table.rows))]
-    columns.append([whole.outputs[f"tau{i}"] for i in range(system.n)])
-    outputs = {f"tau{i}_part{k}": node for k, column in enumerate(columns) for i, node in enumerate(column)}
-    return Shares(Graph(whole.inputs, outputs), (*table.rows, "all"))
+    rows = {f"tau{i}": [f"tau{i}_part{k}" for k in range(len(table.rows) + 1)] for i in range(system.n)}
+    outputs = {part: table.graph.outputs[f"{tau}_{k}"] for tau, row in rows.items() for k, part in enumerate(row[:-1])}
+    graph = Graph(whole.inputs, outputs | {row[-1]: whole.outputs[tau] for tau, row in rows.items()})
+    return StateTable("Torques and forces that each part takes", graph, (*table.rows, "all"), rows)
+
+
+def elimination(graph: Graph, names: Mapping[str, str]) -> list[Step]:
+    """The steps of forward dynamics, or of Hamilton's equations where velocities are rates of coordinates.
+
+    A pivot is what an acceleration or a velocity is divided by: the inertia that its joint feels while all joints
+    further out follow freely. It is a node like others, known by what is divided by it. [] for a graph that divides by
+    no pivots.
+
+    names: {name in the graph: what a person calls it}.
+    """
+    rates = _numbered(graph, "p", "_dot")
+    kind, solved = ("velocity", _numbered(graph, "q", "_dot")) if rates else ("acceleration", _numbered(graph, "qdd"))
+    every = {node for _, node in solved.values()}
+    place = {node: i for i, node in enumerate(graph.nodes)}
+    found = {i: _pivot(node, every, place) for i, (_, node) in solved.items()}
+    pivots = {i: pivot for i, pivot in found.items() if pivot is not None}
+    if len(pivots) < len(solved) or (rates and rates.keys() != solved.keys()):
+        return []
+    joints = {i: names.get(name, name).partition(".")[2] or name for i, (name, _) in solved.items()}
+    done = {node for node in graph.nodes if not node.args}
+    steps: list[Step] = []
+
+    def add(words: str, value: Node, i: int) -> None:
+        fresh = tuple([node for node in topological([value]) if node not in done])
+        done.update(fresh)
+        steps.append(Step(words, fresh, value, i))
+
+    for i, pivot in sorted(pivots.items(), key=lambda each: (bool(each[1].args), place[each[1]], -each[0])):
+        words = f"Eliminate {joints[i]}: its pivot is the inertia that it feels while all joints further out follow."
+        add(words, pivot, i)
+    how = "nothing else is unknown at the base"
+    for i, (_, node) in sorted(solved.items(), key=lambda each: place[each[1][1]]):
+        add(f"Back out: the {kind} of {joints[i]}; {how}.", node, i)
+        how = "what moves it from below is known now"
+    for i, (_, node) in sorted(rates.items(), reverse=True):
+        add(f"All velocities are known: the rate of the momentum of {joints[i]}.", node, i)
+    return steps
+
+
+def _numbered(graph: Graph, kind: str, end: str = "") -> dict[int, tuple[str, Node]]:
+    """{number: (name, node)} of the outputs of a kind, such as q0_dot, q1_dot .."""
+    found = {}
+    for name, node in graph.outputs.items():
+        number = name.removeprefix(kind).removesuffix(end)
+        if number.isdecimal() and name == f"{kind}{number}{end}":
+            found[int(number)] = (name, node)
+    return found
+
+
+def _pivot(solved: Node, others: set[Node], place: Mapping[Node, int]) -> Node | None:
+    """The first of the divisors that are met below what is solved for, before a division or another of it.
+
+    What of the joints further in is met, too, was divided by their pivots, which come later.
+    """
+    found: list[Node] = []
+    rest, seen = [solved], {solved}
+    while rest:
+        node = rest.pop()
+        if node.op.name == "div":
+            found.append(node.args[1])
+            continue
+        below = [arg for arg in node.args if arg not in others and arg not in seen]
+        rest += below
+        seen.update(below)
+    return min(found, key=lambda node: (bool(node.args), place[node]), default=None)

@@ -1,24 +1,5 @@
-// Elements of the page and of its pictures, and numbers as texts. Texts stay texts, whatever is in them.
+// Parts of the panels, and numbers as texts.
 
-const SVG = "http://www.w3.org/2000/svg";
-
-/** An element around texts and other elements. */
-function tag(name, attributes = {}, ...inside) {
-  const made = document.createElement(name);
-  for (const key in attributes) made.setAttribute(key, attributes[key]);
-  made.append(...inside);
-  return made;
-}
-
-/** An element of a picture. */
-function element(name, attributes, parent) {
-  const made = document.createElementNS(SVG, name);
-  for (const key in attributes) made.setAttribute(key, attributes[key]);
-  if (parent) parent.appendChild(made);
-  return made;
-}
-
-const byId = (id) => document.getElementById(id);
 const quiet = (words) => tag("p", { class: "quiet" }, words);
 const rowHead = (...words) => tag("th", { scope: "row" }, ...words);
 const scrolled = (...inside) => tag("div", { class: "scroll" }, ...inside);

@@ -10,12 +10,11 @@ import numpy as np
 import cgraph as cg
 from cgraph import Node
 from cgraph.extend import Array, real_array, real_number
-
-from ..equations.formulations import inverse_dynamics
-from ..simulation.simulate import simulate
-from ..simulation.trajectory import Trajectory
-from ..systems.model import Model
-from .scenes import of_model
+from dynamics.equations.formulations import inverse_dynamics
+from dynamics.scenes import of_model
+from dynamics.simulation.simulate import simulate
+from dynamics.simulation.trajectory import Trajectory
+from dynamics.systems.model import Model
 
 SWING = 0.5  # rad, and the unit of any other coordinate: how far the wanted motion goes
 DT = 1e-3  # s, the step that the embedded formulations take
@@ -74,10 +73,11 @@ def driven(model: Model, formulation: str = "chain_rule", t_end: float | None = 
     Examples
     --------
     >>> import dynamics as dyn
+    >>> import viz
     >>> arm = dyn.planar_arm([1.0], [1.0])
     >>> errors = []
     >>> for formulation in ("chain_rule", "euler_embedded"):
-    ...     run, wanted = dyn.scenes.driven(arm, formulation, t_end=1.0)
+    ...     run, wanted = viz.driven(arm, formulation, t_end=1.0)
     ...     errors.append(float(abs(run.q - wanted(run.t)).max()))
     >>> errors[0] < 1e-6, errors[1] > 0.1
     (True, True)

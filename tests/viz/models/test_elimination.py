@@ -5,8 +5,8 @@ import pytest
 
 import dynamics as dyn
 from cgraph import Graph
-from dynamics.scenes.elimination import elimination
 from tests.tolerances import SOLVED
+from viz.models.inspection import elimination
 
 MODELS = {
     "one": dyn.planar_arm([1.0], [1.0]),
@@ -22,15 +22,15 @@ def test_a_pivot_is_the_inertia_that_is_left_when_all_joints_further_out_follow(
     graph, names = dyn.forward_dynamics(model), dyn.display_names(model)
     n = sum(output.startswith("qdd") for output in graph.outputs)
     steps = elimination(graph, names)
-    assert sorted(step.coordinate for step in steps[:n]) == sorted(step.coordinate for step in steps[n:]) == [*range(n)]
+    assert sorted(step.joint for step in steps[:n]) == sorted(step.joint for step in steps[n:]) == [*range(n)]
     at = {each: 0.3 + 0.1 * i for i, each in enumerate(graph.input_names)}
-    pivots = Graph(graph.inputs, {str(step.coordinate): step.value for step in steps[:n]}).evaluate(at)
+    pivots = Graph(graph.inputs, {str(step.joint): step.value for step in steps[:n]}).evaluate(at)
     entries = dyn.mass_matrix(model)
     values = entries.evaluate({each: at[each] for each in entries.input_names})
     mass = np.array(list(values.values())).reshape(n, n)
     gone: list[int] = []
     for step in steps[:n]:
-        i = step.coordinate
+        i = step.joint
         expected = mass[i, i] - (
             mass[i, gone] @ np.linalg.solve(mass[np.ix_(gone, gone)], mass[gone, i]) if gone else 0
         )
@@ -38,7 +38,7 @@ def test_a_pivot_is_the_inertia_that_is_left_when_all_joints_further_out_follow(
         assert f"Eliminate {names[f'qdd{i}'].partition('.')[2]}:" in step.words
         gone.append(i)
     for step in steps[n:]:
-        assert step.value is graph.outputs[f"qdd{step.coordinate}"]
+        assert step.value is graph.outputs[f"qdd{step.joint}"]
     lit = [node for step in steps for node in step.nodes]
     assert len(set(lit)) == len(lit)  # a node is new once
     assert {node for node in graph.nodes if node.args} == set(lit)
@@ -52,7 +52,7 @@ def test_the_velocities_of_momenta_have_the_same_pivots_and_the_rates_come_after
     forward, momenta = (elimination(graph, names) for graph in graphs)
     assert [step.words for step in forward[:n]] == [step.words for step in momenta[:n]]
     for step in momenta[n : 2 * n]:
-        assert step.value is graphs[1].outputs[f"q{step.coordinate}_dot"]
+        assert step.value is graphs[1].outputs[f"q{step.joint}_dot"]
     assert [step.value for step in momenta[2 * n :]] == [graphs[1].outputs[f"p{i}_dot"] for i in reversed(range(n))]
     lit = [node for step in momenta for node in step.nodes]
     assert len(set(lit)) == len(lit)

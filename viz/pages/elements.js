@@ -1,0 +1,15 @@
+// Elements of pages and of their pictures. Texts stay texts, whatever is in them.
+
+const SVG = "http://www.w3.org/2000/svg";
+function filled(made, attributes, inside) {
+  for (const key in attributes) made.setAttribute(key, attributes[key]);
+  made.append(...inside);
+  return made;
+}
+/** An element around texts and other elements. */
+const tag = (name, attributes = {}, ...inside) => filled(document.createElement(name), attributes, inside);
+/** An element of a picture. */
+const drawn = (name, attributes = {}, ...inside) => filled(document.createElementNS(SVG, name), attributes, inside);
+/** An element of a picture, the last in another. */
+const element = (name, attributes, parent) => parent.appendChild(drawn(name, attributes));
+const byId = (id) => document.getElementById(id);

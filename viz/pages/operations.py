@@ -1,0 +1,88 @@
+"""The operations of the table for scripts of pages: values as JavaScript, partials as programs, formulas as trees."""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import TYPE_CHECKING, Any
+from xml.etree import ElementTree
+
+import cgraph as cg
+from cgraph import Graph, Node
+from cgraph.extend import OPS, Op
+
+if TYPE_CHECKING:
+    from cgraph.extend import Json
+
+Part = str | int | list[Any]  # of a formula: a text, the number of an argument, [element, attributes, *parts]
+
+
+def values() -> str:
+    """The constant VALUE {operation: function}."""
+    functions = ",\n".join([f"  {op.name}: {op.javascript}" for op in OPS.values()])
+    return f"const VALUE = {{\n{functions},\n}};\n"
+
+
+def operations() -> str:
+    """The constants VALUE, ROWS {operation: its row} and FORMULA: operation -> [tree, least binding, binding].
+
+    An operation without a formula is written as a function.
+    """
+    rows = {
+        op.name: {
+            "symbol": op.symbol,
+            "arity": op.arity,
+            "commutative": op.commutative,
+            "selects": op.selects,
+            "rounding": op.rounding,
+            "singular": op.singular is not None,
+            "slopes": slopes(op),
+        }
+        for op in OPS.values()
+    }
+    table = json.dumps(rows, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+    formulas = [[op.name, [_tree(op), op.mathml.least, op.mathml.binding]] for op in OPS.values() if op.mathml]
+    tree = json.dumps(formulas, separators=(",", ":"), ensure_ascii=False)
+    return f"{values()}const ROWS = {table};\nconst FORMULA = new Map({tree});\n"
+
+
+def slopes(op: Op) -> dict[str, Json]:
+    """The partials of an operation as a small program, from its row: 0 is the output, 1.. the arguments, then `code`.
+
+    A line of code is a number, or an operation and the numbers of its arguments; `out` names one result an argument.
+    """
+    y, *args = cg.variables(["y", *[f"x{slot}" for slot in range(op.arity)]])
+    partials = [cg.constant(each) if not isinstance(each, Node) else each for each in op.partials(y, *args)]
+    graph = Graph([y, *args], {str(i): node for i, node in enumerate(partials)})
+    number = {node: i for i, node in enumerate([y, *args])}
+    code: list[Json] = []
+    for node in graph.nodes:
+        if node not in number:
+            number[node] = op.arity + 1 + len(code)
+            code.append(node.value if node.value is not None else [node.op.name, *[number[arg] for arg in node.args]])
+    return {"code": code, "out": [number[node] for node in partials]}
+
+
+def _tree(op: Op) -> Part:
+    """The formula of an operation as a tree, so that the page makes elements and reads no markup."""
+    assert op.mathml is not None
+    try:
+        root = ElementTree.fromstring(f"<mrow>{op.mathml.text}</mrow>")  # noqa: S314 (the table's own text)
+    except ElementTree.ParseError as error:
+        raise ValueError(f"the MathML of operation {op.name!r} is not well formed: {error}") from None
+    return _element(root)
+
+
+def _element(element: ElementTree.Element) -> Part:
+    """[name, attributes, *what is inside]."""
+    parts = _parts(element.text)
+    for child in element:
+        parts += [_element(child), *_parts(child.tail)]
+    return [element.tag, element.attrib, *parts]
+
+
+def _parts(text: str | None) -> list[Part]:
+    """Text and the numbers of arguments, which stand as {0}, {1}, .. in it."""
+    return [
+        int(part[1:-1]) if re.fullmatch(r"{\d}", part) else part for part in re.split(r"({\d})", text or "") if part
+    ]
