@@ -1,4 +1,4 @@
-"""The formulations of Lagrange's equation as graphs: by definition, kinetic only, and by the chain rule.
+"""The formulations of Lagrange's equation as graphs: by definition, kinetic only, by the chain rule, by velocities.
 
 Equations and figures named here are those of T. Kusaka and T. Tanaka, Robotics 2025, 14(9), 115.
 """
@@ -14,6 +14,7 @@ from cgraph.extend import TANGENT, Builder, building, cotangents, require_choice
 
 from ..systems.model import Model, as_system
 from ..systems.system import System
+from .bias_terms import bias_terms
 from .shorter_form import shorter_form
 from .substitute import substitute
 
@@ -29,7 +30,7 @@ class LagrangeTerms(NamedTuple):
     inputs: list[Node]
     q: list[Node]
     qd: list[Node]
-    momentum: list[Node]  # p = dL/dqd
+    momentum: list[Node] | None  # p = dL/dqd; None where it is not formed, but the two terms below are at fixed z
     momentum_rate: list[Node]  # d/dt dL/dqd
     gradient: list[Node]  # dL/dq; of quasi-velocities G^T dL/dq - ad(qd; p)
 
@@ -90,11 +91,27 @@ def kinetic_only_exact(system: System) -> LagrangeTerms:
     return embedding.terms(embedded, gradient, x_dot)
 
 
+def newton_euler(system: System) -> LagrangeTerms:
+    """Newton's and Euler's equations of bodies; of any Lagrangian the same, d/dt dL/dz at its velocity nodes z.
+
+    tau = (dz/dqd)^T d/dt dL/dz - dL/dq at fixed z: what d/dt dL/dqd and dL/dq have in common is never formed. Slopes
+    dz/dqd are the partial velocities of T. R. Kane and D. A. Levinson, "Dynamics: Theory and Applications" (1985); of
+    bodies the forces at z are those of J. Y. S. Luh, M. W. Walker, R. P. C. Paul, "On-line computational scheme for
+    mechanical manipulators", J. Dyn. Sys. Meas. Control 102(2), 1980.
+    """
+    free = system.without_constraints  # whose tags shared nodes would have
+    terms = bias_terms(free, system.qdd)
+    forces = cotangents(terms.inertial, system.qd, Builder())
+    return LagrangeTerms([*system.q, *system.qd, *system.qdd], system.q, system.qd, None, forces, terms.gradient)
+
+
 FORMULATIONS: dict[str, Callable[[System], LagrangeTerms]] = {
     formulation.__name__: formulation
-    for formulation in (chain_rule, chain_rule_literal, euler_embedded, kinetic_only, kinetic_only_exact)
+    for formulation in (chain_rule, chain_rule_literal, euler_embedded, kinetic_only, kinetic_only_exact, newton_euler)
 }
 """Formulations of Lagrange's equation by name, right and wrong ones: what `inverse_dynamics` takes."""
+INERTIAL = tuple([name for name in FORMULATIONS if name != newton_euler.__name__])  # those that form d/dt dL/dqd
+SMALL = (chain_rule.__name__, newton_euler.__name__)  # right ones, of which the other may be the smaller
 THROUGH_STEP: dict[str, Callable[[System], Node]] = {
     "euler_embedded": lambda system: system.lagrangian,
     "kinetic_only": lambda system: system.kinetic,
@@ -109,9 +126,10 @@ def inverse_dynamics(model: Model, formulation: str = "chain_rule", *, simplify:
     model : Model
         A system, a mechanism or a scene with n coordinates.
     formulation : str
-        "chain_rule" is right and the smallest, "chain_rule_literal" the same with every gradient written out.
-        "euler_embedded", "kinetic_only" and "kinetic_only_exact" have the Euler relation in the graph; the first two
-        are wrong, as the paper has them.
+        "chain_rule" is the paper's, "chain_rule_literal" the same with every gradient written out. "newton_euler" takes
+        the velocities in L in place of qd: the smaller graph, but of few coordinates or a plain L. "euler_embedded",
+        "kinetic_only" and "kinetic_only_exact" have the Euler relation in the graph; the first two are wrong, as the
+        paper has them.
     simplify : bool
         False leaves the graph as derived.
 
@@ -136,11 +154,11 @@ def inverse_dynamics(model: Model, formulation: str = "chain_rule", *, simplify:
     >>> dyn.inverse_dynamics(block).evaluate({"q0": 0.0, "qd0": 2.0, "qdd0": 3.0})
     {'tau0': 13.0}
     >>> list(dyn.FORMULATIONS)
-    ['chain_rule', 'chain_rule_literal', 'euler_embedded', 'kinetic_only', 'kinetic_only_exact']
+    ['chain_rule', 'chain_rule_literal', 'euler_embedded', 'kinetic_only', 'kinetic_only_exact', 'newton_euler']
     """
     system = as_system(model)
     require_choice("formulation", formulation, FORMULATIONS)
-    if require_flag("simplify", simplify) and formulation == "chain_rule":
+    if require_flag("simplify", simplify) and formulation in SMALL:
         return shorter_form(system, lambda form: cg.simplify(torques(form, formulation)))
     graph = torques(system, formulation)
     return cg.simplify(graph) if simplify else graph
@@ -171,8 +189,10 @@ def momentum_rate(
 
     Parameters
     ----------
-    model, formulation, simplify
+    model, simplify
         As for `inverse_dynamics`.
+    formulation : str
+        Any but "newton_euler", which forms no momentum.
     keep_momentum : bool
         The momenta p0.. = dL/dqd are outputs too.
 
@@ -184,7 +204,7 @@ def momentum_rate(
     Raises
     ------
     ValueError
-        For an unknown formulation.
+        For any other formulation.
     TypeError
         For what is no model, or has no Lagrangian.
 
@@ -201,8 +221,9 @@ def momentum_rate(
 
 def momenta(system: System, formulation: str, through: Node = ONE, *, keep_momentum: bool = True) -> Graph:
     """The inertial term, with or without the momenta, as derived.  through: as of `torques`."""
+    require_choice("formulation", formulation, INERTIAL)
     terms = _lagrange_terms(system, formulation, through)
-    outputs = {f"p{i}": p for i, p in enumerate(terms.momentum)} if keep_momentum else {}
+    outputs = {f"p{i}": p for i, p in enumerate(terms.momentum or ())} if keep_momentum else {}
     outputs |= {f"p{i}_dot": rate for i, rate in enumerate(terms.momentum_rate)}
     return system.graph(outputs, terms.inputs, [through] if through is not ONE else [])
 

@@ -87,19 +87,20 @@ class TreeEquations:
                     partials[0] = partials[0] - spatial.dot(self.ground.vertical, moment)
         return partials
 
-    def bias_forces(self, q: Sequence[Node], qd: Sequence[Node]) -> list[BiasForce]:
-        """The bias wrenches of all bodies, with the velocities that they work on."""
+    def bias_forces(self, q: Sequence[Node], qd: Sequence[Node], qdd: Sequence[Node]) -> list[BiasForce]:
+        """The wrenches of all bodies at these accelerations, with the velocities that they work on."""
         forces: list[BiasForce] = []
         with building(Builder()):
             accelerations = {WORLD: newton_euler.base_acceleration(self.ground)}
-            rows = zip(self.bodies, self.links, self._moved(q, qd), parts(self.bodies, q, qd), strict=True)
-            for body, link, moved, (x, u) in rows:
+            rates = [qdd[place.u] for place in places(self.bodies)]
+            rows = zip(self.bodies, self.links, self._moved(q, qd), parts(self.bodies, q, qd), rates, strict=True)
+            for body, link, moved, state, u_dot in rows:
                 joint = moving_type(body.joint.type)
                 with cg.tag(body.name):
                     acceleration = accelerations[body.name] = newton_euler.propagate_acceleration(
-                        accelerations[body.parent], moved.parent, moved.motion, link, joint, x, u
+                        accelerations[body.parent], moved.parent, moved.motion, link, joint, *state, u_dot
                     )
-                    forces += newton_euler.bias_wrench(acceleration, moved.motion, link, joint, x, u)
+                    forces += newton_euler.wrench(acceleration, moved.motion, link, joint, *state, u_dot)
         return forces
 
     def momentum_rates(self, q: Sequence[Node], qd: Sequence[Node], p: Sequence[Node]) -> list[Node] | None:
