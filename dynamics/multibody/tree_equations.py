@@ -75,7 +75,10 @@ class TreeEquations:
         """The links in as few inertial numbers as there can be, unless these would have to be computed in the graph."""
         if any([isinstance(number, Node) for link in self.links for number in link.numbers]):
             return self.links
-        return base_parameter_links(self.links, [body.joint.type for body in self.bodies], self.parents)[0]
+        base = base_parameter_links(self.links, [body.joint.type for body in self.bodies], self.parents)[0]
+        return min(
+            self.links, base, key=lambda links: sum([number != 0.0 for link in links for number in link.numbers])
+        )
 
     def partial_lagrangians(self, q: Sequence[Node], qd: Sequence[Node]) -> list[Node]:
         """One for each body, tagged with its name and energy."""
@@ -88,12 +91,12 @@ class TreeEquations:
         return partials
 
     def bias_forces(self, q: Sequence[Node], qd: Sequence[Node], qdd: Sequence[Node]) -> list[BiasForce]:
-        """The wrenches of all bodies at these accelerations, with the velocities that they work on."""
+        """The wrenches of all bodies at these accelerations, of base numbers, with the velocities that they work on."""
         forces: list[BiasForce] = []
         with building(Builder()):
             accelerations = {WORLD: newton_euler.base_acceleration(self.ground)}
             rates = [qdd[place.u] for place in places(self.bodies)]
-            rows = zip(self.bodies, self.links, self._moved(q, qd), parts(self.bodies, q, qd), rates, strict=True)
+            rows = zip(self.bodies, self._fewest, self._moved(q, qd), parts(self.bodies, q, qd), rates, strict=True)
             for body, link, moved, state, u_dot in rows:
                 joint = moving_type(body.joint.type)
                 with cg.tag(body.name):
