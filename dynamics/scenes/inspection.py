@@ -266,7 +266,7 @@ def _shares(scene: Scene) -> Shares | None:
     system, mechanism = scene.system, scene.mechanism
     if len(system.partial_lagrangians) < 2 or (mechanism is not None and mechanism.base_parameters):
         return None
-    table, whole = torque_by_link(system), inverse_dynamics(system)
+    table, whole = torque_by_link(system), inverse_dynamics(system, "chain_rule")
     columns = [[table.graph.outputs[f"tau{i}_{k}"] for i in range(system.n)] for k in range(len(table.rows))]
     columns.append([whole.outputs[f"tau{i}"] for i in range(system.n)])
     outputs = {f"tau{i}_part{k}": node for k, column in enumerate(columns) for i, node in enumerate(column)}

@@ -76,7 +76,7 @@ def test_the_fewest_edges_to_cut_are_one_for_each_joint(n):
     assert not found.ok
     assert len(found.edges) == n
     assert {(edge.target.name, edge.slot) for edge in found.edges} == {(f"q{i}", 0) for i in range(n)}
-    assert cg.lint(dyn.inverse_dynamics(arm), independent=[groups], function="L").ok
+    assert cg.lint(dyn.inverse_dynamics(arm, "chain_rule"), independent=[groups], function="L").ok
 
 
 def test_lint_takes_a_file_with_a_coordinate_that_nothing_uses(tmp_path, capsys):
@@ -153,7 +153,7 @@ def test_lint_looks_in_a_box_and_at_a_point(capsys):
 def test_why_adds_up_to_the_derivative(capsys):
     found = figures(capsys, "why", "triple_pendulum", "tau0", "q2", "--k", "1000")
     assert found["paths"] == len(found["listed"]) == 22
-    graph = dyn.inverse_dynamics(dyn.scenes.load("triple_pendulum"))
+    graph = dyn.inverse_dynamics(dyn.scenes.load("triple_pendulum"), "chain_rule")
     exact = by_complex_step(graph, "tau0", "q2", found["at"])
     assert abs(sum(path["value"] for path in found["listed"]) - exact) <= ROUNDING
     assert found["difference"] <= ROUNDING
@@ -181,7 +181,7 @@ def test_why_on_forward_dynamics(capsys):
 
 def test_the_sum_over_all_paths_of_a_long_arm():
     scene = dyn.scenes.load("chain", n=40)
-    graph = dyn.inverse_dynamics(scene)
+    graph = dyn.inverse_dynamics(scene, "chain_rule")
     at = filled(graph, scene, {})
     found = cg.why(graph, "tau0", "q2", at=at, k=1)
     assert found.count > 100_000
