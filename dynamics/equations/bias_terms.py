@@ -35,7 +35,7 @@ class BiasTerms(NamedTuple):
 
 
 def bias_terms(system: System, qdd: Sequence[Node] | None = None) -> BiasTerms:
-    """As the system states its forces (`System.bias_forces`), or else derived from its Lagrangian.  qdd: 0 if None."""
+    """As the system states its forces (`System.bias_forces`), or else derived from its Lagrangian.  qdd: see there."""
     stated = system.bias_forces(qdd)
     if stated is None:
         return bias_terms_of_lagrangian(system, qdd)

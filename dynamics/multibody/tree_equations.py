@@ -26,6 +26,7 @@ from .joints import AxialJoint, moving_type
 from .link_cache import Moved
 from .mechanism_fields import Structure
 from .momentum_columns import momentum_derivatives
+from .spatial import ZERO
 
 
 class TreeEquations:
@@ -90,13 +91,17 @@ class TreeEquations:
                     partials[0] = partials[0] - spatial.dot(self.ground.vertical, moment)
         return partials
 
-    def bias_forces(self, q: Sequence[Node], qd: Sequence[Node], qdd: Sequence[Node]) -> list[BiasForce]:
-        """The wrenches of all bodies at these accelerations, of base numbers, with the velocities that they work on."""
+    def bias_forces(self, q: Sequence[Node], qd: Sequence[Node], qdd: Sequence[Node] | None) -> list[BiasForce]:
+        """The wrenches of all bodies at these accelerations, with the velocities that they work on.
+
+        Of base numbers; for forward dynamics (None) of what the bodies are, which of a chain of 100 keeps a digit more.
+        """
+        links = self.links if qdd is None else self._fewest
         forces: list[BiasForce] = []
         with building(Builder()):
             accelerations = {WORLD: newton_euler.base_acceleration(self.ground)}
-            rates = [qdd[place.u] for place in places(self.bodies)]
-            rows = zip(self.bodies, self._fewest, self._moved(q, qd), parts(self.bodies, q, qd), rates, strict=True)
+            rates = [(qdd or [ZERO] * len(qd))[place.u] for place in places(self.bodies)]
+            rows = zip(self.bodies, links, self._moved(q, qd), parts(self.bodies, q, qd), rates, strict=True)
             for body, link, moved, state, u_dot in rows:
                 joint = moving_type(body.joint.type)
                 with cg.tag(body.name):

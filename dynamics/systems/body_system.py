@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 from cgraph import Node
 from cgraph.extend import Builder
 
-from .kinematics import ZERO
 from .momentum_derivatives import MomentumDerivatives
 from .system import BiasForce, System
 from .torque_derivatives import MotionState, TorqueDerivatives
@@ -19,8 +18,8 @@ from .torque_derivatives import MotionState, TorqueDerivatives
 class BodyEquations(Protocol):
     """What bodies know of their equations; see the methods of `System` of the same names, also for None."""
 
-    def bias_forces(self, q: Sequence[Node], qd: Sequence[Node], qdd: Sequence[Node]) -> Sequence[BiasForce]:
-        """The pairs (velocity, force) of a motion; of the bias at accelerations 0."""
+    def bias_forces(self, q: Sequence[Node], qd: Sequence[Node], qdd: Sequence[Node] | None) -> Sequence[BiasForce]:
+        """The pairs (velocity, force) of a motion; see `System.bias_forces` for None."""
 
     def momentum_rates(self, q: Sequence[Node], qd: Sequence[Node], p: Sequence[Node]) -> list[Node] | None:
         """Rates of the momenta p of velocities qd."""
@@ -69,7 +68,7 @@ class BodySystem(System):
 
     def bias_forces(self, qdd: Sequence[Node] | None = None) -> Sequence[BiasForce]:
         """The pairs (velocity, force) that the bodies state; see `System.bias_forces`."""
-        return self._equations.bias_forces(self.q, self.qd, [ZERO] * self.n if qdd is None else qdd)
+        return self._equations.bias_forces(self.q, self.qd, qdd)
 
     def momentum_rates(self, p: Sequence[Node]) -> list[Node] | None:
         """By composite momentum; see `System.momentum_rates`."""

@@ -271,6 +271,8 @@ class System:
     def bias_forces(self, qdd: Sequence[Node] | None = None) -> Sequence[BiasForce] | None:
         """Forces f at velocities z, nodes of L, with sum of f dz/dqd = d/dt dL/dqd - dL/dq: the bias, where qdd is 0.
 
+        qdd: None is 0, too, and asks for the forces as elimination takes them, each at the body that it is of.
+
         None where nobody knows better than to derive it from L, as here.
         """
         return None
