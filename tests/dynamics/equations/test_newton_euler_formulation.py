@@ -10,10 +10,19 @@ from pytest import mark
 
 import cgraph as cg
 import dynamics as dyn
+from cgraph import structure_hash
+from dynamics.equations.formulations import SMALL
 from dynamics.experiments.trust.random_lagrangians import LAGRANGIANS, random_setting
 from dynamics.multibody.joints import COMPOSITIONS, TYPES
-from dynamics.multibody.mechanism import WORLD, Mechanism
-from tests.dynamics.mechanisms import TREES as MODELS, random_body, random_joint, random_mechanism, random_state
+from dynamics.multibody.mechanism import WORLD, Body, Joint, Mechanism
+from tests.dynamics.mechanisms import (
+    TREES as MODELS,
+    random_body,
+    random_joint,
+    random_mechanism,
+    random_state,
+    turned_arm,
+)
 from tests.dynamics.units import Units, in_units
 from tests.high_precision import evaluate, rounding_size
 from tests.slow import slow
@@ -79,6 +88,23 @@ def test_torques_of_a_random_lagrangian_are_those_of_the_chain_rule(number: int)
     values = [graph.evaluate({name: at[name] for name in graph.input_names}) for graph in (by_velocities, right)]
     for name, size in rounding_size(right, at).items():
         assert abs(values[0][name] - values[1][name]) <= SAME * max(size, abs(values[1][name]))
+
+
+def test_without_a_name_the_smaller_graph_is_taken() -> None:
+    hinge, seven = dyn.planar_arm([1.3], [0.7], damping=0.1), turned_arm(7)
+    sizes = {name: [len(dyn.inverse_dynamics(model, name).nodes) for model in (hinge, seven)] for name in SMALL}
+    assert [len(dyn.inverse_dynamics(model).nodes) for model in (hinge, seven)] == [
+        min(counts) for counts in zip(*sizes.values(), strict=True)
+    ]
+    assert sizes["newton_euler"][1] < 0.6 * sizes["chain_rule"][1]
+    screw = Body("screw", Joint("screw", (1.0, 0.0, 0.0), pitch=0.2), mass=2.0, inertia=(0.1, 0.2, 0.3))
+    slides = [Body(f"slide {i}", Joint("prismatic", np.eye(3)[i % 3]), f"slide {i - 1}" if i else WORLD, mass=1.0 + i)
+              for i in range(12)]  # fmt: skip
+    for model in (Mechanism([screw]), Mechanism(slides)):
+        least = len(dyn.inverse_dynamics(model, "chain_rule").nodes)
+        assert len(dyn.inverse_dynamics(model).nodes) == least < len(dyn.inverse_dynamics(model, "newton_euler").nodes)
+        raw = [dyn.inverse_dynamics(model, *name, simplify=False) for name in ((), ("chain_rule",))]
+        assert structure_hash(raw[0]) == structure_hash(raw[1])
 
 
 def plain_arm(n: int) -> dyn.System:
