@@ -14,6 +14,7 @@ from .compile_time import compile_time
 from .ensembles import ensembles
 from .long_chains import long_chains
 from .node_counts import node_counts
+from .operation_counts import operation_counts
 from .reconfiguration import reconfiguration
 
 
@@ -27,6 +28,9 @@ class BenchFigure(NamedTuple):
 
 FIGURES = {
     "counts": BenchFigure("nodes of forward dynamics, and what leaving out one idea adds", node_counts, ("links",)),
+    "operations": BenchFigure(
+        "products and sums of robots' equations beside published ones", operation_counts, ("links",)
+    ),
     "build": BenchFigure("time to build the graph of forward dynamics", build_time, ("links", "repeats")),
     "compile": BenchFigure("time to compile chains, and derivatives of them", compile_time, ("links",)),
     "agreement": BenchFigure("largest differences from MuJoCo and Pinocchio", agreement, ("links", "count")),
