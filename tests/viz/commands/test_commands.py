@@ -215,6 +215,18 @@ def test_compare_has_totals_that_add_up_and_a_class_for_every_node(capsys):
     assert "spurious" not in text
 
 
+def test_compare_says_what_the_chain_rule_carries_that_velocities_do_not(capsys):
+    arguments = ("compare", "triple_pendulum", "--formulations", "chain_rule", "newton_euler")
+    text = said(capsys, *arguments, status=1)
+    assert text.startswith("left: chain_rule, 171 nodes = ")
+    assert "right: newton_euler, 97 nodes = " in text
+    left, right = text.split("Only right:")
+    for link in ("link 2", "link 3"):
+        assert f"{link}: rate of a slope, of d/dt dL/dqd, which dL/dq cancels in part" in left
+    assert "rate of a slope" not in right
+    assert "link 1: position, velocity, acceleration, force on a body" in right
+
+
 ATWOOD = """import dynamics as dyn
 atwood = dyn.System(lambda q, qd, t, p: p["m"] * qd[0] ** 2 + p["w"] * q[0], ["x"], {"m": 1.5, "w": 9.81})
 ball = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 - 9.81 * q[0], ["y"])
