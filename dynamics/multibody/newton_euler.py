@@ -44,8 +44,13 @@ def base_acceleration(ground: Motion) -> Acceleration:
     """Base acceleration: gravity enters as an upward acceleration, as in RNEA."""
     vertical = spatial.scaled(ground.strength, ground.vertical)
     falls = any([each.value != 0.0 for each in vertical])
-    still = (STILL, STILL, STILL)
-    return Acceleration(STILL, vertical, still, still, (KINETIC, POTENTIAL) if falls else (KINETIC,))
+    return acceleration_in_space(STILL, STILL, vertical, (KINETIC, POTENTIAL) if falls else (KINETIC,))
+
+
+def acceleration_in_space(omega: Triple, angular: Triple, linear: Triple, tags: tuple[str, ...]) -> Acceleration:
+    """That of a body with angular velocity omega that does not move in a plane, in its axes."""
+    tensor = _tensor(omega, angular)
+    return Acceleration(angular, linear, tensor, tensor, tags)
 
 
 def propagate_acceleration(
