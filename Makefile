@@ -23,10 +23,11 @@ paper: $(INSTALLED)viz,mujoco  ## the paper's figures and tables, into OUT=paper
 test: $(INSTALLED)test  ## the tests, on WORKERS=2 processes; ARGS="-k name" or a path narrows them
 	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal $(ARGS)
 
-check: $(INSTALLED)test,check  ## lint, format and types
+check: $(INSTALLED)test,check  ## lint, format, types and the direction of imports
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	$(BIN)/lint-imports
 
 coverage: $(INSTALLED)test  ## the lines that no test runs: the total, and the WORST=15 files with most of them
 	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal -q --timeout 600 --cov --cov-report= $(ARGS)

@@ -24,13 +24,13 @@ label may have. `certain_digits` says what rounding leaves of the outputs.
 
 **Run**: a `Program` is graphs over registers of numbers (`Call`, `Map`, `Sum`, `Factor`, `Solve`, `If`, `While`), and
 `runner` makes it machine code or Python. `program_jvp` and `program_vjp` are its derivatives, `many` is what memories
-side by side run, and `register_statement` adds a kind of statement.
+side by side run, and `register_statement` adds a kind of statement. `copied` and `added` are the plainest ones.
 
 **At the edges**: `real_array`, `real_number`, `is_finite`, `check_name`, `require_graph`, `require_flag`,
 `require_whole`, `require_choice`, `require_sequence`, `require_mapping` and `require_path` check what a caller passed,
 `thread_count` reads `threads=`, `share` gives work to threads, `atomic_write` writes a file whole or not at all,
 `write_files` several, and `check_writable` looks beforehand; `counted` is a number with its noun; `html_table`,
-`html_text`, `html_lines` and `picture` are what a notebook shows of a result; `install` ends an error about a missing
+`html_lines` and `picture` are what a notebook shows of a result; `install` ends an error about a missing
 package, `scipy_integrate` gives SciPy's module or raises it. `memo` and `kept_by_first` make a
 function keep its results. `Array` is the type of an array of float64, `Json` of what JSON can hold.
 
@@ -78,11 +78,11 @@ if TYPE_CHECKING:
     from .program.runners.choose_runner import runner
     from .program.runners.runner import Record, Runner
     from .program.statement import STATEMENTS, Statement, StatementRow, register_statement, require_length
-    from .program.statements.call import Call, Map, Sum
+    from .program.statements.call import Call, Map, Sum, added, copied
     from .program.statements.control import FixedPoint, If, While
     from .program.statements.matrix import Factor, Solve
     from .program.statements.memory import Pop, Push, Take
-    from .simplification.identities import rewritten, shortened
+    from .simplification.identities import shortened
     from .simplification.polynomial import Polynomial, expand, format_polynomial
     from .simplification.reciprocals import with_reciprocals
     from .util.atomic_write import atomic_write, check_writable, write_files
@@ -90,7 +90,7 @@ if TYPE_CHECKING:
     from .util.counted import counted
     from .util.doors import doors
     from .util.extras import install
-    from .util.html_text import html_lines, html_table, html_text, picture
+    from .util.html_text import html_lines, html_table, picture
     from .util.json_type import Json
     from .util.nearest import nearest, or_nearest
     from .util.real_arrays import is_finite, real_array, real_number
@@ -150,6 +150,7 @@ __all__ = [
     "Take",
     "Tape",
     "While",
+    "added",
     "as_node",
     "atomic_write",
     "building",
@@ -158,6 +159,7 @@ __all__ = [
     "check_writable",
     "columns",
     "compressed_jacobian",
+    "copied",
     "cotangents",
     "counted",
     "doors",
@@ -167,7 +169,6 @@ __all__ = [
     "hessian_nodes",
     "html_lines",
     "html_table",
-    "html_text",
     "install",
     "is_finite",
     "jets",
@@ -194,7 +195,6 @@ __all__ = [
     "require_sequence",
     "require_texts",
     "require_whole",
-    "rewritten",
     "run_passes",
     "runner",
     "scipy_integrate",

@@ -13,11 +13,8 @@ from pathlib import Path
 import pytest
 
 import viz
-from viz.architecture.architecture import Architecture, of_modules
-from viz.architecture.import_rule import PACKAGES
-from viz.architecture.imports import Module, modules
+from tests.sources import PACKAGES, ROOT, Source, sources as read_sources
 
-ROOT = Path(__file__).parents[1]
 PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 
 # Each is imported in one file, so that its absence is handled in one place; for types alone it may be named in others.
@@ -35,6 +32,7 @@ OPTIONAL = {
     "scipy": "scipy",
     "flint": "python-flint",
     "mpmath": "mpmath",
+    "shtab": "shtab",
     "pinocchio": "pin",
     "casadi": "casadi",
     "heyoka": "heyoka",
@@ -43,8 +41,6 @@ OPTIONAL = {
     "torch": None,  # measured when it is there, never asked for
 }
 
-ROOMS, FLOORS = 16, 9  # at most, of the whole library
-LOOSE = {"cgraph": 3, "dynamics": 2, "viz": 3}  # modules beside __init__, at most
 FILE, CLASS, FUNCTION = 350, 200, 60  # lines at most; of a class and of a function without docstrings
 LONGER: dict[str, str] = {}  # {file, or file::name: why it may be longer}
 MODELS = {"Model", "System", "OdeSystem", "Mechanism", "PlanarArm", "Scene"}  # nobody asks which of them it has
@@ -52,33 +48,16 @@ MUJOCO = ("dynamics/io/mujoco_twin.py",)  # its models are MuJoCo's, without typ
 
 
 @pytest.fixture(scope="module")
-def known() -> dict[str, Module]:
-    """{dotted name: module} of all three packages."""
-    found = modules(PACKAGES)
+def sources() -> dict[str, Source]:
+    """{file: its source} of all three packages."""
+    found = read_sources()
     assert len(found) > 200
     return found
 
 
-@pytest.fixture(scope="module")
-def sources(known: dict[str, Module]) -> dict[str, Module]:
-    """{file: module}."""
-    return {module.path.relative_to(ROOT).as_posix(): module for module in known.values()}
-
-
-@pytest.fixture(scope="module")
-def walked(sources: dict[str, Module]) -> dict[str, list[ast.AST]]:
-    """{file: all nodes of its tree}."""
-    return {file: list(ast.walk(module.tree)) for file, module in sources.items()}
-
-
-@pytest.fixture(scope="module")
-def library(known: dict[str, Module]) -> Architecture:
-    return of_modules(known, PACKAGES)
-
-
-def roots(module: Module, for_types: bool = True) -> set[str]:
-    """Top-level packages that a module imports."""
-    return {each.module.partition(".")[0] for each in module.imports if for_types or not each.for_types}
+def roots(source: Source, for_types: bool = True) -> set[str]:
+    """Top-level packages that a file imports."""
+    return {name.partition(".")[0] for name in source.imports(for_types)}
 
 
 def docstrings(nodes: Iterable[ast.AST]) -> Iterator[tuple[str, int, int]]:
@@ -93,50 +72,32 @@ def length(node: ast.FunctionDef | ast.ClassDef) -> int:
     return node.end_lineno - node.lineno + 1 - sum(lines for _, _, lines in docstrings(ast.walk(node)))
 
 
-def test_imports_point_one_way(library: Architecture) -> None:
-    """As the table of layers in viz/architecture/import_rule.py has it."""
-    assert [f"{a} imports {b}" for a, b in library.climbing] == []
-
-
-def test_nothing_imports_itself_in_a_circle(library: Architecture) -> None:
-    assert library.circles == ()
-    assert library.file_circles == ()
-
-
-def test_the_library_has_few_rooms_on_few_floors(library: Architecture) -> None:
-    assert len(library.rooms) <= ROOMS
-    assert max(library.floors.values()) <= FLOORS
-    assert {package: names for package, names in library.loose.items() if len(names) > LOOSE[package]} == {}
-
-
-def test_every_import_is_known(sources: dict[str, Module]) -> None:
+def test_every_import_is_known(sources: dict[str, Source]) -> None:
     known = {*sys.stdlib_module_names, "numpy", *PACKAGES, *OPTIONAL}
     assert {file: unknown for file, module in sources.items() if (unknown := roots(module) - known)} == {}
 
 
-def test_an_optional_dependency_is_imported_in_one_file(sources: dict[str, Module]) -> None:
+def test_an_optional_dependency_is_imported_in_one_file(sources: dict[str, Source]) -> None:
     users = {name: [file for file, module in sources.items() if name in roots(module, False)] for name in OPTIONAL}
     assert {name: files for name, files in users.items() if len(files) > 1} == {}
 
 
-def test_the_core_is_imported_through_its_two_faces(sources: dict[str, Module]) -> None:
+def test_the_core_is_imported_through_its_two_faces(sources: dict[str, Source]) -> None:
     deeper = [
-        f"{file}: {each.module}"
-        for file, module in sources.items()
-        for each in module.imports
-        if each.module.startswith("cgraph.") and not file.startswith("cgraph/") and each.module != "cgraph.extend"
+        f"{file}: {name}"
+        for file, source in sources.items()
+        for name in source.imports()
+        if name.startswith("cgraph.") and not file.startswith("cgraph/") and name != "cgraph.extend"
     ]
     assert deeper == []
 
 
-def test_the_core_is_small_and_imports_numpy_and_the_standard_library_alone(sources: dict[str, Module]) -> None:
+def test_the_core_is_small_and_imports_numpy_and_the_standard_library_alone(sources: dict[str, Source]) -> None:
     core = {file: module for file, module in sources.items() if file.startswith("cgraph/core/")}
-    texts = {file: module.path.read_text(encoding="utf-8").splitlines() for file, module in core.items()}
+    texts = {file: module.text.splitlines() for file, module in core.items()}
     code = 0
     for file, lines in texts.items():
-        told = {
-            line for _, start, count in docstrings(ast.walk(core[file].tree)) for line in range(start, start + count)
-        }
+        told = {line for _, start, count in docstrings(core[file].nodes) for line in range(start, start + count)}
         code += sum(
             [
                 number not in told and bool(line.strip()) and not line.strip().startswith("#")
@@ -163,7 +124,7 @@ def test_the_core_loads_nothing_else_of_ours(tmp_path: Path) -> None:
     }
 
 
-def test_no_public_function_takes_a_model_of_any_type(sources: dict[str, Module]) -> None:
+def test_no_public_function_takes_a_model_of_any_type(sources: dict[str, Source]) -> None:
     found = [
         f"{file}:{node.lineno} {node.name}"
         for file, module in sources.items()
@@ -178,25 +139,25 @@ def test_no_public_function_takes_a_model_of_any_type(sources: dict[str, Module]
     assert found == []
 
 
-def test_nobody_asks_which_kind_of_model_it_has(walked: dict[str, list[ast.AST]]) -> None:
+def test_nobody_asks_which_kind_of_model_it_has(sources: dict[str, Source]) -> None:
     found = [
         f"{file}:{node.lineno} {ast.unparse(node)}"
-        for file, nodes in walked.items()
+        for file, source in sources.items()
         if not file.startswith("cgraph/")
-        for node in nodes
+        for node in source.nodes
         if isinstance(node, ast.Call) and ast.unparse(node.func) == "isinstance"
         if MODELS & {name.id for name in ast.walk(node.args[1]) if isinstance(name, ast.Name)}
     ]
     assert found == []
 
 
-def test_nothing_is_too_long(sources: dict[str, Module], walked: dict[str, list[ast.AST]]) -> None:
+def test_nothing_is_too_long(sources: dict[str, Source]) -> None:
     found = {}
     for file, module in sources.items():
-        lines = len(module.path.read_text(encoding="utf-8").splitlines())
+        lines = len(module.text.splitlines())
         if lines > FILE:
             found[file] = lines
-        for node in walked[file]:
+        for node in module.nodes:
             if isinstance(node, ast.FunctionDef | ast.ClassDef):
                 limit = CLASS if isinstance(node, ast.ClassDef) else FUNCTION
                 if node.end_lineno - node.lineno >= limit and length(node) > limit:
@@ -212,13 +173,13 @@ def simulates(node: ast.AST) -> bool:
     )
 
 
-def test_no_run_is_used_without_a_look_at_how_it_ended(walked: dict[str, list[ast.AST]]) -> None:
+def test_no_run_is_used_without_a_look_at_how_it_ended(sources: dict[str, Source]) -> None:
     """Who calls a simulation reads its `stats`, or hands the result on as it is."""
     found = []
-    for file, nodes in walked.items():
-        if file.startswith("dynamics/simulation/") or not any([simulates(node) for node in nodes]):
+    for file, source in sources.items():
+        if file.startswith("dynamics/simulation/") or not any([simulates(node) for node in source.nodes]):
             continue
-        for function in nodes:
+        for function in source.nodes:
             if not isinstance(function, ast.FunctionDef):
                 continue
             within = list(ast.walk(function))
@@ -230,12 +191,12 @@ def test_no_run_is_used_without_a_look_at_how_it_ended(walked: dict[str, list[as
     assert found == []
 
 
-def test_a_docstring_says_more_than_where_to_look(walked: dict[str, list[ast.AST]]) -> None:
+def test_a_docstring_says_more_than_where_to_look(sources: dict[str, Source]) -> None:
     pointer = re.compile(r"(See|As in|Like) `*[\w.]+`*\.?")
     found = [
         f"{file}:{line} {text}"
-        for file, nodes in walked.items()
-        for text, line, _ in docstrings(nodes)
+        for file, source in sources.items()
+        for text, line, _ in docstrings(source.nodes)
         if pointer.fullmatch(text)
     ]
     assert found == []
@@ -272,7 +233,7 @@ def test_drawing_knows_nothing_of_mechanics(tmp_path: Path) -> None:
 
 
 def test_a_command_loads_no_optional_dependency_that_it_does_not_use(tmp_path: Path) -> None:
-    commands = ["scenes", "draw --help", "report --help", "architecture viz", "--help", "draw chain --out a.dot"]
+    commands = ["scenes", "draw --help", "report --help", "--help", "draw chain --out a.dot"]
     program = (
         "import viz.cli\n"
         "def main(command):\n"

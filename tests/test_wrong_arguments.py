@@ -348,6 +348,8 @@ CALLS |= {
     ),
     "extend.register_statement": call(registered_statement, extend.STATEMENTS[extend.Call]),
     "extend.Factor": call(a_program_of(extend.Factor), "x", "y"),
+    "extend.added": call(a_program_of(extend.added), "x", "y", "z"),
+    "extend.copied": call(a_program_of(extend.copied), "x", "y"),
     "extend.Formulas": call(extend.Formulas, GRAPH.nodes, GRAPH.outputs, PLAIN, called=None),
     "extend.If": call(a_program_of(extend.If), "x", (HALF,), (HALF,)),
     "extend.Map": call(a_program_of(extend.Map), GRAPH, ("x",), ("y",), ("z",)),
@@ -378,7 +380,6 @@ CALLS |= {
     "extend.hessian_nodes": call(extend.hessian_nodes, X * Y, [X, Y], None),
     "extend.html_lines": call(extend.html_lines, "text"),
     "extend.html_table": call(extend.html_table, ["a"], [["b"]], title="t", texts=1),
-    "extend.html_text": call(extend.html_text, "text"),
     "extend.install": call(extend.install, "viz"),
     "extend.is_finite": call(extend.is_finite, 1.0),
     "extend.ldl_elimination": call(extend.ldl_elimination, [[4.0], [2.0, 2.0]], [10.0, 6.0]),
@@ -398,7 +399,6 @@ CALLS |= {
     "extend.require_sequence": call(lambda value: extend.require_sequence("value", value, "texts", str), ["a"]),
     "extend.require_texts": call(lambda value: extend.require_texts("value", value), {"a": "b"}),
     "extend.require_whole": call(lambda value, least: extend.require_whole("value", value, least), 3, 0),
-    "extend.rewritten": call(extend.rewritten, [X * Y], None),
     "extend.runner": call(extend.runner, PROGRAM, "python", fast=False, fma=True),
     "extend.scipy_integrate": call(extend.scipy_integrate, "what"),
     "extend.share": call(extend.share, abs, range(3), 2),
@@ -470,7 +470,7 @@ RECORDS = """
 LEFT_OUT = """cg.recording_lines cg.clear_cache cg.clear_caches cg.Compiled.bind cg.Compiled.values cg.Graph.check
     cg.Graph.counts cg.Graph.listing cg.Graph.only_output cg.Graph.to_networkx dyn.System.bias_forces
     dyn.System.require_values dyn.System.momentum_rates
-    dyn.System.momentum_derivatives dyn.System.torque_derivatives
+    dyn.System.torque_derivatives
     dyn.JointForce.along dyn.JointForce.check dyn.JointLimit.along dyn.JointLimit.check dyn.JointFriction.along
     dyn.JointFriction.check dyn.Actuator.along dyn.Actuator.check
     extend.Array extend.columns extend.doors extend.Order extend.Polynomial extend.Builder extend.Runner

@@ -20,7 +20,7 @@ from typing import NamedTuple
 from ..core.builder import Builder
 from ..core.node import Node, as_node, variable
 from .dissection import Piece, dissect
-from .elimination_order import Step
+from .elimination_order import Step, nodes_of
 from .schur_elimination import ONE, EdgePushing
 from .symmetric_elimination import PivotRow
 from .symmetric_matrix import ZERO, SymmetricMatrix
@@ -203,8 +203,3 @@ def written_rows(equations: EdgePushing, plan: Sequence[Step]) -> list[set[Node]
         rows.append(matrix.written)
         matrix.written = set()
     return rows
-
-
-def nodes_of(step: Step) -> list[Node]:
-    """The nodes of a step."""
-    return [node for r in step for node in (r.first, r.second)] if isinstance(step, list) else [step]

@@ -76,3 +76,8 @@ def elimination_steps(
             for arg in arguments[finished]:
                 pass_to(arg)
     return result
+
+
+def nodes_of(step: Step) -> list[Node]:
+    """The nodes of a step."""
+    return [node for r in step for node in (r.first, r.second)] if isinstance(step, list) else [step]

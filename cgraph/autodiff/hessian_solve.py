@@ -13,11 +13,9 @@ from ..core.node import Node, Scalar, as_node
 from ..core.reverse import cotangents
 from ..core.scope import building
 from ..core.traversal import topological
-from ..simplification.balanced_sums import balanced
 from ..util.explain_failure import explain_failure
 from ..util.require import require_choice, require_flag, require_graph, require_sequence
-from .balanced_elimination import BalancedElimination, nodes_of, written_rows
-from .elimination_order import Step, elimination_steps
+from .elimination_order import Step, elimination_steps, nodes_of
 from .schur_elimination import EdgePushing
 
 Order = Literal["recursive", "balanced"]
@@ -163,6 +161,8 @@ def solve_nodes(
     equations = _solved(output, wrt, rhs, build, at or {}, multipliers, order)
     x = [equations.dots[node] for node in wrt]
     if order == "balanced":
+        from ..simplification.balanced_sums import balanced
+
         x = balanced(x, build)
     if check:
         with building(build) as set_label:
@@ -180,25 +180,10 @@ def solve_tangents(
     *,
     order: Order = "recursive",
 ) -> dict[Node, Node]:
-    """Tangents (dz/dw) x of the nodes z that f is made from, for the x of `solve_nodes`, which has them anyway.
+    """Tangents {z: (dz/dw) x} of the nodes z that f is made from, for the x of `solve_nodes`, which has them anyway.
 
-    Parameters
-    ----------
-    output, wrt, rhs, build, order
-        As of `solve_nodes`.
+    At w it is x itself; a product within a rotation may be left out. Arguments and errors are those of `solve_nodes`.
 
-    Returns
-    -------
-    dict of Node to Node
-        {z: (dz/dw) x}, x itself at w. A product within a rotation may be left out.
-
-    Raises
-    ------
-    SingularError
-        As `solve_nodes`.
-
-    Examples
-    --------
     >>> import cgraph as cg
     >>> from cgraph.extend import solve_tangents
     >>> v, tau = cg.variables("v tau")
@@ -228,6 +213,8 @@ def _solved(
         passed = equations.arguments(_rows(output, multipliers, wrt))
         plan = elimination_steps(passed, equations.rotations)
     if order == "balanced":
+        from .balanced_elimination import BalancedElimination, written_rows
+
         if multipliers:
             raise ValueError('order "balanced" needs a function without multipliers')
         fewest = elimination_steps(passed, equations.rotations, fewest=True)

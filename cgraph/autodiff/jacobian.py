@@ -108,24 +108,10 @@ def _distinct(by_name: list[str], by_place: list[str]) -> list[str]:
 
 @explain_failure
 def hessian_nodes(output: Node, wrt: Sequence[Node], build: Builder | None = None) -> list[list[Node]]:
-    """The lower triangle of the Hessian d2y/dx2, as nodes: forward mode over reverse mode.
+    """The lower triangle of the Hessian d2y/dx2, row i with i + 1 nodes: forward mode over reverse mode.
 
-    Parameters
-    ----------
-    output : Node
-        y.
-    wrt : sequence of Node
-        The variables x.
-    build : Builder, optional
-        What the nodes are built by; by default a new one.
+    wrt: the variables x.  build: what the nodes are built by; by default a new one.
 
-    Returns
-    -------
-    list of lists of Node
-        Row i has i + 1 entries.
-
-    Examples
-    --------
     >>> import cgraph as cg
     >>> from cgraph.extend import hessian_nodes
     >>> x, y = cg.variables("x y")

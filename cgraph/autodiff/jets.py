@@ -7,8 +7,9 @@ same for all k > 0, the rest, from those sums, which run over many nodes at once
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import AbstractContextManager
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from ..core.builder import Builder
 from ..core.checks import check_name
@@ -62,6 +63,9 @@ class Jets(NamedTuple):
     pieces: tuple[Node, ...]
 
 
+ROUNDS = 100  # of partials of partials; those of the table come back to what is there after 2
+
+
 class NoSeriesError(ValueError):
     """An operation without a Taylor series in the equations."""
 
@@ -87,7 +91,8 @@ def jets(rate: Graph, time: str = "t", *, exact: bool = False) -> Jets:
     Raises
     ------
     NoSeriesError
-        For an operation that jumps; unless `exact`, for a piecewise one, too.
+        For an operation that jumps, or whose partials of partials never come back to what is there; unless `exact`, for
+        a piecewise one, too.
     TypeError
         For what is no graph.
     ValueError
@@ -110,11 +115,14 @@ def jets(rate: Graph, time: str = "t", *, exact: bool = False) -> Jets:
     return _Jets(rate, check_name("the time", time), require_flag("exact", exact)).graphs()
 
 
+_ENDLESS = "{op} has no Taylor series: its partials need partials of new nodes, and those again, {rounds} times over"
+
+
 class _Shared:
     """Builds nodes as they are written, shared; what is folded of one argument alone, as -(-x), rounds nothing."""
 
     def __init__(self, graph: Graph) -> None:
-        self._made: dict[tuple[Any, ...], Node] = {}
+        self._made: dict[tuple[str | int, ...], Node] = {}
         for node in graph.nodes:
             if node.args:
                 self._made.setdefault(self._key(node.op, node.args), node)
@@ -127,7 +135,7 @@ class _Shared:
             self._made[key] = Node(op, args, label)
         return self._made[key]
 
-    def _key(self, op: Row, args: tuple[Node, ...]) -> tuple[Any, ...]:
+    def _key(self, op: Row, args: tuple[Node, ...]) -> tuple[str | int, ...]:
         return (op.name, *[repr(arg.value) if arg.op is CONSTANT else id(arg) for arg in args])
 
 
@@ -136,7 +144,7 @@ class _Jets:
 
     def __init__(self, rate: Graph, time: str, exact: bool) -> None:
         self.rate, self.exact, m = rate, exact, len(rate.outputs)
-        self.build: Any = _Shared(rate) if exact else Builder()
+        self.build = _Shared(rate) if exact else Builder()
         self.before = variables([f"rate{i}" for i in range(m)])
         self.unit, self.k = variables(["unit", "order"])
         self.of: dict[Node, Node | None] = {}  # {node: its coefficient k, None where it is constant}
@@ -144,6 +152,8 @@ class _Jets:
         self.sums: dict[tuple[Node, Node, str], Node] = {}  # {(a, b, kind): the sum of (j) a_j b_k-j}
         self.sides: dict[Node, Node] = {}  # {piecewise node: the variable that holds its side}
         self.switches: list[Node] = []  # what decides them
+        self.rounds: dict[Node, int] = {}  # {partial: how many operations were differentiated one after another for it}
+        self.round = 0
         with self._building():
             self.states = [before * (self.unit / self.k) for before in self.before]
             for k, node in enumerate(rate.inputs):
@@ -153,9 +163,13 @@ class _Jets:
                 self.of[node] = moving
             self.waiting = list(rate.outputs.values())
             while self.waiting:
-                self.at(self.waiting.pop())
+                node = self.waiting.pop()
+                self.round = self.rounds.get(node, 0)
+                if self.round > ROUNDS:
+                    raise NoSeriesError(_ENDLESS.format(op=node.op.name, rounds=ROUNDS))
+                self.at(node)
 
-    def _building(self) -> AbstractContextManager[Any]:
+    def _building(self) -> AbstractContextManager[Callable[[Label], None]]:
         return building(self.build)
 
     def graphs(self) -> Jets:
@@ -199,6 +213,7 @@ class _Jets:
         for node in (a, b):
             if node not in self.of:
                 self.waiting.append(node)
+                self.rounds.setdefault(node, self.round + 1)
         if kind != "weighted" and (b, a, kind) in self.sums:
             a, b = b, a
         return self.sums.setdefault((a, b, kind), variable(f"sum{len(self.sums)}"))

@@ -22,30 +22,10 @@ def ldl_solve(
     pivots are articulated inertias. Structural zeros cost nothing. A row whose pivot is the constant zero waits, and
     leaves with another if it has to, so that an indefinite A is solved with, too; other pivots are not looked at.
 
-    Parameters
-    ----------
-    lower : n sequences of Node
-        The lower triangle of A by rows: row i has at least i + 1 entries.
-    rhs : sequence of Node, n of them
-        The right-hand side.
-    build : Builder, optional
-        What the nodes are built by; by default a new one.
-    check : bool
-        Append one more node: 0 where all pivots are positive, else 1 + the index of the first one eliminated that is
-        not.
+    lower: the lower triangle of A by rows: row i has at least i + 1 entries.  check: append one more node: 0 where all
+    pivots are positive, else 1 + the index of the first one eliminated that is not.
+    Raises SingularError if a row has only zeros left, or with `check` a pivot is a constant that is not positive.
 
-    Returns
-    -------
-    list of Node
-        x, n nodes; with `check`, n + 1.
-
-    Raises
-    ------
-    SingularError
-        If a row has only zeros left, or with `check` a pivot is a constant that is not positive.
-
-    Examples
-    --------
     >>> import cgraph as cg
     >>> from cgraph.extend import as_node, ldl_solve
     >>> ldl_solve([[as_node(4.0)], [as_node(2.0), as_node(2.0)]], [as_node(10.0), as_node(6.0)])
@@ -78,28 +58,14 @@ def _require_triangle(lower: Sequence[Sequence[object]], rhs: Sequence[object]) 
 
 @explain_failure
 def ldl_elimination(lower: Sequence[Sequence[Any]], rhs: Sequence[object]) -> tuple[list[Any], list[Any]]:
-    """The solution x of A x = rhs and the pivots of A, over any numbers with + - * /.
+    """The solution x of A x = rhs and the pivots of A, the diagonal of D, over any numbers with + - * /.
 
     For i = n - 1 .. 0:  g_ij = A_ij / A_ii,  A_jk -= g_ij A_ik,  b_j -= g_ij b_i  (j, k < i);
     for i = 0 .. n - 1:  x_i = b_i / A_ii - sum_j g_ij x_j.
 
-    Parameters
-    ----------
-    lower : n sequences of numbers
-        The lower triangle of the symmetric A by rows: row i has at least i + 1 entries. Arrays, symbols and other
-        types with arithmetic count as numbers.
-    rhs : sequence of n numbers
-        The right-hand side.
+    lower: the lower triangle of the symmetric A by rows: row i has at least i + 1 entries. Arrays, symbols and other
+    types with arithmetic count as numbers.
 
-    Returns
-    -------
-    x : list of n numbers
-        The solution.
-    pivots : list of n numbers
-        The diagonal of D.
-
-    Examples
-    --------
     >>> from cgraph.extend import ldl_elimination
     >>> ldl_elimination([[4.0], [2.0, 2.0]], [10.0, 6.0])
     ([2.0, 1.0], [2.0, 2.0])

@@ -15,16 +15,19 @@ and a variable w, once all nodes that use it have left, by Gaussian elimination.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 from ..core.builder import Builder
-from ..core.forward import ReachedNodes
-from ..core.node import Node, as_node
+from ..core.forward import ReachedNodes, tangents
+from ..core.node import Node, as_node, variable
+from ..core.row import Row
+from ..core.scope import building
+from ..core.traversal import topological
+from ..util.caches import OPERATIONS, memo
 from .elimination_order import Step
 from .rotation_pairs import Rotation, rotations
-from .second_order import second_partials
 from .symmetric_elimination import SymmetricElimination
 from .symmetric_matrix import ZERO
-from .variable_sums import variable_sums
 
 ONE = as_node(1.0)
 
@@ -43,7 +46,7 @@ class EdgePushing(SymmetricElimination):
         self.order = order
         self.depends = set(order)
         self.position = {node: i for i, node in enumerate(rhs)}
-        self.sums = variable_sums(order, self.position)
+        self.sums = _variable_sums(order, self.position)
         in_sums = {node: self.position[terms.variable] for node, terms in self.sums.items()}
         super().__init__(dict(rhs), self.position | in_sums)
         self.bars: dict[Node, Node] = {output: ONE}  # adjoints
@@ -74,8 +77,8 @@ class EdgePushing(SymmetricElimination):
                 result[node] = list(dict.fromkeys([firsts.get(arg, arg) for arg in args if arg in self.depends]))
         leaves_at = {terms.variable: node for node, terms in self.sums.items()}
         for multiplier, variables in rows.items():
-            for variable in variables:
-                result[leaves_at.get(variable, variable)].append(leaves_at.get(multiplier, multiplier))
+            for w in variables:
+                result[leaves_at.get(w, w)].append(leaves_at.get(multiplier, multiplier))
         return result
 
     def unknown(self, node: Node) -> Node:
@@ -224,7 +227,7 @@ class EdgePushing(SymmetricElimination):
 
     def add_local_hessian(self, node: Node, bar: Node) -> None:
         """W_kj += zbar d2z/(da_k da_j); an argument in two slots gets both mixed terms."""
-        for j, k, second in second_partials(node, self.build):
+        for j, k, second in _second_partials(node, self.build):
             a, b = node.args[j], node.args[k]
             if a in self.depends and b in self.depends:
                 term = self.product(node, bar, second)
@@ -236,3 +239,78 @@ def _total(terms: list[Node]) -> Node:
     for term in terms[1:]:
         total = total + term
     return total
+
+
+class _VariableSum(NamedTuple):
+    """The terms of z = p variable + p_other other, where z can be eliminated in place of the variable; p is 1 or -1."""
+
+    variable: Node
+    other: Node
+    p: float
+    p_other: float
+
+
+def _variable_sums(order: Sequence[Node], position: Mapping[Node, int]) -> dict[Node, _VariableSum]:
+    """The sums and differences with the only use of a variable; where both terms are such, the later variable's.
+
+    order: nodes, arguments first.  position: {variable: its place among all}.
+    """
+    uses: dict[Node, int] = {}
+    for node in order:
+        for arg in node.args:
+            uses[arg] = uses.get(arg, 0) + 1
+    sums = {}
+    for node in order:
+        if node.op.name in ("add", "sub"):
+            signs = (1.0, 1.0 if node.op.name == "add" else -1.0)
+            free = [k for k, arg in enumerate(node.args) if arg in position and uses[arg] == 1]
+            if free:
+                k = max(free, key=lambda k: position[node.args[k]])
+                sums[node] = _VariableSum(node.args[k], node.args[1 - k], signs[k], signs[1 - k])
+    return sums
+
+
+class _Second(NamedTuple):
+    """d2y / da_j da_k of an operation y(a), over placeholders: its nodes, arguments first, the result last."""
+
+    j: int
+    k: int
+    nodes: list[Node]
+
+
+def _second_partials(node: Node, build: Builder) -> list[tuple[int, int, Node]]:
+    """(j, k, d2y / da_j da_k) for y = node and its arguments a, j >= k, where it is not zero; nodes made by `build`.
+
+    Arguments count as independent, also where one node stands in two slots.
+    """
+    output, arguments, seconds = _seconds_of(node.op)
+    result = []
+    for j, k, nodes in seconds:
+        new = dict(zip(arguments, node.args, strict=True))
+        new[output] = node
+        for placeholder in nodes:  # put the operation's arguments in place of a, its output in place of y
+            if placeholder not in new:
+                args = tuple([new[arg] for arg in placeholder.args])
+                new[placeholder] = build(placeholder.op, args, node.label) if args else placeholder
+        if new[nodes[-1]].value != 0.0:
+            result.append((j, k, new[nodes[-1]]))
+    return result
+
+
+@memo(OPERATIONS)
+def _seconds_of(op: Row) -> tuple[Node, list[Node], list[_Second]]:
+    """Placeholders for the output y and the arguments a of an operation, and its second partials over them."""
+    output = variable("output#")
+    arguments = [variable(f"argument{i}#") for i in range(op.arity)]
+    build = Builder()
+    with building(build):
+        first = [as_node(partial) for partial in op.partials(output, *arguments)]
+    one = as_node(1.0)
+    # d2y/da_j da_k is the tangent of the partial dy/da_k in direction a_j; y itself moves by dy/da_j.
+    seconds = []
+    for j in range(op.arity):
+        for k in range(j + 1):
+            dots = tangents({arguments[j]: one, output: first[j]}, first, build)
+            if first[k] in dots:
+                seconds.append(_Second(j, k, topological([dots[first[k]]])))
+    return output, arguments, seconds

@@ -10,11 +10,11 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from ..util.caches import memo
-from ..util.extras import install
-from .disk_cache import Cache
 
 if TYPE_CHECKING:
     from llvmlite.binding import ExecutionEngine, TargetMachine
+
+    from .disk_cache import Cache
 
 LEVEL = 2  # of the code generator's optimization; the text has no redundancy for passes over it to find
 # Nodes; beyond, level 0: a quarter of the time to compile, code that takes a third longer, or a tenth where it waits
@@ -118,6 +118,8 @@ def host() -> Host:
     try:
         from llvmlite import __version__, binding
     except ImportError:
+        from ..util.extras import install
+
         raise ImportError(f"machine code needs llvmlite: {install('native')}") from None
     return _host(binding, __version__)
 

@@ -8,8 +8,7 @@ from typing import NamedTuple
 from ..core.graph import Graph
 from ..core.node import CONSTANT, Node
 from ..operations.operation import OPS, columns
-from .arithmetic import REGISTERS, Arithmetic, words_of
-from .constants import Constants
+from .arithmetic import REGISTERS, Arithmetic, bits, words_of
 from .parts import Parts, Step
 from .schedule import Joined, Merged, joined_calls, products_of, schedule
 from .vector_math import helpers
@@ -128,7 +127,7 @@ def instructions(graph: Graph, arithmetic: Arithmetic, address: Address, name: s
     uniform: so many inputs, the first, are single numbers in memory, the same for all lanes.
     """
     t, words = arithmetic.type, words_of(arithmetic)
-    constants = Constants(graph, arithmetic, name)
+    constants = _Constants(graph, arithmetic, name)
     rows = {node: row for row, node in enumerate(graph.inputs)}
 
     def leaf(node: Node, r: str) -> tuple[str, list[str]]:
@@ -165,6 +164,50 @@ def instructions(graph: Graph, arithmetic: Arithmetic, address: Address, name: s
             r, lines = leaf(node, f"%leaf{outputs[node][0]}")
             written[-1] += [*lines, *store(node, r)]
     return Code(written, constants.start(), parts.places, constants.definitions())
+
+
+class _Constants:
+    """A table of a graph's constants behind the code of a function, each once, read by way of its address.
+
+    As an operand, a constant would need its own address, ten bytes where instructions have five to nine; the processor
+    waits for the code of a long graph.
+
+    name: of the function.
+    """
+
+    def __init__(self, graph: Graph, arithmetic: Arithmetic, name: str) -> None:
+        self._arithmetic, self._name = arithmetic, name
+        inside = {node.args[1] for node in graph.nodes if node.op is OPS["div"]}  # LLVM divides by 2 with a product
+        self._rows: dict[Node, int] = {}
+        for node in graph.nodes:
+            if node.op is CONSTANT and node.value and node not in inside:
+                self._rows[node] = len(self._rows)
+
+    def definitions(self) -> list[str]:
+        """The table, and its address in a variable: LLVM would put the address of each row into the instructions."""
+        if not self._rows:
+            return []
+        numbers = ", ".join([f"double {bits(node.value or 0.0)}" for node in self._rows])
+        return [
+            f"@{self._name}.numbers = internal constant [{len(self._rows)} x double] [{numbers}], align 64",
+            f"@{self._name}.constants = internal global ptr @{self._name}.numbers",
+        ]
+
+    def start(self) -> list[str]:
+        """What stands at the start of a function that reads constants."""
+        return [] if not self._rows else [f"  %constants = load ptr, ptr @{self._name}.constants, align 8"]
+
+    def read(self, node: Node, name: str) -> tuple[str, list[str]]:
+        """The name of a constant's value, and the lines that bring it there."""
+        if node not in self._rows:
+            assert node.value is not None
+            return self._arithmetic.number(node.value), []
+        one = name if self._arithmetic.lanes == 1 else f"{name}.one"
+        lines = [
+            f"  {name}.at = getelementptr double, ptr %constants, i64 {self._rows[node]}",
+            f"  {one} = load double, ptr {name}.at, align 8, !invariant.load !{{}}",
+        ]
+        return name, lines + (self._arithmetic.splat(name, one) if self._arithmetic.lanes > 1 else [])
 
 
 def _step(

@@ -15,7 +15,7 @@ class Builder:
     """Builds nodes folded and shared: the same operation on the same arguments is made once.
 
     Merging unites labels, and keeps the first name. Only nodes that this builder made are merged, so that no other
-    node changes. A node without tags, such as a sum at a variable, takes those of its arguments.
+    node changes. A node without tags, such as the sum of cotangents at a variable, takes those of its arguments.
 
     >>> import cgraph as cg
     >>> from cgraph.extend import Builder, building
@@ -31,18 +31,18 @@ class Builder:
     def __call__(self, op: Row, args: tuple[Node, ...], label: Label, name: str | None = None) -> Node:
         """The node of this operation on these arguments; a name is kept by a node made here for the first time."""
         for arg in args:
-            if arg.op is not CONSTANT:
+            if arg.op is not CONSTANT:  # a rule may fold an operation on nodes that are not all constants
                 if op.fold is not None and (node := op.fold(*args)) is not None:
                     return node  # type: ignore[no-any-return]
                 break
         else:
             value = op.scalar(*[arg.value for arg in args])
-            if value == value:
+            if value == value:  # no constant is NaN: the operation then stays
                 return constant(value)
-        # One order for both a*b and b*a: a constant first, else as first met.
+        # a * b and b * a are one node, with a constant first, else in the order of the one that was made first.
         if op.commutative and args[1].op is CONSTANT and args[0].op is not CONSTANT:
             args = args[::-1]
-        key: tuple[str | int, ...]  # no objects, which the garbage collector would follow
+        key: tuple[str | int, ...]  # of identities: the garbage collector would follow nodes
         if len(args) == 2:
             first, second = id(args[0]), id(args[1])
             key = (op.name, second, first) if op.commutative and first > second else (op.name, first, second)
@@ -65,7 +65,7 @@ class Builder:
 def folded(nodes: Collection[Node], build: Builder, replace: Mapping[Node, Node] | None = None) -> list[Node]:
     """Copies of nodes, and of all that they reach, made by a builder; replace: {node: what stands in its place}.
 
-    Once is enough: a rule sees the very arguments that the copy keeps, so a copy of the copy would come out alike.
+    One pass is enough: the rules see arguments that are folded already, so a second pass would change nothing.
 
     >>> import cgraph as cg
     >>> from cgraph.extend import Builder, folded

@@ -56,15 +56,15 @@ class ReachedNodes:
     """The flags of nodes that one sweep, forward or reverse, reaches through operations that select.
 
     A selecting operation such as `where` has the partial 0 in an argument that it leaves out. Beyond it, whichever way
-    the sweep goes, the tangent or cotangent is 0 and must stay so, though partials there may be infinite or NaN. A zero
-    of any other origin is no such zero: times infinity it is NaN, as it should be.
+    the sweep goes, the tangent or cotangent is 0 and must stay 0, though partials there may be infinite or NaN. Any
+    other 0 times infinity is NaN, as in IEEE arithmetic.
 
     seeds: {seed: its value}, if a zero of it means the same, which matters where an operation has a singular slope;
     else {seed: None}.
     """
 
     def __init__(self, seeds: Mapping[Node, Node | None]) -> None:
-        # {node: what is not 0 where the sweep reaches it; None: it always does}
+        # {node: the node that is not 0 where the sweep reaches it; None: the sweep reaches it everywhere}
         self._flags: dict[Node, Node | None] = dict(seeds)
         self._behind_selection: set[Node] = set()
 
@@ -74,7 +74,7 @@ class ReachedNodes:
             return apply(ROWS["zero_safe_mul"], a, b)
         flag = self._flags.get(source)
         may_be_infinite = op.singular is not None or source in self._behind_selection
-        # A finite constant is a slope that takes 0 to 0, or a cotangent that is nowhere 0.
+        # With a finite constant no flag is needed: a constant slope takes 0 to 0, a constant cotangent is nowhere 0.
         if flag is None or not may_be_infinite or any([x.value is not None and math.isfinite(x.value) for x in (a, b)]):
             return a * b
         return apply(ROWS["where"], flag, a * b, 0.0)

@@ -17,8 +17,8 @@ class Interned(Generic[Key, Value]):
 
     def __init__(self) -> None:
         self._table: WeakValueDictionary[Key, Value] = WeakValueDictionary()
-        self._lock = threading.RLock()  # the garbage collector may run, and ask for an object, inside
-        self.get = self._table.get  # the object of a key, or None: the fast way to what is there
+        self._lock = threading.RLock()  # reentrant: the garbage collector may run inside, and ask for an object
+        self.get = self._table.get  # the object of a key, or None; without the lock
 
     def get_or_make(self, key: Key, make: Callable[[], Value]) -> Value:
         """The object of a key, made if there is none; two threads that ask at once get the same."""
@@ -29,7 +29,7 @@ class Interned(Generic[Key, Value]):
             return value
 
 
-PART = 16  # members that a set of its own may have; a larger one is a chain of parts of at least this size
+PART = 16  # members from which on a part is no longer copied: what is added becomes the next part of a chain
 
 
 class SharedSet:
@@ -69,7 +69,7 @@ class SharedSet:
         if not left:
             return self
         if len(self.part) >= PART:
-            return SharedSet(frozenset(list(left)), self)  # anew: a difference keeps the memory of all it came from
+            return SharedSet(frozenset(list(left)), self)  # copied: a difference keeps memory for all of them
         return SharedSet(self.part | left, self.base)
 
     def _parts(self) -> Iterator[frozenset[Any]]:
@@ -129,7 +129,7 @@ class Label:
         return _label(self._tags.add(tags), self.roles, self._lines)
 
     def at(self, line: SourceLine) -> Label:
-        """This label with a line more."""
+        """This label with one more line."""
         return _label(self._tags, self.roles, self._lines.add(frozenset({line})))
 
     def with_tags_of(self, other: Label) -> Label:

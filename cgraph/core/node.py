@@ -195,7 +195,7 @@ class Node:
         return method_of(self, name)
 
 
-# Past Node.__setattr__, in half the time of object.__setattr__.
+# The setters of the fields, which Node.__setattr__ does not stop; in half the time of object.__setattr__.
 _set_args, _set_label, _set_name, _set_op, _set_value = [vars(Node)[field].__set__ for field in Node.__slots__[1:]]
 Scalar = Node | float
 _constants: Interned[tuple[float, float], Node] = Interned()
@@ -291,7 +291,7 @@ def apply(op: Row, *args: Scalar) -> Node:
     """A new node of this operation, built as the current scope says."""
     if len(args) != op.arity:
         raise TypeError(f"{op.name} takes {op.arity} argument(s), got {len(args)}")
-    return _built(op, tuple([each if isinstance(each, Node) else constant(each) for each in args]))
+    return _built(op, tuple([arg if isinstance(arg, Node) else constant(arg) for arg in args]))
 
 
 def _built(op: Row, args: tuple[Node, ...]) -> Node:
@@ -309,8 +309,8 @@ def _binary(name: str, a: Scalar, b: Scalar) -> Node:
         a = constant(a)
     if isinstance(a, Node) and isinstance(b, Node):
         return _built(ROWS[name], (a, b))
-    for each in (a, b):
-        if not isinstance(each, (Node, numbers.Real, np.ndarray)):
+    for operand in (a, b):
+        if not isinstance(operand, (Node, numbers.Real, np.ndarray)):
             return NotImplemented  # type: ignore[no-any-return]  # Python then asks the other operand, or raises
     from ..operations.arrays import elementwise
 

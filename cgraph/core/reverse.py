@@ -26,7 +26,8 @@ def cotangents(
     seeds: {y: y_bar}.  wrt: leaves or inner nodes; one may depend on another: the cotangent of an inner node counts
     every use of it, and goes on to its arguments.  build: what makes the nodes.
     fixed: inner nodes that count as independent: nothing goes on to their arguments.
-    through: {inner node: factor} of its cotangent before it goes on to its arguments, which marks all that comes of it.
+    through: {inner node: factor}; its cotangent is multiplied by the factor before it goes on to the arguments, so that
+    what depends on the factor has come this way.
     zero_wins: a seed that is zero counts for nothing, also where a slope is infinite or NaN; else the result is NaN.
 
     >>> import cgraph as cg
@@ -42,17 +43,17 @@ def cotangents(
             active.add(node)
     bars = dict(seeds)
     reached = ReachedNodes(seeds if zero_wins else dict.fromkeys(seeds))
-    # A cotangent that is a constant carries no tags: what is made of it at an argument takes them from the use itself.
-    bare: dict[Node, Label] = {}
+    # A constant carries no tags. What is made of a constant cotangent takes those of the uses that it came from.
+    uses: dict[Node, Label] = {}  # {node with a constant cotangent: label with the tags of its uses}
     with building(build or Builder()) as labelled:
         for node in reversed(order):
             bar = bars.get(node)
             if bar is None or node not in active or not node.args or node in fixed:
                 continue
-            labelled(_label(node, bare))
+            labelled(_label(node, uses))
             if through and node in through:
                 bar = bar * through[node]
-            terms: dict[Node, Node] = {}  # by argument first, so that x * x gives 2 * (bar * x)
+            terms: dict[Node, Node] = {}  # of one use, summed by argument first: x * x gives 2 * (bar * x)
             for arg, partial in zip(node.args, map(as_node, node.op.partials(node, *node.args)), strict=True):
                 if arg in active:
                     term = reached.product(node.op, node, bar, partial)
@@ -63,9 +64,9 @@ def cotangents(
                 if term.value == 0.0:
                     continue
                 if term.value is not None:
-                    bare[arg] = bare.get(arg, UNLABELLED).with_tags_of(node.label)
-                if arg in bars:  # the sum over all uses of arg is about arg, not about this use
-                    labelled(_label(arg, bare))
+                    uses[arg] = uses.get(arg, UNLABELLED).with_tags_of(node.label)
+                if arg in bars:  # the sum over all uses of arg has the label of arg, not of this use
+                    labelled(_label(arg, uses))
                     bars[arg] = bars[arg] + term
                 else:
                     bars[arg] = term
@@ -73,6 +74,6 @@ def cotangents(
     return [bars.get(node, zero) for node in wrt]
 
 
-def _label(node: Node, bare: Mapping[Node, Label]) -> Label:
+def _label(node: Node, uses: Mapping[Node, Label]) -> Label:
     label = node.label.derived(ADJOINT)
-    return label.with_tags_of(bare[node]) if node in bare else label
+    return label.with_tags_of(uses[node]) if node in uses else label

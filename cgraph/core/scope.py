@@ -11,7 +11,7 @@ from typing import Any
 from .checks import check_name
 from .label import WRITTEN, Label
 
-# (operation, arguments, label) -> node. Nodes are built by what this module holds, so it cannot name their types.
+# (operation, arguments, label) -> node. `node.py` imports this module, which so cannot name the types.
 Build = Callable[[Any, tuple[Any, ...], Label], Any]
 
 
@@ -71,9 +71,9 @@ def tag(*tags: str) -> Iterator[None]:
 def building(build: Build) -> Iterator[Callable[[Label], None]]:
     """Send every node made inside the `with` block through `build`, in general a `Builder`.
 
-    It gives a function that sets the label of the nodes to come: setting a field of this block's scope costs a tenth of
-    setting a context variable. The garbage collector is off inside the block: what is built is kept, so its searches
-    through a growing graph would free nothing, and take as long as all the rest.
+    It gives a function that sets the label of the nodes to come, in a tenth of the time of another `with` block. The
+    garbage collector is off inside the block: what is built is kept, so its searches through a growing graph would free
+    nothing, and take as long as all the rest.
 
     >>> import cgraph as cg
     >>> from cgraph.extend import Builder, building
@@ -95,7 +95,7 @@ def building(build: Build) -> Iterator[Callable[[Label], None]]:
 
 @contextmanager
 def without_collection() -> Iterator[None]:
-    """Within, many small objects that stay are made without walks over all of them, which free nothing."""
+    """The garbage collector is off inside the `with` block: its walks over many new objects would free none of them."""
     collecting = gc.isenabled()
     gc.disable()
     try:

@@ -20,8 +20,8 @@ def topological(outputs: Iterable[Node]) -> list[Node]:
     [<node variable x>, <node sin>, <node 1.0>, <node add>]
     """
     order: list[Node] = []
-    closed: set[Node] = set()
-    waiting: set[Node] = set()  # for an argument that is not closed
+    closed: set[Node] = set()  # what is in `order`
+    waiting: set[Node] = set()  # on the stack, for an argument that is not closed yet
     for output in outputs:
         if output in closed:
             continue

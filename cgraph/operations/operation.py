@@ -225,20 +225,8 @@ _LEAVES = {row.name: Op(row.name, 0, row.scalar, row.array, row.partials) for ro
 
 
 def columns(row: Row) -> Op:
-    """All columns of a node's operation; those of a leaf are empty.
+    """All columns of a node's operation, its `op`; those of a leaf are empty.
 
-    Parameters
-    ----------
-    row : Row
-        The `op` of a node.
-
-    Returns
-    -------
-    Op
-        Its row of the table.
-
-    Examples
-    --------
     >>> import cgraph as cg
     >>> from cgraph.extend import columns
     >>> columns(cg.sin(cg.variable("x")).op).c

@@ -2,11 +2,18 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import replace
 
-from .masks import Masked
+from ..core.graph import Graph
+from ..operations.table import where
+from ..writing.naming import variables
 from .program import Program
-from .statement import row_of
+from .statement import Statement, reads_and_writes, row_of
+from .statements.call import Call, Map, copied
+from .statements.control import FixedPoint, If, While
+from .statements.memory import Push
 
 
 def many(program: Program) -> Program:
@@ -52,3 +59,92 @@ def many(program: Program) -> Program:
     masked = Masked(lengths, own=own)
     masked.run(program.body)
     return replace(program, registers=lengths, body=tuple(masked.statements))
+
+
+class Masked:
+    """Statements that change the lanes of a mask alone, when what they write is put back in the others.
+
+    Attributes
+    ----------
+    lengths : dict of str to int
+        Of all registers; grows.
+    mask : tuple of str
+        The register of the mask, of length 1: 1 in its lanes, else 0; none: all lanes.
+    statements : list of Statement
+        What has been added.
+    written : dict of str to None
+        Registers to be put back.
+    """
+
+    def __init__(self, lengths: dict[str, int], mask: Sequence[str] = (), depth: int = 0, own: str = ":") -> None:
+        self.lengths, self.mask, self._depth, self._own = lengths, tuple(mask), depth, own
+        self.statements: list[Statement] = []
+        self.written: dict[str, None] = {}
+
+    def run(self, statements: Sequence[Statement]) -> None:
+        """Statements, one after another."""
+        for statement in statements:
+            rule = row_of(statement).masked
+            if rule is None:
+                self.add(statement)
+                self.written |= dict.fromkeys(reads_and_writes(statement)[1])
+            else:
+                rule(statement, self)
+
+    def add(self, *statements: Statement) -> None:
+        """Statements which change nothing of the program's in other lanes."""
+        self.statements += statements
+
+    def body(self, statements: Sequence[Statement], mask: str) -> tuple[Statement, ...]:
+        """Statements in the lanes of a mask: what they write is kept before, and put back in the others."""
+        inner = Masked(self.lengths, (mask,), self._depth + 1, self._own)
+        inner.run(statements)
+        before = {name: inner.register(f"{name} before", self.lengths[name]) for name in inner.written}
+        keep = [copied(name, kept) for name, kept in before.items()]
+        choose = [Map(_CHOSEN, (mask, name, kept), (name,)) for name, kept in before.items()]
+        return (*keep, *inner.statements, *choose)
+
+    def register(self, name: str, length: int = 1) -> str:
+        """A register for a body at this depth, which others at this depth share."""
+        own = f"{name}{self._own}{self._depth}"
+        self.lengths.setdefault(own, length)
+        return own
+
+
+def masked_if(statement: If, masked: Masked) -> None:
+    """Either way in its lanes."""
+    on, off = masked.register("on"), masked.register("off")
+    graph = _WAYS_IN_MASK if masked.mask else _WAYS
+    masked.add(Call(graph, (statement.register, *masked.mask), (on, off)))
+    for way, body in ((on, statement.body), (off, statement.otherwise)):
+        if body:
+            masked.add(If(way, masked.body(body, way)))
+
+
+def masked_while(statement: While | FixedPoint, masked: Masked) -> None:
+    """Turns in the lanes that still go on."""
+    going = masked.register("going")
+    graph = _GOING_IN_MASK if masked.mask else _GOING
+    masked.add(Call(graph, (statement.register, *masked.mask), (going,)))
+    turn = masked.body(statement.body, going)
+    masked.add(While(going, (*turn, Call(_GOING_IN_MASK, (statement.register, going), (going,)))))
+
+
+def masked_push(push: Push, masked: Masked) -> None:
+    """In other lanes the count is infinite meanwhile, so that nothing is put on the stack."""
+    if not masked.mask:
+        masked.add(push)
+        return
+    count = masked.register("count")
+    masked.add(Map(_COUNT, (*masked.mask, push.count), (count,)), replace(push, count=count))
+    masked.add(Map(_CHOSEN, (*masked.mask, count, push.count), (push.count,)))
+
+
+_C, _MASK, _NEW, _OLD = variables("c mask new old")
+_ON = _C > 0.0  # where NaN is not
+_CHOSEN = Graph([_MASK, _NEW, _OLD], {"chosen": where(_MASK, _NEW, _OLD)})
+_COUNT = Graph([_MASK, _OLD], {"count": where(_MASK, _OLD, math.inf)})
+_GOING = Graph([_C], {"going": _ON})
+_GOING_IN_MASK = Graph([_C, _MASK], {"going": where(_ON, _MASK, 0.0)})
+_WAYS = Graph([_C], {"on": _ON, "off": where(_ON, 0.0, 1.0)})
+_WAYS_IN_MASK = Graph([_C, _MASK], {"on": where(_ON, _MASK, 0.0), "off": where(_ON, 0.0, _MASK)})

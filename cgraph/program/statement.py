@@ -1,4 +1,4 @@
-"""Statement: what a program does at a time; and the table of the kinds of statements, a row each."""
+"""Statement: what a program does at a time; the table of the kinds of statements, a row each; what runs them."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 from ..core.checks import GraphError
+from ..core.evaluation import Array
+from ..core.graph import Graph
 
 Lengths = Mapping[str, int]  # of registers, by name
 Names = tuple[str, ...]
@@ -132,6 +134,36 @@ def row_of(statement: Statement) -> StatementRow:
         return STATEMENTS[type(statement)]
     except KeyError:
         raise TypeError(f"{statement!r:.60} is no statement of the table, see register_statement") from None
+
+
+@dataclass(frozen=True)
+class Execution:
+    """What the rules of statements in Python call: graphs at points, and other statements.
+
+    Attributes
+    ----------
+    lengths : mapping of str to int
+        Of the registers.
+    values : callable
+        (graph, x): the outputs of a graph of the program at a point.
+    batch : callable
+        (graph, points): the outputs at points (inputs, N), (outputs, N).
+    many : int
+        How many memories run side by side; -1: one alone.
+    """
+
+    lengths: Lengths
+    values: Callable[[Graph, Sequence[float]], Sequence[float]]
+    batch: Callable[[Graph, Array], Array]
+    many: int = -1
+
+    def run(self, statements: Sequence[Statement], state: dict[str, Any]) -> None:
+        """Statements, one after another."""
+        for statement in statements:
+            row = row_of(statement)
+            rule = row.run if self.many < 0 else row.beside
+            assert rule is not None, "Runner.run_many has asked"
+            rule(statement, state, self)
 
 
 def names_in(statement: Statement, fields: Iterable[str]) -> Names:

@@ -3,23 +3,38 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from importlib import import_module
 from typing import Any
 
-from .masks import masked_if, masked_push, masked_while
 from .statement import StatementRow, register_statement
 from .statements import call, control, matrix, memory, tiles
 
 
 def _later(file: str, name: str) -> Callable[..., Any]:
-    """A rule of `derivatives`, which is loaded when it is first asked for: most runs have no derivatives."""
+    """A rule that is loaded when it is first asked for: most runs have no derivatives, and one memory."""
 
     def rule(*arguments: Any) -> Any:
-        return getattr(import_module(f"{__package__}.derivatives.{file}"), name)(*arguments)
+        return getattr(import_module(f"{__package__}.{file}"), name)(*arguments)
 
     return rule
 
 
+WHILE = StatementRow(
+    control.While,
+    reads=("register",),
+    writes=(),
+    run=control.run_while,
+    check=control.check_control,
+    bodies=("body",),
+    text=control.while_text,
+    beside=control.while_beside,
+    masked=_later("many", "masked_while"),
+    assign=_later("derivatives.control_rules", "assign_while"),
+    jvp=_later("derivatives.control_rules", "push_while"),
+    transpose=_later("derivatives.control_rules", "pull_while"),
+    reruns=True,
+)
 ROWS = [
     StatementRow(
         call.Call,
@@ -30,8 +45,8 @@ ROWS = [
         graph="graph",
         text=call.call_text,
         beside=call.call_beside,
-        jvp=_later("call_rules", "push_call"),
-        transpose=_later("call_rules", "pull_call"),
+        jvp=_later("derivatives.call_rules", "push_call"),
+        transpose=_later("derivatives.call_rules", "pull_call"),
     ),
     *[
         StatementRow(
@@ -43,8 +58,8 @@ ROWS = [
             graph="graph",
             text=text,
             beside=call.elements_beside,
-            jvp=_later("call_rules", "push_elements"),
-            transpose=_later("call_rules", "pull_elements"),
+            jvp=_later("derivatives.call_rules", "push_elements"),
+            transpose=_later("derivatives.call_rules", "pull_elements"),
         )
         for kind, run, text in ((call.Map, call.run_map, call.map_text), (call.Sum, call.run_sum, call.sum_text))
     ],
@@ -56,8 +71,8 @@ ROWS = [
         check=matrix.check_matrix,
         text=matrix.factor_text,
         beside=matrix.factor_beside,
-        jvp=_later("matrix_rules", "push_factor"),
-        transpose=_later("matrix_rules", "pull_factor"),
+        jvp=_later("derivatives.matrix_rules", "push_factor"),
+        transpose=_later("derivatives.matrix_rules", "pull_factor"),
     ),
     StatementRow(
         matrix.Solve,
@@ -67,8 +82,8 @@ ROWS = [
         check=matrix.check_matrix,
         text=matrix.solve_text,
         beside=matrix.solve_beside,
-        jvp=_later("matrix_rules", "push_solve"),
-        transpose=_later("matrix_rules", "pull_solve"),
+        jvp=_later("derivatives.matrix_rules", "push_solve"),
+        transpose=_later("derivatives.matrix_rules", "pull_solve"),
     ),
     StatementRow(
         control.If,
@@ -79,39 +94,19 @@ ROWS = [
         bodies=("body", "otherwise"),
         text=control.if_text,
         beside=control.if_beside,
-        masked=masked_if,
-        assign=_later("control_rules", "assign_if"),
-        jvp=_later("control_rules", "push_if"),
-        transpose=_later("control_rules", "pull_if"),
+        masked=_later("many", "masked_if"),
+        assign=_later("derivatives.control_rules", "assign_if"),
+        jvp=_later("derivatives.control_rules", "push_if"),
+        transpose=_later("derivatives.control_rules", "pull_if"),
     ),
-    StatementRow(
-        control.While,
-        reads=("register",),
-        writes=(),
-        run=control.run_while,
-        check=control.check_control,
-        bodies=("body",),
-        text=control.while_text,
-        beside=control.while_beside,
-        masked=masked_while,
-        assign=_later("control_rules", "assign_while"),
-        jvp=_later("control_rules", "push_while"),
-        transpose=_later("control_rules", "pull_while"),
-        reruns=True,
-    ),
-    StatementRow(
-        control.FixedPoint,
-        reads=("register",),
-        writes=(),
-        run=control.run_while,
-        check=control.check_control,
-        bodies=("body",),
-        text=control.while_text,
-        beside=control.while_beside,
-        masked=masked_while,
-        assign=_later("fixed_point_rules", "assign_fixed_point"),
-        jvp=_later("fixed_point_rules", "push_fixed_point"),
-        transpose=_later("fixed_point_rules", "pull_fixed_point"),
+    WHILE,
+    replace(
+        WHILE,  # with the derivative of its equations in place of its turns
+        kind=control.FixedPoint,
+        assign=_later("derivatives.fixed_point_rules", "assign_fixed_point"),
+        jvp=_later("derivatives.fixed_point_rules", "push_fixed_point"),
+        transpose=_later("derivatives.fixed_point_rules", "pull_fixed_point"),
+        reruns=False,
     ),
     StatementRow(
         memory.Take,
@@ -121,8 +116,8 @@ ROWS = [
         check=memory.check_take,
         text=memory.take_text,
         beside=memory.take_beside,
-        jvp=_later("memory_rules", "push_take"),
-        transpose=_later("memory_rules", "pull_take"),
+        jvp=_later("derivatives.memory_rules", "push_take"),
+        transpose=_later("derivatives.memory_rules", "pull_take"),
     ),
     StatementRow(
         memory.Push,
@@ -132,9 +127,9 @@ ROWS = [
         check=memory.check_stack,
         text=memory.push_text,
         beside=memory.push_beside,
-        masked=masked_push,
-        jvp=_later("memory_rules", "push_push"),
-        transpose=_later("memory_rules", "pull_push"),
+        masked=_later("many", "masked_push"),
+        jvp=_later("derivatives.memory_rules", "push_push"),
+        transpose=_later("derivatives.memory_rules", "pull_push"),
     ),
     StatementRow(
         memory.Pop,
@@ -144,8 +139,8 @@ ROWS = [
         check=memory.check_stack,
         text=memory.pop_text,
         beside=memory.pop_beside,
-        jvp=_later("memory_rules", "push_pop"),
-        transpose=_later("memory_rules", "pull_pop"),
+        jvp=_later("derivatives.memory_rules", "push_pop"),
+        transpose=_later("derivatives.memory_rules", "pull_pop"),
     ),
     StatementRow(
         tiles.TiledMap,

@@ -31,37 +31,15 @@ class Product(NamedTuple):
     label: Label
 
 
-@explain_failure
-def rewritten(nodes: Sequence[Node], build: Builder | None = None) -> list[Node]:
+def rewritten(nodes: Sequence[Node]) -> list[Node]:
     """Nodes of the same values, written out as sums of products by identities, with common factors taken out.
 
     sin^2 + cos^2 = 1, cosh^2 - sinh^2 = 1, the addition theorems, squares of roots, and all that cancels in a sum of
     products are seen through; a node that is constant or zero by these comes out as a number. A node that would be too
     long stays as a function of its arguments. The result can be longer than what it came from.
-
-    Parameters
-    ----------
-    nodes : sequence of Node
-        What to write anew.
-    build : Builder, optional
-        What the nodes are made by; by default a new one.
-
-    Returns
-    -------
-    list of Node
-        In the order of `nodes`.
-
-    Examples
-    --------
-    >>> import cgraph as cg
-    >>> from cgraph.extend import rewritten
-    >>> x, y = cg.variables("x y")
-    >>> rewritten([cg.sin(x) ** 2 + cg.cos(x) ** 2, cg.sin(x + y) - cg.sin(y + x)])
-    [<node 1.0>, <node 0.0>]
     """
-    build = build or Builder()
     canonical = Canonical(nodes)
-    with building(build) as set_label:
+    with building(Builder()) as set_label:
         writer = _Writer(canonical, set_label)
         return [writer.node(canonical[node]) for node in nodes]
 
@@ -263,18 +241,6 @@ def shortened(nodes: Sequence[Node]) -> list[Node]:
 
     Together where that takes fewer nodes; else, of some, those that then depend on fewer variables.
 
-    Parameters
-    ----------
-    nodes : sequence of Node
-        What to write anew.
-
-    Returns
-    -------
-    list of Node
-        In the order of `nodes`.
-
-    Examples
-    --------
     >>> import cgraph as cg
     >>> from cgraph.extend import shortened
     >>> x, y = cg.variables("x y")

@@ -17,25 +17,9 @@ Polynomial = dict[Monomial, float]  # coefficients; terms that cancel are gone
 def expand(node: Node, atoms: Mapping[Node, str] | None = None) -> Polynomial:
     """The terms of a node that is built by +, -, * and whole powers from variables and constants.
 
-    Parameters
-    ----------
-    node : Node
-        What to expand.
-    atoms : mapping of Node to str, optional
-        {inner node: name}, nodes that are written as one symbol.
+    As {monomial: coefficient}, a monomial being ((name, power), ...) in order of names; terms that cancel are absent.
+    atoms: {inner node: name}, nodes that are written as one symbol. Raises GraphError for any other operation.
 
-    Returns
-    -------
-    dict of tuple to float
-        {monomial: coefficient}, a monomial being ((name, power), ...) in order of names; terms that cancel are absent.
-
-    Raises
-    ------
-    GraphError
-        If the node is made by any other operation.
-
-    Examples
-    --------
     >>> import cgraph as cg
     >>> from cgraph.extend import expand
     >>> a, b = cg.variables("a b")
@@ -59,20 +43,8 @@ def expand(node: Node, atoms: Mapping[Node, str] | None = None) -> Polynomial:
 
 @explain_failure
 def format_polynomial(terms: Polynomial) -> str:
-    """A polynomial as text, terms in order of degree and name.
+    """A polynomial, see `expand`, as text, terms in order of degree and name; "0" without terms.
 
-    Parameters
-    ----------
-    terms : Polynomial
-        {monomial: coefficient}, see `expand`.
-
-    Returns
-    -------
-    str
-        Such as `I*qdd0 - 2*dt*k*qd0`; "0" without terms.
-
-    Examples
-    --------
     >>> import cgraph as cg
     >>> from cgraph.extend import expand, format_polynomial
     >>> a, b = cg.variables("a b")

@@ -17,18 +17,6 @@ def with_reciprocals(graph: Graph) -> Graph:
     A division takes a processor as long as ten to thirty products. A quotient is then rounded twice, within 1.5 units
     in the last place. It is the last thing to do to a graph: `simplify` and `specialize` make quotients of them again.
 
-    Parameters
-    ----------
-    graph : Graph
-        Any graph.
-
-    Returns
-    -------
-    Graph
-        With the same inputs and outputs, and a node more for a divisor.
-
-    Examples
-    --------
     >>> import cgraph as cg
     >>> from cgraph.extend import with_reciprocals
     >>> a, b, d = cg.variables("a b d")

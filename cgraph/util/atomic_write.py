@@ -13,30 +13,12 @@ from .explain_failure import explain_failure
 
 @explain_failure
 def atomic_write(path: str | Path, data: str | bytes, *, mode: int = 0o666) -> Path:
-    """Write a file whole or not at all, by way of a temporary file beside it.
+    """Write a file whole or not at all, by way of a temporary file beside it; its path. Text is UTF-8.
 
-    Parameters
-    ----------
-    path : str or Path
-        Where to; a link is followed, and stays a link.
-    data : str or bytes
-        What to write; text as UTF-8.
-    mode : int
-        Permissions of the file, less the process's umask: 0o600 keeps it from others.
+    A link is followed, and stays a link. Raises OSError with the path in its message, if the folder is missing or must
+    not be written to: what was at the path stays, and nothing else is left behind.
+    mode: permissions, less the process's umask: 0o600 keeps the file from others.
 
-    Returns
-    -------
-    Path
-        The path.
-
-    Raises
-    ------
-    OSError
-        With the path in its message, if the folder is missing or must not be written to. What was at the path stays,
-        and nothing else is left behind.
-
-    Examples
-    --------
     >>> import tempfile
     >>> from pathlib import Path
     >>> from cgraph.extend import atomic_write
@@ -50,22 +32,8 @@ def atomic_write(path: str | Path, data: str | bytes, *, mode: int = 0o666) -> P
 
 @explain_failure
 def write_files(files: Mapping[Path, str | bytes], *, mode: int = 0o666) -> None:
-    """Write several files, all or none: they take their places once all are written beside them.
+    """Write several files, all or none: they take their places once all are written beside them. As `atomic_write`.
 
-    Parameters
-    ----------
-    files : mapping of Path to str or bytes
-        {where to: what to write}; text as UTF-8.
-    mode : int
-        Permissions of the files, less the process's umask.
-
-    Raises
-    ------
-    OSError
-        As `atomic_write` does.
-
-    Examples
-    --------
     >>> import tempfile
     >>> from pathlib import Path
     >>> from cgraph.extend import write_files
@@ -95,18 +63,8 @@ def write_files(files: Mapping[Path, str | bytes], *, mode: int = 0o666) -> None
 def check_writable(path: str | Path) -> None:
     """Find out whether a file could be written, before the work of making what goes there. Leaves nothing behind.
 
-    Parameters
-    ----------
-    path : str or Path
-        Of a file that is there or not.
+    Raises OSError as `atomic_write` would for the place alone.
 
-    Raises
-    ------
-    OSError
-        As `atomic_write` would for the place alone.
-
-    Examples
-    --------
     >>> from cgraph.extend import check_writable
     >>> check_writable("nowhere/at/all.svg")
     Traceback (most recent call last):

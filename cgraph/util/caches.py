@@ -50,20 +50,8 @@ def memo(size: int) -> Callable[[Callable[Arguments, Result]], Memo[Arguments, R
     """The decorator of a function that keeps its last results, for as long as the process or until `clear_caches`.
 
     Its arguments must be hashable, and those that are compared by identity are kept alive. docs/design.md lists every
-    function that has it.
+    function that has it.  size: how many results are kept at most, the last ones used.
 
-    Parameters
-    ----------
-    size : int
-        How many results are kept at most: the last ones used.
-
-    Returns
-    -------
-    callable
-        Takes the function, and gives the one that keeps.
-
-    Examples
-    --------
     >>> from cgraph.extend import memo
     >>> @memo(16)
     ... def square(x):
@@ -87,20 +75,9 @@ def kept_by_first(
 ) -> Callable[Concatenate[First, Arguments], Result]:
     """The function, whose results its first argument keeps: a `cached_property` that is written elsewhere.
 
-    They go when that object goes, so the other arguments should be few: flags, names, a method.
+    They go when that object goes, so the other arguments, hashable, should be few: flags, names, a method. The object
+    is not altered, has a `__dict__` and can be referred to weakly.
 
-    Parameters
-    ----------
-    function : callable
-        Of an object that is not altered, has a `__dict__` and can be referred to weakly, and of hashable arguments.
-
-    Returns
-    -------
-    callable
-        Of the same arguments.
-
-    Examples
-    --------
     >>> import cgraph as cg
     >>> from cgraph.extend import kept_by_first
     >>> @kept_by_first

@@ -8,22 +8,8 @@ from .require import require_whole
 
 @explain_failure
 def counted(number: int, noun: str) -> str:
-    """The number and the noun, in the plural of all but 1.
+    """The number, at least 0, and the noun, in the plural of all but 1.
 
-    Parameters
-    ----------
-    number : int
-        How many, at least 0.
-    noun : str
-        One of them.
-
-    Returns
-    -------
-    str
-        `1 node`, `2 nodes`.
-
-    Examples
-    --------
     >>> from cgraph.extend import counted
     >>> counted(1, "node"), counted(2, "node")
     ('1 node', '2 nodes')

@@ -17,31 +17,14 @@ def doors(
     first: str = "",
     explained: Collection[str] = (),
 ) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
-    """The `__getattr__` and `__dir__` of a module whose names are written elsewhere.
+    """The `__getattr__` and `__dir__` of a module whose names are written elsewhere, by its `__name__` and `__file__`.
 
     The imports of the file under `if TYPE_CHECKING:`, which type checkers read, say where each name is written. A
     module is imported when one of its names is first asked for, and the name then stays in the package.
+    otherwise: what gives a name that no import brings, or raises AttributeError.  first: a module that is imported
+    before any of those that have the names.  explained: functions of the core whose wrong arguments are told in a
+    sentence, see `explain_failure`.
 
-    Parameters
-    ----------
-    package : str
-        The module's `__name__`.
-    file : str
-        Its `__file__`.
-    otherwise : callable, optional
-        What gives a name that no import brings, or raises AttributeError.
-    first : str
-        A module that is imported before any of those that have the names.
-    explained : collection of str
-        Functions of the core whose wrong arguments are told in a sentence, see `explain_failure`.
-
-    Returns
-    -------
-    tuple of callable
-        `__getattr__` and `__dir__`.
-
-    Examples
-    --------
     >>> import cgraph as cg
     >>> "jvp" in dir(cg)
     True

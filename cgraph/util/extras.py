@@ -2,20 +2,10 @@
 
 
 def install(extra: str) -> str:
-    """How to get the packages of an extra, as the end of an error's sentence.
+    """How to get the packages of an extra, such as "viz", as the end of an error's sentence.
 
-    Parameters
-    ----------
-    extra : str
-        Name of an extra of the distribution, such as "viz".
+    The argument of the command is quoted, since some shells expand brackets.
 
-    Returns
-    -------
-    str
-        The command, its argument quoted, since some shells expand brackets.
-
-    Examples
-    --------
     >>> from cgraph.extend import install
     >>> install("viz")
     "in a checkout of cgraph, pip install '.[viz]'"

@@ -13,26 +13,11 @@ LEFT, RIGHT = "text-align:left", "text-align:right;font-variant-numeric:tabular-
 
 @explain_failure
 def html_table(header: Sequence[str], rows: Sequence[Sequence[str]], *, title: str = "", texts: int = 1) -> str:
-    """A table of texts.
+    """A table of texts as HTML, in which what the texts hold is shown as it is, never run.
 
-    Parameters
-    ----------
-    header : sequence of str
-        Names of the columns; of empty ones no line is drawn.
-    rows : sequence of sequence of str
-        The cells.
-    title : str
-        What stands above.
-    texts : int
-        How many of the first columns are words, read from the left; the others are numbers.
+    header: names of the columns; of empty ones no line is drawn.  texts: so many of the first columns are words, read
+    from the left; the others are numbers.
 
-    Returns
-    -------
-    str
-        HTML; what the texts hold is shown as it is, never run.
-
-    Examples
-    --------
     >>> from cgraph.extend import html_table
     >>> "&lt;b&gt;" in html_table(["name", "size"], [["<b>", "3"]])
     True
@@ -51,20 +36,8 @@ def html_table(header: Sequence[str], rows: Sequence[Sequence[str]], *, title: s
 
 @explain_failure
 def html_lines(text: str) -> str:
-    """Text in its lines, in letters of equal width.
+    """Text in its lines, in letters of equal width, as HTML.
 
-    Parameters
-    ----------
-    text : str
-        What is shown.
-
-    Returns
-    -------
-    str
-        HTML.
-
-    Examples
-    --------
     >>> from cgraph.extend import html_lines
     >>> html_lines("x < y")
     '<pre>x &lt; y</pre>'
@@ -72,26 +45,8 @@ def html_lines(text: str) -> str:
     return f"<pre>{escape(text)}</pre>"
 
 
-@explain_failure
 def html_text(text: str) -> str:
-    """A paragraph of text.
-
-    Parameters
-    ----------
-    text : str
-        What is said.
-
-    Returns
-    -------
-    str
-        HTML.
-
-    Examples
-    --------
-    >>> from cgraph.extend import html_text
-    >>> html_text("x < y")
-    '<p>x &lt; y</p>'
-    """
+    """A paragraph of text as HTML."""
     return f"<p>{escape(text)}</p>"
 
 
@@ -99,20 +54,8 @@ def html_text(text: str) -> str:
 def picture(kind: str, what: object) -> str | None:
     """The HTML that a drawing package makes of something (entry point `kind` of the group `cgraph.renderers`), if any.
 
-    Parameters
-    ----------
-    kind : str
-        "graph" or "trajectory".
-    what : object
-        What is drawn.
+    None where no package is installed that draws it, or where it cannot: the notebook shows text then.
 
-    Returns
-    -------
-    str or None
-        HTML; None where no package is installed that draws it, or where it cannot: the notebook shows text then.
-
-    Examples
-    --------
     >>> from cgraph.extend import picture
     >>> picture("sculpture", 3) is None
     True

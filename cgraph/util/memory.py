@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from ..core.checks import GraphError
+from ..core.evaluation import Array
 
-Array = np.ndarray[Any, np.dtype[np.float64]]
 
-
-def require_memory(name: str, array: Any, *shapes: tuple[int, ...]) -> None:
+def require_memory(name: str, array: object, *shapes: tuple[int, ...]) -> None:
     """Raise GraphError unless machine code can use the array as it lies."""
     wanted = " or ".join(map(str, shapes))
     if not isinstance(array, np.ndarray) or array.dtype != np.float64 or array.shape not in shapes:
@@ -35,7 +32,7 @@ def require_out(out: Array, shape: tuple[int, int], points: Array) -> None:
     require_target("out", out, "X", points)
 
 
-def describe(value: Any) -> str:
+def describe(value: object) -> str:
     """What a value is that should have been an array of float64 of some shape."""
     return f"{value.dtype} {value.shape}" if isinstance(value, np.ndarray) else type(value).__name__
 

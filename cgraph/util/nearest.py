@@ -15,24 +15,8 @@ _LISTED = 12  # names that are listed where none is near
 
 @explain_failure
 def nearest(name: str, known: Iterable[str], most: int = 3) -> list[str]:
-    """The known names that are spelled most like a name, whatever their case; the best first.
+    """The known names, at most so many, that are spelled most like a name, whatever their case; the best first.
 
-    Parameters
-    ----------
-    name : str
-        A name that is not there.
-    known : iterable of str
-        Those that are.
-    most : int
-        How many to give at most.
-
-    Returns
-    -------
-    list of str
-        Empty where none is alike.
-
-    Examples
-    --------
     >>> from cgraph.extend import nearest
     >>> nearest("q.ankel", ["q.hip", "q.knee", "q.ankle"])
     ['q.ankle']
@@ -47,20 +31,6 @@ def nearest(name: str, known: Iterable[str], most: int = 3) -> list[str]:
 def or_nearest(name: str, known: Sequence[str]) -> str:
     """What an error says after "there is no ...": the nearest of the known names, or some of them.
 
-    Parameters
-    ----------
-    name : str
-        A name that is not there.
-    known : sequence of str
-        Those that are.
-
-    Returns
-    -------
-    str
-        A part of a sentence, without the stop.
-
-    Examples
-    --------
     >>> from cgraph.extend import or_nearest
     >>> or_nearest("kne", ["hip", "knee", "ankle"])
     "did you mean 'knee'?"

@@ -1,4 +1,4 @@
-"""Real numbers, and arrays of them, from what callers pass: checked."""
+"""Real numbers, and arrays of them, from what callers pass: checked. what: the value, for the error's sentence."""
 
 from __future__ import annotations
 
@@ -13,29 +13,11 @@ _KINDS = {"c": "complex numbers", "U": "text", "S": "text", "M": "dates", "m": "
 
 
 def real_array(what: str, value: object) -> Array:
-    """The value as an array of float64, but not from what NumPy would silently make numbers of.
+    """The value as an array of float64, itself if it is one, but not from what NumPy would silently make numbers of.
 
-    Parameters
-    ----------
-    what : str
-        What the value is, for the error's sentence.
-    value : array_like
-        Real numbers.
+    Raises TypeError for complex numbers (their imaginary part would be lost), text, dates and masked values, ValueError
+    for rows of different lengths and a number too large for float64.
 
-    Returns
-    -------
-    ndarray of float64
-        The value itself if it is one already, else a copy.
-
-    Raises
-    ------
-    TypeError
-        If there are complex numbers (their imaginary part would be lost), text, dates, or masked values.
-    ValueError
-        If rows have different lengths, or a number is too large for float64.
-
-    Examples
-    --------
     >>> from cgraph.extend import real_array
     >>> real_array("q", [1, 2])
     array([1., 2.])
@@ -66,29 +48,8 @@ def real_array(what: str, value: object) -> Array:
 
 
 def real_number(what: str, value: object) -> float:
-    """The value as a float.
+    """The value as a float. Raises TypeError for what is no real number, ValueError for one too large for float64.
 
-    Parameters
-    ----------
-    what : str
-        What the value is, for the error's sentence.
-    value : float
-        A real number.
-
-    Returns
-    -------
-    float
-        The number.
-
-    Raises
-    ------
-    TypeError
-        If it is anything but a real number.
-    ValueError
-        If it is too large for float64.
-
-    Examples
-    --------
     >>> from cgraph.extend import real_number
     >>> real_number("mass", 2)
     2.0
@@ -106,17 +67,6 @@ def real_number(what: str, value: object) -> float:
 def is_finite(value: object) -> bool:
     """Whether a value is a real number that is finite in float64.
 
-    Parameters
-    ----------
-    value : object
-        Anything.
-
-    Returns
-    -------
-    bool
-
-    Examples
-    --------
     >>> from cgraph.extend import is_finite
     >>> [is_finite(value) for value in (1, float("nan"), 10**400, "a")]
     [True, False, False, False]

@@ -1,4 +1,7 @@
-"""What public functions ask of plain arguments: flags, whole numbers, choices, sequences, mappings and paths."""
+"""What public functions ask of plain arguments: flags, whole numbers, choices, sequences, mappings and paths.
+
+what: what the value is, as the error begins.
+"""
 
 from __future__ import annotations
 
@@ -16,26 +19,8 @@ from .explain_failure import explain_failure
 
 
 def require_flag(what: str, value: object) -> bool:
-    """The value as a bool.
+    """The value as a bool: True or False, also NumPy's. Raises TypeError for what Python only counts as one.
 
-    Parameters
-    ----------
-    what : str
-        What the value is, as the error begins.
-    value : bool
-        True or False, also NumPy's.
-
-    Returns
-    -------
-    bool
-
-    Raises
-    ------
-    TypeError
-        For anything else, also what Python counts as true or false.
-
-    Examples
-    --------
     >>> from cgraph.extend import require_flag
     >>> require_flag("check", "no")
     Traceback (most recent call last):
@@ -48,30 +33,10 @@ def require_flag(what: str, value: object) -> bool:
 
 @explain_failure
 def require_whole(what: str, value: object, least: int = 0) -> int:
-    """The value as an int.
+    """The value as an int, if it is a whole number from `least`, also NumPy's; no bool.
 
-    Parameters
-    ----------
-    what : str
-        What the value is, as the error begins.
-    value : int
-        A whole number, also NumPy's; no bool.
-    least : int
-        The least that it may be.
+    Raises TypeError for what is no whole number, ValueError for one that is less, or does not fit 64 bits.
 
-    Returns
-    -------
-    int
-
-    Raises
-    ------
-    TypeError
-        If it is no whole number.
-    ValueError
-        If it is less, or does not fit 64 bits.
-
-    Examples
-    --------
     >>> from cgraph.extend import require_whole
     >>> require_whole("passes", 2.5)
     Traceback (most recent call last):
@@ -89,28 +54,8 @@ def require_whole(what: str, value: object, least: int = 0) -> int:
 
 @explain_failure
 def require_choice(what: str, value: object, choices: Collection[str]) -> str:
-    """The value, if it is one of the choices.
+    """The value, if it is one of the choices. Raises ValueError for any other.
 
-    Parameters
-    ----------
-    what : str
-        What the value is, as the error begins.
-    value : str
-        A name.
-    choices : collection of str
-        The names that there are.
-
-    Returns
-    -------
-    str
-
-    Raises
-    ------
-    ValueError
-        For any other value.
-
-    Examples
-    --------
     >>> from cgraph.extend import require_choice
     >>> require_choice("backend", "fast", ["llvm", "python"])
     Traceback (most recent call last):
@@ -122,30 +67,10 @@ def require_choice(what: str, value: object, choices: Collection[str]) -> str:
 
 
 def require_sequence(what: str, value: object, of: str, kind: type | tuple[type, ...] = object) -> tuple[Any, ...]:
-    """The members of a sequence; an iterator is read once.
+    """The members of a sequence, each an instance of `kind`; an iterator is read once. Raises TypeError.
 
-    Parameters
-    ----------
-    what : str
-        What the value is, as the error begins.
-    value : iterable
-        The members. A string is its characters.
-    of : str
-        What the members are, in the plural.
-    kind : type or tuple of types
-        What every member must be an instance of.
+    of: what they are, in the plural.
 
-    Returns
-    -------
-    tuple
-
-    Raises
-    ------
-    TypeError
-        If it cannot be iterated, or a member is of another kind.
-
-    Examples
-    --------
     >>> from cgraph.extend import require_sequence
     >>> require_sequence("outputs", 3, "names")
     Traceback (most recent call last):
@@ -161,28 +86,10 @@ def require_sequence(what: str, value: object, of: str, kind: type | tuple[type,
 
 
 def require_mapping(what: str, value: object, of: str) -> Mapping[Any, Any]:
-    """The value, if it is a mapping.
+    """The value, if it is a mapping. Raises TypeError for anything else.
 
-    Parameters
-    ----------
-    what : str
-        What the value is, as the error begins.
-    value : mapping
-        Such as a dict.
-    of : str
-        From what to what, as "input: value".
+    of: from what to what, as "input: value".
 
-    Returns
-    -------
-    mapping
-
-    Raises
-    ------
-    TypeError
-        For anything else.
-
-    Examples
-    --------
     >>> from cgraph.extend import require_mapping
     >>> require_mapping("at", [1.0], "input: value")
     Traceback (most recent call last):
@@ -194,26 +101,8 @@ def require_mapping(what: str, value: object, of: str) -> Mapping[Any, Any]:
 
 
 def require_texts(what: str, value: object) -> Mapping[str, str]:
-    """The value, if it is a mapping of names to texts; an empty one for None.
+    """The value, if it is a mapping of names to texts; an empty one for None. Raises TypeError for anything else.
 
-    Parameters
-    ----------
-    what : str
-        What the value is, as the error begins.
-    value : mapping of str to str, or None
-        Such as what a person calls the inputs of a graph.
-
-    Returns
-    -------
-    mapping of str to str
-
-    Raises
-    ------
-    TypeError
-        For anything else.
-
-    Examples
-    --------
     >>> from cgraph.extend import require_texts
     >>> require_texts("names", {"q0": 1})
     Traceback (most recent call last):
@@ -228,26 +117,8 @@ def require_texts(what: str, value: object) -> Mapping[str, str]:
 
 
 def require_path(what: str, value: object) -> Path:
-    """The value as a path, a leading ~ read as the home.
+    """The value, a string or a path, as a path, a leading ~ read as the home. Raises TypeError for anything else.
 
-    Parameters
-    ----------
-    what : str
-        What the value is, as the error begins.
-    value : str or os.PathLike
-        A path.
-
-    Returns
-    -------
-    Path
-
-    Raises
-    ------
-    TypeError
-        For anything else.
-
-    Examples
-    --------
     >>> from cgraph.extend import require_path
     >>> require_path("folder", 3)
     Traceback (most recent call last):
@@ -261,20 +132,6 @@ def require_path(what: str, value: object) -> Path:
 def require_graph(what: str, graph: object) -> None:
     """Raise TypeError, saying that the function `what` needs a graph, for anything else.
 
-    Parameters
-    ----------
-    what : str
-        The function that was called.
-    graph : object
-        What it was given.
-
-    Raises
-    ------
-    TypeError
-        For what is no `Graph`.
-
-    Examples
-    --------
     >>> from cgraph.extend import require_graph
     >>> require_graph("gradient", 3)
     Traceback (most recent call last):

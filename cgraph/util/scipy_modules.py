@@ -18,25 +18,8 @@ def scipy_sparse(what: str) -> ModuleType:
 
 
 def scipy_integrate(what: str) -> ModuleType:
-    """The module `scipy.integrate`.
+    """The module `scipy.integrate`. Raises ImportError, saying that `what` needs SciPy, where there is none.
 
-    Parameters
-    ----------
-    what : str
-        What needs it, for the error's sentence.
-
-    Returns
-    -------
-    module
-        SciPy's.
-
-    Raises
-    ------
-    ImportError
-        Where SciPy is not installed.
-
-    Examples
-    --------
     >>> from cgraph.extend import scipy_integrate
     >>> scipy_integrate("method 'scipy:BDF'").__name__
     'scipy.integrate'

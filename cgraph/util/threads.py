@@ -9,29 +9,15 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
+from ..core.evaluation import Array
 from .explain_failure import explain_failure
 
 
 def thread_count(threads: int | None) -> int:
-    """The number of threads that an argument `threads` asks for.
+    """The number of threads that an argument `threads` asks for: at least 1; None is one for each core of this process.
 
-    Parameters
-    ----------
-    threads : int or None
-        At least 1; None means one for each core that this process may use.
+    Raises ValueError for anything else.
 
-    Returns
-    -------
-    int
-        At least 1.
-
-    Raises
-    ------
-    ValueError
-        If it is anything else.
-
-    Examples
-    --------
     >>> from cgraph.extend import thread_count
     >>> thread_count(3)
     3
@@ -49,17 +35,6 @@ def share(work: Callable[[int], None], items: Iterable[int], threads: int) -> No
 
     After an exception, Ctrl-C among them, no thread begins another item; it is raised once all have stopped.
 
-    Parameters
-    ----------
-    work : callable
-        What is done with an item.
-    items : iterable of int
-        Such as where blocks of an array begin.
-    threads : int
-        How many work, at least 1.
-
-    Examples
-    --------
     >>> from cgraph.extend import share
     >>> squares = [0] * 4
     >>> share(lambda i: squares.__setitem__(i, i * i), range(4), threads=2)
@@ -89,3 +64,17 @@ def share(work: Callable[[int], None], items: Iterable[int], threads: int) -> No
         run()
         for other in others:
             other.result()
+
+
+def write_batch(
+    width: int, columns: Callable[[Array, Array], None], points: Array, result: Array, threads: int
+) -> None:
+    """What `columns` writes, (n_out, N), of points, (n_in, N), in blocks of that width."""
+
+    def block(start: int) -> None:
+        stop = start + width
+        columns(points[:, start:stop], result[:, start:stop])
+
+    # Blocks begin where they begin whatever `threads` is, so that each column always has the same neighbours.
+    total = points.shape[1]
+    share(block, range(0, total, width), min(threads, total // width))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import warnings
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from .row_numbers import row_numbers
 
 STATES = 8  # states that meet the constraints and whose rank is clear, at which rows are compared, at most
 DEPENDENT = 1e-9  # of the largest row of a loop, or of a row of no loop: one of the others if no more of it is left
+BETTER = 5.0  # times as much of it has to be new for a row to be kept in place of one before it
 CLEAR = 1e-5  # what is left of rows that are independent: less is also seen where a state is singular but for rounding
 
 
@@ -36,7 +38,11 @@ class ConstraintWarning(UserWarning):
 
 @kept_by_first
 def independent_rows(constraints: Constraints) -> tuple[int, ...]:
-    """Indices of the rows that do not follow from those before them, at all states seen.
+    """Indices of rows that do not follow from one another, at all states seen.
+
+    Of rows that could stand for one another those are kept of which most is new at the worst of these states, the first
+    ones where there is no great difference: a four-bar in an oblique plane has its closure in three rows, of which two
+    may say nearly the same.
 
     The states are random ones that meet the constraints, since rows may depend on one another only there. Where the
     rank is less than elsewhere, a state that is known to the rounding e of the rows is off by sqrt(e), and so are rows
@@ -47,20 +53,28 @@ def independent_rows(constraints: Constraints) -> tuple[int, ...]:
     Raises ConstraintError where no state is seen that meets all.
     """
     numbers = row_numbers(constraints)
-    clear: list[dict[int, float]] = []
+    clear: dict[int, list[Array]] = {}  # by rank
     doubtful: list[dict[int, float]] = []
     acting = np.zeros(len(constraints), dtype=bool)
     for point in numbers.states():
         matrix = numbers.certain_matrix(point)
         acting |= matrix.any(axis=1)
-        shares = _independent(matrix, *numbers.scales(point))
+        rows, columns = numbers.scales(point)
+        matrix = rows[:, None] * matrix * columns
+        shares = _independent([matrix])
         if min(shares.values(), default=1.0) < CLEAR:
             doubtful.append(shares)
             continue
-        clear.append(shares)
-        if len(clear) == STATES or len(shares) == np.count_nonzero(numbers.typical(point, numbers.reach).any(axis=1)):
+        clear.setdefault(len(shares), []).append(matrix)
+        most = np.count_nonzero(numbers.typical(point, numbers.reach).any(axis=1))
+        if sum(map(len, clear.values())) == STATES or len(shares) == most:
             break
-    kept = max(clear or doubtful, key=len)
+    kept = max(doubtful, key=len, default={})
+    if clear:
+        rank = max(clear)
+        kept = _independent(clear[rank], BETTER)
+        if len(kept) < rank:  # other rows at other states
+            kept = _independent(clear[rank][:1])
     small = [f"{constraints.names[k]!r} ({x:.1e} of it is new)" for k, x in kept.items() if x < CLEAR]
     if small and not clear:
         text = f"at all states seen next to nothing is new of {' and '.join(small)}: kept, and may hold the motion"
@@ -75,19 +89,22 @@ def independent_rows(constraints: Constraints) -> tuple[int, ...]:
     return tuple(kept)
 
 
-def _independent(matrix: Array, rows: Array, columns: Array) -> dict[int, float]:
-    """Rows of J that are not sums of earlier ones, and how much of each is new: Gram and Schmidt.
+def _independent(matrices: Sequence[Array], better: float = np.inf) -> dict[int, float]:
+    """Rows that are not sums of others, and how much of each is new where that is least: Gram and Schmidt.
 
-    rows, columns: factors by what J is about the state; by what it is there a row that is small at a flat position
-    would look as good as any.
+    matrices: J of some states, (m, n), with factors by what J is about the state; by what it is there a row that is
+    small at a flat position would look as good as any.  better: times as much has to be new of a row to take the place
+    of one before it; without, the rows that are not sums of earlier ones.
     """
     kept: dict[int, float] = {}
-    basis: list[Array] = []
-    for k, rest in enumerate(rows[:, None] * matrix * columns):
+    rest = np.array(matrices)  # (states, m, n)
+    while True:
+        new = np.linalg.norm(rest, axis=2).min(axis=0)
+        new[list(kept)] = 0.0
+        if not (new > DEPENDENT).any():
+            return dict(sorted(kept.items()))
+        k = int(np.argmax((new > DEPENDENT) & (new >= new.max() / better)))
+        kept[k] = float(new[k])
+        units = rest[:, k] / np.linalg.norm(rest[:, k], axis=1)[:, None]
         for _ in range(2):
-            for unit in basis:
-                rest = rest - (unit @ rest) * unit
-        if (left := float(np.linalg.norm(rest))) > DEPENDENT:
-            kept[k] = left
-            basis.append(rest / left)
-    return kept
+            rest = rest - np.einsum("sm,sn->smn", np.einsum("smn,sn->sm", rest, units), units)

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import cgraph as cg
-from cgraph import Graph
-from cgraph.extend import shortened
+from cgraph import Graph, extend
 
 from ..systems.body_system import BodySystem
 from ..systems.system import System
@@ -26,7 +25,7 @@ def shorter_form(system: System, derive: Callable[[System], Graph], *, mirrored:
         graph = min(graph, derive(system.shortened), key=_size)
     if mirrored or len(graph.nodes) > LONGEST:
         return graph
-    outputs = dict(zip(graph.outputs, shortened(list(graph.outputs.values())), strict=True))
+    outputs = dict(zip(graph.outputs, extend.shortened(list(graph.outputs.values())), strict=True))
     return min(graph, cg.simplify(Graph(graph.inputs, outputs)), key=_size)
 
 

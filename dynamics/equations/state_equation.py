@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from cgraph import Graph
-from cgraph.extend import require_choice
+from cgraph.extend import kept_by_first, require_choice
 
 from ..systems.arguments import TIME
 from ..systems.model import Model, as_ode, as_system, system_of
+from ..systems.system import System
 from .constraints import held_still
 from .equations_of_motion import SOLUTIONS, forward_dynamics
 from .formulations import ZERO
@@ -94,7 +95,12 @@ def state_inputs(model: Model) -> StateInputs:
     if ode is not None:
         return StateInputs(ode.states, (), ode.extra_inputs[:1] == [ode.t], dict(ode.parameters))
     system = as_system(model)
+    return _inputs_of(system)._replace(parameters=dict(system.parameters))  # which a person may change
+
+
+@kept_by_first
+def _inputs_of(system: System) -> StateInputs:
     states = tuple([str(node.name) for node in (*system.q, *system.qd)])
     applied = tuple([str(node.name) for node in system.tau])
     timed = TIME in [node.name for node in system.extra_inputs[:1]]
-    return StateInputs(states, applied, timed, dict(system.parameters))
+    return StateInputs(states, applied, timed, {})

@@ -23,7 +23,6 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import Array, Builder, building, cotangents, folded, hessian_nodes, topological, with_reciprocals
 
-from ..systems.momentum_derivatives import MomentumDerivatives
 from ..systems.system import System
 from .formulations import ONE, ZERO
 from .hamiltonian import ITERATIONS
@@ -90,12 +89,9 @@ class SymmetricParts:
         return shorter(system, lambda method: Blocks(mass_solve(system, build, method), mixed, second))
 
     @cached_property
-    def derivatives(self) -> MomentumDerivatives:
-        """-X, M^-1 and S - K: as bodies state them, or by the blocks."""
+    def derivatives(self) -> tuple[Rows, Rows, Rows]:
+        """-X, M^-1 and S - K."""
         build, n = self.transform.build, self.system.n
-        stated = self.system.momentum_derivatives(self.transform.p, build)
-        if stated is not None:
-            return stated
         solve, mixed, second = self.blocks
         wt = _transposed(mixed)
         xt = solve.solutions(wt, build)
@@ -103,13 +99,13 @@ class SymmetricParts:
             k = [[_dot(wt[i], xt[j]) for j in range(i + 1)] for i in range(n)]
             by_q = [[-xt[j][i] for j in range(n)] for i in range(n)]
             left = [[second[i][j] - k[max(i, j)][min(i, j)] for j in range(n)] for i in range(n)]
-        return MomentumDerivatives(by_q, inverse(solve, build), left, [])
+        return by_q, inverse(solve, build), left
 
     @cached_property
     def rows(self) -> list[list[Node]]:
         """Rows of (A B), (2n, 3n)."""
         n, c, r = self.system.n, self.brackets, self.gain
-        by_q, minv, second, _ = self.derivatives
+        by_q, minv, second = self.derivatives
         columns = _transposed(by_q)
         with building(self.transform.build):
             top = [[c[i][j] + by_q[i][j] for j in range(n)] for i in range(n)]
@@ -131,8 +127,7 @@ class SymmetricParts:
     def of_momenta(self) -> Graph:
         """All entries of A and B over (q, p)."""
         transform, width = self.transform, 3 * self.system.n
-        velocities = self.derivatives.velocities or transform.velocities
-        of_momenta = dict(zip(self.system.qd, velocities, strict=True))
+        of_momenta = dict(zip(self.system.qd, transform.velocities, strict=True))
         flat = folded([entry for row in self.rows for entry in row], transform.build, of_momenta)
         inputs = [*self.system.q, *transform.p, *self.system.extra_inputs]
         return _graph(inputs, [flat[k : k + width] for k in range(0, len(flat), width)])

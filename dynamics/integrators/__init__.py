@@ -6,13 +6,10 @@ from importlib import import_module
 
 from cgraph.extend import doors, memo
 
-from .composition import COMPOSITIONS, Composition
 from .dop853 import DOP853
 from .explicit import explicit_step
 from .method import Method
-from .momentum_form import in_form, momentum_form
-from .momentum_graphs import Mechanics, mechanics
-from .partitioned_tableau import PARTITIONED, Partitioned, gauss
+from .momenta import Mechanics, in_form, mechanics, momentum_form
 from .problem import (
     Problem,
     derive,
@@ -26,6 +23,7 @@ from .problem import (
 )
 from .step import Step
 from .step_control import measured
+from .symplectic_tableaus import COMPOSITIONS, PARTITIONED, Composition, Partitioned, gauss
 from .tableau import TABLEAUS, Tableau
 
 TYPE_CHECKING = False  # as a checker knows it
@@ -94,7 +92,6 @@ METHODS: dict[str, Method] = Methods(
             degree=TAYLOR_ORDER,
             finest=2.0**-52,
             starts=True,
-            derived=False,
         ),
         **{name: _symplectic(method) for name, method in PARTITIONED.items()},
         **{

@@ -1,4 +1,4 @@
-"""Graphs that act component by component: weighted sums and compensated additions of states."""
+"""Statements and formulas that act component by component: weighted and compensated sums of states."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Call
+from cgraph.extend import Call, Map
 
 
 def weighted(nodes: Sequence[Node], weights: Sequence[float]) -> Node:
@@ -19,16 +19,25 @@ def weighted(nodes: Sequence[Node], weights: Sequence[float]) -> Node:
     return cg.constant(0.0) if total is None else total
 
 
-def ahead(weights: Sequence[float]) -> Graph:
-    """x + h * (sum of weight * slope); inputs x, h and the slopes."""
-    x, h, *slopes = cg.variables(["x", "h", *(f"s{k}" for k in range(len(weights)))])
-    return Graph([x, h, *slopes], {"y": x + h * weighted(slopes, weights)})
+def used(weights: Sequence[float], register: str) -> tuple[list[Node], list[float], tuple[str, ...]]:
+    """Of registers that are numbered from 0: those of a weight that is not 0, as nodes, their weights and names."""
+    numbers = [k for k, weight in enumerate(weights) if weight]
+    nodes = cg.variables([f"s{k}" for k in numbers])
+    return nodes, [weights[k] for k in numbers], tuple([f"{register}{k}" for k in numbers])
 
 
-def scaled(weights: Sequence[float]) -> Graph:
-    """h * (sum of weight * slope); inputs h and the slopes."""
-    h, *slopes = cg.variables(["h", *(f"s{k}" for k in range(len(weights)))])
-    return Graph([h, *slopes], {"y": h * weighted(slopes, weights)})
+def advanced(target: str, weights: Sequence[float], slope: str = "slope") -> Map:
+    """target = x + h * (sum of weight * slope)."""
+    x, h = cg.variables("x h")
+    slopes, parts, names = used(weights, slope)
+    return Map(Graph([x, h, *slopes], {"y": x + h * weighted(slopes, parts)}), ("x", "h", *names), (target,))
+
+
+def combined(rows: Sequence[Sequence[float]], sources: Sequence[str], targets: Sequence[str]) -> Map:
+    """Each target = sum of weight * source, of its row of weights."""
+    nodes = cg.variables([f"s{k}" for k in range(len(sources))])
+    graph = Graph(nodes, {f"{k}": weighted(nodes, row) for k, row in enumerate(rows)})
+    return Map(graph, tuple(sources), tuple(targets))
 
 
 def compensated(x: Node, more: Node) -> tuple[Node, Node]:
@@ -48,4 +57,7 @@ def identity(m: int) -> Call:
     return Call(Graph([], {f"{k}": value for k, value in enumerate(values)}), (), ("unit",))
 
 
-SAME = function("a", a=cg.variable("a"))
+def stage_time(target: str, c: float) -> Call:
+    """target = t + c h."""
+    t, h = cg.variables("t h")
+    return Call(Graph([t, h], {"y": t + c * h}), ("t", "h"), (target,))

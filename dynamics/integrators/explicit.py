@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import Call, Map, Statement, Sum
+from cgraph.extend import Call, Map, Statement, Sum, copied
 
-from .elementwise import SAME, ahead, compensated, scaled, weighted
+from .elementwise import advanced, compensated, stage_time, used, weighted
 from .problem import Problem
 from .step import Step
 from .step_control import SAFETY, SCALE, scale
@@ -25,10 +25,10 @@ def explicit_step(tableau: Tableau, problem: Problem) -> Step:
     for k in range(1, stages):
         body += _stage(problem, k, tableau.c[k], tableau.a[k], ("at", "at_t"))
     if not tableau.error:
-        return Step(lengths, [*body, stage_state("x_new", tableau.b)], rates)
+        return Step(lengths, [*body, advanced("x_new", tableau.b)], rates)
     last, extra = f"slope{stages}", len(tableau.extra)
     degree, estimates = len(tableau.interpolant[0]), len(tableau.error)
-    lengths |= {last: m, "rounding": m, "rounding_new": m, "lost": 1, "rise": 1, "reach": 1}
+    lengths |= {last: m, "rounding": m, "rounding_new": m, "nonfinite_rate": 1, "rise": 1, "reach": 1}
     lengths |= {f"sum{k}": 1 for k in range(estimates)}
     error: list[Statement] = [stage_time("at_t", 1.0), Call(problem.rate, ("x_new", "at_t", "p"), (last,))]
     error += [_squared(weights, f"sum{k}") for k, weights in enumerate(tableau.error)]
@@ -36,11 +36,11 @@ def explicit_step(tableau: Tableau, problem: Problem) -> Step:
         lengths,
         [*body, _arrival(tableau.b)],
         rates,
-        kept=[Map(SAME, ("rounding_new",), ("rounding",))],
+        kept=[copied("rounding_new", "rounding")],
         fixed=("rounding", "rounding_new"),
-        error=[*error, _whole(last), _estimate(estimates, m)],
+        error=[*error, _finite(last), _estimate(estimates, m)],
         estimate=tableau.estimate,
-        handed=[*_held(tableau), Map(SAME, (last,), ("slope0",))],
+        handed=[*_at_limit(tableau), copied(last, "slope0")],
         dense=_dense(tableau, problem),
         dense_lengths={f"slope{stages + 1 + k}": m for k in range(extra)}
         | {f"dense{k + 1}": m for k in range(degree)}
@@ -48,61 +48,47 @@ def explicit_step(tableau: Tableau, problem: Problem) -> Step:
     )
 
 
-def stage_time(target: str, c: float) -> Call:
-    """target = t + c h."""
-    t, h = cg.variables("t h")
-    return Call(Graph([t, h], {"y": t + c * h}), ("t", "h"), (target,))
-
-
-def stage_state(target: str, weights: Sequence[float]) -> Map:
-    """target = x + h * (sum of weight * slope)."""
-    used = [k for k, weight in enumerate(weights) if weight]
-    slopes = tuple([f"slope{k}" for k in used])
-    return Map(ahead([weights[k] for k in used]), ("x", "h", *slopes), (target,))
-
-
 def _stage(problem: Problem, k: int, c: float, weights: Sequence[float], at: tuple[str, str]) -> list[Statement]:
     """Register slope{k}, from registers x, t, h and the slopes before, at a state and a time that are kept in `at`."""
     rate = Call(problem.rate, (*at, "p"), (f"slope{k}",))
-    return [stage_state(at[0], weights), stage_time(at[1], c), rate]
+    return [advanced(at[0], weights), stage_time(at[1], c), rate]
 
 
 def _arrival(weights: tuple[float, ...]) -> Map:
     """x_new = x + h * (sum of weight * slope) + what rounding took off the step before; rounding_new, what off this."""
-    used = [k for k, weight in enumerate(weights) if weight]
-    x, before, h, *slopes = cg.variables(["x", "rounding", "h", *(f"s{k}" for k in used)])
-    total, rounding = compensated(x, h * weighted(slopes, [weights[k] for k in used]) + before)
+    slopes, parts, names = used(weights, "slope")
+    x, before, h = cg.variables("x rounding h")
+    total, rounding = compensated(x, h * weighted(slopes, parts) + before)
     graph = Graph([x, before, h, *slopes], {"x": total, "rounding": rounding})
-    return Map(graph, ("x", "rounding", "h", *[f"slope{k}" for k in used]), ("x_new", "rounding_new"))
+    return Map(graph, ("x", "rounding", "h", *names), ("x_new", "rounding_new"))
 
 
-def _whole(last: str) -> Sum:
-    """Register `lost`: 0 where the trial arrived at a finite state with a finite rate, else NaN."""
+def _finite(last: str) -> Sum:
+    """Register `nonfinite_rate`: 0 where the trial arrived at a finite state with a finite rate, else NaN."""
     x_new, slope = cg.variables("x_new slope")
-    return Sum(Graph([x_new, slope], {"none": (x_new - x_new) + (slope - slope)}), ("x_new", last), "lost")
+    return Sum(Graph([x_new, slope], {"none": (x_new - x_new) + (slope - slope)}), ("x_new", last), "nonfinite_rate")
 
 
 def _squared(weights: tuple[float, ...], target: str) -> Sum:
     """Sum over the state of (h * (sum of weight * slope) / scale)^2."""
-    used = [k for k, weight in enumerate(weights) if weight]
+    slopes, parts, names = used(weights, "slope")
     *sizes, h = inputs = cg.variables((*SCALE, "h"))
-    nodes = cg.variables([f"s{k}" for k in used])
-    part = h * weighted(nodes, [weights[k] for k in used]) / scale(*sizes)
-    return Sum(Graph([*inputs, *nodes], {"y": part * part}), (*SCALE, "h", *[f"slope{k}" for k in used]), target)
+    part = h * weighted(slopes, parts) / scale(*sizes)
+    return Sum(Graph([*inputs, *slopes], {"y": part * part}), (*SCALE, "h", *names), target)
 
 
 def _estimate(count: int, m: int) -> Call:
     """The root mean square; of two estimates, that of DOP853 (Hairer, Norsett and Wanner I, section II.10)."""
     if count == 1:
-        total, none = cg.variables("sum0 lost")
-        return Call(Graph([total, none], {"error": cg.sqrt(total / m) + none}), ("sum0", "lost"), ("error",))
-    fifth, third, none = inputs = cg.variables("sum0 sum1 lost")
+        total, none = cg.variables("sum0 nonfinite_rate")
+        return Call(Graph([total, none], {"error": cg.sqrt(total / m) + none}), ("sum0", "nonfinite_rate"), ("error",))
+    fifth, third, none = inputs = cg.variables("sum0 sum1 nonfinite_rate")
     both = fifth + 0.01 * third
     error = cg.where(cg.equal(both, 0.0), 0.0, cg.where(both < math.inf, fifth / cg.sqrt(both * m), both))
-    return Call(Graph(inputs, {"error": error + none}), ("sum0", "sum1", "lost"), ("error",))
+    return Call(Graph(inputs, {"error": error + none}), ("sum0", "sum1", "nonfinite_rate"), ("error",))
 
 
-def _held(tableau: Tableau) -> list[Statement]:
+def _at_limit(tableau: Tableau) -> list[Statement]:
     """Counts accepted steps beyond the stability limit on the negative real axis (Hairer and Wanner II, section IV.2).
 
     h |f(x_new) - f(y)| / |x_new - y|, with y the state of the last stage, which like x_new stands at t + h.
@@ -115,9 +101,13 @@ def _held(tableau: Tableau) -> list[Statement]:
     graph = Graph(inputs, {"y": part * part})
     rise = Sum(graph, (*SCALE, f"slope{stages}", f"slope{stages - 1}"), "rise")
     reach = Sum(graph, (*SCALE, "x_new", "at"), "reach")
-    h, up, along, held = inputs = cg.variables("h rise reach held")
+    h, up, along, count = inputs = cg.variables("h rise reach at_limit")
     beyond = h * h * up > (SAFETY * limit) ** 2 * along
-    return [rise, reach, Call(Graph(inputs, {"sum": held + beyond}), ("h", "rise", "reach", "held"), ("held",))]
+    return [
+        rise,
+        reach,
+        Call(Graph(inputs, {"sum": count + beyond}), ("h", "rise", "reach", "at_limit"), ("at_limit",)),
+    ]
 
 
 def _dense(tableau: Tableau, problem: Problem) -> list[Statement]:
@@ -125,9 +115,8 @@ def _dense(tableau: Tableau, problem: Problem) -> list[Statement]:
     body: list[Statement] = []
     for k, (c, weights) in enumerate(tableau.extra, start=len(tableau.b) + 1):
         body += _stage(problem, k, c, weights, ("inside", "inside_t"))
-    for power in range(len(tableau.interpolant[0])):
-        weights = tuple([row[power] for row in tableau.interpolant])
-        used = [k for k, weight in enumerate(weights) if weight]
-        slopes = tuple([f"slope{k}" for k in used])
-        body.append(Map(scaled([weights[k] for k in used]), ("h", *slopes), (f"dense{power + 1}",)))
+    h = cg.variable("h")
+    for power, weights in enumerate(zip(*tableau.interpolant, strict=True), start=1):
+        slopes, parts, names = used(weights, "slope")
+        body.append(Map(Graph([h, *slopes], {"y": h * weighted(slopes, parts)}), ("h", *names), (f"dense{power}",)))
     return body

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from cgraph.extend import Program
+import cgraph as cg
+from cgraph import Graph, Node
+from cgraph.extend import Call, Program, Statement, Sum
 
-from .equal import equal
 from .problem import Problem
-from .step import Step
-from .step_control import HERMITE, chosen
+from .step import Step, arriving, rate_calls, with_registers
+from .step_control import HERMITE, chosen, first_pass
 
 ROUNDING = 16.0 * 2.0**-52  # of the sums of a step
 
@@ -40,10 +41,8 @@ class Method:
     starts : bool
         Whether steps need no search for the first, and no limit by the one before, since each is at most what the
         derivatives at its start allow: `prepare` makes `next` no larger.
-    derived : bool
-        Whether motions by the method have derivatives.
 
-    A run of equal steps makes one in a pass. Before each pass the registers (`equal.registers`) hold
+    A run of equal steps makes one in a pass. Before each pass the registers hold
 
     ======================  =========================================================================================
     x (m), p                the state, and the values of the problem's parameters
@@ -68,7 +67,7 @@ class Method:
     jump, longest, still    how steps pass jumps in time, and go on from rest: see `step_control`
     x_new (m), error        where the trial arrived, and its estimated error, 1 at the tolerance (`measured`)
     accepted, rejected      1 or 0 after a trial, and how many were 0
-    held                    accepted steps at the stability limit, where the step counts them
+    at_limit                accepted steps at the stability limit, where the step counts them
     status                  RUNNING, DONE, or TOO_SMALL: the run stops when it is not RUNNING
     t_old, x_old (m)        of the last accepted step
     dense1, .. (m)          with dense output: x(t_old + s h) = x_old + sum_k dense_k s^k, for k up to `degree`
@@ -83,7 +82,6 @@ class Method:
     degree: int = HERMITE
     finest: float = ROUNDING
     starts: bool = False
-    derived: bool = True
 
     def program(self, problem: Problem, dense: bool) -> Program:
         """The steps of a run, one after another; dense: with dense output where they are chosen.
@@ -99,3 +97,42 @@ class Method:
 
     def __repr__(self) -> str:
         return f"<Method of order {self.order}, {'steps by error' if self.adaptive else 'equal steps'}>"
+
+
+def equal_registers(problem: Problem) -> dict[str, int]:
+    """What every program of equal steps has."""
+    single = dict.fromkeys(("t", "h", "start", "count", "evaluations", "nonfinite"), 1)
+    return {"x": problem.size, "x_new": problem.size, "p": len(problem.parameters), **single}
+
+
+def equal(step: Step, problem: Problem) -> Program:
+    """Equal steps: one step a pass, of a length that is given, over and over."""
+    lengths = with_registers(step, equal_registers(problem))
+    body = arriving([*step.rates, *step.prepare, *step.body, *step.kept])
+    body += _advance(rate_calls(problem, step.rates, step.prepare, step.body))
+    if step.failed:
+        body.append(_judged(step.failed, "singular" in step.lengths))
+    if step.start:
+        body.insert(0, first_pass(*step.start))
+        lengths["fresh"] = 1
+    return Program(lengths, body, record=["t", "x"], stop="nonfinite")
+
+
+def _advance(evaluations: int) -> list[Statement]:
+    """After a step: the next time, computed from the start so that it does not drift; whether the state is finite."""
+    names = ("start", "count", "h", "evaluations")
+    start, count, h, done = inputs = cg.variables(names)
+    outputs = {"t": start + (count + 1.0) * h, "count": count + 1.0, "evaluations": done + float(evaluations)}
+    x = cg.variable("x")
+    return [Call(Graph(inputs, outputs), names, tuple(outputs)), Sum(Graph([x], {"none": x - x}), ("x",), "nonfinite")]
+
+
+def _judged(failed: str, singular: bool) -> Call:
+    """Whether the step failed; of what goes on, an inertia that is negative says nothing."""
+    names = ["nonfinite", failed, *(["singular"] if singular else [])]
+    inputs = cg.variables(names)
+    bad = inputs[0] + inputs[1]
+    outputs: dict[str, Node | float] = {"nonfinite": bad, failed: 0.0}
+    if singular:
+        outputs["singular"] = cg.where(bad, inputs[2], 0.0)
+    return Call(Graph(inputs, outputs), tuple(names), tuple(names))

@@ -10,12 +10,13 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import kept_by_first, memo, topological
 
+from ..equations.constraint_rank import independent_rows
 from ..equations.energies import energy
 from ..equations.projection import projection
 from ..equations.state_equation import normalization, state_inputs, with_multipliers
 from ..equations.substitute import substitute
 from ..systems.arguments import TIME, Parameters, call_user_function
-from ..systems.model import Model, as_ode, as_system, system_of
+from ..systems.model import Equations, Model, as_equations
 from ..systems.system import System
 
 KEPT = 16  # problems that stay for another run, with what was derived from them
@@ -40,7 +41,7 @@ class Problem:
     missing: what the velocities leave of the momenta; inputs as of these. None where they are not iterated.
     """
 
-    model: Model
+    model: Equations
     states: tuple[str, ...]
     components: tuple[str, ...]
     parameters: tuple[str, ...]
@@ -106,11 +107,11 @@ def derive(model: Model, bound: Mapping[str, float]) -> Problem:
 
     Raises SingularMassMatrixError for a coordinate without inertia, TypeError for what is no model.
     """
-    inputs, ode = state_inputs(model), as_ode(model)
-    if ode is not None:
-        equations: tuple[Any, ...] = (ode.rates,)
+    model = as_equations(model)
+    inputs, system = state_inputs(model), model.system
+    if system is None:
+        equations: tuple[Any, ...] = (model.ode and model.ode.rates,)
     else:
-        system = as_system(model)
         moving = system.kinematics
         equations = (system.coordinates, system.partial_lagrangians, system.forces, system.damping)
         equations += (
@@ -129,14 +130,14 @@ def derive(model: Model, bound: Mapping[str, float]) -> Problem:
 @dataclass(frozen=True)
 class _Request:
     key: tuple[Any, ...]
-    model: Model = field(compare=False)
+    model: Equations = field(compare=False)
     bound: Mapping[str, float] = field(compare=False)
 
 
 @memo(KEPT)
 def _derived(request: _Request) -> Problem:
     model, bound = request.model, dict(request.bound)
-    inputs, system = state_inputs(model), system_of(model)
+    inputs, system = state_inputs(model), model.system
     parameters = tuple([name for name in (*inputs.applied, *inputs.parameters) if name not in bound])
     if system is None:
         components = [f"state {name!r}" for name in inputs.states]
@@ -163,6 +164,16 @@ def _bind(graph: Graph, first: Sequence[str], parameters: Sequence[str], bound: 
 def total_energy(problem: Problem) -> Graph | None:
     """The energy E of a mechanical system: inputs the states, t, parameters. None for a first-order system."""
     return None if problem.system is None else problem.bind(problem.states, energy(problem.system))
+
+
+def constraint_rates(problem: Problem) -> Graph | None:
+    """The rates of the constraints that are kept, by their names: inputs the states, t, parameters. None without."""
+    system = problem.system
+    if system is None or problem.projection is None:
+        return None
+    constraints = system.constraints
+    rates = {constraints.names[k]: constraints.rates[k] for k in independent_rows(constraints)}
+    return problem.bind(problem.states, Graph([*system.q, *system.qd, *system.extra_inputs], rates))
 
 
 @kept_by_first

@@ -14,14 +14,13 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Call, Factor, FixedPoint, If, Map, Solve, Statement, Sum
+from cgraph.extend import Call, Factor, FixedPoint, If, Map, Solve, Statement, Sum, added, copied
 
-from .elementwise import SAME, identity, weighted
-from .explicit import stage_time
+from .elementwise import combined, identity, stage_time, weighted
 from .jacobian_statements import jacobian_statements
 from .problem import Problem
 from .step import Step
-from .step_control import SCALE, lost, measured, scale
+from .step_control import SCALE, measured, nonfinite, scale
 from .tableau import Row
 
 _R6 = math.sqrt(6.0)
@@ -73,12 +72,13 @@ def radau_step(problem: Problem) -> Step:
         *_matrices(m),
         *[stage_time(f"time{k}", _C[k]) for k in range(3)],
         *_guess(z, powers),
-        *_combined(_T_INVERSE, z, w),
+        combined(_T_INVERSE, z, w),
         _begin(),
         FixedPoint("going", (*_turn(problem, z, w, f), *_compared(m))),
         _unsolved(),
     ]
-    controls = "h_old lost lost2 going turns stalled change change_old exact newton converged failed again sum".split()
+    controls = "h_old nonfinite_real nonfinite_complex going turns stalled change change_old exact newton".split()
+    controls += "converged failed again sum".split()
     lengths = _lengths(m) | on_the_way | dict.fromkeys((*powers, "error_vector", "size", "least"), m)
     lengths |= {"rtol": 1, "atol": m, "leap": 1, "evaluations": 1} | dict.fromkeys(controls, 1)
     zeros = Graph([], {f"{k}": 0.0 for k in range(m)})
@@ -87,12 +87,12 @@ def radau_step(problem: Problem) -> Step:
         body,
         prepare=[*slopes, Call(problem.rate, ("x", "t", "p"), ("rate",))],
         start=[identity(m), *[Call(zeros, (), (name,)) for name in (*powers, "size")]],
-        kept=[*_combined(_POWERS, z, powers), Call(SAME, ("h",), ("h_old",))],
+        kept=[combined(_POWERS, z, powers), copied("h", "h_old")],
         fixed=("jacobian", "real", "complex", "size", "least", "rtol", "atol", "leap", *powers, *on_the_way, *controls),
         failed="failed",
         error=_estimate(problem, z),
         estimate=4,
-        dense=_combined(_POWERS, z, ("dense1", "dense2", "dense3")),
+        dense=[combined(_POWERS, z, ("dense1", "dense2", "dense3"))],
     )
 
 
@@ -155,12 +155,6 @@ def _guess(z: tuple[str, ...], powers: tuple[str, ...]) -> list[Statement]:
     return body
 
 
-def _combined(rows: list[Row], sources: tuple[str, ...], targets: tuple[str, ...]) -> list[Statement]:
-    nodes = cg.variables(list(sources))
-    graph = Graph(nodes, {f"{k}": weighted(nodes, row) for k, row in enumerate(rows)})
-    return [Map(graph, sources, targets)]
-
-
 def _begin() -> Call:
     """Newton's iteration starts; it ends where a change is small beside the tolerance of the step.
 
@@ -185,7 +179,7 @@ def _turn(problem: Problem, z: tuple[str, ...], w: tuple[str, ...], f: tuple[str
     m = problem.size
     body: list[Statement] = []
     for k in range(3):
-        body += [_sum_of("x", (z[k],), (1.0,), "at"), Call(problem.rate, ("at", f"time{k}", "p"), (f[k],))]
+        body += [added("x", z[k], "at"), Call(problem.rate, ("at", f"time{k}", "p"), (f[k],))]
     h, *nodes = inputs = cg.variables(["h", *w, *f])
     ws, fs = nodes[:3], nodes[3:]
     parts = [weighted(fs, row) for row in _T_INVERSE]
@@ -200,10 +194,8 @@ def _turn(problem: Problem, z: tuple[str, ...], w: tuple[str, ...], f: tuple[str
     joined = Call(Graph(lanes, {f"{k}": node for k, node in enumerate(lanes)}), ("F1", "F2"), ("right12",))
     parted = Call(joined.graph, ("right12",), ("F1", "F2"))
     body += [rights, Solve("real", "pivots", "right0"), joined, Solve("complex", "pivots2", "right12"), parted]
-    before, after = cg.variables("before after")
-    add = Graph([before, after], {"w": before + after})
-    body += [Map(add, (name, step), (name,)) for name, step in zip(w, CHANGES, strict=True)]
-    return [*body, *_combined(_T, w, z), _sum_of("x", z[2:], (1.0,), "x_new")]
+    body += [added(name, change, name) for name, change in zip(w, CHANGES, strict=True)]
+    return [*body, combined(_T, w, z), added("x", z[2], "x_new")]
 
 
 def _compared(m: int) -> list[Statement]:
@@ -252,11 +244,6 @@ def _unsolved() -> Call:
     return Call(graph, ("failed", "converged"), ("failed",))
 
 
-def _sum_of(base: str, parts: tuple[str, ...], weights: Row, target: str) -> Map:
-    x, *nodes = cg.variables(["x", *(f"z{k}" for k in range(len(parts)))])
-    return Map(Graph([x, *nodes], {"y": x + weighted(nodes, weights)}), (base, *parts), (target,))
-
-
 def _estimate(problem: Problem, z: tuple[str, ...]) -> list[Statement]:
     """The error as the real system filters it; filtered twice when the first says no (section IV.8, eq. 8.19 and 8.20).
 
@@ -269,19 +256,19 @@ def _estimate(problem: Problem, z: tuple[str, ...]) -> list[Statement]:
     error, before, old, converged = cg.variables("error accepted h_old converged")
     doubt = Graph([error, before, old], {"again": (error > 1.0) * cg.maximum(1.0 - before, cg.equal(old, 0.0))})
     twice = (
-        _sum_of("x", ("error_vector",), (1.0,), "at"),
+        added("x", "error_vector", "at"),
         Call(problem.rate, ("at", "t", "p"), ("F0",)),
         Map(Graph(inputs, {"e": rate + weighted(nodes, _ERROR) / h}), ("F0", "h", *z), ("error_vector",)),
         Solve("real", "pivots", "error_vector"),
         *measured("error_vector", m),
     )
-    none, none2 = cg.variables("lost lost2")
+    none, none2 = cg.variables("nonfinite_real nonfinite_complex")
     halved = Graph([error, converged, none, none2], {"error": cg.where(converged, error + none + none2, HALVES)})
     return [
-        lost("real", "lost"),
-        lost("complex", "lost2"),
+        nonfinite("real"),
+        nonfinite("complex"),
         *once,
         Call(doubt, ("error", "accepted", "h_old"), ("again",)),
         If("again", twice),
-        Call(halved, ("error", "converged", "lost", "lost2"), ("error",)),
+        Call(halved, ("error", "converged", "nonfinite_real", "nonfinite_complex"), ("error",)),
     ]

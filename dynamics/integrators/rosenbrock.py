@@ -7,18 +7,18 @@ where the one before arrived, so that the step arrives one U further, and that U
 from __future__ import annotations
 
 import itertools
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import Call, Factor, Map, Solve, Statement
+from cgraph.extend import Call, Factor, Map, Solve, Statement, added
 
-from .elementwise import SAME, identity, weighted
-from .explicit import stage_time
+from .elementwise import combined, identity, stage_time, used, weighted
 from .jacobian_statements import jacobian_statements
 from .problem import Problem, time_derivative
 from .step import Step
-from .step_control import lost, measured
+from .step_control import measured, nonfinite
 from .tableau import Row
 
 
@@ -85,42 +85,24 @@ RODAS5P = Rosenbrock(
 )
 
 
-def rodas_step(problem: Problem) -> Step:
-    """The step of Rodas5P."""
-    return rosenbrock_step(RODAS5P, problem)
-
-
-def rosenbrock_step(method: Rosenbrock, problem: Problem) -> Step:
-    """The step."""
-    m, last, degree = problem.size, f"U{len(method.c) - 1}", len(method.dense) + 1
-    now, on_the_way = jacobian_statements(problem)
-    both = Graph(cg.variables("error lost"), {"error": cg.variable("error") + cg.variable("lost")})
+def rodas_step(problem: Problem, method: Rosenbrock = RODAS5P) -> Step:
+    """The step of Rodas5P, or of another method of this form."""
+    m, stages, degree = problem.size, [f"U{k}" for k in range(len(method.c))], len(method.dense) + 1
+    slopes, on_the_way = jacobian_statements(problem)
+    lengths = dict.fromkeys(("unit", "jacobian", "matrix"), m * m) | dict.fromkeys(("pivots", "at", "rate", *stages), m)
+    lengths |= {"time_slope": m if problem.timed else 0, "at_t": 1, "sum": 1, "nonfinite_matrix": 1, **on_the_way}
+    by_time = [Call(time_derivative(problem), ("x", "t", "p"), ("time_slope",))] if problem.timed else []
     names = [("h_", degree - 1), ("dense", degree)]
     return Step(
-        {**_lengths(method, problem), **on_the_way, "sum": 1, "lost": 1},
+        lengths,
         [_matrix(method.gamma), Factor("matrix", "pivots"), *_stages(method, problem)],
-        prepare=[*now, *_time_slope(problem)],
+        prepare=[*slopes, *by_time],
         start=[identity(m)],
-        error=[*measured(last, m), lost("matrix", "lost"), Call(both, ("error", "lost"), ("error",))],
+        error=[*measured(stages[-1], m), nonfinite("matrix"), added("error", "nonfinite_matrix", "error")],
         estimate=method.order,
-        dense=_dense(method),
+        dense=_dense(method, stages),
         dense_lengths={f"{name}{k + 1}": m for name, count in names for k in range(count)},
     )
-
-
-def _time_slope(problem: Problem) -> list[Statement]:
-    """df/dt, where there is one."""
-    return [Call(time_derivative(problem), ("x", "t", "p"), ("time_slope",))] if problem.timed else []
-
-
-def _stages(method: Rosenbrock, problem: Problem) -> list[Statement]:
-    return [statement for k in range(len(method.c)) for statement in _stage(method, problem, k)]
-
-
-def _lengths(method: Rosenbrock, problem: Problem) -> dict[str, int]:
-    m, stages = problem.size, [f"U{k}" for k in range(len(method.c))]
-    lengths = dict.fromkeys(("unit", "jacobian", "matrix"), m * m) | dict.fromkeys(("pivots", "at", "rate", *stages), m)
-    return lengths | {"time_slope": m if problem.timed else 0, "at_t": 1}
 
 
 def _matrix(gamma: float) -> Map:
@@ -128,51 +110,44 @@ def _matrix(gamma: float) -> Map:
     return Map(Graph([unit, h, slope], {"w": unit / (gamma * h) - slope}), ("unit", "h", "jacobian"), ("matrix",))
 
 
-def _stage(method: Rosenbrock, problem: Problem, k: int) -> list[Statement]:
-    """Register U{k}; and, with the last, x_new."""
+def _stages(method: Rosenbrock, problem: Problem) -> list[Statement]:
+    """Registers U0, U1, .. and x_new."""
     last = len(method.c) - 1
     body: list[Statement] = []
-    if k == 0:
-        body.append(Map(SAME, ("x",), ("at",)))
-    elif k < len(method.a):
-        body.append(_sum("at", "x", method.a[k]))
-    else:  # on from where the stage before arrived
-        body.append(_sum("at", "at", (*[0.0] * (k - 1), 1.0)))
-    body += [stage_time("at_t", method.c[k]), Call(problem.rate, ("at", "at_t", "p"), ("rate",))]
-    weights = method.slopes[k]
-    used = [j for j, weight in enumerate(weights) if weight]
-    rate, h, slope, *nodes = inputs = cg.variables(["rate", "h", "slope", *(f"u{j}" for j in used)])
-    right = rate + weighted(nodes, [weights[j] for j in used]) / h if used else rate
-    names = ["rate", "h", "time_slope", *(f"U{j}" for j in used)]
+    for k in range(last + 1):
+        if k < len(method.a):
+            body.append(_state(method.a[k]))
+        else:  # on from where the stage before arrived
+            body.append(added("at", f"U{k - 1}", "at"))
+        body += [stage_time("at_t", method.c[k]), Call(problem.rate, ("at", "at_t", "p"), ("rate",))]
+        body += [_right(method, problem, k), Solve("matrix", "pivots", f"U{k}")]
+    return [*body, added("at", f"U{last}", "x_new")]
+
+
+def _state(weights: Row) -> Map:
+    """at = x + sum of weight * U."""
+    x = cg.variable("x")
+    nodes, parts, names = used(weights, "U")
+    graph = Graph([x, *nodes], {"y": x + weighted(nodes, parts) if nodes else x})
+    return Map(graph, ("x", *names), ("at",))
+
+
+def _right(method: Rosenbrock, problem: Problem, k: int) -> Map:
+    """The right-hand side of stage k, in register U{k}."""
+    rate, h, slope = cg.variables("rate h slope")
+    nodes, parts, names = used(method.slopes[k], "U")
+    right = rate + weighted(nodes, parts) / h if nodes else rate
+    inputs, registers = [rate, h, *nodes], ("rate", "h", *names)
     if problem.timed and method.d[k]:
         right = right + method.d[k] * (h * slope)
-    else:
-        inputs, names = [rate, h, *nodes], [names[0], names[1], *names[3:]]
-    body += [Map(Graph(inputs, {"r": right}), tuple(names), (f"U{k}",)), Solve("matrix", "pivots", f"U{k}")]
-    if k == last:
-        body.append(_sum("x_new", "at", (*[0.0] * k, 1.0)))
-    return body
+        inputs, registers = [*inputs, slope], (*registers, "time_slope")
+    return Map(Graph(inputs, {"r": right}), registers, (f"U{k}",))
 
 
-def _sum(target: str, base: str, weights: Row) -> Map:
-    """target = base + sum of weight * U."""
-    used = [j for j, weight in enumerate(weights) if weight]
-    x, *nodes = cg.variables(["x", *(f"u{j}" for j in used)])
-    graph = Graph([x, *nodes], {"y": x + weighted(nodes, [weights[j] for j in used])})
-    return Map(graph, (base, *[f"U{j}" for j in used]), (target,))
-
-
-def _dense(method: Rosenbrock) -> list[Statement]:
+def _dense(method: Rosenbrock, stages: Sequence[str]) -> list[Statement]:
     """The powers of s in x + s (x_new - x) + s (1 - s) (h_1 + s h_2 + ..)."""
-    slopes = tuple([f"U{k}" for k in range(len(method.c))])
-    x, x_new, *parts = cg.variables(["x", "x_new", *(f"h_{k + 1}" for k in range(len(method.dense)))])
-    powers = [x_new - x + parts[0]]
-    powers += [after - before for before, after in itertools.pairwise(parts)]
-    powers.append(-parts[-1])
-    body: list[Statement] = []
-    for k, weights in enumerate(method.dense):
-        nodes = cg.variables([f"u{j}" for j in range(len(slopes))])
-        body.append(Map(Graph(nodes, {"h": weighted(nodes, weights)}), slopes, (f"h_{k + 1}",)))
-    names = ("x", "x_new", *[f"h_{k + 1}" for k in range(len(parts))])
-    graph = Graph([x, x_new, *parts], {f"{k}": node for k, node in enumerate(powers)})
-    return [*body, Map(graph, names, tuple([f"dense{k + 1}" for k in range(len(powers))]))]
+    parts = [f"h_{k + 1}" for k in range(len(method.dense))]
+    x, x_new, *h = cg.variables(["x", "x_new", *parts])
+    powers = [x_new - x + h[0], *[after - before for before, after in itertools.pairwise(h)], -h[-1]]
+    graph = Graph([x, x_new, *h], {f"dense{k + 1}": node for k, node in enumerate(powers)})
+    return [combined(method.dense, stages, parts), Map(graph, ("x", "x_new", *parts), tuple(graph.outputs))]

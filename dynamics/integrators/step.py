@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from cgraph.extend import STATEMENTS, Call, FixedPoint, Map, Statement, While
+from cgraph.extend import STATEMENTS, Call, FixedPoint, Map, Statement, While, copied
 
-from .elementwise import SAME
 from .problem import Problem
 
 # What a step may read of a run; in equal steps and derivatives those for which it has lengths are 0.
-SHARED = ("x", "x_new", "t", "h", "p", "rtol", "atol", "leap", "next", "evaluations", "error", "held", "accepted")
+SHARED = ("x", "x_new", "t", "h", "p", "rtol", "atol", "leap", "next", "evaluations", "error", "at_limit", "accepted")
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +111,7 @@ def arriving(statements: Sequence[Statement]) -> list[Statement]:
     *before, last = statements
     if isinstance(last, Map | Call) and last.outputs == ("x_new",):
         return [*before, replace(last, outputs=("x",))]
-    return [*statements, Map(SAME, ("x_new",), ("x",))]
+    return [*statements, copied("x_new", "x")]
 
 
 def with_registers(step: Step, own: Mapping[str, int]) -> dict[str, int]:

@@ -4,8 +4,9 @@ A pass is a trial of one step, from t to t_new = t + h exactly. Registers: x the
 evaluations, as with equal steps; `h` the step, negative for a run back in time; `tried` its size before t_new was
 rounded, `next` the size to try next, `max_step` and `min_step` their limits; `end` where to stop; rtol, and atol for
 each component of the state; accepted (1 or 0), status; rejected, a count; `error`, the estimate of the last trial, 1
-at the tolerance; x_new what the trial arrived at; `fresh`, 1 before the first pass; `held`, accepted steps at the
-stability limit of an explicit method; and of the last accepted step t_old, x_old and, for its dense output, dense1, ..
+at the tolerance; x_new what the trial arrived at; `fresh`, 1 before the first pass; `at_limit`, accepted steps
+at the stability limit of an explicit method; and of the last accepted step t_old, x_old and, for its dense output,
+dense1, ..
 
 Where a force jumps, steps can only shrink. `jump` is the share of the `longest` of the last steps in which it may be
 missed, 0 where the caller has given atol: what its mean rate would make in that time counts into the `scale` of a
@@ -21,9 +22,9 @@ from collections.abc import Sequence
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Call, If, Map, Program, Statement, Sum
+from cgraph.extend import Call, If, Map, Program, Statement, Sum, copied
 
-from .elementwise import SAME, function
+from .elementwise import function
 from .problem import Problem
 from .step import Step, rate_calls, with_registers
 
@@ -41,7 +42,7 @@ SMALLEST_ATOL = 2.0**-1022  # in place of 0: a state that is 0 and stays 0 has n
 def registers(problem: Problem) -> dict[str, int]:
     """What every program has."""
     names = "t h tried next max_step min_step end fresh rtol accepted status rejected error error_old"
-    names += " evaluations held t_old t_new jump longest leap still moved"
+    names += " evaluations at_limit t_old t_new jump longest leap still moved"
     m = problem.size
     states = dict.fromkeys(("x", "x_new", "x_old", "atol"), m)
     return {**states, "p": len(problem.parameters), **dict.fromkeys(names.split(), 1)}
@@ -102,14 +103,14 @@ def control(order: int, evaluations: int) -> Call:
 
 def accept_step(*after: Statement) -> If:
     """An accepted step becomes the state; `after` is what the method does besides, with x still the old state."""
-    kept = (Map(SAME, ("x",), ("x_old",)), Call(SAME, ("t",), ("t_old",)))
+    kept = (copied("x", "x_old"), copied("t", "t_old"))
     h, longest = cg.variables("h longest")
     after_h = Graph([h, longest], {"longest": cg.maximum(abs(h), FORGOTTEN * longest)})
     x, x_new, moved, wanted, still = cg.variables("x x_new moved next still")
     way = Sum(Graph([x, x_new], {"way": abs(x_new - x)}), ("x", "x_new"), "moved")
     short = Graph([moved, wanted, still], {"next": cg.where(moved, wanted, cg.minimum(wanted, still))})
     steps = (way, Call(short, ("moved", "next", "still"), ("next",)), Call(after_h, ("h", "longest"), ("longest",)))
-    arrived = (Map(SAME, ("x_new",), ("x",)), Call(SAME, ("t_new",), ("t",)))
+    arrived = (copied("x_new", "x"), copied("t_new", "t"))
     return If("accepted", (*kept, *after, *steps, *arrived))
 
 
@@ -185,13 +186,13 @@ def moved(m: int) -> list[Statement]:
     part = (onto - x) / scale(x, onto, rtol, atol, cg.constant(0.0))
     total = Sum(Graph([x, rtol, atol, onto], {"y": part * part}), ("x", "rtol", "atol", "onto"), "way")
     longer = Graph([way, far], {"far": cg.maximum(cg.sqrt(way / m), far)})
-    return [total, Call(longer, ("way", "farthest"), ("farthest",)), Map(SAME, ("onto",), ("x",))]
+    return [total, Call(longer, ("way", "farthest"), ("farthest",)), copied("onto", "x")]
 
 
-def lost(register: str, target: str) -> Sum:
-    """target = 0 where all numbers of a register are finite, else NaN.
+def nonfinite(register: str) -> Sum:
+    """Register nonfinite_{register} = 0 where all numbers of a register are finite, else NaN.
 
     Divided by an infinite number, an error is 0: that of a step with infinite pivots.
     """
     a = cg.variable("a")
-    return Sum(Graph([a], {"none": a - a}), (register,), target)
+    return Sum(Graph([a], {"none": a - a}), (register,), f"nonfinite_{register}")

@@ -17,22 +17,20 @@ reversible motions without drift.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Call, FixedPoint, Map, Statement, Sum
+from cgraph.extend import Call, FixedPoint, Map, Statement, Sum, added, copied
 
 from ..systems.arguments import TIME
-from .composition import Composition
-from .elementwise import SAME, compensated, function, weighted
-from .explicit import stage_time
-from .momentum_graphs import Mechanics, mechanics
-from .partitioned_tableau import MIDPOINT, SYMPLECTIC_EULER, VERLET, Partitioned, Row, over
+from .elementwise import compensated, function, stage_time, weighted
+from .momenta import Mechanics, mechanics
 from .problem import Problem, reaches
 from .step import Step
 from .step_control import count
+from .symplectic_tableaus import MIDPOINT, SYMPLECTIC_EULER, VERLET, Composition, Partitioned, Row, over
 
 TURNS = 60.0  # of the iteration for the stages, at most
 ENOUGH = 2.0**-53  # a change below this, relative, is rounding
@@ -49,9 +47,25 @@ def composed_step(composition: Composition, problem: Problem) -> Step:
 
 def partitioned_step(method: Partitioned, problem: Problem, composition: Composition = ONCE) -> Step:
     """One step of coordinates and momenta; where there are none, of the state by a method of Gauss's."""
-    if problem.canonical:
-        return (_of_phase if problem.momenta else _of_momenta)(method, problem, composition)
-    return _of_states(method, problem, composition)
+    if problem.canonical and not problem.momenta:
+        return _of_momenta(method, problem, composition)
+    if not problem.canonical and method.a is not method.b:
+        raise ValueError(f"this method advances coordinates and {_lacking_momenta(problem)}")
+    return _of_rates(method, problem, composition)
+
+
+def _lacking_momenta(problem: Problem) -> str:
+    """Why coordinates and momenta cannot be advanced in turn."""
+    system = problem.system
+    if system is None:
+        return "momenta in turn; a system of first order has none"
+    if len(system.constraints):
+        holding = f"constraint {system.constraints.names[0]!r} holds both"
+        return f"their momenta in turn, and {holding}: take 'midpoint', 'gauss4' or 'dop853'"
+    pairs = zip(system.velocities, system.qd, strict=True)
+    other = next(name for name, velocity in pairs if velocity not in system.q_dot)
+    no_rate = f"velocity {other!r} is the rate of no coordinate"
+    return f"their momenta in turn, and {no_rate}: take 'midpoint', 'gauss4' or 'dop853'"
 
 
 def _separable(problem: Problem) -> bool:
@@ -64,14 +78,21 @@ def _separable(problem: Problem) -> bool:
 
 
 def _of_momenta(method: Partitioned, problem: Problem, composition: Composition) -> Step:
+    """States q and qd: momenta are read at the start, and the velocity that belongs to them is solved for."""
     graphs, n = mechanics(problem), problem.nq
     stages = range(len(method.w))
-    lengths = {"q": n, "v": n, "momentum": n, "q_rounding": n, "momentum_rounding": n}
-    lengths |= {f"{name}{i}": n for name in ("Q", "V", "P", "F", "W") for i in stages}
+    lengths = dict.fromkeys(("q", "v", "momentum", "q_rounding", "momentum_rounding"), n)
+    lengths |= {f"{name}{i}": n for name in "QVPFW" for i in stages}
     read = Call(graphs.momentum, ("x", "t", "p"), ("momentum",))
-    start = [_copied(problem.size, ("x",), ("q", "v")), read]
+    start = [_copied(problem.size, ("x",), ("q", "v")), read, *[copied("v", f"V{i}") for i in stages]]
     if graphs.separable and method in (SYMPLECTIC_EULER, VERLET):
-        body = _explicit(method, graphs)
+        body = _explicit(
+            method,
+            lambda t: [_force(graphs, "q", "v", t, "F0")],
+            lambda t: [_velocity(graphs, "q", "v", "momentum", t, "v")],
+            after=[copied("v", "V0")],
+        )
+        body += [_velocity(graphs, "q", "v", "momentum", "later", "v"), count(2)] if method is VERLET else [count(1)]
     else:
         turn: list[Statement] = []
         for i in stages:
@@ -80,104 +101,61 @@ def _of_momenta(method: Partitioned, problem: Problem, composition: Composition)
             turn.append(_stage(method.b[i], "momentum", "F", f"P{i}"))
             turn.append(_velocity(graphs, f"Q{i}", f"V{i}", f"P{i}", f"time{i}", f"W{i}"))
         body = _iterated(method, turn)
-        body += [_added("q", "q_rounding", "V", method.w), _added("momentum", "momentum_rounding", "F", method.w)]
-        body += [stage_time("later", 1.0), *_settled(graphs)]
+        body += [_added("q", "V", method.w), _added("momentum", "F", method.w), stage_time("later", 1.0)]
+        settled = _velocity(graphs, "q", "v", "momentum", "later", "v")
+        body += [settled] * (1 if graphs.quadratic else REPEATS)
     body = [*_in_turn(composition, body), _copied(problem.size, ("q", "v"), ("x_new",))]
-    return _step(method, lengths, [*start, *_guess_at_rest(method, "v")], body)
-
-
-def _of_phase(method: Partitioned, problem: Problem, composition: Composition) -> Step:
-    """States q and p: both rates come of one graph, and stages are iterated on them."""
-    n, stages = problem.nq, range(len(method.w))
-    lengths = {f"{name}{i}": n for name in ("Q", "P", "V", "F", "W") for i in stages}
-    lengths |= dict.fromkeys(("q", "momentum", "q_rounding", "momentum_rounding"), n)
-    both = ("V0", "F0")
-    start: list[Statement] = [
-        _copied(problem.size, ("x",), ("q", "momentum")),
-        Call(problem.rate, ("q", "momentum", "t", "p"), both),
-        *_guess_at_rest(method, "V0"),
-        *[Map(SAME, ("F0",), (f"F{i}",)) for i in stages],
-    ]
-    body: list[Statement]
-    if method in (SYMPLECTIC_EULER, VERLET) and _separable(problem):
-        half = method is VERLET
-        kick = _stage(over(2, 1 if half else 2), "momentum", "F", "momentum")
-        body = [
-            Call(problem.rate, ("q", "momentum", "t", "p"), both),
-            kick,
-            Call(problem.rate, ("q", "momentum", "t", "p"), both),
-            _added("q", "q_rounding", "V", (Fraction(1),)),
-            stage_time("later", 1.0),
-        ]
-        if half:
-            body += [Call(problem.rate, ("q", "momentum", "later", "p"), both), kick]
-    else:
-        turn: list[Statement] = [count(len(stages))]
-        for velocity in ("V", "W"):  # twice, since an error of V comes back to V by F
-            for i in stages:
-                turn.append(_stage(method.a[i], "q", "V", f"Q{i}"))
-                turn.append(_stage(method.b[i], "momentum", "F", f"P{i}"))
-            turn += [
-                Call(problem.rate, (f"Q{i}", f"P{i}", f"time{i}", "p"), (f"{velocity}{i}", f"F{i}")) for i in stages
-            ]
-        body = _iterated(method, turn)
-        body += [_added("q", "q_rounding", "V", method.w), _added("momentum", "momentum_rounding", "F", method.w)]
-    body = [*_in_turn(composition, body), _copied(problem.size, ("q", "momentum"), ("x_new",))]
     return _step(method, lengths, start, body)
 
 
-def _of_states(method: Partitioned, problem: Problem, composition: Composition) -> Step:
-    if method.a is not method.b:
-        system = problem.system
-        if system is None:
-            raise ValueError("this method advances coordinates and momenta in turn; a system of first order has none")
-        if len(system.constraints):
-            raise ValueError(
-                "this method advances coordinates and their momenta in turn, and constraint "
-                f"{system.constraints.names[0]!r} holds both: take 'midpoint', 'gauss4' or 'dop853'"
-            )
-        pairs = zip(system.velocities, system.qd, strict=True)
-        other = next(name for name, velocity in pairs if velocity not in system.q_dot)
-        raise ValueError(
-            "this method advances coordinates and their momenta in turn, and velocity "
-            f"{other!r} is the rate of no coordinate: take 'midpoint', 'gauss4' or 'dop853'"
-        )
-    m, stages = problem.size, range(len(method.w))
-    lengths = {"x_rounding": m} | {f"{name}{i}": m for name in ("Q", "V", "W") for i in stages}
-    turn: list[Statement] = []
-    for i in stages:
-        turn.append(_stage(method.a[i], "x_new", "V", f"Q{i}"))
-        turn.append(Call(problem.rate, (f"Q{i}", f"time{i}", "p"), (f"W{i}",)))
-    body = [*_iterated(method, turn), _added("x_new", "x_rounding", "V", method.w)]
-    rate = Call(problem.rate, ("x", "t", "p"), ("W0",))
-    body = [Map(SAME, ("x",), ("x_new",)), *_in_turn(composition, body)]
-    return _step(method, lengths, [rate, *_guess_at_rest(method, "W0")], body)
+def _of_rates(method: Partitioned, problem: Problem, composition: Composition) -> Step:
+    """States whose rates come of one graph: q and p, of stages Q and P, or any state, of stages Q alone."""
+    stages = range(len(method.w))
+    parts = [("q", "Q", "V", method.a), ("momentum", "P", "F", method.b)][: 2 if problem.momenta else 1]
+    bases, slopes = tuple([part[0] for part in parts]), [part[2] for part in parts]
+    names = [*bases, *[f"{base}_rounding" for base in bases], "W0"]
+    names += [f"{name}{i}" for _, stage, slope, _ in parts for name in (stage, slope, "W") for i in stages]
+
+    def rates(at: Sequence[str], t: str, velocity: str, i: int = 0) -> Call:
+        return Call(problem.rate, (*at, t, "p"), tuple([f"{name}{i}" for name in (velocity, *slopes[1:])]))
+
+    start = [rates("x", "t", "V"), *[copied(f"{slope}0", f"{slope}{i}") for slope in slopes for i in stages[1:]]]
+    body: list[Statement]
+    if method in (SYMPLECTIC_EULER, VERLET) and _separable(problem):
+        body = _explicit(method, lambda t: [rates(bases, t, "V")], lambda t: [rates(bases, t, "V")])
+    else:
+        turn: list[Statement] = [count(len(stages))] if problem.momenta else []
+        for velocity in ("V", "W") if problem.momenta else "W":  # twice, since an error of V comes back to V by F
+            turn += [_stage(a[i], base, slope, f"{stage}{i}") for i in stages for base, stage, slope, a in parts]
+            turn += [rates([f"{part[1]}{i}" for part in parts], f"time{i}", velocity, i) for i in stages]
+        body = [*_iterated(method, turn), *[_added(base, slope, method.w) for base, _, slope, _ in parts]]
+    m = problem.size
+    body = [_copied(m, ("x",), bases), *_in_turn(composition, body), _copied(m, bases, ("x_new",))]
+    return _step(method, dict.fromkeys(names, m // len(parts)), start, body)
 
 
-def _step(method: Partitioned, lengths: dict[str, int], start: list[Statement], body: list[Statement]) -> Step:
-    names = "singular failed failures whole begin going turns change speed change_old later"
-    single = dict.fromkeys(names.split(), 1)
-    single |= {f"{name}{i}": 1 for name in ("time", "change", "speed") for i in range(len(method.w))}
-    fixed = [name for name in lengths if name.endswith("rounding")]
-    fixed += [name for name in single if not name.startswith(("time", "whole", "begin", "later"))]
-    return Step({**lengths, **single}, body, start=start, fixed=tuple(fixed), failed="failures")
+def _step(method: Partitioned, lengths: dict[str, int], start: Sequence[Statement], body: list[Statement]) -> Step:
+    numbers = [f"{name}{i}" for name in ("change", "speed") for i in range(len(method.w))]
+    numbers += "singular failed failures going turns change speed change_old".split()
+    times = ["later", "whole_t", "whole_h", *[f"time{i}" for i in range(len(method.w))]]
+    fixed = [*[name for name in lengths if name.endswith("rounding")], *numbers]
+    lengths = lengths | dict.fromkeys([*numbers, *times], 1)
+    return Step(lengths, body, start=start, fixed=tuple(fixed), failed="failures")
 
 
 def _in_turn(composition: Composition, body: list[Statement]) -> list[Statement]:
     """The body, a step of h from t, once for every step of a composition; a step that failed is counted."""
-    whole, begin, failures = cg.variables("whole begin failures")
-    counted = Call(
-        function("failed failures", sum=cg.variable("failed") + failures), ("failed", "failures"), ("failures",)
-    )
+    counted = added("failures", "failed", "failures")
     if composition is ONCE:
         return [*body, counted]
-    result: list[Statement] = [Map(SAME, ("h",), ("whole",)), Map(SAME, ("t",), ("begin",))]
+    h, t = cg.variables("whole_h whole_t")
+    result: list[Statement] = [copied("h", "whole_h"), copied("t", "whole_t")]
     done = 0.0
     for step in composition.steps:
-        here = Graph([whole, begin], {"h": step * whole, "t": begin + done * whole})
-        result += [Call(here, ("whole", "begin"), ("h", "t")), *body, counted]
+        here = Graph([h, t], {"h": step * h, "t": t + done * h})
+        result += [Call(here, ("whole_h", "whole_t"), ("h", "t")), *body, counted]
         done += step
-    return [*result, Map(SAME, ("whole",), ("h",))]
+    return [*result, copied("whole_h", "h")]
 
 
 def _stage(weights: Row, base: str, slope: str, target: str) -> Map:
@@ -191,9 +169,9 @@ def _stage(weights: Row, base: str, slope: str, target: str) -> Map:
 
 def _change(h: Node, slopes: Sequence[Node], weights: Sequence[Fraction]) -> tuple[Node, Node | None]:
     """h * (sum of weight * slope), by the weights as float64 holds them, and by what it leaves of them."""
-    held = [float(weight) for weight in weights]
-    left = [float(weight - Fraction(number)) for weight, number in zip(weights, held, strict=True)]
-    return h * weighted(slopes, held), h * weighted(slopes, left) if any(left) else None
+    first = [float(weight) for weight in weights]
+    left = [float(weight - Fraction(number)) for weight, number in zip(weights, first, strict=True)]
+    return h * weighted(slopes, first), h * weighted(slopes, left) if any(left) else None
 
 
 def _force(graphs: Mechanics, q: str, v: str, t: str, target: str) -> Call:
@@ -215,7 +193,7 @@ def _iterated(method: Partitioned, turn: list[Statement]) -> list[Statement]:
     measured: list[Statement] = []
     for i in stages:
         measured += [Sum(difference, (f"W{i}", f"V{i}"), f"change{i}"), Sum(square, (f"W{i}",), f"speed{i}")]
-        measured.append(Map(SAME, (f"W{i}",), (f"V{i}",)))
+        measured.append(copied(f"W{i}", f"V{i}"))
     body.append(FixedPoint("going", (*turn, *measured, _judged(len(method.w)))))
     return body
 
@@ -239,40 +217,29 @@ def _judged(stages: int) -> Call:
     return Call(Graph(cg.variables(inputs), outputs), inputs, tuple(outputs))
 
 
-def _guess_at_rest(method: Partitioned, velocity: str) -> list[Statement]:
-    return [Map(SAME, (velocity,), (f"V{i}",)) for i in range(len(method.w))]
-
-
-def _added(base: str, rounding: str, slope: str, weights: Row) -> Map:
+def _added(base: str, slope: str, weights: Row) -> Map:
     """base += h * (sum of weight * slope), with what rounding took off kept for the next step."""
     x, before, h, *slopes = cg.variables(["x", "rounding", "h", *(f"s{k}" for k in range(len(weights)))])
     change, rest = _change(h, slopes, weights)
     total, after = compensated(x, change + (before if rest is None else before + rest))
-    graph = Graph([x, before, h, *slopes], {"x": total, "rounding": after})
+    graph, rounding = Graph([x, before, h, *slopes], {"x": total, "rounding": after}), f"{base}_rounding"
     return Map(graph, (base, rounding, "h", *[f"{slope}{k}" for k in range(len(weights))]), (base, rounding))
 
 
-def _settled(graphs: Mechanics) -> list[Statement]:
-    """v, the velocity that belongs to the momenta at the end of the step."""
-    once = _velocity(graphs, "q", "v", "momentum", "later", "v")
-    return [once] if graphs.quadratic else [once] * REPEATS
+def _explicit(
+    method: Partitioned,
+    force: Callable[[str], list[Statement]],
+    velocity: Callable[[str], list[Statement]],
+    after: Sequence[Statement] = (),
+) -> list[Statement]:
+    """Kinetic energy of the velocities alone with a constant mass matrix, forces of the coordinates: no iteration.
 
-
-def _explicit(method: Partitioned, graphs: Mechanics) -> list[Statement]:
-    """Kinetic energy of the velocities alone with a constant mass matrix, forces of the coordinates: no iteration."""
+    force, velocity: registers F0 and V0 at q and the momentum, at a time; V0 needs what is `after` besides.
+    """
     half = method is VERLET
     kick = _stage(over(2, 1 if half else 2), "momentum", "F", "momentum")
-    body: list[Statement] = [
-        _force(graphs, "q", "v", "t", "F0"),
-        kick,
-        _velocity(graphs, "q", "v", "momentum", "t", "v"),
-        _added("q", "q_rounding", "V", (Fraction(1),)),
-        stage_time("later", 1.0),
-    ]
-    body.insert(3, Map(SAME, ("v",), ("V0",)))
-    if half:
-        body += [_force(graphs, "q", "v", "later", "F0"), kick, _velocity(graphs, "q", "v", "momentum", "later", "v")]
-    return [*body, count(2 if half else 1)]
+    body = [*force("t"), kick, *velocity("t"), *after, _added("q", "V", (Fraction(1),)), stage_time("later", 1.0)]
+    return [*body, *force("later"), kick] if half else body
 
 
 def _copied(count: int, sources: tuple[str, ...], targets: tuple[str, ...]) -> Call:

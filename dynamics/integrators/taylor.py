@@ -12,11 +12,10 @@ import math
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import Call, If, Jets, Map, NoSeriesError, Statement, Sum, jets
+from cgraph.extend import Call, If, Jets, Map, NoSeriesError, Statement, Sum, copied, jets
 
 from ..systems.arguments import TIME
-from .elementwise import SAME, compensated, function
-from .explicit import stage_time
+from .elementwise import compensated, function, stage_time
 from .problem import Problem
 from .step import Step
 from .step_control import count
@@ -30,7 +29,7 @@ def taylor_step(order: int, problem: Problem) -> Step:
     m, graphs = problem.size, _jets(problem)
     orders = range(1, order + 1)
     numbers = Graph([], {f"order{k}": float(k) for k in orders})
-    series: list[Statement] = [Map(SAME, ("rate",), ("rates0",))]
+    series: list[Statement] = [copied("rate", "rates0")]
     for k in orders:
         series += [If(f"takes{k}", tuple(_coefficients(k, graphs)))]
     unit, h = cg.variables("unit h")
@@ -48,12 +47,12 @@ def taylor_step(order: int, problem: Problem) -> Step:
         [share, _arrival(order)],
         [_rates(graphs, "x", "t", ""), count(1)],
         [at_all, *series, _wish()],
-        [Call(numbers, (), tuple(numbers.outputs)), _orders(order), Map(SAME, ("next",), ("unit",))],
-        kept=[Map(SAME, ("rounding_new",), ("rounding",)), Map(SAME, ("h",), ("unit",))],
+        [Call(numbers, (), tuple(numbers.outputs)), _orders(order), copied("next", "unit")],
+        kept=[copied("rounding_new", "rounding"), copied("h", "unit")],
         fixed=("rounding", "rounding_new", "next", "rtol", "atol", *controls),
         error=[stage_time("at_t", 1.0), _rates(graphs, "x_new", "at_t", "_new"), count(1), *_checked(m)],
         estimate=order,
-        handed=[Map(SAME, (f"{name}_new",), (name,)) for name in ("rate", "zeros")],
+        handed=[copied(f"{name}_new", name) for name in ("rate", "zeros")],
         dense=[_dense(order)],
         dense_lengths={f"dense{k}": m for k in orders},
     )
@@ -95,7 +94,7 @@ def _coefficients(k: int, graphs: Jets) -> list[Statement]:
         body.append(Map(graph, tuple([name for pair in pairs for name in pair]), ("sums",)))
     inputs = (f"rates{(k - 1) % 2}", "unit", f"order{k}", "zeros", "sums" if k > 1 else "none")
     body.append(Call(graphs.order, inputs, (f"c{k}", f"rates{k % 2}", f"left{k}", f"right{k}")))
-    return [*body, Map(SAME, ("last",), ("before",)), Sum(_SQUARE, (f"c{k}", "x", "c1", "rtol", "atol"), "last")]
+    return [*body, copied("last", "before"), Sum(_SQUARE, (f"c{k}", "x", "c1", "rtol", "atol"), "last")]
 
 
 def _square() -> Graph:

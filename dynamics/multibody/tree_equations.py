@@ -11,7 +11,6 @@ import cgraph as cg
 from cgraph import Node
 from cgraph.extend import Array, Builder, building
 
-from ..systems.momentum_derivatives import MomentumDerivatives
 from ..systems.system import BiasForce
 from ..systems.torque_derivatives import MotionState, TorqueDerivatives
 from . import newton_euler, spatial
@@ -25,7 +24,6 @@ from .joint_coordinates import parts, places
 from .joints import AxialJoint, moving_type
 from .link_cache import Moved
 from .mechanism_fields import Structure
-from .momentum_columns import momentum_derivatives
 from .spatial import ZERO
 
 
@@ -144,16 +142,6 @@ class TreeEquations:
         with building(build):
             up = newton_euler.base_acceleration(self.ground).linear
             return torque_derivatives(self.bodies, self.links, self.parents, up, state, build)
-
-    def momentum_derivatives(
-        self, q: Sequence[Node], qd: Sequence[Node], p: Sequence[Node], build: Builder
-    ) -> MomentumDerivatives | None:
-        """Of all bodies, with their springs."""
-        if not self._turning:
-            return None
-        with building(build):
-            up = newton_euler.base_acceleration(self.ground).linear
-            return momentum_derivatives(self.bodies, self.links, self.parents, up, (q, qd), p, build)
 
     def _moved(self, q: Sequence[Node], qd: Sequence[Node]) -> list[Moved]:
         motions = {WORLD: self.ground}

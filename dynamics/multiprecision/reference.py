@@ -14,7 +14,7 @@ from cgraph.extend import require_choice, require_path
 from ..equations.initial_value import initial_value, times_to_record
 from ..equations.state_equation import state_equation, state_inputs
 from ..systems.controller import with_closed_form
-from ..systems.model import Model
+from ..systems.model import Model, as_equations
 from .collocation import collocation
 from .disk_store import Store, key
 from .flint_numbers import Number, text
@@ -97,7 +97,7 @@ def reference(
         folder = require_path("folder", folder)
     if isinstance(digits, bool) or not (isinstance(digits, int) and 1 <= digits <= MOST // 2):
         raise ValueError(f"digits must be a whole number from 1 to {MOST // 2}, got {digits!r}")
-    model, constant, _ = with_closed_form(model, tau, parameters)
+    model, constant, _ = with_closed_form(as_equations(model), tau, parameters)
     start, inputs = initial_value(model, q, qd, constant, parameters), state_inputs(model)
     x, times = start.x.tolist(), times_to_record(t_eval).tolist()
     values = {name: start.bound[name] for name in (*inputs.parameters, *inputs.applied)}

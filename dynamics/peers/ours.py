@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -18,12 +19,12 @@ from ..equations.linearization import state_space
 from ..equations.linearization_parts import LinearizationParts, linearization_parts
 from ..equations.linearize_many import WRITTEN_OUT, linearization_program, linearize_many
 from ..equations.state_equation import state_equation
-from ..multibody.mechanism import as_mechanism
+from ..multibody.body import Body
+from ..multibody.mechanism import Mechanism, as_mechanism
 from ..simulation.gradients.gradient import gradient
 from ..systems.model import Model
 from .case import DT, MOTIONS, NUDGE, PASSES, Case, rk4_step
 from .contender import Contender, Peer, UnavailableError
-from .inertial_parameters import with_inertial_parameters
 
 
 def task_graph(case: Case, task: str) -> Graph:
@@ -188,3 +189,21 @@ class OurNumpy(Peer):
 def _same(values: Array) -> Array:
     array: Array = values
     return array
+
+
+def with_inertial_parameters(mechanism: Mechanism) -> tuple[Mechanism, dict[str, float]]:
+    """The mechanism with ten parameters for each body with mass, and {name: value} of them; it has none yet."""
+    bodies: list[Body] = []
+    numbers: dict[str, float] = {}
+    for k, body in enumerate(mechanism.bodies):
+        inertia = np.asarray(body.inertia, dtype=np.float64)
+        matrix = np.diag(inertia) if inertia.ndim == 1 else inertia
+        if not body.mass and not matrix.any():  # a frame
+            bodies.append(body)
+            continue
+        center = {f"center{k}_{i}": float(value) for i, value in enumerate(np.asarray(body.center, dtype=np.float64))}
+        entries = {f"inertia{k}_{i}{j}": float(matrix[i, j]) for i in range(3) for j in range(i, 3)}
+        rows = [[f"inertia{k}_{min(i, j)}{max(i, j)}" for j in range(3)] for i in range(3)]
+        numbers |= {f"mass{k}": float(np.asarray(body.mass)), **center, **entries}
+        bodies.append(replace(body, mass=f"mass{k}", center=tuple(center), inertia=rows))
+    return replace(mechanism, bodies=bodies, parameters=numbers), numbers

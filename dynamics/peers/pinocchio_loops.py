@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,6 +29,21 @@ def constrained_accelerations(mechanism: Mechanism, q: Array, qd: Array, tau: Ar
 
     Raises ImportError without Pinocchio, and UnavailableError for what it has not.
     """
+    ready, rows = constraint_dynamics(mechanism, _PROXIMAL), []
+    for x in np.concatenate([q, qd, tau], axis=1):
+        run, result = ready(x)
+        run()
+        rows.append(result())
+    return np.array(rows)
+
+
+def constraint_dynamics(
+    mechanism: Mechanism, proximal: tuple[float, float, int]
+) -> Callable[[Array], tuple[Callable[[], object], Callable[[], Array]]]:
+    """At x = (q, qd, tau): a call, and what reads the accelerations, (n,), that it left.
+
+    proximal: what is left of the constraints, its regularization, and iterations. Raises as above.
+    """
     for loop in mechanism.loops:
         if loop.kind not in _KINDS:
             raise UnavailableError(f"has no loop of the kind {loop.kind!r}")
@@ -39,13 +55,16 @@ def constrained_accelerations(mechanism: Mechanism, q: Array, qd: Array, tau: Ar
         models.append(pin.RigidConstraintModel(getattr(pin.ContactType, _KINDS[loop.kind]), twin, *ends, pin.LOCAL))
         datas.append(models[-1].createData())
     pin.initConstraintDynamics(twin, data, models, datas)
-    rows = []
-    for x in np.concatenate([q, qd, tau], axis=1):
-        theirs, v, force = peer.arguments(x, "forward")
-        settings = pin.ProximalSettings(*_PROXIMAL)
-        solved = pin.constraintDynamics(twin, data, theirs, v, force, models, datas, settings)
-        rows.append(peer.of.our_a(theirs, v, np.array(solved)))
-    return np.array(rows)
+    settings, solve = pin.ProximalSettings(*proximal), pin.constraintDynamics
+
+    def ready(x: Array) -> tuple[Callable[[], object], Callable[[], Array]]:
+        theirs = peer.arguments(x, "forward")
+        return (
+            lambda: solve(twin, data, *theirs, models, datas, settings),
+            lambda: peer.of.our_a(*theirs[:2], np.array(data.ddq)),
+        )
+
+    return ready
 
 
 def _frame(

@@ -13,7 +13,7 @@ from cgraph.extend import kept_by_first
 from ..equations.state_equation import state_inputs
 from ..integrators import Problem, quantity_inputs
 from ..systems.controller import with_closed_form
-from ..systems.model import Model, as_ode, as_system
+from ..systems.model import Equations, Model, as_equations
 from .run_options import RunOptions
 from .sampled_controller import Hold, SampledController
 
@@ -29,7 +29,7 @@ class Applied:
     controller: a sampled one.
     """
 
-    model: Model
+    model: Equations
     constant: Any
     nodes: Sequence[Node] | None
     controller: SampledController | None = None
@@ -50,9 +50,8 @@ class Applied:
             raise ValueError(f"method {options.method!r} does not end its steps with periods: take one of dyn.METHODS")
         if options.direction < 0.0:
             raise ValueError("a SampledController holds what it has seen, so that t_end has to be later than t0")
-        system = as_system(self.model)
         observed = None if problem.velocities is None else _compiled(problem.velocities, options.backend)
-        return Hold(self.controller, system.velocities, system.nq, options.t0, observed)
+        return Hold(self.controller, self.model.velocities, problem.nq, options.t0, observed)
 
     def graph(self, problem: Problem) -> Graph:
         """tau as a graph over the states, t and parameters of a problem of the model."""
@@ -67,14 +66,15 @@ def _compiled(velocities: Graph, backend: str) -> cg.Compiled:
     return cg.compile(velocities, backend)
 
 
-def with_applied(model: Model, tau: Tau, parameters: Mapping[str, Any] | None) -> tuple[Model, Applied]:
-    """The model that moves, with a controller in closed form, and what is applied to it.
+def with_applied(model: Model, tau: Any, parameters: Mapping[str, Any] | None) -> tuple[Equations, Applied]:
+    """The system that moves, with a controller in closed form, and what is applied to it.
 
     parameters: of the run; those that the model does not have are the controller's.
     """
+    moving = as_equations(model)
     if isinstance(tau, SampledController):
-        if as_ode(model) is not None:
+        if moving.system is None:
             raise TypeError("a controller gives forces, and none act on a system of first order")
-        return model, Applied(model, 0.0, as_system(model).tau, tau)
-    moving, constant, forces = with_closed_form(model, tau, parameters)
+        return moving, Applied(moving, 0.0, moving.system.tau, tau)
+    moving, constant, forces = with_closed_form(moving, tau, parameters)
     return moving, Applied(moving, constant, forces)

@@ -33,13 +33,7 @@ class Recorder:
         else:
             following = int(np.searchsorted(self.direction * self.times, self.direction * last, side="right"))
             times = self.times[self._next : following]
-            rows = np.searchsorted(self.direction * block.t, self.direction * times)
-            exact = block.t[rows] == times
-            states = block.x[rows]
-            if not exact.all():
-                inside = rows[~exact]
-                states[~exact] = block.states_at(inside, (times[~exact] - block.t_old[inside]) / block.h[inside])
-            self._append(times, states)
+            self._append(times, block.at(times))
         self._next, self.last, self._last_state = following, last, block.x[-1].copy()
 
     def add_last(self) -> None:

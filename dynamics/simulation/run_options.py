@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import math
+import os
+from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,7 +17,6 @@ from cgraph.extend import Array, real_array, real_number
 from ..equations.initial_value import times_to_record
 from ..integrators import METHODS
 from ..integrators.step_control import RESOLUTION
-from .free_memory import room
 from .steps.equal_steps import step_count
 
 METHOD = "dop853"  # unless another is asked for
@@ -22,6 +24,7 @@ RTOL, ATOL = 1e-9, 1e-10  # of chosen steps
 STEP = 1e-3  # s, of methods of equal steps
 BOUND = 1e-3  # of the estimated error of equal steps, relative
 TABLES = 3  # that the rows are in at most at once, while they are put together
+SHARE = 0.9  # of the free memory
 SCIPY = "scipy:"
 SCIPY_SOLVERS = ("Radau", "BDF", "LSODA", "DOP853", "RK45")
 
@@ -240,3 +243,18 @@ def time_span(t_end: float | None, t0: float, t_span: ArrayLike | None) -> tuple
     if span.shape != (2,):
         raise ValueError(f"t_span must be two times, (t0, t_end), got shape {span.shape}")
     return float(span[0]), float(span[1])
+
+
+def room() -> float:
+    """Bytes that a result may take."""
+    return SHARE * _free()
+
+
+def _free() -> float:
+    """Bytes that can be taken without swapping; where the system does not say, all there are, or no limit."""
+    with suppress(OSError, StopIteration):  # Linux
+        lines = Path("/proc/meminfo").read_text(encoding="ascii").splitlines()
+        return 1024.0 * next(int(line.split()[1]) for line in lines if line.startswith("MemAvailable:"))
+    with suppress(OSError, ValueError, AttributeError):  # macOS
+        return float(os.sysconf("SC_PHYS_PAGES")) * os.sysconf("SC_PAGE_SIZE")
+    return math.inf

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-import time
 import warnings
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import replace
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,17 +18,14 @@ from ..equations.initial_value import initial_value
 from ..integrators import Problem, derive, force, in_form, total_energy
 from ..systems.model import Model
 from .applied_forces import Applied, Tau, with_applied
-from .estimates.advice import advise
-from .estimates.error_estimate import ErrorEstimate
-from .estimates.run_estimate import RunEstimate
 from .events.event import Event, as_events
 from .events.event_program import event_program
-from .free_memory import room
 from .missed_momenta import missed_momenta
+from .outcome import INTERRUPTED, REACHED, outcome
 from .progress_bar import Progress
 from .recorder import Recorder
 from .row_values import converted, row_values
-from .run_options import METHOD, TABLES, RunOptions, time_span
+from .run_options import METHOD, TABLES, RunOptions, room, time_span
 from .sampled_controller import HeldForces
 from .solution import Solution
 from .steps.dense_output import StepBlock
@@ -177,14 +173,15 @@ def simulate(
     run, x = made(options, hold=hold), converted(stepped.momentum, t0, start.x)
 
     # Integrate, noting rows and events
-    recorder = Recorder(x, options.times, options.t0, options.direction)
     steps: list[StepBlock] | None = [] if dense_output else None
-    outcome = _integrate(run, x, recorder, options, steps, made if hold is None else None)
+    stats, rows = _integrate(run, x, options, steps, made if hold is None else None)
 
     # Put the result together
-    rows, held = recorder.table(), None if hold is None else hold.held
-    stats = _stats(run, options.method, outcome, missed_momenta(stepped, *rows, start=(t0, start.x, x)))
-    for text in [*outcome.early, *stats.warnings]:
+    held = None if hold is None else hold.held
+    if missed := missed_momenta(stepped, *rows, start=(t0, start.x, x)):
+        stats = replace(stats, warnings=(*stats.warnings, *missed))
+    early = not stats.success and not stats.message.startswith(INTERRUPTED)
+    for text in [*([f"the run {stats.message}"] if early else []), *stats.warnings]:
         warnings.warn(text, SimulationWarning, stacklevel=2)
     dense = None if steps is None else Solution(options.t0, x, steps, problem.nq, stepped.velocities)
     kept = run.crossings(problem.nq), _graphs(problem, applied), dense, held
@@ -192,74 +189,37 @@ def simulate(
     return Trajectory(*table, stats, *kept, model.coordinates, model.velocities, momenta)
 
 
-class _Outcome(NamedTuple):
-    """How a run ended: in the end, at an event, or otherwise; and how large its error is.
-
-    early: that it stopped, unless Ctrl-C did it.
-    """
-
-    seconds: float
-    status: int
-    message: str
-    error: ErrorEstimate | None
-    early: tuple[str, ...] = ()
-
-
 def _integrate(
     run: Integration,
     x: Array,
-    recorder: Recorder,
     options: RunOptions,
     steps: list[StepBlock] | None,
     again: Callable[[RunOptions], Integration] | None,
-) -> _Outcome:
-    """Run from x to t_end, an event, a failure, the end of the memory, or Ctrl-C, and estimate the error.
-
-    steps: receives the steps with their dense output.  again: the same run by other options, see `advise`.
-    """
-    begin, error, interrupted = time.perf_counter(), None, False
-    estimate = RunEstimate(run, x, options)
-    try:
-        with np.errstate(all="ignore"), Progress("simulate", options.length, options.progress) as report:
-            _run(run, x, recorder, estimate, steps, lambda t: report(abs(t - options.t0)))
-            error = None if run.status else estimate.result()
-    except KeyboardInterrupt:
-        run.status, interrupted = f"interrupted after t = {recorder.last:.6g} s", True
-    if run.status:
+) -> tuple[Stats, tuple[Array, Array]]:
+    """How a run from x goes, and its rows, times and states.  steps: see `_noted`.  again: see `outcome`."""
+    recorder = Recorder(x, options.times, options.t0, options.direction)
+    stats = outcome(run, x, recorder, options, _noted(run, x, recorder, options, steps), again)
+    if stats.message != REACHED:  # where it ended is its last row, also between the times of t_eval
         recorder.add_last()
-    seconds = time.perf_counter() - begin - estimate.seconds
-    advise(run, recorder.last, options, x, again)
-    if run.event and not run.status:
-        return _Outcome(seconds, 1, run.event, error)
-    early = (f"the run {run.status}",) if run.status and not interrupted else ()
-    return _Outcome(seconds, -1 if run.status else 0, run.status or "reached t_end", error, early)
+    return stats, recorder.table()
 
 
-def _run(
-    run: Integration,
-    x: Array,
-    recorder: Recorder,
-    estimate: RunEstimate,
-    steps: list[StepBlock] | None,
-    report: Callable[[float], None],
-) -> None:
-    """Note rows and events, block by block. A run that an event ends has it as its last row."""
+def _noted(
+    run: Integration, x: Array, recorder: Recorder, options: RunOptions, steps: list[StepBlock] | None
+) -> Iterator[StepBlock]:
+    """The blocks of a run, until rows and steps fill the memory.  steps: receives them, with their dense output."""
     most, kept = room() / TABLES, 0
-    for block in run.blocks(x):
-        if steps is not None and block.dense is None:
-            block = run.with_dense(block)
-        recorder.add(block)
-        estimate.add(block)
-        if steps is not None:
-            steps.append(block)
-            kept += block.nbytes
-        if recorder.size + kept > most:
-            last = f"{recorder.last:.6g} s"
-            run.status = f"stopped at t = {last}: the rows fill the memory; t_eval records fewer"
-            return
-        report(float(block.t[-1]))
-    if run.event:
-        recorder.add_last()
+    with Progress("simulate", options.length, options.progress) as report:
+        for block in run.blocks(x):
+            if steps is not None:
+                steps.append(block if block.dense is not None else run.with_dense(block))
+                kept += steps[-1].nbytes
+            yield block if steps is None else steps[-1]
+            if recorder.size + kept > most:
+                last = f"{recorder.last:.6g} s"
+                run.status = f"stopped at t = {last}: the rows fill the memory; t_eval records fewer"
+                return
+            report(abs(float(block.t[-1]) - options.t0))
 
 
 def _table(
@@ -271,29 +231,6 @@ def _table(
     if energy is not None:
         energies = row_values(energy, times, states, () if held is None else held.at(times))[:, 0]
     return (times, states[:, :nq], states[:, nq:], energies), rows[:, nq:] if stepped.momenta else None
-
-
-def _stats(run: Integration, method: str, outcome: _Outcome, said: Sequence[str]) -> Stats:
-    seconds, status, message, error, _ = outcome
-    if error and math.isnan(error.largest):
-        error = None  # nothing could be compared
-    texts = [*run.warnings, *said, *([error.warning] if error and error.warning else [])]
-    return Stats(
-        method,
-        run.steps,
-        run.rejected,
-        run.evaluations,
-        run.largest,
-        seconds,
-        status >= 0,
-        message,
-        status,
-        run.jacobians,
-        run.factorizations,
-        error.largest if error else None,
-        error.last if error else None,
-        tuple(texts),
-    )
 
 
 def _graphs(problem: Problem, applied: Applied) -> dict[str, Graph]:

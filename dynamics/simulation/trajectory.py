@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph import Graph
-from cgraph.extend import Array, counted, or_nearest, picture
+from cgraph import Graph, extend
+from cgraph.extend import Array, counted, or_nearest
 
 from .row_values import row_values
 from .sampled_controller import HeldForces
@@ -338,7 +338,7 @@ class Trajectory:
 
     def _repr_html_(self) -> str | None:
         """The plot that a notebook shows, when a drawing package is installed (extra `viz`)."""
-        return picture("trajectory", self)
+        return extend.picture("trajectory", self)
 
     def __repr__(self) -> str:
         n, stats = self.q.shape[1], self.stats

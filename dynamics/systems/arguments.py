@@ -7,7 +7,7 @@ import math
 import numbers
 import re
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from types import FunctionType
+from types import CodeType, FunctionType
 from typing import Any, NoReturn
 
 import cgraph as cg
@@ -109,10 +109,8 @@ def call_user_function(what: str, function: Callable[..., object], *arguments: o
 
 def _takes(function: Callable[..., object], count: int) -> bool:
     """Whether it can be called with so many arguments."""
-    if type(function) is FunctionType and not hasattr(function, "__wrapped__"):
-        code = function.__code__
-        if not code.co_kwonlyargcount and not code.co_flags & inspect.CO_VARARGS:
-            return 0 <= code.co_argcount - count <= len(function.__defaults__ or ())
+    if (code := _plain_code(function)) is not None:
+        return 0 <= code.co_argcount - count <= len(function.__defaults__ or ())
     try:
         inspect.signature(function).bind(*[None] * count)
     except TypeError:
@@ -122,8 +120,18 @@ def _takes(function: Callable[..., object], count: int) -> bool:
 
 def _keeps(function: Callable[..., object], place: int, name: str) -> bool:
     """Whether its argument at this place has a default and another name: a value that it keeps."""
+    if _plain_code(function) is not None and not function.__defaults__:
+        return False
     taken = [*inspect.signature(function).parameters.values()][place : place + 1]
     return any([each.default is not each.empty and each.name != name for each in taken])
+
+
+def _plain_code(function: Callable[..., object]) -> CodeType | None:
+    """The code of a function of positional arguments alone, which tells its signature sooner than `inspect` does."""
+    if type(function) is not FunctionType or hasattr(function, "__wrapped__"):
+        return None
+    code = function.__code__
+    return None if code.co_kwonlyargcount or code.co_flags & inspect.CO_VARARGS else code
 
 
 def sequence(what: str, value: Any) -> list[Any]:

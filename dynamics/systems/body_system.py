@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 from cgraph import Node
 from cgraph.extend import Builder
 
-from .momentum_derivatives import MomentumDerivatives
 from .system import BiasForce, System
 from .torque_derivatives import MotionState, TorqueDerivatives
 
@@ -26,11 +25,6 @@ class BodyEquations(Protocol):
 
     def torque_derivatives(self, state: MotionState, build: Builder) -> TorqueDerivatives | None:
         """Derivatives of the torques of a motion."""
-
-    def momentum_derivatives(
-        self, q: Sequence[Node], qd: Sequence[Node], p: Sequence[Node], build: Builder
-    ) -> MomentumDerivatives | None:
-        """How velocities and rates of momenta depend on coordinates and momenta."""
 
 
 class BodySystem(System):
@@ -77,7 +71,3 @@ class BodySystem(System):
     def torque_derivatives(self, qdd: Sequence[Node], build: Builder) -> TorqueDerivatives | None:
         """In closed form; see `System.torque_derivatives`."""
         return self._equations.torque_derivatives((self.q, self.qd, qdd), build)
-
-    def momentum_derivatives(self, p: Sequence[Node], build: Builder) -> MomentumDerivatives | None:
-        """By articulated inertias; see `System.momentum_derivatives`."""
-        return self._equations.momentum_derivatives(self.q, self.qd, p, build)

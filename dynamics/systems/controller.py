@@ -12,7 +12,7 @@ from cgraph import Graph, Node
 from cgraph.extend import memo, topological
 
 from .arguments import Parameters, parameter_items, parameter_value
-from .model import Model, as_ode, as_system
+from .model import Equations, Model, as_equations
 from .system import System, generalized_forces, require_known
 
 KEPT = 16  # systems that stay for another run
@@ -64,16 +64,18 @@ def with_controller(
     >>> A.round(3).tolist()
     [[0.0, 1.0], [-74.422, -9.0]]
     """
-    return controlled(model, controller, parameters).system
+    return controlled(as_equations(model), controller, parameters).system
 
 
 def controlled(
-    model: Model, controller: Callable[..., Sequence[Node | float]], parameters: Mapping[str, float] | None = None
+    model: Equations,
+    controller: Callable[..., Sequence[Node | float]],
+    parameters: Mapping[str, float] | None = None,
 ) -> Controlled:
     """See `with_controller`. For a controller with the same graph as one of the last few, the same nodes."""
-    if as_ode(model) is not None:
+    system = model.system
+    if system is None:
         raise TypeError("a controller gives forces, and none act on a system of first order: write it into the rate")
-    system = as_system(model)
     gains = {name: parameter_value(name, value) for name, value in parameter_items(parameters)}
     if shared := [name for name in gains if name in system.parameters]:
         raise ValueError(f"{shared[0]!r} is a parameter of the model; choose another name for that of the controller")
@@ -103,14 +105,14 @@ def _controlled(request: _Request) -> Controlled:
     return Controlled(_with_forces(request.system, request.forces, dict(request.gains)), request.forces)
 
 
-def with_closed_form(model: Model, tau: Any, parameters: object) -> tuple[Model, Any, Sequence[Node] | None]:
+def with_closed_form(model: Equations, tau: Any, parameters: object) -> tuple[Equations, Any, Sequence[Node] | None]:
     """What moves, the constant force on it, and the whole applied force as nodes; of a first-order model None.
 
     tau: a controller in closed form, or the constant force.  parameters: of the run, {name: value}; those that the
     model does not have are the controller's.
     """
     if not callable(tau):
-        return model, tau, None if as_ode(model) is not None else as_system(model).tau
+        return model, tau, None if model.system is None else model.system.tau
     given = parameters if isinstance(parameters, Mapping) else {}
     closed = controlled(model, tau, {name: 0.0 for name in given if name not in model.parameters})
     return closed.system, 0.0, closed.forces

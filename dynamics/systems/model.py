@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Protocol, TypeAlias
 
 if TYPE_CHECKING:
     from .ode_system import OdeSystem
     from .system import System
+
+Equations: TypeAlias = "System | OdeSystem"  # what is behind a model
 
 
 class Model(Protocol):
@@ -85,9 +87,15 @@ def as_ode(model: Model) -> OdeSystem | None:
     return ode
 
 
+def as_equations(model: Model) -> Equations:
+    """The Lagrangian or the first-order system of a model, itself a model: what a run asks from its door on."""
+    ode = as_ode(model)
+    return as_system(model) if ode is None else ode
+
+
 def system_of(model: Model) -> System | None:
     """The Lagrangian system of a model; None of one of first order."""
-    return as_system(model) if as_ode(model) is None else None
+    return as_equations(model).system
 
 
 def _made(model: object) -> object:

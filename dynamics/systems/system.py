@@ -10,8 +10,8 @@ from functools import cached_property
 from numpy.typing import ArrayLike
 
 import cgraph as cg
-from cgraph import Graph, Node
-from cgraph.extend import Builder, require_sequence, shortened, topological
+from cgraph import Graph, Node, extend
+from cgraph.extend import Builder, require_sequence, topological
 
 from .arguments import (
     TIME,
@@ -25,7 +25,6 @@ from .arguments import (
 )
 from .constraints import Constraints
 from .kinematics import Kinematics
-from .momentum_derivatives import MomentumDerivatives
 from .quasi_velocities import QuasiVelocities
 from .torque_derivatives import TorqueDerivatives
 
@@ -246,7 +245,9 @@ class System:
 
         P, whose sums could lose digits that a product of differences keeps, only where it then depends on less.
         """
-        kinetic, potential, forces = (shortened(part) for part in ([self.kinetic], [self.potential], self.forces))
+        kinetic, potential, forces = (
+            extend.shortened(part) for part in ([self.kinetic], [self.potential], self.forces)
+        )
         if [*kinetic, *potential, *forces] == [self.kinetic, self.potential, *self.forces]:
             return None
         other = copy(self)
@@ -283,10 +284,6 @@ class System:
 
     def torque_derivatives(self, qdd: Sequence[Node], build: Builder) -> TorqueDerivatives | None:
         """Torques of a motion and their derivatives, without damping and applied forces; None as for `bias_forces`."""
-        return None
-
-    def momentum_derivatives(self, p: Sequence[Node], build: Builder) -> MomentumDerivatives | None:
-        """How velocities and rates of momenta depend on coordinates and momenta, without damping and applied forces."""
         return None
 
     def _require_consistent(self) -> None:

@@ -3,7 +3,7 @@
 from typing import Any
 
 from dynamics.integrators import METHODS
-from dynamics.integrators.composition import COMPOSITIONS
+from dynamics.integrators.symplectic_tableaus import COMPOSITIONS
 from tests.slow import slow
 
 # Compositions differ in their coefficients alone: of those a short and a long one, for what holds of every method.

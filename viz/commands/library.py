@@ -35,8 +35,6 @@ if TYPE_CHECKING:
 
     from .. import theme
     from ..animation.canvas import KINDS, check_can_animate
-    from ..architecture.architecture import architecture
-    from ..architecture.picture import to_dot as architecture_dot
     from ..graph_drawing.dot import to_dot
     from ..graph_drawing.render import check_can_draw, render_png, render_svg, tags_to_collapse
     from ..lessons.lesson import SCREENS, lesson

@@ -27,7 +27,6 @@ COMMANDS = {
     "why": "the paths by which an output depends on an input, and what they weigh",
     "compare": "compare two formulations of a scene's equations, node by node; status 1 where they differ",
     "lesson": "a page for a class, on any scene: predict, reveal, play; with answers",
-    "architecture": "which folder of the library imports which; status 1 for a circle or an arrow that climbs",
     "completion": "a script that lets the Tab key complete commands and options",
 }
 

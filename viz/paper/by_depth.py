@@ -7,8 +7,7 @@ from collections.abc import Mapping, Sequence
 from cgraph import Counts, Graph
 from dynamics import hamilton_equations, scenes, state_equation
 from dynamics.equations.both_forms import HAMILTON, LAGRANGE, VELOCITIES_ALONE, both_forms, form_sizes
-from dynamics.experiments.speed.bench_scenes import chain
-from dynamics.experiments.speed.both_forms import MODELS
+from dynamics.experiments.speed.bench_scenes import SCENES, chain
 from dynamics.experiments.text_table import csv_text
 
 from .. import theme
@@ -40,12 +39,12 @@ SIZES = ("nodes", "edges", "depth", "width")
 def figure7(larger: Mapping[str, str] = LARGER) -> Part:
     """Figure 7: a rotor on a spring and the three-link arm in both forms, a row for each operation of depth.
 
-    And the silhouettes of a long chain in both orders of elimination.  larger: {what it is called: one of `MODELS`}
+    And the silhouettes of a long chain in both orders of elimination.  larger: {what it is called: one of the bench's `SCENES`}
     whose sizes are counted as well.
     """
     drawn = {SPRING: both_forms(scenes.load("spring_mass")), ARM: both_forms(scenes.load("triple_pendulum"))}
     sizes = {name: form_sizes(forms) for name, forms in drawn.items()}
-    sizes |= {name: form_sizes(both_forms(MODELS[model]())) for name, model in larger.items()}
+    sizes |= {name: form_sizes(both_forms(SCENES[model]())) for name, model in larger.items()}
     spring = levels_svg([LevelPanel(TITLES[name], graph) for name, graph in drawn[SPRING].items()], LARGE)
     level = sizes[ARM][VELOCITIES_ALONE].depth
     marks: dict[str, Mapping[str, int]] = {HAMILTON: {"q̇ is solved": level}}

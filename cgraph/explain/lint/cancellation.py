@@ -55,29 +55,12 @@ def rounded(names: Names, at: Point) -> Rounded:
 
 @explain_failure
 def certain_digits(graph: Graph, at: Point) -> dict[str, float]:
-    """Decimal digits of the outputs that rounding leaves certain at a point, by a running bound to first order.
+    """Decimal digits of the outputs that rounding leaves certain at a point, {output: digits}, by a running bound.
 
-    Parameters
-    ----------
-    graph : Graph
-        Any graph.
-    at : mapping of str to float
-        A value for every input, taken to be off by half a unit in the last place.
+    at: {input: value}, each taken to be off by half a unit in the last place. The bound is to first order; digits are 0
+    to 16, infinite where nothing was rounded, NaN where there is no bound. Raises GraphError for an input that is
+    missing or unknown, ValueError for a value that is not finite.
 
-    Returns
-    -------
-    dict of str to float
-        {output: digits}, 0 to 16; infinite where nothing was rounded, NaN where the bound is none.
-
-    Raises
-    ------
-    GraphError
-        For an input that is missing or unknown.
-    ValueError
-        For a value that is not finite.
-
-    Examples
-    --------
     >>> import cgraph as cg
     >>> from cgraph.extend import certain_digits
     >>> x, y = cg.variables("x y")

@@ -11,7 +11,7 @@ from ..statements.call import Call, Map, added, zeroed
 from .products import Products
 from .single_assignment import Assignment, Registers, flat
 
-HEAVY = 8  # nodes of a graph for each of its outputs, from which on these are kept and not computed again
+HEAVY = 4  # operations of a graph for each of its outputs, from which on these are kept and not computed again
 
 
 class Replayed(NamedTuple):
@@ -158,4 +158,7 @@ def replayed(assignments: Sequence[Assignment], values: Iterable[str]) -> Replay
 def _heavy(statement: Statement) -> bool:
     if row_of(statement).bodies:
         return True
-    return isinstance(statement, Call) and len(statement.graph.nodes) > HEAVY * len(statement.graph.outputs)
+    if not isinstance(statement, Call):
+        return False
+    graph = statement.graph
+    return sum(1 for node in graph.nodes if node.args) > HEAVY * len(graph.outputs)

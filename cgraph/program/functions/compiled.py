@@ -16,8 +16,7 @@ from ...core.graph import Graph
 from ...util.html_text import html_table, html_text
 from ...util.memory import lies_in_rows, require_memory, require_out, require_target
 from ...util.real_arrays import real_array
-from ...util.threads import thread_count
-from ..runners.write_batch import write_batch
+from ...util.threads import thread_count, write_batch
 from .bound_function import point_of
 from .differentiable import Differentiable
 

@@ -6,23 +6,24 @@ import ctypes
 import threading
 from collections.abc import Callable, Mapping
 from functools import cached_property, partial
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ...codegen import llvm_engine as llvm
-from ...codegen.batch_code import BatchCode
-from ...codegen.batch_ir import Batch, batch_ir
 from ...codegen.bound_call import LONG, SHORT, bound_call
-from ...codegen.disk_cache import Cache
 from ...core.evaluation import Array
 from ...core.scope import without_collection
 from ...util.memory import aligned
 from ..fuse import fused
 from ..program import Program, whole_graph
 from .llvm_ir import offsets, point_ir, program_functions, program_ir, require_texts
-from .rows_ir import program_rows_ir
 from .runner import Record, Runner
+
+if TYPE_CHECKING:
+    from ...codegen.batch_ir import Batch
+    from ...codegen.disk_cache import Cache
+    from .batch_code import BatchCode
 
 _NUMBER = 8  # bytes
 _POINTER, _COUNT = ctypes.c_void_p, ctypes.c_int64
@@ -141,6 +142,8 @@ class NativeRunner(Runner):
 
     def _batch(self, name: str) -> tuple[int, BatchCode]:
         """The points in a block, and the machine code."""
+        from .batch_code import BatchCode
+
         lanes, text, alone = self._host.lanes, self.batch_text(name), whole_graph(self._fused, name) is not None
         code = self._compiled(text.source, looped=not alone)
         width = max(WORK // max(1, self._nodes) // lanes, 1) * lanes
@@ -148,6 +151,9 @@ class NativeRunner(Runner):
 
     def batch_text(self, name: str) -> Batch:
         """The text in LLVM's language of the function for batches of a register."""
+        from ...codegen.batch_ir import batch_ir
+        from .batch_code import program_rows_ir
+
         lanes, how, graph = self._host.lanes, (self._flags, self._host.registers), whole_graph(self._fused, name)
         with without_collection():
             if graph is not None:

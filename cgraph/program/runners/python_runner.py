@@ -10,8 +10,8 @@ import numpy as np
 from ...codegen.python_function import OnArrays, OnFloats
 from ...core.evaluation import Array
 from ...core.graph import Graph
-from ..execution import Execution
 from ..program import Program, whole_graph
+from ..statement import Execution
 from .runner import Record, Runner
 
 BLOCK = 4096  # points that NumPy takes at once: temporaries stay in the cache

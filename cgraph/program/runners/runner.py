@@ -15,12 +15,10 @@ from ...core.evaluation import Array
 from ...util.memory import describe, require_memory, require_out
 from ...util.real_arrays import real_array
 from ...util.require import require_mapping, require_whole
-from ...util.threads import thread_count
-from ..many import many
+from ...util.threads import thread_count, write_batch
 from ..program import Program
 from ..statement import reads_and_writes, row_of
 from .llvm_ir import offsets
-from .write_batch import write_batch
 
 BLOCK = 64  # states of a batch in Python that are run between looks at the keyboard
 
@@ -92,6 +90,8 @@ class Runner(ABC):
     def masked(self) -> Program:
         """The program of memories side by side, see `many`; made at its first use."""
         if self._masked is None:
+            from ..many import many
+
             self._masked = many(self.program)
         return self._masked
 

@@ -15,6 +15,7 @@ from ...core.evaluation import Array
 from ...core.graph import Graph
 from ...writing.naming import variables
 from ..statement import (
+    Execution,
     Lengths,
     Names,
     Statement,
@@ -24,7 +25,6 @@ from ..statement import (
 )
 
 if TYPE_CHECKING:
-    from ..execution import Execution
     from ..writer import Writer
 
 State = dict[str, list[float]]
@@ -123,8 +123,13 @@ def elements(statement: Map | Sum, lengths: Lengths) -> int:
 
 
 def copied(source: str, target: str) -> Map:
-    """target = source."""
-    return Map(SAME, (source,), (target,))
+    """Statement target = source, of registers of one length.
+
+    >>> from cgraph.extend import copied
+    >>> copied("x_new", "x").outputs
+    ('x',)
+    """
+    return Map(_SAME, (source,), (target,))
 
 
 def zeroed(register: str) -> Map:
@@ -133,12 +138,17 @@ def zeroed(register: str) -> Map:
 
 
 def added(total: str, term: str, result: str) -> Map:
-    """result = total + term."""
+    """Statement result = total + term, of registers of one length.
+
+    >>> from cgraph.extend import added
+    >>> added("x", "change", "x").inputs
+    ('x', 'change')
+    """
     return Map(_ADDED, (total, term), (result,))
 
 
 _A, _B = variables("a b")
-SAME = Graph([_A], {"a": _A})
+_SAME = Graph([_A], {"a": _A})
 _ZERO = Graph([_A], {"zero": 0.0})
 _ADDED = Graph([_A, _B], {"sum": _A + _B})
 

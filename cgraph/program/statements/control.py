@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...core.evaluation import Array
-from ..statement import Lengths, Statement, require_length
+from ..statement import Execution, Lengths, Statement, require_length
 
 if TYPE_CHECKING:
-    from ..execution import Execution
     from ..writer import Writer
 
 State = dict[str, list[float]]

@@ -1,19 +1,23 @@
-"""Factor, Solve: linear equations of a matrix in a register."""
+"""Factor, Solve: linear equations of a matrix in a register, by LU factorization with partial pivoting.
+
+In NumPy and as LLVM text: the same operations in the same order. Arrays and memory may have an axis of lanes more, the
+last: many matrices side by side, each with pivots of its own.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...codegen.arithmetic import Arithmetic
 from ...core.evaluation import Array
-from ..statement import Lengths, Statement, length_of, require_length
-from . import lu_solve
+from ..statement import Execution, Lengths, Statement, length_of, require_length
+from .function_writer import FunctionWriter
 
 if TYPE_CHECKING:
-    from ..execution import Execution
     from ..writer import Writer
 
 State = dict[str, list[float]]
@@ -82,7 +86,7 @@ def run_factor(statement: Factor, state: State, _: Execution) -> None:
     """In Python."""
     n = len(state[statement.pivots])
     a, p = np.array(state[statement.matrix]).reshape(n, n), np.empty(n)
-    lu_solve.factor(a, p)
+    _factor(a, p)
     state[statement.matrix], state[statement.pivots] = a.ravel().tolist(), p.tolist()
 
 
@@ -90,7 +94,7 @@ def run_solve(statement: Solve, state: State, _: Execution) -> None:
     """In Python."""
     n = len(state[statement.pivots])
     a, p, b = np.array(state[statement.matrix]), np.array(state[statement.pivots]), np.array(state[statement.vector])
-    _solve(statement)(a.reshape(n, n), p, b)
+    _solver(statement)(a.reshape(n, n), p, b)
     state[statement.vector] = b.tolist()
 
 
@@ -99,7 +103,7 @@ def factor_beside(statement: Factor, state: dict[str, Array], _: Execution) -> N
     pivots = np.empty_like(state[statement.pivots])
     n, count = pivots.shape
     a = np.array(state[statement.matrix])
-    lu_solve.factor(a.reshape(n, n, count), pivots)
+    _factor(a.reshape(n, n, count), pivots)
     state[statement.matrix], state[statement.pivots] = a, pivots
 
 
@@ -107,26 +111,161 @@ def solve_beside(statement: Solve, state: dict[str, Array], _: Execution) -> Non
     """Of many memories."""
     pivots, b = state[statement.pivots], np.array(state[statement.vector])
     n, count = b.shape
-    _solve(statement)(state[statement.matrix].reshape(n, n, count), pivots, b)
+    _solver(statement)(state[statement.matrix].reshape(n, n, count), pivots, b)
     state[statement.vector] = b
 
 
-def _solve(statement: Solve) -> Callable[[Array, Array, Array], None]:
-    return lu_solve.solve_transposed if statement.transposed else lu_solve.solve
+def _solver(statement: Solve) -> Callable[[Array, Array, Array], None]:
+    return _solve_transposed if statement.transposed else _solve
 
 
 def factor_text(statement: Factor, writer: Writer) -> None:
     """As machine code."""
     n = writer.registers[statement.pivots]
-    name = writer.functions.text("lu.factor", lu_solve.factor_text)
+    name = writer.functions.text("lu.factor", _lu_factor_text)
     writer.line(f"call void @{name}({writer.arguments(statement.matrix, statement.pivots)}, i64 {n})")
 
 
 def solve_text(statement: Solve, writer: Writer) -> None:
     """As machine code."""
     n = writer.registers[statement.pivots]
-    name, text = "lu.solve", lu_solve.solve_text
+    name, text = "lu.solve", _lu_solve_text
     if statement.transposed:
-        name, text = "lu.solve.transposed", lu_solve.solve_transposed_text
+        name, text = "lu.solve.transposed", _lu_solve_transposed_text
     arguments = writer.arguments(statement.matrix, statement.pivots, statement.vector)
     writer.line(f"call void @{writer.functions.text(name, text)}({arguments}, i64 {n})")
+
+
+def _factor(a: Array, pivots: Array) -> None:
+    """LU = PA in place of a (n, n), L with a unit diagonal; pivots (n,) receives the row exchanged with row k."""
+    n = len(a)
+    with np.errstate(all="ignore"):
+        for k in range(n):
+            pivots[k] = _largest(a, k)
+            _exchange(a, k, pivots)
+            a[k + 1 :, k] /= a[k, k]  # column k of L; then the Schur complement
+            a[k + 1 :, k + 1 :] -= a[k + 1 :, k, None] * a[k, k + 1 :]
+
+
+def _solve(a: Array, pivots: Array, b: Array) -> None:
+    """The solution of A x = b in place of b (n,)."""
+    n = len(a)
+    with np.errstate(all="ignore"):
+        for k in range(n):  # b = P b
+            _exchange(b, k, pivots)
+        for k in range(n):  # L y = b
+            b[k + 1 :] -= a[k + 1 :, k] * b[k]
+        for k in reversed(range(n)):  # U x = y
+            b[k] /= a[k, k]
+            b[:k] -= a[:k, k] * b[k]
+
+
+def _solve_transposed(a: Array, pivots: Array, b: Array) -> None:
+    """The solution of A^T x = b in place of b (n,): A^T = U^T L^T P."""
+    n = len(a)
+    with np.errstate(all="ignore"):
+        for k in range(n):  # U^T y = b
+            b[k] /= a[k, k]
+            b[k + 1 :] -= a[k, k + 1 :] * b[k]
+        for k in reversed(range(n)):  # L^T z = y
+            b[:k] -= a[k, :k] * b[k]
+        for k in reversed(range(n)):  # x = P^T z
+            _exchange(b, k, pivots)
+
+
+def _largest(a: Array, k: int) -> Any:
+    """argmax over i >= k of |a[i, k]|, in every lane: not NumPy's, since a NaN must not win, as in machine code."""
+    row: Any = k
+    if a.ndim == 2:
+        for i in range(k + 1, len(a)):
+            if abs(a[i, k]) > abs(a[row, k]):
+                row = i
+        return row
+    best = np.abs(a[k, k])
+    for i in range(k + 1, len(a)):
+        size = np.abs(a[i, k])
+        row, best = np.where(size > best, i, row), np.where(size > best, size, best)
+    return row
+
+
+def _exchange(b: Array, k: int, pivots: Array) -> None:
+    """Rows k and pivots[k]; in a lane that is not asked for, where this is no row, row k with itself."""
+    if pivots.ndim == 1:
+        if (row := int(pivots[k])) != k:
+            b[[k, row]] = b[[row, k]]
+        return
+    lanes, there = np.arange(b.shape[-1]), (pivots[k] >= 0.0) & (pivots[k] < len(b))
+    rows = np.where(there, pivots[k], k).astype(int)
+    b[k], b[rows, ..., lanes] = np.moveaxis(b[rows, ..., lanes], 0, -1), np.moveaxis(b[k].copy(), -1, 0)
+
+
+def _lu_factor_text(arithmetic: Arithmetic) -> list[str]:
+    """`void lu.factor(double *a, double *p, int64_t n)`, as `factor`."""
+    ir = FunctionWriter(arithmetic)
+    best, chosen = (ir.value(f"alloca {ir.type}, align 64") for _ in range(2))
+    with ir.loop("0", "%n") as k:
+        # p[k] = argmax over i >= k of |a[i, k]|
+        next_k = ir.value(f"add i64 {k}, 1")
+        ir.store(ir.absolute(ir.load(ir.element(k, k))), best)
+        ir.store(ir.everywhere(k), chosen)
+        with ir.loop(next_k, "%n") as i:
+            here, before = ir.absolute(ir.load(ir.element(i, k))), ir.load(best)
+            larger = ir.above(here, before)
+            ir.store(ir.choose(larger, here, before), best)
+            ir.store(ir.choose(larger, ir.everywhere(i), ir.load(chosen)), chosen)
+        ir.store(ir.load(chosen), ir.at("%p", k))
+        with ir.each_lane() as lane:  # exchange rows k and p[k]
+            row = ir.pivot(k, lane)
+            count = ir.value(f"select i1 {ir.value(f'icmp eq i64 {row}, {k}')}, i64 0, i64 %n")
+            with ir.loop("0", count) as j:
+                ir.exchange("%a", ir.index(k, j), ir.index(row, j), lane)
+        # for i > k:  l = a[i, k] /= a[k, k];  a[i, j] -= l a[k, j] for j > k
+        pivot = ir.load(ir.element(k, k))
+        with ir.loop(next_k, "%n") as i:
+            target = ir.element(i, k)
+            gain = ir.divide(target, pivot)
+            with ir.loop(next_k, "%n") as j:
+                ir.subtract_product(ir.element(i, j), gain, ir.load(ir.element(k, j)))
+    return ir.function("lu.factor", "ptr %a, ptr %p, i64 %n")
+
+
+def _lu_solve_text(arithmetic: Arithmetic) -> list[str]:
+    """`void lu.solve(double *a, double *p, double *b, int64_t n)`, as `solve`."""
+    ir = FunctionWriter(arithmetic)
+    # b = P b
+    with ir.loop("0", "%n") as k, ir.each_lane() as lane:
+        ir.exchange("%b", k, ir.pivot(k, lane), lane)
+    # L y = b:  b[i] -= a[i, k] b[k] for i > k, k = 0 .. n - 1
+    with ir.loop("0", "%n") as k:
+        value = ir.load(ir.at("%b", k))
+        with ir.loop(ir.value(f"add i64 {k}, 1"), "%n") as i:
+            ir.subtract_product(ir.at("%b", i), ir.load(ir.element(i, k)), value)
+    # U x = y:  b[k] /= a[k, k], b[i] -= a[i, k] b[k] for i < k, k = n - 1 .. 0
+    with ir.loop("0", "%n") as back:
+        k = ir.value(f"sub i64 {ir.value('sub i64 %n, 1')}, {back}")
+        value = ir.divide(ir.at("%b", k), ir.load(ir.element(k, k)))
+        with ir.loop("0", k) as i:
+            ir.subtract_product(ir.at("%b", i), ir.load(ir.element(i, k)), value)
+    return ir.function("lu.solve", "ptr %a, ptr %p, ptr %b, i64 %n")
+
+
+def _lu_solve_transposed_text(arithmetic: Arithmetic) -> list[str]:
+    """`void lu.solve.transposed(double *a, double *p, double *b, int64_t n)`, as `solve_transposed`."""
+    ir = FunctionWriter(arithmetic)
+    # U^T y = b:  b[k] /= a[k, k], b[i] -= a[k, i] b[k] for i > k, k = 0 .. n - 1
+    with ir.loop("0", "%n") as k:
+        value = ir.divide(ir.at("%b", k), ir.load(ir.element(k, k)))
+        with ir.loop(ir.value(f"add i64 {k}, 1"), "%n") as i:
+            ir.subtract_product(ir.at("%b", i), ir.load(ir.element(k, i)), value)
+    # L^T z = y:  b[i] -= a[k, i] b[k] for i < k, k = n - 1 .. 0
+    with ir.loop("0", "%n") as back:
+        k = ir.value(f"sub i64 {ir.value('sub i64 %n, 1')}, {back}")
+        value = ir.load(ir.at("%b", k))
+        with ir.loop("0", k) as i:
+            ir.subtract_product(ir.at("%b", i), ir.load(ir.element(k, i)), value)
+    # x = P^T z
+    with ir.loop("0", "%n") as back:
+        k = ir.value(f"sub i64 {ir.value('sub i64 %n, 1')}, {back}")
+        with ir.each_lane() as lane:
+            ir.exchange("%b", k, ir.pivot(k, lane), lane)
+    return ir.function("lu.solve.transposed", "ptr %a, ptr %p, ptr %b, i64 %n")

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...codegen.arithmetic import Arithmetic
 from ...core.checks import GraphError
 from ...core.evaluation import Array
 from ..statement import (
+    Execution,
     Lengths,
     Names,
     Statement,
@@ -22,7 +24,6 @@ from ..statement import (
 from .function_writer import FunctionWriter
 
 if TYPE_CHECKING:
-    from ..execution import Execution
     from ..writer import Writer
 
 State = dict[str, list[float]]
@@ -190,7 +191,7 @@ def _row(state: dict[str, Array], names: Names) -> Array:
     return np.concatenate([none, *[state[name] for name in names]])
 
 
-def _places(number: Array, width: int) -> Any:
+def _places(number: Array, width: int) -> NDArray[np.int_]:
     """Where the rows of these numbers lie in a stack, (width, N)."""
     return number.astype(int) * width + np.arange(width)[:, None]
 

@@ -9,10 +9,9 @@ import numpy as np
 
 from ...core.checks import GraphError
 from ...core.graph import Graph
-from ..statement import Lengths, Names, Statement, require_length
+from ..statement import Execution, Lengths, Names, Statement, require_length
 
 if TYPE_CHECKING:
-    from ..execution import Execution
     from ..writer import Writer
 
 

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from importlib.util import find_spec
-from typing import NamedTuple
 
 import numpy as np
 
@@ -19,21 +17,16 @@ from ...io.write_mjcf import to_mjcf
 from ...multibody.loops import Loop
 from ...multibody.mechanism import Mechanism
 from ...multibody.planar_arm import planar_arm
-from ...peers.case import Case
-from ...peers.pinocchio import PinocchioPeer
+from ...peers.contender import Contender
+from ...peers.pinocchio_loops import constraint_dynamics
 from ..text_table import table
+from .worker import repetitions, timed
 
 SIZES, LENGTH = (3, 10, 40), 0.8  # links, m each
 PIN = (1.0, 0.0, 0.0)  # m, where the tip is held
-REPEATS, SECONDS = 50, 0.002  # turns, and how long the calls of one take: short, so that some are not disturbed
+REPEATS = 50  # turns, each short, so that some are not disturbed
+PROXIMAL = 1e-12, 1e-10, 10  # Pinocchio's: what is left of the pin, its regularization, and iterations
 AGREE = 1e-6  # relative: Pinocchio's iteration, which stops before rounding
-
-
-class Solver(NamedTuple):
-    """A call that is timed, and the accelerations (n,) that it left."""
-
-    call: Callable[[], object]
-    result: Callable[[], Array]
 
 
 def pinned(links: int) -> tuple[Mechanism, Mechanism]:
@@ -42,39 +35,27 @@ def pinned(links: int) -> tuple[Mechanism, Mechanism]:
     return arm, Mechanism(arm.bodies, arm.gravity, loops=[Loop("point", "tip", to_at=PIN)])
 
 
-def ours(held: Mechanism, x: Array) -> Solver:
+def ours(held: Mechanism, x: Array) -> Contender:
     """The compiled graph, bound to its arrays: accelerations and the force of the pin."""
     compiled, n = cg.compile(forward_dynamics(held)), len(x) // 3
     out = np.empty(compiled.n_out)
-    return Solver(compiled.bind(np.array(x), out), lambda: out[:n])
+    return Contender(compiled.bind(np.array(x), out), lambda _: out[:n])
 
 
-def pinocchio(arm: Mechanism, x: Array) -> Solver:
-    """constraintDynamics, proximal, with a point of the last body held; without its stabilisation."""
-    peer = PinocchioPeer(Case("pinned", arm))
-    pin, model, data, n = peer.pinocchio, peer.twin, peer.data, len(x) // 3
-    models, datas = pin.StdVec_RigidConstraintModel(), pin.StdVec_RigidConstraintData()
-    tip, place = pin.SE3(np.eye(3), np.array([0.0, 0.0, -LENGTH])), pin.SE3(np.eye(3), np.array(PIN))
-    last = model.njoints - 1
-    models.append(pin.RigidConstraintModel(pin.ContactType.CONTACT_3D, model, last, tip, 0, place, pin.LOCAL))
-    datas.append(models[0].createData())
-    pin.initConstraintDynamics(model, data, models, datas)
-    q = peer.of.q(x[:n])
-    qd, tau = (peer.of.v(q, x[k * n : (k + 1) * n]) for k in (1, 2))
-    settings, solve = pin.ProximalSettings(1e-12, 1e-10, 10), pin.constraintDynamics
-    return Solver(
-        lambda: solve(model, data, q, qd, tau, models, datas, settings), lambda: peer.of.our_a(q, qd, data.ddq)
-    )
+def pinocchio(held: Mechanism, x: Array) -> Contender:
+    """constraintDynamics, proximal, without its stabilisation."""
+    run, result = constraint_dynamics(held, PROXIMAL)(x)
+    return Contender(run, lambda _: result())
 
 
-def connected(arm: Mechanism, x: Array) -> Solver:
+def connected(arm: Mechanism, x: Array) -> Contender:
     """mj_forward with an equality constraint, which is soft: other accelerations, the same work."""
     module, n = mujoco(), len(x) // 3
     hold = f'<equality><connect body1="{arm.moving[-1].name}" anchor="0 0 {-LENGTH}"/></equality>'
     model = module.MjModel.from_xml_string(to_mjcf(arm).replace("</worldbody>", f"</worldbody>{hold}"))
     data = module.MjData(model)
     data.qpos[:], data.qvel[:], data.qfrc_applied[:] = x[:n], x[n : 2 * n], x[2 * n :]
-    return Solver(lambda: module.mj_forward(model, data), lambda: data.qacc)
+    return Contender(lambda: module.mj_forward(model, data), lambda _: data.qacc)
 
 
 def closed_chains(repeats: int = REPEATS) -> Iterator[str]:
@@ -86,11 +67,14 @@ def closed_chains(repeats: int = REPEATS) -> Iterator[str]:
         q, qd = nearest_state(held, 0.6 * rng.normal(size=links), rng.normal(size=links))
         x = np.concatenate([q, qd, rng.normal(size=links)])
         calls = {"ours": ours(held, x)}
-        calls |= {"Pinocchio": pinocchio(arm, x)} if find_spec("pinocchio") else {}
+        calls |= {"Pinocchio": pinocchio(held, x)} if find_spec("pinocchio") else {}
         calls |= {"MuJoCo": connected(arm, x)} if find_spec("mujoco") else {}
+        for each in calls.values():
+            each.run()
         if "Pinocchio" in calls:
             _check(links, calls["ours"], calls["Pinocchio"])
-        turns = [{name: _microseconds(each.call) for name, each in calls.items()} for _ in range(repeats)]
+        counts = {name: repetitions(each) for name, each in calls.items()}
+        turns = [{name: 1e6 * timed(each, counts[name]) for name, each in calls.items()} for _ in range(repeats)]
         spent = {name: min(turn[name] for turn in turns) for name in calls}
         ratios = [
             cell
@@ -103,23 +87,9 @@ def closed_chains(repeats: int = REPEATS) -> Iterator[str]:
     yield "\n".join(["chains pinned at the tip; microseconds a call", *table(header, rows)])
 
 
-def _check(links: int, one: Solver, other: Solver) -> None:
+def _check(links: int, one: Contender, other: Contender) -> None:
     """Raise ArithmeticError where accelerations differ by more than Pinocchio's iteration leaves."""
-    one.call()
-    other.call()
-    ours, theirs = one.result(), other.result()
+    ours, theirs = one.result(one.run()), other.result(other.run())
     off = float(np.abs(ours - theirs).max() / np.abs(ours).max())
     if not off <= AGREE:
         raise ArithmeticError(f"{links} links: accelerations differ from Pinocchio's by {off:.1e} of the largest")
-
-
-def _microseconds(call: Callable[[], object]) -> float:
-    """Of one call, over so many as take long enough to be timed."""
-    call()
-    begin = time.perf_counter()
-    call()
-    count = max(10, int(SECONDS / max(time.perf_counter() - begin, 1e-7)))
-    begin = time.perf_counter()
-    for _ in range(count):
-        call()
-    return 1e6 * (time.perf_counter() - begin) / count

@@ -124,13 +124,14 @@ def _serve(pipe: Connection, load: Load, name: str) -> None:
     with suppress(EOFError, BrokenPipeError):
         kind = PEERS[name]
         with suppress(Exception):  # loading a package is no part of making a contender; what is wrong shows again there
+            kind.load()
             import_module(kind.package)
         contenders: dict[tuple[str, str], tuple[Contender, int]] = {}
         case, peer = Case(name, load()), None
         while True:
             asked = pipe.recv()
             if asked in contenders:
-                pipe.send(_timed(*contenders[asked]))
+                pipe.send(timed(*contenders[asked]))
                 continue
             start = time.perf_counter()
             try:
@@ -138,7 +139,7 @@ def _serve(pipe: Connection, load: Load, name: str) -> None:
                 contender = peer.prepare(*asked)
                 result = contender.run()
                 seconds = time.perf_counter() - start
-                contenders[asked] = contender, _repetitions(contender)
+                contenders[asked] = contender, repetitions(contender)
                 pipe.send(Prepared(seconds, contender.result(result), contender.size))
             except UnavailableError as error:
                 pipe.send(Refused(str(error)))
@@ -146,7 +147,7 @@ def _serve(pipe: Connection, load: Load, name: str) -> None:
                 pipe.send(Refused(f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"))
 
 
-def _repetitions(contender: Contender) -> int:
+def repetitions(contender: Contender) -> int:
     """How many runs make a measurable time."""
     start = time.perf_counter()
     contender.run()
@@ -154,7 +155,7 @@ def _repetitions(contender: Contender) -> int:
     return max(1, math.ceil(CHUNK / once)) if once < CHUNK else 1
 
 
-def _timed(contender: Contender, repetitions: int) -> float:
+def timed(contender: Contender, repetitions: int) -> float:
     """Seconds for an evaluation."""
     run = contender.run
     gc.disable()

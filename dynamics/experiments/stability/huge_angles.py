@@ -9,8 +9,8 @@ import numpy as np
 import cgraph as cg
 from cgraph.extend import Array
 
+from ...multiprecision.chain_equations import Pair
 from ...multiprecision.flint_numbers import working
-from ...multiprecision.planar_arm_equations import Pair
 from .case_result import CaseResult, Measurement
 from .known_limits import reason
 from .single_evaluations import SEED, available

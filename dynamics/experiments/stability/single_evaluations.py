@@ -5,7 +5,7 @@ centre and inertia, damping, gravity), the error is
     max_i |y_i - exact_i| / (ulp max_i (|y_i| + sum_j |df_i/dx_j| |x_j|)),    ulp = 2^-52.
 The sum is what a relative change of each x_j makes of y_i: the componentwise condition, in the maximum norm. So 1 is
 what rounding the data once would do, whatever the algorithm. The derivatives are the graph's own (`cg.jvp`, of an arm
-whose parameters are inputs), the exact values come from closed formulas in multiprecision.
+whose parameters are inputs), the exact values come from Newton-Euler equations in multiprecision.
 
 In double-double the parameters are inputs too. Built in, products of them are rounded when the graph is made, each on
 its own, and then m l_1 l_2, m l_1 and m g no longer belong to one m: with a mass of 1e12 that moves the light links.
@@ -28,9 +28,8 @@ from ...equations.equations_of_motion import forward_dynamics
 from ...equations.formulations import inverse_dynamics
 from ...multibody.mechanism import Mechanism
 from ...multibody.planar_arm import planar_arm, planar_links
-from ...multiprecision.planar_arm_equations import Pair, accelerations, torques
+from ...multiprecision.chain_equations import Pair, accelerations, torques
 from ...systems.system import System
-from ..planar_by_centers import by_centers
 from .case_result import CaseResult, Measurement
 from .known_limits import reason
 
@@ -207,3 +206,21 @@ def arm_with_parameters(n: int) -> System:
         dict.fromkeys([*names, "g"], 1.0),
         forces=lambda q, qd, t, p: [-p[f"damping{i}"] * qd[i] for i in range(n)],
     )
+
+
+def by_centers(q: Sequence[Node], qd: Sequence[Node], links: Sequence[LinkParameters], gravity: Node) -> list[Node]:
+    """The partial Lagrangians by positions and velocities of the centers of mass, K = m v.v / 2 + I w^2 / 2."""
+    partials: list[Node] = []
+    angle, omega = q[0], qd[0]
+    x, y, height = cg.constant(0.0), cg.constant(0.0), cg.constant(0.0)  # velocity of the joint, and its height
+    for i, link in enumerate(links):
+        if i:
+            angle, omega = angle + q[i], omega + qd[i]
+        s, c = cg.sin(angle), cg.cos(angle)
+        r = link.center
+        u, v = x + r * omega * c, y + r * omega * s
+        kinetic = 0.5 * link.mass * (u * u + v * v) + 0.5 * link.inertia * (omega * omega)
+        partials.append(kinetic - link.mass * gravity * (height - r * c))
+        r = link.length
+        x, y, height = x + r * omega * c, y + r * omega * s, height - r * c
+    return partials

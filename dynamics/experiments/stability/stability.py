@@ -38,8 +38,8 @@ ABOUT = {
     "energy. Both relative to the energy at the start.",
     single_evaluations.SECTION: "The largest error of torques or accelerations, in units of 2^-52 of the largest "
     "component's size, where a size is |y_i| + sum_j |dy_i/dx_j| |x_j| over all inputs and parameters: the "
-    "componentwise condition. 1 is what rounding the data once would do. Exact values from closed formulas with a "
-    "dense solve in multiprecision; the worst of five random states, backends, single points and batches.",
+    "componentwise condition. 1 is what rounding the data once would do. Exact values from Newton-Euler equations "
+    "with a dense solve in multiprecision; the worst of five random states, backends, single points and batches.",
     huge_angles.SECTION: "The largest error over random angles, in units of the last place of the exact value.",
 }
 

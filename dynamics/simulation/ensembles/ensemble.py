@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
 
 from cgraph.extend import Array
 
-from ..trajectory import Crossings
+from ..trajectory import Crossings, Stats
 
 Counts = np.ndarray[Any, np.dtype[np.int64]]
 
@@ -60,6 +61,19 @@ class EnsembleStats:
     error: Array
     error_at_end: Array
     warnings: tuple[tuple[str, ...], ...]
+
+
+COLUMNS: dict[str, type] = dict.fromkeys(("steps", "rejected", "nfev", "status"), np.int64) | {"success": np.bool_}
+COLUMNS |= dict.fromkeys(("dt", "error", "error_at_end"), np.float64)  # None is NaN
+
+
+def ensemble_stats(each: Sequence[Stats], more: Sequence[Sequence[str]], seconds: float) -> EnsembleStats:
+    """The statistics of runs side by side.  more: what speaks against each result besides."""
+    names = [*COLUMNS, "message", "warnings"]
+    *numbers, messages, warnings = zip(*map(attrgetter(*names), each), strict=True)
+    columns: dict[str, Any] = {name: np.array(numbers[k], dtype=kind) for k, (name, kind) in enumerate(COLUMNS.items())}
+    said = tuple([(*texts, *others) for texts, others in zip(warnings, more, strict=True)])
+    return EnsembleStats(each[0].method, seconds=seconds, message=messages, warnings=said, **columns)
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,6 @@ import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,31 +18,29 @@ from cgraph.extend import Array, require_whole
 
 from ...equations.initial_value import initial_values
 from ...integrators import METHODS, Problem, derive, in_form
-from ...systems.controller import with_closed_form
 from ...systems.model import Model
+from ..applied_forces import with_applied
 from ..events.event import Event, as_events
 from ..events.event_log import split_crossings
 from ..events.event_program import EventProgram, event_program
-from ..free_memory import room
 from ..missed_momenta import missed_momenta
+from ..outcome import INTERRUPTED
 from ..progress_bar import Progress
 from ..row_values import converted
-from ..run_options import METHOD, RunOptions, time_span
+from ..run_options import METHOD, RunOptions, room, time_span
 from ..sampled_controller import SampledController
-from ..steps.equal_steps import step_count
+from ..steps.equal_steps import EqualSteps, even_steps, step_count
 from ..steps.step_program import StepProgram, pickled_steps, step_program
 from ..trajectory import SimulationWarning
-from .chunk import INTERRUPTED, Chunk, Part, empty
-from .ensemble import Ensemble, EnsembleStats
-from .lane_steps import iterates
-from .step_grid import StepGrid, step_grids
+from .chunk import Chunk, Part, not_begun
+from .ensemble import Ensemble, EnsembleStats, ensemble_stats
 from .task import Task
+from .vectorized import iterates
 from .workers import Map, Workers, checked, finished
 
 VECTOR = 8  # lanes, or a multiple of them, of every processor: a chunk of trajectories side by side is whole vectors
 LARGEST = 256  # trajectories in a chunk, unless asked for
 SHARES = 4  # chunks for each worker, so that workers of unlike speed finish together
-REACHED = "reached t_end"
 UNKNOWN = 16  # workers behind a map, which does not say
 
 
@@ -133,13 +130,13 @@ def simulate_many(
     [-0.077, -0.155, -0.2348]
     """
     # Check
-    _check(method, chunk)
+    _check(method, chunk, tau)
     t0, t_end = time_span(t_end, t0, t_span)
     arguments = (dt, max_step, rtol, atol, t_eval, first_step, max_steps, backend, progress)
     options = RunOptions(t_end, method, *arguments, t0, estimate_error)
     watched, team = as_events(events), checked(workers)
-    model, tau = _closed(model, tau, parameters)
-    start = initial_values(model, q, qd, tau, parameters, t0)
+    model, applied = with_applied(model, tau, parameters)
+    start = initial_values(model, q, qd, applied.constant, parameters, t0)
     options.check(start.states)
     count = _row_count(options)
     _check_room(start.x, count)
@@ -158,7 +155,7 @@ def simulate_many(
     chunks = _chunks(x, p, _width(len(x), chunk, team, whole=bool(grids)))
 
     # Integrate, by whoever takes the chunks and compiles the steps
-    whole = empty(0, np.empty((len(x), count, problem.size)))
+    whole = not_begun(method, 0, np.empty((len(x), count, problem.size)))
     _run(task, chunks, team, whole)
 
     # Put the result together
@@ -166,16 +163,6 @@ def simulate_many(
     for text in _warnings(result.stats):
         warnings.warn(text, SimulationWarning, stacklevel=2)
     return result
-
-
-def _closed(model: Model, tau: Any, parameters: object) -> tuple[Model, ArrayLike]:
-    """The model with a controller in closed form, and the constant force on it."""
-    if isinstance(tau, SampledController):
-        raise TypeError(
-            "a SampledController may remember what it has seen, and so controls one run: call simulate for each start, "
-            "or write the controller in closed form"
-        )
-    return with_closed_form(model, tau, parameters)[:2]
 
 
 def _row_count(options: RunOptions) -> int:
@@ -200,15 +187,10 @@ def _ensemble(
 ) -> Ensemble:
     """All that has come.  starts: q and qd, the states (N, m) that they make, and the parameters of the problem."""
     times, rows, nq, each = options.row_times, whole.rows, problem.nq, [*zip(*starts, strict=True)]
-    found = [split_crossings(watch, log, nq, p) for log, (*_, p) in zip(whole.happened, each, strict=True)]
-    crossings = {event.name: tuple([named[event.name] for named in found]) for event in watch.events}
+    logs = [split_crossings(watch, log, nq, p) for log, (*_, p) in zip(whole.happened, each, strict=True)]
+    crossings = {event.name: tuple([named[event.name] for named in logs]) for event in watch.events}
     missed = [missed_momenta(problem, times, rows[k], p, start=(options.t0, q, x)) for k, (q, x, p) in enumerate(each)]
-    texts = tuple([(*a, *b) for a, b in zip(whole.warnings, missed, strict=True)])
-    message, ended = tuple([status or REACHED for status in whole.status]), np.array(whole.ended)
-    success = ended | np.array([status == REACHED for status in message])
-    status, (largest, last) = np.where(ended, 1, np.where(success, 0, -1)), whole.errors
-    counts = (whole.steps, whole.rejected, whole.evaluations, whole.dt, seconds, success)
-    stats = EnsembleStats(options.method, *counts, message, status, largest, last, texts)
+    stats = ensemble_stats(whole.stats, missed, seconds)
     states = converted(problem.velocities, times, rows, starts[2][:, None])
     momenta = rows[:, :, nq:] if problem.momenta else None
     return Ensemble(times, states[:, :, :nq], states[:, :, nq:], stats, crossings, momenta)
@@ -234,11 +216,16 @@ def _warnings(stats: EnsembleStats) -> list[str]:
     return said
 
 
-def _check(method: str, chunk: int | None) -> None:
+def _check(method: str, chunk: int | None, tau: object) -> None:
     if isinstance(method, str) and method not in METHODS:
         raise ValueError(f"method must be one of {', '.join(METHODS)}, got {method!r}")
     if chunk is not None:
         require_whole("chunk", chunk, 1)
+    if isinstance(tau, SampledController):
+        raise TypeError(
+            "a SampledController may remember what it has seen, and so controls one run: call simulate for each start, "
+            "or write the controller in closed form"
+        )
 
 
 def _check_room(x: Array, rows: int) -> None:
@@ -251,12 +238,14 @@ def _check_room(x: Array, rows: int) -> None:
         )
 
 
-def _grids(program: StepProgram, options: RunOptions, count: int) -> list[StepGrid]:
+def _grids(program: StepProgram, options: RunOptions, count: int) -> list[EqualSteps]:
     """The equal steps of trajectories side by side; empty where they have to go, or are done sooner, one by one."""
     if program.adaptive or (count < VECTOR and iterates(program)):
         return []
-    grids = step_grids(options)
-    return grids if sum(grid.steps * grid.rows for grid in grids) <= options.max_steps else []
+    grids = even_steps(options.instants, options.step)
+    if options.times is None:  # every step is a row
+        grids = [each._replace(rows=each.steps) for each in grids]
+    return grids if sum(grid.steps for grid in grids) <= options.max_steps else []
 
 
 def _chunks(x: Array, p: Array, width: int) -> list[Chunk]:
@@ -276,7 +265,6 @@ def _run(task: Task, chunks: Sequence[Chunk], workers: int | Map, whole: Part) -
     Raises ValueError unless all parts come.
     """
     arrived = np.zeros(len(whole.rows), dtype=bool)
-    whole.status[:] = [INTERRUPTED] * len(arrived)
     try:
         with (
             Progress("simulate", len(arrived), task.options.progress) as report,

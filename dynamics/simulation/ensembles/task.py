@@ -10,22 +10,20 @@ from functools import partial
 
 import numpy as np
 
-from cgraph.extend import Array, memo, runner
+from cgraph.extend import Array, memo
 
-from ..estimates.error_estimate import ErrorEstimate, Estimator
-from ..estimates.run_estimate import RunEstimate
+from ..estimates.error_estimate import Estimator
 from ..events.event_program import EventProgram
 from ..events.watched import WatchedIntegration
+from ..outcome import INTERRUPTED, outcome
 from ..recorder import Recorder
 from ..run_options import RunOptions
-from ..steps.equal_steps import equal_steps
+from ..steps.equal_steps import EqualSteps, equal_steps
 from ..steps.integration import integration
-from ..steps.step_program import CompiledSteps, StepProgram, compile_steps
-from ..steps.stepping import Integration, StoppedError
-from .chunk import Chunk, Part, empty
-from .lane_steps import lane_steps
-from .step_grid import StepGrid
-from .vectorized import VectorCode, VectorizedIntegration, beside
+from ..steps.step_program import CompiledSteps, compile_steps
+from ..steps.stepping import StoppedError
+from .chunk import Chunk, Part, not_begun
+from .vectorized import VectorCode, VectorizedIntegration, beside, vector_code
 
 KEPT = 8  # programs that a process keeps ready
 
@@ -37,7 +35,7 @@ class Task:
     pickled: bytes  # a StepProgram; that it is the same as another's is seen without reading it
     options: RunOptions
     count: int  # of the rows of a trajectory
-    grids: tuple[StepGrid, ...]  # of trajectories side by side; empty: one after another
+    grids: tuple[EqualSteps, ...]  # of trajectories side by side; empty: one after another
     events: bytes = b""  # an EventProgram; nothing without events
 
     def __call__(self, chunk: Chunk) -> Part:
@@ -49,7 +47,7 @@ class Task:
 
     def run(self, chunk: Chunk, rows: Array, stopped: Callable[[], bool]) -> Part:
         """Run the chunk into rows (k, T, m), to its end, or until soon after Ctrl-C or `stopped`: see the part."""
-        part = empty(chunk.first, rows)
+        part = not_begun(self.options.method, chunk.first, rows)
         with np.errstate(all="ignore"):
             (self._side_by_side if self.grids else self._one_by_one)(chunk, part, stopped)
         return part
@@ -57,15 +55,11 @@ class Task:
     def _side_by_side(self, chunk: Chunk, part: Part, stopped: Callable[[], bool]) -> None:
         with _lock:
             code = _vector_code(self.pickled, self.options.backend)
-        times = self.options.times
-        at = int(times is None or times[0] == self.options.t0)
-        part.rows[:, :at] = chunk.x[:, None]
         estimator = None
         if self.options.estimated:
             estimator = Estimator(code.program, self.options, chunk.p, partial(beside, code), sparse=True)
             estimator.begin(chunk.x, equal_steps(self.options.instants, self.options.step))
-        even = len(self.grids) == 1
-        run = VectorizedIntegration(code, chunk, part, at, self.options.t0, estimator, even=even)
+        run = VectorizedIntegration(code, self.options, chunk, part, estimator, even=len(self.grids) == 1)
         try:
             for grid in self.grids:
                 run.begin(grid)
@@ -73,12 +67,9 @@ class Task:
                     if stopped():
                         raise StoppedError
                     run.advance(*block)
-            for k, error in enumerate(estimator.estimates() if estimator else []):
-                if not part.status[k]:
-                    part.tell(k, error)
+            run.end(errors=estimator.estimates() if estimator else [])
         except (KeyboardInterrupt, StoppedError):
             run.interrupt()
-        run.end()
 
     def _one_by_one(self, chunk: Chunk, part: Part, stopped: Callable[[], bool]) -> None:
         with _lock:
@@ -86,31 +77,15 @@ class Task:
         events = _event_program(self.events) if self.events else None
         for k, x in enumerate(chunk.x):
             run = integration(compiled, self.options, chunk.p[k].tolist(), stopped, events=events)
+            recorder = Recorder(x, self.options.times, self.options.t0, self.options.direction)
+            part.stats[k] = outcome(run, x, recorder, self.options)
             if isinstance(run, WatchedIntegration):
                 part.happened[k] = run.log.happened
-            recorder = Recorder(x, self.options.times, self.options.t0, self.options.direction)
-            interrupted, error = self._interrupted(run, x, recorder)
             states = recorder.table()[1]
             part.rows[k, : len(states)], part.rows[k, len(states) :] = states, np.nan
-            part.steps[k], part.rejected[k], part.evaluations[k] = run.steps, run.rejected, run.evaluations
-            part.dt[k], part.status[k], part.warnings[k] = run.largest, run.status or run.event, run.warnings
-            part.ended[k] = bool(run.event) and not run.status
-            if error is not None:
-                part.tell(k, error)
-            if interrupted:
-                part.interrupt(k, recorder.last, len(states))
+            if part.stats[k].message.startswith(INTERRUPTED):
+                part.rows[k + 1 :] = np.nan
                 return
-
-    def _interrupted(self, run: Integration, x: Array, recorder: Recorder) -> tuple[bool, ErrorEstimate | None]:
-        """Run one trajectory; whether it was interrupted, and its error where that is estimated."""
-        estimate = RunEstimate(run, x, self.options)
-        try:
-            for block in run.blocks(x):
-                recorder.add(block)
-                estimate.add(block)
-            return False, None if run.status else estimate.result()
-        except (KeyboardInterrupt, StoppedError):
-            return True, None
 
 
 _lock = threading.Lock()  # threads that come at the same time wait for one to make the code
@@ -118,14 +93,7 @@ _lock = threading.Lock()  # threads that come at the same time wait for one to m
 
 @memo(KEPT)
 def _vector_code(pickled: bytes, backend: str) -> VectorCode:
-    program: StepProgram = pickle.loads(pickled)  # noqa: S301  # it came with the task itself
-    programs = lane_steps(program)
-    start = None if programs.start is None else runner(programs.start, backend)
-    one_pass = runner(programs.one_pass, backend)
-    for code in (start, one_pass):
-        if code is not None:
-            code.run_many(np.zeros((code.size, 0)), 0)  # the code for vectors is compiled at its first use
-    return VectorCode(program, start, one_pass, programs.stops)
+    return vector_code(pickle.loads(pickled), backend)  # noqa: S301  # it came with the task itself
 
 
 @memo(KEPT)

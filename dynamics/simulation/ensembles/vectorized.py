@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from cgraph.extend import Array, Runner
+import cgraph as cg
+from cgraph import Graph
+from cgraph.extend import Array, Call, FixedPoint, If, Runner, While, runner
 
 from ..estimates.courses import Course
-from ..estimates.error_estimate import Estimator
+from ..estimates.error_estimate import ErrorEstimate, Estimator
 from ..estimates.state_difference import States
+from ..outcome import INTERRUPTED, ended
+from ..run_options import RunOptions
+from ..steps.equal_steps import EqualSteps
 from ..steps.step_program import StepProgram
 from ..steps.stepping import begin_equal, failed_step, nonfinite
-from .chunk import INTERRUPTED, Chunk, Part
-from .step_grid import StepGrid
+from .chunk import Chunk, Part
 
 WORK = 2**21  # nodes computed in a block: half a millisecond for each vector
 NUMBERS = 2**22  # in the rows of a block
@@ -24,12 +29,44 @@ SEEN = 4  # steps that one of the longest of runs beside stands for
 
 
 class VectorCode(NamedTuple):
-    """Machine code for the steps of many trajectories, and for what they do before the first."""
+    """Machine code for the equal steps of many trajectories, a lane of a vector for each.
+
+    start: what they do before the first, over the same memory.  stops: whether a lane whose step failed makes no more;
+    else it goes on, and its state is not finite.
+    """
 
     program: StepProgram
-    start: Runner | None  # over the same memory
+    start: Runner | None
     one_pass: Runner
-    stops: bool  # see `LaneSteps`
+    stops: bool
+
+
+def vector_code(program: StepProgram, backend: str) -> VectorCode:
+    """The steps of a program, without its `stop`: lanes that go on do not stop for one that failed."""
+    steps = replace(program.steps, stop=None)
+    first, start = steps.body[0], None
+    if isinstance(first, If) and first.register == "fresh" and not first.otherwise:
+        start, steps = replace(steps, body=first.body), replace(steps, body=steps.body[1:])
+    stops = iterates(program)
+    if stops:  # equations that were not solved leave a state that is finite
+        registers = {**steps.registers, "live": 1}
+        body = (Call(_LIVE, ("nonfinite",), ("live",)), If("live", tuple(steps.body)))
+        start = start and replace(start, registers=registers)
+        steps = replace(steps, registers=registers, body=body)
+    code = VectorCode(program, None if start is None else runner(start, backend), runner(steps, backend), stops)
+    for each in (code.start, code.one_pass):
+        if each is not None:
+            each.run_many(np.zeros((each.size, 0)), 0)  # the code for vectors is compiled at its first use
+    return code
+
+
+def iterates(program: StepProgram) -> bool:
+    """Whether steps turn as often as numbers say, so that lanes wait for one another."""
+    return any(isinstance(each, While | FixedPoint) for each in program.steps.statements())
+
+
+_NONFINITE = cg.variable("nonfinite")
+_LIVE = Graph([_NONFINITE], {"live": cg.where(_NONFINITE, 0.0, 1.0)})
 
 
 def _start_memories(code: VectorCode, x: Array, p: Array) -> Array:
@@ -50,9 +87,16 @@ def _block_limits(code: VectorCode, count: int) -> tuple[int, int]:
 
 def _advanced(code: VectorCode, memories: Array, steps: int, every: int) -> tuple[Array, States]:
     """So many steps: the record of each `every`th, and its states."""
-    record = code.one_pass.run_many(memories, steps, every).rows
-    states = record[:, 1 : 1 + code.program.size].transpose(2, 0, 1)
-    return record, States(np.ascontiguousarray(record[:, 0, 0]), states)
+    record, read = code.one_pass.run_many(memories, steps, every).rows, code.one_pass.read
+    farthest = int(np.argmax(read(memories, "count")[0]))  # where one has failed its time stands still
+    times, states = np.ascontiguousarray(record[:, 0, farthest]), record[:, 1 : 1 + code.program.size]
+    failed = np.flatnonzero(read(memories, "nonfinite")[0])
+    if code.stops and len(failed):  # what it leaves may be finite, and is no solution
+        begin, ends = read(memories, "start")[0, failed], read(memories, "t")[0, failed]
+        after = np.abs(times[:, None] - begin) >= np.abs(ends - begin)
+        states = states.copy()
+        states[:, :, failed] = np.where(after[:, None], np.nan, states[:, :, failed])
+    return record, States(times, states.transpose(2, 0, 1))
 
 
 def beside(code: VectorCode, course: Course, x: Array, p: Array) -> Iterator[States]:
@@ -66,7 +110,7 @@ def beside(code: VectorCode, course: Course, x: Array, p: Array) -> Iterator[Sta
 
 
 class VectorizedIntegration:
-    """One run of the trajectories of a chunk, into a part, from its row `at` on.
+    """One run of the trajectories of a chunk, into a part.
 
     estimator: is told the states after all steps, or, where the grid is even, after those that it looks at.
     A trajectory whose state is no longer finite is noticed after the block in which it stopped being so. From there its
@@ -74,23 +118,31 @@ class VectorizedIntegration:
     """
 
     def __init__(
-        self, code: VectorCode, chunk: Chunk, part: Part, at: int, t0: float, estimator: Estimator | None, *, even: bool
+        self,
+        code: VectorCode,
+        options: RunOptions,
+        chunk: Chunk,
+        part: Part,
+        estimator: Estimator | None,
+        *,
+        even: bool,
     ) -> None:
         self.code, self.program, self.runner, self.part = code, code.program, code.one_pass, part
         self.estimator, self._seen = estimator, SEEN if even and estimator and not estimator.every else 1
         count, total = part.rows.shape[:2]
         self._memories = _start_memories(code, chunk.x, chunk.p)
-        self._live = np.ones(count, dtype=bool)
+        self._live, self._method = np.ones(count, dtype=bool), options.method
         self._good = np.full(count, total)  # rows that count
-        self._at, self._done, self._reached = at, 0, t0  # rows, steps, and the time [s] of the last block
-        self._interrupted = False
+        self._done, self._longest, self._reached = 0, 0.0, options.t0  # steps; s, a step; s, the time of the last block
+        self._at = int(options.times is None or options.times[0] == options.t0)  # row
+        part.rows[:, : self._at] = chunk.x[:, None]
         passes, rows = _block_limits(code, count)
         self.limits = passes if estimator is None else min(passes, rows), rows
 
-    def begin(self, grid: StepGrid) -> None:
+    def begin(self, grid: EqualSteps) -> None:
         """The steps that follow are of this grid."""
         begin_equal(self.runner, self._memories, grid.begin, grid.h)
-        self.part.dt[self._live] = np.maximum(self.part.dt[self._live], abs(grid.h))
+        self._longest = max(self._longest, abs(grid.h))
 
     def advance(self, steps: int, every: int, due: bool) -> None:
         """Make steps; those after every `every`th are rows if they are due."""
@@ -109,31 +161,33 @@ class VectorizedIntegration:
             self.part.rows[:, self._at : self._at + len(kept)] = kept[:, 1 : 1 + m].transpose(2, 0, 1)
             self._at += len(kept)
         failed = self._live & (self.runner.read(self._memories, "nonfinite")[0] != 0.0)
-        if failed.any():
-            for k in np.flatnonzero(failed).tolist():
-                if self.code.stops:
-                    self._failed_step(k, before[:, [k]], at, every if due else 0)
-                else:
-                    self._locate_failure(k, before[:, [k]], steps)
-            self._live &= ~failed
-            if self._live.any():
-                self._memories[:, ~self._live] = self._memories[:, np.flatnonzero(self._live)[:1]]
+        for k in np.flatnonzero(failed).tolist():
+            if self.code.stops:
+                self._failed_step(k, before[:, [k]], at, every if due else 0)
+            else:
+                self._locate_failure(k, before[:, [k]], steps)
+        self._live &= ~failed
+        if failed.any() and self._live.any():
+            self._memories[:, ~self._live] = self._memories[:, np.flatnonzero(self._live)[:1]]
         self._done += steps
         self._reached = float(self.runner.read(self._memories, "t")[0, 0])
 
     def interrupt(self) -> None:
         """Those that have not failed end here, with the rows that they have."""
-        for k in np.flatnonzero(self._live).tolist():
-            self.part.status[k] = f"{INTERRUPTED} after t = {self._reached:.6g} s"
         self._good[self._live] = self._at
-        self._interrupted = True
+        self.end(f"{INTERRUPTED} after t = {self._reached:.6g} s")
 
-    def end(self) -> None:
-        """Count the steps, and end what has failed."""
-        live, evaluations = self._live, self.runner.read(self._memories, "evaluations")[0]
-        self.part.steps[live], self.part.evaluations[live] = self._done, evaluations[live]
-        for k in range(len(live)) if self._interrupted else np.flatnonzero(~live):
+    def end(self, status: str = "", errors: Sequence[ErrorEstimate] = ()) -> None:
+        """Those that have not failed end, at their end or for a reason.  errors: of all, if they are estimated."""
+        evaluations = self.runner.read(self._memories, "evaluations")[0]
+        for k in np.flatnonzero(self._live).tolist():
+            self._note(k, self._done, int(evaluations[k]), status, errors[k] if errors else None)
+        for k in np.flatnonzero(self._good < self.part.rows.shape[1]).tolist():
             self.part.rows[k, self._good[k] :] = np.nan
+
+    def _note(self, k: int, steps: int, evaluations: int, status: str, error: ErrorEstimate | None = None) -> None:
+        counts = (steps, 0, evaluations, self._longest, 0.0)
+        self.part.stats[k] = ended(self._method, counts, status, error=error)
 
     def _failed_step(self, k: int, memory: Array, at: int, every: int) -> None:
         """Of trajectory k, which stopped in the block that began with this memory, (size, 1), and row `at`."""
@@ -141,11 +195,11 @@ class VectorizedIntegration:
         t, count, evaluations = (runner.read(after, name)[0, 0] for name in ("t", "count", "evaluations"))
         steps = int(count - runner.read(memory, "count")[0, 0]) - 1
         self._good[k] = at + steps // every if every else at
-        self.part.steps[k], self.part.evaluations[k] = self._done + steps, evaluations
         runner.run_many(memory, steps, max(1, steps))
         singular = runner.read(after, "singular")[0, 0] if "singular" in runner.program.registers else 0.0
         before, x = (runner.read(each, "x")[:, 0] for each in (memory, after))
-        self.part.status[k] = failed_step(self.program.components, t, before, x, int(singular))
+        status = failed_step(self.program.components, t, before, x, int(singular))
+        self._note(k, self._done + steps, int(evaluations), status)
 
     def _locate_failure(self, k: int, memory: Array, steps: int) -> None:
         """Where trajectory k stopped being finite in the block that began with this memory, (size, 1)."""
@@ -155,7 +209,6 @@ class VectorizedIntegration:
         so_far = evaluations[0, 0]
         rows = self.runner.run_many(memory, steps, 1).rows[:, :, 0]
         row = int(np.argmax(~np.isfinite(rows).all(axis=1)))
-        self.part.steps[k] = self._done + row
-        self.part.evaluations[k] = so_far + (row + 1) * (evaluations[0, 0] - so_far) / steps
+        done = so_far + (row + 1) * (evaluations[0, 0] - so_far) / steps
         what = nonfinite(self.program.components, rows[row, 1 : 1 + self.program.size])
-        self.part.status[k] = f"stopped at t = {rows[row, 0]:.6g} s: {what}"
+        self._note(k, self._done + row, int(done), f"stopped at t = {rows[row, 0]:.6g} s: {what}")

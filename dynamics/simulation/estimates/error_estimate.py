@@ -142,7 +142,7 @@ class Estimator:
         if len(states.t):
             size = np.maximum(states.x.max(axis=1), -states.x.min(axis=1))
             self._size = np.maximum(self._size, np.where(np.isfinite(size), size, 0.0))
-        self._differences[0].add(0, states)
+            self._differences[0].add(0, states)
         for number, beside in enumerate(self._beside):
             for each in self._until(beside, end, states.resets):
                 self._differences[number].add(1, each)

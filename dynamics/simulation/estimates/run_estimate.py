@@ -9,7 +9,6 @@ import numpy as np
 
 from cgraph.extend import Array
 
-from ..events.watched import WatchedIntegration
 from ..run_options import RunOptions
 from ..steps.dense_output import StepBlock
 from ..steps.equal_steps import EqualSteps, equal_steps
@@ -72,8 +71,11 @@ class RunEstimate:
         run, leg = self._run, self._run.leg
         assert isinstance(leg, FixedStepIntegration)
         other: Integration = leg.beside(course.stretches, p[0].tolist())
-        if leg.control is None and isinstance(run, WatchedIntegration) and run.resetting:
-            other = run.beside(course.steps)
+        if leg.control is None and run is not leg:  # with events
+            from ..events.watched import WatchedIntegration
+
+            assert isinstance(run, WatchedIntegration)
+            other = run.beside(course.steps) if run.resetting else other
         for block in other.blocks(x[0]):
             yield States(block.t, block.x[None], other.resets)
             at, t = course.stretches[0].begin, float(block.t[-1])

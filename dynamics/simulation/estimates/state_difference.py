@@ -39,7 +39,7 @@ def even(rows: Indices) -> slice | Indices:
         return slice(0)
     apart = int(rows[1] - rows[0]) if len(rows) > 1 else 1
     even = bool((np.diff(rows) == apart).all())
-    return slice(int(rows[0]), int(rows[-1]) + 1, apart) if even else rows
+    return slice(int(rows[0]), int(rows[-1]) + 1, apart) if even and apart else rows
 
 
 class Difference:

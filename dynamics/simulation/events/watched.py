@@ -48,16 +48,6 @@ class WatchedIntegration(Integration):
             lambda leg: first.beside(steps(leg.t0), first.parameters), options, EventLog(self.log.program)
         )
 
-    @property
-    def jacobians(self) -> int:
-        """Evaluations of the Jacobian of the rate."""
-        return sum(run.jacobians for run in self._legs)
-
-    @property
-    def factorizations(self) -> int:
-        """LU factorizations of matrices."""
-        return sum(run.factorizations for run in self._legs)
-
     def crossings(self, nq: int, parameters: ArrayLike = 0.0) -> dict[str, Crossings]:
         """Of each event by name, where it happened, with states split after nq numbers; parameters: of the problem."""
         return split_crossings(self.log.program, self.log.happened, nq, parameters)
@@ -103,6 +93,8 @@ class WatchedIntegration(Integration):
 
     def _count(self, run: Integration, rejected: int, evaluations: int) -> None:
         self.rejected, self.evaluations = rejected + run.rejected, evaluations + run.evaluations
+        self.jacobians = sum(leg.jacobians for leg in self._legs)
+        self.factorizations = sum(leg.factorizations for leg in self._legs)
         self.largest, self.stiff = max(self.largest, run.largest), self.stiff or run.stiff
         self.slope = run.slope
         self.warnings = list(dict.fromkeys([*self.warnings, *run.warnings, *self.log.warnings]))

@@ -23,7 +23,7 @@ from ..trajectory import SimulationWarning
 from .doubts import doubts
 from .legs import Bars, Legs, legs_of
 from .loss_function import loss_graph, with_slopes
-from .motion import START, TORQUE, VELOCITY, MotionOf, motion_of
+from .motion import START, TORQUE, VELOCITY, MotionRequest, motion_of
 from .point_functions import at
 
 Loss = Callable[..., Node]
@@ -112,8 +112,8 @@ def gradient(
     q, qd, t_end, t0, t_span, dt, max_step, rtol, atol, first_step, parameters, backend, form
         As for `simulate`.
     method : str, optional
-        A name of `dyn.METHODS`, of equal or chosen steps, but "taylor". By default that of `simulate`, "dop853", which
-        chooses its steps; and "rk4" where `dt` or a row of forces a step asks for equal ones. Equations that are
+        A name of `dyn.METHODS`, of equal or chosen steps. By default that of `simulate`, "dop853", which chooses its
+        steps; and "rk4" where `dt` or a row of forces a step asks for equal ones. Equations that are
         iterated are solved to rounding, of implicit methods and of their derivatives.
     running : callable, optional
         (q, qd, tau, t) or (q, qd, tau, t, p) to a node, summed over the steps, at the state, force and time where each
@@ -169,7 +169,7 @@ def gradient(
 
 
 def differentiated(
-    motion: MotionOf, loss: Loss | None, running: Loss | None, watched: Sequence[Event] = ()
+    motion: MotionRequest, loss: Loss | None, running: Loss | None, watched: Sequence[Event] = ()
 ) -> tuple[Any, dict[str, Any], Legs, tuple[Array, Array]]:
     """The loss of a motion, its gradient by names, the motion, and the slopes of the loss by its start and by its end.
 
@@ -186,7 +186,7 @@ def differentiated(
     return value + legs.loss, _gradients(motion, start, inputs, rows, end), legs, (start, end.x)
 
 
-def _final(graph: Graph | None, motion: MotionOf, legs: Legs) -> tuple[Any, Bars]:
+def _final(graph: Graph | None, motion: MotionRequest, legs: Legs) -> tuple[Any, Bars]:
     """The final loss, and its slopes."""
     m = len(legs.x)
     if graph is None:
@@ -196,7 +196,7 @@ def _final(graph: Graph | None, motion: MotionOf, legs: Legs) -> tuple[Any, Bars
     return value, Bars(np.array(bars[:m]), bars[m], np.array(bars[m + 1 :]).reshape(-1, *legs.x.shape[1:]))
 
 
-def _gradients(motion: MotionOf, start: Array, inputs: Array, rows: Array, end: Bars) -> dict[str, Any]:
+def _gradients(motion: MotionRequest, start: Array, inputs: Array, rows: Array, end: Bars) -> dict[str, Any]:
     """By the names of `wrt`, from the cotangents of the start, of the inputs, and of the forces of each step."""
     nq, forces, equations, many = motion.problem.nq, motion.forces, motion.equations, motion.many
     by_name: dict[str, Any] = {}
@@ -219,7 +219,7 @@ def _gradients(motion: MotionOf, start: Array, inputs: Array, rows: Array, end: 
     return result
 
 
-def _displaced(motion: MotionOf, bar: Array) -> Array:
+def _displaced(motion: MotionRequest, bar: Array) -> Array:
     """The cotangent of the coordinates; of quasi-velocities by displacements, G^T q_bar."""
     system, nq = motion.problem.system, motion.problem.nq
     if system is None or system.kinematics.quasi is None:

@@ -17,7 +17,7 @@ from ...systems.model import Model
 from ..trajectory import SimulationWarning
 from .doubts import doubts
 from .gradient import Loss, differentiated
-from .motion import START, TORQUE, VELOCITY, MotionError, MotionOf, motion_of
+from .motion import START, TORQUE, VELOCITY, MotionError, MotionRequest, motion_of
 
 FEW = 4  # motions: fewer by a method that iterates are done sooner one by one
 WIDE = 16  # motions side by side: whole vectors of any processor, of which what is recorded stays in its caches
@@ -158,7 +158,7 @@ def gradient_many(
     return MotionGradients(value, by_name, t, end[:, : problem.nq], end[:, problem.nq :])
 
 
-def _parts(motions: MotionOf) -> list[int | slice]:
+def _parts(motions: MotionRequest) -> list[int | slice]:
     """The motions that go one by one, or side by side."""
     count = motions.many
     if motions.options.adaptive or (count < FEW and motions.method.step(motions.problem).iterates):
@@ -166,7 +166,7 @@ def _parts(motions: MotionOf) -> list[int | slice]:
     return [slice(k, min(k + WIDE, count)) for k in range(0, count, WIDE)]
 
 
-def _shapes(motions: MotionOf) -> dict[str, tuple[int, ...]]:
+def _shapes(motions: MotionRequest) -> dict[str, tuple[int, ...]]:
     """Of the gradients of a motion, by the names of `wrt`."""
     problem, nq = motions.problem, motions.problem.nq
     n = problem.size - nq
@@ -180,7 +180,7 @@ def _by_motion(array: Any, part: int | slice) -> Array:
     return np.moveaxis(rows, -1, 0) if isinstance(part, slice) else rows[None]
 
 
-def _some(motions: MotionOf, part: int | slice) -> MotionOf:
+def _some(motions: MotionRequest, part: int | slice) -> MotionRequest:
     """One of the motions, or some of them; one by chosen steps with these."""
     x, tau, values = (array[..., part] for array in (motions.x, motions.tau, motions.values))
     return replace(motions, x=x, tau=tau, values=values).with_legs()

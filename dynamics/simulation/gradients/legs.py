@@ -19,7 +19,7 @@ from cgraph.extend import Array, kept_by_first
 
 from ..events.event import Event
 from ..events.event_program import WatchedEvent, event_program
-from .motion import TORQUE, Leg, MotionError, MotionOf
+from .motion import TORQUE, Leg, MotionError, MotionRequest
 from .motion_programs import MotionPrograms, Request, motion_programs
 from .motion_run import MotionRun
 from .motion_steps import LOSS
@@ -43,7 +43,7 @@ class Legs:
     x, t: the end of the motion, in states of its steps.  loss: the running loss of all legs.
     """
 
-    motion: MotionOf
+    motion: MotionRequest
     programs: MotionPrograms
     events: Mapping[str, WatchedEvent]
     every: Sequence[int] = ()
@@ -143,7 +143,7 @@ class Legs:
         return Bars(end.x + share * g.x, 0.0, inputs), end.t + share * g.t
 
 
-def legs_of(motion: MotionOf, watched: Sequence[Event], running: Graph | None = None, *, forwards: bool) -> Legs:
+def legs_of(motion: MotionRequest, watched: Sequence[Event], running: Graph | None = None, *, forwards: bool) -> Legs:
     """The legs of a motion, along which tangents are to be pushed forwards, or cotangents pulled back."""
     by = [TORQUE] if TORQUE in motion.wrt else []
     by += ["p", "c"] if motion.by_parameters else []
@@ -183,7 +183,7 @@ def _pullback(graph: Graph) -> Graph:
     return cg.vjp(graph)
 
 
-def pulled_at(graph: Graph, motion: MotionOf, x: Array, t: float, seeds: Sequence[float]) -> Bars:
+def pulled_at(graph: Graph, motion: MotionRequest, x: Array, t: float, seeds: Sequence[float]) -> Bars:
     """J^T seeds of a graph over the states, t and parameters, at a state and an instant."""
     pulled = _pullback(graph)
     bars = dict(zip(pulled.input_names[len(graph.inputs) :], seeds, strict=True))
@@ -191,32 +191,29 @@ def pulled_at(graph: Graph, motion: MotionOf, x: Array, t: float, seeds: Sequenc
     return Bars(values[:m], values[m] if motion.many else float(values[m]), values[m + 1 :])
 
 
-def values_at(graph: Graph, motion: MotionOf, x: Array, t: float) -> Array:
+def values_at(graph: Graph, motion: MotionRequest, x: Array, t: float) -> Array:
     """The outputs of a graph over the states, t and parameters, at a state and an instant."""
     return _arrays(graph.evaluate(point(graph, motion, x, t)), motion)
 
 
-def converted(graph: Graph | None, motion: MotionOf, x: Array, t: float) -> Array:
+def converted(graph: Graph | None, motion: MotionRequest, x: Array, t: float) -> Array:
     """The same where there is a graph, else the state itself."""
     return x if graph is None else values_at(graph, motion, x, t)
 
 
-def _arrays(values: Mapping[str, Any], motion: MotionOf) -> Array:
+def _arrays(values: Mapping[str, Any], motion: MotionRequest) -> Array:
     """(k,), or (k, N) of N motions side by side."""
     shape = (motion.many,) if motion.many else ()
     rows = [np.broadcast_to(np.asarray(value, dtype=np.float64), shape) for value in values.values()]
     return np.array(rows).reshape(len(rows), *shape)
 
 
-def _inputs(motion: MotionOf) -> list[Any]:
+def _inputs(motion: MotionRequest) -> list[Any]:
     """Forces and parameters that stay inputs, at the end."""
-    return [*motion.force_at_end, *motion.values] if motion.many else _numbers(motion.force_at_end, motion.values)
+    values = np.concatenate([motion.force_at_end, motion.values])
+    return [*values] if motion.many else values.tolist()
 
 
-def _numbers(*arrays: Array) -> list[float]:
-    return [number for array in arrays for number in array.tolist()]
-
-
-def point(graph: Graph, motion: MotionOf, x: Array, t: float) -> dict[str, Any]:
+def point(graph: Graph, motion: MotionRequest, x: Array, t: float) -> dict[str, Any]:
     """The inputs of a graph over the states, t and parameters, at a state and an instant."""
     return dict(zip(graph.input_names, [*(x if motion.many else x.tolist()), t, *_inputs(motion)], strict=True))

@@ -57,7 +57,7 @@ class MotionError(ValueError):
 
 
 @dataclass(frozen=True, eq=False)
-class MotionOf:
+class MotionRequest:
     """A motion, whose steps are chosen.
 
     x: (m,), where it starts, in q and qd.
@@ -97,7 +97,7 @@ class MotionOf:
         """How many of the applied forces are inputs."""
         return self.equations.forces
 
-    def with_legs(self, events: Sequence[Event] = ()) -> MotionOf:
+    def with_legs(self, events: Sequence[Event] = ()) -> MotionRequest:
         """The same with the legs that chosen steps and events make, and what speaks against these steps.
 
         Raises MotionError for a motion that does not reach its end.
@@ -155,7 +155,7 @@ def motion_of(
     events: Sequence[Event] = (),
     *,
     many: bool = False,
-) -> MotionOf:
+) -> MotionRequest:
     """The motion of checked arguments.  span: t_end, t0, t_span.  options: those of `simulate` besides.
 
     many: N motions side by side, of which those by chosen steps have no legs yet.
@@ -190,7 +190,7 @@ def motion_of(
     if rows is not None:
         forces = np.broadcast_to(np.moveaxis(rows, 0, -1), (*rows.shape[1:], len(start.x))) if many else rows[0]
     chosen_steps = run.adaptive or events
-    motion = MotionOf(
+    motion = MotionRequest(
         equations,
         METHODS[run.method],
         start.x.T.copy() if many else start.x[0],
@@ -224,9 +224,8 @@ def options_of(
 @memo(KEPT)
 def _checked_options(t_end: float, method: str, t0: float, *options: tuple[str, Any]) -> RunOptions:
     run = RunOptions(t_end, method, t0=t0, **dict(options))
-    if run.scipy_solver is not None or not METHODS[method].derived:
-        names = ", ".join([name for name, each in METHODS.items() if each.derived])
-        raise ValueError(f"motions by method {method!r} have no derivatives here; those by {names} have")
+    if run.scipy_solver is not None:
+        raise ValueError(f"motions by method {method!r} have no derivatives here; those by {', '.join(METHODS)} have")
     return run
 
 

@@ -30,7 +30,6 @@ class MotionEquations:
 
     forces: how many of the parameters are applied forces.  names: of p.  numbers: c, a graph over p, if there are any.
     pullback: of the rate, where there is one.
-    sharing_rate, sharing_pullback: the same two, where the one records for the other what both need.
     start, end: (q, qd) to a state of the steps and back, over states, t, parameters; None where they are the same.
     """
 
@@ -40,8 +39,6 @@ class MotionEquations:
     names: tuple[str, ...]
     numbers: Graph | None
     pullback: RatePullback | None
-    sharing_rate: Graph
-    sharing_pullback: RatePullback | None
     start: Graph | None
     end: Graph | None
 
@@ -93,7 +90,7 @@ def motion_equations(problem: Problem, forces: int) -> MotionEquations:
     made = replace(problem, parameters=parameters, rate=rate, projection=projected, multipliers=None)
     over_p = Graph(cg.variables(list(names)), outputs) if outputs else None
     ways = _whole(made, made.momentum), _whole(made, made.velocities)
-    return MotionEquations(problem, made, forces, names, over_p, pullback, *_sharing(rate, pullback), *ways)
+    return MotionEquations(problem, made, forces, names, over_p, pullback, *ways)
 
 
 def _whole(problem: Problem, last: Graph | None) -> Graph | None:
@@ -104,18 +101,33 @@ def _whole(problem: Problem, last: Graph | None) -> Graph | None:
     return problem.bind(last.input_names[: problem.size], Graph(last.inputs, q | last.outputs))
 
 
-def _sharing(rate: Graph, pullback: RatePullback | None) -> tuple[Graph, RatePullback | None]:
-    """The rate with what its pullback can take over from it as outputs besides, and the pullback that does."""
+def sharing(equations: MotionEquations) -> tuple[Graph, RatePullback] | None:
+    """The rate with values that its pullback needs as outputs besides, and the pullback that takes them over, if any.
+
+    These are what slopes of the power by the state, and what is solved, read; of them the cheap are made again.
+    """
+    pullback, rate = equations.pullback, equations.problem.rate
     if pullback is None:
-        return rate, None
+        return None
     here = {node for node in rate.nodes if node.args}
-    edge: dict[Node, None] = {}
-    for node in topological(pullback.solved):
-        if node not in here:
-            edge |= {arg: None for arg in node.args if arg in here}
-    edge |= {node: None for node in topological([pullback.power]) if node in here and node.op.name not in ARITHMETIC}
-    variables = new_variables("shared", len(edge), rate.input_names)
-    shared = dict(zip(edge, variables, strict=True))
+    moving, needed = {*rate.inputs[: equations.problem.size]}, set(pullback.solved)
+    for node in topological([pullback.power]):
+        moves = [arg in moving for arg in node.args]
+        moving |= {node} if any(moves) else set()
+        if node.op.name == "mul":
+            needed |= {arg for arg, other in zip(node.args, reversed(moves), strict=True) if other}
+        elif any(moves) and node.op.name not in ARITHMETIC:
+            needed |= {node, *node.args}
+    order = topological([pullback.power, *pullback.solved])
+    for node in reversed(order):
+        if node in needed and node not in here:
+            needed |= {*node.args}
+    recorded, known = list[Node](), set(rate.inputs)
+    for node in [node for node in order if node in here and node in needed]:
+        if node.op.name not in ARITHMETIC or not known.issuperset(node.args):
+            recorded.append(node)
+        known.add(node)
+    shared = dict(zip(recorded, new_variables("shared", len(recorded), rate.input_names), strict=True))
     more = {str(variable.name): node for node, variable in shared.items()}
     return Graph(rate.inputs, {**rate.outputs, **more}), replace(pullback, shared=shared)
 

@@ -64,7 +64,7 @@ def motion_programs(request: Request) -> MotionPrograms:
         request.running,
         each_step=request.each_step,
         wrt=request.wrt,
-        sharing=not request.forwards and not request.many,
+        shares=not request.forwards and not request.many,
     )
     step, start, first = steps.step, steps.start, None
     if request.forwards:

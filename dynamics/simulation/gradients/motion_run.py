@@ -14,7 +14,7 @@ from cgraph.extend import Array, Runner, Tape, run_passes
 
 from ..steps.dense_output import Indices
 from ..steps.stepping import nonfinite, unsolved
-from .motion import MotionError, MotionOf
+from .motion import MotionError, MotionRequest
 from .motion_programs import Along, MotionPrograms
 from .motion_steps import LOSS
 
@@ -33,7 +33,9 @@ class MotionRun:
     side, such a one has an end that is not finite.
     """
 
-    def __init__(self, motion: MotionOf, programs: MotionPrograms, *, arrives: bool = False, every: int = 0) -> None:
+    def __init__(
+        self, motion: MotionRequest, programs: MotionPrograms, *, arrives: bool = False, every: int = 0
+    ) -> None:
         """every: keep the states after every so many steps alone, of which nothing goes along the motion."""
         self.motion, self.start, self.step, self.failed = motion, programs.start, programs.step, programs.failed
         count, width = len(motion.h), self.step.forward.program.width
@@ -41,7 +43,7 @@ class MotionRun:
         self._every = every or 1
         self.tape = Tape(self.step.forward, partial(_fed, motion), 0 if fits else math.ceil(math.sqrt(count)))
         self._memory = self._begin()
-        self._run(0, count - arrives)
+        self.tape.run(self._memory, 0, count - arrives, PIECE, self._every)
         if not arrives:
             self._end()
 
@@ -49,6 +51,8 @@ class MotionRun:
         """The memory before the first step."""
         motion, start = self.motion, self.start
         given = {"t": motion.t[:1], **motion.parameters_at(motion.force_at_start)}
+        if motion.method.adaptive and not self.failed:  # rtol = 0: what is iterated is solved to rounding
+            given |= {"rtol": np.asarray(motion.options.relative), "atol": np.asarray(motion.options.absolute)}
         if start is None:
             self.begin = motion.x
             return _memory(self.step.forward, {**given, self.step.passes.handed["x"]: motion.x}, motion.many)
@@ -71,20 +75,17 @@ class MotionRun:
     def finish(self) -> None:
         """Make the last step."""
         count = len(self.motion.h)
-        self._run(count - 1, count)
+        self.tape.run(self._memory, count - 1, count, PIECE, self._every)
         self._end()
-
-    def _run(self, begin: int, end: int) -> None:
-        self.tape.run(self._memory, begin, end, PIECE, self._every)
 
     def _end(self) -> None:
         forward, handed, memory = self.step.forward, self.step.passes.handed, self._memory
         self.x = forward.read(memory, handed["x"]).copy()
         self.loss = forward.read(memory, handed[LOSS])[0].copy() if LOSS in handed else np.zeros(self.x.shape[1:])
-        bad = self._bad(memory)
-        if not self.motion.many and bad.any():
-            raise MotionError(f"the motion {self.stopped()}")
-        self.x[..., bad] = np.nan
+        if (bad := self._bad(memory)).any():
+            if not self.motion.many:
+                raise MotionError(f"the motion {self.stopped()}")
+            self.x[:, bad] = np.nan
         self._constants = {name: forward.read(memory, name).copy() for name in self.step.passes.constants}
 
     def _bad(self, memory: Array) -> Any:
@@ -184,7 +185,7 @@ class MotionRun:
 
     def _vectors(self, along: Along, memory: Array) -> dict[str, Array]:
         unsolved = along.back.read(memory, along.linear.unsolved)[0] != 0.0
-        if np.any(unsolved & np.isfinite(self.x).all(axis=0) if self.motion.many else unsolved):
+        if unsolved.any() and (unsolved & np.isfinite(self.x).all(axis=0) if self.motion.many else unsolved).any():
             raise MotionError("the equations of a step's derivative were not solved: the step is too long")
         return {name: along.back.read(memory, register).copy() for name, register in along.linear.vectors.items()}
 
@@ -212,12 +213,9 @@ def _memory(ready: Runner, values: Mapping[str, Array], many: int) -> Array:
     return ready.memory(wide, many)
 
 
-def _fed(motion: MotionOf, first: int, last: int) -> Array:
+def _fed(motion: MotionRequest, first: int, last: int) -> Array:
     """What the steps first .. last - 1 are fed."""
-    part = slice(first, last)
-    columns = np.stack([motion.t[:-1][part], motion.h[part]], axis=1)
-    if not motion.each_step:
-        return columns
-    tau = motion.tau[part]
-    wide = np.broadcast_to(columns[..., None], (*columns.shape, motion.many)) if motion.many else columns
-    return np.concatenate([wide, tau], axis=1)
+    tau = motion.tau[first:last] if motion.each_step else np.empty((last - first, 0))
+    rows = np.empty((last - first, 2 + tau.shape[1], *tau.shape[2:]))
+    rows[:, 0].T[...], rows[:, 1].T[...], rows[:, 2:] = motion.t[first:last], motion.h[first:last], tau
+    return rows

@@ -12,12 +12,13 @@ from cgraph import Graph
 from cgraph.extend import STATEMENTS, Call, Linearization, Program, Statement
 
 from ...integrators import Method, Problem
-from ...integrators.equal import registers
+from ...integrators.method import equal_registers
 from ...integrators.step import with_registers
 from ...systems.arguments import TIME, new_variables
-from .motion_equations import PARAMETERS, MotionEquations
+from .motion_equations import PARAMETERS, MotionEquations, sharing
 
 LOSS = "loss"  # register: the running loss so far
+GIVEN = (*PARAMETERS, "t", "rtol", "atol")  # registers: what a motion has from without
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,16 +41,16 @@ def motion_steps(
     *,
     each_step: bool,
     wrt: tuple[str, ...],
-    sharing: bool,
+    shares: bool,
 ) -> MotionSteps:
     """The steps with derivatives by `wrt`: among "tau", "p", "c", "h" and "t", besides the state.
 
     running: the loss of a step, a graph over the states, t and parameters.  each_step: whether the applied forces are
-    new in every step.  sharing: whether the rate records what its pullback needs of it.
+    new in every step.  shares: whether the rate records what its pullback needs of it.
     """
     problem = equations.problem
     made = method.step(problem)
-    lengths = with_registers(made, {**registers(problem), **equations.lengths, "arrival": 1, LOSS: 1})
+    lengths = with_registers(made, {**equal_registers(problem), **equations.lengths, "arrival": 1, LOSS: 1})
     body: list[Statement] = [*made.derived, *_arrival(problem)]
     carried = ["x"]
     if running is not None:
@@ -57,17 +58,18 @@ def motion_steps(
         total = Graph([*running.inputs, before], {LOSS: running.only_output() + before})
         body.insert(0, Call(total, ("x", "t", "p", LOSS), (LOSS,)))
         carried.append(LOSS)
-    pullbacks = {id(problem.rate): equations.pullback, id(equations.sharing_rate): equations.sharing_pullback}
-    if sharing and equations.sharing_pullback is not None:
-        body = _sharing(body, equations, lengths)
+    pullbacks = {} if equations.pullback is None else {id(problem.rate): equations.pullback}
+    if shares and (both := sharing(equations)) is not None:
+        body = _sharing(body, problem.rate, both[0], lengths)
+        pullbacks[id(both[0])] = both[1]
     fed = ("t", "h", "tau") if each_step else ("t", "h")
     make = partial(
         Linearization,
         constant=(*made.fixed, "evaluations", "nonfinite"),
-        rules={key: pullback for key, pullback in pullbacks.items() if pullback is not None},
+        rules=pullbacks,
     )
     step = make(Program(lengths, _separate(body), record=(), feed=fed), carried, wrt)
-    read = [name for name in (*step.handed, *step.constants) if name not in (*PARAMETERS, "t")]
+    read = [name for name in (*step.handed, *step.constants) if name not in GIVEN]
     begin = _separate([*_normalized(problem, TIME), *made.start])
     start = make(Program(lengths, begin, record=()), read, [name for name in wrt if name != "h"]) if begin else None
     return MotionSteps(start, step, made.failed)
@@ -88,14 +90,14 @@ def _separate(statements: Sequence[Statement]) -> list[Statement]:
     return result
 
 
-def _sharing(body: list[Statement], equations: MotionEquations, lengths: dict[str, int]) -> list[Statement]:
+def _sharing(body: list[Statement], rate: Graph, sharing_rate: Graph, lengths: dict[str, int]) -> list[Statement]:
     """The statements, of which those that call the rate record what its pullback shares with it."""
     result: list[Statement] = []
     for k, statement in enumerate(body):
-        if isinstance(statement, Call) and statement.graph is equations.problem.rate:
+        if isinstance(statement, Call) and statement.graph is rate:
             register = f"shared{k}"
-            lengths[register] = len(equations.sharing_rate.outputs) - len(statement.graph.outputs)
-            statement = Call(equations.sharing_rate, statement.inputs, (*statement.outputs, register))
+            lengths[register] = len(sharing_rate.outputs) - len(statement.graph.outputs)
+            statement = Call(sharing_rate, statement.inputs, (*statement.outputs, register))
         result.append(statement)
     return result
 

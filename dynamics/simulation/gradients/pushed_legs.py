@@ -12,7 +12,7 @@ from cgraph import Graph
 from cgraph.extend import Array
 
 from .legs import Bars, Legs, leg_slopes, pulled_at
-from .motion import MotionOf
+from .motion import MotionRequest
 from .motion_equations import PARAMETERS
 
 
@@ -62,7 +62,7 @@ def pushed_legs(legs: Legs, directions: Mapping[str, Array]) -> Rows:
 
 
 def _through(
-    graph: Graph | None, motion: MotionOf, x: Array, t: float, x_dot: Array, t_dot: Array, inputs: Array
+    graph: Graph | None, motion: MotionRequest, x: Array, t: float, x_dot: Array, t_dot: Array, inputs: Array
 ) -> Array:
     """Tangents of the state that a graph makes of one; the same without a graph."""
     if graph is None:
@@ -71,7 +71,7 @@ def _through(
     return np.stack([row.x @ x_dot + row.t * t_dot + row.inputs @ inputs for row in rows])
 
 
-def _observed(motion: MotionOf, rows: Rows, inputs: Array) -> Rows:
+def _observed(motion: MotionRequest, rows: Rows, inputs: Array) -> Rows:
     """Rows of states (q, qd), of those of the steps."""
     graph = motion.equations.end
     if graph is None:

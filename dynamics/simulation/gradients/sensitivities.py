@@ -19,7 +19,7 @@ from ..events.event import Event, as_events
 from ..trajectory import SimulationWarning
 from .doubts import doubts
 from .legs import legs_of
-from .motion import START, TORQUE, VELOCITY, MotionOf, motion_of
+from .motion import START, TORQUE, VELOCITY, MotionRequest, motion_of
 from .pushed_legs import pushed_legs
 
 
@@ -140,7 +140,7 @@ def sensitivities(
     return Sensitivities(t, x[:, :nq], x[:, nq:], derivatives, times)
 
 
-def _directions(motion: MotionOf) -> tuple[dict[str, Array], dict[str, int | slice]]:
+def _directions(motion: MotionRequest) -> tuple[dict[str, Array], dict[str, int | slice]]:
     """Tangents of x, tau and p, a column for each number of `wrt`; and where the columns of each name are."""
     problem, nq, equations = motion.problem, motion.problem.nq, motion.equations
     names = equations.names
@@ -174,7 +174,7 @@ def _directions(motion: MotionOf) -> tuple[dict[str, Array], dict[str, int | sli
     return directions, columns
 
 
-def _displacements(motion: MotionOf) -> Array:
+def _displacements(motion: MotionRequest) -> Array:
     """dq of displacements of the coordinates, (nq, n): G(q), or 1."""
     system, nq = motion.problem.system, motion.problem.nq
     if system is None or system.kinematics.quasi is None:

@@ -10,18 +10,21 @@ from numpy.typing import ArrayLike
 
 from cgraph.extend import Array, Runner
 
-from ...integrators.step_control import COLLAPSE, DONE, SMALLEST_ATOL, TOO_SMALL
+from ...integrators.step_control import COLLAPSE, DONE, RESOLUTION, RUNNING, SMALLEST_ATOL, TOO_SMALL
 from ..estimates.state_sizes import StateSizes
 from ..run_options import RunOptions
 from ..sampled_controller import Hold
 from .dense_output import StepBlock
-from .first_step import LEAP, first_step
+from .flat_position import FlatPosition
 from .step_program import CompiledSteps
 from .stepping import FIRST_PASSES, NativeIntegration, nonfinite
 
+LEAP = 1e-2  # of the whole run: the first step that is tried
+TRIALS = 60  # of a first step
+AHEAD = 3.0  # times the change of a first step: how far its first rate may point
+HUGE = 1e300  # a tolerance that anything meets
 ROUNDS = 4  # of a first step, by which the sizes of the states are known
 HALVINGS = 100  # of a look ahead
-FAR = 1e3  # tolerances of a step, by which constraints may move what it arrives at
 JUMP = 1e-2  # of the longest of the last steps: how much of it a jump may take, where atol is chosen by sizes
 SUDDEN = 1e-3  # of a kind of rate: a force that jumps at the start changes it by more
 HELD, SHARE = 100, 0.25  # steps at the stability limit, of all, from which on a run is called stiff
@@ -42,7 +45,8 @@ class AdaptiveIntegration(NativeIntegration):
         self.relative = max(options.relative, self.program.finest)
         self.absolute = np.broadcast_to(np.maximum(options.absolute, SMALLEST_ATOL), self.program.size)
         self.sizes = self._fresh_sizes() if options.atol is None else None
-        self._below_rounding = self._far = False
+        self._below_rounding = False
+        self.flat = FlatPosition(self.program)
 
     def blocks(self, x: Array) -> Iterator[StepBlock]:
         """The steps from x (m,) on, some at a time."""
@@ -66,21 +70,24 @@ class AdaptiveIntegration(NativeIntegration):
             "accepted": 1.0,
         }
         memory = self.runner.memory(start)
+        self.flat.begin(options.t0, x, self.parameters)
         seen = FIRST_PASSES  # so many trials, and then twice as many as before, between two looks at the sizes
         while True:
             done = self.steps + self.rejected
             left = options.max_steps - done
             if left <= 0:
-                self.status = self.too_many(self._number(memory, "t"), options.max_steps)
+                self.status = self.too_many(self._number(memory, "t"), left + done) + self.flat.near(self.parameters)
                 return
             rows, _ = self._advance(memory, int(min(left, seen - done if self.sizes else 2**31)), whole=False)
             status = self._number(memory, "status")
-            self.steps += len(rows)
-            self.rejected = int(self._number(memory, "rejected"))
+            self._count(len(rows), int(self._number(memory, "rejected")))
             self.evaluations = int(self._number(memory, "evaluations"))
             if len(rows):
                 self._look(memory, rows)
                 yield self._block(rows)
+            self.status = self.flat.creeping(status == RUNNING, self.steps, self.largest, rows, self.parameters)
+            if self.status:
+                return
             if self.sizes:
                 self.sizes.see(rows[:, 2 : 2 + self.program.size])
                 if self.steps + self.rejected >= seen:
@@ -88,7 +95,7 @@ class AdaptiveIntegration(NativeIntegration):
                     self.absolute = self.sizes.tolerance()
                     self.runner.write(memory, "atol", self.absolute)
             if status == TOO_SMALL:
-                self.status = self._too_small(memory)
+                self.status = self._too_small(memory) + self.flat.near(self.parameters)
             if status == TOO_SMALL or (status == DONE and not self._next_period(memory)):
                 return
 
@@ -121,7 +128,7 @@ class AdaptiveIntegration(NativeIntegration):
 
     def _look(self, memory: Array, rows: Array) -> None:
         """Note once what a user should know of these steps: stiffness, and tolerances below rounding."""
-        options, held = self.options, int(self._number(memory, "held"))
+        options, held = self.options, int(self._number(memory, "at_limit"))
         if held >= HELD and held >= SHARE * self.steps and not self.stiff:
             t, h = rows[-1, :2]
             self.stiff = (
@@ -129,13 +136,8 @@ class AdaptiveIntegration(NativeIntegration):
                 f"method {options.method!r}, not by its tolerance"
             )
             self.warnings.append(self.stiff)
-        if not self._far and "farthest" in self.program.steps.registers:
-            way, self._far = self._number(memory, "farthest"), self._number(memory, "farthest") > FAR
-            if self._far:
-                self.warnings.append(
-                    f"by t = {rows[-1, 0]:.6g} s the constraints moved the state by {way:.3g} times the tolerance of a "
-                    "step: near a position where it can go on in two ways the motion is not certain"
-                )
+        if self.flat.rows is not None:
+            self.warnings += self.flat.look(rows, self._number(memory, "farthest"), self.parameters)
         if options.relative < self.relative and not self._below_rounding:
             size = np.abs(rows[:, 2 : 2 + self.program.size])
             short = (self.absolute + options.relative * size < self.relative * size).any(axis=0)
@@ -243,8 +245,7 @@ class AdaptiveIntegration(NativeIntegration):
 
     def _scale(self, x: Array, x_new: Array) -> Array:
         """What the error of a step is measured by."""
-        size: Array = self.absolute + self.relative * np.maximum(np.abs(x), np.abs(x_new))
-        return size
+        return np.asarray(self.absolute + self.relative * np.maximum(np.abs(x), np.abs(x_new)))
 
 
 def _lacking(runner: Runner, memory: Array, components: Sequence[str]) -> str:
@@ -255,3 +256,52 @@ def _lacking(runner: Runner, memory: Array, components: Sequence[str]) -> str:
             row, column = divmod(int(bad[0]), len(by))
             return f"the derivative of the rate of {components[row]} by {by[column]}"
     return ""
+
+
+def first_step(
+    runner: Runner,
+    order: int,
+    options: RunOptions,
+    start: Mapping[str, ArrayLike],
+    rate: Array,
+    scale: Callable[[Array, Array], Array],
+) -> float:
+    """A step that two half steps confirm, their difference is within the tolerance, and the first rate, too.
+
+    The estimate of an embedded method can vanish by symmetry, such as at a start from rest, and a guess from the first
+    derivatives can be far off; halving cannot be fooled by either. Of an initial layer that a method damps, both the
+    whole and the half steps keep nothing: there the first rate points much farther than the step goes.
+
+    start: registers x and p.  rate: (m,), of the state at the start.  scale: what errors from x to x_new are measured
+    by, (m,).
+    """
+    span, x = options.t_end - options.t0, np.asarray(start["x"])
+    anything = {"rtol": HUGE, "atol": HUGE, "max_step": math.inf, "fresh": 1.0, "accepted": 1.0}
+    anything |= {"t": options.t0, "end": math.copysign(math.inf, span), "error_old": 1.0}
+    memory = runner.memory({**start, **anything})
+    least = min(abs(span), max(2.0 * RESOLUTION * abs(options.t0), math.ulp(0.0)))
+    h = max(min(abs(span), options.longest_step) * LEAP, least)
+    for _ in range(TRIALS):
+        with np.errstate(all="ignore"):
+            whole = _forced(runner, memory, [h])
+            size = scale(x, whole)
+            change = (whole - _forced(runner, memory, [0.5 * h, 0.5 * h])) / size
+            difference = float(np.sqrt(np.mean(change * change)))
+            ahead = float(np.max(h * np.abs(rate) / np.maximum(np.abs(whole - x), size)))
+        if (difference <= 1.0 and ahead <= AHEAD) or h <= least:
+            break
+        # of tolerances; below a rounding, as of a state that moves evenly, it does not limit the step
+        factor = 0.9 * max(difference, 1e-16) ** (-1.0 / (order + 1)) if math.isfinite(difference) else 0.0
+        h = max(h * min(0.5, max(1e-3, min(factor, AHEAD / max(ahead, AHEAD)))), least)
+    return h
+
+
+def _forced(runner: Runner, memory: Array, steps: Sequence[float]) -> Array:
+    """The state after these steps from a memory, which is left as it is; NaN where one could not be made."""
+    memory = memory.copy()
+    for h in steps:
+        runner.write(memory, "next", h)
+        runner.run(memory, 1)
+        if not runner.read(memory, "accepted")[0]:
+            return np.full(len(runner.read(memory, "x")), math.nan)
+    return runner.read(memory, "x")

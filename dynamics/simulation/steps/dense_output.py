@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 import cgraph as cg
-from cgraph import Compiled, Graph
+from cgraph import Graph
 from cgraph.extend import Array, kept_by_first
+
+if TYPE_CHECKING:
+    from cgraph import Compiled
 
 UNIT = 2.0**-53  # relative error of one rounding
 
@@ -42,6 +46,16 @@ class StepBlock(NamedTuple):
             total *= share
         inside = normalized(self.normalization, self.x_old[rows] + total, self.times_at(rows, s))
         states: Array = np.where((s == 1.0)[:, None], self.x[rows], inside)
+        return states
+
+    def at(self, times: Array) -> Array:
+        """States (k, m) at times (k,) of these steps."""
+        direction = math.copysign(1.0, self.h[-1])
+        rows = np.searchsorted(direction * self.t, direction * times)
+        states, inside = self.x[rows], np.flatnonzero(self.t[rows] != times)
+        if len(inside):
+            rows = rows[inside]
+            states[inside] = self.states_at(rows, (times[inside] - self.t_old[rows]) / self.h[rows])
         return states
 
     def times_at(self, rows: Indices, s: Array) -> Array:

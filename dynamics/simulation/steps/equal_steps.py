@@ -4,22 +4,41 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 SAME = 8.0  # units of the last bit of the time, by which instants that are meant to be the same may differ
+EVEN = 4.0  # units of the last bit of the time, by which instants may miss an even spacing
 ENOUGH = 1.5  # times the longest of the steps that make up one twice as long
 
 
 class EqualSteps(NamedTuple):
-    """`steps` steps of h [s] from `begin` on, negative in a run back in time; the last one ends at `end` exactly."""
+    """`steps` steps of h [s] from `begin` on, negative in a run back in time; the last one ends at `end` exactly.
+
+    rows: of how many instants, evenly spaced, `end` is the last, at all of which a step ends.
+    """
 
     begin: float
     h: float
     steps: int
     end: float
+    rows: int = 1
+
+    def blocks(self, most_passes: int, most_rows: int) -> Iterator[tuple[int, int, bool]]:
+        """(steps, steps for a row, whether the rows are instants) of blocks with at most so many steps and rows."""
+        every = self.steps // self.rows
+        if every <= most_passes:
+            most = max(1, min(most_passes // every, most_rows))
+            for done in range(0, self.rows, most):
+                yield min(most, self.rows - done) * every, every, True
+            return
+        full, last = divmod(every - 1, most_passes)
+        for _ in range(self.rows):
+            for _ in range(full):
+                yield most_passes, most_passes, False
+            yield last + 1, last + 1, True
 
 
 def step_count(length: float, dt: float) -> int:
@@ -33,6 +52,24 @@ def equal_steps(instants: Sequence[float], dt: float) -> list[EqualSteps]:
     for begin, end in itertools.pairwise(instants):
         count = step_count(end - begin, dt)
         result.append(EqualSteps(begin, (end - begin) / count, count, end))
+    return result
+
+
+def even_steps(instants: Sequence[float], dt: float) -> list[EqualSteps]:
+    """The same as `equal_steps`, but with instants that are evenly spaced, to rounding, in one stretch."""
+    times = np.array(instants)
+    gaps, ulps = np.diff(times), np.spacing(np.maximum(np.abs(times[:-1]), np.abs(times[1:])))
+    breaks = np.flatnonzero(np.abs(np.diff(gaps)) > EVEN * ulps[1:]) + 1
+    result: list[EqualSteps] = []
+    for first, last in itertools.pairwise([0, *breaks.tolist(), len(gaps)]):
+        begin, rows = float(times[first]), last - first
+        gap = (float(times[last]) - begin) / rows
+        off = np.abs(times[first : last + 1] - (begin + gap * np.arange(rows + 1))).max()
+        if off <= EVEN * ulps[first:last].max():
+            count = step_count(gap, dt)
+            result.append(EqualSteps(begin, gap / count, rows * count, float(times[last]), rows))
+        else:
+            result += equal_steps(times[first : last + 1].tolist(), dt)
     return result
 
 

@@ -72,19 +72,8 @@ class ScipyIntegration(Integration):
     def __init__(self, solver: ScipySolver, options: RunOptions, *, between: bool = False) -> None:
         super().__init__(solver.components)
         self.solver, self.options, self.between = solver, options, between
-        self._jacobians = self._factorizations = 0
         self._idle = 0  # steps in a row that hardly moved the time
         self._largest = np.zeros(len(solver.components))  # sizes of the components so far
-
-    @property
-    def jacobians(self) -> int:
-        """Evaluations of the Jacobian, as SciPy counts them."""
-        return self._jacobians
-
-    @property
-    def factorizations(self) -> int:
-        """LU factorizations, as SciPy counts them."""
-        return self._factorizations
 
     def blocks(self, x: Array) -> Iterator[StepBlock]:
         """The steps from x (m,) on, some at a time."""
@@ -154,7 +143,7 @@ class ScipyIntegration(Integration):
         except (ValueError, ArithmeticError, np.linalg.LinAlgError) as error:  # from SciPy's linear algebra
             self.status = where + self._gave_up(solver, [str(error)])
             return False
-        self.evaluations, self._jacobians, self._factorizations = solver.nfev, solver.njev, solver.nlu
+        self.evaluations, self.jacobians, self.factorizations = solver.nfev, solver.njev, solver.nlu
         if reason := nonfinite(self.components, solver.y):
             self.status = f"stopped at t = {solver.t:.6g} s: {reason}"
         elif solver.status == "failed":

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import pickle
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from cgraph import Graph
 from cgraph.extend import Call, Factor, If, Program, Runner, kept_by_first, runner
 
 from ...integrators import Method, Problem
+from ...integrators.problem import constraint_rates
 from ...integrators.step_control import moved
 
 
@@ -31,11 +33,8 @@ class StepProgram:
     groups: tuple[int, ...]  # of the components: the same for those of one quantity, as a quaternion's
     ordinary: bool  # of a first-order system, whose states may all round each other
     normalization: Graph | None  # of states, see Problem; with constraints their projection, over states and t
-
-    @property
-    def factorizations(self) -> int:
-        """LU factorizations in a trial of a step."""
-        return sum(isinstance(statement, Factor) for statement in self.steps.statements())
+    nq: int  # coordinates in a state, which come first
+    rows: Graph | None  # of chosen steps: see `constraint_rates`
 
     @property
     def size(self) -> int:
@@ -49,6 +48,11 @@ class CompiledSteps:
 
     program: StepProgram
     runner: Runner
+
+    @cached_property
+    def factorizations(self) -> int:
+        """LU factorizations in a trial of a step."""
+        return sum(isinstance(statement, Factor) for statement in self.program.steps.statements())
 
 
 @kept_by_first
@@ -75,6 +79,8 @@ def step_program(problem: Problem, method: Method, *, dense: bool) -> StepProgra
         groups,
         problem.system is None,
         between(problem),
+        problem.nq,
+        constraint_rates(problem) if method.adaptive else None,
     )
 
 

@@ -47,6 +47,7 @@ class Clock:
 class Integration(ABC):
     """One run. `blocks` makes the steps; the attributes say how far it has come.
 
+    jacobians, factorizations: evaluations of the Jacobian of the rate, LU factorizations of matrices.
     status: empty while all is well, else why it stopped before the end.  largest: step [s].
     warnings: what speaks against the result, a sentence each.  event: the one that has ended it, in words.
     parameters: values of the rate's inputs that are not built in, as of the block that has come last.
@@ -57,7 +58,7 @@ class Integration(ABC):
 
     def __init__(self, components: Sequence[str]) -> None:
         self.components = components
-        self.steps = self.rejected = self.evaluations = self.resets = 0
+        self.steps = self.rejected = self.evaluations = self.jacobians = self.factorizations = self.resets = 0
         self.largest = 0.0
         self.status = ""
         self.warnings: list[str] = []
@@ -68,16 +69,6 @@ class Integration(ABC):
     def leg(self) -> Integration:
         """The part of the run that it is in: what makes its steps since the last reset."""
         return self
-
-    @property
-    @abstractmethod
-    def jacobians(self) -> int:
-        """Evaluations of the Jacobian of the rate."""
-
-    @property
-    @abstractmethod
-    def factorizations(self) -> int:
-        """LU factorizations of matrices."""
 
     @abstractmethod
     def blocks(self, x: Array) -> Iterator[StepBlock]:
@@ -115,18 +106,18 @@ class NativeIntegration(Integration):
         super().__init__(compiled.program.components)
         self.program, self.runner, self.options = compiled.program, compiled.runner, options
         self.parameters, self._stopped, self.control = list(parameters), stopped, control
-        self._passes = FIRST_PASSES
+        self._passes, self._factored = FIRST_PASSES, compiled.factorizations
         self._accepted = True
 
-    @property
-    def jacobians(self) -> int:
-        """Evaluations of the Jacobian of the rate: one for every state that steps were tried from."""
-        return self.steps + (not self._accepted) if self.program.factorizations else 0
+    def _count(self, steps: int, rejected: int = 0) -> None:
+        """So many steps more.  rejected: trials that were not accepted, in all.
 
-    @property
-    def factorizations(self) -> int:
-        """LU factorizations of matrices: in every trial of a step of an implicit method."""
-        return self.program.factorizations * (self.steps + self.rejected)
+        The Jacobian is evaluated for every state that steps are tried from, and factored in every trial.
+        """
+        self.steps, self.rejected = self.steps + steps, rejected
+        if self._factored:
+            self.jacobians = self.steps + (not self._accepted)
+            self.factorizations = self._factored * (self.steps + self.rejected)
 
     def _run(self, memory: Array, passes: int, every: int = 1) -> tuple[Array, int]:
         if self._stopped():
@@ -207,7 +198,7 @@ class FixedStepIntegration(NativeIntegration):
             rows, done = self._advance(memory, int(min(left, most - self.steps)), whole=not self.every_step)
             left -= done
             failed = self._number(memory, "nonfinite") != 0.0
-            self.steps += done - failed
+            self._count(done - failed)
             self.evaluations = int(self._number(memory, "evaluations"))
             t_old, x_old = self._number(before, "t"), self.runner.read(before, "x").copy()
             if failed:

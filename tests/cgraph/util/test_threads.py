@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import cgraph as cg
-from cgraph.program.functions import generated_function as generated
+from cgraph.program.functions import compile as functions
 from cgraph.program.runners import native_runner
 from cgraph.util import threads
 from cgraph.util.threads import share, thread_count
@@ -38,7 +38,7 @@ def function(request, monkeypatch):
     if "without" in request.param:
         monkeypatch.setitem(sys.modules, "llvmlite", None)
     monkeypatch.setattr(native_runner, "WORK", 24 * len(graph().nodes))
-    monkeypatch.setattr(generated, "BLOCK", 24)
+    monkeypatch.setattr(functions, "BLOCK", 24)
     return cg.compile(graph(), request.param.partition(" ")[0])
 
 

@@ -23,7 +23,7 @@ from dynamics.experiments.text_table import digits
 from dynamics.io.mujoco_twin import MujocoTwin
 from dynamics.peers import Case, UnavailableError, ours
 from dynamics.peers.case import BATCH, DERIVATIVES, DT, MOTIONS, NUDGE, PASSES
-from dynamics.peers.inertial_parameters import with_inertial_parameters
+from dynamics.peers.ours import with_inertial_parameters
 from dynamics.peers.translate import translated
 from viz import cli
 

@@ -10,24 +10,14 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.experiments.speed import (
-    balanced_order,
-    both_forms,
-    both_linearizations,
-    closed_chains,
-    compile_time,
-    ensembles,
-    long_chains,
-    parallel_c,
-    reconfiguration,
-)
+from dynamics.experiments.speed import closed_chains, ensembles, reconfiguration, stages
 from dynamics.experiments.speed.agreement import QUANTITIES, differences, random_arm
 from dynamics.experiments.speed.bench_figures import FIGURES
 from dynamics.experiments.speed.bench_scenes import turned_arm
-from dynamics.experiments.speed.build_time import build_time
 from dynamics.experiments.speed.node_counts import VARIANTS
 from dynamics.experiments.text_table import WIDTH, csv_text, table
 from dynamics.peers import PEERS, Case
+from tests.dynamics.figures import balanced_order, both_forms, parallel_c
 from viz import cli
 
 ROUNDING = 1e-11  # relative, of accelerations of seven bodies by another order of operations
@@ -68,23 +58,23 @@ def test_pendulums_of_an_ensemble_end_where_those_of_mujoco_and_jax_do() -> None
 
 
 def test_the_time_to_compile_is_told_by_stages_of_a_chain(capsys: pytest.CaptureFixture[str]) -> None:
-    compile_time.cost("planar", 2)
+    stages.compile_cost("planar", 2)
     nodes, *seconds = capsys.readouterr().out.split()
-    assert int(nodes) == len(dyn.forward_dynamics(long_chains.MODELS["planar"](2)).nodes)
-    assert len(seconds) == len(compile_time.HEADER) - 3
+    assert int(nodes) == len(dyn.forward_dynamics(stages.MODELS["planar"](2)).nodes)
+    assert len(seconds) == len(stages.COLUMNS) - 3
     assert all(float(value) > 0.0 for value in seconds)
 
 
 def test_elimination_is_accurate_on_long_chains_and_dense_solves_are_less_so() -> None:
     pytest.importorskip("flint")
-    errors = long_chains.accuracy("planar", 30, 0.1)
+    errors = stages.accuracy("planar", 30, 0.1)
     assert errors["elimination"] < 1e-13  # some roundings a link
     assert all(errors[name] > 10.0 * errors["elimination"] for name in errors if name != "elimination")
 
 
 def test_the_cost_of_a_chain_is_told_by_stage(capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("resource")
-    long_chains.cost("3D", 3)
+    stages.cost("3D", 3)
     lines = capsys.readouterr().out.splitlines()
     assert [line.split("  ")[0] for line in lines[2:5]] == ["Lagrangian", "forward dynamics", "evaluate"]
     assert lines[-1].startswith(f"{len(dyn.forward_dynamics(turned_arm(3)).nodes)} nodes")
@@ -106,7 +96,7 @@ def test_every_change_of_structure_is_timed_and_its_torques_agree() -> None:
 
 
 def test_the_build_is_of_the_graph() -> None:
-    (text,) = build_time(3, 1)
+    (text,) = stages.build_time(3, 1)
     arm = dyn.planar_arm([1.0, 0.9, 0.8], [1.1, 1.1 - 0.4 / 3, 1.1 - 0.8 / 3], damping=0.1)
     assert text.splitlines()[-1].split()[-2:] == [str(len(each)) for each in _size(dyn.forward_dynamics(arm))]
 
@@ -162,25 +152,19 @@ def test_csv_has_empty_cells_for_what_is_not_known() -> None:
     assert csv_text(["a", "b"], [[1, None], ["x,y", 0.1]]) == 'a,b\n1,\n"x,y",0.1\n'
 
 
-def test_both_forms_are_counted_and_timed(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("name", both_forms.FIGURES)
+def test_both_forms_and_their_linearizations_are_counted_and_timed(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
     monkeypatch.setattr(both_forms, "SECONDS", 1e-4)
-    plain, canonical, alone, of_momenta, of_velocities = both_forms.rows("planar 3", 1)
-    for row, derive in zip((plain, canonical, alone), both_forms.FORMS.values(), strict=True):
+    this = both_forms.FIGURES[name]
+    first, *others, one_ratio, other_ratio = both_forms.rows(this, "planar 3", 1)
+    for row, derive in zip((first, *others), this.forms.values(), strict=True):
         counts = derive(both_forms.MODELS["planar 3"]()).counts()
-        assert row[1:5] == tuple(map(str, (counts.nodes, counts.edges, counts.depth, counts.width)))
-    for ratios, row in ((of_momenta, canonical), (of_velocities, alone)):
-        assert float(ratios[1]) == pytest.approx(int(row[1]) / int(plain[1]), abs=1e-3)
+        assert list(row[1 : 1 + len(this.sizes)]) == [str(getattr(counts, size)) for size in this.sizes]
+    for ratios, row in zip((one_ratio, other_ratio), others, strict=True):
+        assert float(ratios[1]) == pytest.approx(int(row[1]) / int(first[1]), abs=1e-3)
         assert all(float(each) > 0.0 for each in ratios[1:])
-
-
-def test_both_linearizations_are_counted_and_timed(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(both_linearizations, "SECONDS", 1e-4)
-    nodes, times = both_linearizations.rows("planar 3", 1)
-    arm = both_forms.MODELS["planar 3"]()
-    found = [len(dyn.state_space(arm, form=form).nodes) for form in ("velocity", "momentum")]
-    assert [int(nodes[1]), int(nodes[3])] == found
-    assert float(nodes[4]) == pytest.approx(found[1] / found[0], abs=1e-3)
-    assert all(float(each) > 0.0 for each in times[1:])
+    *_, ratio = both_forms.rows(this._replace(compiled=1), "planar 3", 1)  # too large to be timed
+    assert list(ratio[1 + len(this.sizes) :]) == ["-"] * len(this.ways)
 
 
 def test_a_schedule_is_bounded_by_work_and_by_depth() -> None:
@@ -198,7 +182,7 @@ def test_a_schedule_is_bounded_by_work_and_by_depth() -> None:
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="no C compiler")
 def test_lanes_and_threads_give_the_same_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(parallel_c, "ROUNDS", 1)
-    graph = balanced_order.trigonometry_given(balanced_order.solved(both_forms.MODELS["planar 3"](), "balanced"))
+    graph = balanced_order.trigonometry_given(balanced_order.solved(_planar(), "balanced"))
     found = parallel_c.times(graph, graph.inputs[:3], ["x0"])
     sums = [total for _, total in found.values()]
     x = [0.2 + 0.8 * ((i * 7919) % 1000) / 1000.0 for i in range(len(graph.inputs))]

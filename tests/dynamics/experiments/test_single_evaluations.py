@@ -29,7 +29,7 @@ def random_arm(n: int) -> tuple[dyn.Mechanism, Array, Array, Array]:
 def test_exact_torques_are_those_of_lagranges_equation(n: int) -> None:
     """By differences of L itself in 80 digits: another formula, other arithmetic."""
     importorskip("flint")
-    from dynamics.multiprecision.planar_arm_equations import torques
+    from dynamics.multiprecision.chain_equations import torques
 
     arm, q, qd, qdd = random_arm(n)
     expected = lagrange(arm, {"q": q, "qd": qd, "qdd": qdd})
@@ -40,7 +40,7 @@ def test_exact_torques_are_those_of_lagranges_equation(n: int) -> None:
 @mark.parametrize("n", [1, 2, 5, 20])
 def test_exact_accelerations_give_the_torques_back(n: int) -> None:
     importorskip("flint")
-    from dynamics.multiprecision.planar_arm_equations import accelerations, torques
+    from dynamics.multiprecision.chain_equations import accelerations, torques
 
     arm, q, qd, tau = random_arm(n)
     qdd = accelerations(arm, q, qd, tau)
@@ -53,7 +53,7 @@ def test_exact_accelerations_give_the_torques_back(n: int) -> None:
 def test_digits_are_added_until_the_result_has_enough() -> None:
     """Masses 24 decades apart, for which the first attempt cannot do."""
     importorskip("flint")
-    from dynamics.multiprecision.planar_arm_equations import accelerations, torques
+    from dynamics.multiprecision.chain_equations import accelerations, torques
 
     _, q, qd, tau = random_arm(6)
     arm = dyn.planar_arm([1e-24] * 5 + [1.0], [1.0] * 6)

@@ -181,3 +181,13 @@ def test_where_a_linkage_can_go_on_in_two_ways_it_keeps_its_energy_or_says_why_n
         warnings.simplefilter("always")
         run = dyn.simulate(model, -length * ways, 4.0 * ways, length, method, max_step=h, max_steps=3000)
     assert np.ptp(run.energy) < 1e-6 * np.abs(run.energy).max() or said or not run.success
+
+
+@pytest.mark.filterwarnings("ignore::dynamics.SimulationWarning")
+def test_a_run_that_creeps_at_a_flat_position_ends_and_names_its_rows() -> None:
+    """The rounding of the constraints over the distance from it is more than the tolerance of a step."""
+    model, q, qd = windows(3)
+    run = dyn.simulate(model, q, qd, 10.0, rtol=1e-12)
+    assert (run.success, run.stats.steps < MOST) == (False, True)
+    assert "; near by 'coupler " in run.stats.message
+    assert "nothing that the other constraints do not say: coordinate 'crank 0' = " in run.stats.message

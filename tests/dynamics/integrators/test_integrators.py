@@ -11,9 +11,8 @@ from pytest import approx, mark, raises
 import cgraph as cg
 import dynamics as dyn
 from dynamics.integrators import METHODS, derive, mechanics
-from dynamics.integrators.composition import COMPOSITIONS
-from dynamics.integrators.partitioned_tableau import PARTITIONED
 from dynamics.integrators.step_control import LARGEST
+from dynamics.integrators.symplectic_tableaus import COMPOSITIONS, PARTITIONED
 from dynamics.simulation.run_options import SCIPY_SOLVERS
 from dynamics.systems.system import System
 from tests.dynamics.planet import PERIHELION, cart, planet, position

@@ -13,9 +13,9 @@ import cgraph as cg
 import dynamics as dyn
 from dynamics.integrators import METHODS, runge_kutta
 from dynamics.integrators.dop853 import DOP853
-from dynamics.integrators.partitioned_tableau import PARTITIONED, Partitioned, gauss
 from dynamics.integrators.radau import _A, _POWERS, _T, _T_INVERSE
 from dynamics.integrators.rosenbrock import RODAS5P
+from dynamics.integrators.symplectic_tableaus import PARTITIONED, Partitioned, gauss
 from dynamics.integrators.tableau import TABLEAUS, Tableau
 from tests.dynamics.planet import PERIHELION, planet, position
 

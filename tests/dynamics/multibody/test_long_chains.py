@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 import dynamics as dyn
-from dynamics.multiprecision.planar_arm_equations import accelerations
-from dynamics.multiprecision.spatial_chain_equations import Array, chain_accelerations
+from cgraph.extend import Array
+from dynamics.multiprecision import chain_equations
+from tests.dynamics import planar_arm_equations
 from tests.dynamics.mechanisms import turned_arm
 
 pytest.importorskip("flint")
@@ -25,11 +26,7 @@ def planar(n: int) -> dyn.Mechanism:
     )
 
 
-def planar_accelerations(arm: dyn.Mechanism, q: Array, qd: Array, tau: Array) -> Array:
-    return accelerations(arm, q, qd, tau).high
-
-
-KINDS = {"planar": (planar, planar_accelerations), "3D": (turned_arm, chain_accelerations)}
+KINDS = {"planar": (planar, planar_arm_equations), "3D": (turned_arm, chain_equations)}
 
 
 def error(kind: str, n: int, spread: float, method: str = "recursive") -> float:
@@ -38,7 +35,7 @@ def error(kind: str, n: int, spread: float, method: str = "recursive") -> float:
     model: Any = make(n)
     rng = np.random.default_rng(n)
     q, qd, tau = rng.uniform(-spread, spread, n), rng.normal(size=n), rng.normal(size=n)
-    exact = reference(model, q, qd, tau)
+    exact = reference.accelerations(model, q, qd, tau).high
     graph = dyn.forward_dynamics(model, method)
     found: Array = np.array(list(graph.evaluate(dict(zip(graph.input_names, [*q, *qd, *tau], strict=True))).values()))
     return float(np.abs(found - exact).max() / np.abs(exact).max())

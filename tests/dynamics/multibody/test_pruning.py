@@ -120,7 +120,7 @@ def test_regrouped_inertia_moves_alike_in_no_more_nodes(family: str, equations: 
 def test_by_default_pruning_costs_no_digit(n: int) -> None:
     """Nothing is switched off, so the graph is that of the model; regrouped, it has lost some."""
     importorskip("flint")
-    from dynamics.multiprecision.planar_arm_equations import accelerations
+    from tests.dynamics.planar_arm_equations import accelerations
 
     rng = np.random.default_rng(n)
     model = dyn.planar_arm(rng.uniform(0.5, 1.5, n).tolist(), rng.uniform(0.5, 1.5, n).tolist())

@@ -382,3 +382,14 @@ def test_jacobians_and_factorizations_are_counted(method: str, jacobians: int, f
     trials = run.stats.steps + run.stats.rejected
     assert (run.njev, run.nlu) == (jacobians * run.stats.steps, factors * trials)
     assert (run.nfev, run.status, run.success) == (run.stats.nfev, 0, True)
+
+
+def test_the_error_where_a_reset_of_the_run_beside_is_at_the_end_of_a_step() -> None:
+    ball = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 - 9.81 * q[0], ["height"])
+    bounce = dyn.Event("bounce", lambda q, qd, t: q[0], direction=-1, reset=lambda q, qd, t: (q, [-0.5 * qd[0]]))
+    with warns(dyn.SimulationWarning, match=r"^the state is off by an estimated 0\.13 of the size of"):
+        run = dyn.simulate(ball, [1.0], [0.0], 0.7, "symplectic_euler", dt=0.05, events=bounce)
+    falls, left = np.sqrt(2.0 / 9.81), 0.7 - np.sqrt(2.0 / 9.81)
+    exact = 0.5 * 9.81 * falls * left - 0.5 * 9.81 * left**2
+    assert run.stats.error_at_end is not None
+    assert 0.5 < run.stats.error_at_end / abs(run.q[-1, 0] - exact) < 2.0

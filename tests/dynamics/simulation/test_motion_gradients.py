@@ -30,7 +30,7 @@ DIFFERENCES = 2e-8  # central differences over 1e-5 of float64
 DIGITS = 1e-10  # beside differences of 30 digits, of stages that are solved to rounding
 WRT = ["q", "qd", "tau", "m", "k"]
 USUAL = "rk4 dopri5 rodas radau verlet gauss4".split()
-OTHERS = [name for name in (*METHODS, "gauss8") if name not in USUAL and name != "taylor"]
+OTHERS = [name for name in (*METHODS, "gauss8") if name not in USUAL]
 
 
 def bead(unit: float = 1.0) -> System:
@@ -120,7 +120,7 @@ def exact_slopes() -> Any:
     ("method", "accuracy"),
     [
         ("dop853", {"rtol": 1e-12}),
-        *slow(*[(name, {"rtol": 1e-12}) for name in ("dopri5", "rodas", "radau")]),
+        *slow(*[(name, {"rtol": 1e-12}) for name in ("dopri5", "rodas", "radau", "taylor")]),
         *slow(*[(name, {"dt": 0.005}) for name in ("gauss6", "yoshida8", "kahan_li8")]),
     ],
 )
@@ -130,6 +130,23 @@ def test_a_gradient_of_short_steps_beside_differences_of_30_digits(
     given = {"wrt": ["q", "k"], "backend": "python", **accuracy}
     result = dyn.gradient(BEAD, loss, [0.5], [0.2], 0.5, method, **given)
     assert [result["q"][0], result["k"]] == approx(exact_slopes, rel=DIGITS)
+
+
+@mark.parametrize("method", ["dop853", "taylor"])
+def test_a_gradient_is_of_the_steps_of_simulate_at_any_tolerance(method: str) -> None:
+    """The order of Taylor's steps, too, is by the tolerance; slopes by differences at the same steps."""
+    for rtol in (1e-3, 1e-7):
+        given = {"method": method, "rtol": rtol, "backend": "python", "t_end": 0.5}
+        result, run = dyn.gradient(BEAD, loss, [0.5], [0.2], **given), dyn.simulate(BEAD, [0.5], [0.2], **given)
+        assert (result.q.tolist(), result.qd.tolist()) == (run.q[-1].tolist(), run.qd[-1].tolist())
+        assert result.t.tolist() == run.t.tolist()
+        at_most = {**given, "max_step": 1e-2, "first_step": 1e-2}  # so short that all starts have the same steps
+        short, (after, before) = (
+            dyn.gradient(BEAD, loss, [0.5], [0.2], **at_most),
+            [dyn.gradient(BEAD, loss, [0.5 + change], [0.2], **at_most) for change in (1e-5, -1e-5)],
+        )
+        assert after.t.tolist() == before.t.tolist()
+        assert short["q"] == approx([(after.value - before.value) / 2e-5], rel=DIFFERENCES)
 
 
 def pendulum_step(x: Any, tau: Any, m: Any, h: float) -> Any:
@@ -498,9 +515,7 @@ def test_what_is_not_there_is_said_in_a_sentence() -> None:
     def end(**given: Any) -> Any:
         return dyn.gradient(BEAD, loss, [0.5], [0.2], **({"t_end": 0.1, "dt": 0.05, "backend": "python"} | given))
 
-    with raises(ValueError, match="by method 'taylor' have no derivatives here; those by euler, rk4"):
-        end(method="taylor", dt=None)
-    with raises(ValueError, match="by method 'scipy:Radau' have no derivatives"):
+    with raises(ValueError, match="by method 'scipy:Radau' have no derivatives here; those by euler, rk4"):
         end(method="scipy:Radau", dt=None)
     with raises(TypeError, match="SampledController calls Python"):
         end(tau=dyn.SampledController(lambda q, qd, t: q, 0.1))

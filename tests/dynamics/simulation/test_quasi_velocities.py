@@ -9,7 +9,7 @@ from pytest import mark
 
 import dynamics as dyn
 from dynamics.integrators import METHODS
-from dynamics.integrators.composition import COMPOSITIONS
+from dynamics.integrators.symplectic_tableaus import COMPOSITIONS
 
 IN_TURN = ("symplectic_euler", "verlet")  # they step coordinates and momenta in turn
 METHODS_OF_STATES = [

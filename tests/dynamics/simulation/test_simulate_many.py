@@ -1,6 +1,7 @@
 """simulate_many: every trajectory is its own, whoever runs it and whatever its neighbors do."""
 
 import math
+import warnings
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from pytest import approx, mark, raises
 import dynamics as dyn
 from dynamics.integrators import METHODS
 from dynamics.simulation.ensembles.simulate_many import simulate_many
-from dynamics.simulation.ensembles.step_grid import StepGrid, grids_between
+from dynamics.simulation.steps.equal_steps import EqualSteps, even_steps
 from dynamics.systems.model import as_system
 from dynamics.systems.system import System
 from tests.dynamics.ensembles import arms, same
@@ -241,11 +242,11 @@ def test_a_result_that_would_not_fit_is_refused() -> None:
 
 
 def test_only_the_last_block_of_a_row_ends_at_an_instant() -> None:
-    grid = StepGrid(0.0, 0.1, 7, 2)
+    grid = EqualSteps(0.0, 0.1, 14, 1.4, rows=2)
     assert [*grid.blocks(3, 5)] == [(3, 3, False), (3, 3, False), (1, 1, True)] * 2
     assert [*grid.blocks(7, 5)] == [(7, 7, True)] * 2
     assert [*grid.blocks(20, 5)] == [(14, 7, True)]
-    assert [*StepGrid(0.0, 0.1, 1, 5).blocks(20, 2)] == [(2, 1, True), (2, 1, True), (1, 1, True)]
+    assert [*EqualSteps(0.0, 0.1, 5, 0.5, rows=5).blocks(20, 2)] == [(2, 1, True), (2, 1, True), (1, 1, True)]
 
 
 @given(
@@ -256,13 +257,27 @@ def test_only_the_last_block_of_a_row_ends_at_an_instant() -> None:
 def test_grids_meet_every_instant_in_steps_of_at_most_dt(gaps: list[float], dt: float, limits: tuple[int, int]) -> None:
     instants = [0.0, *np.cumsum(gaps).tolist()]
     met = [0.0]
-    for grid in grids_between(instants, dt):
+    for grid in even_steps(instants, dt):
         assert grid.begin == approx(met[-1], rel=INSTANT, abs=INSTANT)
         assert grid.h <= dt * (1 + 10.0 * SPACING)
-        met += [grid.begin + (k + 1) * grid.steps * grid.h for k in range(grid.rows)]
+        met += [grid.begin + (k + 1) * grid.steps / grid.rows * grid.h for k in range(grid.rows)]
         blocks = list(grid.blocks(*limits))
-        assert sum(steps for steps, _, _ in blocks) == grid.steps * grid.rows
+        assert sum(steps for steps, _, _ in blocks) == grid.steps
         assert sum(steps // every for steps, every, due in blocks if due) == grid.rows
         assert all(steps <= limits[0] for steps, _, _ in blocks)
     assert met == approx(instants, rel=INSTANT)
-    assert len(grids_between(np.linspace(0.0, 3.0, 1001).tolist(), dt)) == 1
+    assert len(even_steps(np.linspace(0.0, 3.0, 1001).tolist(), dt)) == 1
+
+
+@mark.parametrize("method", ["midpoint", "gauss6", "verlet"])
+def test_the_errors_of_an_ensemble_are_those_of_its_runs_when_the_first_of_them_fails(method: str) -> None:
+    arm, starts = dyn.planar_arm([1.0, 0.8], [1.0, 0.8]), [[2.0, 0.5], *[[0.01 * k, 0.0] for k in range(1, 9)]]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", dyn.SimulationWarning)
+        fan = simulate_many(arm, starts, [0.0, 0.2], 2.0, method, dt=0.2)
+        alone = [dyn.simulate(arm, start, [0.0, 0.2], 2.0, method, dt=0.2) for start in starts]
+    assert fan.stats.status.tolist() == [-1, *[0] * 8]
+    assert fan.stats.message == tuple([run.message for run in alone])
+    np.testing.assert_array_equal(fan.stats.error[1:], [run.stats.error for run in alone[1:]])
+    for states, run in zip(fan.q, alone, strict=True):
+        np.testing.assert_array_equal(states[: len(run.q)], run.q)

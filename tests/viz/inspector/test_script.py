@@ -13,7 +13,7 @@ import pytest
 import cgraph as cg
 import dynamics as dyn
 import viz
-from cgraph.codegen.python_source import source
+from cgraph.codegen.python_function import source
 from cgraph.extend import Names
 from cgraph.operations.table import OPS
 from dynamics.scenes.inspection import Inspection, inspection

@@ -1,13 +1,25 @@
-"""Mechanics: the graphs of momenta p = dL/dqd and of their rates, for methods that step coordinates and momenta."""
+"""Momenta p = dL/dqd: their graphs, for methods that step q and p, and the problem whose states these are."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Builder, SingularError, building, cotangents, hessian_nodes, kept_by_first, solve_nodes
+from cgraph.extend import (
+    Builder,
+    SingularError,
+    building,
+    cotangents,
+    hessian_nodes,
+    kept_by_first,
+    require_choice,
+    solve_nodes,
+)
 
+from ..equations.equations_of_motion import momentum
+from ..equations.hamiltonian import FORMS, hamilton_equations, missing_momenta, velocities
 from ..equations.singular_mass_matrix import SingularMassMatrixError
 from ..systems.arguments import new_variables
 from ..systems.system import System
@@ -86,3 +98,34 @@ def _solved(system: System, rhs: list[Node], build: Builder) -> list[Node]:
         if not error.pivot:
             raise
     return [*solve_nodes(system.lagrangian, system.qd, rhs, build), cg.constant(0.0)]
+
+
+def in_form(problem: Problem, form: str) -> Problem:
+    """The problem that the steps of a run are of. Raises ValueError for a form that it has not."""
+    if require_choice("form", form, FORMS) == "velocity":
+        return problem
+    return momentum_form(problem)
+
+
+@kept_by_first
+def momentum_form(problem: Problem) -> Problem:
+    """The same motion in q and p = dL/dqd.
+
+    Raises ValueError for a first-order system; ConstraintError, SingularMassMatrixError and ValueError as
+    `hamilton_equations`.
+    """
+    system = problem.system
+    if system is None:
+        raise ValueError('form="momentum" needs a Lagrangian, which a system of first order does not have')
+    states = (*problem.states[: problem.nq], *[f"p{i}" for i in range(system.n)])
+    names = [f"momentum of {name!r}" for name in system.velocities]
+    missing = missing_momenta(system)
+    return replace(
+        problem,
+        states=states,
+        components=(*problem.components[: problem.nq], *names),
+        rate=problem.bind(states, hamilton_equations(system)),
+        velocities=problem.bind(states, velocities(system)),
+        momentum=problem.bind(problem.states, momentum(system)),
+        missing=missing and problem.bind(states, missing),
+    )

@@ -17,26 +17,15 @@ from typing import NamedTuple
 import numpy as np
 
 from cgraph.extend import Array
-
-from ..multibody.mechanism import Mechanism
-from ..multibody.planar_arm import planar_links
-from .flint_numbers import Number, flint, working
+from dynamics.multibody.mechanism import Mechanism
+from dynamics.multibody.planar_arm import planar_links
+from dynamics.multiprecision.chain_equations import Pair
+from dynamics.multiprecision.flint_numbers import Number, flint, working
 
 Vector = list[Number]
 DIGITS = 60  # of the first attempt; twice as many until `LOST` is met
 MOST = 2000
 LOST = 1e-50  # the largest bound on the error, relative to the largest component
-
-
-class Pair(NamedTuple):
-    """Numbers as sums of two float64, `high` the nearest one: 32 digits. Each (n,)."""
-
-    high: Array
-    low: Array
-
-    def deviation(self, x: Array) -> Array:
-        """x - this, exact to the last bits of x."""
-        return (x - self.high) - self.low
 
 
 def torques(arm: Mechanism, q: Array, qd: Array, qdd: Array) -> Pair:

@@ -5,7 +5,8 @@ import pytest
 from mpmath import mp, mpf
 
 import dynamics as dyn
-from dynamics.multiprecision.planar_arm_equations import Pair, accelerations, torques
+from dynamics.multiprecision.chain_equations import Pair, accelerations, torques
+from tests.dynamics import planar_arm_equations
 
 pytest.importorskip("flint")
 PAIR = mpf(2) ** -104  # of the value: what two float64 hold
@@ -40,3 +41,19 @@ def assert_near(pair: Pair, exact: mpf) -> None:
         deviation = mpf(float(x)) - exact
         found = mpf(pair.deviation(np.array([x]))[0])
         assert abs(found - deviation) <= PAIR * abs(exact) + mpf(2) ** -53 * abs(deviation)
+
+
+@pytest.mark.parametrize("n", [1, 2, 7])
+def test_newton_euler_in_space_and_closed_formulas_of_the_plane_agree_in_all_digits(n: int) -> None:
+    """Lengths of 1e-6 and 1e6 m in turn, for which the first attempt cannot do, among them."""
+    rng = np.random.default_rng(n)
+    for lengths in (rng.uniform(0.5, 1.5, n), 10.0 ** (6.0 * (-1.0) ** np.arange(n))):
+        arm = dyn.planar_arm(rng.uniform(0.5, 1.5, n).tolist(), lengths.tolist(), damping=0.1)
+        state = rng.uniform(-3.0, 3.0, n), rng.normal(size=n), rng.normal(size=n)
+        for ours, theirs in (
+            (torques, planar_arm_equations.torques),
+            (accelerations, planar_arm_equations.accelerations),
+        ):
+            one, other = ours(arm, *state), theirs(arm, *state)
+            assert one.high.tolist() == other.high.tolist()
+            assert one.low.tolist() == pytest.approx(other.low.tolist(), rel=1e-9)

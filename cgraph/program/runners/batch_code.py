@@ -1,14 +1,19 @@
-"""BatchCode: machine code for batches as a function of arrays."""
+"""Machine code of batches: one pass of a program at many values of a register, in rows or in columns."""
 
 from __future__ import annotations
 
 import ctypes
+from dataclasses import replace
 
 import numpy as np
 
-from ..core.evaluation import Array
-from ..util.memory import aligned, lies_in_rows
-from .llvm_engine import Code
+from ...codegen.arithmetic import Arithmetic
+from ...codegen.batch_ir import Batch, Place, rows_ir
+from ...codegen.llvm_engine import Code
+from ...core.evaluation import Array
+from ...util.memory import aligned, lies_in_rows
+from ..program import Program
+from .llvm_ir import offsets, program_ir
 
 _BATCH = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, *[ctypes.c_int64] * 3, ctypes.c_void_p)
 
@@ -59,3 +64,16 @@ class BatchCode:
         strides = points.strides[axis] // points.itemsize, result.strides[axis] // result.itemsize
         entry(points.ctypes.data, result.ctypes.data, count, *strides, memory.ctypes.data)  # type: ignore[misc]
         self._free.append(memory)
+
+
+def program_rows_ir(program: Program, name: str, lanes: int, flags: str, registers: int) -> Batch:
+    """The module with `rows`, see `codegen.batch_ir`, of one pass: from the register of that name to what it records.
+
+    Both are read and written where they lie among the registers.
+    """
+    places = offsets(program.registers, 1)
+    point, *results = [Place(places[each], program.registers[each]) for each in (name, *program.record)]
+    calls = ["  %rows = call i64 @run(ptr %w, ptr null, i64 1, i64 1, ptr %done, ptr null)"]
+    driver = rows_ir(Arithmetic(flags, lanes), point, results, calls, ["  %done = alloca i64, align 8"])
+    source = program_ir(replace(program, record=()), flags, lanes, 1, registers)
+    return Batch("\n".join([source, *driver, ""]), lanes * places[""])

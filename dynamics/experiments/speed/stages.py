@@ -1,0 +1,189 @@
+"""Stages of a model, from its Lagrangian to a result: what each one takes, by the clock, the processor and memory."""
+
+from __future__ import annotations
+
+import statistics
+import sys
+import time
+from collections.abc import Callable, Iterator
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+
+import cgraph as cg
+from cgraph.extend import Array, ldl_elimination
+
+from ...equations.equations_of_motion import bias, forward_dynamics, mass_matrix
+from ...equations.linearize_many import linearize_many
+from ...multibody.mechanism import Mechanism
+from ...multibody.planar_arm import planar_arm
+from ...multiprecision.chain_equations import accelerations
+from ...systems.model import as_system
+from ..fresh_process import run_fresh
+from ..text_table import digits, table
+from .bench_scenes import turned_arm
+
+BUILT, REPEATS = (3, 20), 7  # links of the arms of `build_time`, and builds of each
+COMPILED = (10, 30, 100)  # links of the chains of `compile_time`
+LINKS = 1000  # of the chains of `long_chains`
+STATES = 3  # of each chain whose errors are taken
+SIZES = (("planar", 10), ("planar", 100), ("planar", 300), ("3D", 10), ("3D", 100))
+DENSE = {"planar": 30, "3D": 10}  # links; beyond, the graph of the dense solve, which grows with n^3, takes long
+COLUMNS = ["chain", "bodies", "nodes", "graph", "code", "a body", "Jacobian", "a body", "A and B", "an entry"]
+TITLE = """\
+Seconds of the processor from the model to a first result, every chain in a process of its own.
+graph, code: forward dynamics as a graph, and compiled.  Jacobian: by q, qd and tau, of the compiled function.
+A and B: `linearize_many`, 6 n^2 entries.  a body, an entry: in ms, of graph and code, the Jacobian, and A and B."""
+
+Made = TypeVar("Made")
+
+
+class Spent(NamedTuple):
+    """Seconds by the clock and of the processor, and the peak of memory [MB] afterwards, 0 on Windows."""
+
+    clock: float
+    processor: float
+    peak: float
+
+
+class Stages:
+    """Runs one stage after another.  spent: what each has taken, by name."""
+
+    def __init__(self) -> None:
+        self.spent: dict[str, Spent] = {}
+
+    def __call__(self, name: str, function: Callable[[], Made]) -> Made:
+        """What the function returns, its cost noted under that name."""
+        begin, worked = time.perf_counter(), time.process_time()
+        result = function()
+        self.spent[name] = Spent(time.perf_counter() - begin, time.process_time() - worked, _peak())
+        return result
+
+
+def _peak() -> float:
+    if sys.platform == "win32":
+        return 0.0
+    import resource  # not on Windows
+
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / (2**20 if sys.platform == "darwin" else 2**10)
+
+
+def planar(n: int) -> Mechanism:
+    """A planar chain of unlike rods."""
+    masses, lengths = [0.2 + 0.05 * (i % 3) for i in range(n)], [0.2 + 0.1 * (i % 2) for i in range(n)]
+    return planar_arm(masses, lengths, damping=0.1)
+
+
+MODELS: dict[str, Callable[[int], Mechanism]] = {"planar": planar, "3D": turned_arm}
+
+
+def build_time(links: int | None = None, repeats: int = REPEATS) -> Iterator[str]:
+    """Median, fastest and slowest build of forward dynamics, and its size. links: of an arm of this length alone."""
+    rows = []
+    for n in BUILT if links is None else (links,):
+        stages, masses, lengths = Stages(), [1.0 - 0.3 * i / n for i in range(n)], [1.1 - 0.4 * i / n for i in range(n)]
+        for turn in range(repeats):  # an arm anew each time: its Lagrangian is kept
+            graph = stages(str(turn), lambda: forward_dynamics(planar_arm(masses, lengths, damping=0.1)))  # noqa: B023
+        seconds = [each.clock for each in stages.spent.values()]
+        times = [f"{1e3 * each:.1f} ms" for each in (statistics.median(seconds), min(seconds), max(seconds))]
+        rows.append([str(n), *times, str(len(graph.nodes)), str(len(graph.edges))])
+    header = ["links", "median", "fastest", "slowest", "nodes", "edges"]
+    title = "forward dynamics of a planar arm, from its Lagrangian to the simplified graph"
+    yield "\n".join([title, *table(header, rows, left=())])
+
+
+def compile_time(links: int | None = None) -> Iterator[str]:
+    """A row a chain: time until forward dynamics and its derivatives have a result.  links: of this length alone."""
+    sizes = COMPILED if links is None else (links,)
+    rows = [[kind, str(n), *_fresh("compile_cost", kind, n).split()] for kind in MODELS for n in sizes]
+    yield "\n".join([TITLE, *table(COLUMNS, rows, left=(0,))])
+
+
+def long_chains(links: int = LINKS) -> Iterator[str]:
+    """Cost of chains of so many links, each in a process of its own; then accuracy, which needs python-flint."""
+    for kind in MODELS:
+        yield f"{kind} chain of {links} links\n{_fresh('cost', kind, links).rstrip()}"
+    for kind, n in SIZES:
+        for spread in (np.pi, 0.1):
+            errors = ",  ".join(f"{name} {error:.1e}" for name, error in accuracy(kind, n, spread).items())
+            yield f"largest relative error, {kind} {n} links, |q| < {spread:4.2f}:  {errors}"
+
+
+def _fresh(function: str, kind: str, n: int) -> str:
+    """What a function below writes of a chain, in a process of its own."""
+    done = run_fresh(__name__, f"{function}({kind!r}, {n})")
+    if done.returncode:
+        raise RuntimeError(f"{kind} chain of {n} links: {done.stderr.strip()[-200:]}")
+    return done.stdout
+
+
+def compile_cost(kind: str, n: int) -> None:
+    """Write one chain's numbers of `compile_time`."""
+    model, stages = MODELS[kind](n), Stages()
+    cg.compile(cg.Graph([cg.variable("x")], {"y": cg.variable("x")}))([0.0])  # LLVM is loaded
+    graph = stages("graph", lambda: forward_dynamics(model))
+    x = np.random.default_rng(n).normal(size=len(graph.inputs))
+
+    def called() -> cg.Compiled:
+        function = cg.compile(graph)
+        function(x)
+        return function
+
+    function = stages("code", called)
+    stages("Jacobian", lambda: function.jacobian(x))
+    stages("A and B", lambda: linearize_many(model, *[part[None] for part in np.split(x, 3)]))
+    derived, compiled, jacobian, matrices = [each.processor for each in stages.spent.values()]
+    each = 1e3 * (derived + compiled) / n, 1e3 * jacobian / n, 1e3 * matrices / (6 * n * n)
+    shown = [derived, compiled, each[0], jacobian, each[1], matrices, each[2]]
+    sys.stdout.write(" ".join([str(len(graph.nodes)), *[digits(value, 2) for value in shown]]))
+
+
+def cost(kind: str, n: int) -> None:
+    """Write the time on the clock, that of the processor, and the peak memory after the stages of one chain."""
+    model, stages = MODELS[kind](n), Stages()
+    stages("numpy and the library, imported", lambda: None)
+    stages("Lagrangian", lambda: as_system(model).lagrangian)
+    graph = stages("forward dynamics", lambda: forward_dynamics(model))
+    x = np.random.default_rng(n).normal(size=len(graph.inputs))
+    values = dict(zip(graph.input_names, x.tolist(), strict=True))
+    evaluated = np.array(list(stages("evaluate", lambda: graph.evaluate(values)).values()))
+    run = stages("compile", lambda: cg.compile(graph))
+    compiled = stages("first call", lambda: run(x))
+    stages("second call", lambda: run(x))
+    rows = [[name, f"{s.clock:.3f} s", f"{s.processor:.3f} s", f"{s.peak:.0f} MB"] for name, s in stages.spent.items()]
+    apart = np.abs(evaluated - compiled).max() / np.abs(evaluated).max()
+    size = f"{len(graph.nodes)} nodes, {len(graph.nodes) / n:.0f} a link; compiled and evaluated differ by {apart:.1e}"
+    sys.stdout.write("\n".join([*table(["stage", "clock", "processor", "peak"], rows), size]))
+
+
+def accuracy(kind: str, n: int, spread: float) -> dict[str, float]:
+    """Largest error relative to the largest entry, by way of solving, over states with angles within +-spread.
+
+    Beside Newton-Euler equations and a dense solve in multiprecision.
+    """
+    model, rng = MODELS[kind](n), np.random.default_rng(n)
+    graphs = {"elimination": forward_dynamics(model, "recursive")}
+    if n <= DENSE[kind]:
+        graphs["dense LDL, graph"] = forward_dynamics(model, "dense")
+    matrix, biases = mass_matrix(model) if n <= 100 else None, bias(model)
+    worst: dict[str, float] = {}
+    for _ in range(STATES):
+        q, qd, tau = rng.uniform(-spread, spread, n), rng.normal(size=n), rng.normal(size=n)
+        state = dict(zip(graphs["elimination"].input_names, [*q, *qd, *tau], strict=True))
+        exact = accelerations(model, q, qd, tau).high
+        solved: dict[str, Array] = {name: values(graph, state) for name, graph in graphs.items()}
+        if matrix is not None:
+            m = values(matrix, state).reshape(n, n)
+            rhs = tau - values(biases, state) - np.array(as_system(model).damping) * qd
+            solved |= {
+                "numpy.linalg.solve": np.asarray(np.linalg.solve(m, rhs), dtype=np.float64),
+                "LDL of the same, floats": np.array(ldl_elimination(m.tolist(), rhs.tolist())[0]),
+            }
+        for name, x in solved.items():
+            worst[name] = max(worst.get(name, 0.0), float(np.abs(x - exact).max() / np.abs(exact).max()))
+    return worst
+
+
+def values(graph: cg.Graph, state: dict[str, float]) -> Array:
+    """The outputs, from what of the state the graph needs."""
+    return np.array(list(graph.evaluate({name: state[name] for name in graph.input_names}).values()))

@@ -1,0 +1,54 @@
+"""The library's source files: their syntax trees and what they import."""
+
+import ast
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+PACKAGES = ("cgraph", "dynamics", "viz")
+
+
+@dataclass(frozen=True)
+class Source:
+    """A file of the library."""
+
+    file: str  # from the root of the checkout
+
+    @cached_property
+    def text(self) -> str:
+        return (ROOT / self.file).read_text(encoding="utf-8")
+
+    @cached_property
+    def tree(self) -> ast.Module:
+        return ast.parse(self.text)
+
+    @cached_property
+    def nodes(self) -> list[ast.AST]:
+        return list(ast.walk(self.tree))
+
+    def imports(self, for_types: bool = True) -> Iterator[str]:
+        """Absolute names of the modules that it imports, in functions, too; under `if TYPE_CHECKING:`, if asked."""
+        typing = {
+            id(inner)
+            for node in self.nodes
+            if isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING")
+            for line in node.body
+            for inner in ast.walk(line)
+        }
+        package = Path(self.file).parent.parts
+        for node in self.nodes:
+            if id(node) in typing and not for_types:
+                continue
+            if isinstance(node, ast.Import):
+                yield from [alias.name for alias in node.names]
+            elif isinstance(node, ast.ImportFrom):
+                above = package[: len(package) - node.level + 1] if node.level else ()
+                yield ".".join([*above, *([node.module] if node.module else [])])
+
+
+def sources() -> dict[str, Source]:
+    """{file: its source} of all three packages."""
+    files = [path.relative_to(ROOT).as_posix() for name in PACKAGES for path in sorted((ROOT / name).rglob("*.py"))]
+    return {file: Source(file) for file in files}
