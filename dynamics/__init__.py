@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from .equations.energies import energy, kinetic_energy, potential_energy
     from .equations.equations_of_motion import bias, forward_dynamics, gravity_force, mass_matrix, momentum
     from .equations.formulation_sizes import formulation_sizes
-    from .equations.formulations import FORMULATIONS, inverse_dynamics, momentum_rate, spurious_nodes
+    from .equations.formulations import FORMULATIONS, inverse_dynamics, momentum_rate
     from .equations.freedom import Freedom, freedom
     from .equations.hamiltonian import hamilton_equations, hamiltonian
     from .equations.integrability import integrable_rows
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from .equations.linearize_many import linearize_many
     from .equations.reduced_linearization import ReducedLinearization, reduced_linearization
     from .equations.singular_mass_matrix import SingularMassMatrixError, raise_if_singular
+    from .equations.spurious_nodes import spurious_nodes
     from .equations.state_equation import state_equation
     from .equations.torque_decomposition import torque_by_joint_motion, torque_by_link
     from .equations.torque_table import TorqueTable

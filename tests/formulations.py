@@ -22,8 +22,10 @@ def _torques() -> dict[str, list[float]]:
 
 
 _TORQUES = _torques()
-CHAIN_RULE = [
-    name for name in dyn.FORMULATIONS if "dt" not in dyn.momentum_rate(dyn.planar_arm([1.0], [1.0]), name).input_names
+WITHOUT_STEP = [
+    name
+    for name in dyn.FORMULATIONS
+    if "dt" not in dyn.inverse_dynamics(dyn.planar_arm([1.0], [1.0]), name).input_names
 ]
 RIGHT = [
     name

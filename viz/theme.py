@@ -27,6 +27,7 @@ FORMULATIONS = {
     "chain_rule": BLUE,
     "chain_rule_literal": PURPLE,
     "kinetic_only_exact": GREEN,
+    "newton_euler": SKY_BLUE,
 }
 # So has an integrator, by its place: every page draws it by this number.
 METHODS = (

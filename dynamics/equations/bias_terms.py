@@ -1,22 +1,24 @@
-"""Lagrange's equation at qdd = 0 as forces on the velocity nodes of L, from which bias and accelerations are made."""
+"""Lagrange's equation as forces on the velocity nodes of L: at qdd = 0 the bias, at others inverse dynamics."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from cgraph import Node
 from cgraph.extend import Builder, building, cotangents, folded, tangents
 
+from ..systems.kinematics import ONE, ZERO
 from ..systems.system import System
-from .formulations import ONE, ZERO
 from .velocity_nodes import velocity_nodes
 
 
 class BiasTerms(NamedTuple):
-    """The terms of  bias = d/dt dL/dqd - dL/dq at qdd = 0 = (sum over z of inertial_z dz/dqd) - gradient.
+    """The terms of  d/dt dL/dqd - dL/dq = (sum over z of inertial_z dz/dqd) - gradient.
 
     z are the velocity nodes of L (`velocity_nodes`): the bias is a set of forces, each at the velocity it works on, and
     the sum is their virtual power. Forward dynamics by elimination takes them as they are, without forming the sum.
+    The slopes dz/dqd are the partial velocities of Kane's equations.
     """
 
     lagrangian: Node  # folded and shared
@@ -26,17 +28,17 @@ class BiasTerms(NamedTuple):
     rates: list[Node]  # rows of velocities that constraints hold at 0
 
     def bias(self, system: System, build: Builder) -> list[Node]:
-        """The bias at the coordinates: one reverse sweep carries all inertial terms from their velocities to qd."""
+        """The sum at the coordinates: one reverse sweep carries all inertial terms from their velocities to qd."""
         inertial = cotangents(self.inertial, system.qd, build)
         with building(build):
             return [force - slope for force, slope in zip(inertial, self.gradient, strict=True)]
 
 
-def bias_terms(system: System) -> BiasTerms:
-    """As the system states its bias (`System.bias_forces`), or else derived from its Lagrangian."""
-    stated = system.bias_forces()
+def bias_terms(system: System, qdd: Sequence[Node] | None = None) -> BiasTerms:
+    """As the system states its forces (`System.bias_forces`), or else derived from its Lagrangian.  qdd: see there."""
+    stated = system.bias_forces(qdd)
     if stated is None:
-        return bias_terms_of_lagrangian(system)
+        return bias_terms_of_lagrangian(system, qdd)
     pairs = [node for pair in stated for node in pair]
     build = Builder()
     rates, n = system.constraints.rates, system.n
@@ -45,13 +47,13 @@ def bias_terms(system: System) -> BiasTerms:
     inertial: dict[Node, Node] = {}
     with building(build):
         for velocity, force in zip(pairs[::2], pairs[1::2], strict=True):
-            if velocity.value is None:  # a constant velocity does no virtual work
+            if velocity.value is None and force.value != 0.0:  # a constant velocity does no virtual work
                 inertial[velocity] = inertial.get(velocity, ZERO) + force
     return BiasTerms(lagrangian, forces, inertial, [ZERO] * system.n, rows)
 
 
-def bias_terms_of_lagrangian(system: System) -> BiasTerms:
-    """Lagrange's equation of L(q, z(q, qd), t), term by term."""
+def bias_terms_of_lagrangian(system: System, qdd: Sequence[Node] | None = None) -> BiasTerms:
+    """Lagrange's equation of L(q, z(q, qd), t), term by term.  qdd: accelerations, 0 if None."""
     # Two builders: a term of L must not get the tags of an equal term that derives from it, and hand them on.
     written, build = Builder(), Builder()
     lagrangian, *nodes = folded([system.lagrangian, *system.forces, *system.constraints.rates], written)
@@ -65,10 +67,9 @@ def bias_terms_of_lagrangian(system: System) -> BiasTerms:
     gradient, momenta = bars[: system.nq], bars[system.nq :]
     if system.kinematics.quasi is not None:
         gradient = system.kinematics.slopes(gradient, momenta, build)
-    # d/dt dL/dz at qdd = 0: eq. (4) of the paper with xdot = (qd, 0), and 1 for t, one forward sweep.
-    x_dot = dict(zip(system.q, system.q_dot, strict=True)) | (
-        {system.t: ONE} if system.t in system.extra_inputs else {}
-    )
+    # d/dt dL/dz: eq. (4) of the paper with xdot = (qd, qdd), and 1 for t, one forward sweep.
+    x_dot = dict(zip(system.q, system.q_dot, strict=True)) | dict(zip(system.qd, qdd or (), strict=qdd is not None))
+    x_dot |= {system.t: ONE} if system.t in system.extra_inputs else {}
     dots = tangents(x_dot, momenta, build)
     inertial = {velocity: dots[p] for velocity, p in zip(velocities, momenta, strict=True) if p in dots}
     return BiasTerms(lagrangian, forces, inertial, gradient, rates)

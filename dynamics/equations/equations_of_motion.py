@@ -99,7 +99,7 @@ def bias(model: Model) -> Graph:
 
     def derive(system: System) -> Graph:
         free = system.without_constraints  # whose tags shared nodes would have
-        outputs = {f"bias{i}": node for i, node in enumerate(bias_terms(free).bias(free, Builder()))}
+        outputs = {f"bias{i}": node for i, node in enumerate(bias_terms(free, [ZERO] * free.n).bias(free, Builder()))}
         return cg.simplify(system.graph(outputs, system.q, system.qd))
 
     return shorter_form(as_system(model), derive)

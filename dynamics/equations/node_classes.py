@@ -5,12 +5,19 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 
 from cgraph import Graph, Node
-from cgraph.extend import ADJOINT, topological
+from cgraph.extend import ADJOINT, TANGENT, topological
 
-from .formulations import EULER
+from .formulations import EULER, newton_euler
 from .verdict import Verdict
 
 LEAVES, DAMPING = "inputs and numbers", "damping"
+ENERGIES, NEWTON_EULER = {"kinetic", "potential"}, newton_euler.__name__
+_OF_ROLES = {  # by whether it is of a reverse sweep, and of a forward one
+    (True, True): "rate of a slope, of d/dt dL/dqd, which dL/dq cancels in part",
+    (True, False): "slope, of momenta or dL/dq, or a force carried to joints",
+    (False, True): "rate of a position or a velocity",
+    (False, False): "position, velocity, acceleration, force on a body",
+}
 POSITIONS = "of positions alone: kinematics, inertia, and its elimination"
 BIAS, ACCELERATIONS = "bias: of velocities, without torques", "accelerations, with the torques"
 VELOCITIES, RATES = "velocities of the momenta", "rates of the momenta"
@@ -22,8 +29,13 @@ def formulation_classes(verdicts: Iterable[Verdict]) -> Callable[[Graph], Callab
     "spurious adjoint": it serves only derivatives through q = qd dt + q_old.
     "takes in what is spurious": a sum that has a part of it.  "Euler edge": the embedded relations q = qd dt + q_old
     and qd = qdd dt + qd_old, and their rates.  "needed": all else.
+    Where one of them is by velocities and all are right, what derivatives the other carries, see `derivative_class`.
     """
     known = {each.graph: each for each in verdicts}
+    if NEWTON_EULER in [each.formulation for each in known.values()] and not any(
+        [each.differs for each in known.values()]
+    ):
+        return lambda graph: derivative_class
 
     def classes(graph: Graph) -> Callable[[Node], str]:
         wrong = known[graph]
@@ -40,6 +52,19 @@ def formulation_classes(verdicts: Iterable[Verdict]) -> Callable[[Graph], Callab
         return name
 
     return classes
+
+
+def derivative_class(node: Node) -> str:
+    """What a node of a right formulation is, and of which bodies: by roles and tags.
+
+    A rate of a slope is of d/dt dL/dqd. What it has of the rates of dz/dqd, for a velocity z in L, dL/dq has as well:
+    in the torque they cancel, and a formulation by velocities has neither (`velocity_nodes`).
+    """
+    if not node.args:
+        return LEAVES
+    of = sorted(node.tags - ENERGIES - {DAMPING})
+    where = f"{of[0]}: " if len(of) == 1 else "several bodies: " if of else ""
+    return where + _OF_ROLES[ADJOINT in node.roles, TANGENT in node.roles]
 
 
 def form_classes(graph: Graph) -> Callable[[Node], str]:

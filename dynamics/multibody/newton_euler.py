@@ -1,6 +1,6 @@
-"""The bias of a tree of bodies as forces at their velocities: the Newton-Euler equations at qdd = 0.
+"""What moves a tree of bodies as forces at their velocities: the Newton-Euler equations, at qdd = 0 those of the bias.
 
-Any Lagrangian gives its bias by differentiation. Of rigid bodies it takes half as many operations this way: gravity is
+Any Lagrangian gives them by differentiation. Of rigid bodies they take half as many operations this way: gravity is
 an acceleration of the ground, velocities of points are not needed, and what a body's rotation makes of them is one
 tensor, alpha x b + omega x (omega x b) for every point b of the body. (J. Y. S. Luh, M. W. Walker, R. P. C. Paul,
 "On-line computational scheme for mechanical manipulators", J. Dyn. Sys. Meas. Control 102(2), 1980; the tensor:
@@ -27,7 +27,7 @@ Tensor = tuple[Triple, Triple, Triple]  # rows
 
 
 class Acceleration(NamedTuple):
-    """How a body's motion changes at qdd = 0, in axes that stand still where those of its motion are just now.
+    """How a body's motion changes, in axes that stand still where those of its motion are just now.
 
     A point of the body, b from its origin, has the acceleration linear + tensor b. For a body that moves in a plane
     `swept` takes b in the axes of the body and gives it in those of the plane; else it is the tensor.
@@ -44,8 +44,13 @@ def base_acceleration(ground: Motion) -> Acceleration:
     """Base acceleration: gravity enters as an upward acceleration, as in RNEA."""
     vertical = spatial.scaled(ground.strength, ground.vertical)
     falls = any([each.value != 0.0 for each in vertical])
-    still = (STILL, STILL, STILL)
-    return Acceleration(STILL, vertical, still, still, (KINETIC, POTENTIAL) if falls else (KINETIC,))
+    return acceleration_in_space(STILL, STILL, vertical, (KINETIC, POTENTIAL) if falls else (KINETIC,))
+
+
+def acceleration_in_space(omega: Triple, angular: Triple, linear: Triple, tags: tuple[str, ...]) -> Acceleration:
+    """That of a body with angular velocity omega that does not move in a plane, in its axes."""
+    tensor = _tensor(omega, angular)
+    return Acceleration(angular, linear, tensor, tensor, tags)
 
 
 def propagate_acceleration(
@@ -56,6 +61,7 @@ def propagate_acceleration(
     joint: MovingJoint,
     q: Sequence[Node],
     u: Sequence[Node],
+    u_dot: Sequence[Node],
 ) -> Acceleration:
     """A link's acceleration from its parent's: `after` is `propagate_motion(before, link, joint, q, u)`."""
     linear = parent.linear
@@ -70,15 +76,21 @@ def propagate_acceleration(
         angular = spatial.rotate_transpose(link.turn, parent.angular)
     if isinstance(joint, AxialJoint):
         linear, angular = _about_axis(parent.tags, after, joint, q[0], u[0], linear, angular)
+        with cg.tag(KINETIC):
+            linear = spatial.plus(linear, (ZERO, ZERO, joint.shift(u_dot[0])))
+            angular = spatial.plus(angular, (ZERO, ZERO, joint.angle(u_dot[0])))
     else:
         omega = spatial.rotate_transpose(link.turn, before.omega)
         linear, angular = _in_space(parent.tags, joint, q, u, omega, linear, angular)
+        with cg.tag(KINETIC):  # linear in u, so that these are their rates at constant q
+            linear = spatial.plus(linear, joint.linear_velocity(q, u_dot))
+            angular = spatial.plus(angular, joint.angular_velocity(q, u_dot))
     with cg.tag(KINETIC):
         tensor = swept = _tensor(after.omega, angular)
         if after.plane:
-            square = after.omega[2] * after.omega[2]
-            c, s = after.plane.cos * square, after.plane.sin * square
-            swept = (-c, s, ZERO), (-s, -c, ZERO), STILL
+            square, alpha, (_, c, s) = after.omega[2] * after.omega[2], angular[2], after.plane
+            along, across = c * square + s * alpha, s * square - c * alpha
+            swept = (-along, across, ZERO), (-across, -along, ZERO), STILL
     return Acceleration(angular, linear, tensor, swept, parent.tags)
 
 
@@ -123,10 +135,16 @@ def _about_axis(
     return linear, angular
 
 
-def bias_wrench(
-    acceleration: Acceleration, motion: Motion, link: Link, joint: MovingJoint, q: Sequence[Node], u: Sequence[Node]
+def wrench(
+    acceleration: Acceleration,
+    motion: Motion,
+    link: Link,
+    joint: MovingJoint,
+    q: Sequence[Node],
+    u: Sequence[Node],
+    u_dot: Sequence[Node],
 ) -> list[BiasForce]:
-    """Bias wrench, each component paired with the velocity it works on; and the spring's force, with its velocity.
+    """The wrench, each component paired with the velocity it works on; the spring's and the armature's force likewise.
 
     f = m a + T h, n = J alpha + omega x J omega + h x a, for the tensor T and the first moment h.
     """
@@ -145,7 +163,9 @@ def bias_wrench(
         torque = [a + b for a, b in zip(torque, spatial.cross(link.moment, a), strict=True)]
     with cg.tag(POTENTIAL):
         springs = spring_forces(link, joint, q, u)
-    return [*zip((*motion.velocity, *motion.omega), (*force, *torque), strict=True), *springs]
+    with cg.tag(KINETIC):
+        armatures = [(velocity, link.armature * rate) for velocity, rate in zip(u, u_dot, strict=True)]
+    return [*zip((*motion.velocity, *motion.omega), (*force, *torque), strict=True), *springs, *armatures]
 
 
 def _tensor(w: Triple, alpha: Triple) -> Tensor:

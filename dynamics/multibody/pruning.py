@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import cgraph as cg
 from cgraph import Graph
@@ -18,7 +18,7 @@ from cgraph.extend import (
     require_sequence,
 )
 
-from ..equations.formulations import inverse_dynamics
+from ..equations.formulations import SMALL, inverse_dynamics, size
 from ..systems.model import Model, as_system
 from .mechanism import as_mechanism
 from .switched_effects import EFFECTS as EFFECTS, absent_parts, has_effect, without_effect  # noqa: PLC0414 (public with `prune`)
@@ -146,6 +146,12 @@ class _Step:
     why: str = ""
 
     def graph(self, equations: Equations) -> Graph:
+        """Of inverse dynamics the smaller of the two small graphs, which may be the other one once numbers are in."""
+        if equations is not inverse_dynamics:
+            return self._graph(equations)
+        return min([self._graph(partial(equations, formulation=name)) for name in SMALL], key=size)
+
+    def _graph(self, equations: Equations) -> Graph:
         graph = equations(self.model)
         require_graph("prune, as what equations(model) gives,", graph)
         if not self.values and self.outputs is None:
@@ -202,7 +208,7 @@ def prune(
     >>> arm = dyn.planar_arm([1.0, 0.8], [1.0, 0.5])
     >>> result = dyn.prune(arm, values={"qd": 0.0, "qdd": 0.0})
     >>> len(dyn.inverse_dynamics(arm).nodes), len(result.graph.nodes)
-    (82, 12)
+    (50, 10)
     """
     model = as_mechanism(model) or as_system(model)
     kept = require_sequence("effects", effects, "names", str)

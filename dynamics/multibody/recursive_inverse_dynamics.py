@@ -1,9 +1,9 @@
 """Inverse dynamics body by body: one compiled kernel for each kind of joint, for trees whose structure changes.
 
-The kernels come from the same energy as every other graph, by the same differentiation, of one body instead of all:
-forwards s = F(s_parent, q, qd) with its tangent, backwards the cotangents of the parent's motion and of (q, qd) with
-theirs, so that tau = d/dt (dL/dqd) - dL/dq. What a body is made of is an input: to hang a tool on an arm, or to lock
-one of its joints, makes no new graph and no new code.
+The kernels are the Newton-Euler equations of every other graph, of one body instead of all: forwards its angular
+velocity and accelerations, backwards its wrench and those of the bodies that it carries, to the parent and to the
+joint. What a body is made of is an input: to hang a tool on an arm, or to lock one of its joints, makes no new graph
+and no new code.
 """
 
 from __future__ import annotations
@@ -16,16 +16,17 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Compiled, Graph, Node
-from cgraph.extend import Array, Builder, building, cotangents, memo, real_array, tangents
+from cgraph.extend import Array, Builder, building, cotangents, memo, real_array
 
-from .body_motion import Motion, energy, ground, propagate_motion
+from . import newton_euler
+from .body_motion import Motion, ground, propagate_motion
 from .inertial_numbers import Link
 from .joint_coordinates import places
 from .joints import MovingJoint, moving_type
 from .mechanism import Mechanism, require_mechanism
+from .spatial import STILL, ZERO, Triple
 
-ONE = cg.constant(1.0)
-MOTION = 10  # numbers in a Motion
+MOTION, WRENCH = 9, 6  # numbers: angular velocity, angular and linear acceleration; force and moment
 
 
 class RecursiveInverseDynamics:
@@ -63,9 +64,7 @@ class RecursiveInverseDynamics:
         self._links = [[float(number) for number in link.numbers] for link in mechanism.links]
         self._kernels = [_kernels(moving_type(body.joint.type)) for body in mechanism.moving]
         self._places = places(mechanism.moving)
-        self._ground = [float(each) for each in (*rest.omega, *rest.velocity, *rest.vertical, rest.depth)] + [
-            0.0
-        ] * MOTION
+        self._ground = [float(each) for each in (*STILL, *STILL, *rest.vertical)]  # as upward as gravity is strong
 
     def __call__(self, q: ArrayLike, qd: ArrayLike, qdd: ArrayLike) -> Array:
         """tau (n,) [N m or N] at q (nq,), qd and qdd (n,). Raises ValueError for another shape."""
@@ -80,51 +79,49 @@ class RecursiveInverseDynamics:
         for parent, link, kernel, state in zip(self._parents, self._links, self._kernels, states, strict=True):
             carrier = motions[parent] if parent >= 0 else self._ground
             motions.append(list(kernel.forwards.values([*carrier, *state, *link])))
-        bars = [[0.0] * (2 * MOTION) for _ in states]
+        bars = [[0.0] * WRENCH for _ in states]
         tau = np.empty(self.n)
         for i in reversed(range(len(states))):
             parent = self._parents[i]
             carrier = motions[parent] if parent >= 0 else self._ground
             values = self._kernels[i].backwards.values([*carrier, *states[i], *self._links[i], *bars[i]])
-            tau[self._places[i].u] = values[2 * MOTION :]
+            tau[self._places[i].u] = values[WRENCH:]
             if parent >= 0:
-                bars[parent] = [a + b for a, b in zip(bars[parent], values[: 2 * MOTION], strict=True)]
+                bars[parent] = [a + b for a, b in zip(bars[parent], values[:WRENCH], strict=True)]
         return tau
 
 
 class _Kernels(NamedTuple):
-    forwards: Compiled  # parent's motion and its rate, q, qd, qdd, link -> motion and its rate
-    backwards: Compiled  # the same, cotangents of the motion and their rates -> those of the parent's motion; tau
+    forwards: Compiled  # parent's motion, q, qd, qdd, link -> motion
+    backwards: Compiled  # the same, wrench of what the body carries -> what the parent carries by it; tau
 
 
 @memo(64)
 def _kernels(joint: MovingJoint) -> _Kernels:
     """What a link with that type of joint needs, whatever its numbers are."""
-    parent, rates, bars, bar_rates = (_variables(name, MOTION) for name in ("s", "s_dot", "bar", "bar_dot"))
+    parent, velocity, bars = _variables("s", MOTION), _variables("v", 3), _variables("bar", WRENCH)
     q = _variables("q", len(joint.coordinates))
     qd, qdd = (_variables(name, len(joint.velocities)) for name in ("qd", "qdd"))
     link, numbers = _link_of_nodes()
+    omega, angular, linear = (_triple(parent[k:]) for k in (0, 3, 6))
     build = Builder()
     with building(build):
-        motion = propagate_motion(_motion(parent), link, joint, q, qd)
-        after = [*motion.omega, *motion.velocity, *motion.vertical, motion.depth]
-        lagrangian = energy(motion, link, joint, q, qd)
-        q_dot = joint.rate(q, qd)
-    along = dict(zip([*parent, *q, *qd], [*rates, *q_dot, *qdd], strict=True))
-    dots = tangents(along, after, build)
-    seeds = dict(zip(after, bars, strict=True)) | {lagrangian: ONE}
-    back = cotangents(seeds, [*parent, *q, *qd], build)
-    momenta = back[MOTION + len(q) :]
-    pulled = cotangents(dict(zip(q_dot, back[MOTION : MOTION + len(q)], strict=True)), qd, build)  # G^T dL/dq
-    back_dots = tangents(along | dict(zip(bars, bar_rates, strict=True)), back, build)
-    zero = cg.constant(0.0)
+        before = Motion(omega, _triple(velocity), STILL, ZERO)
+        motion = propagate_motion(before, link, joint, q, qd)
+        carrier = newton_euler.acceleration_in_space(omega, angular, linear, ())
+        acceleration = newton_euler.propagate_acceleration(carrier, before, motion, link, joint, q, qd, qdd)
+        moved = [*motion.velocity, *motion.omega]
+        pairs = [*zip(moved, bars, strict=True)]
+        pairs += newton_euler.wrench(acceleration, motion, link, joint, q, qd, qdd)
+        forces: dict[Node, Node] = {}
+        for z, force in pairs:
+            forces[z] = forces.get(z, ZERO) + force
+    back = cotangents(forces, [*velocity, *omega, *qd], build)  # motions are linear in velocities: so without these
     with building(build):
-        rows = zip(momenta, pulled, joint.structure(qd, momenta), qd, strict=True)
-        tau = [back_dots.get(p, zero) - slope + term + link.damping * u for p, slope, term, u in rows]
-    inputs = [*parent, *rates, *q, *qd, *qdd, *numbers]
-    forwards = [*after, *(dots.get(node, zero) for node in after)]
-    backwards = [*back[:MOTION], *(back_dots.get(node, zero) for node in back[:MOTION]), *tau]
-    return _Kernels(_compiled(inputs, forwards), _compiled([*inputs, *bars, *bar_rates], backwards))
+        tau = [force + link.damping * u for force, u in zip(back[WRENCH:], qd, strict=True)]
+    inputs = [*parent, *q, *qd, *qdd, *numbers]
+    forwards = [*motion.omega, *acceleration.angular, *acceleration.linear]
+    return _Kernels(_compiled(inputs, forwards), _compiled([*inputs, *bars], [*back[:WRENCH], *tau]))
 
 
 def _compiled(inputs: Sequence[Node], outputs: Sequence[Node]) -> Compiled:
@@ -135,9 +132,8 @@ def _variables(name: str, count: int) -> list[Node]:
     return cg.variables([f"{name}{k}" for k in range(count)])
 
 
-def _motion(nodes: Sequence[Node]) -> Motion:
-    omega, velocity, vertical = ((nodes[k], nodes[k + 1], nodes[k + 2]) for k in (0, 3, 6))
-    return Motion(omega, velocity, vertical, nodes[9])
+def _triple(nodes: Sequence[Node]) -> Triple:
+    return nodes[0], nodes[1], nodes[2]
 
 
 def _link_of_nodes() -> tuple[Link, list[Node]]:

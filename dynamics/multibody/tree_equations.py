@@ -24,6 +24,7 @@ from .joint_coordinates import parts, places
 from .joints import AxialJoint, moving_type
 from .link_cache import Moved
 from .mechanism_fields import Structure
+from .spatial import ZERO
 
 
 class TreeEquations:
@@ -73,7 +74,10 @@ class TreeEquations:
         """The links in as few inertial numbers as there can be, unless these would have to be computed in the graph."""
         if any([isinstance(number, Node) for link in self.links for number in link.numbers]):
             return self.links
-        return base_parameter_links(self.links, [body.joint.type for body in self.bodies], self.parents)[0]
+        base = base_parameter_links(self.links, [body.joint.type for body in self.bodies], self.parents)[0]
+        return min(
+            self.links, base, key=lambda links: sum([number != 0.0 for link in links for number in link.numbers])
+        )
 
     def partial_lagrangians(self, q: Sequence[Node], qd: Sequence[Node]) -> list[Node]:
         """One for each body, tagged with its name and energy."""
@@ -85,19 +89,24 @@ class TreeEquations:
                     partials[0] = partials[0] - spatial.dot(self.ground.vertical, moment)
         return partials
 
-    def bias_forces(self, q: Sequence[Node], qd: Sequence[Node]) -> list[BiasForce]:
-        """The bias wrenches of all bodies, with the velocities that they work on."""
+    def bias_forces(self, q: Sequence[Node], qd: Sequence[Node], qdd: Sequence[Node] | None) -> list[BiasForce]:
+        """The wrenches of all bodies at these accelerations, with the velocities that they work on.
+
+        Of base numbers; for forward dynamics (None) of what the bodies are, which of a chain of 100 keeps a digit more.
+        """
+        links = self.links if qdd is None else self._fewest
         forces: list[BiasForce] = []
         with building(Builder()):
             accelerations = {WORLD: newton_euler.base_acceleration(self.ground)}
-            rows = zip(self.bodies, self.links, self._moved(q, qd), parts(self.bodies, q, qd), strict=True)
-            for body, link, moved, (x, u) in rows:
+            rates = [(qdd or [ZERO] * len(qd))[place.u] for place in places(self.bodies)]
+            rows = zip(self.bodies, links, self._moved(q, qd), parts(self.bodies, q, qd), rates, strict=True)
+            for body, link, moved, state, u_dot in rows:
                 joint = moving_type(body.joint.type)
                 with cg.tag(body.name):
                     acceleration = accelerations[body.name] = newton_euler.propagate_acceleration(
-                        accelerations[body.parent], moved.parent, moved.motion, link, joint, x, u
+                        accelerations[body.parent], moved.parent, moved.motion, link, joint, *state, u_dot
                     )
-                    forces += newton_euler.bias_wrench(acceleration, moved.motion, link, joint, x, u)
+                    forces += newton_euler.wrench(acceleration, moved.motion, link, joint, *state, u_dot)
         return forces
 
     def momentum_rates(self, q: Sequence[Node], qd: Sequence[Node], p: Sequence[Node]) -> list[Node] | None:

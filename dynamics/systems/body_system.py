@@ -17,8 +17,8 @@ from .torque_derivatives import MotionState, TorqueDerivatives
 class BodyEquations(Protocol):
     """What bodies know of their equations; see the methods of `System` of the same names, also for None."""
 
-    def bias_forces(self, q: Sequence[Node], qd: Sequence[Node]) -> Sequence[BiasForce]:
-        """The pairs (velocity, force) of the bias."""
+    def bias_forces(self, q: Sequence[Node], qd: Sequence[Node], qdd: Sequence[Node] | None) -> Sequence[BiasForce]:
+        """The pairs (velocity, force) of a motion; see `System.bias_forces` for None."""
 
     def momentum_rates(self, q: Sequence[Node], qd: Sequence[Node], p: Sequence[Node]) -> list[Node] | None:
         """Rates of the momenta p of velocities qd."""
@@ -60,9 +60,9 @@ class BodySystem(System):
         """Raises ValueError for values with which the bodies cannot be."""
         self._require_values(values)
 
-    def bias_forces(self) -> Sequence[BiasForce]:
+    def bias_forces(self, qdd: Sequence[Node] | None = None) -> Sequence[BiasForce]:
         """The pairs (velocity, force) that the bodies state; see `System.bias_forces`."""
-        return self._equations.bias_forces(self.q, self.qd)
+        return self._equations.bias_forces(self.q, self.qd, qdd)
 
     def momentum_rates(self, p: Sequence[Node]) -> list[Node] | None:
         """By composite momentum; see `System.momentum_rates`."""

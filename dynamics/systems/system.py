@@ -269,8 +269,10 @@ class System:
         """Whether M is known to be positive definite; where it is not, `forward_dynamics` looks at its rank."""
         return False
 
-    def bias_forces(self) -> Sequence[BiasForce] | None:
-        """The bias as forces f at velocities z, nodes of L: sum of f dz/dqd = d/dt dL/dqd - dL/dq at qdd = 0.
+    def bias_forces(self, qdd: Sequence[Node] | None = None) -> Sequence[BiasForce] | None:
+        """Forces f at velocities z, nodes of L, with sum of f dz/dqd = d/dt dL/dqd - dL/dq: the bias, where qdd is 0.
+
+        qdd: None is 0, too, and asks for the forces as elimination takes them, each at the body that it is of.
 
         None where nobody knows better than to derive it from L, as here.
         """

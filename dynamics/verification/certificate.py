@@ -235,8 +235,8 @@ class _Checks:
         yield Residual(equation, max(0.0, rounding - smallest), POSITIVE, note)
 
     def _bias(self) -> Residual:
-        """Bodies state their bias by Newton and Euler; inverse dynamics is of the Lagrangian."""
-        still, pushed = self.value(self.inverse, qdd=None), self.pushed
+        """Bodies state their bias by Newton and Euler; the chain rule asks nothing but the Lagrangian."""
+        still, pushed = self.value(inverse_dynamics(self.system, "chain_rule"), qdd=None), self.pushed
         equation = "bias = inverse dynamics at qdd = 0, without damping and forces"
         return Residual(equation, worst(self.bias - still - pushed, np.abs(still) + np.abs(pushed)), ROUNDING)
 

@@ -37,7 +37,7 @@ ARM = "import dynamics as dyn; arm = dyn.planar_arm([1.0, 1.0], [1.0, 1.0])"
         ("import cgraph", 10),
         ("import dynamics", 10),
         ("import viz", 10),
-        (f"{ARM}; dyn.inverse_dynamics(arm)", 96),
+        (f"{ARM}; dyn.inverse_dynamics(arm)", 98),
         (f"{ARM}; dyn.simulate(arm, [0.0, 1.0], [0.0, 0.0], 0.1)", 196),
     ],
 )

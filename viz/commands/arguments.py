@@ -20,7 +20,14 @@ from . import library
 from .command import Command
 from .signals import settled
 
-FORMULATIONS = ("chain_rule", "chain_rule_literal", "euler_embedded", "kinetic_only", "kinetic_only_exact")
+FORMULATIONS = (
+    "chain_rule",
+    "chain_rule_literal",
+    "euler_embedded",
+    "kinetic_only",
+    "kinetic_only_exact",
+    "newton_euler",
+)
 MOMENTUM_FORM = "Hamilton's equations, q_dot and p_dot of q and the momenta p"
 READING = ("ignore", "floating")  # options of `scenes.of_file`
 IN_PYTHON = "file.py:name, a model of a Python file, which is executed"

@@ -27,7 +27,8 @@ DRAWN = 60  # nodes, at most, of a graph that is drawn
 
 def euler_edge(subject: Subject) -> Screen:
     """The screen of a system."""
-    right, verdict = inverse_dynamics(subject.system), formulation_verdict(subject.scene, "euler_embedded")
+    right = inverse_dynamics(subject.system, "chain_rule")
+    verdict = formulation_verdict(subject.scene, "euler_embedded")
     wrong = verdict.graph
     torque = subject.evaluate(right)
     errors = [(dt, _after_a_step(subject, wrong, dt) - torque) for dt in STEPS]

@@ -100,7 +100,7 @@ def _teacher(subject: Subject, screens: Sequence[Screen]) -> str:
     minutes = sum(screen.minutes for screen in screens)
     graphs: dict[str, Graph] = {
         "The Lagrangian": lagrangian_graph(subject.system),
-        "The torque": inverse_dynamics(subject.system),
+        "The torque": inverse_dynamics(subject.system, "chain_rule"),
     }
     equations = "".join([f"<p>{name}</p>{formula(graph, subject.scene_names)}" for name, graph in graphs.items()])
     return (

@@ -20,7 +20,7 @@ MOVED = 3  # joints with three sliders
 
 def torque_parts(subject: Subject) -> Screen:
     """The screen of a system."""
-    graph, system = inverse_dynamics(subject.system), subject.system
+    graph, system = inverse_dynamics(subject.system, "chain_rule"), subject.system
     parts = _parts(subject)
     joint = int(np.abs(parts).sum(axis=0).argmax())
     sizes = np.abs(parts[:, joint])
@@ -59,7 +59,7 @@ def torque_parts(subject: Subject) -> Screen:
 
 def _parts(subject: Subject) -> Array:
     """The three parts at each joint, (3, n)."""
-    graph = inverse_dynamics(subject.system)
+    graph = inverse_dynamics(subject.system, "chain_rule")
     still = {f"qd{i}": 0.0 for i in range(subject.system.n)}
     steady = {f"qdd{i}": 0.0 for i in range(subject.system.n)}
     held = subject.evaluate(graph, **still, **steady)

@@ -235,7 +235,7 @@ def _shares(scene: Scene) -> StateTable | None:
     system, mechanism = scene.system, scene.mechanism
     if len(system.partial_lagrangians) < 2 or (mechanism is not None and mechanism.base_parameters):
         return None
-    table, whole = torque_by_link(system), inverse_dynamics(system)
+    table, whole = torque_by_link(system), inverse_dynamics(system, "chain_rule")
     rows = {f"tau{i}": [f"tau{i}_part{k}" for k in range(len(table.rows) + 1)] for i in range(system.n)}
     outputs = {part: table.graph.outputs[f"{tau}_{k}"] for tau, row in rows.items() for k, part in enumerate(row[:-1])}
     graph = Graph(whole.inputs, outputs | {row[-1]: whole.outputs[tau] for tau, row in rows.items()})

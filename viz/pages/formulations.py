@@ -13,6 +13,7 @@ TITLES = {
     "chain_rule": "chain rule",
     "chain_rule_literal": "chain rule, literal",
     "kinetic_only_exact": "kinetic only, exact",
+    "newton_euler": "Newton-Euler",
 }
 COLORS = {TITLES[name]: color for name, color in theme.FORMULATIONS.items()}
 WHY_FEWER = (

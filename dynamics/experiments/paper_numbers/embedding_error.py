@@ -42,7 +42,7 @@ def embedding_error(
     system = as_system(model)
     energy = {"euler_embedded": system.lagrangian, "kinetic_only": system.kinetic}[formulation]
     parameters = list(system.parameters.values())
-    true = cg.compile(inverse_dynamics(system))(np.concatenate([q, qd, qdd, parameters]))
+    true = cg.compile(inverse_dynamics(system, "chain_rule"))(np.concatenate([q, qd, qdd, parameters]))
     slopes = cg.jacobian(system.graph({"E": energy}, system.q, system.qd), wrt=system.q)
     limit = cg.compile(slopes)(np.concatenate([q, qd, parameters]))
     flawed = cg.compile(inverse_dynamics(system, formulation))

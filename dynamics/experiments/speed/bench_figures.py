@@ -25,6 +25,11 @@ FIGURES = {
     "counts": BenchFigure(
         "nodes of forward dynamics, and what leaving out one idea adds", "speed.node_counts.node_counts", ("links",)
     ),
+    "operations": BenchFigure(
+        "products and sums of robots' equations beside published ones",
+        "speed.operation_counts.operation_counts",
+        ("links",),
+    ),
     "build": BenchFigure(
         "time to build the graph of forward dynamics", "speed.stages.build_time", ("links", "repeats")
     ),

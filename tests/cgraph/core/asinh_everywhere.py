@@ -180,7 +180,7 @@ def test_it_can_be_typed_and_the_page_differentiates_it():
     system = dyn.System(lambda q, qd, t: cg.asinh(q[0] + 2.0) * qd[0] ** 2, ["x"])
     at = {"q0": 0.3, "qd0": 1.5, "qdd0": -0.7}
     program = "(text, at) => outputsAt(TYPED.inverseDynamics(parsed(text), 'chain_rule'), at).at"
-    expected = dyn.inverse_dynamics(system).evaluate(at)
+    expected = dyn.inverse_dynamics(system, "chain_rule").evaluate(at)
     assert run_typed(program, "L = asinh(x + 2)*x'^2", at) == pytest.approx(expected, rel=SEVERAL)
 
 

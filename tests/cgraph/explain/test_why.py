@@ -138,7 +138,7 @@ def test_the_branch_not_taken_weighs_nothing():
 
 
 def test_of_40_links_the_paths_to_a_torque_are_told_apart():
-    graph = dyn.inverse_dynamics(dyn.planar_arm([1.0] * 40, [1.0] * 40))
+    graph = dyn.inverse_dynamics(dyn.planar_arm([1.0] * 40, [1.0] * 40), "chain_rule")
     at = {name: math.sin(3.0 * i) for i, name in enumerate(graph.input_names)}
     found = why(graph, "tau0", "q2", at)
     assert found.count > 10**5
@@ -156,7 +156,7 @@ def test_of_40_links_the_paths_to_a_torque_are_told_apart():
 
 
 def test_marks_are_nodes_and_edges_of_the_graph():
-    graph = dyn.inverse_dynamics(dyn.scenes.load("triple_pendulum"))
+    graph = dyn.inverse_dynamics(dyn.scenes.load("triple_pendulum"), "chain_rule")
     found = why(graph, "tau0", "q2", k=3)
     assert found.edges <= set(graph.edges)
     assert found.nodes <= set(graph.nodes)

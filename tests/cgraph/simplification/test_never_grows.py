@@ -65,7 +65,7 @@ def scene(seed: int) -> tuple[dyn.Mechanism, np.random.Generator]:
 @pytest.mark.parametrize("seed", [*range(8), *slow(*range(8, SCENES))])
 def test_on_random_scenes(seed):
     model, generator = scene(seed)
-    raw = dyn.inverse_dynamics(model, simplify=False)
+    raw = dyn.inverse_dynamics(model, "chain_rule", simplify=False)
     simple = cg.simplify(raw)
     assert_no_larger(simple, raw)
     graphs = [raw, simple, dyn.forward_dynamics(model), dyn.energy(model)]

@@ -27,26 +27,26 @@ def exponent(formulation: str, sizes: Sequence[int]) -> float:
 
 def test_inverse_dynamics_of_the_paper_s_arm_is_small() -> None:
     arm = dyn.planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7])
-    counts = dyn.inverse_dynamics(arm).counts()
+    counts = dyn.inverse_dynamics(arm, "chain_rule").counts()
     assert (counts.nodes, counts.edges) == (164, 284)
     assert counts.nodes <= 190
     assert counts.edges <= 335
 
 
 def test_damping_adds_a_product_and_a_sum_for_each_joint_and_one_constant() -> None:
-    plain = dyn.inverse_dynamics(dyn.planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7])).counts()
-    damped = dyn.inverse_dynamics(dyn.scenes.load("triple_pendulum")).counts()
+    plain = dyn.inverse_dynamics(dyn.planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7]), "chain_rule").counts()
+    damped = dyn.inverse_dynamics(dyn.scenes.load("triple_pendulum"), "chain_rule").counts()
     assert (damped.nodes - plain.nodes, damped.edges - plain.edges) == (3 * 2 + 1, 3 * 4)
 
 
 @mark.parametrize("n", range(1, 13))
 def test_each_further_equal_link_adds_79_nodes(n: int) -> None:
-    assert dyn.inverse_dynamics(equal_links(n)).counts().nodes == 8 + 79 * (n - 1)
+    assert dyn.inverse_dynamics(equal_links(n), "chain_rule").counts().nodes == 8 + 79 * (n - 1)
 
 
 @mark.parametrize("n", range(2, 13))
 def test_each_further_equal_link_adds_148_edges(n: int) -> None:
-    assert dyn.inverse_dynamics(equal_links(n)).counts().edges == 146 + 148 * (n - 2)
+    assert dyn.inverse_dynamics(equal_links(n), "chain_rule").counts().edges == 146 + 148 * (n - 2)
 
 
 @mark.parametrize("n", range(3, 13))

@@ -10,6 +10,7 @@ from pytest import mark, raises
 
 import cgraph as cg
 import dynamics as dyn
+from dynamics.equations.formulations import INERTIAL
 from dynamics.io import mujoco_twin as mujoco_io
 from dynamics.systems.system import System
 
@@ -128,11 +129,17 @@ def test_numbers_of_numpy_are_numbers(value: Any) -> None:
     assert System(mass, ["x"], {"k": value}).parameters == {"k": 2.0}
 
 
-@mark.parametrize("make", [dyn.inverse_dynamics, dyn.momentum_rate])
-def test_an_unknown_formulation_is_named_with_those_that_there_are(make) -> None:
-    names = ", ".join(dyn.FORMULATIONS)
-    with raises(ValueError, match=f"formulation must be one of {names}, got 'lagrange'"):
-        make(System(mass, ["x"]), "lagrange")
+@mark.parametrize(
+    ("make", "known", "name"),
+    [
+        (dyn.inverse_dynamics, dyn.FORMULATIONS, "lagrange"),
+        (dyn.momentum_rate, INERTIAL, "lagrange"),
+        (dyn.momentum_rate, INERTIAL, "newton_euler"),  # forms no momentum
+    ],
+)
+def test_an_unknown_formulation_is_named_with_those_that_there_are(make, known, name) -> None:
+    with raises(ValueError, match=f"formulation must be one of {', '.join(known)}, got {name!r}"):
+        make(System(mass, ["x"]), name)
 
 
 @mark.parametrize("make", [dyn.inverse_dynamics, dyn.mass_matrix, dyn.bias, dyn.energy, dyn.forward_dynamics])

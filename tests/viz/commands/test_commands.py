@@ -76,7 +76,7 @@ def test_the_fewest_edges_to_cut_are_one_for_each_joint(n):
     assert not found.ok
     assert len(found.edges) == n
     assert {(edge.target.name, edge.slot) for edge in found.edges} == {(f"q{i}", 0) for i in range(n)}
-    assert cg.lint(dyn.inverse_dynamics(arm), independent=[groups], function="L").ok
+    assert cg.lint(dyn.inverse_dynamics(arm, "chain_rule"), independent=[groups], function="L").ok
 
 
 def test_lint_takes_a_file_with_a_coordinate_that_nothing_uses(tmp_path, capsys):
@@ -153,7 +153,7 @@ def test_lint_looks_in_a_box_and_at_a_point(capsys):
 def test_why_adds_up_to_the_derivative(capsys):
     found = figures(capsys, "why", "triple_pendulum", "tau0", "q2", "--k", "1000")
     assert found["paths"] == len(found["listed"]) == 22
-    graph = dyn.inverse_dynamics(dyn.scenes.load("triple_pendulum"))
+    graph = dyn.inverse_dynamics(dyn.scenes.load("triple_pendulum"), "chain_rule")
     exact = by_complex_step(graph, "tau0", "q2", found["at"])
     assert abs(sum(path["value"] for path in found["listed"]) - exact) <= ROUNDING
     assert found["difference"] <= ROUNDING
@@ -181,7 +181,7 @@ def test_why_on_forward_dynamics(capsys):
 
 def test_the_sum_over_all_paths_of_a_long_arm():
     scene = dyn.scenes.load("chain", n=40)
-    graph = dyn.inverse_dynamics(scene)
+    graph = dyn.inverse_dynamics(scene, "chain_rule")
     at = filled(graph, scene, {})
     found = cg.why(graph, "tau0", "q2", at=at, k=1)
     assert found.count > 100_000
@@ -213,6 +213,18 @@ def test_compare_has_totals_that_add_up_and_a_class_for_every_node(capsys):
     text = said(capsys, "compare", "triple_pendulum", "--formulations", "chain_rule", "chain_rule_literal", status=1)
     assert text.startswith("left: chain_rule, 171 nodes = ")
     assert "spurious" not in text
+
+
+def test_compare_says_what_the_chain_rule_carries_that_velocities_do_not(capsys):
+    arguments = ("compare", "triple_pendulum", "--formulations", "chain_rule", "newton_euler")
+    text = said(capsys, *arguments, status=1)
+    assert text.startswith("left: chain_rule, 171 nodes = ")
+    assert "right: newton_euler, 97 nodes = " in text
+    left, right = text.split("Only right:")
+    for link in ("link 2", "link 3"):
+        assert f"{link}: rate of a slope, of d/dt dL/dqd, which dL/dq cancels in part" in left
+    assert "rate of a slope" not in right
+    assert "link 1: position, velocity, acceleration, force on a body" in right
 
 
 ATWOOD = """import dynamics as dyn

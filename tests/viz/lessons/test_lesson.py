@@ -170,7 +170,7 @@ def test_parts_of_a_torque_add_up(subject, screens):
         [float(cell.replace("−", "-")) for cell in re.findall(r"<td>([−\d.e]+)</td>", row)]
         for row in re.findall(r"<tr><td>.*?</tr>", screen.reveal)
     ]
-    torque = subject.evaluate(dyn.inverse_dynamics(subject.system))
+    torque = subject.evaluate(dyn.inverse_dynamics(subject.system, "chain_rule"))
     assert np.allclose([row[-1] for row in numbers], torque, rtol=1e-3, atol=1e-12)
     assert np.allclose([sum(row[:3]) for row in numbers], torque, rtol=2e-3, atol=2e-3 * np.abs(torque).max())
 
@@ -229,9 +229,9 @@ def test_the_page_computes_what_the_graphs_do(subject, screens, v8):
     graphs = [play[name] for play in plays for name in ("right", "wrong", "graph", "free", "held") if name in play]
     assert len(graphs) == 6
     direct = [
-        dyn.inverse_dynamics(subject.system),
+        dyn.inverse_dynamics(subject.system, "chain_rule"),
         dyn.inverse_dynamics(subject.system, "euler_embedded"),
-        dyn.inverse_dynamics(subject.system),
+        dyn.inverse_dynamics(subject.system, "chain_rule"),
         dyn.mass_matrix(subject.system),
     ]
     for sent, graph in zip(graphs, direct, strict=False):
