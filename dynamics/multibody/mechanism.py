@@ -28,8 +28,7 @@ from .joint_positions import skeleton
 from .kinematic_tree import Carrier, lock_joints, merge_fixed_bodies, parents_first, require_inertia, resists
 from .loop_equations import check_loops, of_loops, position_rows, velocity_rows
 from .loops import Loop
-from .mechanism_fields import Structure, changed, listed
-from .mechanism_summary import summary
+from .mechanism_fields import Structure, changed, listed, summary
 from .modification import attach_subtree, detach_subtree, lock_joint, map_state, subtree_of, unlock_joint
 from .parameter_values import bound_body, bound_force, require_values, used_names
 from .parameters import bound, entries, names_in, symbol

@@ -1,4 +1,4 @@
-"""The fields of a mechanism, as plain data."""
+"""The fields of a mechanism, as plain data, and in a few words."""
 
 from __future__ import annotations
 
@@ -15,7 +15,9 @@ from .joint_force import JointForce
 from .link_cache import SharedParts
 from .loops import Loop
 from .parameter_values import used_names
-from .parameters import Quantities
+from .parameters import Quantities, Quantity, entries, names_in
+
+MOST = 6  # names that a repr shows of a kind
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,8 +63,31 @@ def listed(what: str, kinds: tuple[type, ...], given: object) -> tuple[Any, ...]
     names = " or ".join([kind.__name__ for kind in kinds])
     if isinstance(given, str) or not isinstance(given, Iterable):
         raise MechanismError(f"{what} must be a sequence of {names}, got {type(given).__name__}: {given!r:.60}")
-    entries = tuple(given)
-    for each in entries:
+    values = tuple(given)
+    for each in values:
         if not isinstance(each, kinds):
             raise MechanismError(f"{what} must be of the type {names}, got {type(each).__name__}: {each!r:.60}")
-    return entries
+    return values
+
+
+def summary(structure: Structure, coordinates: Sequence[str]) -> list[str]:
+    """For a repr: how many bodies and which coordinates, then what is locked, acts, closes, can be varied, and gravity."""
+    parts = [f"{len(structure.bodies)} bodies, {len(coordinates)} coordinate(s) {_first(coordinates)}".rstrip()]
+    parts[0] += ", ..." if len(coordinates) > MOST else ""
+    named = {
+        "locked": list(structure.locked),
+        "forces on": [force.body for force in structure.forces],
+        "loops": [loop.label for loop in structure.loops],
+    }
+    parts += [f"{what} {_first(names)}" for what, names in named.items() if names]
+    parts += [f"parameters {', '.join(structure.parameter_values)}"] if structure.parameter_values else []
+    return [*parts, f"gravity {', '.join([_shown(each) for each in entries(structure.gravity)])}"]
+
+
+def _first(names: Sequence[str]) -> str:
+    return ", ".join(names[:MOST])
+
+
+def _shown(number: Quantity) -> str:
+    names = names_in([number])
+    return f"({', '.join(names)})" if names else f"{float(number):g}"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -262,8 +261,7 @@ class Trajectory:
     @cached_property
     def qdd(self) -> Array:
         """Accelerations at the rows, (T, n); of an OdeSystem without columns."""
-        rates = self._rows("rate")
-        return rates[:, rates.shape[1] - self.qd.shape[1] :]
+        return self._rows("rate")[:, self.q.shape[1] :]
 
     @cached_property
     def forces(self) -> Array:
@@ -296,7 +294,7 @@ class Trajectory:
     @cached_property
     def energy(self) -> Array:
         """Kinetic and potential energy at the rows, (T,) [J]; NaN for an OdeSystem."""
-        return self._rows("energy")[:, 0] if "energy" in self.graphs else np.full(len(self.t), math.nan)
+        return self._rows("energy")[:, 0] if "energy" in self.graphs else np.full(len(self.t), np.nan)
 
     @cached_property
     def tau(self) -> Array:
