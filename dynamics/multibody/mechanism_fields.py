@@ -71,7 +71,7 @@ def listed(what: str, kinds: tuple[type, ...], given: object) -> tuple[Any, ...]
 
 
 def summary(structure: Structure, coordinates: Sequence[str]) -> list[str]:
-    """For a repr: how many bodies and which coordinates, then what is locked, acts, closes, can be varied, and gravity."""
+    """For a repr: bodies and coordinates, then what is locked, acts, closes, can be varied, and gravity."""
     parts = [f"{len(structure.bodies)} bodies, {len(coordinates)} coordinate(s) {_first(coordinates)}".rstrip()]
     parts[0] += ", ..." if len(coordinates) > MOST else ""
     named = {
