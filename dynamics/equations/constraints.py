@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import Builder, Order, building, cotangents, hessian_nodes, ldl_solve, solve_nodes, topological
+from cgraph.extend import Builder, Order, building, cotangents, ldl_solve, solve_nodes, topological
 
 from ..systems.system import System
 from .bias_terms import BiasTerms
@@ -90,7 +90,7 @@ class DenseSolver:
 
     def __init__(self, system: System, lagrangian: Node, rows: Rows, build: Builder) -> None:
         slopes = [cotangents({z: ONE}, system.qd, build) for z in rows.rates]
-        lower = hessian_nodes(lagrangian, system.qd, build)
+        lower = system.mass_matrix(lagrangian, build)
         self._matrix = [[ZERO] * (k + 1) for k in range(len(slopes))]
         self._matrix += [[*[slope[i] for slope in slopes], *row[: i + 1]] for i, row in enumerate(lower)]
         self._n, self._m, self._build = system.n, len(slopes), build

@@ -10,7 +10,6 @@ from cgraph.extend import (
     SingularError,
     building,
     cotangents,
-    hessian_nodes,
     require_choice,
     require_flag,
 )
@@ -62,7 +61,7 @@ def mass_matrix(model: Model) -> Graph:
     """
 
     def derive(system: System) -> Graph:
-        lower, n = hessian_nodes(system.lagrangian, system.qd), system.n
+        lower, n = system.mass_matrix(system.lagrangian), system.n
         outputs = {f"M_{i}_{j}": lower[max(i, j)][min(i, j)] for i in range(n) for j in range(n)}
         return cg.simplify(system.graph(outputs, system.q, system.qd))
 
@@ -175,7 +174,7 @@ def momentum(model: Model) -> Graph:
 
 
 SOLUTIONS = ("auto", "recursive", "dense", "balanced")
-DENSE_UP_TO = 6  # coordinates; beyond, the dense graph is larger on a tree of bodies, and takes long to build
+DENSE_UP_TO = 7  # coordinates; beyond, the dense graph is larger on a tree of bodies, and takes long to build
 WORTH = 0.9  # of the recursive graph's nodes, at most, for the dense one: elimination keeps more digits
 
 
@@ -191,7 +190,7 @@ def forward_dynamics(model: Model, method: str = "auto", *, check: bool = False)
     method : {"auto", "recursive", "dense", "balanced"}
         "recursive": elimination on the graph of L without forming M (`cg.hessian_solve`); for a tree of bodies the
         number of nodes is linear in n. "dense": M factored as LDL^T; smaller for some short arms, and less accurate
-        where masses or lengths differ by decades. "auto": recursive, but up to 6 coordinates dense where that saves
+        where masses or lengths differ by decades. "auto": recursive, but up to 7 coordinates dense where that saves
         more than a tenth of the nodes. "balanced": elimination of halves of a chain at the same time, and long sums in
         blocks, so that of a planar chain the depth is O(log n), for about twice the nodes (`cg.hessian_solve`); not
         with constraints.

@@ -35,7 +35,7 @@ def held_sides(system: System, solved: Graph, build: Builder) -> tuple[list[list
 
 
 def _solved(system: System, lagrangian: Node, rows: Rows, side: Sequence[Node], build: Builder) -> list[Node]:
-    """(dqdd, -dlambda) for a right-hand side: densely up to 6 coordinates, where that goes without exchanging rows."""
+    """(dqdd, -dlambda) for a right-hand side: densely up to 7 coordinates, where that goes without exchanging rows."""
     if system.n <= DENSE_UP_TO:
         with suppress(SingularError):
             return DenseSolver(system, lagrangian, rows, build).solve(side)

@@ -15,7 +15,6 @@ from cgraph.extend import (
     building,
     cotangents,
     folded,
-    hessian_nodes,
     ldl_solve,
     solve_nodes,
     topological,
@@ -90,7 +89,7 @@ def mass_solve(system: System, build: Builder, method: str) -> MassSolve:
     b = cg.variables([f"b{i}#" for i in range(system.n)])
     (lagrangian,) = folded([system.lagrangian], build)
     if method == "dense":
-        return linear(b, ldl_solve(hessian_nodes(lagrangian, system.qd, build), b, build))
+        return linear(b, ldl_solve(system.mass_matrix(lagrangian, build), b, build))
     return linear(b, solve_nodes(lagrangian, system.qd, b, build))
 
 

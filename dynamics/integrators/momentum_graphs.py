@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Builder, SingularError, building, cotangents, hessian_nodes, kept_by_first, solve_nodes
+from cgraph.extend import Builder, SingularError, building, cotangents, kept_by_first, solve_nodes
 
 from ..equations.singular_mass_matrix import SingularMassMatrixError
 from ..systems.arguments import new_variables
@@ -70,7 +70,7 @@ def mechanics(problem: Problem) -> Mechanics:
 
     state = [*system.q, *system.qd]
     momentum, rate = graph(state, momenta), graph(state, force)
-    mass_matrix = [node for row in hessian_nodes(system.lagrangian, system.qd) for node in row]
+    mass_matrix = [node for row in system.mass_matrix(system.lagrangian) for node in row]
     quadratic = not reaches(mass_matrix, system.qd)
     free = not reaches(rate.outputs.values(), system.qd)
     constant = not reaches([*mass_matrix, *momentum.outputs.values()], [*system.q, system.t])

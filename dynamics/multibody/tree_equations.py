@@ -9,7 +9,7 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import Array, Builder, building
+from cgraph.extend import Array, Builder, building, hessian_nodes
 
 from ..systems.momentum_derivatives import MomentumDerivatives
 from ..systems.system import BiasForce
@@ -18,14 +18,19 @@ from . import newton_euler, spatial
 from .base_parameters import base_parameter_links
 from .body import WORLD, Body, quantities
 from .body_motion import Motion, ground
+from .composite_inertia import without_axial_moments
 from .composite_momentum import COMPOSITE, CompositeMomentum, about_parent, body_momentum, momentum_rates, stated
+from .equation_links import equation_links
 from .inertial_numbers import Link
 from .inverse_dynamics_columns import torque_derivatives
 from .joint_coordinates import parts, places
-from .joints import AxialJoint, moving_type
+from .joints import AxialJoint, JointType, moving_type
 from .link_cache import Moved
+from .mass_matrix_columns import Carried, mass_matrix_columns, size_of
 from .mechanism_fields import Structure
 from .momentum_columns import momentum_derivatives
+
+WORTH = 0.9  # of the nodes of a mass matrix from the Lagrangian, at most, for one by composite inertias
 
 
 class TreeEquations:
@@ -44,8 +49,12 @@ class TreeEquations:
 
     @cached_property
     def links(self) -> list[Link]:
-        """What motion and energy of each body are made of."""
-        return self._links[0]
+        """What motion and energy of each body are made of, in the body's own frame."""
+        return self._regrouped(self._own)[0] if self.base_parameters else self._own
+
+    @cached_property
+    def _types(self) -> list[JointType]:
+        return [body.joint.type for body in self.bodies]
 
     @cached_property
     def ground(self) -> Motion:
@@ -62,20 +71,38 @@ class TreeEquations:
         return all([isinstance(joint, AxialJoint) or joint.turns_with_body for joint in joints])
 
     @cached_property
-    def _links(self) -> tuple[list[Link], Array]:
-        """The links, and the first moment of what of their inertia is the world's."""
+    def _own(self) -> list[Link]:
         carriers = [self.bodies[i] if i >= 0 else None for i in self.parents]
-        links = [self.shared.link(body, carrier) for body, carrier in zip(self.bodies, carriers, strict=True)]
-        if self.base_parameters:
-            return base_parameter_links(links, [body.joint.type for body in self.bodies], self.parents)
-        return links, np.zeros(3)
+        return [self.shared.link(body, carrier) for body, carrier in zip(self.bodies, carriers, strict=True)]
+
+    @cached_property
+    def _placed(self) -> list[Link]:
+        """The links in the frames of the equations."""
+        return equation_links(self._own, self._types, self.parents)
+
+    @cached_property
+    def _links(self) -> tuple[list[Link], Array]:
+        """The links of the equations, and the first moment of what of their inertia is the world's."""
+        return self._regrouped(self._placed) if self.base_parameters else (self._placed, np.zeros(3))
 
     @cached_property
     def _fewest(self) -> list[Link]:
         """The links in as few inertial numbers as there can be, unless these would have to be computed in the graph."""
-        if any([isinstance(number, Node) for link in self.links for number in link.numbers]):
-            return self.links
-        return base_parameter_links(self.links, [body.joint.type for body in self.bodies], self.parents)[0]
+        return self._regrouped(self._placed)[0] if self._numeric else self._links[0]
+
+    def _regrouped(self, links: Sequence[Link]) -> tuple[list[Link], Array]:
+        return base_parameter_links(links, self._types, self.parents)
+
+    @cached_property
+    def _numeric(self) -> bool:
+        """Whether no link has parameters."""
+        return not any([isinstance(number, Node) for link in self._own for number in link.numbers])
+
+    @cached_property
+    def _hinged_chain(self) -> bool:
+        """Whether hinges without parameters follow one on another: their M takes the fewest nodes by composites."""
+        hinged = all([joint.kind == "revolute" for joint in self._types])
+        return hinged and self._numeric and self.parents == list(range(-1, len(self.bodies) - 1))
 
     def partial_lagrangians(self, q: Sequence[Node], qd: Sequence[Node]) -> list[Node]:
         """One for each body, tagged with its name and energy."""
@@ -92,15 +119,33 @@ class TreeEquations:
         forces: list[BiasForce] = []
         with building(Builder()):
             accelerations = {WORLD: newton_euler.base_acceleration(self.ground)}
-            rows = zip(self.bodies, self.links, self._moved(q, qd), parts(self.bodies, q, qd), strict=True)
+            rows = zip(self.bodies, self._fewest, self._moved(q, qd), parts(self.bodies, q, qd), strict=True)
             for body, link, moved, (x, u) in rows:
                 joint = moving_type(body.joint.type)
                 with cg.tag(body.name):
                     acceleration = accelerations[body.name] = newton_euler.propagate_acceleration(
-                        accelerations[body.parent], moved.parent, moved.motion, link, joint, x, u
+                        accelerations[body.parent], moved.parent, moved.motion, link, joint, link.at(x), u
                     )
                     forces += newton_euler.bias_wrench(acceleration, moved.motion, link, joint, x, u)
         return forces
+
+    def mass_matrix(self, q: Sequence[Node], qd: Sequence[Node], lagrangian: Node, build: Builder) -> list[list[Node]]:
+        """The lower triangle of M by composite inertias; or from the Lagrangian, where that takes fewer nodes."""
+        joints = [moving_type(joint) for joint in self._types]
+        links = self._regrouped(equation_links(self._own, self._types, self.parents, outwards=True))[0]
+        with building(build):
+            links = without_axial_moments(links if self._numeric else self._fewest, joints, self.parents)
+            motions = [moved.motion.plane for moved in self._moved(q, qd, links)]
+            rows = zip(self.bodies, self.parents, links, joints, motions, places(self.bodies), strict=True)
+            carried = [
+                Carried(body.name, k, link, joint, link.at(q[at.q]), at.u.start, plane, motions[k] if k >= 0 else None)
+                for body, k, link, joint, plane, at in rows
+            ]
+            columns = mass_matrix_columns(carried, len(qd))
+        if self._hinged_chain:
+            return columns
+        derived = hessian_nodes(lagrangian, qd, build)  # with nodes that other equations have as well
+        return columns if size_of(columns) < WORTH * size_of(derived) else derived
 
     def momentum_rates(self, q: Sequence[Node], qd: Sequence[Node], p: Sequence[Node]) -> list[Node] | None:
         """dp/dt without applied forces at velocities qd that belong to p, by composite momentum.
@@ -120,11 +165,11 @@ class TreeEquations:
                 body, link, moved, (x, u) = rows[i]
                 joint = moving_type(body.joint.type)
                 with cg.tag(body.name, COMPOSITE):
-                    composites[i] = stated(composites[i], link, joint, x, u, p[at[i].u])
+                    composites[i] = stated(composites[i], link, joint, link.at(x), u, p[at[i].u])
                     motions = (moved.parent, moved.motion)
                     rates[:0] = momentum_rates(composites[i], *motions, link, joint, x, u, p[at[i].u])
                     if (k := self.parents[i]) >= 0:
-                        carried = about_parent(composites[i], *motions, link, joint, x)
+                        carried = about_parent(composites[i], *motions, link, joint, link.at(x))
                         composites[k] = composites[k].plus(carried)
         return rates
 
@@ -134,7 +179,7 @@ class TreeEquations:
             return None
         with building(build):
             up = newton_euler.base_acceleration(self.ground).linear
-            return torque_derivatives(self.bodies, self.links, self.parents, up, state, build)
+            return torque_derivatives(self.bodies, self._links[0], self.parents, up, state, build)
 
     def momentum_derivatives(
         self, q: Sequence[Node], qd: Sequence[Node], p: Sequence[Node], build: Builder
@@ -144,12 +189,12 @@ class TreeEquations:
             return None
         with building(build):
             up = newton_euler.base_acceleration(self.ground).linear
-            return momentum_derivatives(self.bodies, self.links, self.parents, up, (q, qd), p, build)
+            return momentum_derivatives(self.bodies, self._links[0], self.parents, up, (q, qd), p, build)
 
-    def _moved(self, q: Sequence[Node], qd: Sequence[Node]) -> list[Moved]:
+    def _moved(self, q: Sequence[Node], qd: Sequence[Node], links: Sequence[Link] | None = None) -> list[Moved]:
         motions = {WORLD: self.ground}
         result = []
-        for body, link, (x, u) in zip(self.bodies, self.links, parts(self.bodies, q, qd), strict=True):
+        for body, link, (x, u) in zip(self.bodies, links or self._links[0], parts(self.bodies, q, qd), strict=True):
             moved = self.shared.moved(motions[body.parent], body, link, x, u)
             motions[body.name] = moved.motion
             result.append(moved)

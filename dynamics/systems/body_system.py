@@ -21,6 +21,9 @@ class BodyEquations(Protocol):
     def bias_forces(self, q: Sequence[Node], qd: Sequence[Node]) -> Sequence[BiasForce]:
         """The pairs (velocity, force) of the bias."""
 
+    def mass_matrix(self, q: Sequence[Node], qd: Sequence[Node], lagrangian: Node, build: Builder) -> list[list[Node]]:
+        """The lower triangle of M."""
+
     def momentum_rates(self, q: Sequence[Node], qd: Sequence[Node], p: Sequence[Node]) -> list[Node] | None:
         """Rates of the momenta p of velocities qd."""
 
@@ -69,6 +72,10 @@ class BodySystem(System):
     def bias_forces(self) -> Sequence[BiasForce]:
         """The pairs (velocity, force) that the bodies state; see `System.bias_forces`."""
         return self._equations.bias_forces(self.q, self.qd)
+
+    def mass_matrix(self, lagrangian: Node, build: Builder | None = None) -> list[list[Node]]:
+        """By composite inertias; see `System.mass_matrix`."""
+        return self._equations.mass_matrix(self.q, self.qd, lagrangian, build or Builder())
 
     def momentum_rates(self, p: Sequence[Node]) -> list[Node] | None:
         """By composite momentum; see `System.momentum_rates`."""

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Builder, require_sequence, shortened, topological
+from cgraph.extend import Builder, hessian_nodes, require_sequence, shortened, topological
 
 from .arguments import (
     TIME,
@@ -267,6 +267,10 @@ class System:
     def surely_regular(self) -> bool:
         """Whether M is known to be positive definite; where it is not, `forward_dynamics` looks at its rank."""
         return False
+
+    def mass_matrix(self, lagrangian: Node, build: Builder | None = None) -> list[list[Node]]:
+        """The lower triangle of M, the Hessian of L by the velocities.  lagrangian: L, folded where other nodes are."""
+        return hessian_nodes(lagrangian, self.qd, build)
 
     def bias_forces(self) -> Sequence[BiasForce] | None:
         """The bias as forces f at velocities z, nodes of L: sum of f dz/dqd = d/dt dL/dqd - dL/dq at qdd = 0.
