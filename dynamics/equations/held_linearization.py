@@ -10,8 +10,8 @@ from cgraph import Graph, Node
 from cgraph.extend import Builder, SingularError, building, cotangents, folded, solve_nodes, tangents
 
 from ..systems.system import System
+from .accelerations import DENSE_UP_TO
 from .constraints import DenseSolver, Rows, constraint_rows
-from .equations_of_motion import DENSE_UP_TO
 from .formulations import ONE, ZERO, torques
 from .inverse_dynamics_derivatives import state_slopes
 from .mass_matrix_solve import MassSolve, linear

@@ -16,7 +16,7 @@ from cgraph import Graph, Node
 from cgraph.extend import Array, Builder, building, folded, topological, with_reciprocals
 
 from ..systems.system import System
-from .equations_of_motion import accelerations
+from .accelerations import accelerations
 from .formulations import ONE, ZERO
 from .held_linearization import held_sides
 from .inverse_dynamics_derivatives import torque_derivatives

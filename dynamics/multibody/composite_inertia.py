@@ -197,7 +197,7 @@ def constant_turn(matrix: Matrix) -> list[Step]:
     c, s = (rows[2, 1] / across, rows[2, 0] / across) if across else (1.0, 0.0)
     rest = c * rows[:, 0] - s * rows[:, 1]  # the columns of R_z R_x: so they fit where axes are nearly parallel, too
     turns = [(2, c, s), (0, rows[2, 2], across), (2, rest[0], rest[1])]
-    return [AxisTurn(axis, as_node(float(c)), as_node(float(s))) for axis, c, s in turns if c != 1.0]
+    return [AxisTurn(axis, as_node(float(c)), as_node(float(s))) for axis, c, s in turns if (c, s) != (1.0, 0.0)]
 
 
 def _rows(rows: Sequence[Sequence[Node]]) -> Second:

@@ -25,11 +25,15 @@ from .inertial_numbers import Link
 from .joints import AxialJoint, JointType
 from .joints.revolute import Revolute
 
+_FAR = 100.0  # times the extent of a body, at most, for its origin from where it was: two digits of its numbers
 _TURN = 4  # numbers in a turn that is about one axis, less than in one about three: products for every vector
 
 
 class _Numbers(NamedTuple):
-    """A link's numbers as arrays, on the way to others.  angle: see `Link`.  moved: how far its origin was [m]."""
+    """A link's numbers as arrays, on the way to others.
+
+    reach: how far its origin may be moved [m].  angle: see `Link`.  moved: how far its origin was moved [m].
+    """
 
     turn: Array
     place: Array
@@ -37,6 +41,7 @@ class _Numbers(NamedTuple):
     moment: Array
     inertia: Array
     joint: JointType
+    reach: float = 0.0
     angle: float = 0.0
     moved: float = 0.0
 
@@ -82,8 +87,8 @@ class _Numbers(NamedTuple):
         (x, y, z), place = self.turn[:, 2], self.place
         across = x * x + y * y
         move = -(place[0] * x + place[1] * y) / across if across else -place[2] / z
-        near = isinstance(self.joint, AxialJoint) and abs(move) <= np.linalg.norm(place) + abs(parent_moved)
-        return self.along(float(move)) if near else self
+        most = min(self.reach, float(np.linalg.norm(place)) + abs(parent_moved))
+        return self.along(float(move)) if isinstance(self.joint, AxialJoint) and abs(move) <= most else self
 
     def less_turned(self) -> tuple[_Numbers, float]:
         """Of a hinge, without what turns it about its own axis before it turns, but for quarters; and how far that is.
@@ -107,14 +112,20 @@ def equation_links(
 ) -> list[Link]:
     """The links, parents first, moved and turned so. Those with parameters stay, and so do their parents.
 
-    joints: their types.  parents: index of each one's parent, -1 for the world.  outwards: move also where as many
-    numbers are left, further out, where fewer columns of the mass matrix have them.
+    joints: their types.  parents: index of each one's parent, -1 for the world.
+    outwards: where as many numbers are left whether an origin is moved or not, always have them further out, where
+    fewer columns of a mass matrix meet them; else not where the parent turns about the axis of its own parent, as
+    velocities have fewer components there.
     """
     children: list[list[int]] = [[] for _ in links]
     for i, parent in enumerate(parents):
         if parent >= 0:
             children[parent].append(i)
     known = {i: _numbers(*pair) for i, pair in enumerate(zip(links, joints, strict=True)) if _is_numeric(pair[0])}
+    for i in reversed(range(len(links))):  # from the tips: no further than what is carried by the least body
+        if i in known:
+            reach = min([_FAR * _extent(known[i]), *[known[child].reach for child in children[i] if child in known]])
+            known[i] = known[i]._replace(reach=reach)
     result = list(links)
     for i, parent in enumerate(parents):
         if i not in known:
@@ -124,20 +135,23 @@ def equation_links(
             known[i] = known[i].carried(known[parent])
             known[i], angle = known[i].less_turned()
         if all([child in known for child in children[i]]):
-            known[i] = _best(known[i], known.get(parent), [known[child] for child in children[i]], outwards)
+            in_plane = parent in known and parents[parent] >= 0 and not known[parent].turn[:2, 2].any()
+            further = outwards or not in_plane
+            known[i] = _best(known[i], known.get(parent), [known[child] for child in children[i]], further)
         if known[i] is not old:
             result[i] = _link(links[i], known[i], angle)
     return result
 
 
-def _best(own: _Numbers, parent: _Numbers | None, children: Sequence[_Numbers], outwards: bool) -> _Numbers:
-    """Moved and turned so that the fewest numbers of it and of what it carries are left."""
+def _best(own: _Numbers, parent: _Numbers | None, children: Sequence[_Numbers], further: bool) -> _Numbers:
+    """Moved and turned so that the fewest numbers of it and of what it carries are left; of as many further out."""
     choices = [own]
     if isinstance(own.joint, AxialJoint):
         if parent is not None and isinstance(parent.joint, AxialJoint):
             choices.append(own.to_normal(parent.moved))
         else:  # where the first of the children has its normal
-            choices += [own.along(float(child.to_normal(0.0).place[2])) for child in children[:1]]
+            moves = [float(child.to_normal(0.0).place[2]) for child in children[:1]]
+            choices += [own.along(move) for move in moves if abs(move) <= own.reach]
     if isinstance(own.joint, Revolute):
         choices += [each.turned(angle) for each in choices for child in children for angle in _turns(each, child)]
 
@@ -146,7 +160,7 @@ def _best(own: _Numbers, parent: _Numbers | None, children: Sequence[_Numbers], 
         return (
             choice.numbers + sum([each.placed_by for each in placed]),
             choice.angle != 0.0,
-            outwards == (choice.moved == 0.0),
+            further == (choice.moved == 0.0),
         )
 
     return min(choices, key=left)
@@ -157,6 +171,11 @@ def _turns(own: _Numbers, child: _Numbers) -> list[float]:
     placed = child.carried(own).to_normal(own.moved)
     x, y = placed.turn[:2, 2] if placed.turn[:2, 2].any() else placed.place[:2]
     return [_within_quarter(math.atan2(y, x))] if x != 0.0 and y != 0.0 else []
+
+
+def _extent(body: _Numbers) -> float:
+    """How far from its origin the mass of a body is, by its moments; infinite without any."""
+    return math.sqrt(float(np.abs(body.inertia).max()) / body.mass) if body.mass > 0.0 else math.inf
 
 
 def _within_quarter(angle: float) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from functools import cached_property
 
 import numpy as np
@@ -31,6 +32,9 @@ from .mechanism_fields import Structure
 from .momentum_columns import momentum_derivatives
 
 WORTH = 0.9  # of the nodes of a mass matrix from the Lagrangian, at most, for one by composite inertias
+
+
+UNEVEN = 1e3  # times a body's moments of inertia, at most, for base numbers that are not looked at further
 
 
 class TreeEquations:
@@ -88,10 +92,20 @@ class TreeEquations:
     @cached_property
     def _fewest(self) -> list[Link]:
         """The links in as few inertial numbers as there can be, unless these would have to be computed in the graph."""
-        return self._regrouped(self._placed)[0] if self._numeric else self._links[0]
+        return self._regrouped(self._placed, fewer=True)[0] if self._numeric else self._links[0]
 
-    def _regrouped(self, links: Sequence[Link]) -> tuple[list[Link], Array]:
-        return base_parameter_links(links, self._types, self.parents)
+    @cached_property
+    def whole(self) -> TreeEquations | None:
+        """The same without base numbers, where these are larger than the bodies' by decades; else None."""
+        numbers = zip(self._fewest, self._links[0], strict=True)
+        if not self._numeric or all([_size(few) <= UNEVEN * _size(own) for few, own in numbers]):
+            return None
+        result = copy(self)
+        vars(result)["_fewest"] = self._links[0]
+        return result
+
+    def _regrouped(self, links: Sequence[Link], *, fewer: bool = False) -> tuple[list[Link], Array]:
+        return base_parameter_links(links, self._types, self.parents, fewer=fewer)
 
     @cached_property
     def _numeric(self) -> bool:
@@ -113,6 +127,11 @@ class TreeEquations:
                     moment = spatial.scaled(self.ground.strength, spatial.constant(self._links[1]))
                     partials[0] = partials[0] - spatial.dot(self.ground.vertical, moment)
         return partials
+
+    def regrouped_lagrangians(self, q: Sequence[Node], qd: Sequence[Node]) -> list[Node]:
+        """Those of base numbers: of the sum only what no derivative shows is missing."""
+        with building(Builder()):
+            return [each.partial for each in self._moved(q, qd, self._fewest)]
 
     def bias_forces(self, q: Sequence[Node], qd: Sequence[Node]) -> list[BiasForce]:
         """The bias wrenches of all bodies, with the velocities that they work on."""
@@ -199,3 +218,8 @@ class TreeEquations:
             motions[body.name] = moved.motion
             result.append(moved)
         return result
+
+
+def _size(link: Link) -> float:
+    """The largest of its moments of inertia and armature."""
+    return max(float(np.abs(np.array(link.full_inertia, dtype=np.float64)).max()), float(link.armature))

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
+from functools import cached_property
 from typing import Any, Protocol
 
 from numpy.typing import ArrayLike
@@ -18,8 +20,15 @@ from .torque_derivatives import MotionState, TorqueDerivatives
 class BodyEquations(Protocol):
     """What bodies know of their equations; see the methods of `System` of the same names, also for None."""
 
+    @property
+    def whole(self) -> BodyEquations | None:
+        """The same with all inertial numbers of all bodies, where fewer may cost digits."""
+
     def bias_forces(self, q: Sequence[Node], qd: Sequence[Node]) -> Sequence[BiasForce]:
         """The pairs (velocity, force) of the bias."""
+
+    def regrouped_lagrangians(self, q: Sequence[Node], qd: Sequence[Node]) -> list[Node]:
+        """Those of as few inertial numbers as there can be, with the same derivatives in sum."""
 
     def mass_matrix(self, q: Sequence[Node], qd: Sequence[Node], lagrangian: Node, build: Builder) -> list[list[Node]]:
         """The lower triangle of M."""
@@ -56,6 +65,24 @@ class BodySystem(System):
     def surely_regular(self) -> bool:
         """Where each body alone has inertia along the velocities of its joint: then no motion is without."""
         return self._surely_regular
+
+    @cached_property
+    def forms(self) -> list[System]:
+        """The system, and one with the energy of base numbers, which is another but for its derivatives."""
+        fewest = copy(self)
+        vars(fewest).pop("lagrangian", None)
+        fewest.partial_lagrangians = tuple(self._equations.regrouped_lagrangians(self.q, self.qd))
+        return [self, fewest]
+
+    @property
+    def whole(self) -> System | None:
+        """The same with all inertial numbers of all bodies, where fewer may cost digits; else None."""
+        equations = self._equations.whole
+        if equations is None:
+            return None
+        result = copy(self)
+        result._equations = equations
+        return result
 
     @property
     def lengths(self) -> tuple[float, ...]:

@@ -127,6 +127,16 @@ class System:
         return None
 
     @property
+    def forms(self) -> list[System]:
+        """The system, and others with the same motion whose energy may take fewer nodes."""
+        return [self]
+
+    @property
+    def whole(self) -> System | None:
+        """The same system with forces of more terms and fewer roundings, where that may count; else None."""
+        return None
+
+    @property
     def mechanism(self) -> None:
         """None: a Lagrangian alone has no bodies."""
         return None

@@ -99,7 +99,7 @@ def test_the_graph_takes_many_states_and_is_smaller_than_that_of_forward_dynamic
     arm = turned_arm(5)
     graph = state_space(arm)
     assert len(graph.nodes) < 4_200  # 8 300 of the Jacobian of forward dynamics
-    assert len(state_space(arm, form="momentum").nodes) < 0.65 * len(graph.nodes)
+    assert len(state_space(arm, form="momentum").nodes) < 0.68 * len(graph.nodes)
     given = states(arm, 3)
     rows = evaluate_at(arm.system, graph, given)
     one = np.concatenate([each.ravel() for each in linearize(arm, *(given[name][1] for name in ("q", "qd", "tau")))])
@@ -160,7 +160,9 @@ def test_of_no_states_there_are_no_matrices_and_one_state_is_refused() -> None:
 
 
 def test_a_column_is_a_graph_that_no_number_of_columns_makes_longer() -> None:
-    short, long = (linearization_parts(random_arm(n).system).in_columns() for n in (6, 12))
+    short, long = (
+        linearization_parts(random_arm(n).system).in_columns() for n in (8, 16)
+    )  # more than are solved densely
     assert len(long.column.nodes) < 2.5 * len(short.column.nodes)
     assert long.factors < 2.5 * short.factors
 
