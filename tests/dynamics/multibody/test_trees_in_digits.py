@@ -72,8 +72,8 @@ def test_trees_of_every_joint(seed: int) -> None:
     tree = random_tree(seed, 1 + seed % 7) if seed % 2 else random_mechanism(2 + seed % 5, kinds, 3, seed)
     found = errors(tree, seed)
     assert found["mass"] < MASS
-    assert max(found["bias"], found["recursive"]) < RECURSIVE
-    assert found["auto"] < DENSE
+    assert found["recursive"] < RECURSIVE
+    assert max(found["bias"], found["auto"]) < DENSE  # of a bias whose terms cancel at some states
 
 
 @pytest.mark.parametrize("angle", [1e-2, 1e-4, 1e-8, 1e-12])
@@ -88,7 +88,9 @@ def test_long_and_short_links(scale: float) -> None:
     found = errors(chain(6, 1.0, scale), 1)
     assert found["mass"] < MASS
     assert max(found["bias"], found["recursive"]) < RECURSIVE
-    assert found["auto"] < 10.0 * DENSE  # dense: over states no worse than three times elimination, at this one ten times
+    assert (
+        found["auto"] < 10.0 * DENSE
+    )  # dense: over states no worse than three times elimination, at this one ten times
 
 
 def test_with_a_heavy_tip_the_accelerations_are_those_of_elimination() -> None:
