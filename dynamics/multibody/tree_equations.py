@@ -34,7 +34,7 @@ from .momentum_columns import momentum_derivatives
 WORTH = 0.9  # of the nodes of a mass matrix from the Lagrangian, at most, for one by composite inertias
 
 
-UNEVEN = 1e3  # times a body's moments of inertia, at most, for base numbers that are not looked at further
+UNEVEN = 200.0  # times a body's moments of inertia, at most, for base numbers that are not looked at further
 
 
 class TreeEquations:
