@@ -20,7 +20,8 @@ numbers.
 **Read**: `expand` and `format_polynomial` write a polynomial out, `Names` tells nodes in a person's words,
 `Formulas` gives the equations of nodes in a `Notation`, `OPS` is
 the table of operations, `register` adds a row to it, an `Op`, and `ADJOINT`, `PRIMAL`, `TANGENT` are the roles that a
-label may have. `certain_digits` says what rounding leaves of the outputs.
+label may have. `certain_digits` says what rounding leaves of the outputs at a point, `rounding_spread` how far it
+moves them at sample points.
 
 **Run**: a `Program` is graphs over registers of numbers (`Call`, `Map`, `Sum`, `Factor`, `Solve`, `If`, `While`), and
 `runner` makes it machine code or Python. `program_jvp` and `program_vjp` are its derivatives, `many` is what memories
@@ -85,6 +86,7 @@ if TYPE_CHECKING:
     from .simplification.identities import shortened
     from .simplification.polynomial import Polynomial, expand, format_polynomial
     from .simplification.reciprocals import with_reciprocals
+    from .simplification.rounding_growth import rounding_spread
     from .util.atomic_write import atomic_write, check_writable, write_files
     from .util.caches import kept_by_first, memo
     from .util.counted import counted
@@ -195,6 +197,7 @@ __all__ = [
     "require_sequence",
     "require_texts",
     "require_whole",
+    "rounding_spread",
     "run_passes",
     "runner",
     "scipy_integrate",

@@ -399,6 +399,7 @@ CALLS |= {
     "extend.require_sequence": call(lambda value: extend.require_sequence("value", value, "texts", str), ["a"]),
     "extend.require_texts": call(lambda value: extend.require_texts("value", value), {"a": "b"}),
     "extend.require_whole": call(lambda value, least: extend.require_whole("value", value, least), 3, 0),
+    "extend.rounding_spread": call(extend.rounding_spread, GRAPH, {}),
     "extend.runner": call(extend.runner, PROGRAM, "python", fast=False, fma=True),
     "extend.scipy_integrate": call(extend.scipy_integrate, "what"),
     "extend.share": call(extend.share, abs, range(3), 2),
@@ -469,6 +470,7 @@ RECORDS = """
 # code, which looks at nothing, and into the names of nodes.
 LEFT_OUT = """cg.recording_lines cg.clear_cache cg.clear_caches cg.Compiled.bind cg.Compiled.values cg.Graph.check
     cg.Graph.counts cg.Graph.listing cg.Graph.only_output cg.Graph.to_networkx dyn.System.bias_forces
+    dyn.System.mass_matrix
     dyn.System.require_values dyn.System.momentum_rates
     dyn.System.torque_derivatives
     dyn.JointForce.along dyn.JointForce.check dyn.JointLimit.along dyn.JointLimit.check dyn.JointFriction.along

@@ -32,7 +32,7 @@ def elimination_steps(
     uses = {node: len(by) for node, by in users.items()}  # by nodes that are not done
     new = {node: len(args) for node, args in arguments.items()}  # arguments that are not live
     live: set[Node] = set()  # what a node that is done passes to
-    by_angle: dict[Node, dict[Node, None]] = {r.cos: {} for r in rotations.values()}  # rotations that are ready
+    by_angle: dict[object, dict[Node, None]] = {r.angle: {} for r in rotations.values()}  # rotations that are ready
     heap: list[tuple[int, int]] = []
 
     def push(node: Node) -> None:
@@ -41,7 +41,7 @@ def elimination_steps(
     def make_ready(node: Node) -> None:
         push(node)
         if node in rotations:
-            by_angle[rotations[node].cos][node] = None
+            by_angle[rotations[node].angle][node] = None
 
     def pass_to(arg: Node) -> None:
         if fewest and arg not in live:
@@ -65,7 +65,7 @@ def elimination_steps(
             continue
         batch = [node]
         if node in rotations:
-            same_angle = by_angle[rotations[node].cos]
+            same_angle = by_angle[rotations[node].angle]
             batch = list(same_angle)
             same_angle.clear()
             result.append([rotations[first] for first in batch])

@@ -1,11 +1,17 @@
-"""Detection of plane rotations in a graph: pairs of sums c x + s y, c y - s x with cosine and sine of one angle."""
+"""Detection of plane rotations in a graph: pairs of sums c x + s y, c y - s x with cosine and sine of one angle.
+
+These are operations, or constants with c^2 + s^2 = 1.
+"""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
-from ..core.node import Node
+from ..core.node import Node, constant
+
+ROUNDING = 2.0**-50  # of constants of size 1 that are the cosine and the sine of one angle
 
 
 class Rotation(NamedTuple):
@@ -20,6 +26,12 @@ class Rotation(NamedTuple):
     sign_x: float
     sign_y: float
     products: tuple[Node, ...]
+
+    @property
+    def angle(self) -> tuple[Node | float, Node | float]:
+        """What rotations by one angle have in common."""
+        cos, sin = (each if each.value is None else each.value for each in (self.cos, self.sin))
+        return cos, sin
 
 
 class _Sum(NamedTuple):
@@ -36,7 +48,7 @@ class _Sum(NamedTuple):
 
 
 def rotations(order: Sequence[Node], depends: Collection[Node], kept: Collection[Node]) -> list[Rotation]:
-    """The rotations of pairs of nodes in `depends` by angles that are not in it.
+    """The rotations of pairs of nodes in `depends` by angles that are not in it, or are constants.
 
     order: nodes, arguments first. The products c x, .. of a rotation have no other use among them, and are not `kept`.
     """
@@ -45,10 +57,19 @@ def rotations(order: Sequence[Node], depends: Collection[Node], kept: Collection
         for arg in node.args:
             uses[arg] = uses.get(arg, 0) + 1
     unpaired: dict[tuple[Node, Node, Node], _Sum] = {}
+    unpaired_constants: dict[frozenset[Node], _Sum] = {}
     pairs = []
     for node in order:
         this = _sum(node, depends, uses)
         if this is None:
+            continue
+        if this.cos.value is not None:
+            both = frozenset((this.a, this.b))
+            if both in unpaired_constants and (pair := _constant_pair(unpaired_constants[both], this)):
+                pairs.append(pair)
+                del unpaired_constants[both]
+            else:
+                unpaired_constants[both] = this
             continue
         other = unpaired.pop((this.cos, this.b, this.a), None)
         if other is None:
@@ -61,17 +82,33 @@ def rotations(order: Sequence[Node], depends: Collection[Node], kept: Collection
     return pairs
 
 
+def _constant_pair(one: _Sum, other: _Sum) -> Rotation | None:
+    """one = c x + s y, other = +-(c y - s x); None where they are not."""
+    c, s = one.cos, one.sin
+    at_x, at_y = (other.cos, other.sin) if other.a is one.a else (other.sin, other.cos)
+    sign = math.copysign(1.0, at_y.value * c.value)  # type: ignore[operator]
+    if max(abs(at_y.value - sign * c.value), abs(at_x.value + sign * s.value)) > ROUNDING:  # type: ignore[operator]
+        return None
+    return Rotation(one.node, other.node, one.a, one.b, c, s, 1.0, sign, one.products + other.products)
+
+
 def _sum(node: Node, depends: Collection[Node], uses: dict[Node, int]) -> _Sum | None:
     """A sum or difference read as +-c a +- s b, where neither product has another use; else None."""
     if node.op.name not in ("add", "sub"):
         return None
-    parts = {}
+    parts, constants = {}, []
     for product, sign in zip(node.args, (1.0, 1.0 if node.op.name == "add" else -1.0), strict=True):
         if product.op.name != "mul" or uses[product] > 1:
             return None
         for factor, of in (product.args, product.args[::-1]):
             if factor.op.name in ("cos", "sin") and factor not in depends and of in depends:
                 parts[factor.op.name] = factor, of, sign
+            elif factor.value is not None and of in depends:
+                constants.append((sign * factor.value, of))
+    if len(constants) == 2:
+        (c, a), (s, b) = constants
+        unit = a is not b and abs(c * c + s * s - 1.0) <= ROUNDING
+        return _Sum(node, a, b, constant(c), constant(s), 1.0, 1.0, node.args) if unit else None
     if len(parts) < 2:
         return None
     (cos, a, cos_sign), (sin, b, sin_sign) = parts["cos"], parts["sin"]

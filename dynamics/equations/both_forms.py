@@ -25,9 +25,12 @@ class Agreement(NamedTuple):
 
 
 def both_forms(model: Model) -> dict[str, Graph]:
-    """{name: graph} of the state equation and of Hamilton's equations. Raises as `hamilton_equations`."""
+    """{name: graph} of the state equation and of Hamilton's equations, both solved by elimination.
+
+    Raises as `hamilton_equations`.
+    """
     hamilton = hamilton_equations(model)  # first: it says what has none
-    return {LAGRANGE: state_equation(model), HAMILTON: hamilton}
+    return {LAGRANGE: state_equation(model, "recursive"), HAMILTON: hamilton}
 
 
 def form_sizes(forms: Mapping[str, Graph]) -> dict[str, Counts]:

@@ -86,13 +86,19 @@ def solved_by_elimination(
 
 
 class DenseSolver:
-    """The same by LDL^T of the whole matrix, the rows of the multipliers eliminated last, for any right-hand sides."""
+    """The same by LDL^T of the whole matrix, the rows of the multipliers eliminated last, for any right-hand sides.
 
-    def __init__(self, system: System, lagrangian: Node, rows: Rows, build: Builder) -> None:
+    composites: take M as bodies give it, `System.mass_matrix`, which has fewer nodes than the Hessian of L; its entries
+    are rounded as wholes, and a factorization may lose the more digits, the worse M is.
+    """
+
+    def __init__(
+        self, system: System, lagrangian: Node, rows: Rows, build: Builder, *, composites: bool = False
+    ) -> None:
         slopes = [cotangents({z: ONE}, system.qd, build) for z in rows.rates]
-        lower = hessian_nodes(lagrangian, system.qd, build)
+        whole = system.mass_matrix(lagrangian, build) if composites else hessian_nodes(lagrangian, system.qd, build)
         self._matrix = [[ZERO] * (k + 1) for k in range(len(slopes))]
-        self._matrix += [[*[slope[i] for slope in slopes], *row[: i + 1]] for i, row in enumerate(lower)]
+        self._matrix += [[*[slope[i] for slope in slopes], *row[: i + 1]] for i, row in enumerate(whole)]
         self._n, self._m, self._build = system.n, len(slopes), build
 
     def solve(self, rhs: Sequence[Node], check: bool = False) -> list[Node]:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Builder, building, folded, hessian_nodes, tangents, topological
+from cgraph.extend import Builder, building, folded, tangents, topological
 
 from ..systems.model import Model, as_system
 from ..systems.system import System
@@ -53,7 +53,7 @@ def coriolis(model: Model) -> Graph:
     require_quadratic(system)
     build = Builder()
     (lagrangian,) = folded([system.lagrangian], Builder())
-    mass = [] if system.kinematics.quasi is None else hessian_nodes(lagrangian, system.qd, build)
+    mass = [] if system.kinematics.quasi is None else system.mass_matrix(lagrangian, build)
     rows = coriolis_matrix(system, folded(bias(system).outputs.values(), build), build, mass)
     outputs = {f"C_{i}_{j}": entry for i, row in enumerate(rows) for j, entry in enumerate(row)}
     return cg.simplify(system.graph(outputs, system.q, system.qd))
@@ -90,7 +90,7 @@ def coriolis_matrix(
 def require_quadratic(system: System) -> None:
     """Raises ValueError unless L is quadratic in the velocities, that is, M does not depend on them."""
     (lagrangian,) = folded([system.lagrangian], Builder())
-    rows = hessian_nodes(lagrangian, system.qd)
+    rows = system.mass_matrix(lagrangian)
     reached = set(topological([entry for row in rows for entry in row]))
     for name, velocity in zip(system.velocities, system.qd, strict=True):
         if velocity in reached:

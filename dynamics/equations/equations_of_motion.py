@@ -2,36 +2,22 @@
 
 from __future__ import annotations
 
-import cgraph as cg
-from cgraph import Graph
-from cgraph.extend import (
-    Builder,
-    Order,
-    SingularError,
-    building,
-    cotangents,
-    hessian_nodes,
-    require_choice,
-    require_flag,
-)
+from collections.abc import Sequence
 
-from ..systems.constraints import ConstraintError
+import cgraph as cg
+from cgraph import Graph, Node
+from cgraph.extend import Builder, cotangents, require_choice, require_flag
+
 from ..systems.model import Model, as_system
 from ..systems.system import System
-from .bias_terms import BiasTerms, bias_terms, bias_terms_of_lagrangian
-from .constraints import (
-    DenseSolver,
-    constraint_rows,
-    multiplier_outputs,
-    require_no_constraints,
-    solved_by_elimination,
-    unknown_names,
-)
+from .accelerations import accelerations, mass_matrix_graph
+from .bias_terms import bias_terms, bias_terms_of_lagrangian
+from .constraints import require_no_constraints
 from .formulations import ONE, ZERO
-from .inertia_rank import without_inertia
 from .shorter_form import shorter_form
-from .singular_mass_matrix import SingularMassMatrixError, no_inertia
 from .substitute import substitute
+
+FEW = 2  # coordinates up to which a bias is also derived from the Lagrangian
 
 
 def mass_matrix(model: Model) -> Graph:
@@ -60,13 +46,7 @@ def mass_matrix(model: Model) -> Graph:
     >>> dyn.mass_matrix(arm).evaluate({"q0": 0.1, "qd0": 0.0})
     {'M_0_0': 4.0}
     """
-
-    def derive(system: System) -> Graph:
-        lower, n = hessian_nodes(system.lagrangian, system.qd), system.n
-        outputs = {f"M_{i}_{j}": lower[max(i, j)][min(i, j)] for i in range(n) for j in range(n)}
-        return cg.simplify(system.graph(outputs, system.q, system.qd))
-
-    return shorter_form(as_system(model), derive)
+    return shorter_form(as_system(model), mass_matrix_graph)
 
 
 def bias(model: Model) -> Graph:
@@ -99,8 +79,12 @@ def bias(model: Model) -> Graph:
 
     def derive(system: System) -> Graph:
         free = system.without_constraints  # whose tags shared nodes would have
-        outputs = {f"bias{i}": node for i, node in enumerate(bias_terms(free, [ZERO] * free.n).bias(free, Builder()))}
-        return cg.simplify(system.graph(outputs, system.q, system.qd))
+        terms = [bias_terms(free)]
+        if system.n <= FEW:  # of a joint or two the energy has no more than the bodies
+            terms += [bias_terms_of_lagrangian(form) for form in free.forms]
+        return _smallest_graph(
+            [system.graph(_named("bias", each.bias(free, Builder())), system.q, system.qd) for each in terms]
+        )
 
     return shorter_form(as_system(model), derive)
 
@@ -134,9 +118,11 @@ def gravity_force(model: Model) -> Graph:
     """
 
     def derive(system: System) -> Graph:
-        derived = bias_terms_of_lagrangian(system.without_constraints).bias(system, Builder())
-        at_rest = substitute(derived, dict.fromkeys(system.qd, ZERO))
-        return cg.simplify(system.graph({f"gravity{i}": node for i, node in enumerate(at_rest)}, system.q, system.qd))
+        free, graphs = system.without_constraints, []
+        for terms in [bias_terms_of_lagrangian(form) for form in free.forms] + [bias_terms(free)]:
+            at_rest = substitute(terms.bias(free, Builder()), dict.fromkeys(system.qd, ZERO))
+            graphs.append(system.graph(_named("gravity", at_rest), system.q, system.qd))
+        return _smallest_graph(graphs)
 
     return shorter_form(as_system(model), derive)
 
@@ -168,15 +154,23 @@ def momentum(model: Model) -> Graph:
     """
 
     def derive(system: System) -> Graph:
-        bars = cotangents({system.lagrangian: ONE}, system.qd)
-        return cg.simplify(system.graph({f"p{i}": bar for i, bar in enumerate(bars)}, system.q, system.qd))
+        momenta = [cotangents({form.lagrangian: ONE}, system.qd) for form in system.forms]
+        return _smallest_graph([system.graph(_named("p", bars), system.q, system.qd) for bars in momenta])
 
     return shorter_form(as_system(model), derive)
 
 
+def _named(name: str, nodes: Sequence[Node]) -> dict[str, Node]:
+    """The nodes as outputs, numbered."""
+    return {f"{name}{i}": node for i, node in enumerate(nodes)}
+
+
+def _smallest_graph(graphs: Sequence[Graph]) -> Graph:
+    """The one with the fewest nodes, simplified; of equal ones the first."""
+    return min([cg.simplify(graph) for graph in graphs], key=lambda graph: len(graph.nodes))
+
+
 SOLUTIONS = ("auto", "recursive", "dense", "balanced")
-DENSE_UP_TO = 6  # coordinates; beyond, the dense graph is larger on a tree of bodies, and takes long to build
-WORTH = 0.9  # of the recursive graph's nodes, at most, for the dense one: elimination keeps more digits
 
 
 def forward_dynamics(model: Model, method: str = "auto", *, check: bool = False) -> Graph:
@@ -191,7 +185,7 @@ def forward_dynamics(model: Model, method: str = "auto", *, check: bool = False)
     method : {"auto", "recursive", "dense", "balanced"}
         "recursive": elimination on the graph of L without forming M (`cg.hessian_solve`); for a tree of bodies the
         number of nodes is linear in n. "dense": M factored as LDL^T; smaller for some short arms, and less accurate
-        where masses or lengths differ by decades. "auto": recursive, but up to 6 coordinates dense where that saves
+        where masses or lengths differ by decades. "auto": recursive, but up to 7 coordinates dense where that saves
         more than a tenth of the nodes. "balanced": elimination of halves of a chain at the same time, and long sums in
         blocks, so that of a planar chain the depth is O(log n), for about twice the nodes (`cg.hessian_solve`); not
         with constraints.
@@ -244,83 +238,3 @@ def forward_dynamics(model: Model, method: str = "auto", *, check: bool = False)
     if method == "balanced":
         require_no_constraints(as_system(model))
     return shorter_form(as_system(model), lambda system: accelerations(system, method, check))
-
-
-def require_inertia(system: System, accelerations: Graph) -> None:
-    """Raises SingularMassMatrixError where M is singular at every state, though no pivot is the constant zero."""
-    moving = without_inertia(accelerations, lambda: mass_matrix(system), system.n)
-    if moving:
-        names = " and ".join([repr(system.velocities[i]) for i in moving])
-        raise SingularMassMatrixError(
-            f"the mass matrix is singular at every state: {'a motion of ' * (len(moving) > 1)}{names} has no inertia"
-        )
-
-
-def _require_inertia_without_constraints(system: System) -> None:
-    """A coordinate whose inertia is the constant zero may leave with a constraint; one that is rounding must not."""
-    free = system.without_constraints
-    try:
-        graph = _solved(free, bias_terms(free), "recursive", check=False)
-    except SingularError:
-        return
-    require_inertia(free, graph)
-
-
-def accelerations(system: System, method: str = "auto", check: bool = False) -> Graph:
-    """Forward dynamics from the Lagrangian as it is written, by one of `SOLUTIONS`.
-
-    Raises SingularMassMatrixError, see `forward_dynamics`.
-    """
-    held = bool(len(system.constraints))
-    short = system.n <= DENSE_UP_TO and not (held and check)
-    methods = [method] if method != "auto" else ["recursive", "dense"] if short else ["recursive"]
-    terms = bias_terms(system)
-    graphs: list[Graph] = []
-    for each in methods:  # the dense matrix may lose in its entries what elimination keeps
-        try:
-            graphs.append(_solved(system, terms, each, check))
-        except SingularError as error:
-            failure = error
-    if not graphs and failure.index >= system.n:
-        raise ConstraintError(
-            f"the constraints are singular: {unknown_names(system)[failure.index]} does nothing, or holds a direction "
-            "without inertia"
-        ) from None
-    if not graphs:
-        raise SingularMassMatrixError(no_inertia(system, failure)) from None
-    chosen = graphs[-1] if len(graphs[-1].nodes) < WORTH * len(graphs[0].nodes) else graphs[0]
-    if not system.surely_regular:
-        if held:
-            _require_inertia_without_constraints(system)
-        else:
-            require_inertia(system, chosen)
-    return chosen
-
-
-def _solved(system: System, terms: BiasTerms, method: str, check: bool) -> Graph:
-    """M qdd - J^T lambda = tau + forces - D qd - bias, J qdd = -(dJ/dt) qd, solved by one method."""
-    build = Builder()
-    rows = constraint_rows(system, terms.rates)
-    with building(build):
-        # What stands at the coordinates already. Elimination takes the inertial terms where they are, at their
-        # velocity nodes, and carries them to the coordinates on its way; a dense solve needs the whole bias here.
-        at_rest = terms.gradient if method != "dense" else [-force for force in terms.bias(system, build)]
-        with cg.tag("damping"):
-            braking = [damping * qd for damping, qd in zip(system.damping, system.qd, strict=True)]
-        rhs = [
-            tau + force - brake + applied
-            for tau, force, brake, applied in zip(system.tau, at_rest, braking, terms.forces, strict=True)
-        ]
-        inertial = {velocity: -force for velocity, force in terms.inertial.items()}
-        rhs += [-change for change in system.constraints.rate_changes(rows.rates, build)]
-    if method != "dense":
-        order: Order = "balanced" if method == "balanced" else "recursive"
-        solved = solved_by_elimination(system, terms, rows, rhs, inertial, build, check, order)
-    else:
-        solved = DenseSolver(system, terms.lagrangian, rows, build).solve(rhs, check)
-    end = system.n + len(rows.kept)
-    outputs = {f"qdd{i}": node for i, node in enumerate(solved[: system.n])}
-    outputs |= multiplier_outputs(system, rows, solved[system.n : end], build)
-    outputs |= dict(zip(("info",), solved[end:], strict=False))
-    graph = cg.simplify(system.graph(outputs, system.q, system.qd, system.tau))
-    return cg.balanced_sums(graph) if method == "balanced" else graph

@@ -10,8 +10,8 @@ from cgraph import Graph, Node
 from cgraph.extend import Builder, SingularError, building, cotangents, folded, solve_nodes, tangents
 
 from ..systems.system import System
+from .accelerations import DENSE_UP_TO
 from .constraints import DenseSolver, Rows, constraint_rows
-from .equations_of_motion import DENSE_UP_TO
 from .formulations import ONE, ZERO, torques
 from .inverse_dynamics_derivatives import state_slopes
 from .mass_matrix_solve import MassSolve, linear
@@ -35,7 +35,7 @@ def held_sides(system: System, solved: Graph, build: Builder) -> tuple[list[list
 
 
 def _solved(system: System, lagrangian: Node, rows: Rows, side: Sequence[Node], build: Builder) -> list[Node]:
-    """(dqdd, -dlambda) for a right-hand side: densely up to 6 coordinates, where that goes without exchanging rows."""
+    """(dqdd, -dlambda) for a right-hand side: densely up to 7 coordinates, where that goes without exchanging rows."""
     if system.n <= DENSE_UP_TO:
         with suppress(SingularError):
             return DenseSolver(system, lagrangian, rows, build).solve(side)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Builder, building, cotangents, folded, hessian_nodes
+from cgraph.extend import Builder, building, cotangents, folded
 
 from ..systems.model import Model, as_system
 from ..systems.system import System
@@ -88,7 +88,7 @@ def _derived(system: System, qdd: Sequence[Node], build: Builder) -> TorqueDeriv
     n = system.n
     flat = folded(substitute([*torque, *_flat(slopes)], at), build)
     rows = _rows(flat[n:], 2 * n)
-    lower = hessian_nodes(system.lagrangian, system.qd, build)
+    lower = system.mass_matrix(system.lagrangian, build)
     mass = [[lower[max(i, j)][min(i, j)] for j in range(n)] for i in range(n)]
     return TorqueDerivatives(flat[:n], [row[:n] for row in rows], [row[n:] for row in rows], mass)
 

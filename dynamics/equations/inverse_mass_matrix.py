@@ -8,7 +8,7 @@ from cgraph.extend import Builder
 
 from ..systems.model import Model, as_system
 from ..systems.system import System
-from .equations_of_motion import accelerations
+from .accelerations import accelerations
 from .mass_matrix_solve import inverse, mass_solve, shorter
 from .shorter_form import shorter_form
 

@@ -14,7 +14,7 @@ from cgraph.extend import Builder, Order, SingularError, building, cotangents, f
 from ..systems.body_system import BodySystem
 from ..systems.constraints import ConstraintError
 from ..systems.system import System
-from .equations_of_motion import require_inertia
+from .accelerations import require_inertia
 from .formulations import ONE, ZERO
 from .singular_mass_matrix import SingularMassMatrixError, no_inertia
 

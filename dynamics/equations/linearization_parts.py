@@ -16,7 +16,7 @@ from cgraph import Graph, Node
 from cgraph.extend import Array, Builder, building, folded, topological, with_reciprocals
 
 from ..systems.system import System
-from .equations_of_motion import accelerations
+from .accelerations import BY_ENERGY, accelerations
 from .formulations import ONE, ZERO
 from .held_linearization import held_sides
 from .inverse_dynamics_derivatives import torque_derivatives
@@ -110,7 +110,7 @@ def linearization_parts(system: System) -> LinearizationParts:
 
 def _parts(system: System, method: str) -> LinearizationParts:
     n, build = system.n, Builder()
-    qdd = accelerations(system, method)
+    qdd = accelerations(system, BY_ENERGY if method == "dense" else method)  # of the M that is factored below
     slopes = torque_derivatives(system, folded(list(qdd.outputs.values()), build), build)
     with building(build):
         sides = [[-row[j] for row in rows] for rows in (slopes.by_q, slopes.by_qd) for j in range(n)]

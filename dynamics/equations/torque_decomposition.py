@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import Builder, building, cotangents, folded, hessian_nodes, tangents
+from cgraph.extend import Builder, building, cotangents, folded, tangents
 
 from ..systems.model import Model, as_system
 from ..systems.system import System
@@ -98,7 +98,7 @@ def torque_by_joint_motion(model: Model) -> TorqueTable:
     require_quadratic(system)
     build = Builder()
     (lagrangian,) = folded([system.lagrangian], Builder())
-    mass = hessian_nodes(lagrangian, system.qd, build)  # its lower triangle
+    mass = system.mass_matrix(lagrangian, build)  # its lower triangle
     forces = folded(bias(system).outputs.values(), build)
     coriolis = coriolis_matrix(system, forces, build, mass)
     n = system.n

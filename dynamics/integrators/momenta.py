@@ -12,7 +12,6 @@ from cgraph.extend import (
     SingularError,
     building,
     cotangents,
-    hessian_nodes,
     kept_by_first,
     require_choice,
     solve_nodes,
@@ -82,7 +81,7 @@ def mechanics(problem: Problem) -> Mechanics:
 
     state = [*system.q, *system.qd]
     momentum, rate = graph(state, momenta), graph(state, force)
-    mass_matrix = [node for row in hessian_nodes(system.lagrangian, system.qd) for node in row]
+    mass_matrix = [node for row in system.mass_matrix(system.lagrangian) for node in row]
     quadratic = not reaches(mass_matrix, system.qd)
     free = not reaches(rate.outputs.values(), system.qd)
     constant = not reaches([*mass_matrix, *momentum.outputs.values()], [*system.q, system.t])

@@ -25,11 +25,12 @@ from .spatial import Triple
 
 
 def base_parameter_links(
-    links: Sequence[Link], joints: Sequence[JointType], parents: Sequence[int]
+    links: Sequence[Link], joints: Sequence[JointType], parents: Sequence[int], *, fewer: bool = False
 ) -> tuple[list[Link], Array]:
     """The links, parents first, with all that moves with the parent given to it; and the world's first moment [kg m].
 
-    joints: their types.  parents: index of each one's parent, -1 for the world.
+    joints: their types.  parents: index of each one's parent, -1 for the world.  fewer: only what leaves fewer numbers
+    of the link and its parent that are not zero.
     The sum of the links' energies is the same but for the potential energy of what the world is given, a constant;
     each one's own is another. The links may be such as no body can be: without mass, with a negative inertia.
     """
@@ -39,13 +40,21 @@ def base_parameter_links(
         for i in reversed(range(len(links))):
             mass, moment, inertia = _numbers(result[i])
             given = joints[i].unobservable(mass, moment, inertia)
-            result[i] = _with(result[i], -given[0], -given[1], -given[2])
-            seen = _seen_by_parent(links[i], *given)
-            if parents[i] >= 0:
-                result[parents[i]] = _with(result[parents[i]], *seen)
-            else:
-                world = world + seen[1]
+            less, seen = _with(result[i], -given[0], -given[1], -given[2]), _seen_by_parent(links[i], *given)
+            if parents[i] < 0:
+                result[i], world = less, world + seen[1]
+                continue
+            old = result[i], result[parents[i]]
+            new = less, _with(old[1], *seen)
+            if not fewer or sum(map(_count, new)) < sum(map(_count, old)):
+                result[i], result[parents[i]] = new
     return result, world
+
+
+def _count(link: Link) -> int:
+    """How many inertial numbers are not zero."""
+    mass, moment, inertia = _numbers(link)
+    return int(np.count_nonzero([mass, *moment, *inertia[np.tril_indices(3)]]))
 
 
 def _seen_by_parent(link: Link, mass: Any, moment: Array, inertia: Array) -> tuple[Any, Array, Array]:

@@ -79,8 +79,7 @@ def _in_space(
 
     with cg.tag("kinetic"):
         omega = spatial.plus(turned(parent.omega), joint.angular_velocity(q, u))
-        carried = spatial.plus(parent.velocity, spatial.cross(parent.omega, offset))
-        velocity = spatial.plus(turned(carried), joint.linear_velocity(q, u))
+        velocity = spatial.plus(turned(_velocity_at(parent, offset)), joint.linear_velocity(q, u))
     with cg.tag("potential"):
         depth = parent.depth + spatial.dot(parent.vertical, offset)
         vertical = turned(parent.vertical)
@@ -91,8 +90,7 @@ def _about_axis(parent: Motion, link: Link, joint: AxialJoint, offset: Triple, q
     along = link.turn[2][2]  # the joint's axis on the parent's
     with cg.tag("kinetic"):
         omega = spatial.rotate_transpose(link.turn, parent.omega)
-        relative = in_plane_axes(parent, spatial.cross(parent.omega, offset))
-        velocity = spatial.rotate_transpose(link.turn, spatial.plus(parent.velocity, relative))
+        velocity = spatial.rotate_transpose(link.turn, _velocity_at(parent, offset))
     with cg.tag("potential"):
         vertical = spatial.rotate_transpose(link.turn, parent.vertical)
         depth = parent.depth + spatial.dot(parent.vertical, in_plane_axes(parent, offset))
@@ -117,6 +115,17 @@ def _about_axis(parent: Motion, link: Link, joint: AxialJoint, offset: Triple, q
     with cg.tag("potential"):
         vertical = spatial.rotate_about_z(c, s, vertical)
     return Motion((x, y, z + joint.angle(qd)), velocity, vertical, depth, parent.strength)
+
+
+def _velocity_at(motion: Motion, offset: Triple) -> Triple:
+    """v + omega x offset; of (a, 0, d) axis by axis, so that elimination moves inertia along one after the other."""
+    if motion.plane or all([each.value != 0.0 for each in offset]):
+        return spatial.plus(motion.velocity, in_plane_axes(motion, spatial.cross(motion.omega, offset)))
+    velocity = motion.velocity
+    for k, along in enumerate(offset):
+        x, y, z = (along if k == i else ZERO for i in range(3))
+        velocity = spatial.plus(velocity, spatial.cross(motion.omega, (x, y, z)))
+    return velocity
 
 
 def carrier_motion(parent: Motion, link: Link, joint: MovingJoint) -> Motion:

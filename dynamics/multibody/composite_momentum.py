@@ -73,7 +73,7 @@ def stated(
     sliding = joint.sliding if isinstance(joint, SpatialJoint) else 0
     if isinstance(joint, SpatialJoint) and sliding:
         force = list(spatial.rotate_transpose(joint.rotation(q), (own[0], own[1], own[2])))
-    for twist, momentum in list(zip(_along(joint, q), own, strict=True))[sliding:]:
+    for twist, momentum in list(zip(along(joint, q), own, strict=True))[sliding:]:
         shares = [each.value for each in (*twist.angular, *twist.linear)]
         if sorted(map(str, shares)) == ["0.0"] * 5 + ["1.0"]:
             k = shares.index(1.0)
@@ -106,7 +106,7 @@ def momentum_rates(
     with cg.tag(POTENTIAL):
         up = scaled(motion.strength, motion.vertical)  # gravity is -up
         loss = carried.plus(Wrench(cross(composite.moment, up), scaled(composite.mass, up)))
-        rates += [-twist.power(loss) for twist in _along(joint, q)[len(rates) :]]
+        rates += [-twist.power(loss) for twist in along(joint, q)[len(rates) :]]
         springs = [force for _, force in spring_forces(link, joint, q, u)] or [ZERO] * len(rates)
         return [rate - spring for rate, spring in zip(rates, springs, strict=True)]
 
@@ -134,7 +134,7 @@ def about_parent(
     return CompositeMomentum(composite.mass, moment, momentum)
 
 
-def _along(joint: MovingJoint, q: Sequence[Node]) -> list[Twist]:
+def along(joint: MovingJoint, q: Sequence[Node]) -> list[Twist]:
     """How each velocity of the joint moves the body, in the body's axes."""
     if isinstance(joint, AxialJoint):
         return [Twist((ZERO, ZERO, joint.angle(ONE)), (ZERO, ZERO, joint.shift(ONE)))]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -23,7 +24,7 @@ class Link:
     """A body in the axes of its motion: numbers, or nodes that stand for them.
 
     turn, place: its axes as columns, and its origin at q = 0, in the parent's axes.  moment: m c.  inertia: about the
-    origin.
+    origin.  angle: of a hinge, how far the axes are turned about its own beside its coordinate [rad].
     """
 
     turn: Matrix  # (3, 3)
@@ -35,6 +36,7 @@ class Link:
     stiffness: float | Node
     spring_reference: float | Node
     armature: float | Node
+    angle: float = 0.0
 
     @cached_property
     def parallel(self) -> bool:
@@ -49,6 +51,15 @@ class Link:
         lower = [self.inertia[i][j] for i in range(3) for j in range(i + 1)]
         others = (self.damping, self.stiffness, self.spring_reference, self.armature)
         return [spatial.plain(each) for each in (*turn, *self.place, self.mass, *self.moment, *lower, *others)]
+
+    @property
+    def full_inertia(self) -> list[list[float | Node]]:
+        """The inertia with its upper triangle."""
+        return [[spatial.plain(self.inertia[max(i, j)][min(i, j)]) for j in range(3)] for i in range(3)]
+
+    def at(self, q: Sequence[Node]) -> Sequence[Node]:
+        """The coordinates of the joint by which the axes move."""
+        return [q[0] + self.angle] if self.angle else q
 
 
 def axes_of(body: Body) -> Array:
@@ -84,5 +95,7 @@ def link(body: Body, outer: Array) -> Link:
             more, center, about_joint = inertia_in(axes, other)
             mass, moment, inertia = mass + more, moment + more * center, spatial.added(inertia, about_joint)
         moment = spatial.constant(moment)
-    numbers = [symbol(each) for each in (joint.damping, joint.stiffness, joint.spring_reference, joint.armature)]
-    return Link(turn.tolist(), place, mass, moment, inertia.tolist(), *numbers)
+    damping, stiffness, reference, armature = map(
+        symbol, (joint.damping, joint.stiffness, joint.spring_reference, joint.armature)
+    )
+    return Link(turn.tolist(), place, mass, moment, inertia.tolist(), damping, stiffness, reference, armature)

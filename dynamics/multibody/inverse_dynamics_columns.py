@@ -154,8 +154,8 @@ def _frames(
     frames: list[Frame] = []
     for body, link, parent, place, flat in zip(bodies, links, parents, places(bodies), in_plane, strict=True):
         q, u, u_dot = state
-        joint = Freedoms(place.u.start, q[place.q], u[place.u], u_dot[place.u], tags)
         with cg.tag(body.name):
+            joint = Freedoms(place.u.start, link.at(q[place.q]), u[place.u], u_dot[place.u], tags)
             if parent < 0:
                 frames.append(root_frame(up, link, moving_type(body.joint.type), joint, in_plane=flat))
             else:

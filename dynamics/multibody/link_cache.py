@@ -62,9 +62,9 @@ class SharedParts:
     def moved(self, parent: Motion, body: Body, link: Link, q: Sequence[Node], u: Sequence[Node]) -> Moved:
         """The motion and energy of a body whose parent moves so. `parent` is one of these motions, or the ground's."""
         joint = moving_type(body.joint.type)
-        key = (id(parent), body.name, joint, *[node.name for node in (*q, *u)], *link.numbers)
+        key = (id(parent), body.name, joint, link.angle, *[node.name for node in (*q, *u)], *link.numbers)
         if key not in self._moved:
             with cg.tag(body.name):
-                motion = propagate_motion(parent, link, joint, q, u)
+                motion = propagate_motion(parent, link, joint, link.at(q), u)
                 self._moved[key] = Moved(parent, motion, energy(motion, link, joint, q, u))
         return self._moved[key]

@@ -75,9 +75,9 @@ class PruneResult:
     Examples
     --------
     >>> import dynamics as dyn
-    >>> result = dyn.prune(dyn.planar_arm([1.0, 0.8], [1.0, 0.5]), dyn.mass_matrix, regroup=True)
+    >>> result = dyn.prune(dyn.planar_arm([1.0, 0.8], [1.0, 0.5]), regroup=True)
     >>> len(result.full.nodes), len(result.graph.nodes)
-    (27, 22)
+    (82, 73)
     """
 
     model: Model

@@ -126,6 +126,16 @@ class System:
         return None
 
     @property
+    def forms(self) -> list[System]:
+        """The system, and others with the same motion whose energy may take fewer nodes."""
+        return [self]
+
+    @property
+    def whole(self) -> System | None:
+        """The same system with forces of more terms and fewer roundings, where that may count; else None."""
+        return None
+
+    @property
     def mechanism(self) -> None:
         """None: a Lagrangian alone has no bodies."""
         return None
@@ -269,10 +279,14 @@ class System:
         """Whether M is known to be positive definite; where it is not, `forward_dynamics` looks at its rank."""
         return False
 
+    def mass_matrix(self, lagrangian: Node, build: Builder | None = None) -> list[list[Node]]:
+        """The lower triangle of M, the Hessian of L by the velocities.  lagrangian: L, folded where other nodes are."""
+        return extend.hessian_nodes(lagrangian, self.qd, build)
+
     def bias_forces(self, qdd: Sequence[Node] | None = None) -> Sequence[BiasForce] | None:
         """Forces f at velocities z, nodes of L, with sum of f dz/dqd = d/dt dL/dqd - dL/dq: the bias, where qdd is 0.
 
-        qdd: None is 0, too, and asks for the forces as elimination takes them, each at the body that it is of.
+        qdd: accelerations, 0 if None.
 
         None where nobody knows better than to derive it from L, as here.
         """

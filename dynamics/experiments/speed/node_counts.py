@@ -13,7 +13,8 @@ import numpy as np
 import cgraph as cg
 from cgraph import Graph, Node
 
-from ...equations.equations_of_motion import accelerations, forward_dynamics
+from ...equations.accelerations import accelerations
+from ...equations.equations_of_motion import forward_dynamics
 from ...multibody.mechanism import Mechanism
 from ...multibody.planar_arm import planar_links
 from ...systems.system import System

@@ -246,6 +246,20 @@ def test_the_gap_that_is_said_is_that_of_a_revolution(kind: str, angle: float) -
     assert 0.7 < float(found[1]) / widest < 1.1
 
 
+def by_points(loop: dyn.Loop, length: float) -> list[dyn.Loop]:
+    """A hinge as two points on its axis, since MJCF has no hinge that closes a loop; any other loop."""
+    if loop.kind != "hinge":
+        return [loop]
+    ends = [
+        (end, length * axis / np.linalg.norm(axis)) for end, axis in ((loop.at, loop.axis), (loop.to_at, loop.to_axis))
+    ]
+    (at, along), (to_at, to_along) = [(np.asarray(end), way) for end, way in ends]
+    places = {"one": (at, to_at), "other": (at + along, to_at + to_along)}
+    return [
+        dyn.Loop("point", loop.body, loop.to, at=a, to_at=b, name=f"{loop.label} {k}") for k, (a, b) in places.items()
+    ]
+
+
 def beside_mujoco(seed: int, span: float = 0.05) -> tuple[float, float]:
     """How far a tilted linkage is from MuJoCo's soft one after a while, and what half the time step changes of that."""
     mujoco = pytest.importorskip("mujoco")
@@ -256,14 +270,17 @@ def beside_mujoco(seed: int, span: float = 0.05) -> tuple[float, float]:
         given = moving_state(exact, length, np.random.default_rng(seed))
         q, qd = dyn.consistent_state(other, *given)
         end = dyn.simulate(other, q, qd, span, rtol=1e-9, t_eval=[span]).q[-1]
+        written = replace(other, loops=[each for loop in other.loops for each in by_points(loop, length)])
     ends = []
     for step in (1e-4, 5e-5):
         text = re.sub(
-            r"<(connect|weld) ", rf'<\1 solref="{2.5 * step} 1" solimp="0.9999 0.9999 0.001" ', dyn.to_mjcf(other, step)
+            r"<(connect|weld) ",
+            rf'<\1 solref="{2.5 * step} 1" solimp="0.9999 0.9999 0.001" ',
+            dyn.to_mjcf(written, step),
         )
         model = mujoco.MjModel.from_xml_string(text)
         data = mujoco.MjData(model)
-        places, rates = joint_order(model, other)
+        places, rates = joint_order(model, written)
         data.qpos[places], data.qvel[rates] = q, qd
         for _ in range(round(span / step)):
             mujoco.mj_step(model, data)
@@ -271,7 +288,7 @@ def beside_mujoco(seed: int, span: float = 0.05) -> tuple[float, float]:
     return float(np.abs((ends[1] - end) / size).max()), float(np.abs((ends[0] - ends[1]) / size).max())
 
 
-@pytest.mark.parametrize("seed", [2, 3, 4])
+@pytest.mark.parametrize("seed", [0, 2, 3, 5, 8])
 def test_a_tilted_linkage_moves_as_mujocos_soft_one(seed: int) -> None:
     off, soft = beside_mujoco(seed)
     assert off < SOFT * soft + ROUNDING

@@ -106,8 +106,8 @@ def test_untouched_partial_lagrangians_are_shared() -> None:
     for new in (old.attach(TOOL, to="link 6"), old.detach("link 5"), old.lock("link 6", 0.2)):
         after = new.system.partial_lagrangians
         shared = [a is b for a, b in zip(before, after, strict=False)]
-        assert sum(shared) >= 4
-        assert all(shared[:4])
+        assert sum(shared) >= 3  # the body that the change is on turns its axes to what it carries
+        assert all(shared[:3])
     other = arm(6)
     assert not any(a is b for a, b in zip(before, other.system.partial_lagrangians, strict=True))
 

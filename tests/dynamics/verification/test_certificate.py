@@ -12,7 +12,7 @@ import pytest
 import cgraph as cg
 import dynamics as dyn
 from cgraph.operations.operation import OPS
-from dynamics.equations import equations_of_motion
+from dynamics.equations import accelerations
 from dynamics.equations.constraints import multiplier_outputs
 from dynamics.io.write_mjcf import to_mjcf
 from dynamics.systems.constraints import Constraints
@@ -68,7 +68,7 @@ def test_every_kind_of_constraint_passes_and_a_wrong_one_is_found(name: str, mon
     monkeypatch.setattr(Constraints, "rate_changes", lambda *a: [1.001 * node + 0.001 for node in changes(*a)])
     assert set(failed(certify(model, 2))) >= {"constraints: J qdd + (dz/dt at qdd = 0) = 0, all rows"}
     monkeypatch.undo()
-    monkeypatch.setattr(equations_of_motion, "multiplier_outputs", lambda *a: doubled(multiplier_outputs(*a)))
+    monkeypatch.setattr(accelerations, "multiplier_outputs", lambda *a: doubled(multiplier_outputs(*a)))
     assert set(failed(certify(model, 2))) >= {"inverse dynamics of forward dynamics = tau + J^T lambda"}
 
 

@@ -1,0 +1,131 @@
+"""Accelerations: M qdd = tau + forces - D qd - bias solved on the graph, by elimination or by a dense factorization."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import cgraph as cg
+from cgraph import Graph
+from cgraph.extend import Builder, Order, SingularError, building, rounding_spread
+
+from ..systems.constraints import ConstraintError
+from ..systems.system import System
+from .bias_terms import BiasTerms, bias_terms
+from .constraints import DenseSolver, constraint_rows, multiplier_outputs, solved_by_elimination, unknown_names
+from .inertia_rank import without_inertia
+from .singular_mass_matrix import SingularMassMatrixError, no_inertia
+
+DENSE_UP_TO = 7  # coordinates; beyond, the dense graph is larger on a tree of bodies, and takes long to build
+WORTH = 0.9  # of the recursive graph's nodes, at most, for the dense one: elimination keeps more digits
+BY_ENERGY = "dense by energy"  # with the Hessian of L, also where bodies give an M of fewer nodes
+TURN = 10  # products that a sine takes as long as, about
+GROWTH = 3.0  # times the rounding of the safest graph, at most, at sample points
+
+
+def mass_matrix_graph(system: System) -> Graph:
+    """M(q) of the system as it is written."""
+    lower, n = system.mass_matrix(system.lagrangian), system.n
+    outputs = {f"M_{i}_{j}": lower[max(i, j)][min(i, j)] for i in range(n) for j in range(n)}
+    return cg.simplify(system.graph(outputs, system.q, system.qd))
+
+
+def require_inertia(system: System, accelerations: Graph) -> None:
+    """Raises SingularMassMatrixError where M is singular at every state, though no pivot is the constant zero."""
+    moving = without_inertia(accelerations, lambda: mass_matrix_graph(system), system.n)
+    if moving:
+        names = " and ".join([repr(system.velocities[i]) for i in moving])
+        raise SingularMassMatrixError(
+            f"the mass matrix is singular at every state: {'a motion of ' * (len(moving) > 1)}{names} has no inertia"
+        )
+
+
+def _require_inertia_without_constraints(system: System) -> None:
+    """A coordinate whose inertia is the constant zero may leave with a constraint; one that is rounding must not."""
+    free = system.without_constraints
+    try:
+        graph = _solved(free, bias_terms(free), "recursive", check=False)
+    except SingularError:
+        return
+    require_inertia(free, graph)
+
+
+def accelerations(system: System, method: str = "auto", check: bool = False) -> Graph:
+    """Forward dynamics from the Lagrangian as it is written, by one of `SOLUTIONS` or `BY_ENERGY`.
+
+    Raises SingularMassMatrixError, see `forward_dynamics`.
+    """
+    held = bool(len(system.constraints))
+    short = system.n <= DENSE_UP_TO and not (held and check)
+    methods = [method] if method != "auto" else ["recursive", "dense"] if short else ["recursive"]
+    ways = [(system, each) for each in methods]
+    if (whole := system.whole) is not None:
+        ways.insert(0, (whole, methods[0]))
+    graphs: list[Graph] = []  # the safest first
+    for form, each in ways:  # the dense matrix may lose in its entries what elimination keeps
+        try:
+            graphs.append(_solved(form, bias_terms(form), each, check))
+        except SingularError as error:
+            failure = error
+    if not graphs and failure.index >= system.n:
+        raise ConstraintError(
+            f"the constraints are singular: {unknown_names(system)[failure.index]} does nothing, or holds a direction "
+            "without inertia"
+        ) from None
+    if not graphs:
+        raise SingularMassMatrixError(no_inertia(system, failure)) from None
+    chosen = _smallest(graphs, WORTH if methods[-1] == "dense" else 1.0, system.parameters)
+    if not system.surely_regular:
+        if held:
+            _require_inertia_without_constraints(system)
+        else:
+            require_inertia(system, chosen)
+    return chosen
+
+
+def _smallest(graphs: Sequence[Graph], worth: float, values: Mapping[str, float]) -> Graph:
+    """Of graphs, the safest first, the smallest whose roundings carry little further than those of the first.
+
+    worth: of the nodes of the one before, at most, for the last.
+    """
+    safe = chosen = graphs[0]
+    for graph in graphs[1:]:
+        limit = worth if graph is graphs[-1] else 1.0
+        smaller = _cost(graph) < limit * _cost(chosen)
+        if smaller and rounding_spread(graph, values) <= GROWTH * rounding_spread(safe, values):
+            chosen = graph
+    return chosen
+
+
+def _cost(graph: Graph) -> int:
+    """Nodes, with sines and cosines for what they take."""
+    return len(graph.nodes) + TURN * sum([node.op.name in ("sin", "cos") for node in graph.nodes])
+
+
+def _solved(system: System, terms: BiasTerms, method: str, check: bool) -> Graph:
+    """M qdd - J^T lambda = tau + forces - D qd - bias, J qdd = -(dJ/dt) qd, solved by one method."""
+    build = Builder()
+    rows = constraint_rows(system, terms.rates)
+    with building(build):
+        # What stands at the coordinates already. Elimination takes the inertial terms where they are, at their
+        # velocity nodes, and carries them to the coordinates on its way; a dense solve needs the whole bias here.
+        at_rest = terms.gradient if not method.startswith("dense") else [-force for force in terms.bias(system, build)]
+        with cg.tag("damping"):
+            braking = [damping * qd for damping, qd in zip(system.damping, system.qd, strict=True)]
+        rhs = [
+            tau + force - brake + applied
+            for tau, force, brake, applied in zip(system.tau, at_rest, braking, terms.forces, strict=True)
+        ]
+        inertial = {velocity: -force for velocity, force in terms.inertial.items()}
+        rhs += [-change for change in system.constraints.rate_changes(rows.rates, build)]
+    if not method.startswith("dense"):
+        order: Order = "balanced" if method == "balanced" else "recursive"
+        solved = solved_by_elimination(system, terms, rows, rhs, inertial, build, check, order)
+    else:
+        solver = DenseSolver(system, terms.lagrangian, rows, build, composites=method == "dense")
+        solved = solver.solve(rhs, check)
+    end = system.n + len(rows.kept)
+    outputs = {f"qdd{i}": node for i, node in enumerate(solved[: system.n])}
+    outputs |= multiplier_outputs(system, rows, solved[system.n : end], build)
+    outputs |= dict(zip(("info",), solved[end:], strict=False))
+    graph = cg.simplify(system.graph(outputs, system.q, system.qd, system.tau))
+    return cg.balanced_sums(graph) if method == "balanced" else graph
