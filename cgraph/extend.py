@@ -89,12 +89,10 @@ if TYPE_CHECKING:
     from .simplification.rounding_growth import rounding_spread
     from .util.atomic_write import atomic_write, check_writable, write_files
     from .util.caches import kept_by_first, memo
-    from .util.counted import counted
     from .util.doors import doors
     from .util.extras import install
     from .util.html_text import html_lines, html_table, picture
     from .util.json_type import Json
-    from .util.nearest import nearest, or_nearest
     from .util.real_arrays import is_finite, real_array, real_number
     from .util.require import (
         require_choice,
@@ -108,6 +106,7 @@ if TYPE_CHECKING:
     )
     from .util.scipy_modules import scipy_integrate
     from .util.threads import share, thread_count
+    from .util.words import counted, nearest, or_nearest
     from .writing.formulas import Formulas, Notation
 
 __all__ = [

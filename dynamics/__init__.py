@@ -8,37 +8,42 @@ if TYPE_CHECKING:
     from cgraph import __version__ as __version__
 
     from . import scenes
-    from .equations.arrays_at import arrays_at
-    from .equations.conserved_momenta import conserved_momenta
-    from .equations.consistent_state import consistent_state
-    from .equations.constraint_lint import ConstraintLint, lint_constraints
-    from .equations.constraint_rank import ConstraintWarning
+    from .equations.constraints.constraint_lint import ConstraintLint, lint_constraints
+    from .equations.constraints.constraint_rank import ConstraintWarning
+    from .equations.constraints.integrability import integrable_rows
     from .equations.coriolis import coriolis, damping_force
     from .equations.energies import energy, kinetic_energy, potential_energy
     from .equations.equations_of_motion import bias, forward_dynamics, gravity_force, mass_matrix, momentum
-    from .equations.formulation_sizes import formulation_sizes
-    from .equations.formulations import FORMULATIONS, inverse_dynamics, momentum_rate
-    from .equations.freedom import Freedom, freedom
-    from .equations.hamiltonian import hamilton_equations, hamiltonian
-    from .equations.integrability import integrable_rows
-    from .equations.inverse_dynamics_derivatives import inverse_dynamics_derivatives
+    from .equations.formulations.formulation_sizes import formulation_sizes
+    from .equations.formulations.formulations import FORMULATIONS, inverse_dynamics, momentum_rate
+    from .equations.formulations.spurious_nodes import spurious_nodes
+    from .equations.formulations.verdict import Verdict, formulation_verdict
     from .equations.inverse_mass_matrix import inverse_mass_matrix
-    from .equations.linearization import linearize, state_space
-    from .equations.linearize_many import linearize_many
-    from .equations.reduced_linearization import ReducedLinearization, reduced_linearization
+    from .equations.linearization.inverse_dynamics_derivatives import inverse_dynamics_derivatives
+    from .equations.linearization.linearization import linearize, state_space
+    from .equations.linearization.linearize_many import linearize_many
+    from .equations.linearization.reduced_linearization import ReducedLinearization, reduced_linearization
+    from .equations.momentum.conserved_momenta import conserved_momenta
+    from .equations.momentum.hamiltonian import hamilton_equations, hamiltonian
     from .equations.singular_mass_matrix import SingularMassMatrixError, raise_if_singular
-    from .equations.spurious_nodes import spurious_nodes
     from .equations.state_equation import state_equation
+    from .equations.states.arrays_at import arrays_at
+    from .equations.states.consistent_state import consistent_state
+    from .equations.states.freedom import Freedom, freedom
     from .equations.torque_decomposition import torque_by_joint_motion, torque_by_link
     from .equations.torque_table import TorqueTable
-    from .equations.verdict import Verdict, formulation_verdict
     from .experiments.stability import cases
     from .integrators import METHODS
     from .io.load import load_mjcf, load_urdf
     from .io.write_mjcf import to_mjcf
     from .io.write_urdf import to_urdf
-    from .multibody.build_tree import serial_arm, tree
-    from .multibody.frames import (
+    from .multibody.builders.build_tree import serial_arm, tree
+    from .multibody.builders.planar_arm import planar_arm
+    from .multibody.changes.impact import Attached, FreeBody, Released, attach_with_impact, release
+    from .multibody.changes.pruning import EFFECTS, OmittedTerm, PruneResult, prune
+    from .multibody.forces.joint_force import Actuator, JointForce, JointFriction, JointLimit
+    from .multibody.mechanism import Body, Force, Joint, Loop, Mechanism, MechanismError, MechanismWarning
+    from .multibody.quantities.frames import (
         frame_acceleration,
         frame_bias_acceleration,
         frame_jacobian,
@@ -46,15 +51,10 @@ if TYPE_CHECKING:
         frame_placement,
         frame_velocity,
     )
-    from .multibody.impact import Attached, FreeBody, Released, attach_with_impact, release
-    from .multibody.joint_force import Actuator, JointForce, JointFriction, JointLimit
-    from .multibody.mechanism import Body, Force, Joint, Loop, Mechanism, MechanismError, MechanismWarning
-    from .multibody.planar_arm import planar_arm
-    from .multibody.pruning import EFFECTS, OmittedTerm, PruneResult, prune
-    from .multibody.recursive_inverse_dynamics import RecursiveInverseDynamics
-    from .multibody.regressor import inertial_parameters, regressor
+    from .multibody.quantities.recursive_inverse_dynamics import RecursiveInverseDynamics
+    from .multibody.quantities.regressor import inertial_parameters, regressor
+    from .multibody.quantities.whole_body import center_of_mass, center_of_mass_jacobian, spatial_momentum
     from .multibody.subtree import Subtree
-    from .multibody.whole_body import center_of_mass, center_of_mass_jacobian, spatial_momentum
     from .multiprecision.reference import reference
     from .multiprecision.solution import Reference
     from .scenes.scenes import Scene

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Literal, NamedTuple
 from ..core.checks import GraphError
 from ..core.graph import Graph
 from ..core.node import VARIABLE, Node, variable
-from ..util.counted import counted
 from ..util.html_text import html_lines
 from ..util.require import require_choice, require_graph, require_sequence, require_texts
+from ..util.words import counted
 from ..writing.structure_hash import node_hashes
 from .names import Names, joined
 

@@ -9,8 +9,8 @@ from ..core.checks import GraphError
 from ..core.graph import Graph
 from ..core.node import CONSTANT, Node
 from ..operations.operation import SUM, columns
-from ..util.nearest import nearest
 from ..util.require import require_graph, require_texts
+from ..util.words import nearest
 from ..writing.source_lines import lines_text
 
 Name = str | Node

@@ -12,9 +12,9 @@ from ..core.checks import GraphError
 from ..core.graph import Edge, Graph
 from ..core.node import Node
 from ..operations.operation import columns
-from ..util.counted import counted
 from ..util.html_text import html_table, html_text
 from ..util.require import require_graph
+from ..util.words import counted
 from ..writing.source_lines import lines_text
 from .edge_partials import Point, edge_slopes
 from .names import Name, Names

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 from ..core.checks import GraphError
 from ..core.graph import Graph
 from ..core.node import Node
-from ..util.counted import counted
 from ..util.html_text import html_lines
 from ..util.require import require_graph
+from ..util.words import counted
 from .names import Name, Names, joined
 from .reachability import ancestors, descendants
 

@@ -11,7 +11,13 @@ from cgraph.extend import Builder, Order, SingularError, building, rounding_spre
 from ..systems.constraints import ConstraintError
 from ..systems.system import System
 from .bias_terms import BiasTerms, bias_terms
-from .constraints import DenseSolver, constraint_rows, multiplier_outputs, solved_by_elimination, unknown_names
+from .constraints.constraints import (
+    DenseSolver,
+    constraint_rows,
+    multiplier_outputs,
+    solved_by_elimination,
+    unknown_names,
+)
 from .inertia_rank import without_inertia
 from .singular_mass_matrix import SingularMassMatrixError, no_inertia
 

@@ -11,7 +11,7 @@ from cgraph.extend import Builder, building, folded, tangents, topological
 from ..systems.model import Model, as_system
 from ..systems.system import System
 from .equations_of_motion import bias
-from .formulations import ONE, ZERO
+from .formulations.formulations import ONE, ZERO
 from .substitute import substitute
 
 

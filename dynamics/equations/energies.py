@@ -9,7 +9,7 @@ from cgraph.extend import Builder, building, cotangents
 from ..systems.body_system import BodySystem
 from ..systems.model import Model, as_system
 from ..systems.system import System
-from .formulations import ONE, ZERO
+from .formulations.formulations import ONE, ZERO
 from .shorter_form import shorter_form
 from .substitute import substitute
 

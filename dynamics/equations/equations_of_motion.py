@@ -12,8 +12,8 @@ from ..systems.model import Model, as_system
 from ..systems.system import System
 from .accelerations import accelerations, mass_matrix_graph
 from .bias_terms import bias_terms, bias_terms_of_lagrangian
-from .constraints import require_no_constraints
-from .formulations import ONE, ZERO
+from .constraints.constraints import require_no_constraints
+from .formulations.formulations import ONE, ZERO
 from .shorter_form import shorter_form
 from .substitute import substitute
 

@@ -22,7 +22,7 @@ from cgraph.extend import (
 )
 
 from ..systems.system import System
-from .formulations import ONE, ZERO
+from .formulations.formulations import ONE, ZERO
 from .singular_mass_matrix import SingularMassMatrixError
 
 DENSE_PATH = 12  # coordinates from the world to a tip; a dense factorization loses digits with about their fourth power

@@ -9,7 +9,7 @@ from cgraph.extend import SingularError, real_array
 
 from ..systems.model import Model, as_system
 from ..systems.system import System
-from .constraints import unknown_names
+from .constraints.constraints import unknown_names
 
 
 class SingularMassMatrixError(ValueError):

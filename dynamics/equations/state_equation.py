@@ -10,9 +10,11 @@ from cgraph.extend import kept_by_first, require_choice
 from ..systems.arguments import TIME
 from ..systems.model import Model, as_ode, as_system, system_of
 from ..systems.system import System
-from .constraints import held_still
+from .constraints.constraints import held_still
 from .equations_of_motion import SOLUTIONS, forward_dynamics
-from .formulations import ZERO
+from .formulations.formulations import ZERO
+
+FORMS = ("velocity", "momentum")  # of a motion: states (q, qd) or (q, p)
 
 
 def state_equation(model: Model, method: str = "auto") -> Graph:

@@ -12,7 +12,7 @@ from ..systems.model import Model, as_system
 from ..systems.system import System
 from .coriolis import coriolis_matrix, require_quadratic
 from .equations_of_motion import bias, gravity_force
-from .formulations import ONE, ZERO
+from .formulations.formulations import ONE, ZERO
 from .torque_table import TorqueTable
 
 _ENERGIES = {"kinetic", "potential"}

@@ -14,7 +14,7 @@ from cgraph.extend import Array, Names, html_table, require_whole, topological
 
 from ..systems.display_names import display_names
 from ..systems.system import System
-from .evaluate_at import evaluate_at
+from .states.evaluate_at import evaluate_at
 
 STRUCTURAL_ZERO = "·"  # a cell that is zero by structure, at every state
 LONGEST_EXPRESSION = 40  # characters of a cell that is written out, with q0 for the coordinate's name

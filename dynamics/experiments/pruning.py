@@ -8,8 +8,8 @@ from typing import Any
 from cgraph import Graph
 
 from ..equations.equations_of_motion import forward_dynamics
-from ..equations.formulations import inverse_dynamics
-from ..multibody.pruning import EFFECTS, Equations, OmittedTerm, PruneResult, prune
+from ..equations.formulations.formulations import inverse_dynamics
+from ..multibody.changes.pruning import EFFECTS, Equations, OmittedTerm, PruneResult, prune
 from ..scenes.scenes import Scene
 
 EQUATIONS: dict[str, Equations] = {"inverse dynamics": inverse_dynamics, "forward dynamics": forward_dynamics}

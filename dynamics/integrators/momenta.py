@@ -18,8 +18,8 @@ from cgraph.extend import (
 )
 
 from ..equations.equations_of_motion import momentum
-from ..equations.hamiltonian import FORMS, hamilton_equations, missing_momenta, velocities
 from ..equations.singular_mass_matrix import SingularMassMatrixError
+from ..equations.state_equation import FORMS
 from ..systems.arguments import new_variables
 from ..systems.system import System
 from .problem import Problem, reaches
@@ -113,6 +113,8 @@ def momentum_form(problem: Problem) -> Problem:
     Raises ValueError for a first-order system; ConstraintError, SingularMassMatrixError and ValueError as
     `hamilton_equations`.
     """
+    from ..equations.momentum.hamiltonian import hamilton_equations, missing_momenta, velocities
+
     system = problem.system
     if system is None:
         raise ValueError('form="momentum" needs a Lagrangian, which a system of first order does not have')

@@ -10,9 +10,9 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import kept_by_first, memo, topological
 
-from ..equations.constraint_rank import independent_rows
+from ..equations.constraints.constraint_rank import independent_rows
+from ..equations.constraints.projection import projection
 from ..equations.energies import energy
-from ..equations.projection import projection
 from ..equations.state_equation import normalization, state_inputs, with_multipliers
 from ..equations.substitute import substitute
 from ..systems.arguments import TIME, Parameters, call_user_function

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 from cgraph.extend import require_flag
 
-from ..equations.constraint_rank import independent_rows
+from ..equations.constraints.constraint_rank import independent_rows
 from ..multibody.mechanism import Mechanism, MechanismError, MechanismWarning
 from ..systems.constraints import ConstraintError
 

@@ -12,8 +12,8 @@ import numpy as np
 
 from cgraph.extend import Array, install
 
+from ..multibody.builders.planar_arm import planar_links
 from ..multibody.mechanism import Mechanism, MechanismError, require_mechanism
-from ..multibody.planar_arm import planar_links
 from ..systems.model import Model
 from .write_mjcf import moving_alone, to_mjcf
 

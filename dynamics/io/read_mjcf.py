@@ -11,7 +11,7 @@ import numpy as np
 
 from cgraph.extend import Array
 
-from ..multibody import spatial
+from ..multibody.algebra import spatial
 from ..multibody.joints import TYPES
 from ..multibody.mechanism import WORLD, Body, Joint, Mechanism, MechanismError, MechanismWarning
 from .left_out import listed, present, refused_or_left_out

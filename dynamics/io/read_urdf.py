@@ -12,9 +12,9 @@ import numpy as np
 
 from cgraph.extend import Array, require_flag
 
-from ..multibody import spatial
+from ..multibody.algebra import spatial
 from ..multibody.body import moment_rounding
-from ..multibody.joint_force import JointForce, JointFriction
+from ..multibody.forces.joint_force import JointForce, JointFriction
 from ..multibody.joints import TYPES, SpatialJoint
 from ..multibody.loops import Loop
 from ..multibody.mechanism import WORLD, Body, Joint, Mechanism, MechanismError

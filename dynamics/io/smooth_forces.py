@@ -12,7 +12,7 @@ import numpy as np
 from cgraph.extend import Array, real_array, real_number, require_flag
 
 from ..multibody.body import Body, MechanismError
-from ..multibody.joint_force import Actuator, JointForce, JointFriction, JointLimit, Range
+from ..multibody.forces.joint_force import Actuator, JointForce, JointFriction, JointLimit, Range
 from .mujoco_twin import mujoco
 
 if TYPE_CHECKING:

@@ -9,9 +9,9 @@ import numpy as np
 
 from cgraph.extend import Array
 
+from ..multibody.algebra.spatial import SNAP
 from ..multibody.joints import AxialJoint
 from ..multibody.mechanism import WORLD, Body, MechanismError
-from ..multibody.spatial import SNAP
 
 SMALLEST = 1e-15  # kg, kg m^2: of a body that moves MuJoCo takes nothing below its mjMINVAL
 STAND_IN = math.nextafter(SMALLEST, 1.0)  # what nobody else writes

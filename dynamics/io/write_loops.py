@@ -7,7 +7,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from ..multibody import spatial
+from ..multibody.algebra import spatial
 from ..multibody.loops import Loop
 from ..multibody.mechanism import WORLD, Mechanism, MechanismError
 from .read_mimic import follows_itself

@@ -11,7 +11,7 @@ import numpy as np
 
 from cgraph.extend import Array, real_number
 
-from ..multibody import spatial
+from ..multibody.algebra import spatial
 from ..multibody.joints import AxialJoint
 from ..multibody.mechanism import WORLD, Body, Mechanism, MechanismError, require_mechanism
 from ..systems.model import Model

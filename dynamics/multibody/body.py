@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from cgraph import Node
 from cgraph.extend import Array, check_name, is_finite
 
-from . import spatial
+from .algebra import spatial
 from .errors import (
     MechanismError as MechanismError,  # noqa: PLC0414 (who needs a body imports them from here)
     MechanismWarning as MechanismWarning,  # noqa: PLC0414

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from cgraph.extend import Array, check_name, is_finite, require_mapping
 
-from . import spatial
+from .algebra import spatial
 from .body import (
     JOINT_QUANTITIES,
     ROUNDING,

@@ -6,15 +6,15 @@ from collections.abc import Callable, Mapping, Sequence
 
 from cgraph import Node
 
-from ..equations.nearly_redundant_rows import without_nearly_redundant
+from ..equations.constraints.nearly_redundant_rows import without_nearly_redundant
 from ..systems.constraints import Constraints, LoopRow
 from .body import Body, MechanismError
-from .forward_kinematics import KinematicChain
-from .inertial_numbers import Link
-from .kinematic_tree import Carrier
 from .loops import check_loop, coupling_row, loop_rows, slip_rows
 from .mechanism_fields import Structure
-from .relative_placement import relative_placements
+from .sweeps.forward_kinematics import KinematicChain
+from .sweeps.inertial_numbers import Link
+from .sweeps.kinematic_tree import Carrier
+from .sweeps.relative_placement import relative_placements
 
 
 def check_loops(structure: Structure) -> None:

@@ -12,14 +12,14 @@ import cgraph as cg
 from cgraph import Node
 from cgraph.extend import Array, Builder, building, check_name, is_finite
 
-from . import spatial
+from .algebra import spatial
+from .algebra.spatial import ZERO, Triple
 from .body import WORLD, Body, Joint, MechanismError, checked_rotation, vector
-from .forward_kinematics import KinematicChain
 from .joint_coordinates import places
 from .joints import COMPOSITIONS
-from .kinematic_tree import locked_at
-from .relative_placement import RelativePlacement
-from .spatial import ZERO, Triple
+from .sweeps.forward_kinematics import KinematicChain
+from .sweeps.kinematic_tree import locked_at
+from .sweeps.relative_placement import RelativePlacement
 
 ROWS = {
     "point": ("x", "y", "z"),

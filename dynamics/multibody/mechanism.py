@@ -19,13 +19,10 @@ from ..systems.model import Model
 from ..systems.system import System
 from .body import WORLD, Body, Joint, MechanismError, MechanismWarning, quantities, vector
 from .composed_joints import locked_parts, outer_names, require_parents
-from .external_force import Force, generalized_forces
-from .forward_kinematics import KinematicChain, kinematic_chain
-from .inertial_numbers import Link
+from .forces.external_force import Force, generalized_forces
+from .forces.joint_force import JointForce, add_joint_forces, check_any_force
 from .joint_coordinates import coordinate_names, lengths, per_velocity, quasi_velocities, velocity_names
-from .joint_force import JointForce, add_joint_forces, check_any_force
 from .joint_positions import skeleton
-from .kinematic_tree import Carrier, lock_joints, merge_fixed_bodies, parents_first, require_inertia, resists
 from .loop_equations import check_loops, of_loops, position_rows, velocity_rows
 from .loops import Loop
 from .mechanism_fields import Structure, changed, listed, summary
@@ -33,6 +30,9 @@ from .modification import attach_subtree, detach_subtree, lock_joint, map_state,
 from .parameter_values import bound_body, bound_force, require_values, used_names
 from .parameters import bound, entries, names_in, symbol
 from .subtree import Subtree
+from .sweeps.forward_kinematics import KinematicChain, kinematic_chain
+from .sweeps.inertial_numbers import Link
+from .sweeps.kinematic_tree import Carrier, lock_joints, merge_fixed_bodies, parents_first, require_inertia, resists
 from .tree_equations import TreeEquations
 
 __all__ = [

@@ -10,12 +10,12 @@ from typing import Any, TypeVar
 from numpy.typing import ArrayLike
 
 from .body import Body, MechanismError
-from .external_force import Force
-from .joint_force import JointForce
-from .link_cache import SharedParts
+from .forces.external_force import Force
+from .forces.joint_force import JointForce
 from .loops import Loop
 from .parameter_values import used_names
 from .parameters import Quantities, Quantity, entries, names_in
+from .sweeps.link_cache import SharedParts
 
 MOST = 6  # names that a repr shows of a kind
 

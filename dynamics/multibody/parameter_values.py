@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 from cgraph.extend import kept_by_first
 
 from .body import BODY_QUANTITIES, JOINT_QUANTITIES, Body, MechanismError, quantities
-from .external_force import Force
-from .joint_force import JointForce
+from .forces.external_force import Force
+from .forces.joint_force import JointForce
 from .parameters import Quantities, bound, entries, evaluated, names_in
 
 

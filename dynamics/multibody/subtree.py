@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 from numpy.typing import ArrayLike
 
 from .body import WORLD, Body, MechanismError
-from .external_force import Force
-from .joint_force import JointForce
+from .forces.external_force import Force
+from .forces.joint_force import JointForce
 from .loops import Loop
 
 

@@ -14,21 +14,21 @@ from cgraph.extend import Array, Builder, building, hessian_nodes
 
 from ..systems.system import BiasForce
 from ..systems.torque_derivatives import MotionState, TorqueDerivatives
-from . import newton_euler, spatial
-from .base_parameters import base_parameter_links
+from .algebra import spatial
+from .algebra.spatial import ZERO
 from .body import WORLD, Body, quantities
-from .body_motion import Motion, ground
-from .composite_inertia import without_axial_moments
-from .composite_momentum import COMPOSITE, CompositeMomentum, about_parent, body_momentum, momentum_rates, stated
-from .equation_links import equation_links
-from .inertial_numbers import Link
-from .inverse_dynamics_columns import torque_derivatives
 from .joint_coordinates import parts, places
 from .joints import AxialJoint, JointType, moving_type
-from .link_cache import Moved
-from .mass_matrix_columns import Carried, mass_matrix_columns, size_of
 from .mechanism_fields import Structure
-from .spatial import ZERO
+from .sweeps import newton_euler
+from .sweeps.base_parameters import base_parameter_links
+from .sweeps.body_motion import Motion, ground
+from .sweeps.composite_inertia import without_axial_moments
+from .sweeps.composite_momentum import COMPOSITE, CompositeMomentum, about_parent, body_momentum, momentum_rates, stated
+from .sweeps.equation_links import equation_links
+from .sweeps.inertial_numbers import Link
+from .sweeps.link_cache import Moved
+from .sweeps.mass_matrix_columns import Carried, mass_matrix_columns, size_of
 
 WORTH = 0.9  # of the nodes of a mass matrix from the Lagrangian, at most, for one by composite inertias
 
@@ -196,6 +196,8 @@ class TreeEquations:
         """Of all bodies, with their springs."""
         if not self._turning:
             return None
+        from .sweeps.inverse_dynamics_columns import torque_derivatives
+
         with building(build):
             up = newton_euler.base_acceleration(self.ground).linear
             return torque_derivatives(self.bodies, self._links[0], self.parents, up, state, build)

@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 from cgraph import Node
 from cgraph.extend import require_choice, require_path
 
-from ..equations.initial_value import initial_value, times_to_record
 from ..equations.state_equation import state_equation, state_inputs
+from ..equations.states.initial_value import initial_value, times_to_record
 from ..systems.controller import with_closed_form
 from ..systems.model import Model, as_equations
 from .collocation import collocation

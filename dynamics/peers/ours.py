@@ -13,11 +13,11 @@ from cgraph import Compiled, Graph, Node
 from cgraph.extend import Array, Call, Program, kept_by_first, runner
 
 from ..equations.equations_of_motion import forward_dynamics
-from ..equations.formulations import inverse_dynamics
-from ..equations.inverse_dynamics_derivatives import inverse_dynamics_derivatives
-from ..equations.linearization import state_space
-from ..equations.linearization_parts import LinearizationParts, linearization_parts
-from ..equations.linearize_many import WRITTEN_OUT, linearization_program, linearize_many
+from ..equations.formulations.formulations import inverse_dynamics
+from ..equations.linearization.inverse_dynamics_derivatives import inverse_dynamics_derivatives
+from ..equations.linearization.linearization import state_space
+from ..equations.linearization.linearization_parts import LinearizationParts, linearization_parts
+from ..equations.linearization.linearize_many import WRITTEN_OUT, linearization_program, linearize_many
 from ..equations.state_equation import state_equation
 from ..multibody.body import Body
 from ..multibody.mechanism import Mechanism, as_mechanism

@@ -11,9 +11,9 @@ import numpy as np
 from cgraph import Graph
 from cgraph.extend import or_nearest, real_array, real_number
 
-from ..equations.consistent_state import nearest_state
 from ..equations.state_equation import state_equation
-from ..multibody.display_units import display_units
+from ..equations.states.consistent_state import nearest_state
+from ..multibody.quantities.display_units import display_units
 from .scenes import Scene
 
 Known = TypeVar("Known", bound=Scene)

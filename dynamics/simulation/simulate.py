@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from cgraph import Graph
 from cgraph.extend import Array, require_flag
 
-from ..equations.initial_value import initial_value
+from ..equations.states.initial_value import initial_value
 from ..integrators import Problem, derive, force, in_form, total_energy
 from ..systems.model import Model
 from .applied_forces import Applied, Tau, with_applied

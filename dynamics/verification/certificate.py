@@ -17,9 +17,9 @@ from cgraph.extend import Array, Builder, cotangents, real_number, require_whole
 from ..equations.coriolis import coriolis, require_quadratic
 from ..equations.energies import energy
 from ..equations.equations_of_motion import bias, forward_dynamics, gravity_force, mass_matrix
-from ..equations.evaluate_at import evaluate_at
-from ..equations.formulations import ONE, ZERO, inverse_dynamics
+from ..equations.formulations.formulations import ONE, ZERO, inverse_dynamics
 from ..equations.inertia_rank import balanced
+from ..equations.states.evaluate_at import evaluate_at
 from ..equations.torque_decomposition import torque_by_joint_motion, torque_by_link
 from ..equations.torque_table import TorqueTable
 from ..systems.model import Model, as_system

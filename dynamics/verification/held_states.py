@@ -11,8 +11,8 @@ import cgraph as cg
 from cgraph import Graph
 from cgraph.extend import Array, Builder, cotangents, tangents
 
-from ..equations.consistent_state import nearest_state
-from ..equations.formulations import ONE, ZERO
+from ..equations.formulations.formulations import ONE, ZERO
+from ..equations.states.consistent_state import nearest_state
 from ..systems.constraints import ConstraintError
 from ..systems.system import System
 from .residual import ROUNDING, Residual, worst

@@ -14,8 +14,8 @@ import numpy as np
 from cgraph.extend import Array
 
 from ..equations.equations_of_motion import forward_dynamics
-from ..equations.evaluate_at import evaluate_at
-from ..equations.formulations import inverse_dynamics
+from ..equations.formulations.formulations import inverse_dynamics
+from ..equations.states.evaluate_at import evaluate_at
 from ..io.load import compiled
 from ..io.mujoco_twin import joint_order, mujoco
 from ..multibody.body import Body, MechanismError

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 import dynamics as dyn
+from dynamics.multibody.algebra.spatial import rotation
 from dynamics.multibody.joint_coordinates import places
 from dynamics.multibody.mechanism import WORLD, Body, Joint, Mechanism
-from dynamics.multibody.spatial import rotation
 from tests.slow import slow
 
 Array = np.ndarray[Any, np.dtype[np.float64]]

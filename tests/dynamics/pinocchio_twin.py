@@ -6,8 +6,8 @@ import numpy as np
 import pinocchio
 
 import dynamics as dyn
+from dynamics.multibody.builders.planar_arm import planar_links
 from dynamics.multibody.mechanism import WORLD
-from dynamics.multibody.planar_arm import planar_links
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

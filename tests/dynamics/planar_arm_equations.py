@@ -17,8 +17,8 @@ from typing import NamedTuple
 import numpy as np
 
 from cgraph.extend import Array
+from dynamics.multibody.builders.planar_arm import planar_links
 from dynamics.multibody.mechanism import Mechanism
-from dynamics.multibody.planar_arm import planar_links
 from dynamics.multiprecision.chain_equations import Pair
 from dynamics.multiprecision.flint_numbers import Number, flint, working
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 import dynamics as dyn
-from dynamics.multibody.spatial import from_quaternion
+from dynamics.multibody.algebra.spatial import from_quaternion
 from tests.dynamics.linkages import ACROSS, bar
 from tests.dynamics.models import Array
 

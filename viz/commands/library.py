@@ -7,7 +7,8 @@ from cgraph.extend import doors
 TYPE_CHECKING = False
 
 if TYPE_CHECKING:
-    from dynamics.equations.both_forms import (
+    from dynamics.equations.formulations.node_classes import form_classes, formulation_classes
+    from dynamics.equations.momentum.both_forms import (
         HAMILTON,
         LAGRANGE,
         VELOCITIES_ALONE,
@@ -15,7 +16,6 @@ if TYPE_CHECKING:
         form_agreement,
         form_sizes,
     )
-    from dynamics.equations.node_classes import form_classes, formulation_classes
     from dynamics.experiments import pruning
     from dynamics.experiments.machine import machine
     from dynamics.experiments.speed import bench as speed

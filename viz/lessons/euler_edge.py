@@ -6,7 +6,7 @@ import numpy as np
 
 from cgraph import Graph
 from dynamics import Verdict, formulation_sizes, formulation_verdict, inverse_dynamics
-from dynamics.equations.formulation_sizes import INERTIAL_TERM, blamed
+from dynamics.equations.formulations.formulation_sizes import INERTIAL_TERM, blamed
 
 from .. import theme
 from ..graph_drawing.dark import to_adaptive

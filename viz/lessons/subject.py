@@ -13,7 +13,7 @@ import cgraph as cg
 from cgraph import Graph
 from cgraph.extend import Array
 from dynamics import display_names
-from dynamics.equations.consistent_state import nearest_state
+from dynamics.equations.states.consistent_state import nearest_state
 from dynamics.scenes.scenes import Scene, of_model
 from dynamics.scenes.start import moving_start
 from dynamics.systems.model import Model

@@ -10,7 +10,7 @@ import numpy as np
 import cgraph as cg
 from cgraph import Node
 from cgraph.extend import Array, real_array, real_number
-from dynamics.equations.formulations import inverse_dynamics
+from dynamics.equations.formulations.formulations import inverse_dynamics
 from dynamics.scenes import of_model
 from dynamics.simulation.simulate import simulate
 from dynamics.simulation.trajectory import Trajectory

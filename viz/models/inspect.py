@@ -6,7 +6,7 @@ import os
 
 from cgraph.extend import require_flag, write_files
 from dynamics import FORMULATIONS, display_names, scenes
-from dynamics.equations.both_forms import HAMILTON
+from dynamics.equations.momentum.both_forms import HAMILTON
 from dynamics.scenes.start import Start, moving_start, rest_text, with_start
 from dynamics.systems.model import Model
 

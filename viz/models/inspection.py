@@ -10,12 +10,9 @@ import numpy as np
 import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import PRIMAL, TANGENT, Array, real_number, topological
-from dynamics.equations.both_forms import HAMILTON, LAGRANGE, VELOCITIES_ALONE, both_forms, form_sizes
 from dynamics.equations.equations_of_motion import forward_dynamics
-from dynamics.equations.formulations import inverse_dynamics
-from dynamics.equations.hamiltonian import velocities
-from dynamics.equations.legendre import is_quadratic
-from dynamics.equations.node_classes import (
+from dynamics.equations.formulations.formulations import inverse_dynamics
+from dynamics.equations.formulations.node_classes import (
     ACCELERATIONS,
     BIAS,
     DAMPING,
@@ -25,11 +22,14 @@ from dynamics.equations.node_classes import (
     VELOCITIES,
     form_classes,
 )
+from dynamics.equations.formulations.verdict import formulation_verdict
+from dynamics.equations.momentum.both_forms import HAMILTON, LAGRANGE, VELOCITIES_ALONE, both_forms, form_sizes
+from dynamics.equations.momentum.hamiltonian import velocities
+from dynamics.equations.momentum.legendre import is_quadratic
 from dynamics.equations.state_equation import state_equation
 from dynamics.equations.torque_decomposition import torque_by_link
-from dynamics.equations.verdict import formulation_verdict
-from dynamics.multibody.display_units import display_units
 from dynamics.multibody.joint_positions import skeleton
+from dynamics.multibody.quantities.display_units import display_units
 from dynamics.scenes import Scene
 from dynamics.simulation.simulate import simulate
 from dynamics.simulation.trajectory import Trajectory

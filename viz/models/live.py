@@ -16,13 +16,13 @@ from cgraph.extend import write_files
 from dynamics import scenes
 from dynamics.equations.energies import kinetic_energy, potential_energy
 from dynamics.equations.equations_of_motion import gravity_force, momentum
-from dynamics.equations.formulations import momentum_rate
-from dynamics.equations.hamiltonian import hamilton_equations, velocities
+from dynamics.equations.formulations.formulations import momentum_rate
+from dynamics.equations.momentum.hamiltonian import hamilton_equations, velocities
 from dynamics.equations.state_equation import state_equation, state_inputs
 from dynamics.integrators import TABLEAUS
-from dynamics.multibody.display_units import display_units
 from dynamics.multibody.joint_positions import drawn_points, view
 from dynamics.multibody.mechanism import Mechanism
+from dynamics.multibody.quantities.display_units import display_units
 from dynamics.scenes import Scene
 from dynamics.scenes.start import Start, moving_start, with_start
 from dynamics.simulation.simulate import simulate

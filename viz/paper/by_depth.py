@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from cgraph import Counts, Graph
 from dynamics import hamilton_equations, scenes, state_equation
-from dynamics.equations.both_forms import HAMILTON, LAGRANGE, VELOCITIES_ALONE, both_forms, form_sizes
+from dynamics.equations.momentum.both_forms import HAMILTON, LAGRANGE, VELOCITIES_ALONE, both_forms, form_sizes
 from dynamics.experiments.speed.bench_scenes import SCENES, chain
 from dynamics.experiments.text_table import csv_text
 

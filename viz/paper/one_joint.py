@@ -5,8 +5,8 @@ from __future__ import annotations
 from cgraph import Graph
 from cgraph.extend import format_polynomial
 from dynamics import formulation_sizes, scenes
-from dynamics.equations.blame import Blame
-from dynamics.equations.formulation_sizes import INERTIAL_TERM, blamed, formulation_size
+from dynamics.equations.formulations.blame import Blame
+from dynamics.equations.formulations.formulation_sizes import INERTIAL_TERM, blamed, formulation_size
 from dynamics.experiments.paper_numbers.equation3 import PAPER, equation3, torque_terms
 from dynamics.experiments.text_table import csv_text
 

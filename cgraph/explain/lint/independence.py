@@ -11,7 +11,7 @@ from ...core.forward import tangents
 from ...core.graph import Edge, Graph
 from ...core.label import ADJOINT
 from ...core.node import Node, constant
-from ...util.counted import counted
+from ...util.words import counted
 from ...writing.networkx_queries import minimum_cut
 from ...writing.source_lines import lines_text
 from ..names import Name, Names, joined

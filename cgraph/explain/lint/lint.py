@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 from ...core.graph import Edge, Graph
 from ...core.node import Node
-from ...util.counted import counted
 from ...util.html_text import html_table, html_text
 from ...util.require import require_graph, require_mapping, require_sequence
+from ...util.words import counted
 from ..edge_partials import Point
 from ..names import Name, Names
 from .cancellation import cancellations, rounded

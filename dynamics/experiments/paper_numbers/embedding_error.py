@@ -10,8 +10,8 @@ import numpy as np
 import cgraph as cg
 from cgraph.extend import Array
 
-from ...equations.formulations import inverse_dynamics
-from ...multibody.planar_arm import planar_arm
+from ...equations.formulations.formulations import inverse_dynamics
+from ...multibody.builders.planar_arm import planar_arm
 from ...systems.model import Model, as_system
 from .fit import exponent
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from cgraph import Graph
 from cgraph.extend import Polynomial, expand, format_polynomial
 
-from ...equations.formulations import inverse_dynamics, momentum_rate
+from ...equations.formulations.formulations import inverse_dynamics, momentum_rate
 from ...scenes.scenes import spring_mass
 
 # The paper's right-hand side, I qdd - k (qdd dt^2 + 2 qd dt + q_old), as coefficients.

@@ -10,8 +10,8 @@ import numpy as np
 
 import cgraph as cg
 
-from ...equations.formulations import inverse_dynamics
-from ...multibody.planar_arm import planar_arm
+from ...equations.formulations.formulations import inverse_dynamics
+from ...multibody.builders.planar_arm import planar_arm
 from .fit import exponent
 
 COUNTS = (1, 2, 3, 4, 6, 8, 10, 14, 20, 28, 40)

@@ -11,7 +11,7 @@ import numpy as np
 import cgraph as cg
 from cgraph import Counts
 
-from ...equations.formulations import inverse_dynamics
+from ...equations.formulations.formulations import inverse_dynamics
 from ...peers.torch import eager_evaluations
 from ...scenes.scenes import triple_pendulum
 

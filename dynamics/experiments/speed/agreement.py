@@ -9,9 +9,9 @@ import numpy as np
 import cgraph as cg
 
 from ...equations.equations_of_motion import bias, forward_dynamics, mass_matrix
-from ...equations.formulations import inverse_dynamics
+from ...equations.formulations.formulations import inverse_dynamics
+from ...multibody.builders.planar_arm import planar_arm
 from ...multibody.mechanism import Mechanism
-from ...multibody.planar_arm import planar_arm
 from ...peers.case import Case
 from ...peers.mujoco import MujocoPeer
 from ...peers.pinocchio import PinocchioPeer

@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 
 from ... import scenes
+from ...multibody.algebra.spatial import rotation
 from ...multibody.body import WORLD, Body, Joint
+from ...multibody.builders.planar_arm import planar_arm
 from ...multibody.mechanism import Mechanism
-from ...multibody.planar_arm import planar_arm
-from ...multibody.spatial import rotation
 from ...scenes import Scene
 
 

@@ -10,13 +10,13 @@ import numpy as np
 import cgraph as cg
 from cgraph.extend import Array
 
-from ...equations.consistent_state import nearest_state
 from ...equations.equations_of_motion import forward_dynamics
+from ...equations.states.consistent_state import nearest_state
 from ...io.mujoco_twin import mujoco
 from ...io.write_mjcf import to_mjcf
+from ...multibody.builders.planar_arm import planar_arm
 from ...multibody.loops import Loop
 from ...multibody.mechanism import Mechanism
-from ...multibody.planar_arm import planar_arm
 from ...peers.contender import Contender
 from ...peers.pinocchio_loops import constraint_dynamics
 from ..text_table import table

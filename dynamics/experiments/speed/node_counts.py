@@ -15,8 +15,8 @@ from cgraph import Graph, Node
 
 from ...equations.accelerations import accelerations
 from ...equations.equations_of_motion import forward_dynamics
+from ...multibody.builders.planar_arm import planar_links
 from ...multibody.mechanism import Mechanism
-from ...multibody.planar_arm import planar_links
 from ...systems.system import System
 from ..paper_numbers.fit import exponent
 from ..text_table import table

@@ -18,13 +18,13 @@ import numpy as np
 import cgraph as cg
 from cgraph.extend import Array
 
-from ...equations.formulations import inverse_dynamics
+from ...equations.formulations.formulations import inverse_dynamics
 from ...io.mujoco_twin import mujoco
 from ...io.write_mjcf import to_mjcf
+from ...multibody.algebra.spatial import rotation
 from ...multibody.body import Body, Joint
 from ...multibody.mechanism import Mechanism
-from ...multibody.recursive_inverse_dynamics import RecursiveInverseDynamics
-from ...multibody.spatial import rotation
+from ...multibody.quantities.recursive_inverse_dynamics import RecursiveInverseDynamics
 from ..text_table import table
 from .bench_scenes import turned_arm
 

@@ -14,9 +14,9 @@ import cgraph as cg
 from cgraph.extend import Array, ldl_elimination
 
 from ...equations.equations_of_motion import bias, forward_dynamics, mass_matrix
-from ...equations.linearize_many import linearize_many
+from ...equations.linearization.linearize_many import linearize_many
+from ...multibody.builders.planar_arm import planar_arm
 from ...multibody.mechanism import Mechanism
-from ...multibody.planar_arm import planar_arm
 from ...multiprecision.chain_equations import accelerations
 from ...systems.model import as_system
 from ..fresh_process import run_fresh

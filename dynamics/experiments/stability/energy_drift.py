@@ -10,7 +10,7 @@ import numpy as np
 
 from cgraph.extend import Array
 
-from ...multibody.planar_arm import planar_arm
+from ...multibody.builders.planar_arm import planar_arm
 from ...scenes import Scene
 from ...simulation.simulate import simulate
 from .case_result import CaseResult, Measurement

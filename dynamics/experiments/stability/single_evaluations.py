@@ -25,9 +25,9 @@ from cgraph import Compiled, Graph, Node
 from cgraph.extend import Array
 
 from ...equations.equations_of_motion import forward_dynamics
-from ...equations.formulations import inverse_dynamics
+from ...equations.formulations.formulations import inverse_dynamics
+from ...multibody.builders.planar_arm import planar_arm, planar_links
 from ...multibody.mechanism import Mechanism
-from ...multibody.planar_arm import planar_arm, planar_links
 from ...multiprecision.chain_equations import Pair, accelerations, torques
 from ...systems.system import System
 from .case_result import CaseResult, Measurement

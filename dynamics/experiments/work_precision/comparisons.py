@@ -18,7 +18,7 @@ from cgraph.extend import Array
 
 from ...equations.energies import energy as energy_graph
 from ...integrators import METHODS, Problem
-from ...multibody.planar_arm import planar_arm
+from ...multibody.builders.planar_arm import planar_arm
 from ...peers import UnavailableError
 from ...simulation.simulate import simulate
 from ...simulation.steps.scipy_solvers import solve_ivp

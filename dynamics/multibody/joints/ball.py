@@ -9,8 +9,8 @@ import numpy as np
 from cgraph import Node
 from cgraph.extend import Array
 
-from .. import spatial
-from ..spatial import STILL, Triple
+from ..algebra import spatial
+from ..algebra.spatial import STILL, Triple
 from . import quaternion
 from .joint_type import NodeMatrix, SpatialJoint
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from cgraph import Node
 
-from .. import spatial
-from ..spatial import Triple, cross
+from ..algebra import spatial
+from ..algebra.spatial import Triple, cross
 from . import quaternion
 from .free import Free
 

@@ -11,7 +11,7 @@ import cgraph as cg
 from cgraph import Node
 from cgraph.extend import Array, tangents, topological
 
-from ..spatial import STILL, ZERO, Triple, cross, plus
+from ..algebra.spatial import STILL, ZERO, Triple, cross, plus
 
 NodeMatrix = Sequence[Sequence[Node]]  # (3, 3), rows
 ONE = cg.constant(1.0)

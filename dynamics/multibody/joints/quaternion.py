@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import cgraph as cg
 from cgraph import Node
 
-from ..spatial import Triple, cross
+from ..algebra.spatial import Triple, cross
 from .joint_type import NodeMatrix
 
 NAMES = ("qw", "qx", "qy", "qz")

@@ -9,7 +9,7 @@ import numpy as np
 from cgraph import Node
 from cgraph.extend import Array
 
-from .. import spatial
+from ..algebra import spatial
 from .joint_type import AxialJoint, JointType
 
 

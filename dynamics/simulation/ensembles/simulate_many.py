@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from cgraph import Node
 from cgraph.extend import Array, require_whole
 
-from ...equations.initial_value import initial_values
+from ...equations.states.initial_value import initial_values
 from ...integrators import METHODS, Problem, derive, in_form
 from ...systems.model import Model
 from ..applied_forces import with_applied

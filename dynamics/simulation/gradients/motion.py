@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 from cgraph import Node
 from cgraph.extend import Array, memo, real_array, require_sequence
 
-from ...equations.initial_value import initial_values
 from ...equations.state_equation import state_inputs
+from ...equations.states.initial_value import initial_values
 from ...integrators import METHODS, Method, Problem, derive, in_form
 from ...systems.model import Model
 from ..applied_forces import with_applied

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 import cgraph as cg
 import dynamics as dyn
 from cgraph import compare
-from dynamics.equations.node_classes import formulation_classes
+from dynamics.equations.formulations.node_classes import formulation_classes
 from tests.strategies import Case, cases, examples
 
 x, y, z = cg.variables("x y z")

@@ -11,7 +11,7 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.equations.constraint_rank import independent_rows
+from dynamics.equations.constraints.constraint_rank import independent_rows
 from tests.dynamics.models import Array
 from tests.slow import slow
 

@@ -9,8 +9,8 @@ from pytest import approx
 import cgraph as cg
 import dynamics as dyn
 from dynamics.equations.coriolis import coriolis, damping_force
-from dynamics.equations.evaluate_at import evaluate_at
-from dynamics.multibody.planar_arm import planar_links
+from dynamics.equations.states.evaluate_at import evaluate_at
+from dynamics.multibody.builders.planar_arm import planar_links
 from dynamics.systems.model import as_system
 from tests.dynamics.mechanisms import EVERY_FAMILY, FAMILIES
 from tests.dynamics.models import MODELS, Array, magnetic, random_arm, relativistic, states

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import dynamics as dyn
-from dynamics.equations.evaluate_at import evaluate_at
+from dynamics.equations.states.evaluate_at import evaluate_at
 
 
 def slider() -> dyn.System:

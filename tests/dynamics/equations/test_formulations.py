@@ -7,7 +7,7 @@ from pytest import approx, mark
 import cgraph as cg
 import dynamics as dyn
 from cgraph.core.traversal import rebuild
-from dynamics.equations.formulations import INERTIAL
+from dynamics.equations.formulations.formulations import INERTIAL
 from tests import high_precision
 from tests.dynamics.models import MODELS, at, before, error, named, random_arm, run, states
 from tests.formulations import SEEN, SMALL, WRONG

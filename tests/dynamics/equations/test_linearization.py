@@ -7,10 +7,10 @@ import pytest
 from pytest import approx
 
 import dynamics as dyn
-from dynamics.equations import linearize_many as many
-from dynamics.equations.evaluate_at import evaluate_at
-from dynamics.equations.linearization import linearize, state_space
-from dynamics.equations.linearization_parts import linearization_parts
+from dynamics.equations.linearization import linearize_many as many
+from dynamics.equations.linearization.linearization import linearize, state_space
+from dynamics.equations.linearization.linearization_parts import linearization_parts
+from dynamics.equations.states.evaluate_at import evaluate_at
 from dynamics.peers.translate import translated
 from dynamics.systems.model import as_system
 from tests.dynamics.mechanisms import FAMILIES, random_mechanism, turned_arm

@@ -7,7 +7,7 @@ from pytest import approx, fixture, mark
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.multibody.planar_arm import planar_links
+from dynamics.multibody.builders.planar_arm import planar_links
 from dynamics.systems.model import as_system
 from dynamics.systems.system import System
 from tests import high_precision

@@ -11,8 +11,8 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.equations.consistent_state import nearest_state
-from dynamics.equations.evaluate_at import Array, evaluate_at
+from dynamics.equations.states.consistent_state import nearest_state
+from dynamics.equations.states.evaluate_at import Array, evaluate_at
 from tests.dynamics.linkages import four_bar, scaled_four_bar
 from tests.dynamics.mechanisms import random_body
 from tests.slow import slow

@@ -8,7 +8,7 @@ from pytest import approx, mark
 import cgraph as cg
 import dynamics as dyn
 from cgraph.core.traversal import rebuild
-from dynamics.equations.node_classes import formulation_classes
+from dynamics.equations.formulations.node_classes import formulation_classes
 from tests.formulations import WRONG
 
 ROUNDING = 1e-12  # a few dozen operations on numbers of order one

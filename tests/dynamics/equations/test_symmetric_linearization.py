@@ -11,9 +11,9 @@ import pytest
 import cgraph as cg
 import dynamics as dyn
 from cgraph.extend import Array, Builder, cotangents
-from dynamics.equations import linearize_many as many
-from dynamics.equations.hamiltonian import velocities
-from dynamics.equations.symmetric_linearization import SymmetricParts
+from dynamics.equations.linearization import linearize_many as many
+from dynamics.equations.linearization.symmetric_linearization import SymmetricParts
+from dynamics.equations.momentum.hamiltonian import velocities
 from dynamics.systems.model import as_system
 from tests.slow import slow
 

@@ -9,10 +9,10 @@ import pytest
 from pytest import approx
 
 import dynamics as dyn
-from dynamics.equations.evaluate_at import evaluate_at
+from dynamics.equations.states.evaluate_at import evaluate_at
 from dynamics.equations.torque_decomposition import torque_by_joint_motion, torque_by_link
 from dynamics.equations.torque_table import TorqueTable
-from dynamics.multibody.planar_arm import planar_links
+from dynamics.multibody.builders.planar_arm import planar_links
 from dynamics.systems.model import as_system
 from tests.dynamics.mechanisms import FAMILIES, PLAIN, turned_tree
 from tests.dynamics.models import MODELS, Array, at, random_arm, states

@@ -12,8 +12,8 @@ from pytest import mark
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.equations.blame import blame
-from dynamics.equations.formulations import THROUGH_STEP, torques
+from dynamics.equations.formulations.blame import blame
+from dynamics.equations.formulations.formulations import THROUGH_STEP, torques
 from tests import high_precision
 from tests.slow import slow
 from viz import cli

@@ -12,7 +12,7 @@ import pytest
 import cgraph as cg
 import dynamics as dyn
 from cgraph.extend import ldl_elimination
-from dynamics.equations import linearize_many
+from dynamics.equations.linearization import linearize_many
 from dynamics.experiments.machine import machine
 from dynamics.experiments.speed import bench as module
 from dynamics.experiments.speed.bench import MODES, PEERS, TASKS, Cell, Row, WorkerPool, bench

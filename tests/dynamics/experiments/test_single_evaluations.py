@@ -10,7 +10,7 @@ from pytest import approx, importorskip, mark, param
 import cgraph as cg
 import dynamics as dyn
 from dynamics.experiments.stability import huge_angles, single_evaluations
-from dynamics.multibody.planar_arm import arm_of_links, planar_links
+from dynamics.multibody.builders.planar_arm import arm_of_links, planar_links
 from tests.dynamics.lagrange_by_mpmath import floats, lagrange
 from tests.dynamics.models import Array
 

@@ -16,8 +16,8 @@ import numpy as np
 import cgraph as cg
 from cgraph import Graph
 from cgraph.extend import Array
-from dynamics.equations.hamiltonian import hamilton_equations, velocities
-from dynamics.equations.linearization import state_space
+from dynamics.equations.linearization.linearization import state_space
+from dynamics.equations.momentum.hamiltonian import hamilton_equations, velocities
 from dynamics.equations.state_equation import state_equation
 from dynamics.experiments.speed.bench_scenes import SCENES, chain
 from dynamics.experiments.text_table import digits, table

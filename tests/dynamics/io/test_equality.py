@@ -9,7 +9,7 @@ from pytest import approx, importorskip, mark, param, raises, warns
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.equations.consistent_state import nearest_state
+from dynamics.equations.states.consistent_state import nearest_state
 from dynamics.multibody.mechanism import Mechanism, MechanismError
 from tests.slow import slow
 

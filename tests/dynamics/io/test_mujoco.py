@@ -8,7 +8,7 @@ from pytest import approx, fixture, mark, param, warns
 import cgraph as cg
 import dynamics as dyn
 from dynamics.io.mujoco_twin import MujocoTwin, mujoco, to_mjcf
-from dynamics.multibody.planar_arm import planar_links
+from dynamics.multibody.builders.planar_arm import planar_links
 from tests.dynamics.models import Array, at, error, random_arm, states
 
 STATES = 100

@@ -13,8 +13,8 @@ import cgraph as cg
 import dynamics as dyn
 from dynamics.io.load import compiled
 from dynamics.io.read_urdf import from_rpy
+from dynamics.multibody.algebra.spatial import rotation
 from dynamics.multibody.mechanism import Body, Joint, Mechanism, MechanismError
-from dynamics.multibody.spatial import rotation
 from tests.dynamics.mechanisms import random_inertia
 from tests.dynamics.models import error
 from tests.tolerances import EQUATIONS, LAST_BITS

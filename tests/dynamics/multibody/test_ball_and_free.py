@@ -11,8 +11,8 @@ from pytest import approx, importorskip, mark, param, raises
 
 import dynamics as dyn
 from cgraph import Graph
+from dynamics.multibody.algebra.spatial import from_quaternion
 from dynamics.multibody.joint_coordinates import per_velocity
-from dynamics.multibody.spatial import from_quaternion
 from dynamics.peers import PEERS
 from dynamics.peers.case import Case
 from dynamics.peers.pinocchio_model import PinocchioModel
@@ -230,7 +230,7 @@ def test_three_hinges_are_a_ball_away_from_their_lock() -> None:
     moved = serial.motion("h2").evaluate({k: x for k, x in at.items() if k[0] == "q" and "qdd" not in k})
     turn = np.array([[moved[f"R_{i}_{j}"] for j in range(3)] for i in range(3)])
     omega = turn.T @ [moved[name] for name in ("wx", "wy", "wz")]
-    from dynamics.multibody.spatial import to_quaternion
+    from dynamics.multibody.algebra.spatial import to_quaternion
 
     start = {f"q{i}": float(x) for i, x in enumerate(to_quaternion(turn))}
     start |= {f"qd{i}": float(x) for i, x in enumerate(omega)} | {f"tau{i}": 0.0 for i in range(3)}

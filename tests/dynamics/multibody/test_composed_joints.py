@@ -12,7 +12,7 @@ from pytest import importorskip, mark, raises
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.multibody.spatial import rotation, unit
+from dynamics.multibody.algebra.spatial import rotation, unit
 from tests.dynamics.mechanisms import random_body, random_mechanism
 from tests.dynamics.models import Array, error, run, states
 from tests.slow import slow

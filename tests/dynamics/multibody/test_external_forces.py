@@ -13,7 +13,7 @@ from pytest import approx, mark, raises
 import cgraph as cg
 import dynamics as dyn
 from dynamics import Body, Force, Joint, Mechanism, MechanismError
-from dynamics.multibody.spatial import from_quaternion
+from dynamics.multibody.algebra.spatial import from_quaternion
 from tests.dynamics.mechanisms import FAMILIES, turned_arm
 from tests.dynamics.models import Array, at, error, inputs, run, states
 from tests.slow import slow

@@ -12,9 +12,9 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.equations.consistent_state import nearest_state
-from dynamics.equations.constraint_rank import independent_rows
-from dynamics.multibody.spatial import rotation
+from dynamics.equations.constraints.constraint_rank import independent_rows
+from dynamics.equations.states.consistent_state import nearest_state
+from dynamics.multibody.algebra.spatial import rotation
 from tests.slow import slow
 
 from ..linkages import ACROSS, bar, four_bar, peaucellier, scaled_four_bar, squeezer, stewart_platform

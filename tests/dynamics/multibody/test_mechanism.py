@@ -16,8 +16,8 @@ from pytest import approx, mark, param, raises, warns
 import cgraph as cg
 import dynamics as dyn
 from dynamics.io.mujoco_twin import MujocoTwin
+from dynamics.multibody.algebra.spatial import from_quaternion, rotation, to_quaternion
 from dynamics.multibody.mechanism import Body, Joint, Mechanism, MechanismError
-from dynamics.multibody.spatial import from_quaternion, rotation, to_quaternion
 from tests.dynamics.mechanisms import (
     EVERY_FAMILY,
     FAMILIES,

@@ -13,9 +13,9 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.equations.consistent_state import nearest_state
+from dynamics.equations.states.consistent_state import nearest_state
 from dynamics.io.mujoco_twin import joint_order
-from dynamics.multibody.spatial import from_quaternion
+from dynamics.multibody.algebra.spatial import from_quaternion
 from tests.dynamics.linkage_by_numpy import energies, openness
 from tests.dynamics.linkages import bar, four_bar
 from tests.dynamics.models import Array

@@ -8,7 +8,7 @@ from mpmath import mp, mpf
 from pytest import approx, mark
 
 import dynamics as dyn
-from dynamics.multibody.planar_arm import planar_links
+from dynamics.multibody.builders.planar_arm import planar_links
 from dynamics.systems.model import as_system
 from tests.dynamics.models import at, random_arm, run, states
 from tests.tolerances import LAST_BITS

@@ -12,8 +12,8 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.equations.consistent_state import nearest_state
-from dynamics.equations.evaluate_at import Array
+from dynamics.equations.states.consistent_state import nearest_state
+from dynamics.equations.states.evaluate_at import Array
 
 from ..linkages import bar, four_bar
 

@@ -7,8 +7,8 @@ import pytest
 from pytest import approx
 
 import dynamics as dyn
-from dynamics.equations.evaluate_at import evaluate_at
-from dynamics.multibody.regressor import inertial_parameters, regressor
+from dynamics.equations.states.evaluate_at import evaluate_at
+from dynamics.multibody.quantities.regressor import inertial_parameters, regressor
 from tests.dynamics.mechanisms import EVERY_FAMILY, FAMILIES, turned_arm
 from tests.dynamics.models import Array, at, states
 

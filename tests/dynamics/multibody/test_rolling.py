@@ -10,7 +10,7 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.equations.consistent_state import nearest_state
+from dynamics.equations.states.consistent_state import nearest_state
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 DOWN = (0.0, 0.0, 9.81)  # z is down

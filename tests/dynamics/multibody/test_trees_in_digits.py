@@ -9,8 +9,8 @@ import pytest
 
 import dynamics as dyn
 from cgraph import Graph
-from dynamics.multibody.equation_links import equation_links
-from dynamics.multibody.spatial import rotation
+from dynamics.multibody.algebra.spatial import rotation
+from dynamics.multibody.sweeps.equation_links import equation_links
 from tests.dynamics.mechanisms import Array, random_inertia, random_mechanism, random_state, random_tree
 from tests.slow import slow
 

@@ -14,7 +14,7 @@ from pytest import approx, mark, param
 import cgraph as cg
 import dynamics as dyn
 from dynamics.equations.inertia_rank import balanced
-from dynamics.multibody.spatial import rotation
+from dynamics.multibody.algebra.spatial import rotation
 from tests.dynamics.mechanisms import Array, random_body
 from tests.dynamics.models import run
 from tests.dynamics.units import Units, in_units, random_units

@@ -10,9 +10,9 @@ from pytest import MonkeyPatch, fixture, mark
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.multibody import spatial
+from dynamics.multibody.algebra import spatial
+from dynamics.multibody.algebra.spatial import Triple
 from dynamics.multibody.joints import TYPES, SpatialJoint
-from dynamics.multibody.spatial import Triple
 from dynamics.verification.certificate import certify
 from tests.dynamics.models import Array
 from tests.dynamics.units import Units, in_units

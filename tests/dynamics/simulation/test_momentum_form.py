@@ -9,7 +9,7 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.equations.consistent_state import nearest_state
+from dynamics.equations.states.consistent_state import nearest_state
 from dynamics.systems.model import as_system
 from tests.early_end import stops
 

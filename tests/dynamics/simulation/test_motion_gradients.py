@@ -12,7 +12,7 @@ from pytest import approx, mark, raises
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.equations.consistent_state import nearest_state
+from dynamics.equations.states.consistent_state import nearest_state
 from dynamics.integrators import METHODS, Tableau, derive, runge_kutta
 from dynamics.simulation.gradients import motion_run
 from dynamics.simulation.gradients.motion_equations import motion_equations

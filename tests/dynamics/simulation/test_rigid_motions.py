@@ -6,7 +6,7 @@ from numpy.typing import ArrayLike
 from pytest import mark
 
 import dynamics as dyn
-from dynamics.multibody.spatial import Array, from_quaternion, rotation
+from dynamics.multibody.algebra.spatial import Array, from_quaternion, rotation
 from dynamics.multiprecision import closed_forms
 
 MOMENTS = [1.0, 2.0, 3.0]  # kg m^2, of the rotor

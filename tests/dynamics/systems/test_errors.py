@@ -10,7 +10,7 @@ from pytest import mark, raises
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.equations.formulations import INERTIAL
+from dynamics.equations.formulations.formulations import INERTIAL
 from dynamics.io import mujoco_twin as mujoco_io
 from dynamics.systems.system import System
 

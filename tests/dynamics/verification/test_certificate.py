@@ -13,7 +13,7 @@ import cgraph as cg
 import dynamics as dyn
 from cgraph.operations.operation import OPS
 from dynamics.equations import accelerations
-from dynamics.equations.constraints import multiplier_outputs
+from dynamics.equations.constraints.constraints import multiplier_outputs
 from dynamics.io.write_mjcf import to_mjcf
 from dynamics.systems.constraints import Constraints
 from dynamics.verification import certificate

@@ -16,7 +16,7 @@ import pytest
 import cgraph as cg
 import dynamics as dyn
 import viz
-from dynamics.equations.consistent_state import nearest_state
+from dynamics.equations.states.consistent_state import nearest_state
 from tests.hostile_texts import HOSTILE, hostile_page
 from viz import cli
 from viz.inspector import Motion, Table, Version

@@ -6,7 +6,7 @@ import re
 import pytest
 
 import dynamics as dyn
-from dynamics.equations.consistent_state import nearest_state
+from dynamics.equations.states.consistent_state import nearest_state
 from tests.dynamics.linkages import four_bar
 from viz import cli
 from viz.models.inspect import inspection_page
@@ -16,7 +16,7 @@ from viz.models.open_loops import tree_alone
 SCENE = """
 from tests.dynamics.linkages import four_bar
 import dynamics as dyn
-from dynamics.equations.consistent_state import nearest_state
+from dynamics.equations.states.consistent_state import nearest_state
 model = four_bar()
 q, qd = nearest_state(model, [0.9, 0.3, 1.4], [1.0, 0.0, 0.0])
 linkage = dyn.scenes.Scene("linkage", "", model, tuple(q), tuple(qd), 0.1)

@@ -8,7 +8,7 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.equations.formulation_sizes import PAPER, TORQUE, blamed
+from dynamics.equations.formulations.formulation_sizes import PAPER, TORQUE, blamed
 from viz import theme
 from viz.graph_drawing.legend import kinds_in, legend_svg
 from viz.graph_drawing.short_formulas import short_formulas

@@ -10,7 +10,7 @@ from hypothesis import given, settings, strategies as st
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.equations.formulations import torques
+from dynamics.equations.formulations.formulations import torques
 from tests.strategies import examples
 from tests.viz.typed.typed_script import run_typed
 from viz.commands.lint import lint_text

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 import cgraph as cg
 
 from ....equations.equations_of_motion import momentum
+from ....multibody.builders.planar_arm import planar_arm
 from ....multibody.mechanism import Body, Joint, Mechanism
-from ....multibody.planar_arm import planar_arm
 from ....multiprecision import closed_forms
 from ....systems.system import System
 from .case import GROWN, RTOL, SLACK, Criterion, StabilityCase, conserved, energy_criterion, error_criterion

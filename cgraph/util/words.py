@@ -1,0 +1,55 @@
+"""Words of messages: numbers of things, and what somebody may have meant by a name that is not there."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Sequence
+from itertools import islice
+
+from .explain_failure import explain_failure
+from .require import require_whole
+
+_MOST, _LENGTH = 5000, 80  # names compared, and characters of each: an error should come at once
+_ALIKE = 0.7  # share of the letters that two names have in common
+_LISTED = 12  # names that are listed where none is near
+
+
+@explain_failure
+def counted(number: int, noun: str) -> str:
+    """The number, at least 0, and the noun, in the plural of all but 1.
+
+    >>> from cgraph.extend import counted
+    >>> counted(1, "node"), counted(2, "node")
+    ('1 node', '2 nodes')
+    """
+    return f"{require_whole('number', number)} {noun}{'' if number == 1 else 's'}"
+
+
+@explain_failure
+def nearest(name: str, known: Iterable[str], most: int = 3) -> list[str]:
+    """The known names, at most so many, that are spelled most like a name, whatever their case; the best first.
+
+    >>> from cgraph.extend import nearest
+    >>> nearest("q.ankel", ["q.hip", "q.knee", "q.ankle"])
+    ['q.ankle']
+    """
+    folded: dict[str, str] = {}
+    for each in islice(known, _MOST):
+        folded.setdefault(each[:_LENGTH].casefold(), each)
+    return [folded[each] for each in difflib.get_close_matches(name[:_LENGTH].casefold(), folded, most, _ALIKE)]
+
+
+@explain_failure
+def or_nearest(name: str, known: Sequence[str]) -> str:
+    """What an error says after "there is no ...": the nearest of the known names, or some of them.
+
+    >>> from cgraph.extend import or_nearest
+    >>> or_nearest("kne", ["hip", "knee", "ankle"])
+    "did you mean 'knee'?"
+    >>> or_nearest("x", ["hip", "knee", "ankle"])
+    'it has hip, knee, ankle'
+    """
+    if near := nearest(name, known):
+        return f"did you mean {' or '.join(map(repr, near))}?"
+    listed = known if len(known) <= _LISTED else [*known[: _LISTED - 2], "...", known[-1]]
+    return f"it has {', '.join(listed) or 'none'}"

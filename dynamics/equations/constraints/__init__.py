@@ -1,0 +1,1 @@
+"""Constraints: their rank, their multipliers, and states projected onto them."""

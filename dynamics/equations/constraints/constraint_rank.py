@@ -1,0 +1,110 @@
+"""The rank of constraints: which rows say something new, looked for at states that meet them, free of units."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+
+import numpy as np
+
+from cgraph.extend import Array, kept_by_first
+
+from ...systems.constraints import Constraints
+from .row_numbers import row_numbers
+
+STATES = 8  # states that meet the constraints and whose rank is clear, at which rows are compared, at most
+DEPENDENT = 1e-9  # of the largest row of a loop, or of a row of no loop: one of the others if no more of it is left
+BETTER = 5.0  # times as much of it has to be new for a row to be kept in place of one before it
+CLEAR = 1e-5  # what is left of rows that are independent: less is also seen where a state is singular but for rounding
+
+
+class ConstraintWarning(UserWarning):
+    """Constraints that say nothing new, and a start that had to be moved to meet them.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> import dynamics as dyn
+    >>> def energy(q, qd, t):
+    ...     return 0.5 * (qd[0] ** 2 + qd[1] ** 2)
+    >>> twice = dyn.System(energy, "x y", constraints=lambda q, t: {"row": q[0] - q[1], "again": 2.0 * (q[0] - q[1])})
+    >>> with warnings.catch_warnings(record=True) as noted:
+    ...     warnings.simplefilter("always")
+    ...     accelerations = dyn.forward_dynamics(twice)
+    >>> print(noted[0].message)
+    constraint 'again' follows from the others and is left out
+    """
+
+
+@kept_by_first
+def independent_rows(constraints: Constraints) -> tuple[int, ...]:
+    """Indices of rows that do not follow from one another, at all states seen.
+
+    Of rows that could stand for one another those are kept of which most is new at the worst of these states, the first
+    ones where there is no great difference: a four-bar in an oblique plane has its closure in three rows, of which two
+    may say nearly the same.
+
+    The states are random ones that meet the constraints, since rows may depend on one another only there. Where the
+    rank is less than elsewhere, a state that is known to the rounding e of the rows is off by sqrt(e), and so are rows
+    that follow from others: states at which as little of a row is new count only if no others are seen. What is new is
+    measured by the size of the row, or of the largest of its loop, about the state. Warns of that, and of rows that are
+    left out, unless they hold nothing, as the third of a point in a plane.
+
+    Raises ConstraintError where no state is seen that meets all.
+    """
+    numbers = row_numbers(constraints)
+    clear: dict[int, list[Array]] = {}  # by rank
+    doubtful: list[dict[int, float]] = []
+    acting = np.zeros(len(constraints), dtype=bool)
+    for point in numbers.states():
+        matrix = numbers.certain_matrix(point)
+        acting |= matrix.any(axis=1)
+        rows, columns = numbers.scales(point)
+        matrix = rows[:, None] * matrix * columns
+        shares = _independent([matrix])
+        if min(shares.values(), default=1.0) < CLEAR:
+            doubtful.append(shares)
+            continue
+        clear.setdefault(len(shares), []).append(matrix)
+        most = np.count_nonzero(numbers.typical(point, numbers.reach).any(axis=1))
+        if sum(map(len, clear.values())) == STATES or len(shares) == most:
+            break
+    kept = max(doubtful, key=len, default={})
+    if clear:
+        rank = max(clear)
+        kept = _independent(clear[rank], BETTER)
+        if len(kept) < rank:  # other rows at other states
+            kept = _independent(clear[rank][:1])
+    small = [f"{constraints.names[k]!r} ({x:.1e} of it is new)" for k, x in kept.items() if x < CLEAR]
+    if small and not clear:
+        text = f"at all states seen next to nothing is new of {' and '.join(small)}: kept, and may hold the motion"
+        warnings.warn(text, ConstraintWarning, stacklevel=2)
+    dropped = [name for k, name in enumerate(constraints.names) if k not in kept and acting[k]]
+    if dropped:
+        names = " and ".join(map(repr, dropped))
+        one = len(dropped) == 1
+        verbs = "follows from the others and is" if one else "follow from the others and are"
+        text = f"constraint{'' if one else 's'} {names} {verbs} left out"
+        warnings.warn(text, ConstraintWarning, stacklevel=2)
+    return tuple(kept)
+
+
+def _independent(matrices: Sequence[Array], better: float = np.inf) -> dict[int, float]:
+    """Rows that are not sums of others, and how much of each is new where that is least: Gram and Schmidt.
+
+    matrices: J of some states, (m, n), with factors by what J is about the state; by what it is there a row that is
+    small at a flat position would look as good as any.  better: times as much has to be new of a row to take the place
+    of one before it; without, the rows that are not sums of earlier ones.
+    """
+    kept: dict[int, float] = {}
+    rest = np.array(matrices)  # (states, m, n)
+    while True:
+        new = np.linalg.norm(rest, axis=2).min(axis=0)
+        new[list(kept)] = 0.0
+        if not (new > DEPENDENT).any():
+            return dict(sorted(kept.items()))
+        k = int(np.argmax((new > DEPENDENT) & (new >= new.max() / better)))
+        kept[k] = float(new[k])
+        units = rest[:, k] / np.linalg.norm(rest[:, k], axis=1)[:, None]
+        for _ in range(2):
+            rest = rest - np.einsum("sm,sn->smn", np.einsum("smn,sn->sm", rest, units), units)

@@ -1,0 +1,1 @@
+"""Inverse dynamics by the formulations of the paper and by velocities, and the verdict on them."""

@@ -1,0 +1,321 @@
+"""The formulations of Lagrange's equation as graphs: by definition, kinetic only, by the chain rule, by velocities.
+
+Equations and figures named here are those of T. Kusaka and T. Tanaka, Robotics 2025, 14(9), 115.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
+
+import cgraph as cg
+from cgraph import Graph, Node
+from cgraph.extend import TANGENT, Builder, building, cotangents, require_choice, require_flag, tangents
+
+from ...systems.body_system import BodySystem
+from ...systems.model import Model, as_system
+from ...systems.system import System
+from ..bias_terms import bias_terms
+from ..shorter_form import LONGEST, shorter_form
+from ..substitute import substitute
+
+EULER = "euler"  # tag of the embedded relations q = qd dt + q_old and qd = qdd dt + qd_old
+COUPLING = "q of qd"  # tag of the product qd dt in the first of them, through which dL/dqd reaches dL/dq
+LAGRANGIAN = "lagrangian"  # tag of what the author left untagged: derivatives of it would take a relation's tag instead
+ONE, ZERO = cg.constant(1.0), cg.constant(0.0)
+
+
+class LagrangeTerms(NamedTuple):
+    """The two terms of tau = d/dt dL/dqd - dL/dq as one formulation writes them, and the state they are taken at."""
+
+    inputs: list[Node]
+    q: list[Node]
+    qd: list[Node]
+    momentum: list[Node] | None  # p = dL/dqd; None where it is not formed, but the two terms below are at fixed z
+    momentum_rate: list[Node]  # d/dt dL/dqd
+    gradient: list[Node]  # dL/dq; of quasi-velocities G^T dL/dq - ad(qd; p)
+
+
+def chain_rule(system: System) -> LagrangeTerms:
+    """Section 3: d/dt p = grad_x p . xdot for p = dL/dqd, x = (q, qd), contracted: one reverse sweep, one forward."""
+    build = Builder()
+    # The reverse sweep over L gives both dL/dq and p = dL/dqd; q and qd are independent inputs (Section 2.2).
+    bars = cotangents({system.lagrangian: ONE}, [*system.q, *system.qd], build)
+    momentum = bars[system.nq :]
+    gradient = system.kinematics.slopes(bars[: system.nq], momentum, build)
+    # Eq. (4) with y = p: a forward sweep along xdot = (qd, qdd) is the product grad_x p . xdot, never written out.
+    dots = tangents(_state_rate(system), momentum, build)
+    rate = [dots.get(p, ZERO) for p in momentum]
+    return LagrangeTerms([*system.q, *system.qd, *system.qdd], system.q, system.qd, momentum, rate, gradient)
+
+
+def chain_rule_literal(system: System) -> LagrangeTerms:
+    """Eq. (4) read literally: the 2n partials of each momentum, a reverse sweep each, then products with xdot."""
+    bars = cotangents({system.lagrangian: ONE}, [*system.q, *system.qd])
+    momentum = bars[system.nq :]
+    gradient = system.kinematics.slopes(bars[: system.nq], momentum, Builder())
+    x_dot = _state_rate(system)
+    rate = []
+    for p in momentum:
+        partials = cotangents({p: ONE}, list(x_dot))  # grad_x p, 2n nodes
+        with building(Builder()) as labelled:
+            labelled(p.label.derived(TANGENT))
+            total = ZERO
+            for partial, dot in zip(partials, x_dot.values(), strict=True):
+                total = total + partial * dot
+        rate.append(total)
+    return LagrangeTerms([*system.q, *system.qd, *system.qdd], system.q, system.qd, momentum, rate, gradient)
+
+
+def euler_embedded(system: System) -> LagrangeTerms:
+    """By definition, eq. (3) and Figure 1: dL/dqd is taken through q = qd dt + q_old, which is wrong."""
+    return _embedded(system, system.lagrangian)
+
+
+def kinetic_only(system: System) -> LagrangeTerms:
+    """Figure 2: the same embedding with K in place of L in the velocity derivative; right where K is free of q."""
+    return _embedded(system, system.kinetic)
+
+
+def kinetic_only_exact(system: System) -> LagrangeTerms:
+    """Kinetic only, exact: dK/dqd is taken at independent q and qd, and only then is the relation embedded.
+
+    d/dt goes through each embedded quantity at its own rate, qd of q and qdd of qd, not through dt, along which q would
+    move at qd + qdd dt.
+    """
+    momentum = cotangents({system.kinetic: ONE}, system.qd)
+    embedding = _Embedding(system)
+    lagrangian, *embedded = embedding.embed(system.lagrangian, *momentum)
+    gradient = cotangents({lagrangian: ONE}, embedding.q)
+    rates = [*embedding.embed(*system.q_dot), *system.qdd]
+    x_dot = dict(zip([*embedding.q, *embedding.qd], rates, strict=True))
+    return embedding.terms(embedded, gradient, x_dot)
+
+
+def newton_euler(system: System) -> LagrangeTerms:
+    """Newton's and Euler's equations of bodies; of any Lagrangian the same, d/dt dL/dz at its velocity nodes z.
+
+    tau = (dz/dqd)^T d/dt dL/dz - dL/dq at fixed z: what d/dt dL/dqd and dL/dq have in common is never formed. Slopes
+    dz/dqd are the partial velocities of T. R. Kane and D. A. Levinson, "Dynamics: Theory and Applications" (1985); of
+    bodies the forces at z are those of J. Y. S. Luh, M. W. Walker, R. P. C. Paul, "On-line computational scheme for
+    mechanical manipulators", J. Dyn. Sys. Meas. Control 102(2), 1980.
+    """
+    free = system.without_constraints  # whose tags shared nodes would have
+    terms = bias_terms(free, system.qdd)
+    forces = cotangents(terms.inertial, system.qd, Builder())
+    return LagrangeTerms([*system.q, *system.qd, *system.qdd], system.q, system.qd, None, forces, terms.gradient)
+
+
+FORMULATIONS: dict[str, Callable[[System], LagrangeTerms]] = {
+    formulation.__name__: formulation
+    for formulation in (chain_rule, chain_rule_literal, euler_embedded, kinetic_only, kinetic_only_exact, newton_euler)
+}
+"""Formulations of Lagrange's equation by name, right and wrong ones: what `inverse_dynamics` takes."""
+INERTIAL = tuple([name for name in FORMULATIONS if name != newton_euler.__name__])  # those that form d/dt dL/dqd
+SMALL = (chain_rule.__name__, newton_euler.__name__)  # right ones, of which the other may be the smaller
+THROUGH_STEP: dict[str, Callable[[System], Node]] = {
+    "euler_embedded": lambda system: system.lagrangian,
+    "kinetic_only": lambda system: system.kinetic,
+}  # the formulations that differentiate by qd through q = qd dt + q_old, and what they differentiate
+
+
+def inverse_dynamics(model: Model, formulation: str | None = None, *, simplify: bool = True) -> Graph:
+    """tau of the motion: tau = d/dt dL/dqd - dL/dq + damping * qd - forces, by one of the `FORMULATIONS`.
+
+    Parameters
+    ----------
+    model : Model
+        A system, a mechanism or a scene with n coordinates.
+    formulation : str, optional
+        By default the smaller graph of "chain_rule", which is the paper's, and "newton_euler", which takes the
+        velocities in L in place of qd. "chain_rule_literal" is the first with every gradient written out.
+        "euler_embedded", "kinetic_only" and "kinetic_only_exact" have the Euler relation in the graph; the first two
+        are wrong, as the paper has them.
+    simplify : bool
+        False leaves the graph as derived.
+
+    Returns
+    -------
+    Graph
+        Inputs q0.., qd0.., qdd0.., then t if needed and parameters. With the Euler relation: the state before the
+        step, q0_old.., qd0_old.., then qdd0.., dt, ...; tau is that of the state after the step, qd = qdd dt + qd_old,
+        q = qd dt + q_old. Outputs tau0.., (n,) [N m or N].
+
+    Raises
+    ------
+    ValueError
+        For an unknown formulation.
+    TypeError
+        For what is no model, or has no Lagrangian.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> block = dyn.System(lambda q, qd, t: 0.5 * 4.0 * qd[0] ** 2, ["x"], damping=0.5)
+    >>> dyn.inverse_dynamics(block).evaluate({"q0": 0.0, "qd0": 2.0, "qdd0": 3.0})
+    {'tau0': 13.0}
+    >>> list(dyn.FORMULATIONS)
+    ['chain_rule', 'chain_rule_literal', 'euler_embedded', 'kinetic_only', 'kinetic_only_exact', 'newton_euler']
+    """
+    system = as_system(model)
+    if formulation is not None:
+        require_choice("formulation", formulation, FORMULATIONS)
+    if not require_flag("simplify", simplify):
+        names = SMALL if formulation is None else (formulation,)
+        return min([torques(system, name) for name in names], key=lambda graph: size(cg.simplify(graph)))
+    if formulation is None:
+        return shorter_form(system, _smaller)
+    if formulation in SMALL:
+        return shorter_form(system, lambda form: cg.simplify(torques(form, formulation)))
+    return cg.simplify(torques(system, formulation))
+
+
+def _smaller(system: System) -> Graph:
+    """The smaller of the `SMALL` ones.
+
+    Of bodies the chain rule gave it in none of 1600 random trees beyond 58 nodes, unless most joints are slides, which
+    take 7 nodes each; so for large graphs, which take long, it is not asked.
+    """
+    by_velocities = cg.simplify(torques(system, newton_euler.__name__))
+    if isinstance(system, BodySystem) and len(by_velocities.nodes) > max(LONGEST, 10 * system.n):
+        return by_velocities
+    return min(cg.simplify(torques(system)), by_velocities, key=size)
+
+
+def size(graph: Graph) -> tuple[int, int]:
+    """Nodes, then edges: by which of two graphs of the same torques the smaller is taken."""
+    return len(graph.nodes), len(graph.edges)
+
+
+def torques(system: System, formulation: str = "chain_rule", through: Node = ONE) -> Graph:
+    """Inverse dynamics from the Lagrangian as it is written, not simplified. Raises as `inverse_dynamics`.
+
+    through: a factor of what `THROUGH_STEP` lets through q = qd dt + q_old; an input of the graph if it is a variable.
+    """
+    terms = _lagrange_terms(system, formulation, through)
+    applied = _forces(system, terms)
+    build = Builder()
+    outputs = {}
+    with building(build):
+        for i in range(system.n):
+            tau = terms.momentum_rate[i] - terms.gradient[i]
+            with cg.tag("damping"):
+                tau = tau + system.damping[i] * terms.qd[i]
+            outputs[f"tau{i}"] = tau - applied[i]
+    return system.graph(outputs, terms.inputs, [through] if through is not ONE else [])
+
+
+def momentum_rate(
+    model: Model, formulation: str = "chain_rule", *, simplify: bool = True, keep_momentum: bool = False
+) -> Graph:
+    """The inertial term d/dt dL/dqd alone: the left side of Eq. (3) and of Figures 1 to 3 of the paper.
+
+    Parameters
+    ----------
+    model, simplify
+        As for `inverse_dynamics`.
+    formulation : str
+        Any but "newton_euler", which forms no momentum.
+    keep_momentum : bool
+        The momenta p0.. = dL/dqd are outputs too.
+
+    Returns
+    -------
+    Graph
+        Inputs as of `inverse_dynamics`; outputs p0_dot.., (n,) [N m or N].
+
+    Raises
+    ------
+    ValueError
+        For any other formulation.
+    TypeError
+        For what is no model, or has no Lagrangian.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> spring = dyn.System(lambda q, qd, t: 0.5 * 4.0 * qd[0] ** 2 - 0.5 * 9.0 * q[0] ** 2, ["x"])
+    >>> dyn.momentum_rate(spring).evaluate({"q0": 1.0, "qd0": 2.0, "qdd0": 3.0})  # the spring has no part in it
+    {'p0_dot': 12.0}
+    """
+    graph = momenta(as_system(model), formulation, keep_momentum=require_flag("keep_momentum", keep_momentum))
+    return cg.simplify(graph) if require_flag("simplify", simplify) else graph
+
+
+def momenta(system: System, formulation: str, through: Node = ONE, *, keep_momentum: bool = True) -> Graph:
+    """The inertial term, with or without the momenta, as derived.  through: as of `torques`."""
+    require_choice("formulation", formulation, INERTIAL)
+    terms = _lagrange_terms(system, formulation, through)
+    outputs = {f"p{i}": p for i, p in enumerate(terms.momentum or ())} if keep_momentum else {}
+    outputs |= {f"p{i}_dot": rate for i, rate in enumerate(terms.momentum_rate)}
+    return system.graph(outputs, terms.inputs, [through] if through is not ONE else [])
+
+
+def _lagrange_terms(system: System, formulation: str, through: Node = ONE) -> LagrangeTerms:
+    if through is not ONE:
+        return _embedded(system, THROUGH_STEP[formulation](system), through)
+    return FORMULATIONS[require_choice("formulation", formulation, FORMULATIONS)](system)
+
+
+def _forces(system: System, terms: LagrangeTerms) -> list[Node]:
+    """The system's forces at the state of the terms: itself, or the embedded one."""
+    if terms.q is system.q:
+        return list(system.forces)
+    return substitute(system.forces, dict(zip([*system.q, *system.qd], [*terms.q, *terms.qd], strict=True)))
+
+
+def _state_rate(system: System) -> dict[Node, Node]:
+    """xdot for x = (q, qd), and 1 for t if the Lagrangian depends on it."""
+    rate = dict(zip([*system.q, *system.qd], [*system.q_dot, *system.qdd], strict=True))
+    return rate | ({system.t: ONE} if system.t in system.extra_inputs else {})
+
+
+class _Embedding:
+    """The Euler relation of Section 2.1 as nodes: the state after a step from variables of the state before it."""
+
+    def __init__(self, system: System) -> None:
+        self.system = system
+        self.dt = cg.variable("dt")
+        q_old = cg.variables([f"q{i}_old" for i in range(system.nq)])
+        qd_old = cg.variables([f"qd{i}_old" for i in range(system.n)])
+        self.inputs = [*q_old, *qd_old, *system.qdd, self.dt]
+        q_dot = system.q_dot  # kept by the system once they are made: not in here, where they would be tagged
+        with cg.tag(EULER):
+            self.qd = [
+                cg.with_name(a * self.dt + old, f"qd{i}")
+                for i, (a, old) in enumerate(zip(system.qdd, qd_old, strict=True))
+            ]
+            rates = substitute(q_dot, dict(zip([*system.q, *system.qd], [*q_old, *self.qd], strict=True)))
+            with cg.tag(COUPLING):
+                moved = [rate * self.dt for rate in rates]
+            self.q = [cg.with_name(m + old, f"q{i}") for i, (m, old) in enumerate(zip(moved, q_old, strict=True))]
+
+    def embed(self, *nodes: Node) -> list[Node]:
+        """Nodes over (q, qd) as nodes over the embedded state, all of them with tags."""
+        state = dict(zip([*self.system.q, *self.system.qd], [*self.q, *self.qd], strict=True))
+        return substitute(nodes, state, LAGRANGIAN)
+
+    def terms(
+        self, momentum: Sequence[Node], gradient: list[Node], x_dot: Mapping[Node, Node] | None = None
+    ) -> LagrangeTerms:
+        """d/dt as the derivative with respect to dt, or along `x_dot`; and to t if the Lagrangian has it."""
+        time = {self.system.t: ONE} if self.system.t in self.system.extra_inputs else {}
+        dots = tangents({**(x_dot or {self.dt: ONE}), **time}, momentum)
+        rate = [dots.get(p, ZERO) for p in momentum]
+        slopes = self.system.kinematics.slopes(gradient, momentum, Builder())
+        if self.system.kinematics.quasi is not None:
+            slopes = self.embed(*slopes)
+        return LagrangeTerms(self.inputs, self.q, self.qd, list(momentum), rate, slopes)
+
+
+def _embedded(system: System, energy: Node, through: Node = ONE) -> LagrangeTerms:
+    """d/dt of d(energy)/dqd with the Euler relation in the graph, the middle of eq. (3), and dL/dq.
+
+    through: a factor of all that comes through q: 1 in the formulation, and at 0 the momentum is the right one.
+    """
+    embedding = _Embedding(system)
+    lagrangian, energy = embedding.embed(system.lagrangian, energy)
+    factors = dict.fromkeys(embedding.q, through)
+    momentum = cotangents({energy: ONE}, embedding.qd, through=factors)  # through q as well: the unwanted coupling
+    gradient = cotangents({lagrangian: ONE}, embedding.q)
+    return embedding.terms(momentum, gradient)

@@ -1,0 +1,185 @@
+"""Linearization: the exact derivative of the state equation or of Hamilton's, as a graph and at a state."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cgraph import Graph
+from cgraph.extend import Array, require_choice
+
+from ...systems.model import Model, as_system
+from ...systems.system import System
+from ..equations_of_motion import forward_dynamics
+from ..shorter_form import shorter_form
+from ..singular_mass_matrix import raise_if_singular
+from ..state_equation import FORMS
+from ..states.evaluate_at import evaluate_at
+from ..states.initial_value import normalized
+from .linearization_parts import LinearizationParts, linearization_parts
+from .symmetric_linearization import SymmetricParts
+
+
+def state_space(model: Model, *, form: str = "velocity") -> Graph:
+    """A and B of d(xdot) = A dx + B dtau, x = (q, qd), or x = (q, p) of the momentum form, at any state.
+
+    Of quasi-velocities, qdot = G(q) qd, dx = (xi, dqd) has small displacements xi with dq = G xi, such as a rotation
+    vector in the body's axes, so that A and B have no row or column more than there are freedoms.
+
+    From tau(q, qd, qdd) = const: M dqdd = dtau - (d tau / dx) dx, at the qdd of forward dynamics, with the slopes of
+    `inverse_dynamics_derivatives`. M is factored once for all columns: by elimination on the graph of L, which keeps
+    the digits of a long chain, or as a matrix where that saves a fifth of the nodes and no path from the world to a tip
+    has more than 12 coordinates.
+
+    Rows of constraints z = J qd + a are differentiated with their multipliers, by the same elimination:
+    M dqdd - J^T dlambda = dtau - d(tau - J^T lambda)/dx dx,  J dqdd = -d(dz/dt)/dx dx. At a state that meets them A
+    holds for displacements that they admit, see `reduced_linearization`.
+
+    In coordinates and momenta p = dL/dqd, of Hamilton's equations, one half of the entries is enough: without damping
+    and forces A = J H'', with J = [[0, 1], [-1, 0]] and the symmetric second slopes of H(q, p), so that J A is
+    symmetric to the last bit, and B = [0, 1]. Damping D and forces f(q, qd, t) add df - D dqd to the rates of momenta,
+    dqd = H_pq dq + H_pp dp, which is not symmetric. A does not depend on tau. With W = dp/dq at fixed velocities,
+    H'' is
+
+        H_pp = M^-1,   H_pq = -M^-1 W,   H_qq = W^T M^-1 W - d2L/dq2
+
+    Of quasi-velocities dp is the change of the numbers p, and A is that of (xi, dp). In (xi, dp + P xi / 2), with
+    P_kj = p . c(e_j, e_k) of the brackets c, it is J times a symmetric matrix again.
+
+    Parameters
+    ----------
+    model : Model
+        A system, a mechanism or a scene with n coordinates.
+    form : {"velocity", "momentum"}
+        Of x, as of `simulate`.
+
+    Returns
+    -------
+    Graph
+        Inputs q0.., qd0.., tau0.., or q0.., p0.., t if needed, parameters; outputs A_0_0, .., (2n, 2n), and B_0_0, ..,
+        (2n, n), row by row. The velocities of p are those of `hamilton_equations`, with its error where L is not
+        quadratic in them.
+
+    Raises
+    ------
+    SingularMassMatrixError
+        For a coordinate without inertia.
+    ConstraintError
+        For the momentum form of a model with constraints.
+    ValueError
+        For the momentum form of a model with a parameter that is called like a momentum.
+    TypeError
+        For what is no model, or has no Lagrangian.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> import dynamics as dyn
+    >>> spring = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 - 0.5 * 9.0 * q[0] ** 2, ["x"], damping=0.5)
+    >>> state = {"q0": 0.0, "qd0": 0.0, "tau0": 0.0}
+    >>> {name: value for name, value in dyn.state_space(spring).evaluate(state).items() if name[2] == "1"}
+    {'A_1_0': -9.0, 'A_1_1': -0.5, 'B_1_0': 1.0}
+    >>> pendulum = dyn.System(lambda q, qd, t: 0.5 * 4.0 * qd[0] ** 2 + 20.0 * cg.cos(q[0]), ["angle"])
+    >>> dyn.state_space(pendulum, form="momentum").evaluate({"q0": 0.0, "p0": 0.0})
+    {'A_0_0': 0.0, 'A_0_1': 0.25, 'A_1_0': -20.0, 'A_1_1': 0.0, 'B_0_0': 0.0, 'B_1_0': 1.0}
+    """
+    if require_choice("form", form, FORMS) == "velocity":
+        return shorter_form(as_system(model), lambda system: linearization_parts(system).written_out())
+    return shorter_form(
+        as_system(model), lambda system: SymmetricParts(system, momenta=True).of_momenta(), mirrored=True
+    )
+
+
+def parts_of(system: System, form: str) -> LinearizationParts | SymmetricParts:
+    """The parts of the linearization of a form, over (q, qd)."""
+    if form == "velocity":
+        return linearization_parts(system)
+    return SymmetricParts(system)
+
+
+def linearize(
+    model: Model,
+    q: ArrayLike,
+    qd: ArrayLike,
+    tau: ArrayLike | None = None,
+    *,
+    form: str = "velocity",
+    t: float = 0.0,
+    parameters: Mapping[str, float] | None = None,
+) -> tuple[Array, Array]:
+    """A, (2n, 2n), and B, (2n, n), of d(xdot) = A dx + B dtau, x = (q, qd), at a state and applied forces (default 0).
+
+    Of the momentum form x = (q, p), see `state_space`; the state is q and qd all the same. Of quasi-velocities dx is of
+    displacements, see there, too. With constraints the state has to meet them (see `consistent_state`), and
+    `reduced_linearization` has the matrices of independent displacements.
+
+    For many states, and for all digits of long chains, there is `linearize_many`.
+
+    Parameters
+    ----------
+    model : Model
+        A system, a mechanism or a scene with n coordinates.
+    q, qd, tau : array_like, (nq,) and (n,)
+        Coordinates [rad or m], velocities, and applied forces [N m or N].
+    form : {"velocity", "momentum"}
+        Of x, as of `simulate`. The state is given by velocities in both, so that nothing is iterated.
+    t : float
+        Time [s], for a model that depends on it.
+    parameters : mapping of str to float
+        Values in place of the model's.
+
+    Returns
+    -------
+    A : ndarray, (2n, 2n)
+    B : ndarray, (2n, n)
+
+    Raises
+    ------
+    ValueError
+        For arrays of another shape, a number that is not finite, an unknown parameter, a quaternion of length 0, or
+        entries that are not finite.
+    SingularMassMatrixError
+        For a coordinate without inertia, or a mass matrix that is singular at this state.
+    ConstraintError
+        For the momentum form of a model with constraints.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> spring = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 - 0.5 * 9.0 * q[0] ** 2, ["x"], damping=0.5)
+    >>> A, B = dyn.linearize(spring, [0.0], [0.0])
+    >>> A.tolist(), B.tolist()
+    ([[0.0, 1.0], [-9.0, -0.5]], [[0.0], [1.0]])
+
+    In the momentum form A is J H'', and its modes are those of the motion:
+
+    >>> pendulum = dyn.planar_arm(masses=[1.0, 1.0], lengths=[1.0, 1.0])
+    >>> A, B = dyn.linearize(pendulum, [0.0, 0.0], [0.0, 0.0], form="momentum")
+    >>> A.round(3).tolist()
+    [[0.0, 0.0, 1.714, -4.286], [0.0, 0.0, -4.286, 13.714], [-19.62, -4.905, 0.0, 0.0], [-4.905, -4.905, 0.0, 0.0]]
+    """
+    system, parts = as_system(model), parts_of(as_system(model), require_choice("form", form, FORMS))
+    graphs = parts.in_columns()
+    flat = evaluate_at(system, graphs.shared, {"q": q, "qd": qd, "tau": tau}, t, parameters)
+    if flat.ndim != 1:
+        raise ValueError("linearize takes one state, got rows of several; see linearize_many")
+    factors, sides, rest = np.split(flat, [graphs.factors, graphs.factors + graphs.sides])
+    rows = [*factors, *sides.reshape(-1, graphs.columns)]
+    solved = graphs.column.evaluate(dict(zip(graphs.column.input_names, rows, strict=True))).values()
+    a, b = parts.assembled(sides, rest, np.concatenate([np.broadcast_to(x, graphs.columns) for x in solved]))
+    if not (np.isfinite(a).all() and np.isfinite(b).all()):
+        _raise_what_is_not_finite(system, {"q": q, "qd": qd, "tau": tau}, t, parameters)
+    return a, b
+
+
+def _raise_what_is_not_finite(
+    system: System, state: Mapping[str, ArrayLike | None], t: float, parameters: Mapping[str, float] | None
+) -> None:
+    """The state has a quaternion without a length, or a mass matrix that is singular, or numbers leave float64."""
+    normalized(system, np.concatenate([np.asarray(state[name], dtype=np.float64) for name in ("q", "qd")]))
+    info = evaluate_at(system, forward_dynamics(system, check=True), state, t, parameters)[-1]
+    if np.isfinite(info):
+        raise_if_singular(system, info)
+    raise ValueError("there is no linearization at this state: its numbers leave the range of float64")

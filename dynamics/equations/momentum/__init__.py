@@ -1,0 +1,1 @@
+"""Hamilton's equations and the momenta that they keep."""

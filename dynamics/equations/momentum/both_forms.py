@@ -1,0 +1,60 @@
+"""Both forms of the equations of motion, of accelerations and of momenta, their sizes, and how far they agree."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import cgraph as cg
+from cgraph import Counts, Graph
+from cgraph.extend import Array
+
+from ...systems.model import Model, as_system
+from ..equations_of_motion import momentum
+from ..state_equation import state_equation
+from .hamiltonian import hamilton_equations
+
+LAGRANGE, HAMILTON, VELOCITIES_ALONE = "state equation", "Hamilton's equations", "velocities alone"
+
+
+class Agreement(NamedTuple):
+    """What both forms of the equations differ by at one state, relative to the largest entry."""
+
+    velocities: float  # q_dot of p = dL/dqd
+    momentum_rates: float  # p_dot, and dp/dt along the accelerations
+
+
+def both_forms(model: Model) -> dict[str, Graph]:
+    """{name: graph} of the state equation and of Hamilton's equations, both solved by elimination.
+
+    Raises as `hamilton_equations`.
+    """
+    hamilton = hamilton_equations(model)  # first: it says what has none
+    return {LAGRANGE: state_equation(model, "recursive"), HAMILTON: hamilton}
+
+
+def form_sizes(forms: Mapping[str, Graph]) -> dict[str, Counts]:
+    """The sizes of both forms, and of the velocities within Hamilton's equations, on which the rest of them stands."""
+    hamilton = forms[HAMILTON]
+    velocities = Graph(hamilton.inputs, {name: node for name, node in hamilton.outputs.items() if name[0] == "q"})
+    return {name: graph.counts() for name, graph in {**forms, VELOCITIES_ALONE: velocities}.items()}
+
+
+def form_agreement(model: Model, forms: Mapping[str, Graph], at: Mapping[str, float]) -> Agreement:
+    """How far both forms agree at a state.  at: values of the inputs of the state equation."""
+    system, momenta = as_system(model), momentum(model)
+    lagrange, hamilton = forms[LAGRANGE], forms[HAMILTON]
+    moved = lagrange.evaluate({name: at[name] for name in lagrange.input_names})
+    known = {**at} | momenta.evaluate({name: at.get(name, 0.0) for name in momenta.input_names})
+    found = hamilton.evaluate({name: known[name] for name in hamilton.input_names})
+    states = [str(node.name) for node in (*system.q, *system.qd)]
+    rated = cg.jvp(momenta, [name for name in (*states, "t") if name in momenta.input_names])
+    along = known | {name: moved.get(name, 1.0) for name in rated.input_names if name.endswith("_dot")}
+    rates = rated.evaluate({name: along[name] for name in rated.input_names})
+    q, p = ([f"{kind}{i}_dot" for i in range(n)] for kind, n in (("q", system.nq), ("p", system.n)))
+    return Agreement(_apart(found, moved, q), _apart(found, rates, p))
+
+
+def _apart(found: Mapping[str, float | Array], expected: Mapping[str, float | Array], names: Sequence[str]) -> float:
+    largest = max([abs(float(expected[name])) for name in names])
+    return max([abs(float(found[name]) - float(expected[name])) for name in names]) / (largest or 1.0)

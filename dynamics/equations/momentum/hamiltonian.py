@@ -1,0 +1,177 @@
+"""Hamilton's equations as graphs: the energy H(q, p), and the rates of coordinates and momenta."""
+
+from __future__ import annotations
+
+from typing import get_args
+
+import cgraph as cg
+from cgraph import Graph, Node
+from cgraph.extend import Builder, Order, building, cotangents, require_choice, require_flag, require_whole
+
+from ...systems.model import Model, as_system
+from ...systems.system import System
+from ..formulations.formulations import ONE, ZERO
+from ..shorter_form import shorter_form
+from .legendre import Legendre, dot
+
+ITERATIONS = 40  # Newton's, for a Lagrangian that is not quadratic in the velocities
+
+
+def hamiltonian(model: Model, *, iterations: int = ITERATIONS, check: bool = False) -> Graph:
+    """The Hamiltonian H(q, p) = p . qd - L at the velocities of the momenta p = dL/dqd: the energy.
+
+    Parameters
+    ----------
+    model : Model
+        A system, a mechanism or a scene with n velocities, without constraints.
+    iterations, check
+        As of `hamilton_equations`.
+
+    Returns
+    -------
+    Graph
+        Inputs q0.., p0.., t if needed, parameters; output H [J], and missing0.. where asked for.
+
+    Raises
+    ------
+    SingularMassMatrixError
+        For a coordinate without inertia.
+    ConstraintError
+        For a model with constraints.
+    ValueError
+        For a parameter that is called like a momentum.
+    TypeError
+        For what is no model, or has no Lagrangian.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> spring = dyn.System(lambda q, qd, t: 0.5 * 4.0 * qd[0] ** 2 - 0.5 * q[0] ** 2, ["x"])
+    >>> print(dyn.hamiltonian(spring).listing(), end="")
+    inputs q0 p0
+    %1 = mul p0 p0  # primal
+    %2 = mul 0.125 %1  # primal
+    %3 = mul q0 q0  # primal
+    %4 = mul 0.5 %3  # primal
+    %5 = add %2 %4  # primal
+    output H = %5
+    """
+    count = require_whole("iterations", iterations, 1)
+    require_flag("check", check)
+
+    def derive(system: System) -> Graph:
+        build = Builder()
+        transform = Legendre(system, build, count)
+        p, u = transform.p, transform.velocities
+        if transform.quadratic:  # of L = u M u / 2 + b u + L0 it is (p - b) u / 2 - L0
+            (rest,) = transform.at_rest([transform.lagrangian])
+            with building(build):
+                total = dot([momentum - b for momentum, b in zip(p, transform.offset, strict=True)], u)
+                total = 0.5 * total - rest
+        else:
+            (rest,) = transform.at([transform.lagrangian])
+            with building(build):
+                total = dot(p, u) - rest
+        outputs = {"H": total} | (_missing(transform) if check else {})
+        return cg.simplify(system.graph(outputs, system.q, p))
+
+    return shorter_form(as_system(model), derive)
+
+
+def hamilton_equations(
+    model: Model, method: str = "recursive", *, iterations: int = ITERATIONS, check: bool = False
+) -> Graph:
+    """Hamilton's equations: qd of the momenta, and their rates p_dot = dL/dq + tau + forces - damping * qd.
+
+    dL/dq is taken at fixed velocities, and is -dH/dq. Of quasi-velocities u, whose momenta are p = dL/du, the rates
+    are G^T dL/dq - ad(u; p), see `QuasiVelocities`. Bodies give them by composite momentum: no acceleration and no
+    bias is in the graph.
+
+    Parameters
+    ----------
+    model : Model
+        A system, a mechanism or a scene with n velocities, without constraints.
+    method : {"recursive", "balanced"}
+        How the velocities are solved for: "recursive", the fewest nodes, or "balanced", with long sums in blocks, which
+        is O(log n) deep for a planar chain and takes more nodes, see `cg.hessian_solve`.
+    iterations : int
+        Newton's steps to the velocities where L is not quadratic in them; a good part of the nodes for every one. They
+        go downhill on L - p qd, from rest, and reach the velocities of an L that is strictly convex in them: the usual
+        number for momenta of up to 1e6 times those at which L is no longer quadratic.
+    check : bool
+        Further outputs missing0.., (n,): p - dL/dqd at the velocities, what the iteration leaves of the momenta; 0
+        where L is quadratic.
+
+    Returns
+    -------
+    Graph
+        Inputs q0.., p0.., tau0.., t if needed, parameters; outputs q0_dot.., (nq,), and p0_dot.., (n,).
+
+    Raises
+    ------
+    SingularMassMatrixError
+        For a coordinate without inertia.
+    ConstraintError
+        For a model with constraints.
+    ValueError
+        For a parameter that is called like a momentum, or an unknown method.
+    TypeError
+        For what is no model, or has no Lagrangian.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> spring = dyn.System(lambda q, qd, t: 0.5 * 4.0 * qd[0] ** 2 - 0.5 * q[0] ** 2, ["x"], damping=0.5)
+    >>> dyn.hamilton_equations(spring).evaluate({"q0": 1.0, "p0": 8.0, "tau0": 0.0})
+    {'q0_dot': 2.0, 'p0_dot': -2.0}
+    """
+    count = require_whole("iterations", iterations, 1)
+    require_flag("check", check)
+    order: Order = "balanced" if require_choice("method", method, get_args(Order)) == "balanced" else "recursive"
+    return shorter_form(as_system(model), lambda system: _equations(system, count, check, order))
+
+
+def velocities(system: System) -> Graph:
+    """The velocities qd0.. of momenta: inputs q0.., p0.., t if needed, parameters."""
+    transform = Legendre(system, Builder(), ITERATIONS)
+    outputs = {f"qd{i}": node for i, node in enumerate(transform.velocities)}
+    return cg.simplify(system.graph(outputs, system.q, transform.p))
+
+
+def missing_momenta(system: System) -> Graph | None:
+    """What `velocities` leave of the momenta, missing0.. as of `hamilton_equations`; None where nothing is iterated."""
+    transform = Legendre(system, Builder(), ITERATIONS)
+    return None if transform.quadratic else cg.simplify(system.graph(_missing(transform), system.q, transform.p))
+
+
+def _equations(system: System, iterations: int, check: bool, order: Order) -> Graph:
+    build = Builder()
+    transform = Legendre(system, build, iterations, order)
+    stated = system.momentum_rates(transform.p)
+    if stated is None:
+        gradient = cotangents({transform.lagrangian: ONE}, system.q, build)
+        stated = system.kinematics.slopes(gradient, transform.p, build)
+    with building(build):
+        with cg.tag("damping"):
+            braking = [damping * qd for damping, qd in zip(system.damping, system.qd, strict=True)]
+        rates = [
+            slope + tau + force - brake
+            for slope, tau, force, brake in zip(stated, system.tau, system.forces, braking, strict=True)
+        ]
+    moved = transform.tagged(transform.at([*system.q_dot, *rates]))
+    outputs = {f"q{i}_dot": node for i, node in enumerate(moved[: system.nq])}
+    outputs |= {f"p{i}_dot": node for i, node in enumerate(moved[system.nq :])}
+    if check:
+        outputs |= _missing(transform)
+    graph = cg.simplify(system.graph(outputs, system.q, transform.p, system.tau))
+    return cg.balanced_sums(graph) if order == "balanced" else graph
+
+
+def _missing(transform: Legendre) -> dict[str, Node]:
+    """What the iteration for the velocities leaves of the momenta, p - dL/dqd; 0 where there is none."""
+    left = [ZERO] * transform.system.n
+    if not transform.quadratic:
+        here = transform.at(transform.momenta)
+        with building(transform.build):
+            left = [p - momentum for p, momentum in zip(transform.p, here, strict=True)]
+    return {f"missing{i}": node for i, node in enumerate(left)}

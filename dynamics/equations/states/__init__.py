@@ -1,0 +1,1 @@
+"""States: values of graphs at them, and states that meet the constraints."""

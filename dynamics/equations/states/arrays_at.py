@@ -1,0 +1,133 @@
+"""Arrays at a state: the numbers of a model's graph, matrices and vectors in their shapes."""
+
+from __future__ import annotations
+
+import math
+import re
+import warnings
+from collections.abc import Mapping
+from itertools import groupby
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cgraph import Compiled, Graph
+from cgraph.extend import Array, kept_by_first
+
+from ...systems.model import Model, as_system
+from ...systems.system import System
+from ..constraints.constraint_rank import ConstraintWarning
+from ..constraints.nearly_redundant_rows import lost_rank
+from .evaluate_at import InputRows, evaluate_at
+
+_ENTRY = re.compile(r"(.*?[^\d_])((?:_\d+)+|\d+)")  # M_0_1, h_2, tau0
+
+
+def arrays_at(
+    model: Model,
+    graph: Graph | Compiled,
+    q: ArrayLike | None = None,
+    qd: ArrayLike | None = None,
+    qdd: ArrayLike | None = None,
+    tau: ArrayLike | None = None,
+    *,
+    t: float = 0.0,
+    parameters: Mapping[str, float] | None = None,
+) -> dict[str, Array]:
+    """The outputs of a graph at a state, or at many, as arrays by name: M_0_0, M_0_1, .. are the matrix "M".
+
+    Compiled, a graph is evaluated by machine code, many states side by side in vectors.
+
+    Parameters
+    ----------
+    model : Model
+        A system, a mechanism or a scene with n velocities, and nq coordinates.
+    graph : Graph or Compiled
+        Of the model, such as `mass_matrix(model)`: inputs among q0.., qd0.., qdd0.., tau0.., t and the parameters.
+    q : array_like, (nq,) or (N, nq)
+        Coordinates [rad or m]; by default 0, quaternions neutral.
+    qd, qdd, tau : array_like, (n,) or (N, n)
+        Velocities, accelerations, and applied forces [N m or N]; by default 0.
+    t : float
+        Time [s], for a model that depends on it.
+    parameters : mapping of str to float
+        Values in place of the model's.
+
+    Returns
+    -------
+    dict of str to ndarray
+        Outputs whose names differ in their indices alone are one array, the others are alone, of the shape (). In
+        front of these shapes stands N where there are N states.
+
+    Raises
+    ------
+    ValueError
+        For arrays of another shape, a number that is not finite, an unknown parameter, and a graph of another model.
+    TypeError
+        For what is no graph, or no model with a Lagrangian.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> arm = dyn.planar_arm(masses=[1.0, 1.0], lengths=[1.0, 1.0])
+    >>> dyn.arrays_at(arm, dyn.mass_matrix(arm), q=[0.0, 0.0])["M"].round(12).tolist()
+    [[2.666666666667, 0.833333333333], [0.833333333333, 0.333333333333]]
+    """
+    function, graph = (graph, graph.graph) if isinstance(graph, Compiled) else (None, graph)
+    if not isinstance(graph, Graph):
+        raise TypeError(f"graph must be a Graph, such as mass_matrix(model), got {type(graph).__name__}: {graph!r:.60}")
+    system, state = as_system(model), {"q": q, "qd": qd, "qdd": qdd, "tau": tau}
+    known = {*system.q, *system.qd, *system.qdd, *system.tau, system.t, *system.extra_inputs}
+    if unknown := [node.name for node in graph.inputs if node not in known]:
+        raise ValueError(f"the graph has the input {unknown[0]!r}, which is no state or parameter of the model")
+    if function is None:
+        flat = evaluate_at(system, graph, state, t, parameters)
+    else:
+        x = InputRows(system, graph.input_names)(state, t, parameters)
+        flat = function.batch(x.T).T if x.ndim == 2 else function(x)
+    _warn_of_lost_rank(system, flat, state, t, parameters)
+    arrays: dict[str, Array] = {}
+    start = 0
+    for name, shape in _shapes(graph):
+        end = start + math.prod(shape)
+        arrays[name] = flat[..., start:end].reshape((*flat.shape[:-1], *shape))
+        start = end
+    return arrays
+
+
+def _warn_of_lost_rank(
+    system: System, flat: Array, state: Mapping[str, ArrayLike | None], t: float, parameters: Mapping[str, float] | None
+) -> None:
+    """A ConstraintWarning where values are not finite, since rows of constraints follow from others at a state."""
+    finite = np.isfinite(flat).all(axis=-1)
+    if not len(system.constraints) or finite.all():
+        return
+    given = system.kinematics.neutral if state["q"] is None else state["q"]
+    rows = np.broadcast_to(np.asarray(given, dtype=np.float64), (*finite.shape, system.nq))
+    if lost := lost_rank(system.constraints, rows[~finite][0], t, {**system.parameters, **(parameters or {})}):
+        where = f" of row {int(np.argmin(finite))}" if finite.ndim else ""
+        warnings.warn(f"values{where} are not finite: {lost}", ConstraintWarning, stacklevel=3)
+
+
+@kept_by_first
+def _shapes(graph: Graph) -> list[tuple[str, tuple[int, ...]]]:
+    """Name and shape of the arrays that the names of a graph's outputs spell, one after another."""
+    arrays: list[tuple[str, tuple[int, ...]]] = []
+    for stem, run in groupby(graph.outputs, key=lambda name: _split(name)[0]):
+        names = list(run)
+        indices = [_split(name)[1] for name in names]
+        if len({len(index) for index in indices}) == 1:
+            shape = tuple([1 + max(axis) for axis in zip(*indices, strict=True)])
+            if list(np.ndindex(*shape)) == indices:
+                arrays.append((stem, shape))
+                continue
+        arrays += [(name, ()) for name in names]  # an array with entries left out
+    return arrays
+
+
+def _split(name: str) -> tuple[str, tuple[int, ...]]:
+    """The name of the array and the place in it, as in M_0_1, h_2 and tau0; of other names no place."""
+    match = _ENTRY.fullmatch(name)
+    if match is None:
+        return name, ()
+    return match[1], tuple([int(index) for index in match[2].strip("_").split("_")])

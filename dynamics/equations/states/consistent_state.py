@@ -1,0 +1,89 @@
+"""Consistent states: those that meet the constraints of a model."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cgraph.extend import Array, real_number
+
+from ...systems.model import Model, as_system
+from ..constraints.constraint_rank import ConstraintWarning
+from ..constraints.projection import projected
+from .initial_value import given_start
+
+MOVED = "the velocities do not meet the constraints and were moved onto them"
+ROUNDING = 1e-9  # of the largest velocity, those of angles and lengths by what they move
+
+
+def consistent_state(
+    model: Model, q: ArrayLike, qd: ArrayLike, t: float = 0.0, parameters: Mapping[str, float] | None = None
+) -> tuple[Array, Array]:
+    """The state that meets the constraints of a model and is near to (q, qd), in the metric of its mass matrix.
+
+    Parameters
+    ----------
+    model : Model
+        A system, a mechanism or a scene.
+    q, qd : array_like, (nq,) and (n,)
+        Where to start.
+    t : float
+        Time [s], for constraints that depend on it.
+    parameters : mapping, optional
+        {name: value} in place of the model's own.
+
+    Returns
+    -------
+    tuple of ndarray
+        q, (nq,), and qd, (n,); as they are of a state that meets the constraints to rounding.
+
+    Warns
+    -----
+    ConstraintWarning
+        Where a velocity is changed by more than rounding: what was given is not a motion that the constraints admit.
+
+    Raises
+    ------
+    ConstraintError
+        Where Newton's method does not arrive; the message names the constraint that is left open.
+    ValueError
+        For states of another shape.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> def energy(q, qd, t):
+    ...     return 0.5 * (qd[0] ** 2 + qd[1] ** 2)
+    >>> rod = dyn.System(energy, "x y", constraints=lambda q, t: {"rod": q[0] ** 2 + q[1] ** 2 - 1.0})
+    >>> q, qd = dyn.consistent_state(rod, [3.0, 4.0], [0.64, -0.48])
+    >>> q.round(12).tolist(), qd.round(12).tolist()
+    ([0.6, 0.8], [0.64, -0.48])
+    """
+    given = given_start(model, q, qd, 0.0, parameters)
+    place, velocity = nearest_state(model, q, qd, t, parameters)
+    system = as_system(model)
+    before, lengths = given.x[system.nq :], np.array(system.lengths[system.nq :])
+    lengths[lengths == 0.0] = 1.0  # of no known length
+    change = lengths * np.abs(velocity - before)
+    if change.max(initial=0.0) > ROUNDING * (lengths * np.maximum(np.abs(before), np.abs(velocity))).max(initial=0.0):
+        k = int(change.argmax())
+        text = f"velocity {system.velocities[k]!r} from {before[k]:.3g} to {velocity[k]:.3g}"
+        warnings.warn(f"{MOVED}, the most {text}", ConstraintWarning, stacklevel=2)
+    return place, velocity
+
+
+def nearest_state(
+    model: Model, q: ArrayLike, qd: ArrayLike, t: float = 0.0, parameters: Mapping[str, float] | None = None
+) -> tuple[Array, Array]:
+    """`consistent_state` of velocities that nobody chose, such as random ones: without a warning."""
+    system = as_system(model)
+    time = real_number("t", t)
+    if not math.isfinite(time):
+        raise ValueError(f"t must be finite, got {t!r} s")
+    start = given_start(model, q, qd, 0.0, parameters)
+    state = projected(system, start.x, time, {name: start.bound[name] for name in system.parameters})
+    return state[: system.nq], state[system.nq :]

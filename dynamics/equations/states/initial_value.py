@@ -1,0 +1,244 @@
+"""Initial value problems as a caller states them: the start, constant forces, parameter values and times, checked."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cgraph.extend import Array, real_array
+
+from ...systems.arguments import parameter_value, per_coordinate
+from ...systems.model import Model, system_of
+from ..constraints.projection import projected_start
+from ..state_equation import StateInputs, normalization, state_inputs
+
+PAST = 1e-14  # of the end: some roundings, by which a last time may lie past it
+
+
+class InitialValue(NamedTuple):
+    """Where a motion starts, and the numbers of every other input of its state equation."""
+
+    x: Array  # (m,): q, normalized, and then qd, or the states of an OdeSystem
+    states: tuple[str, ...]  # names of x
+    bound: dict[str, float]  # tau0.., parameters
+
+
+class InitialValues(NamedTuple):
+    """Where N motions start, and the other inputs of their state equation: one number for all, or one for each."""
+
+    x: Array  # (N, m)
+    states: tuple[str, ...]
+    bound: dict[str, float]
+    varied: dict[str, Array]  # (N,) each
+
+    def values(self, k: int) -> dict[str, float]:
+        """The inputs of motion k."""
+        return self.bound | {name: float(column[k]) for name, column in self.varied.items()}
+
+
+def initial_value(
+    model: Model,
+    q: ArrayLike,
+    qd: ArrayLike | None,
+    tau: float | Sequence[float] = 0.0,
+    parameters: Mapping[str, float] | None = None,
+    t: float = 0.0,
+) -> InitialValue:
+    """The start of a model's motion.
+
+    q, qd: (nq,) and (n,), or the states of an OdeSystem and None; of a quaternion in q only the direction counts.
+    tau: constant applied force, for all velocities or for each.  parameters: values in place of the model's own.
+    t: when [s]. A start that does not meet the constraints of a system is moved onto them, with a ConstraintWarning.
+
+    Raises TypeError or ValueError, naming the argument, for another shape or what is not finite.
+    """
+    x, states, bound, _ = initial_values(model, q, qd, tau, parameters, t, many=False)
+    return InitialValue(x[0], states, bound)
+
+
+def initial_values(
+    model: Model,
+    q: ArrayLike,
+    qd: ArrayLike | None,
+    tau: ArrayLike = 0.0,
+    parameters: Mapping[str, ArrayLike] | None = None,
+    t: float = 0.0,
+    *,
+    many: bool = True,
+) -> InitialValues:
+    """The starts of N motions; see `initial_value`. Each of the arguments has one row for all, or one for each.
+
+    many: else one motion, whose arguments have no axis N.
+    """
+    start = _given(model, q, qd, tau, parameters, many=many)
+    system = system_of(model)
+    if system is None or not len(system.constraints):
+        return start
+    rows = []
+    for k, x in enumerate(start.x):
+        values = start.values(k)
+        rows.append(projected_start(system, x, t, {name: values[name] for name in system.parameters}))
+    return start._replace(x=np.array(rows))
+
+
+def given_start(
+    model: Model,
+    q: ArrayLike,
+    qd: ArrayLike | None,
+    tau: float | Sequence[float] = 0.0,
+    parameters: Mapping[str, float] | None = None,
+) -> InitialValue:
+    """The start as it is given, whether or not it meets the constraints of the model."""
+    x, states, bound, _ = _given(model, q, qd, tau, parameters, many=False)
+    return InitialValue(x[0], states, bound)
+
+
+def _given(
+    model: Model,
+    q: ArrayLike,
+    qd: ArrayLike | None,
+    tau: Any,
+    parameters: Mapping[str, Any] | None,
+    *,
+    many: bool,
+) -> InitialValues:
+    """The starts as they are given."""
+    inputs, system = state_inputs(model), system_of(model)
+    n = len(inputs.applied)
+    nq = len(inputs.states) - n
+    bound, varied = _parameters(inputs, parameters, many=many)
+    if parameters and system is not None:
+        system.require_values({**bound, **varied})
+    counts = {f"parameter {name!r}": len(column) for name, column in varied.items()}
+    if system is None:
+        if np.any(real_array("tau", tau)):
+            raise ValueError(f"tau must be 0 for a system of first order, which no force acts on, got {tau!r:.60}")
+        if qd is not None:
+            raise ValueError("qd must be None for a system of first order; q holds its whole state")
+        rows = {"q": _rows("q", q, nq, "state", many=many)}
+    else:
+        rows = {"q": _rows("q", q, nq, "coordinate", many=many)}
+        rows["qd"] = _rows("qd", qd, n, "coordinate" if n == nq else "velocity", many=many)
+        if many and (tau := real_array("tau", tau)).ndim == 2:
+            columns = _rows("tau", tau, n, "velocity", many=many).T
+            counts = {"tau": len(tau)} | counts
+            varied = dict(zip(inputs.applied, columns, strict=True)) | varied
+        else:
+            forces = per_coordinate("tau", tau.tolist() if isinstance(tau, np.ndarray) else tau, model.velocities)
+            bound = dict(zip(inputs.applied, forces, strict=True)) | bound
+    parts = list(rows.values())
+    if many:
+        count = _one_count({what: len(array) for what, array in rows.items() if array.ndim == 2} | counts)
+        parts = [np.broadcast_to(array, (count, array.shape[-1])) for array in parts]
+    x = normalized(model, np.concatenate(parts, axis=-1))
+    return InitialValues(x.reshape(-1, x.shape[-1]), inputs.states, bound, varied)
+
+
+def normalized(model: Model, x: Array) -> Array:
+    """States (.., m) with the constraint of the coordinates met, such as quaternions of length 1.
+
+    Raises ValueError where there are no such, as of a quaternion of length 0.
+    """
+    graph = normalization(model)
+    if graph is None:
+        return x
+    columns = list(np.moveaxis(x, -1, 0))
+    with np.errstate(all="ignore"):
+        for _ in range(2):  # of a length that is far from 1, the first time is rounded
+            columns = list(graph.evaluate(dict(zip(graph.input_names, columns, strict=True))).values())
+    result = np.stack(np.broadcast_arrays(*columns), axis=-1)
+    if not (good := np.isfinite(result)).all():
+        *row, _ = np.argwhere(~good)[0].tolist()
+        bad = [k for k, fine in enumerate(good[*row]) if not fine]
+        names, values = ", ".join([repr(model.coordinates[k]) for k in bad]), x[*row, bad].tolist()
+        of = f" of trajectory {row[0]}" if row else ""
+        raise ValueError(f"{names} need a length whose square is neither 0 nor beyond float64, got {values}{of}")
+    return result
+
+
+def _check_names(inputs: StateInputs, names: Iterable[str]) -> None:
+    """Raises ValueError for a name that is no parameter."""
+    if unknown := [str(name) for name in names if name not in inputs.parameters]:
+        has = ", ".join(inputs.parameters) or "none"
+        raise ValueError(f"the system has no parameter {', '.join(unknown)} (it has {has})")
+
+
+def times_to_record(t_eval: ArrayLike, t_end: float = math.inf, t0: float = 0.0) -> Array:
+    """The times to record, (T,). A last one past t_end by rounding, as that of 0.1 * np.arange(4), becomes t_end.
+
+    Raises ValueError unless they go from t0 towards t_end, increasing, or decreasing where t_end < t0, and lie between.
+    """
+    times = real_array("t_eval", t_eval).copy()
+    direction, sense = (-1.0, "decreasing") if t_end < t0 else (1.0, "increasing")
+    span = f"in [{t0:g}, t_end = {t_end:g} s]" if math.isfinite(t_end) else f"from {t0:g} s on"
+    needed = f"t_eval must be {sense} times {span}"
+    if times.ndim != 1 or not len(times):
+        raise ValueError(f"{needed}, got shape {times.shape}")
+    if 0.0 < direction * (times[-1] - t_end) <= PAST * max(abs(t0), abs(t_end)):
+        times[-1] = t_end
+    listed: list[float] = times.tolist()
+    low, high = min(t0, t_end), max(t0, t_end)
+    outside = [t for t in listed if not (low <= t <= high and math.isfinite(t))]
+    if outside:
+        raise ValueError(f"{needed}, got {outside[0]!r}")
+    if order := [pair for pair in itertools.pairwise(listed) if not direction * pair[0] < direction * pair[1]]:
+        raise ValueError(f"{needed}, got {order[0][0]!r} before {order[0][1]!r}")
+    return times
+
+
+def _parameters(
+    inputs: StateInputs, parameters: Mapping[str, Any] | None, *, many: bool
+) -> tuple[dict[str, float], dict[str, Array]]:
+    """Parameters that are the same for all motions, and columns, (N,), of those that are not."""
+    if not isinstance(parameters, Mapping | None):
+        raise TypeError(f"parameters must be a mapping of names to numbers, got {parameters!r:.60}")
+    chosen, bound, varied = dict(parameters or {}), dict(inputs.parameters), dict[str, Array]()
+    _check_names(inputs, chosen)
+    for name, value in chosen.items():
+        if many and np.ndim(value):
+            varied[name] = _column(name, value)
+            del bound[name]
+        else:
+            bound[name] = parameter_value(name, np.asarray(value).item() if many else value)
+    return bound, varied
+
+
+def _rows(what: str, value: ArrayLike | None, n: int, item: str, *, many: bool) -> Array:
+    """Numbers for a motion, (n,), or of many also for each, (N, n)."""
+    array = None if value is None else real_array(what, value)
+    if array is None or array.ndim not in ((1, 2) if many else (1,)) or array.shape[-1] != n:
+        needed = f"(N, {n}), or ({n},) for all trajectories" if many else f"({n},), one for each {item}"
+        raise ValueError(f"{what} must have shape {needed}, got {None if array is None else array.shape}")
+    if not (good := np.isfinite(array)).all():
+        if array.ndim == 1:
+            raise ValueError(f"{what} must be finite, got {array.tolist()}")
+        row, column = np.argwhere(~good)[0].tolist()
+        raise ValueError(f"{what} must be finite, got {array[row, column]} at index {column} of trajectory {row}")
+    return array
+
+
+def _column(name: str, value: ArrayLike) -> Array:
+    array = real_array(f"parameter {name!r}", value)
+    if array.ndim != 1:
+        raise ValueError(f"parameter {name!r} must be a number or have shape (N,), got {array.shape}")
+    if not (good := np.isfinite(array)).all():
+        k = int(np.argmin(good))
+        raise ValueError(f"parameter {name!r} must be finite, got {array[k]} for trajectory {k}")
+    return array
+
+
+def _one_count(counts: Mapping[str, int]) -> int:
+    if not counts:
+        raise ValueError("how many trajectories: q, qd, tau or a parameter must have a row for each, (N, n) or (N,)")
+    if len(set(counts.values())) > 1:
+        rows = ", ".join(f"{what} has {count}" for what, count in counts.items())
+        raise ValueError(f"q, qd, tau and parameters must have the same number of trajectories, got: {rows}")
+    count = next(iter(counts.values()))
+    if not count:
+        raise ValueError("there must be at least one trajectory, got 0")
+    return count

@@ -1,0 +1,1 @@
+"""Rotations, twists and wrenches as nodes."""

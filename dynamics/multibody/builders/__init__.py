@@ -1,0 +1,1 @@
+"""Mechanisms from a few numbers."""

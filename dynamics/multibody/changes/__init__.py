@@ -1,0 +1,1 @@
+"""Mechanisms that change: impacts, releases, and what a scene does not need."""

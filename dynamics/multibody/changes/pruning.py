@@ -1,0 +1,289 @@
+"""Pruning: the graph of what a question needs, and what was left out of it, why, and how many nodes that saved."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+
+import cgraph as cg
+from cgraph import Graph
+from cgraph.extend import (
+    check_name,
+    counted,
+    real_number,
+    require_flag,
+    require_graph,
+    require_mapping,
+    require_sequence,
+)
+
+from ...equations.formulations.formulations import SMALL, inverse_dynamics, size
+from ...systems.model import Model, as_system
+from ..mechanism import as_mechanism
+from .switched_effects import EFFECTS as EFFECTS, absent_parts, has_effect, without_effect  # noqa: PLC0414 (public with `prune`)
+
+GROUPS = ("q", "qd", "qdd", "tau")
+NEVER = "unobservable inertial numbers"
+
+Equations = Callable[[Model], Graph]
+
+
+@dataclass(frozen=True)
+class OmittedTerm:
+    """Something that is not in a graph.
+
+    Parameters
+    ----------
+    what, why : str
+        What it is, and why it is not there.
+    nodes, edges : int
+        How many more there would be with it.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> arm = dyn.planar_arm([1.0, 0.8], [1.0, 0.5], damping=0.1)
+    >>> print(dyn.prune(arm, effects=["gravity"]).omitted[0])
+    damping: switched off (5 nodes, 8 edges)
+    """
+
+    what: str
+    why: str
+    nodes: int
+    edges: int
+
+    def __str__(self) -> str:
+        return f"{self.what}: {self.why} ({counted(self.nodes, 'node')}, {counted(self.edges, 'edge')})"
+
+
+@dataclass(frozen=True, eq=False)
+class PruneResult:
+    """What is left of a model after `prune`, and accounts of the rest, made on demand.
+
+    Parameters
+    ----------
+    model : Model
+        What is left.
+    graph : Graph
+        Its equations.
+    equations : callable
+        What makes a graph of a model.
+    steps : tuple
+        From the model as given to what is left.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> result = dyn.prune(dyn.planar_arm([1.0, 0.8], [1.0, 0.5]), regroup=True)
+    >>> len(result.full.nodes), len(result.graph.nodes)
+    (82, 73)
+    """
+
+    model: Model
+    graph: Graph
+    equations: Equations
+    steps: tuple[_Step, ...]  # from the model as given to what is left
+
+    @cached_property
+    def full(self) -> Graph:
+        """The graph of the model as given."""
+        return self.steps[0].graph(self.equations)
+
+    @cached_property
+    def omitted(self) -> tuple[OmittedTerm, ...]:
+        """What was in the full graph, in the order in which it was taken out: the nodes add up to the difference."""
+        before, result = self.full, []
+        for step in self.steps[1:]:
+            after = self.graph if step is self.steps[-1] else step.graph(self.equations)
+            result.append(OmittedTerm(step.what, step.why, *_saved(before, after)))
+            before = after
+        return tuple(result)
+
+    @cached_property
+    def absent(self) -> tuple[OmittedTerm, ...]:
+        """What the model as given has not, so that no graph of it has nodes for it, each counted by putting it in.
+
+        Gravity as on earth or, along the axes of some joints, askew; 0.3 for damping, stiffness and armature; a body of
+        1 kg for one without mass; a hinge in place of a weld.
+        """
+        last = self.steps[-1]
+        result: list[OmittedTerm] = []
+        mechanism, given = as_mechanism(self.model), as_mechanism(self.steps[0].model)
+        if mechanism is None or given is None:
+            return ()
+        for what, why, model in absent_parts(mechanism, given):
+            with_it = replace(last, model=model).graph(self.equations)
+            result.append(OmittedTerm(what, why, *_saved(with_it, self.graph)))
+        return tuple(result)
+
+    @cached_property
+    def remains(self) -> tuple[OmittedTerm, ...]:
+        """What is in the graph though no motion shows it; and the nodes that `regroup` would save."""
+        fewer = _regrouped(self.steps[-1])
+        if fewer is None:
+            return ()
+        without = fewer.graph(self.equations)
+        nodes, edges = _saved(self.graph, without)
+        return (OmittedTerm(NEVER, "not regrouped", nodes, edges),) if nodes > 0 else ()
+
+    def __str__(self) -> str:
+        lines = [f"{_size(self.full)} as given, {_size(self.graph)} left."]
+        for title, rows in (("Left out", self.omitted), ("Not there", self.absent), ("Remains", self.remains)):
+            if rows:
+                lines += [f"{title}:", *(f"  {row}" for row in rows)]
+        return "\n".join(lines)
+
+
+@dataclass(frozen=True, eq=False)
+class _Step:
+    """A model and what is asked of it, after `what` was taken out."""
+
+    model: Model
+    values: Mapping[str, float]
+    outputs: tuple[str, ...] | None
+    what: str = ""
+    why: str = ""
+
+    def graph(self, equations: Equations) -> Graph:
+        """Of inverse dynamics the smaller of the two small graphs, which may be the other one once numbers are in."""
+        if equations is not inverse_dynamics:
+            return self._graph(equations)
+        return min([self._graph(partial(equations, formulation=name)) for name in SMALL], key=size)
+
+    def _graph(self, equations: Equations) -> Graph:
+        graph = equations(self.model)
+        require_graph("prune, as what equations(model) gives,", graph)
+        if not self.values and self.outputs is None:
+            return graph
+        return cg.specialize(graph, _bound(graph, self.values), self.outputs)
+
+
+def prune(
+    model: Model,
+    equations: Equations = inverse_dynamics,
+    *,
+    effects: Iterable[str] = EFFECTS,
+    lock: Mapping[str, float] | None = None,
+    values: Mapping[str, float] | None = None,
+    outputs: Sequence[str] | None = None,
+    regroup: bool = False,
+) -> PruneResult:
+    """The equations of a model with what is asked for and nothing else.
+
+    Parameters
+    ----------
+    model : Model
+        A mechanism, a scene, or a Lagrangian.
+    equations : callable
+        The function that makes the graph: `inverse_dynamics`, `forward_dynamics`, `mass_matrix`, ...
+    effects : iterable of str
+        Those of `EFFECTS` that are kept: gravity, damping, springs, armature, forces. Of a Lagrangian that is not a
+        mechanism's, only damping and forces can be told apart.
+    lock : mapping, optional
+        {body: coordinate [rad or m]} of joints to lock, of a mechanism.
+    values : mapping, optional
+        {input: number} of inputs that become constants; "q", "qd", "qdd", "tau" stand for all of their kind, so that
+        {"qd": 0, "qdd": 0} leaves the torques that hold a posture.
+    outputs : sequence of str, optional
+        Names of those to keep.
+    regroup : bool
+        Give inertial numbers that no motion shows to the bodies further in, where that saves nodes. The motion is the
+        same, but accelerations lose digits, one or two on long chains and more under a heavy load; and the tag of a
+        body no longer stands for its own inertia alone.
+
+    Returns
+    -------
+    PruneResult
+        The model that is left, its graph with all inputs, and what was left out, why, and what that saved.
+
+    Raises
+    ------
+    ValueError
+        For an effect that is unknown or cannot be told apart, and as `cg.specialize` and `Mechanism.lock` do.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> arm = dyn.planar_arm([1.0, 0.8], [1.0, 0.5])
+    >>> result = dyn.prune(arm, values={"qd": 0.0, "qdd": 0.0})
+    >>> len(dyn.inverse_dynamics(arm).nodes), len(result.graph.nodes)
+    (50, 10)
+    """
+    model = as_mechanism(model) or as_system(model)
+    kept = require_sequence("effects", effects, "names", str)
+    if not callable(equations) or isinstance(equations, type):
+        raise TypeError(f"equations must be a function of a model, got {type(equations).__name__}: {equations!r:.60}")
+    if unknown := [each for each in kept if each not in EFFECTS]:
+        raise ValueError(f"effects are {', '.join(EFFECTS)}, got {unknown[0]!r}")
+    numbers = _mapping("values", values)
+    if numbers:
+        known = as_system(model).parameters
+        as_system(model).require_values(known | {name: value for name, value in numbers.items() if name in known})
+    steps = _steps(model, kept, _mapping("lock", lock), numbers, outputs)
+    graph = steps[-1].graph(equations)
+    fewer = _regrouped(steps[-1]) if require_flag("regroup", regroup) else None
+    if fewer is not None and len((candidate := fewer.graph(equations)).nodes) < len(graph.nodes):
+        steps.append(fewer)
+        graph = candidate
+    return PruneResult(steps[-1].model, graph, equations, tuple(steps))
+
+
+def _mapping(what: str, given: Mapping[str, float] | None) -> dict[str, float]:
+    """The numbers of a mapping by name; none for None."""
+    chosen = {} if given is None else require_mapping(what, given, "name: number")
+    return {check_name(what, name): real_number(f"{what}: {name!r}", value) for name, value in chosen.items()}
+
+
+def _regrouped(step: _Step) -> _Step | None:
+    """The step with base parameters; None of a model that has them or is no mechanism."""
+    mechanism = as_mechanism(step.model)
+    if mechanism is None or mechanism.base_parameters:
+        return None
+    return replace(step, model=replace(mechanism, base_parameters=True), what=NEVER, why="regrouped")
+
+
+def _steps(
+    model: Model,
+    kept: Collection[str],
+    lock: Mapping[str, float],
+    values: Mapping[str, float],
+    outputs: Sequence[str] | None,
+) -> list[_Step]:
+    """From the model as given, one thing after another taken out."""
+    steps = [_Step(model, {}, None)]
+    for effect in EFFECTS:
+        if effect not in kept and has_effect(steps[-1].model, effect):
+            less = without_effect(steps[-1].model, effect)
+            steps.append(replace(steps[-1], what=effect, why="switched off", model=less))
+    for body, at in lock.items():
+        mechanism = as_mechanism(steps[-1].model)
+        if mechanism is None:
+            raise ValueError(f"a joint can be locked of a Mechanism, got {type(model).__name__}")
+        locked = mechanism.lock(body, at)
+        steps.append(replace(steps[-1], what=f"joint of {body}", why=f"locked at {at:g}", model=locked))
+    for name, value in values.items():
+        known = {**steps[-1].values, name: value}
+        steps.append(replace(steps[-1], what=f"input {name}", why=f"is {value:g}", values=known))
+    if outputs is not None:
+        outputs = list(require_sequence("outputs", outputs, "names", str))
+        why = f"only {', '.join(outputs)} asked for"
+        steps.append(replace(steps[-1], what="other outputs", why=why, outputs=tuple(outputs)))
+    return steps
+
+
+def _bound(graph: Graph, values: Mapping[str, float]) -> dict[str, float]:
+    """The values by the graph's own names; a group's for every input of the group."""
+    result: dict[str, float] = {}
+    for name, value in values.items():
+        members = [each for each in graph.input_names if each.startswith(name) and each[len(name) :].isdecimal()]
+        result |= dict.fromkeys(members if name in GROUPS and members else [name], value)
+    return result
+
+
+def _saved(before: Graph, after: Graph) -> tuple[int, int]:
+    return len(before.nodes) - len(after.nodes), len(before.edges) - len(after.edges)
+
+
+def _size(graph: Graph) -> str:
+    return f"{counted(len(graph.nodes), 'node')} and {counted(len(graph.edges), 'edge')}"

@@ -1,0 +1,119 @@
+"""Forces and torques on bodies, and the generalized forces that they are."""
+
+from __future__ import annotations
+
+import math
+import numbers
+from collections.abc import Container, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+import cgraph as cg
+from cgraph import Node
+from cgraph.extend import Builder, building, cotangents, topological
+
+from ..algebra.spatial import ZERO, Triple
+from ..body import MechanismError, vector
+from ..sweeps.forward_kinematics import KinematicChain
+
+FORCE = "force"  # tag
+FRAMES = ("world", "body")
+Component = Node | float | str
+
+
+@dataclass(frozen=True, eq=False)
+class Force:
+    """A force on a body at a point, and a torque on the body, from outside the mechanism.
+
+    Parameters
+    ----------
+    body : str
+        Name of the body.
+    value, torque : sequence of 3
+        Force [N] and torque [N m] in the axes of `frame`. A component is a number, a parameter's name, or a node over
+        q0.., qd0.., t and parameters.
+    at : array_like, (3,)
+        The point, in the body's frame [m].
+    frame : str
+        "world", or "body": force and torque then turn with the body.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> cart = dyn.Body("cart", dyn.Joint("prismatic", (1.0, 0.0, 0.0)), mass=2.0)
+    >>> pushed = dyn.Mechanism([cart], forces=[dyn.Force("cart", ("push", 0.0, 0.0))])
+    >>> dyn.forward_dynamics(pushed).evaluate({"q0": 0.0, "qd0": 0.0, "tau0": 0.0, "push": 4.0})
+    {'qdd0': 2.0}
+    """
+
+    body: str
+    value: Sequence[Component] = (0.0, 0.0, 0.0)
+    at: ArrayLike = (0.0, 0.0, 0.0)
+    frame: str = "world"
+    torque: Sequence[Component] = (0.0, 0.0, 0.0)
+
+    @property
+    def components(self) -> tuple[Component, ...]:
+        """The six components, force first."""
+        return (*self.value, *self.torque)
+
+    @property
+    def names(self) -> set[str]:
+        """Names of the parameters and variables that it uses."""
+        variables = topological([each for each in self.components if isinstance(each, Node)])
+        named = {str(node.name) for node in variables if node.name}
+        return named | {each for each in self.components if isinstance(each, str)}
+
+
+def check_force(force: Force, bodies: Container[str]) -> None:
+    """Raises MechanismError unless the force is three and three components at a point of one of `bodies`."""
+    if not isinstance(force.body, str) or force.body not in bodies:
+        raise MechanismError(f"there is a force on the unknown body {force.body!r:.80}")
+    where = f"the force on body {force.body!r}"
+    vector(f"{where}: at", force.at)
+    if force.frame not in FRAMES:
+        raise MechanismError(f"{where}: frame must be one of {', '.join(FRAMES)}, got {force.frame!r}")
+    for what, given in (("value", force.value), ("torque", force.torque)):
+        if isinstance(given, str | Node) or not isinstance(given, Sequence | np.ndarray) or len(given) != 3:
+            raise MechanismError(f"{where}: {what} must have three components, got {given!r:.80}")
+        for each in given:
+            finite = isinstance(each, numbers.Real) and math.isfinite(each)
+            if not (finite or isinstance(each, str | Node)):
+                raise MechanismError(
+                    f"{where}: a component of {what} must be a finite number, a parameter's name or a node, "
+                    f"got {each!r:.60}"
+                )
+
+
+def generalized_forces(
+    forces: Sequence[tuple[Force, KinematicChain]], qd: Sequence[Node], parameters: Mapping[str, Node]
+) -> list[Node]:
+    """Q = J^T f + J_w^T torque of all forces together, one node for each of qd.
+
+    Virtual power is f . v + torque . w, v and w linear in qd, so one reverse sweep from v and w, seeded with the force
+    and the torque, gives its slope along qd. What the force itself depends on is not differentiated.
+    """
+    build = Builder()
+    total = [ZERO] * len(qd)
+    for force, chain in forces:
+        with building(build), cg.tag(force.body, FORCE):
+            value, torque = (_nodes(each, parameters) for each in (force.value, force.torque))
+            if force.frame == "body":
+                value, torque = chain.direction(value), chain.direction(torque)
+            motion = chain.motion(force.at)
+            seeds: dict[Node, Node] = {}
+            for rate, bar in zip((*motion.velocity, *motion.omega), (*value, *torque), strict=True):
+                seeds[rate] = seeds[rate] + bar if rate in seeds else bar  # two rates may be one node
+            shares = cotangents(seeds, qd, build)
+            total = [sum_ + share for sum_, share in zip(total, shares, strict=True)]
+    return total
+
+
+def _nodes(components: Sequence[Component], parameters: Mapping[str, Node]) -> Triple:
+    x, y, z = (
+        parameters[each] if isinstance(each, str) else each if isinstance(each, Node) else cg.constant(float(each))
+        for each in components
+    )
+    return x, y, z

@@ -1,0 +1,286 @@
+"""Joint forces: what acts along the freedoms of one joint, limits as springs, dry friction, and actuators."""
+
+from __future__ import annotations
+
+import math
+from abc import ABC, abstractmethod
+from collections.abc import Container, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+import cgraph as cg
+from cgraph import Node
+from cgraph.extend import Builder, building, check_name, real_array, real_number
+
+from ..body import Body, MechanismError
+from ..joint_coordinates import places
+from ..joints import COMPOSITIONS
+from .external_force import FORCE, Force, check_force
+
+Range = tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class JointForce(ABC):
+    """A force along the freedoms of a joint, smooth or with kinks, one of the `forces` of a mechanism.
+
+    On a joint that is locked it has no effect. `JointLimit`, `JointFriction` and `Actuator` are such forces; one of
+    your own says its force in `along` and what it refuses in `check`.
+
+    Parameters
+    ----------
+    body : str
+        The name of the body on the joint.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> class Cubic(dyn.JointForce):
+    ...     def check(self, body):
+    ...         pass
+    ...     def along(self, q, qd, parameters):
+    ...         return [-8.0 * q[0] ** 3]
+    >>> cart = dyn.Body("cart", dyn.Joint("prismatic", (1.0, 0.0, 0.0)), mass=2.0)
+    >>> sprung = dyn.Mechanism([cart], forces=[Cubic("cart")])
+    >>> dyn.forward_dynamics(sprung).evaluate({"q0": 0.5, "qd0": 0.0, "tau0": 0.0})
+    {'qdd0': -0.5}
+    """
+
+    body: str
+
+    @property
+    def components(self) -> tuple[str, ...]:
+        """Names of the parameters that it uses."""
+        return ()
+
+    @property
+    def names(self) -> set[str]:
+        """The same as a set."""
+        return set(self.components)
+
+    @abstractmethod
+    def check(self, body: Body) -> None:
+        """Raises MechanismError for a joint that it cannot act on, and for numbers out of range."""
+
+    @abstractmethod
+    def along(self, q: Sequence[Node], qd: Sequence[Node], parameters: Mapping[str, Node]) -> list[Node]:
+        """The force on every velocity of the joint."""
+
+    def _require(self, what: str, value: object, at_least: float = -math.inf) -> None:
+        where = f"{type(self).__name__} on body {self.body!r}"
+        number = real_number(f"{where}: {what}", value)
+        if not (math.isfinite(number) and number >= at_least):
+            bound = f" and at least {at_least:g}" if math.isfinite(at_least) else ""
+            raise MechanismError(f"{where}: {what} must be finite{bound}, got {number!r}")
+
+    def _require_axis(self, body: Body) -> None:
+        if len(body.joint.type.coordinates) != 1:
+            raise MechanismError(
+                f"{type(self).__name__} acts on joints of one coordinate, and that of body {body.name!r} is "
+                f"{body.joint.kind}"
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class JointLimit(JointForce):
+    """A limit of a joint, as a stiff spring beyond it: k x (1 + d x_dot), x >= 0 how far beyond, never pulling back.
+
+    Hunt and Crossley's contact, IEEE J. Robotics Autom. 1975: unlike with a damper alone, the force is continuous.
+
+    Parameters
+    ----------
+    body : str
+        The body on the joint, a hinge or slide.
+    lower, upper : float
+        The range of its coordinate [rad or m]; infinite where there is no limit.
+    stiffness : float
+        k > 0 [N m/rad or N/m].
+    damping : float
+        d >= 0 [s/rad or s/m]; a body that arrives with the speed v is thrown back with about v (1 - 2/3 d v).
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> cart = dyn.Body("cart", dyn.Joint("prismatic", (1.0, 0.0, 0.0)), mass=2.0)
+    >>> track = dyn.Mechanism([cart], forces=[dyn.JointLimit("cart", -1.0, 1.0, stiffness=1e4)])
+    >>> dyn.forward_dynamics(track).evaluate({"q0": 1.001, "qd0": 0.0, "tau0": 0.0})["qdd0"].__round__(6)
+    -5.0
+    """
+
+    lower: float
+    upper: float
+    stiffness: float
+    damping: float = 0.0
+
+    def check(self, body: Body) -> None:
+        """Raises MechanismError for a joint of several coordinates, an empty range, and numbers out of range."""
+        self._require_axis(body)
+        if not (real_number("lower", self.lower) < real_number("upper", self.upper)):
+            raise MechanismError(
+                f"JointLimit on body {self.body!r}: lower must be below upper, got {self.lower!r} and {self.upper!r}"
+            )
+        self._require("stiffness", self.stiffness, 0.0)
+        self._require("damping", self.damping, 0.0)
+
+    def along(self, q: Sequence[Node], qd: Sequence[Node], parameters: Mapping[str, Node]) -> list[Node]:
+        """The force of both ends."""
+        force = cg.constant(0.0)
+        for sign, end in ((1.0, self.upper), (-1.0, self.lower)):
+            if math.isfinite(end):
+                beyond = cg.maximum(sign * (q[0] - end), 0.0)
+                push = self.stiffness * beyond
+                if self.damping:
+                    push = push * cg.maximum(1.0 + sign * self.damping * qd[0], 0.0)
+                force = force - sign * push
+        return [force]
+
+
+@dataclass(frozen=True, eq=False)
+class JointFriction(JointForce):
+    """Dry friction of a joint, regularized: -loss tanh(qd / velocity). It creeps where true friction would stick.
+
+    Parameters
+    ----------
+    body : str
+        The body on the joint.
+    loss : float
+        The force of every freedom that slides [N m or N].
+    velocity : float
+        At which about three quarters of it act, > 0 [rad/s or m/s].
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> cart = dyn.Body("cart", dyn.Joint("prismatic", (1.0, 0.0, 0.0)), mass=2.0)
+    >>> rough = dyn.Mechanism([cart], forces=[dyn.JointFriction("cart", loss=4.0, velocity=0.01)])
+    >>> dyn.forward_dynamics(rough).evaluate({"q0": 0.0, "qd0": 1.0, "tau0": 0.0})
+    {'qdd0': -2.0}
+    """
+
+    loss: float
+    velocity: float
+
+    def check(self, body: Body) -> None:
+        """Raises MechanismError for numbers out of range."""
+        self._require("loss", self.loss, 0.0)
+        self._require("velocity", self.velocity, 0.0)
+        if self.velocity == 0.0:
+            raise MechanismError(f"JointFriction on body {self.body!r}: velocity must be positive, got 0.0")
+
+    def along(self, q: Sequence[Node], qd: Sequence[Node], parameters: Mapping[str, Node]) -> list[Node]:
+        """The force on every velocity."""
+        return [-self.loss * cg.tanh(rate / self.velocity) for rate in qd]
+
+
+@dataclass(frozen=True, eq=False)
+class Actuator(JointForce):
+    """An actuator of a joint with affine gain and bias, as MuJoCo's motors, position and velocity servos are.
+
+    force = gain . (1, l, v) * input + bias . (1, l, v), with l = gear q, v = gear qd; the joint gets gear * force.
+
+    Parameters
+    ----------
+    body : str
+        The body on the joint, a hinge or slide.
+    input : str
+        The parameter that controls it; 0 where a run says nothing else.
+    gear : float
+        Transmission ratio.
+    gain, bias : sequence of 3 floats
+        Of 1, length and velocity: a motor has (1, 0, 0) and zeros; a position servo (kp, 0, 0) and (0, -kp, -kv).
+    input_range, force_range, joint_range : pair of floats, optional
+        Between which input, force, and the force on the joint are cut off.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> cart = dyn.Body("cart", dyn.Joint("prismatic", (1.0, 0.0, 0.0)), mass=2.0)
+    >>> servo = dyn.Actuator("cart", "target", gain=(50.0, 0.0, 0.0), bias=(0.0, -50.0, 0.0))
+    >>> track = dyn.Mechanism([cart], forces=[servo])
+    >>> dyn.forward_dynamics(track).evaluate({"q0": 0.1, "qd0": 0.0, "tau0": 0.0, "target": 0.3})["qdd0"].__round__(6)
+    5.0
+    """
+
+    input: str
+    gear: float = 1.0
+    gain: Sequence[float] = (1.0, 0.0, 0.0)
+    bias: Sequence[float] = (0.0, 0.0, 0.0)
+    input_range: Range | None = None
+    force_range: Range | None = None
+    joint_range: Range | None = None
+
+    @property
+    def components(self) -> tuple[str, ...]:
+        """The name of the input."""
+        return (self.input,)
+
+    def check(self, body: Body) -> None:
+        """Raises MechanismError for a joint of several coordinates, and for numbers that are not finite."""
+        self._require_axis(body)
+        where = f"Actuator on body {self.body!r}"
+        check_name(f"the input of the {where}", self.input, spaces=False)
+        self._require("gear", self.gear)
+        for what, numbers in (("gain", self.gain), ("bias", self.bias)):
+            if (row := real_array(f"{where}: {what}", numbers)).shape != (3,) or not np.isfinite(row).all():
+                raise MechanismError(f"{where}: {what} needs three finite numbers, got {numbers!r:.60}")
+        for what, pair in (("input", self.input_range), ("force", self.force_range), ("joint", self.joint_range)):
+            if pair is not None:
+                row = real_array(f"{where}: {what}_range", pair)
+                if row.shape != (2,) or not row[0] <= row[1]:
+                    raise MechanismError(f"{where}: {what}_range must be (lower, upper), got {pair!r:.60}")
+
+    def along(self, q: Sequence[Node], qd: Sequence[Node], parameters: Mapping[str, Node]) -> list[Node]:
+        """The force on the joint."""
+        gain, bias = (_affine(numbers, self.gear * q[0], self.gear * qd[0]) for numbers in (self.gain, self.bias))
+        force = _within(gain * _within(parameters[self.input], self.input_range) + bias, self.force_range)
+        return [_within(self.gear * force, self.joint_range)]
+
+
+def _affine(numbers: Sequence[float], length: Node, velocity: Node) -> Node:
+    terms = [number * node for number, node in zip(numbers[1:], (length, velocity), strict=True) if number]
+    return sum(terms, cg.constant(float(numbers[0])))
+
+
+def _within(node: Node, limits: Range | None) -> Node:
+    return node if limits is None else cg.minimum(cg.maximum(node, float(limits[0])), float(limits[1]))
+
+
+def check_any_force(force: Force | JointForce, carried: Container[str], bodies: Sequence[Body]) -> None:
+    """Raises MechanismError for a force that bodies, or the joint of one, cannot have.  carried: names of bodies."""
+    if isinstance(force, JointForce):
+        _check_joint_force(force, bodies)
+    else:
+        check_force(force, carried)
+
+
+def _check_joint_force(force: JointForce, bodies: Sequence[Body]) -> None:
+    named = {body.name: body for body in bodies}
+    if not isinstance(force.body, str) or force.body not in named:
+        raise MechanismError(f"there is a force on the joint of the unknown body {force.body!r:.80}")
+    body = named[force.body]
+    if body.joint.kind in COMPOSITIONS:
+        acts = f"{type(force).__name__} acts on joints of one coordinate"
+        raise MechanismError(f"{acts}, and that of body {body.name!r} is {body.joint.kind}")
+    if not body.joint.type.moves:
+        raise MechanismError(f"there is a force on the joint of body {body.name!r}, which does not move")
+    force.check(body)
+
+
+def add_joint_forces(
+    total: Sequence[Node],
+    forces: Sequence[object],
+    moving: Sequence[Body],
+    state: tuple[Sequence[Node], Sequence[Node]],
+    parameters: Mapping[str, Node],
+) -> list[Node]:
+    """A force for each velocity, with those of joints added.  moving: bodies.  state: q and qd."""
+    result, (q, qd) = list(total), state
+    where = {body.name: place for body, place in zip(moving, places(moving), strict=True)}
+    for force in [each for each in forces if isinstance(each, JointForce)]:
+        if (place := where.get(force.body)) is not None:
+            with building(Builder()), cg.tag(force.body, FORCE):
+                along = force.along(q[place.q], qd[place.u], parameters)
+                for k, node in zip(range(place.u.start, place.u.stop), along, strict=True):
+                    result[k] = result[k] + node
+    return result

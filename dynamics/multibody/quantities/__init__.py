@@ -1,0 +1,1 @@
+"""Quantities of a mechanism: frames, momentum, center of mass, regressor, torques by sweeps."""

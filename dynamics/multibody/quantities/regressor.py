@@ -1,0 +1,142 @@
+"""The regressor: joint forces as a matrix times the bodies' inertial parameters."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+import cgraph as cg
+from cgraph import Graph, Node
+from cgraph.extend import Array, Builder, building
+
+from ...equations.formulations.formulations import inverse_dynamics
+from ...systems.model import Model
+from ...systems.system import System
+from ..algebra import spatial
+from ..body import WORLD, quantities
+from ..joint_coordinates import parts, quasi_velocities
+from ..joints import moving_type
+from ..mechanism import Mechanism, as_mechanism
+from ..sweeps.body_motion import energy, ground, propagate_motion
+from ..sweeps.inertial_numbers import Link, axes_of, link
+
+PARAMETERS = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")  # the order of Pinocchio
+_LOWER = ((0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2))  # entries of I in that order
+
+
+def regressor(model: Model) -> Graph:
+    """Y(q, qd, qdd) with Y pi = tau - armature qdd - damping qd - spring forces + applied forces.
+
+    pi: for each moving body the ten `PARAMETERS`, see `inertial_parameters`. Each partial Lagrangian is linear in them,
+    so Y is the Jacobian of inverse dynamics by them: one reverse sweep a joint over the graph in which they are
+    variables. A column of zeros is a parameter that no motion reveals; which combinations of the others do, the rank
+    of stacked Y tells.
+
+    Parameters
+    ----------
+    model : Model
+        A mechanism, or a scene of one.
+
+    Returns
+    -------
+    Graph
+        Inputs q0.., qd0.., qdd0.., parameters; outputs Y_0_0, Y_0_1, .. row by row, (n, 10 n).
+
+    Raises
+    ------
+    TypeError
+        For a model without bodies.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> len(dyn.regressor(dyn.planar_arm([1.0, 0.8], [1.0, 0.5])).outputs)
+    40
+    """
+    mechanism = _mechanism(model)
+    names = [f"{each}_{i}" for i in range(len(mechanism.moving)) for each in PARAMETERS]
+    while set(names) & mechanism.parameter_values.keys():
+        names = [f"{name}_" for name in names]
+    system = System(
+        lambda q, qd, t, p: _partial_lagrangians(mechanism, q, qd, [p[name] for name in names]),
+        mechanism.coordinates,
+        dict.fromkeys(names, 0.0) | mechanism.parameter_values,
+        quasi_velocities=quasi_velocities(mechanism.moving),
+    )
+    slopes = cg.jacobian(inverse_dynamics(system), names).outputs.values()
+    width = len(names)
+    outputs = {f"Y_{k // width}_{k % width}": slope for k, slope in enumerate(slopes)}
+    parameters = cg.variables(list(mechanism.parameter_values))
+    return cg.simplify(Graph([*system.q, *system.qd, *system.qdd, *parameters], outputs))
+
+
+def inertial_parameters(model: Model) -> Array:
+    """Mass, first moment and inertia about the joint's origin of each moving body, all that is welded to it merged in.
+
+    Parameters
+    ----------
+    model : Model
+        A mechanism, or a scene of one.
+
+    Returns
+    -------
+    ndarray, (n, 10)
+        In the bodies' axes, columns as `PARAMETERS`: m [kg], m c [kg m], and Ixx, Ixy, Iyy, Ixz, Iyz, Izz [kg m^2].
+        Of the mechanism's own parameters it takes the values.
+
+    Raises
+    ------
+    TypeError
+        For a model without bodies.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> dyn.inertial_parameters(dyn.planar_arm([2.0], [3.0], mass_model="point"))[0, :4].tolist()
+    [2.0, 0.0, 0.0, -6.0]
+    """
+    rows = []
+    for body in _mechanism(model).bind().moving:
+        mass, center = float(body.mass), np.asarray(body.center)
+        inertia = spatial.parallel_axis(np.asarray(body.inertia), mass, center)
+        rows.append([mass, *(mass * center), *(inertia[i, j] for i, j in _LOWER)])
+    return np.array(rows)
+
+
+def _mechanism(model: Model) -> Mechanism:
+    mechanism = as_mechanism(model)
+    if mechanism is None:
+        raise TypeError(f"a regressor needs a Mechanism, got {type(model).__name__}: {model!r:.60}")
+    return mechanism
+
+
+def _partial_lagrangians(mechanism: Mechanism, q: list[Node], qd: list[Node], pi: list[Node]) -> list[Node]:
+    motions, axes = {WORLD: ground(quantities("gravity", mechanism.gravity))}, {WORLD: np.eye(3)}
+    partials = []
+    with building(Builder()):
+        states = parts(mechanism.moving, q, qd)
+        for i, body in enumerate(mechanism.moving):
+            axes[body.name] = axes_of(body)
+            known, joint = link(body, axes[body.parent]), moving_type(body.joint.type)
+            with cg.tag(body.name):
+                motions[body.name] = propagate_motion(motions[body.parent], known, joint, *states[i])
+                unknown = _symbolic(known, axes[body.name], pi[10 * i : 10 * i + 10])
+                partials.append(energy(motions[body.name], unknown, joint, *states[i]))
+    return partials
+
+
+def _symbolic(known: Link, axes: Array, pi: list[Node]) -> Link:
+    """The link with its inertial numbers as nodes, turned from the body's axes into those of its motion."""
+    mass, x, y, z, *lower = pi
+    entries = dict(zip(_LOWER, lower, strict=True))
+    inertia = [[entries[max(i, j), min(i, j)] for j in range(3)] for i in range(3)]
+    half = [
+        spatial.rotate_transpose(axes.tolist(), (row[0], row[1], row[2])) for row in inertia
+    ]  # I axes, as I is symmetric
+    columns = [spatial.rotate_transpose(axes.tolist(), (half[0][j], half[1][j], half[2][j])) for j in range(3)]
+    turned = [[columns[j][i] for j in range(3)] for i in range(3)]
+    moment = spatial.rotate_transpose(axes.tolist(), (x, y, z))
+    return replace(
+        known, mass=mass, moment=moment, inertia=turned, damping=0.0, stiffness=0.0, spring_reference=0.0, armature=0.0
+    )

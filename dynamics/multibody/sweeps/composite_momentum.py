@@ -1,0 +1,143 @@
+"""Composite momentum: the rates of the momenta of a tree of bodies from what each body and all that it carries have.
+
+A body and all that it carries have the momentum (n, f) about the body's origin, the first moment h and the mass m. What
+turns and moves with the body has no other part in the rate of its momentum than that the axes turn, that the origin
+moves, and gravity:
+
+    n_dot = -(w x n + v x f) + h x g,   f_dot = -w x f + m g          (and what the joint that carries it does)
+
+The momentum p of a velocity is the share of (n, f) along it, and its rate that of (n_dot, f_dot): for a hinge about z
+n_x w_y - n_y w_x + f_x v_y - f_y v_x + (h_x g_y - h_y g_x). No acceleration is needed. And where a share of (n, f) is
+one of the momenta, it need not be summed up from the bodies.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import cgraph as cg
+from cgraph import Node
+from cgraph.extend import as_node
+
+from ..algebra import spatial
+from ..algebra.spatial import STILL, ZERO, Triple, cross, plus, scaled
+from ..algebra.spatial_vectors import Twist, Wrench
+from ..joints import AxialJoint, MovingJoint, SpatialJoint
+from .body_motion import Motion, carrier_motion, in_body_axes, in_plane_axes, joint_translation, spring_forces
+from .inertial_numbers import Link
+from .newton_euler import KINETIC, POTENTIAL
+
+ONE = as_node(1.0)
+COMPOSITE = "momentum"  # tag of what composite momenta are made of, and of the rates made of them
+
+
+class CompositeMomentum(NamedTuple):
+    """Of a body and all that it carries, about the body's origin, in the axes of its motion."""
+
+    mass: Node
+    moment: Triple
+    momentum: Wrench
+
+    def plus(self, other: CompositeMomentum) -> CompositeMomentum:
+        """Of both."""
+        with cg.tag(POTENTIAL):
+            mass, moment = self.mass + other.mass, plus(self.moment, other.moment)
+        with cg.tag(KINETIC):
+            return CompositeMomentum(mass, moment, self.momentum.plus(other.momentum))
+
+
+def body_momentum(motion: Motion, link: Link) -> CompositeMomentum:
+    """Of the body alone: f = m v + w x h, n = J w + h x v. In a plane n_z is a momentum, and the rest has no part."""
+    h, w, v, mass = in_plane_axes(motion, link.moment), motion.omega, motion.velocity, as_node(link.mass)
+    with cg.tag(KINETIC):
+        force = plus(scaled(mass, v), cross(w, h))
+        torque = STILL
+        if not motion.plane:
+            inertia = [[link.inertia[max(i, j)][min(i, j)] for j in range(3)] for i in range(3)]
+            torque = plus(spatial.rotate(inertia, w), cross(h, v))
+    return CompositeMomentum(mass, h, Wrench(torque, force))
+
+
+def stated(
+    composite: CompositeMomentum,
+    link: Link,
+    joint: MovingJoint,
+    q: Sequence[Node],
+    u: Sequence[Node],
+    p: Sequence[Node],
+) -> CompositeMomentum:
+    """With the momenta p of the joint's velocities u in place of the shares of (n, f) that they are."""
+    torque, force = list(composite.momentum.torque), list(composite.momentum.force)
+    own = [momentum - link.armature * velocity for momentum, velocity in zip(p, u, strict=True)]
+    sliding = joint.sliding if isinstance(joint, SpatialJoint) else 0
+    if isinstance(joint, SpatialJoint) and sliding:
+        force = list(spatial.rotate_transpose(joint.rotation(q), (own[0], own[1], own[2])))
+    for twist, momentum in list(zip(along(joint, q), own, strict=True))[sliding:]:
+        shares = [each.value for each in (*twist.angular, *twist.linear)]
+        if sorted(map(str, shares)) == ["0.0"] * 5 + ["1.0"]:
+            k = shares.index(1.0)
+            (torque if k < 3 else force)[k % 3] = momentum
+    return composite._replace(momentum=Wrench((torque[0], torque[1], torque[2]), (force[0], force[1], force[2])))
+
+
+def momentum_rates(
+    composite: CompositeMomentum,
+    parent: Motion,
+    motion: Motion,
+    link: Link,
+    joint: MovingJoint,
+    q: Sequence[Node],
+    u: Sequence[Node],
+    p: Sequence[Node],
+) -> list[Node]:
+    """The rates of the momenta p of a joint's velocities u, without applied forces; the spring's among them."""
+    rates: list[Node] = []
+    if isinstance(joint, SpatialJoint) and joint.sliding:  # along the joint's axes, which turn with the parent
+        carrier = in_body_axes(parent)
+        with cg.tag(KINETIC):
+            x, y, z = (p[k] - link.armature * u[k] for k in range(3))
+            turned = cross(spatial.rotate_transpose(link.turn, carrier.omega), (x, y, z))
+        with cg.tag(POTENTIAL):
+            up = spatial.rotate_transpose(link.turn, scaled(parent.strength, carrier.vertical))
+            rates = [-(a + composite.mass * b) for a, b in zip(turned, up, strict=True)]
+    with cg.tag(KINETIC):
+        carried = composite.momentum.carried(Twist(motion.omega, motion.velocity))
+    with cg.tag(POTENTIAL):
+        up = scaled(motion.strength, motion.vertical)  # gravity is -up
+        loss = carried.plus(Wrench(cross(composite.moment, up), scaled(composite.mass, up)))
+        rates += [-twist.power(loss) for twist in along(joint, q)[len(rates) :]]
+        springs = [force for _, force in spring_forces(link, joint, q, u)] or [ZERO] * len(rates)
+        return [rate - spring for rate, spring in zip(rates, springs, strict=True)]
+
+
+def about_parent(
+    composite: CompositeMomentum, parent: Motion, motion: Motion, link: Link, joint: MovingJoint, q: Sequence[Node]
+) -> CompositeMomentum:
+    """The same about the parent's origin, in the axes of the parent's motion."""
+    carrier, offset = carrier_motion(parent, link, joint), joint_translation(link, joint, q)
+
+    def turned(vector: Triple) -> Triple:
+        if isinstance(joint, SpatialJoint):
+            vector = spatial.rotate(joint.rotation(q), vector)
+        elif not motion.plane:
+            angle = joint.angle(q[0])
+            vector = spatial.rotate_about_z(cg.cos(angle), -cg.sin(angle), vector)
+        vector = spatial.rotate(link.turn, vector)
+        return in_plane_axes(parent, vector) if parent.plane and not carrier.plane else vector
+
+    offset = in_plane_axes(parent, offset)
+    with cg.tag(POTENTIAL):
+        moment = plus(turned(composite.moment), scaled(composite.mass, offset))
+    with cg.tag(KINETIC):
+        momentum = Wrench(turned(composite.momentum.torque), turned(composite.momentum.force)).about(offset)
+    return CompositeMomentum(composite.mass, moment, momentum)
+
+
+def along(joint: MovingJoint, q: Sequence[Node]) -> list[Twist]:
+    """How each velocity of the joint moves the body, in the body's axes."""
+    if isinstance(joint, AxialJoint):
+        return [Twist((ZERO, ZERO, joint.angle(ONE)), (ZERO, ZERO, joint.shift(ONE)))]
+    count = len(joint.velocities)
+    units = [[ONE if i == k else ZERO for i in range(count)] for k in range(count)]
+    return [Twist(joint.angular_velocity(q, unit), joint.linear_velocity(q, unit)) for unit in units]

@@ -1,0 +1,206 @@
+"""Links for equations: the same bodies, with origins and axes in which more of their numbers are zero.
+
+An axial joint may have its origin anywhere on its axis, and the axes of a hinge may be turned about it. With the
+origin where the common normal with the axis of the parent's joint meets it, and the parent's axes turned so that the
+normal is along one of them, a joint is placed by (a, 0, d), and its axis turned about one axis of the parent's alone.
+(J. Denavit, R. S. Hartenberg, "A kinematic notation for lower-pair mechanisms based on matrices", J. Applied Mechanics
+22(2), 1955.) So it is done only where fewer numbers are left, and no origin is moved further than its link and the
+parent's move are long: the normal of axes that are nearly parallel may be far away, and the way back takes digits.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from cgraph import Node
+from cgraph.extend import Array
+
+from ..algebra import spatial
+from ..joints import AxialJoint, JointType
+from ..joints.revolute import Revolute
+from .inertial_numbers import Link
+
+_FAR = 100.0  # times the extent of a body, at most, for its origin from where it was: two digits of its numbers
+_TURN = 4  # numbers in a turn that is about one axis, less than in one about three: products for every vector
+
+
+class _Numbers(NamedTuple):
+    """A link's numbers as arrays, on the way to others.
+
+    reach: how far its origin may be moved [m].  angle: see `Link`.  moved: how far its origin was moved [m].
+    """
+
+    turn: Array
+    place: Array
+    mass: float
+    moment: Array
+    inertia: Array
+    joint: JointType
+    reach: float = 0.0
+    angle: float = 0.0
+    moved: float = 0.0
+
+    @property
+    def placed_by(self) -> int:
+        """How many numbers place it."""
+        turned = int(np.count_nonzero(self.turn[:2, 2]) == 2)
+        return int(np.count_nonzero(self.place)) + _TURN * turned
+
+    @property
+    def numbers(self) -> int:
+        """How many there are that other origins and axes may have as zeros."""
+        inertia = self.inertia
+        shown = [self.moment[0], self.moment[1], inertia[0, 1], inertia[0, 2], inertia[1, 2]]
+        return self.placed_by + int(np.count_nonzero(shown))
+
+    def carried(self, by: _Numbers) -> _Numbers:
+        """On the parent as it is now, placed as on the one before its origin was moved and its axes were turned."""
+        back = _about_z(-by.angle)
+        place = spatial.product(back, spatial.added(self.place, np.array([0.0, 0.0, -by.moved])))
+        return self._replace(turn=spatial.snapped(back @ self.turn), place=place)
+
+    def along(self, move: float) -> _Numbers:
+        """With the origin moved along its own axis."""
+        back = np.array([0.0, 0.0, -move])
+        crossed = np.outer(back, self.moment)
+        inertia = spatial.added(self.inertia, 2.0 * np.trace(crossed) * np.eye(3) - crossed - crossed.T)
+        return self._replace(
+            place=spatial.added(self.place, move * self.turn[:, 2]),
+            moment=spatial.added(self.moment, self.mass * back),
+            inertia=spatial.parallel_axis(inertia, self.mass, back),
+            moved=move,
+        )
+
+    def turned(self, angle: float) -> _Numbers:
+        """Of a hinge, with its axes turned about its own."""
+        back = _about_z(-angle)
+        inertia = spatial.product(back, self.inertia, back.T)
+        return self._replace(moment=spatial.product(back, self.moment), inertia=inertia, angle=angle)
+
+    def to_normal(self, parent_moved: float) -> _Numbers:
+        """With its origin on the common normal with the parent's axis, unless that is far away."""
+        (x, y, z), place = self.turn[:, 2], self.place
+        across = x * x + y * y
+        move = -(place[0] * x + place[1] * y) / across if across else -place[2] / z
+        most = min(self.reach, float(np.linalg.norm(place)) + abs(parent_moved))
+        return self.along(float(move)) if isinstance(self.joint, AxialJoint) and abs(move) <= most else self
+
+    def less_turned(self) -> tuple[_Numbers, float]:
+        """Of a hinge, without what turns it about its own axis before it turns, but for quarters; and how far that is.
+
+        As it is where its axis is across no axis of the parent's.
+        """
+        x, y, z = self.turn[:, 2]
+        if (x != 0.0 and y != 0.0) or not isinstance(self.joint, Revolute):
+            return self, 0.0
+        left = np.array(
+            [[1.0, 0.0, 0.0], [0.0, z, y], [0.0, -y, z]] if x == 0.0 else [[z, 0.0, x], [0.0, 1.0, 0.0], [-x, 0.0, z]]
+        )
+        rest = left.T @ self.turn
+        angle = math.atan2(rest[1, 0], rest[0, 0])
+        small = _within_quarter(angle)
+        return (self._replace(turn=left @ np.rint(_about_z(angle - small)) + 0.0), small) if small else (self, 0.0)
+
+
+def equation_links(
+    links: Sequence[Link], joints: Sequence[JointType], parents: Sequence[int], *, outwards: bool = False
+) -> list[Link]:
+    """The links, parents first, moved and turned so. Those with parameters stay, and so do their parents.
+
+    joints: their types.  parents: index of each one's parent, -1 for the world.
+    outwards: where as many numbers are left whether an origin is moved or not, always have them further out, where
+    fewer columns of a mass matrix meet them; else not where the parent turns about the axis of its own parent, as
+    velocities have fewer components there.
+    """
+    children: list[list[int]] = [[] for _ in links]
+    for i, parent in enumerate(parents):
+        if parent >= 0:
+            children[parent].append(i)
+    known = {i: _numbers(*pair) for i, pair in enumerate(zip(links, joints, strict=True)) if _is_numeric(pair[0])}
+    for i in reversed(range(len(links))):  # from the tips: no further than what is carried by the least body
+        if i in known:
+            reach = min([_FAR * _extent(known[i]), *[known[child].reach for child in children[i] if child in known]])
+            known[i] = known[i]._replace(reach=reach)
+    result = list(links)
+    for i, parent in enumerate(parents):
+        if i not in known:
+            continue
+        old, angle = known[i], 0.0
+        if parent in known:
+            known[i] = known[i].carried(known[parent])
+            known[i], angle = known[i].less_turned()
+        if all([child in known for child in children[i]]):
+            in_plane = parent in known and parents[parent] >= 0 and not known[parent].turn[:2, 2].any()
+            further = outwards or not in_plane
+            known[i] = _best(known[i], known.get(parent), [known[child] for child in children[i]], further)
+        if known[i] is not old:
+            result[i] = _link(links[i], known[i], angle)
+    return result
+
+
+def _best(own: _Numbers, parent: _Numbers | None, children: Sequence[_Numbers], further: bool) -> _Numbers:
+    """Moved and turned so that the fewest numbers of it and of what it carries are left; of as many further out."""
+    choices = [own]
+    if isinstance(own.joint, AxialJoint):
+        if parent is not None and isinstance(parent.joint, AxialJoint):
+            choices.append(own.to_normal(parent.moved))
+        else:  # where the first of the children has its normal
+            moves = [float(child.to_normal(0.0).place[2]) for child in children[:1]]
+            choices += [own.along(move) for move in moves if abs(move) <= own.reach]
+    if isinstance(own.joint, Revolute):
+        choices += [each.turned(angle) for each in choices for child in children for angle in _turns(each, child)]
+
+    def left(choice: _Numbers) -> tuple[int, bool, bool]:
+        placed = [each.carried(choice).to_normal(choice.moved) for each in children]
+        return (
+            choice.numbers + sum([each.placed_by for each in placed]),
+            choice.angle != 0.0,
+            further == (choice.moved == 0.0),
+        )
+
+    return min(choices, key=left)
+
+
+def _turns(own: _Numbers, child: _Numbers) -> list[float]:
+    """The angle that turns the axes to the common normal with a child's axis, but for quarter turns."""
+    placed = child.carried(own).to_normal(own.moved)
+    x, y = placed.turn[:2, 2] if placed.turn[:2, 2].any() else placed.place[:2]
+    return [_within_quarter(math.atan2(y, x))] if x != 0.0 and y != 0.0 else []
+
+
+def _extent(body: _Numbers) -> float:
+    """How far from its origin the mass of a body is, by its moments; infinite without any."""
+    return math.sqrt(float(np.abs(body.inertia).max()) / body.mass) if body.mass > 0.0 else math.inf
+
+
+def _within_quarter(angle: float) -> float:
+    """What is left of an angle beside quarter turns; no rounding of one."""
+    rest = angle - round(angle / (math.pi / 2)) * (math.pi / 2)
+    return rest if abs(rest) > spatial.SNAP else 0.0
+
+
+def _about_z(angle: float) -> Array:
+    return spatial.rotation(np.array([0.0, 0.0, 1.0]), angle)
+
+
+def _is_numeric(link: Link) -> bool:
+    return not any([isinstance(each, Node) for each in link.numbers[:19]])
+
+
+def _numbers(link: Link, joint: JointType) -> _Numbers:
+    place, moment = (np.array([spatial.plain(each) for each in triple]) for triple in (link.place, link.moment))
+    inertia = np.array([[link.inertia[max(i, j)][min(i, j)] for j in range(3)] for i in range(3)])
+    return _Numbers(np.array(link.turn, dtype=np.float64), place, float(link.mass), moment, inertia, joint)
+
+
+def _link(link: Link, to: _Numbers, angle: float) -> Link:
+    """The link in other numbers.  angle: more than its axes are turned by."""
+    place, moment = spatial.constant(to.place), spatial.constant(to.moment)
+    return replace(
+        link, turn=to.turn.tolist(), place=place, moment=moment, inertia=to.inertia.tolist(), angle=to.angle + angle
+    )
