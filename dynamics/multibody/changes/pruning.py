@@ -75,9 +75,9 @@ class PruneResult:
     Examples
     --------
     >>> import dynamics as dyn
-    >>> result = dyn.prune(dyn.planar_arm([1.0, 0.8], [1.0, 0.5]), regroup=True)
+    >>> result = dyn.prune(dyn.planar_arm([1.0, 0.8], [1.0, 0.5]), values={"qd": 0.0})
     >>> len(result.full.nodes), len(result.graph.nodes)
-    (82, 73)
+    (50, 36)
     """
 
     model: Model

@@ -84,7 +84,7 @@ def test_closed_chains_are_timed_and_agree(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(closed_chains, "SIZES", (3,))
     (text,) = closed_chains.closed_chains(1)
     row = text.splitlines()[-1].split()
-    assert row[:2] == ["3", "231"]
+    assert row[:2] == ["3", "257"]
     assert float(row[2]) > 0.0
 
 
