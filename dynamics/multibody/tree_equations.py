@@ -31,8 +31,6 @@ from .sweeps.link_cache import Moved
 from .sweeps.mass_matrix_columns import Carried, mass_matrix_columns, size_of
 
 WORTH = 0.9  # of the nodes of a mass matrix from the Lagrangian, at most, for one by composite inertias
-
-
 UNEVEN = 200.0  # times a body's moments of inertia, at most, for base numbers that are not looked at further
 
 
