@@ -10,9 +10,10 @@ dense1, ..
 
 Where a force jumps, steps can only shrink. `jump` is the share of the `longest` of the last steps in which it may be
 missed, 0 where the caller has given atol: what its mean rate would make in that time counts into the `scale` of a
-component by `leap`, rtol times that time over h. A step far shorter than those before passes a jump so, and a pole, at
-which the steps before get short as well, stays one. A step in which nothing moved says nothing of forces to come: the
-next is at most `still`.
+component by `leap`, rtol times that time over h. A step far shorter than those before passes a jump so. A pole stays
+one: on the way to it rates grow by a share of themselves in every step, and by that share the longest step is
+forgotten. On the way to a jump rates stay as they are, however many steps lead there. A step in which nothing moved
+says nothing of forces to come: the next is at most `still`.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ SAFETY, SMALLEST, LARGEST = 0.9, 0.2, 5.0  # factors from one step to the next
 MEMORY = 0.04  # weight of the estimate before in the choice of the next step (Gustafsson's PI control)
 RESOLUTION = 4.0 * 2.0**-52  # steps below this share of t hardly move t
 SCALE = ("x", "x_new", "rtol", "atol", "leap")
-FORGOTTEN = 0.9  # of the longest step, in every step that is shorter
+FORGOTTEN = 0.1  # of the longest step at most, in every step that is shorter
 COLLAPSE = 2.0**-200  # steps below this share of a run never end it
 HERMITE = 3  # degree of the dense output of a step that has none of its own
 SMALLEST_ATOL = 2.0**-1022  # in place of 0: a state that is 0 and stays 0 has no error
@@ -42,7 +43,7 @@ SMALLEST_ATOL = 2.0**-1022  # in place of 0: a state that is 0 and stays 0 has n
 def registers(problem: Problem) -> dict[str, int]:
     """What every program has."""
     names = "t h tried next max_step min_step end fresh rtol accepted status rejected error error_old"
-    names += " evaluations at_limit t_old t_new jump longest leap still moved"
+    names += " evaluations at_limit t_old t_new jump longest leap still moved turned"
     m = problem.size
     states = dict.fromkeys(("x", "x_new", "x_old", "atol"), m)
     return {**states, "p": len(problem.parameters), **dict.fromkeys(names.split(), 1)}
@@ -104,14 +105,29 @@ def control(order: int, evaluations: int) -> Call:
 def accept_step(*after: Statement) -> If:
     """An accepted step becomes the state; `after` is what the method does besides, with x still the old state."""
     kept = (copied("x", "x_old"), copied("t", "t_old"))
-    h, longest = cg.variables("h longest")
-    after_h = Graph([h, longest], {"longest": cg.maximum(abs(h), FORGOTTEN * longest)})
+    h, longest, turned = cg.variables("h longest turned")
+    lost = cg.minimum(cg.sqrt(turned), FORGOTTEN) * longest
+    after_h = Graph([h, longest, turned], {"longest": cg.maximum(abs(h), longest - lost)})
     x, x_new, moved, wanted, still = cg.variables("x x_new moved next still")
     way = Sum(Graph([x, x_new], {"way": abs(x_new - x)}), ("x", "x_new"), "moved")
     short = Graph([moved, wanted, still], {"next": cg.where(moved, wanted, cg.minimum(wanted, still))})
-    steps = (way, Call(short, ("moved", "next", "still"), ("next",)), Call(after_h, ("h", "longest"), ("longest",)))
+    remembered = Call(after_h, ("h", "longest", "turned"), ("longest",))
+    steps = (way, Call(short, ("moved", "next", "still"), ("next",)), remembered)
     arrived = (copied("x_new", "x"), copied("t_new", "t"))
-    return If("accepted", (*kept, *after, *steps, *arrived))
+    return If("accepted", (_turn(), *kept, *after, *steps, *arrived))
+
+
+def _turn() -> Sum:
+    """Register `turned`: the sum over the state of squares of changes of the mean rate, each a share of the larger one.
+
+    Both rates are compared as ways in the time of this step; before the first one there is none.
+    """
+    t, h, t_old, x, x_new, x_old = cg.variables("t h t_old x x_new x_old")
+    before = cg.where(cg.equal(t, t_old), 0.0, h / (t - t_old)) * (x - x_old)
+    way = x_new - x
+    share = abs(way - before) / cg.maximum(cg.maximum(abs(way), abs(before)), SMALLEST_ATOL)
+    names = ("h", "t", "t_old", "x", "x_new", "x_old")
+    return Sum(Graph([h, t, t_old, x, x_new, x_old], {"square": share * share}), names, "turned")
 
 
 def count(evaluations: int) -> Call:

@@ -54,8 +54,10 @@ class AdaptiveIntegration(NativeIntegration):
         wanted, longest = self._first_step(x)
         start: Mapping[str, float | Array | list[float]] = {
             "x": x,
+            "x_old": x,
             "p": self.parameters,
             "t": options.t0,
+            "t_old": options.t0,
             "end": end,
             "rtol": self.relative,
             "atol": self.absolute,
