@@ -37,7 +37,7 @@ def mass_matrix_graph(system: System) -> Graph:
 
 def require_inertia(system: System, accelerations: Graph) -> None:
     """Raises SingularMassMatrixError where M is singular at every state, though no pivot is the constant zero."""
-    moving = without_inertia(accelerations, lambda: mass_matrix_graph(system), system.n)
+    moving = without_inertia(system, accelerations, lambda: mass_matrix_graph(system))
     if moving:
         names = " and ".join([repr(system.velocities[i]) for i in moving])
         raise SingularMassMatrixError(

@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from cgraph import Graph, extend
-from cgraph.extend import Array
+import cgraph as cg
+from cgraph import Graph, Node, extend
+from cgraph.extend import Array, solve_nodes, topological
+
+from ..systems.system import System
+from .substitute import substitute
 
 STATES = 3
 TORQUE = 2.0**200  # so large that no other force counts
+ROUNDINGS = 8  # of constants, tried at a state
+PLACES = 64  # units in its last place, by which a constant of a body may be off that was made of others
 SPARE = 1e-3  # what rounding may do to M^-1, relative, where M is not looked at closely
 
 
@@ -26,14 +32,17 @@ def balanced(matrix: Array) -> Array:
     return scale[..., :, None] * matrix * scale[..., None, :]
 
 
-def without_inertia(accelerations: Graph, mass_matrix: Callable[[], Graph], n: int) -> list[int]:
+def without_inertia(system: System, accelerations: Graph, mass_matrix: Callable[[], Graph]) -> list[int]:
     """The coordinates of which no digit of the acceleration is certain at some random states; [] where M has full rank.
 
     accelerations: the graph of forward dynamics. Its M^-1 mostly shows at once that there is nothing to fear. A pivot
-    that is all rounding leaves no digit; one that is small, since a mass is, leaves them all.
+    that is all rounding leaves no digit; one that is small, since a mass is, leaves them all. Constants that are folded
+    on the way do not tell how they were rounded. So where digits stay, M x = tau is solved anew with those of L as
+    inputs, which are moved in their last place.
     """
-    rng = np.random.default_rng(0)
+    n, rng = system.n, np.random.default_rng(0)
     found: set[int] = set()
+    unfolded: tuple[Graph, dict[str, float]] | None = None
     for k in range(STATES):
         point = {name: 10.0**-k * float(rng.uniform(0.5, 1.5)) for name in accelerations.input_names}
         point |= {f"tau{i}": TORQUE * point[f"tau{i}"] for i in range(n)}
@@ -54,9 +63,35 @@ def without_inertia(accelerations: Graph, mass_matrix: Callable[[], Graph], n: i
         digits = extend.certain_digits(accelerations, point)
         lost = {i for i in range(n) if digits[f"qdd{i}"] == 0.0}
         if not lost:
+            unfolded = unfolded or _unfolded(system)
+            lost = _moved_by_rounding(*unfolded, point)
+        if not lost:
             return []
         found |= lost
     return sorted(found)
+
+
+def _unfolded(system: System) -> tuple[Graph, dict[str, float]]:
+    """The solution of M x = tau with the constants of L as inputs, and their values by name; exponents stay."""
+    nodes = topological([system.lagrangian])
+    exponents = {node.args[1].value for node in nodes if node.op.name == "pow"}
+    values = {node.value for node in nodes if node.value is not None} - exponents - {0.0, 1.0, -1.0}
+    inputs = {value: cg.variable(f"constant{k}#") for k, value in enumerate(sorted(values))}
+    replacement = {node: inputs[node.value] for node in nodes if node.value in inputs}
+    (lagrangian,) = substitute([system.lagrangian], replacement)
+    solution = solve_nodes(lagrangian, system.qd, system.tau)
+    variables: list[Node] = [node for node in topological(solution) if not node.args and node.value is None]
+    graph = Graph(variables, {f"qdd{i}": node for i, node in enumerate(solution)})
+    return graph, {str(node.name): value for value, node in inputs.items()}
+
+
+def _moved_by_rounding(graph: Graph, constants: Mapping[str, float], point: Mapping[str, float]) -> set[int]:
+    """The outputs that change by half of their size or more as the constants change in their last place."""
+    steps = np.random.default_rng(0).integers(-PLACES, PLACES + 1, (len(constants), ROUNDINGS))
+    moved = {name: x + steps[k] * np.spacing(x) for k, (name, x) in enumerate(constants.items())}
+    with np.errstate(all="ignore"):
+        results = graph.evaluate({name: moved.get(name, point.get(name, 0.0)) for name in graph.input_names})
+        return {i for i, x in enumerate(results.values()) if not np.ptp(x) <= 0.5 * np.abs(x).max()}
 
 
 def _inverse(accelerations: Graph, point: dict[str, float], n: int) -> Array:

@@ -264,6 +264,32 @@ def test_of_random_chains_those_without_inertia_are_refused(seed: int) -> None:
         assert len(forward_dynamics(mechanism).outputs) == mechanism.system.n
 
 
+@pytest.mark.parametrize("seed", [*range(6), *slow(*range(6, 300))])
+def test_slides_in_more_directions_than_there_are_have_no_inertia(seed: int) -> None:
+    """M is constant, so that its pivots are folded: rounding of constants is what is left of one that should be zero.
+
+    Slides follow one another along axes in a line, a plane or in space; those that a mass ends are independent where
+    they are no more than that has dimensions.
+    """
+    rng = np.random.default_rng(seed)
+    count, dimensions = int(rng.integers(2, 8)), int(rng.integers(1, 4))
+    span, unit = np.linalg.qr(rng.normal(size=(3, 3)))[0][:, :dimensions], 10.0 ** rng.uniform(-6.0, 6.0)
+    bodies, since, regular = [], 0, True  # massless slides so far
+    for i in range(count):
+        heavy = i == count - 1 or rng.random() < 0.3
+        joint = dyn.Joint("prismatic", span @ rng.normal(size=dimensions), rng.normal(size=3))
+        mass = unit * 10.0 ** rng.uniform(-3.0, 3.0) if heavy else 0.0
+        bodies.append(dyn.Body(f"b{i}", joint, f"b{i - 1}" if i else "world", mass))
+        since += 1
+        if heavy:
+            regular, since = regular and since <= dimensions, 0
+    if regular:
+        assert len(forward_dynamics(dyn.Mechanism(bodies)).outputs) == count
+    else:
+        with pytest.raises(SingularMassMatrixError):
+            forward_dynamics(dyn.Mechanism(bodies))
+
+
 @pytest.mark.parametrize("kinds", [("prismatic", "free"), ("ball", "ball"), ("free", "prismatic"), ("free", "free")])
 def test_a_massless_body_on_a_joint_that_the_next_one_repeats_is_refused(kinds: tuple[str, str]) -> None:
     first = dyn.Body("first", dyn.Joint(kinds[0]))
