@@ -16,7 +16,7 @@ from .substitute import substitute
 STATES = 3
 TORQUE = 2.0**200  # so large that no other force counts
 ROUNDINGS = 8  # of constants, tried at a state
-PLACES = 64  # units in its last place, by which a constant of a body may be off that was made of others
+PLACES = 8  # units in its last place, by which a constant of a body may be off that was made of others
 SPARE = 1e-3  # what rounding may do to M^-1, relative, where M is not looked at closely
 
 
@@ -91,7 +91,8 @@ def _moved_by_rounding(graph: Graph, constants: Mapping[str, float], point: Mapp
     moved = {name: x + steps[k] * np.spacing(x) for k, (name, x) in enumerate(constants.items())}
     with np.errstate(all="ignore"):
         results = graph.evaluate({name: moved.get(name, point.get(name, 0.0)) for name in graph.input_names})
-        return {i for i, x in enumerate(results.values()) if not np.ptp(x) <= 0.5 * np.abs(x).max()}
+        moves = [not np.isfinite(x).all() or np.ptp(x) > 0.5 * np.abs(x).max() for x in results.values()]
+    return set(np.flatnonzero(moves).tolist())
 
 
 def _inverse(accelerations: Graph, point: dict[str, float], n: int) -> Array:
