@@ -12,8 +12,8 @@ from .body import Body, MechanismError
 from .loops import check_loop, coupling_row, loop_rows, slip_rows
 from .mechanism_fields import Structure
 from .sweeps.forward_kinematics import KinematicChain
-from .sweeps.inertial_numbers import Link
 from .sweeps.kinematic_tree import Carrier
+from .sweeps.links import Link
 from .sweeps.relative_placement import relative_placements
 
 

@@ -31,8 +31,8 @@ from .parameter_values import bound_body, bound_force, require_values, used_name
 from .parameters import bound, entries, names_in, symbol
 from .subtree import Subtree
 from .sweeps.forward_kinematics import KinematicChain, kinematic_chain
-from .sweeps.inertial_numbers import Link
 from .sweeps.kinematic_tree import Carrier, lock_joints, merge_fixed_bodies, parents_first, require_inertia, resists
+from .sweeps.links import Link
 from .tree_equations import TreeEquations
 
 __all__ = [

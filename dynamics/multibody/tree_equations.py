@@ -18,17 +18,16 @@ from .algebra import spatial
 from .algebra.spatial import ZERO
 from .body import WORLD, Body, quantities
 from .joint_coordinates import parts, places
-from .joints import AxialJoint, JointType, moving_type
+from .joints import JointType
 from .mechanism_fields import Structure
-from .sweeps import newton_euler
 from .sweeps.base_parameters import base_parameter_links
-from .sweeps.body_motion import Motion, ground
 from .sweeps.composite_inertia import without_axial_moments
 from .sweeps.composite_momentum import COMPOSITE, CompositeMomentum, about_parent, body_momentum, momentum_rates, stated
 from .sweeps.equation_links import equation_links
-from .sweeps.inertial_numbers import Link
 from .sweeps.link_cache import Moved
+from .sweeps.links import Link
 from .sweeps.mass_matrix_columns import Carried, mass_matrix_columns, size_of
+from .sweeps.outward import Motion, base_acceleration, ground, propagate_acceleration, wrench
 
 WORTH = 0.9  # of the nodes of a mass matrix from the Lagrangian, at most, for one by composite inertias
 UNEVEN = 200.0  # times a body's moments of inertia, at most, for base numbers that are not looked at further
@@ -61,15 +60,14 @@ class TreeEquations:
     def ground(self) -> Motion:
         """The world at rest."""
         inner = [link for link, parent in zip(self.links, self.parents, strict=True) if parent >= 0]
-        axial = all([isinstance(body.joint.type, AxialJoint) for body in self.bodies])
+        axial = all([joint.has_axis for joint in self._types])
         in_plane = axial and all([link.parallel for link in inner])
         return self.shared.ground(ground(self.gravity, in_plane=in_plane))
 
     @cached_property
     def _turning(self) -> bool:
         """Whether the directions of all joints turn with their bodies, which closed forms take for granted."""
-        joints = {moving_type(body.joint.type) for body in self.bodies}
-        return all([isinstance(joint, AxialJoint) or joint.turns_with_body for joint in joints])
+        return all([joint.turns_with_body for joint in set(self._types)])
 
     @cached_property
     def _own(self) -> list[Link]:
@@ -134,26 +132,25 @@ class TreeEquations:
         """The wrenches of all bodies at these accelerations, with the velocities that they work on."""
         forces: list[BiasForce] = []
         with building(Builder()):
-            accelerations = {WORLD: newton_euler.base_acceleration(self.ground)}
+            accelerations = {WORLD: base_acceleration(self.ground)}
             rates = [(qdd or [ZERO] * len(qd))[place.u] for place in places(self.bodies)]
             rows = zip(self.bodies, self._fewest, self._moved(q, qd), parts(self.bodies, q, qd), rates, strict=True)
             for body, link, moved, (x, u), u_dot in rows:
-                joint = moving_type(body.joint.type)
+                joint = body.joint.type
                 with cg.tag(body.name):
-                    acceleration = accelerations[body.name] = newton_euler.propagate_acceleration(
+                    acceleration = accelerations[body.name] = propagate_acceleration(
                         accelerations[body.parent], moved.parent, moved.motion, link, joint, link.at(x), u, u_dot
                     )
-                    forces += newton_euler.wrench(acceleration, moved.motion, link, joint, x, u, u_dot)
+                    forces += wrench(acceleration, moved.motion, link, joint, x, u, u_dot)
         return forces
 
     def mass_matrix(self, q: Sequence[Node], qd: Sequence[Node], lagrangian: Node, build: Builder) -> list[list[Node]]:
         """The lower triangle of M by composite inertias; or from the Lagrangian, where that takes fewer nodes."""
-        joints = [moving_type(joint) for joint in self._types]
         links = self._regrouped(equation_links(self._own, self._types, self.parents, outwards=True))[0]
         with building(build):
-            links = without_axial_moments(links if self._numeric else self._fewest, joints, self.parents)
+            links = without_axial_moments(links if self._numeric else self._fewest, self._types, self.parents)
             motions = [moved.motion.plane for moved in self._moved(q, qd, links)]
-            rows = zip(self.bodies, self.parents, links, joints, motions, places(self.bodies), strict=True)
+            rows = zip(self.bodies, self.parents, links, self._types, motions, places(self.bodies), strict=True)
             carried = [
                 Carried(body.name, k, link, joint, link.at(q[at.q]), at.u.start, plane, motions[k] if k >= 0 else None)
                 for body, k, link, joint, plane, at in rows
@@ -180,7 +177,7 @@ class TreeEquations:
             rates, at = list[Node](), places(self.bodies)
             for i in reversed(range(len(rows))):
                 body, link, moved, (x, u) = rows[i]
-                joint = moving_type(body.joint.type)
+                joint = body.joint.type
                 with cg.tag(body.name, COMPOSITE):
                     composites[i] = stated(composites[i], link, joint, link.at(x), u, p[at[i].u])
                     motions = (moved.parent, moved.motion)
@@ -197,7 +194,7 @@ class TreeEquations:
         from .sweeps.inverse_dynamics_columns import torque_derivatives
 
         with building(build):
-            up = newton_euler.base_acceleration(self.ground).linear
+            up = base_acceleration(self.ground).linear
             return torque_derivatives(self.bodies, self._links[0], self.parents, up, state, build)
 
     def _moved(self, q: Sequence[Node], qd: Sequence[Node], links: Sequence[Link] | None = None) -> list[Moved]:

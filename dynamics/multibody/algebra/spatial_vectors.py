@@ -7,6 +7,7 @@ from typing import NamedTuple
 from cgraph import Node
 
 from .spatial import STILL, Triple, cross, dot, plus, scaled
+from .turns import Turn
 
 
 class Twist(NamedTuple):
@@ -55,6 +56,10 @@ class Wrench(NamedTuple):
         """Its rate, where it is carried along with a velocity: (w x n + v x f, w x f)."""
         torque = plus(cross(velocity.angular, self.torque), cross(velocity.linear, self.force))
         return Wrench(torque, cross(velocity.angular, self.force))
+
+    def turned(self, turn: Turn) -> Wrench:
+        """In the axes before a turn."""
+        return Wrench(turn.out(self.torque), turn.out(self.force))
 
     def about(self, offset: Triple) -> Wrench:
         """The same about another point, from which this one is `offset` away."""

@@ -10,7 +10,8 @@ from cgraph import Node
 from cgraph.extend import Array
 
 from ..algebra import spatial
-from ..algebra.spatial import STILL, Triple
+from ..algebra.spatial import STILL
+from ..algebra.spatial_vectors import Twist
 from . import quaternion
 from .joint_type import NodeMatrix, SpatialJoint
 
@@ -31,18 +32,10 @@ class Ball(SpatialJoint):
         """That of the quaternion."""
         return quaternion.rotation(q)
 
-    def angular_velocity(self, q: Sequence[Node], u: Sequence[Node]) -> Triple:
-        """The velocities themselves."""
+    def velocity(self, q: Sequence[Node], u: Sequence[Node]) -> Twist:
+        """The velocities are the angular velocity."""
         x, y, z = u
-        return x, y, z
-
-    def angular_acceleration(self, q: Sequence[Node], u: Sequence[Node]) -> Triple:
-        """0: the velocities are its components."""
-        return STILL
-
-    def linear_acceleration(self, q: Sequence[Node], u: Sequence[Node]) -> Triple:
-        """0."""
-        return STILL
+        return Twist((x, y, z), STILL)
 
     def rate(self, q: Sequence[Node], u: Sequence[Node]) -> Sequence[Node]:
         """That of the quaternion."""

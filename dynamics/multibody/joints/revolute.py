@@ -17,6 +17,7 @@ class Revolute(AxialJoint):
     kind = "revolute"
     mjcf = "hinge"
     urdf = "continuous"
+    measured_about_axis = True
 
     def angle(self, x: Node) -> Node:
         """The coordinate itself."""

@@ -16,10 +16,9 @@ from ...systems.system import System
 from ..algebra import spatial
 from ..body import WORLD, quantities
 from ..joint_coordinates import parts, quasi_velocities
-from ..joints import moving_type
 from ..mechanism import Mechanism, as_mechanism
-from ..sweeps.body_motion import energy, ground, propagate_motion
-from ..sweeps.inertial_numbers import Link, axes_of, link
+from ..sweeps.links import Link, axes_of, link
+from ..sweeps.outward import energy, ground, propagate_motion
 
 PARAMETERS = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")  # the order of Pinocchio
 _LOWER = ((0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2))  # entries of I in that order
@@ -118,7 +117,7 @@ def _partial_lagrangians(mechanism: Mechanism, q: list[Node], qd: list[Node], pi
         states = parts(mechanism.moving, q, qd)
         for i, body in enumerate(mechanism.moving):
             axes[body.name] = axes_of(body)
-            known, joint = link(body, axes[body.parent]), moving_type(body.joint.type)
+            known, joint = link(body, axes[body.parent]), body.joint.type
             with cg.tag(body.name):
                 motions[body.name] = propagate_motion(motions[body.parent], known, joint, *states[i])
                 unknown = _symbolic(known, axes[body.name], pi[10 * i : 10 * i + 10])

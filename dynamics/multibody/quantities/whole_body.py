@@ -22,9 +22,8 @@ from ..algebra import spatial
 from ..algebra.spatial import ZERO, Triple
 from ..body import WORLD, MechanismError
 from ..joint_coordinates import parts
-from ..joints import moving_type
 from ..mechanism import Mechanism, require_mechanism
-from ..sweeps.body_motion import Motion, energy, propagate_motion
+from ..sweeps.outward import Motion, energy, propagate_motion
 from .frames import jacobian_rows
 
 POINTS = ("origin", "center of mass")
@@ -173,7 +172,7 @@ def _moments(mechanism: Mechanism) -> Moments:
         mass: Node = ZERO
         rows = zip(mechanism.moving, mechanism.links, parts(mechanism.moving, system.q, system.qd), strict=True)
         for body, link, (q, u) in rows:
-            joint = moving_type(body.joint.type)
+            joint = body.joint.type
             with cg.tag(body.name):
                 motion = propagate_motion(motions[body.parent], link, joint, q, u)
                 motions[body.name] = motion

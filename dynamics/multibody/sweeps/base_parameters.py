@@ -21,7 +21,7 @@ from cgraph.extend import Array, Builder, building
 from ..algebra import spatial
 from ..algebra.spatial import Triple
 from ..joints import JointType
-from .inertial_numbers import Link
+from .links import Link
 
 
 def base_parameter_links(

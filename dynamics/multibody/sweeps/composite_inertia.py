@@ -13,87 +13,17 @@ from typing import NamedTuple
 import numpy as np
 
 from cgraph import Node
-from cgraph.extend import Array, as_node
+from cgraph.extend import as_node
 
 from ..algebra import spatial
-from ..algebra.spatial import Matrix, Triple, cross, plus, scaled
+from ..algebra.spatial import Triple, cross, plus, scaled
 from ..algebra.spatial_vectors import Twist, Wrench
-from ..joints import AxialJoint, MovingJoint
-from .composite_motion import Entries, combined
-from .inertial_numbers import Link
+from ..algebra.turns import NEXT, Turn
+from ..joints import JointType
+from .links import Link
 
-NEXT = ((1, 2), (2, 0), (0, 1))
-Axes = Entries
 ONE = as_node(1.0)
 Second = tuple[tuple[Node, ...], ...]  # rows, symmetric
-
-
-class AxisTurn(NamedTuple):
-    """A turn about an axis of the old axes and of the new ones: (a, b) after it becomes (c a - s b, s a + c b)."""
-
-    axis: int
-    cos: Node
-    sin: Node
-
-    def vector(self, old: Triple) -> Triple:
-        """What a vector is in the new axes."""
-        (i, j), new = NEXT[self.axis], list(old)
-        new[i], new[j] = self.cos * old[i] - self.sin * old[j], self.sin * old[i] + self.cos * old[j]
-        return new[0], new[1], new[2]
-
-    def wrench(self, old: Wrench) -> Wrench:
-        """What a wrench is in the new axes."""
-        return Wrench(self.vector(old.torque), self.vector(old.force))
-
-    def inertia(self, old: CompositeInertia) -> CompositeInertia:
-        """With u = s (A_ii - A_jj) + 2 c A_ij the block is [[A_ii - s u, c u - A_ij], [.., A_jj + s u]]."""
-        k, (i, j), (c, s) = self.axis, NEXT[self.axis], self[1:]
-        new = [list(row) for row in old.second]
-        if c.value == 0.0:
-            new[i][i], new[j][j], new[i][j] = new[j][j], new[i][i], -new[i][j]
-        else:
-            u = s * (new[i][i] - new[j][j]) + 2.0 * c * new[i][j]
-            new[i][i], new[j][j], new[i][j] = new[i][i] - s * u, new[j][j] + s * u, c * u - new[i][j]
-        new[j][i] = new[i][j]
-        a, b = new[k][i], new[k][j]
-        new[k][i] = new[i][k] = c * a - s * b
-        new[k][j] = new[j][k] = s * a + c * b
-        about_z = old.about_z if k == 2 else new[0][0] + new[1][1]
-        return old._replace(moment=self.vector(old.moment), second=_rows(new), about_z=about_z)
-
-    def axes(self, new: Axes) -> Axes:
-        """The old axes as columns, of the new ones."""
-        (i, j), old = NEXT[self.axis], list(new)
-        old[i] = plus(scaled(self.cos, new[i]), scaled(self.sin, new[j]))
-        x, y, z = (self.cos * b - self.sin * a for a, b in zip(new[i], new[j], strict=True))
-        old[j] = x, y, z
-        return old[0], old[1], old[2]
-
-
-class MatrixTurn(NamedTuple):
-    """A turn about any axis.  rows: of the matrix that gives components in the new axes."""
-
-    rows: Matrix
-
-    def vector(self, old: Triple) -> Triple:
-        """What a vector is in the new axes."""
-        return spatial.rotate(self.rows, old)
-
-    def wrench(self, old: Wrench) -> Wrench:
-        """What a wrench is in the new axes."""
-        return Wrench(self.vector(old.torque), self.vector(old.force))
-
-    def inertia(self, old: CompositeInertia) -> CompositeInertia:
-        """R A R^T."""
-        half = [self.vector((row[0], row[1], row[2])) for row in old.second]  # columns of R A
-        rows = [spatial.total([self.rows[i][k] * half[k][j] for k in range(3)]) for i in range(3) for j in range(i + 1)]
-        new = [[rows[_place(i, j)] for j in range(3)] for i in range(3)]
-        return old._replace(moment=self.vector(old.moment), second=_rows(new), about_z=new[0][0] + new[1][1])
-
-    def axes(self, new: Axes) -> Axes:
-        """The old axes as columns, of the new ones."""
-        x, y, z = (combined(new, (as_node(a), as_node(b), as_node(c))) for a, b, c in zip(*self.rows, strict=True))
-        return x, y, z
 
 
 class Shift(NamedTuple):
@@ -108,20 +38,8 @@ class Shift(NamedTuple):
         new[i], new[j] = new[i] - self.by * old.force[j], new[j] + self.by * old.force[i]
         return Wrench((new[0], new[1], new[2]), old.force)
 
-    def inertia(self, old: CompositeInertia) -> CompositeInertia:
-        """About the new point."""
-        k, r, moment, new = self.axis, self.by, list(old.moment), [list(row) for row in old.second]
-        more = old.mass * r
-        change = (2.0 * r) * moment[k] + more * r if r.value is not None else 2.0 * (r * moment[k]) + more * r
-        for i in NEXT[k]:
-            new[k][i] = new[i][k] = new[k][i] + r * moment[i]
-        new[k][k] = new[k][k] + change
-        moment[k] = moment[k] + more
-        about_z = old.about_z if k == 2 else old.about_z + change
-        return CompositeInertia(old.mass, (moment[0], moment[1], moment[2]), _rows(new), about_z)
 
-
-Step = AxisTurn | MatrixTurn | Shift
+Step = Turn | Shift
 
 
 class CompositeInertia(NamedTuple):
@@ -144,8 +62,26 @@ class CompositeInertia(NamedTuple):
     def through(self, steps: Sequence[Step]) -> CompositeInertia:
         """In other axes, about another point."""
         for step in steps:
-            self = step.inertia(self)  # noqa: PLW0642
+            self = self.about(step) if isinstance(step, Shift) else self.turned(step)  # noqa: PLW0642
         return self
+
+    def turned(self, turn: Turn) -> CompositeInertia:
+        """In the axes before a turn."""
+        second = _rows(turn.second_moments(self.second))
+        about_z = self.about_z if turn.about_z else second[0][0] + second[1][1]
+        return self._replace(moment=turn.out(self.moment), second=second, about_z=about_z)
+
+    def about(self, shift: Shift) -> CompositeInertia:
+        """About the point that a shift leads to."""
+        k, r, moment, new = shift.axis, shift.by, list(self.moment), [list(row) for row in self.second]
+        more = self.mass * r
+        change = (2.0 * r) * moment[k] + more * r if r.value is not None else 2.0 * (r * moment[k]) + more * r
+        for i in NEXT[k]:
+            new[k][i] = new[i][k] = new[k][i] + r * moment[i]
+        new[k][k] = new[k][k] + change
+        moment[k] = moment[k] + more
+        about_z = self.about_z if k == 2 else self.about_z + change
+        return CompositeInertia(self.mass, (moment[0], moment[1], moment[2]), _rows(new), about_z)
 
     def wrench(self, rate: Twist) -> Wrench:
         """What gives it this acceleration from rest."""
@@ -168,7 +104,7 @@ def rigid(link: Link) -> CompositeInertia:
     return CompositeInertia(as_node(link.mass), link.moment, _rows(second), full[2][2])
 
 
-def without_axial_moments(links: Sequence[Link], joints: Sequence[MovingJoint], parents: Sequence[int]) -> list[Link]:
+def without_axial_moments(links: Sequence[Link], joints: Sequence[JointType], parents: Sequence[int]) -> list[Link]:
     """The links, those that turn about z without the second moment along it, and those that slide without any.
 
     Their parents have it in their place. Base parameters leave none of the moment of inertia about y instead, which
@@ -179,10 +115,10 @@ def without_axial_moments(links: Sequence[Link], joints: Sequence[MovingJoint], 
         return list(links)
     for i in reversed(range(len(links))):
         joint, own = joints[i], inertias[i]
-        if not isinstance(joint, AxialJoint):
+        if not joint.has_axis:
             continue
         along = 0.5 * (own[0, 0] + own[1, 1] - own[2, 2]) * np.diag([1.0, 1.0, 0.0])
-        given = along if joint.angle(ONE).value != 0.0 else own
+        given = along if joint.turns else own
         inertias[i] = spatial.added(own, -given)
         if parents[i] >= 0:
             turn = np.array(links[i].turn)
@@ -190,21 +126,5 @@ def without_axial_moments(links: Sequence[Link], joints: Sequence[MovingJoint], 
     return [replace(link, inertia=inertia.tolist()) for link, inertia in zip(links, inertias, strict=True)]
 
 
-def constant_turn(matrix: Matrix) -> list[Step]:
-    """Turns about axes, to components in the old axes from those in the columns: R = R_z R_x R_z."""
-    rows: Array = np.array(matrix, dtype=np.float64)
-    across = float(np.hypot(rows[2, 0], rows[2, 1]))
-    c, s = (rows[2, 1] / across, rows[2, 0] / across) if across else (1.0, 0.0)
-    rest = c * rows[:, 0] - s * rows[:, 1]  # the columns of R_z R_x: so they fit where axes are nearly parallel, too
-    turns = [(2, c, s), (0, rows[2, 2], across), (2, rest[0], rest[1])]
-    return [AxisTurn(axis, as_node(float(c)), as_node(float(s))) for axis, c, s in turns if (c, s) != (1.0, 0.0)]
-
-
 def _rows(rows: Sequence[Sequence[Node]]) -> Second:
     return tuple([tuple(row) for row in rows])
-
-
-def _place(i: int, j: int) -> int:
-    """Of an entry in the lower triangle, row by row."""
-    i, j = max(i, j), min(i, j)
-    return i * (i + 1) // 2 + j

@@ -23,12 +23,10 @@ from cgraph.extend import as_node
 from ..algebra import spatial
 from ..algebra.spatial import STILL, ZERO, Triple, cross, plus, scaled
 from ..algebra.spatial_vectors import Twist, Wrench
-from ..joints import AxialJoint, MovingJoint, SpatialJoint
-from .body_motion import Motion, carrier_motion, in_body_axes, in_plane_axes, joint_translation, spring_forces
-from .inertial_numbers import Link
-from .newton_euler import KINETIC, POTENTIAL
+from ..joints import JointType
+from .links import Link
+from .outward import KINETIC, POTENTIAL, Motion, joint_translation, spring_forces
 
-ONE = as_node(1.0)
 COMPOSITE = "momentum"  # tag of what composite momenta are made of, and of the rates made of them
 
 
@@ -49,7 +47,7 @@ class CompositeMomentum(NamedTuple):
 
 def body_momentum(motion: Motion, link: Link) -> CompositeMomentum:
     """Of the body alone: f = m v + w x h, n = J w + h x v. In a plane n_z is a momentum, and the rest has no part."""
-    h, w, v, mass = in_plane_axes(motion, link.moment), motion.omega, motion.velocity, as_node(link.mass)
+    h, w, v, mass = motion.out(link.moment), motion.omega, motion.velocity, as_node(link.mass)
     with cg.tag(KINETIC):
         force = plus(scaled(mass, v), cross(w, h))
         torque = STILL
@@ -62,7 +60,7 @@ def body_momentum(motion: Motion, link: Link) -> CompositeMomentum:
 def stated(
     composite: CompositeMomentum,
     link: Link,
-    joint: MovingJoint,
+    joint: JointType,
     q: Sequence[Node],
     u: Sequence[Node],
     p: Sequence[Node],
@@ -70,10 +68,9 @@ def stated(
     """With the momenta p of the joint's velocities u in place of the shares of (n, f) that they are."""
     torque, force = list(composite.momentum.torque), list(composite.momentum.force)
     own = [momentum - link.armature * velocity for momentum, velocity in zip(p, u, strict=True)]
-    sliding = joint.sliding if isinstance(joint, SpatialJoint) else 0
-    if isinstance(joint, SpatialJoint) and sliding:
-        force = list(spatial.rotate_transpose(joint.rotation(q), (own[0], own[1], own[2])))
-    for twist, momentum in list(zip(along(joint, q), own, strict=True))[sliding:]:
+    if joint.sliding:
+        force = list(joint.turn(q).into((own[0], own[1], own[2])))
+    for twist, momentum in list(zip(joint.columns(q), own, strict=True))[joint.sliding :]:
         shares = [each.value for each in (*twist.angular, *twist.linear)]
         if sorted(map(str, shares)) == ["0.0"] * 5 + ["1.0"]:
             k = shares.index(1.0)
@@ -86,15 +83,15 @@ def momentum_rates(
     parent: Motion,
     motion: Motion,
     link: Link,
-    joint: MovingJoint,
+    joint: JointType,
     q: Sequence[Node],
     u: Sequence[Node],
     p: Sequence[Node],
 ) -> list[Node]:
     """The rates of the momenta p of a joint's velocities u, without applied forces; the spring's among them."""
     rates: list[Node] = []
-    if isinstance(joint, SpatialJoint) and joint.sliding:  # along the joint's axes, which turn with the parent
-        carrier = in_body_axes(parent)
+    if joint.sliding:  # along the joint's axes, which turn with the parent
+        carrier = parent.in_body_axes()
         with cg.tag(KINETIC):
             x, y, z = (p[k] - link.armature * u[k] for k in range(3))
             turned = cross(spatial.rotate_transpose(link.turn, carrier.omega), (x, y, z))
@@ -106,38 +103,25 @@ def momentum_rates(
     with cg.tag(POTENTIAL):
         up = scaled(motion.strength, motion.vertical)  # gravity is -up
         loss = carried.plus(Wrench(cross(composite.moment, up), scaled(composite.mass, up)))
-        rates += [-twist.power(loss) for twist in along(joint, q)[len(rates) :]]
+        rates += [-twist.power(loss) for twist in joint.columns(q)[len(rates) :]]
         springs = [force for _, force in spring_forces(link, joint, q, u)] or [ZERO] * len(rates)
         return [rate - spring for rate, spring in zip(rates, springs, strict=True)]
 
 
 def about_parent(
-    composite: CompositeMomentum, parent: Motion, motion: Motion, link: Link, joint: MovingJoint, q: Sequence[Node]
+    composite: CompositeMomentum, parent: Motion, motion: Motion, link: Link, joint: JointType, q: Sequence[Node]
 ) -> CompositeMomentum:
     """The same about the parent's origin, in the axes of the parent's motion."""
-    carrier, offset = carrier_motion(parent, link, joint), joint_translation(link, joint, q)
+    stays, offset = parent.keeps_plane(link, joint), parent.out(joint_translation(link, joint, q))
+
+    back = motion.turn.reversed  # not `out`, for the sake of products that other equations have as well
 
     def turned(vector: Triple) -> Triple:
-        if isinstance(joint, SpatialJoint):
-            vector = spatial.rotate(joint.rotation(q), vector)
-        elif not motion.plane:
-            angle = joint.angle(q[0])
-            vector = spatial.rotate_about_z(cg.cos(angle), -cg.sin(angle), vector)
-        vector = spatial.rotate(link.turn, vector)
-        return in_plane_axes(parent, vector) if parent.plane and not carrier.plane else vector
+        vector = spatial.rotate(link.turn, back.into(vector))
+        return vector if stays else parent.out(vector)
 
-    offset = in_plane_axes(parent, offset)
     with cg.tag(POTENTIAL):
         moment = plus(turned(composite.moment), scaled(composite.mass, offset))
     with cg.tag(KINETIC):
         momentum = Wrench(turned(composite.momentum.torque), turned(composite.momentum.force)).about(offset)
     return CompositeMomentum(composite.mass, moment, momentum)
-
-
-def along(joint: MovingJoint, q: Sequence[Node]) -> list[Twist]:
-    """How each velocity of the joint moves the body, in the body's axes."""
-    if isinstance(joint, AxialJoint):
-        return [Twist((ZERO, ZERO, joint.angle(ONE)), (ZERO, ZERO, joint.shift(ONE)))]
-    count = len(joint.velocities)
-    units = [[ONE if i == k else ZERO for i in range(count)] for k in range(count)]
-    return [Twist(joint.angular_velocity(q, unit), joint.linear_velocity(q, unit)) for unit in units]

@@ -14,9 +14,9 @@ import cgraph as cg
 from cgraph import Node
 from cgraph.extend import as_node
 
-from ..algebra.spatial import ZERO, Triple, cross, plus, scaled
+from ..algebra.spatial import ZERO, Triple, combined, cross, plus, scaled
 from ..algebra.spatial_vectors import Twist, Wrench
-from .inertial_numbers import Link
+from .links import Link
 
 Entries = tuple[Triple, Triple, Triple]  # rows
 TURNS = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
@@ -90,12 +90,6 @@ def body_motion(link: Link, axes: Entries, velocity: Twist, acceleration: Twist,
     still = Composite(mass, moment, second, momentum, _rows(spread), Wrench((ZERO,) * 3, (ZERO,) * 3))
     with cg.tag(*tags):
         return still._replace(wrench=still.inertial(acceleration).plus(still.coriolis(velocity)))
-
-
-def combined(columns: Entries, vector: Triple) -> Triple:
-    """A vector of the body in the axes that the columns are in."""
-    x, y, z = (scaled(factor, column) for factor, column in zip(vector, columns, strict=True))
-    return plus(plus(x, y), z)
 
 
 def _rotated_second(link: Link, axes: Entries) -> Entries:

@@ -21,9 +21,8 @@ from cgraph import Node
 from cgraph.extend import Array
 
 from ..algebra import spatial
-from ..joints import AxialJoint, JointType
-from ..joints.revolute import Revolute
-from .inertial_numbers import Link
+from ..joints import JointType
+from .links import Link
 
 _FAR = 100.0  # times the extent of a body, at most, for its origin from where it was: two digits of its numbers
 _TURN = 4  # numbers in a turn that is about one axis, less than in one about three: products for every vector
@@ -88,7 +87,7 @@ class _Numbers(NamedTuple):
         across = x * x + y * y
         move = -(place[0] * x + place[1] * y) / across if across else -place[2] / z
         most = min(self.reach, float(np.linalg.norm(place)) + abs(parent_moved))
-        return self.along(float(move)) if isinstance(self.joint, AxialJoint) and abs(move) <= most else self
+        return self.along(float(move)) if self.joint.has_axis and abs(move) <= most else self
 
     def less_turned(self) -> tuple[_Numbers, float]:
         """Of a hinge, without what turns it about its own axis before it turns, but for quarters; and how far that is.
@@ -96,7 +95,7 @@ class _Numbers(NamedTuple):
         As it is where its axis is across no axis of the parent's.
         """
         x, y, z = self.turn[:, 2]
-        if (x != 0.0 and y != 0.0) or not isinstance(self.joint, Revolute):
+        if (x != 0.0 and y != 0.0) or not self.joint.measured_about_axis:
             return self, 0.0
         left = np.array(
             [[1.0, 0.0, 0.0], [0.0, z, y], [0.0, -y, z]] if x == 0.0 else [[z, 0.0, x], [0.0, 1.0, 0.0], [-x, 0.0, z]]
@@ -146,13 +145,13 @@ def equation_links(
 def _best(own: _Numbers, parent: _Numbers | None, children: Sequence[_Numbers], further: bool) -> _Numbers:
     """Moved and turned so that the fewest numbers of it and of what it carries are left; of as many further out."""
     choices = [own]
-    if isinstance(own.joint, AxialJoint):
-        if parent is not None and isinstance(parent.joint, AxialJoint):
+    if own.joint.has_axis:
+        if parent is not None and parent.joint.has_axis:
             choices.append(own.to_normal(parent.moved))
         else:  # where the first of the children has its normal
             moves = [float(child.to_normal(0.0).place[2]) for child in children[:1]]
             choices += [own.along(move) for move in moves if abs(move) <= own.reach]
-    if isinstance(own.joint, Revolute):
+    if own.joint.measured_about_axis:
         choices += [each.turned(angle) for each in choices for child in children for angle in _turns(each, child)]
 
     def left(choice: _Numbers) -> tuple[int, bool, bool]:

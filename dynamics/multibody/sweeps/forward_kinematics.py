@@ -17,17 +17,17 @@ from ..algebra import spatial
 from ..algebra.spatial import STILL, Triple
 from ..body import Body
 from ..joint_coordinates import parts
-from ..joints import AxialJoint, MovingJoint, moving_type
-from .body_motion import joint_translation
-from .inertial_numbers import Link, axes_of
+from ..joints import JointType
 from .kinematic_tree import Carrier
+from .links import Link, axes_of
+from .outward import joint_translation
 
 
 class Step(NamedTuple):
     """One joint on the way from a body to the world: the link that it carries, and its coordinates."""
 
     link: Link
-    joint: MovingJoint
+    joint: JointType
     q: Sequence[Node]
     u: Sequence[Node]
 
@@ -61,14 +61,10 @@ class KinematicChain:
         velocity, omega = STILL, STILL
         for step in self.steps:
             place = joint_translation(step.link, step.joint, step.q)
-            if isinstance(step.joint, AxialJoint):
-                (x, y, _), (u, v, w), spin = point, velocity, step.joint.angle(step.u[0])
-                velocity = (u - spin * y, v + spin * x, w + step.joint.shift(step.u[0]))
-                omega = (omega[0], omega[1], omega[2] + spin)
-            else:
-                turning = step.joint.angular_velocity(step.q, step.u)
-                moving = spatial.plus(step.joint.linear_velocity(step.q, step.u), spatial.cross(turning, point))
-                velocity, omega = spatial.plus(velocity, moving), spatial.plus(omega, turning)
+            turning, sliding = step.joint.velocity(step.q, step.u)
+            (u, v, w), (a, b, c), (x, y, z) = velocity, turning, point
+            velocity = spatial.plus((u + b * z - c * y, v + c * x - a * z, w + a * y - b * x), sliding)
+            omega = spatial.plus(omega, turning)
             point = spatial.plus(place, _in_parent_axes(step, point))
             velocity, omega = _in_parent_axes(step, velocity), _in_parent_axes(step, omega)
         return PointMotion(point, velocity, omega)
@@ -86,13 +82,7 @@ class KinematicChain:
 
 def _in_parent_axes(step: Step, vector: Triple) -> Triple:
     """A vector in the axes of a step's link, in those of the next."""
-    if isinstance(step.joint, AxialJoint):
-        angle = step.joint.angle(step.q[0])
-        if angle.value != 0.0:
-            vector = spatial.rotate_about_z(cg.cos(angle), -cg.sin(angle), vector)
-    else:
-        vector = spatial.rotate(step.joint.rotation(step.q), vector)
-    return spatial.rotate(step.link.turn, vector)
+    return spatial.rotate(step.link.turn, step.joint.turn(step.q).out(vector))
 
 
 def kinematic_chain(
@@ -105,7 +95,7 @@ def kinematic_chain(
     name, states = carrier.name, parts(moving, q, qd)
     while name in index:
         i = index[name]
-        steps.append(Step(links[i], moving_type(moving[i].joint.type), *states[i]))
+        steps.append(Step(links[i], moving[i].joint.type, *states[i]))
         name = moving[i].parent
     position = spatial.product(axes.T, carrier.position)
     return KinematicChain(position, spatial.snapped(axes.T @ carrier.orientation), tuple(steps))

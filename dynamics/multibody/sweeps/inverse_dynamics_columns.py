@@ -26,12 +26,11 @@ from ..algebra.spatial import ZERO, Triple, dot
 from ..algebra.spatial_vectors import Wrench
 from ..body import Body
 from ..joint_coordinates import Places, places
-from ..joints import AxialJoint, MovingJoint, moving_type
-from .body_motion import spring_forces
+from ..joints import JointType
 from .composite_motion import Composite, body_motion
-from .inertial_numbers import Link
+from .links import Link
 from .motion_columns import Column, Frame, Freedoms, Tags, next_frame, root_frame
-from .newton_euler import KINETIC, POTENTIAL
+from .outward import KINETIC, POTENTIAL, spring_forces
 
 
 class Reaction(NamedTuple):
@@ -93,12 +92,12 @@ def torque_derivatives(
                     result.torques[k] = result.torques[k] + link.armature * state[2][k]
                     result.mass[k][k] = result.mass[k][k] + link.armature
             with cg.tag(body.name, POTENTIAL):
-                _add_spring(result, link, moving_type(body.joint.type), place, state, build)
+                _add_spring(result, link, body.joint.type, place, state, build)
     return result
 
 
 def _add_spring(
-    result: TorqueDerivatives, link: Link, joint: MovingJoint, place: Places, state: MotionState, build: Builder
+    result: TorqueDerivatives, link: Link, joint: JointType, place: Places, state: MotionState, build: Builder
 ) -> None:
     q, u = state[0][place.q], state[1][place.u]
     for i, (_, force) in zip(range(place.u.start, place.u.stop), spring_forces(link, joint, q, u), strict=False):
@@ -109,7 +108,7 @@ def _add_spring(
 def add_spring_slopes(
     to: list[list[Node]],
     link: Link,
-    joint: MovingJoint,
+    joint: JointType,
     place: Places,
     state: tuple[Sequence[Node], Sequence[Node]],
     build: Builder,
@@ -157,9 +156,9 @@ def _frames(
         with cg.tag(body.name):
             joint = Freedoms(place.u.start, link.at(q[place.q]), u[place.u], u_dot[place.u], tags)
             if parent < 0:
-                frames.append(root_frame(up, link, moving_type(body.joint.type), joint, in_plane=flat))
+                frames.append(root_frame(up, link, body.joint.type, joint, in_plane=flat))
             else:
-                frames.append(next_frame(frames[parent], link, moving_type(body.joint.type), joint, in_plane=flat))
+                frames.append(next_frame(frames[parent], link, body.joint.type, joint, in_plane=flat))
     return frames
 
 
@@ -169,7 +168,7 @@ def _trees_in_a_plane(bodies: Sequence[Body], links: Sequence[Link], parents: Se
     flat: dict[int, bool] = {}
     for i, (body, link, parent) in enumerate(zip(bodies, links, parents, strict=True)):
         roots.append(roots[parent] if parent >= 0 else i)
-        along = isinstance(body.joint.type, AxialJoint) and (parent < 0 or link.parallel)
+        along = body.joint.type.has_axis and (parent < 0 or link.parallel)
         flat[roots[i]] = flat.get(roots[i], True) and along
     return [flat[root] for root in roots]
 

@@ -14,9 +14,8 @@ from cgraph import Node
 from ..algebra import spatial
 from ..body import Body, checked
 from ..composed_joints import parts_of
-from ..joints import moving_type
-from .body_motion import Motion, energy, propagate_motion
-from .inertial_numbers import Link, axes_of, link
+from .links import Link, axes_of, link
+from .outward import Motion, energy, propagate_motion
 
 
 class Moved(NamedTuple):
@@ -61,7 +60,7 @@ class SharedParts:
 
     def moved(self, parent: Motion, body: Body, link: Link, q: Sequence[Node], u: Sequence[Node]) -> Moved:
         """The motion and energy of a body whose parent moves so. `parent` is one of these motions, or the ground's."""
-        joint = moving_type(body.joint.type)
+        joint = body.joint.type
         key = (id(parent), body.name, joint, link.angle, *[node.name for node in (*q, *u)], *link.numbers)
         if key not in self._moved:
             with cg.tag(body.name):

@@ -16,17 +16,13 @@ import cgraph as cg
 from cgraph import Node
 from cgraph.extend import topological
 
-from ..algebra import spatial
-from ..algebra.spatial import STILL, ZERO, Triple, cross, plus, scaled
+from ..algebra.spatial import STILL, ZERO, Triple, combined, cross, plus, scaled
 from ..algebra.spatial_vectors import Twist, Wrench
-from ..joints import AxialJoint, MovingJoint, SpatialJoint
-from .body_motion import PlaneAngle
-from .composite_inertia import AxisTurn, CompositeInertia, MatrixTurn, Shift, Step, constant_turn, rigid
-from .composite_momentum import along
-from .composite_motion import combined
-from .inertial_numbers import Link
-from .motion_columns import UNIT
-from .newton_euler import KINETIC
+from ..algebra.turns import UNIT, Axes, AxisTurn, constant_turns
+from ..joints import JointType
+from .composite_inertia import CompositeInertia, Shift, Step, rigid
+from .links import Link
+from .outward import KINETIC
 
 FEW = 6  # freedoms in a row; up to so many, columns in the axes of the first body are not tried
 
@@ -37,41 +33,35 @@ class Carried(NamedTuple):
     name: str
     parent: int
     link: Link
-    joint: MovingJoint
+    joint: JointType
     q: Sequence[Node]
     first: int
-    plane: PlaneAngle | None  # see `Motion`
-    before: PlaneAngle | None  # of its parent
+    plane: AxisTurn | None  # see `Motion`
+    before: AxisTurn | None  # of its parent
 
     @property
     def twists(self) -> list[Twist]:
         """The columns S of its velocities, in the axes of its motion."""
-        return along(self.joint, self.q)
+        return self.joint.columns(self.q)
 
     def own(self) -> CompositeInertia:
         """Its inertia in the axes of its motion."""
         alone = rigid(self.link)
-        return AxisTurn(2, self.plane.cos, self.plane.sin).inertia(alone) if self.plane else alone
+        return alone.turned(self.plane) if self.plane else alone
 
     def turn(self) -> list[Step]:
         """From its axes to those of its joint; none where S is the same in both."""
-        if isinstance(self.joint, SpatialJoint):
-            return [MatrixTurn(self.joint.rotation(self.q))]
-        angle = self.joint.angle(self.q[0])
-        return [] if self.plane or angle.value == 0.0 else [AxisTurn(2, cg.cos(angle), cg.sin(angle))]
+        turn = self.joint.turn(self.q)
+        return [] if self.plane or turn.still else [turn]
 
     def outwards(self) -> list[Step]:
         """From the axes of its joint, about its origin, to those of its parent's motion, about the parent's origin."""
         plane, link = self.before, self.link
-        if isinstance(self.joint, SpatialJoint):
-            moved = self.joint.translation(self.q)
-        else:
-            moved = (ZERO, ZERO, self.joint.shift(self.q[0]))
-        steps = [*_shifts(moved), *constant_turn(link.turn)]
+        steps = [*_shifts(self.joint.translation(self.q)), *constant_turns(link.turn)]
         if plane and self.plane:
-            return [*steps, *_shifts(spatial.rotate_about_z(plane.cos, -plane.sin, link.place))]
+            return [*steps, *_shifts(plane.out(link.place))]
         steps += _shifts(link.place)
-        return [*steps, AxisTurn(2, plane.cos, plane.sin)] if plane else steps
+        return [*steps, plane] if plane else steps
 
 
 def mass_matrix_columns(bodies: Sequence[Carried], n: int) -> list[list[Node]]:
@@ -104,11 +94,11 @@ def _columns(bodies: Sequence[Carried], lower: list[list[Node]]) -> list[list[Wr
             whole, others = body.own(), carried[i]
             whole = whole if others is None else whole.plus(others)
             turned = whole.through(body.turn())
-            if isinstance(body.joint, AxialJoint):
+            if body.joint.has_axis:
                 wrenches = columns[i] = [turned.wrench(body.twists[0])]
             else:
                 wrenches = [whole.wrench(twist) for twist in body.twists]
-                columns[i] = [turn.wrench(wrench) for turn in body.turn() for wrench in wrenches]
+                columns[i] = [_through(body.turn(), wrench) for wrench in wrenches]
             for k, wrench in enumerate(wrenches):
                 row = lower[body.first + k]
                 for j, twist in enumerate(body.twists[: k + 1], body.first):
@@ -162,7 +152,7 @@ def _by_first_bodies(
 class Frame(NamedTuple):
     """Axes as columns, and an origin, in those of the body on the world."""
 
-    axes: tuple[Triple, Triple, Triple]
+    axes: Axes
     origin: Triple
 
     def of(self, steps: Sequence[Step]) -> Frame:
@@ -172,7 +162,7 @@ class Frame(NamedTuple):
             if isinstance(step, Shift):
                 origin = plus(origin, scaled(step.by, axes[step.axis]))
             else:
-                axes = step.axes(axes)
+                axes = step.columns(axes)
         return Frame(axes, origin)
 
     def twist(self, own: Twist) -> Twist:
@@ -198,7 +188,7 @@ def _longest(bodies: Sequence[Carried]) -> int:
 
 def _through(steps: Sequence[Step], wrench: Wrench) -> Wrench:
     for step in steps:
-        wrench = step.wrench(wrench)
+        wrench = step.wrench(wrench) if isinstance(step, Shift) else wrench.turned(step)
     return wrench
 
 

@@ -8,19 +8,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-import cgraph as cg
 from cgraph import Node
 from cgraph.extend import Array
 
 from ..algebra import spatial
-from ..algebra.spatial import STILL, ZERO, Triple
+from ..algebra.spatial import STILL, Triple
+from ..algebra.turns import in_a_row
 from ..body import Body
 from ..joint_coordinates import parts
-from ..joints import AxialJoint, SpatialJoint, moving_type
-from .body_motion import joint_translation
 from .forward_kinematics import Step
-from .inertial_numbers import Link, axes_of
 from .kinematic_tree import Carrier
+from .links import Link, axes_of
+from .outward import joint_translation
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,8 +60,8 @@ class RelativePlacement:
         """The steps, those about one axis that no constant turn separates together."""
         runs: list[list[Step]] = []
         for step in self.steps:
-            axial = isinstance(step.joint, AxialJoint) and np.array_equal(np.asarray(step.link.turn), np.eye(3))
-            if runs and axial and isinstance(runs[-1][-1].joint, AxialJoint):
+            axial = step.joint.has_axis and np.array_equal(np.asarray(step.link.turn), np.eye(3))
+            if runs and axial and runs[-1][-1].joint.has_axis:
                 runs[-1].append(step)
             else:
                 runs.append([step])
@@ -71,24 +70,13 @@ class RelativePlacement:
 
 def _through(run: Sequence[Step], vector: Triple, points: bool) -> Triple:
     """A point or a vector of a run's last link, in the axes before its first: each link by its angle in the plane."""
-    first, total = run[0], STILL
-    if isinstance(first.joint, SpatialJoint):
-        total = spatial.rotate(first.joint.rotation(first.q), vector)
-    else:
-        angle = ZERO
-        for step in run:
-            if points and step is not first:
-                total = spatial.plus(total, _turned(angle, joint_translation(step.link, step.joint, step.q)))
-            assert isinstance(step.joint, AxialJoint)  # as of all runs of several
-            angle = angle + step.joint.angle(step.q[0])
-        total = spatial.plus(total, _turned(angle, vector))
-    total = spatial.rotate(first.link.turn, total)
+    first, total, turn = run[0], STILL, run[0].joint.turn(run[0].q)
+    for step in run[1:]:
+        if points:
+            total = spatial.plus(total, turn.out(joint_translation(step.link, step.joint, step.q)))
+        turn = in_a_row(turn, step.joint.turn(step.q))
+    total = spatial.rotate(first.link.turn, spatial.plus(total, turn.out(vector)))
     return spatial.plus(joint_translation(first.link, first.joint, first.q), total) if points else total
-
-
-def _turned(angle: Node, vector: Triple) -> Triple:
-    """A vector turned about z."""
-    return vector if angle.value == 0.0 else spatial.rotate_about_z(cg.cos(angle), -cg.sin(angle), vector)
 
 
 def relative_placements(
@@ -106,10 +94,7 @@ def relative_placements(
     result = []
     for carrier, path in zip(carriers, paths, strict=True):
         names = path[: path.index(common)]
-        steps = [
-            Step(links[index[each]], moving_type(moving[index[each]].joint.type), states[index[each]][0], ())
-            for each in names
-        ]
+        steps = [Step(links[index[each]], moving[index[each]].joint.type, states[index[each]][0], ()) for each in names]
         own = axes_of(moving[index[carrier.name]]) if carrier.name in index else np.eye(3)
         orientation = spatial.snapped(own.T @ carrier.orientation)
         result.append(

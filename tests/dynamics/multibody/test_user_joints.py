@@ -12,6 +12,7 @@ import cgraph as cg
 import dynamics as dyn
 from dynamics.multibody.algebra import spatial
 from dynamics.multibody.algebra.spatial import Triple
+from dynamics.multibody.algebra.spatial_vectors import Twist
 from dynamics.multibody.joints import TYPES, SpatialJoint
 from dynamics.verification.certificate import certify
 from tests.dynamics.models import Array
@@ -51,12 +52,12 @@ class Angles(SpatialJoint):
         turns = [turn(axis, q[k]) for k, (kind, axis) in enumerate(self.hinges) if kind == "revolute"]
         return reduce(lambda a, b: [[spatial.dot(tuple(r), tuple(c)) for c in zip(*b, strict=True)] for r in a], turns)
 
-    def angular_velocity(self, q: Nodes, u: Nodes) -> Triple:
+    def velocity(self, q: Nodes, u: Nodes) -> Twist:
         omega = spatial.STILL
         for k, (kind, axis) in enumerate(self.hinges):
             if kind == "revolute":
                 omega = spatial.plus(spatial.rotate_transpose(turn(axis, q[k]), omega), along(axis, u[k]))
-        return omega
+        return Twist(omega, spatial.STILL)
 
     def placement(self, axis: Array, at: Array) -> tuple[Array, Array]:
         raise NotImplementedError
@@ -76,8 +77,9 @@ class Polar(Angles):
     def translation(self, q: Nodes) -> Triple:
         return q[1] * cg.cos(q[0]), q[1] * cg.sin(q[0]), ZERO
 
-    def linear_velocity(self, q: Nodes, u: Nodes) -> Triple:
-        return spatial.rotate_transpose(turn(X, q[2]), (u[1], q[1] * u[0], ZERO))
+    def velocity(self, q: Nodes, u: Nodes) -> Twist:
+        moved = spatial.rotate_transpose(turn(X, q[2]), (u[1], q[1] * u[0], ZERO))
+        return super().velocity(q, u)._replace(linear=moved)
 
 
 class Still(Angles):
@@ -85,8 +87,8 @@ class Still(Angles):
 
     kind = "still"
 
-    def angular_acceleration(self, q: Nodes, u: Nodes) -> Triple:
-        return spatial.STILL
+    def acceleration(self, q: Nodes, u: Nodes) -> Twist:
+        return super().acceleration(q, u)._replace(angular=spatial.STILL)
 
 
 class Constant(Angles):

@@ -15,7 +15,6 @@ from cgraph.extend import Array, Builder, building
 from ..algebra import spatial
 from ..algebra.spatial import Matrix, Triple
 from ..body import Body
-from ..joints import AxialJoint
 from ..parameters import symbol
 
 
@@ -63,8 +62,8 @@ class Link:
 
 
 def axes_of(body: Body) -> Array:
-    """The axes of the body's motion, as columns in the body's; of an axial joint the third is its axis."""
-    return spatial.to_z(np.asarray(body.joint.axis)) if isinstance(body.joint.type, AxialJoint) else np.eye(3)
+    """The axes of the body's motion, as columns in the body's; where its joint has an axis, the third is that."""
+    return body.joint.type.axes(np.asarray(body.joint.axis))
 
 
 @dataclass(frozen=True, eq=False)
