@@ -10,11 +10,10 @@ from ..equations.constraints.nearly_redundant_rows import without_nearly_redunda
 from ..systems.constraints import Constraints, LoopRow
 from .body import Body, MechanismError
 from .loops import check_loop, coupling_row, loop_rows, slip_rows
-from .mechanism_fields import Structure
-from .sweeps.forward_kinematics import KinematicChain
+from .structure import Structure
+from .sweeps.kinematic_chain import KinematicChain, kinematic_chains
 from .sweeps.kinematic_tree import Carrier
-from .sweeps.links import Link
-from .sweeps.relative_placement import relative_placements
+from .sweeps.links import LinkState
 
 
 def check_loops(structure: Structure) -> None:
@@ -32,10 +31,10 @@ def position_rows(
     structure: Structure,
     moving: Sequence[Body],
     carriers: Mapping[str, Carrier],
-    links: Sequence[Link],
-    q: list[Node],
+    states: Sequence[LinkState],
 ) -> dict[str, Node]:
-    """phi(q) of all loops."""
+    """phi(q) of all loops.  states: of the links of the moving bodies."""
+    q = [node for at in states for node in at.q]
     bodies = {body.name: body for body in structure.bodies}
     rows: dict[str, Node] = {}
     for loop in structure.loops:
@@ -43,7 +42,7 @@ def position_rows(
             phi = [coupling_row(loop, moving, bodies, structure.locked, q)]
         else:
             ends = [carriers[name] for name in (loop.body, loop.to)]
-            phi = loop_rows(loop, *relative_placements(ends, moving, links, q))
+            phi = loop_rows(loop, *kinematic_chains(ends, moving, states))
         rows |= dict(zip(loop.rows, phi, strict=True))
     return rows
 

@@ -17,9 +17,8 @@ from .algebra.spatial import ZERO, Triple
 from .body import WORLD, Body, Joint, MechanismError, checked_rotation, vector
 from .joint_coordinates import places
 from .joints import COMPOSITIONS
-from .sweeps.forward_kinematics import KinematicChain
+from .sweeps.kinematic_chain import KinematicChain
 from .sweeps.kinematic_tree import locked_at
-from .sweeps.relative_placement import RelativePlacement
 
 ROWS = {
     "point": ("x", "y", "z"),
@@ -165,26 +164,29 @@ def _has_one_coordinate(joint: Joint) -> bool:
     return joint.kind not in COMPOSITIONS and len(joint.type.coordinates) == 1
 
 
-def loop_rows(loop: Loop, body: RelativePlacement, to: RelativePlacement) -> list[Node]:
+def loop_rows(loop: Loop, body: KinematicChain, to: KinematicChain) -> list[Node]:
     """phi of a loop that holds frames, of which these are the placements."""
     with building(Builder()), cg.tag(loop.label):
-        gap = spatial.plus(body.point(loop.at), spatial.scaled(-1.0, to.point(loop.to_at)))
+        gap = spatial.plus(body.place_of(loop.at), spatial.scaled(-1.0, to.place_of(loop.to_at)))
         if loop.kind == "distance":
             length = float(loop.length)
             return [(0.5 / length) * (spatial.dot(gap, gap) - length * length)]
         if loop.kind == "rolling":
             axis, target = _axes(loop)
-            normal = to.direction(target[:, 2])
-            tilt = spatial.dot(body.direction(axis[:, 2]), normal)
+            normal = to.axis(target[:, 2])
+            tilt = spatial.dot(body.axis(axis[:, 2]), normal)
             return [spatial.dot(gap, normal) - float(loop.length) * cg.sqrt(1.0 - tilt * tilt)]
         rows = list(gap)
         if loop.kind == "hinge":
             axis, target = _axes(loop)
-            along = body.direction(axis[:, 2])
-            rows += [-spatial.dot(to.direction(target[:, 1]), along), spatial.dot(to.direction(target[:, 0]), along)]
+            along = body.axis(axis[:, 2])
+            rows += [
+                -spatial.dot(to.axis(target[:, 1]), along),
+                spatial.dot(to.axis(target[:, 0]), along),
+            ]
         if loop.kind == "weld":
-            x, y, z = (body.direction(column) for column in np.asarray(loop.orientation, dtype=np.float64))
-            x_to, y_to, z_to = (to.direction(column) for column in np.eye(3))
+            x, y, z = (body.axis(column) for column in np.asarray(loop.orientation, dtype=np.float64))
+            x_to, y_to, z_to = (to.axis(column) for column in np.eye(3))
             rows += _rotation_rows((x, y, z), (x_to, y_to, z_to))
     return _without_rounding(rows, [*body.lengths(loop.at), *to.lengths(loop.to_at)])
 

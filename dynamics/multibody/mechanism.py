@@ -25,12 +25,11 @@ from .joint_coordinates import coordinate_names, lengths, per_velocity, quasi_ve
 from .joint_positions import skeleton
 from .loop_equations import check_loops, of_loops, position_rows, velocity_rows
 from .loops import Loop
-from .mechanism_fields import Structure, changed, listed, summary
 from .modification import attach_subtree, detach_subtree, lock_joint, map_state, subtree_of, unlock_joint
-from .parameter_values import bound_body, bound_force, require_values, used_names
-from .parameters import bound, entries, names_in, symbol
+from .parameters import Quantity, bound, entries, names_in, symbol
+from .structure import Structure, bound_body, bound_force, changed, listed, require_values, used_names
 from .subtree import Subtree
-from .sweeps.forward_kinematics import KinematicChain, kinematic_chain
+from .sweeps.kinematic_chain import KinematicChain, kinematic_chains
 from .sweeps.kinematic_tree import Carrier, lock_joints, merge_fixed_bodies, parents_first, require_inertia, resists
 from .sweeps.links import Link
 from .tree_equations import TreeEquations
@@ -47,6 +46,8 @@ __all__ = [
     "as_mechanism",
     "require_mechanism",
 ]
+
+SHOWN = 6  # names of a kind that a repr shows, at most
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +126,19 @@ class Mechanism(Structure):
         self._require_values(self.parameters, bodies)
 
     def __repr__(self) -> str:
-        return f"<Mechanism of {'; '.join(summary(self, self.coordinates))}>"
+        counted = (
+            f"{len(self.bodies)} bodies, {len(self.coordinates)} coordinate(s) {_first(self.coordinates)}".rstrip()
+        )
+        named = {
+            "locked": list(self.locked),
+            "forces on": [force.body for force in self.forces],
+            "loops": [loop.label for loop in self.loops],
+        }
+        parts = [counted + (", ..." if len(self.coordinates) > SHOWN else "")]
+        parts += [f"{what} {_first(names)}" for what, names in named.items() if names]
+        parts += [f"parameters {', '.join(self.parameter_values)}"] if self.parameter_values else []
+        parts += [f"gravity {', '.join([_shown(each) for each in entries(self.gravity)])}"]
+        return f"<Mechanism of {'; '.join(parts)}>"
 
     @cached_property
     def parts(self) -> tuple[Body, ...]:
@@ -197,7 +210,7 @@ class Mechanism(Structure):
             forces=self._generalized_forces if self.forces else None,
             damping=per_velocity(self.moving, [symbol(body.joint.damping) for body in self.moving]),
             quasi_velocities=quasi_velocities(self.moving),
-            constraints=lambda q, t: position_rows(self, self.moving, self.carriers, self.links, q),
+            constraints=lambda q, t: position_rows(self, self.moving, self.carriers, self._equations.states(q, ())),
             velocity_constraints=lambda q, qd, t: velocity_rows(self, lambda body: self._chain(body, q, qd)),
             lengths=lengths(self._bound.moving),
             require_values=self._require_values,
@@ -216,7 +229,8 @@ class Mechanism(Structure):
         return add_joint_forces(total, self.forces, self.moving, (q, qd), p)
 
     def _chain(self, body: str, q: Sequence[Node], qd: Sequence[Node]) -> KinematicChain:
-        return kinematic_chain(self.carriers[body], self.moving, self.links, q, qd)
+        ends = [self.carriers[name] for name in (body, WORLD)]
+        return kinematic_chains(ends, self.moving, self._equations.states(q, qd))[0]
 
     @property
     def links(self) -> list[Link]:
@@ -341,6 +355,15 @@ def require_mechanism(model: Model, what: str) -> Mechanism:
     if mechanism is None:
         raise MechanismError(f"{what} takes rigid bodies, a Mechanism or a scene of one, got {model!r:.80}")
     return mechanism
+
+
+def _first(names: Sequence[str]) -> str:
+    return ", ".join(names[:SHOWN])
+
+
+def _shown(number: Quantity) -> str:
+    names = names_in([number])
+    return f"({', '.join(names)})" if names else f"{float(number):g}"
 
 
 def _point(body: str, at: ArrayLike) -> Array:

@@ -12,8 +12,7 @@ from cgraph.extend import Array, real_array
 
 from .body import Body, MechanismError
 from .joint_coordinates import coordinate_names, neutral, places, velocity_names
-from .mechanism_fields import AnyStructure, Structure, changed
-from .parameter_values import used_names
+from .structure import AnyStructure, Structure, changed, used_names
 from .subtree import Subtree, as_subtree, descendants, inserted
 
 

@@ -63,7 +63,8 @@ class Wrench(NamedTuple):
 
     def about(self, offset: Triple) -> Wrench:
         """The same about another point, from which this one is `offset` away."""
-        return Wrench(plus(self.torque, cross(offset, self.force)), self.force)
+        (a, b, c), (x, y, z), (f, g, h) = self.torque, offset, self.force
+        return Wrench((a + y * h - z * g, b + z * f - x * h, c + x * g - y * f), self.force)
 
 
-REST = Twist(STILL, STILL)
+REST, IDLE = Twist(STILL, STILL), Wrench(STILL, STILL)

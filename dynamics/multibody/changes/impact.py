@@ -13,7 +13,7 @@ from cgraph.extend import Array, real_array
 from ...equations.equations_of_motion import forward_dynamics, momentum
 from ..body import Body, MechanismError, vector
 from ..mechanism import Mechanism, require_mechanism
-from ..parameter_values import bound_body
+from ..structure import bound_body
 
 _COMPONENTS = ("x y z", "vx vy vz", "wx wy wz")
 

@@ -23,7 +23,7 @@ from ..algebra.spatial_vectors import Twist
 from ..joint_coordinates import places
 from ..joints import JointType
 from ..mechanism import Mechanism, require_mechanism
-from ..sweeps.links import Link
+from ..sweeps.links import Link, LinkState
 from ..sweeps.outward import (
     Motion,
     acceleration_in_space,
@@ -114,12 +114,11 @@ def _kernels(joint: JointType) -> _Kernels:
     build = Builder()
     with building(build):
         before = Motion(omega, _triple(velocity), STILL, ZERO)
-        motion = propagate_motion(before, link, joint, q, qd)
+        at = LinkState("", 0, link, joint, q, qd, qdd)
+        motion = propagate_motion(before, at)
         carrier = acceleration_in_space(omega, Twist(angular, linear), ())
-        acceleration = propagate_acceleration(carrier, before, motion, link, joint, q, qd, qdd)
-        moved = [*motion.velocity, *motion.omega]
-        pairs = [*zip(moved, bars, strict=True)]
-        pairs += wrench(acceleration, motion, link, joint, q, qd, qdd)
+        acceleration = propagate_acceleration(carrier, before, motion, at)
+        pairs = [*zip([*motion.velocity, *motion.omega], bars, strict=True), *wrench(acceleration, motion, at)]
         forces: dict[Node, Node] = {}
         for z, force in pairs:
             forces[z] = forces.get(z, ZERO) + force

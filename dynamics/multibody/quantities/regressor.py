@@ -15,10 +15,10 @@ from ...systems.model import Model
 from ...systems.system import System
 from ..algebra import spatial
 from ..body import WORLD, quantities
-from ..joint_coordinates import parts, quasi_velocities
+from ..joint_coordinates import quasi_velocities
 from ..mechanism import Mechanism, as_mechanism
-from ..sweeps.links import Link, axes_of, link
-from ..sweeps.outward import energy, ground, propagate_motion
+from ..sweeps.links import Link, axes_of, link, link_states
+from ..sweeps.outward import energy, ground, motions
 
 PARAMETERS = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")  # the order of Pinocchio
 _LOWER = ((0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2))  # entries of I in that order
@@ -111,17 +111,16 @@ def _mechanism(model: Model) -> Mechanism:
 
 
 def _partial_lagrangians(mechanism: Mechanism, q: list[Node], qd: list[Node], pi: list[Node]) -> list[Node]:
-    motions, axes = {WORLD: ground(quantities("gravity", mechanism.gravity))}, {WORLD: np.eye(3)}
+    axes = {body.name: axes_of(body) for body in mechanism.moving} | {WORLD: np.eye(3)}
+    base = ground(quantities("gravity", mechanism.gravity))
     partials = []
     with building(Builder()):
-        states = parts(mechanism.moving, q, qd)
-        for i, body in enumerate(mechanism.moving):
-            axes[body.name] = axes_of(body)
-            known, joint = link(body, axes[body.parent]), body.joint.type
-            with cg.tag(body.name):
-                motions[body.name] = propagate_motion(motions[body.parent], known, joint, *states[i])
-                unknown = _symbolic(known, axes[body.name], pi[10 * i : 10 * i + 10])
-                partials.append(energy(motions[body.name], unknown, joint, *states[i]))
+        links = [link(body, axes[body.parent]) for body in mechanism.moving]
+        states = link_states(mechanism.moving, links, mechanism.parents, q, qd)
+        for i, (at, motion) in enumerate(zip(states, motions(states, base), strict=True)):
+            with cg.tag(at.name):
+                unknown = _symbolic(at.link, axes[at.name], pi[10 * i : 10 * i + 10])
+                partials.append(energy(motion, at._replace(link=unknown)))
     return partials
 
 

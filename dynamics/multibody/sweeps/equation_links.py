@@ -17,7 +17,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cgraph import Node
 from cgraph.extend import Array
 
 from ..algebra import spatial
@@ -120,7 +119,11 @@ def equation_links(
     for i, parent in enumerate(parents):
         if parent >= 0:
             children[parent].append(i)
-    known = {i: _numbers(*pair) for i, pair in enumerate(zip(links, joints, strict=True)) if _is_numeric(pair[0])}
+    known = {
+        i: _Numbers(np.array(link.turn, dtype=np.float64), link.offset, *link.inertial, joint)
+        for i, (link, joint) in enumerate(zip(links, joints, strict=True))
+        if link.is_numeric
+    }
     for i in reversed(range(len(links))):  # from the tips: no further than what is carried by the least body
         if i in known:
             reach = min([_FAR * _extent(known[i]), *[known[child].reach for child in children[i] if child in known]])
@@ -185,16 +188,6 @@ def _within_quarter(angle: float) -> float:
 
 def _about_z(angle: float) -> Array:
     return spatial.rotation(np.array([0.0, 0.0, 1.0]), angle)
-
-
-def _is_numeric(link: Link) -> bool:
-    return not any([isinstance(each, Node) for each in link.numbers[:19]])
-
-
-def _numbers(link: Link, joint: JointType) -> _Numbers:
-    place, moment = (np.array([spatial.plain(each) for each in triple]) for triple in (link.place, link.moment))
-    inertia = np.array([[link.inertia[max(i, j)][min(i, j)] for j in range(3)] for i in range(3)])
-    return _Numbers(np.array(link.turn, dtype=np.float64), place, float(link.mass), moment, inertia, joint)
 
 
 def _link(link: Link, to: _Numbers, angle: float) -> Link:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,8 +14,24 @@ from cgraph.extend import Array, Builder, building
 
 from ..algebra import spatial
 from ..algebra.spatial import Matrix, Triple
+from ..algebra.spatial_vectors import Twist
+from ..algebra.turns import Turn
 from ..body import Body
+from ..joint_coordinates import places
+from ..joints import JointType
 from ..parameters import symbol
+
+
+class Numbers(NamedTuple):
+    """Inertial numbers: floats, or nodes where there are parameters."""
+
+    mass: Any
+    moment: Array  # (3,)
+    inertia: Array  # (3, 3)
+
+    def negated(self) -> Numbers:
+        """With other signs."""
+        return Numbers(-self.mass, -self.moment, -self.inertia)
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,9 +72,105 @@ class Link:
         """The inertia with its upper triangle."""
         return [[spatial.plain(self.inertia[max(i, j)][min(i, j)]) for j in range(3)] for i in range(3)]
 
-    def at(self, q: Sequence[Node]) -> Sequence[Node]:
-        """The coordinates of the joint by which the axes move."""
-        return [q[0] + self.angle] if self.angle else q
+    @cached_property
+    def is_numeric(self) -> bool:
+        """Whether there are no parameters among the numbers of place and inertia."""
+        return not any([isinstance(each, Node) for each in self.numbers[:19]])
+
+    @property
+    def inertial(self) -> Numbers:
+        """Mass, first moment and inertia as arrays."""
+        moment = np.array([spatial.plain(each) for each in self.moment])
+        return Numbers(self.mass, moment, np.array(self.full_inertia))
+
+    @property
+    def offset(self) -> Array:
+        """The place as an array, (3,)."""
+        return np.array([spatial.plain(each) for each in self.place])
+
+    def with_more(self, added: Numbers) -> Link:
+        """The link with these numbers added to its own."""
+        mass, moment, inertia = self.inertial
+        moment, inertia = spatial.added(moment, added.moment), spatial.added(inertia, added.inertia)
+        return replace(self, mass=mass + added.mass, moment=spatial.constant(moment), inertia=inertia.tolist())
+
+
+class LinkState(NamedTuple):
+    """A link on its joint, at the state of that.
+
+    name: of its body, for tags.  parent: index of the link that carries it, -1 for the world.  first: place of the
+    joint's first velocity among all.
+    """
+
+    name: str
+    parent: int
+    link: Link
+    joint: JointType
+    q: Sequence[Node]
+    u: Sequence[Node]
+    u_dot: Sequence[Node] = ()
+    first: int = 0
+
+    @property
+    def moved(self) -> Sequence[Node]:
+        """The coordinates by which the axes move."""
+        return [self.q[0] + self.link.angle] if self.link.angle else self.q
+
+    @property
+    def turn(self) -> Turn:
+        """From the joint's axes to the link's."""
+        return self.joint.turn(self.moved)
+
+    @property
+    def shift(self) -> Triple:
+        """Where the joint has the link's origin, in the joint's axes [m]."""
+        return self.joint.translation(self.moved)
+
+    @property
+    def place(self) -> Triple:
+        """Where the link's origin is from its parent's, in the parent's axes [m]."""
+        return spatial.plus(self.link.place, spatial.rotate(self.link.turn, self.shift))
+
+    @property
+    def columns(self) -> list[Twist]:
+        """How each velocity of the joint moves the link, in the link's axes."""
+        return self.joint.columns(self.moved)
+
+    def into(self, vector: Triple) -> Triple:
+        """A vector in the parent's axes, in those of the joint."""
+        return spatial.rotate_transpose(self.link.turn, vector)
+
+    def springs(self) -> list[tuple[Node, Node]]:
+        """The velocities that the joint's spring works on, and its forces."""
+        return [(velocity, self.link.stiffness * x) for velocity, x in zip(self.u, self.stretches(), strict=False)]
+
+    def stretches(self) -> Sequence[Node]:
+        """How far the spring is stretched along each velocity; nothing where there is no spring."""
+        absent = not isinstance(self.link.stiffness, Node) and not self.link.stiffness
+        return [] if absent else self.joint.stretches(self.q, self.link.spring_reference)
+
+
+def link_states(
+    bodies: Sequence[Body],
+    links: Sequence[Link],
+    parents: Sequence[int],
+    q: Sequence[Node],
+    u: Sequence[Node],
+    u_dot: Sequence[Node] | None = None,
+) -> list[LinkState]:
+    """The links of moving bodies, parents first, at a state of all.  parents: their indices.  u_dot: by default 0."""
+    rates = [spatial.ZERO] * len(u) if u_dot is None else u_dot
+    rows = zip(bodies, parents, links, places(bodies), strict=True)
+    return [
+        LinkState(body.name, parent, each, body.joint.type, q[at.q], u[at.u], rates[at.u], at.u.start)
+        for body, parent, each, at in rows
+    ]
+
+
+def parents_of(bodies: Sequence[Body]) -> list[int]:
+    """For each body the index of the one that carries it, -1 for the world."""
+    index = {body.name: i for i, body in enumerate(bodies)}
+    return [index.get(body.parent, -1) for body in bodies]
 
 
 def axes_of(body: Body) -> Array:

@@ -17,14 +17,11 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import cgraph as cg
-from cgraph import Node
 
-from ..algebra import spatial
 from ..algebra.spatial import STILL, Triple, combined, plus
 from ..algebra.spatial_vectors import REST, Twist
 from ..algebra.turns import UNIT, Axes, MatrixTurn, Turn, in_a_row
-from ..joints import JointType
-from .links import Link
+from .links import LinkState
 from .outward import KINETIC
 
 Tags = Sequence[str]
@@ -57,78 +54,90 @@ class Frame(NamedTuple):
     turn: Turn
 
 
-class Freedoms(NamedTuple):
-    """The joint of a body with its state: the index of its first velocity, coordinates, velocities, accelerations.
+def frames_of(states: Sequence[LinkState], up: Triple, tags: Tags) -> list[Frame]:
+    """How all links, parents first, are placed and move.
 
-    tags: the energies that accelerations come of.
+    up: the acceleration of the world against free fall.  tags: the energies that accelerations come of.
     """
+    flat, frames = trees_in_a_plane(states), list[Frame]()
+    for at, in_plane in zip(states, flat, strict=True):
+        with cg.tag(at.name):
+            if at.parent < 0:
+                frames.append(_root_frame(up, at, tags, in_plane=in_plane))
+            else:
+                frames.append(_next_frame(frames[at.parent], at, tags, in_plane=in_plane))
+    return frames
 
-    start: int
-    q: Sequence[Node]
-    u: Sequence[Node]
-    u_dot: Sequence[Node]
-    tags: Tags
+
+def trees_in_a_plane(states: Sequence[LinkState]) -> list[bool]:
+    """For each link whether all axes of its tree are parallel."""
+    roots: list[int] = []
+    flat: dict[int, bool] = {}
+    for i, at in enumerate(states):
+        roots.append(roots[at.parent] if at.parent >= 0 else i)
+        along = at.joint.has_axis and (at.parent < 0 or at.link.parallel)
+        flat[roots[i]] = flat.get(roots[i], True) and along
+    return [flat[root] for root in roots]
 
 
-def root_frame(up: Triple, link: Link, joint: JointType, state: Freedoms, *, in_plane: bool) -> Frame:
-    """Of a body on the world.  up: the acceleration against free fall.  in_plane: so move all that it carries.
+def _root_frame(up: Triple, at: LinkState, tags: Tags, *, in_plane: bool) -> Frame:
+    """Of a body on the world.  in_plane: so move it and all that it carries.
 
     All that a tree needs is alike in any axes, so they are those that this body has just now, or, of a tree in a plane
     and of velocities along them, those of its joint.
     """
-    turn = joint.turn(state.q)
-    with cg.tag(*state.tags):
-        up = spatial.rotate_transpose(link.turn, up)
-    axes = UNIT
-    if in_plane or joint.sliding:
+    turn, axes = at.turn, UNIT
+    with cg.tag(*tags):
+        up = at.into(up)
+    if in_plane or at.joint.sliding:
         axes = turn.columns(UNIT)
     else:
-        with cg.tag(*state.tags):
+        with cg.tag(*tags):
             up = turn.into(up)
-    return _moved(joint, state, UNIT, Frame(STILL, axes, REST, Twist(STILL, up), (), UNIT, turn))
+    return _moved(at, tags, UNIT, Frame(STILL, axes, REST, Twist(STILL, up), (), UNIT, turn))
 
 
-def next_frame(parent: Frame, link: Link, joint: JointType, state: Freedoms, *, in_plane: bool) -> Frame:
+def _next_frame(parent: Frame, at: LinkState, tags: Tags, *, in_plane: bool) -> Frame:
     """Of a body that another carries."""
-    before, turn = MatrixTurn(link.turn).columns(parent.axes), joint.turn(state.q)
-    offset = plus(combined(parent.axes, link.place), combined(before, joint.translation(state.q)))
+    before, turn = MatrixTurn(at.link.turn).columns(parent.axes), at.turn
+    offset = plus(combined(parent.axes, at.link.place), combined(before, at.shift))
     if in_plane:
-        before, turn = MatrixTurn(link.turn).columns(parent.before), in_a_row(parent.turn, turn, link.turn[2][2])
+        before = MatrixTurn(at.link.turn).columns(parent.before)
+        turn = in_a_row(parent.turn, turn, at.link.turn[2][2])
     with cg.tag(KINETIC):
         velocity = parent.velocity.at(offset)
-    with cg.tag(*state.tags):
+    with cg.tag(*tags):
         acceleration = parent.acceleration.at(offset)
-    return _moved(joint, state, before, Frame(offset, turn.columns(before), velocity, acceleration, (), before, turn))
+    return _moved(at, tags, before, Frame(offset, turn.columns(before), velocity, acceleration, (), before, turn))
 
 
-def _moved(joint: JointType, state: Freedoms, before: Axes, frame: Frame) -> Frame:
+def _moved(at: LinkState, tags: Tags, before: Axes, frame: Frame) -> Frame:
     """The frame with the motion of the joint, as long as it has that of the body that carries it.
 
     before: the axes of the joint.
     """
-    if joint.sliding:
-        frame = _stage(frame, 0, [Twist(STILL, axis) for axis in before[: joint.sliding]], state)
-    own = joint.columns(state.q)[joint.sliding :]
-    turned = [Twist(combined(frame.axes, w), combined(frame.axes, v)) for w, v in own]
-    return _stage(frame, joint.sliding, turned, state)
+    sliding = at.joint.sliding
+    if sliding:
+        frame = _stage(frame, 0, [Twist(STILL, axis) for axis in before[:sliding]], at, tags)
+    turned = [Twist(combined(frame.axes, w), combined(frame.axes, v)) for w, v in at.columns[sliding:]]
+    return _stage(frame, sliding, turned, at, tags)
 
 
-def _stage(frame: Frame, first: int, motions: Sequence[Twist], state: Freedoms) -> Frame:
+def _stage(frame: Frame, first: int, motions: Sequence[Twist], at: LinkState, tags: Tags) -> Frame:
     """The frame with the motion of the joint's freedoms from `first` on."""
     velocity, acceleration = frame.velocity, frame.acceleration
     along, columns = REST, []
     with cg.tag(KINETIC):
-        carried = [velocity.cross(motion) for motion in motions]
+        carried = [velocity.cross(motion) for motion in motions]  # psi'
         for k, motion in enumerate(motions, first):
-            along = along.plus(motion.scaled(state.u[k]))
+            along = along.plus(motion.scaled(at.u[k]))  # S u
         rates = [slow.scaled(2.0) for slow in carried]
         if len(motions) > 1:
-            rates = [rate.plus(along.cross(motion)) for rate, motion in zip(rates, motions, strict=True)]
-    with cg.tag(*state.tags):
+            rates = [rate.plus(along.cross(motion)) for rate, motion in zip(rates, motions, strict=True)]  # psi' + S'
+    with cg.tag(*tags):
         for k, (motion, slow, rate) in enumerate(zip(motions, carried, rates, strict=True), first):
-            twice = frame.acceleration.cross(motion).plus(velocity.cross(slow))
-            columns.append(Column(state.start + k, first, motion, slow, twice, rate))
-            change = slow.scaled(state.u[k]).plus(motion.scaled(state.u_dot[k]))
-            acceleration = acceleration.plus(change)
+            twice = frame.acceleration.cross(motion).plus(velocity.cross(slow))  # psi''
+            columns.append(Column(at.first + k, first, motion, slow, twice, rate))
+            acceleration = acceleration.plus(slow.scaled(at.u[k]).plus(motion.scaled(at.u_dot[k])))
     velocity = velocity.plus(along)
     return frame._replace(velocity=velocity, acceleration=acceleration, columns=[*frame.columns, *columns])

@@ -24,8 +24,7 @@ from ..algebra import spatial
 from ..algebra.spatial import STILL, ZERO, Triple, cross, plus, scaled
 from ..algebra.spatial_vectors import Twist
 from ..algebra.turns import NO_TURN, AxisTurn, Turn, about_z, in_a_row
-from ..joints import JointType
-from .links import Link
+from .links import LinkState
 
 KINETIC, POTENTIAL = "kinetic", "potential"
 Tensor = tuple[Triple, Triple, Triple]  # rows
@@ -64,9 +63,9 @@ class Motion(NamedTuple):
             vertical = self.into(self.vertical)
         return self._replace(velocity=velocity, vertical=vertical, plane=None)
 
-    def keeps_plane(self, link: Link, joint: JointType) -> bool:
-        """Whether a body carried by this one on that joint stays in its plane."""
-        return self.plane is not None and joint.has_axis and link.parallel
+    def keeps(self, at: LinkState) -> bool:
+        """Whether a link carried by this body stays in its plane."""
+        return self.plane is not None and at.joint.has_axis and at.link.parallel
 
 
 def ground(gravity: Array, *, in_plane: bool = False) -> Motion:
@@ -87,24 +86,27 @@ def ground(gravity: Array, *, in_plane: bool = False) -> Motion:
         return Motion(STILL, STILL, spatial.constant(0.0 - gravity), ZERO)
 
 
-def joint_translation(link: Link, joint: JointType, q: Sequence[Node]) -> Triple:
-    """Where the link's origin is from its parent's, in the parent's axes."""
-    return plus(link.place, spatial.rotate(link.turn, joint.translation(q)))
+def motions(states: Sequence[LinkState], ground: Motion) -> list[Motion]:
+    """The motions of all links, parents first, on a ground that may move."""
+    result: list[Motion] = []
+    for at in states:
+        with cg.tag(at.name):
+            result.append(propagate_motion(result[at.parent] if at.parent >= 0 else ground, at))
+    return result
 
 
-def propagate_motion(parent: Motion, link: Link, joint: JointType, q: Sequence[Node], u: Sequence[Node]) -> Motion:
-    """The motion of a link from that of its parent; q and u are the coordinates and velocities of its joint.
+def propagate_motion(parent: Motion, at: LinkState) -> Motion:
+    """The motion of a link from that of its parent.
 
     omega = R^T omega_parent + omega_joint, v = R^T (v_parent + omega_parent x offset) + v_joint.
     """
-    parent = parent if parent.keeps_plane(link, joint) else parent.in_body_axes()
-    offset, turn = joint_translation(link, joint, q), joint.turn(q)
+    parent = parent if parent.keeps(at) else parent.in_body_axes()
+    offset, turn = at.place, at.turn
     with cg.tag(KINETIC):
-        relative = joint.velocity(q, u)
-        omega = spatial.rotate_transpose(link.turn, parent.omega)
-        velocity = spatial.rotate_transpose(link.turn, _velocity_at(parent, offset))
+        relative = at.joint.velocity(at.moved, at.u)
+        omega, velocity = at.into(parent.omega), at.into(_velocity_at(parent, offset))
     with cg.tag(POTENTIAL):
-        vertical = spatial.rotate_transpose(link.turn, parent.vertical)
+        vertical = at.into(parent.vertical)
         depth = parent.depth + spatial.dot(parent.vertical, parent.out(offset))
     begins = all([each.value == 0.0 for each in omega])
     before = NO_TURN if turn.angle is not None and (parent.plane or begins) else turn
@@ -113,22 +115,22 @@ def propagate_motion(parent: Motion, link: Link, joint: JointType, q: Sequence[N
     with cg.tag(POTENTIAL):
         vertical = before.into(vertical)
     still = all([each.value == 0.0 for each in (*velocity, *vertical[:2])])
-    plane = _plane(parent.plane, turn, link, begins=begins, still=still)
+    plane = _plane(parent.plane, turn, at.link.turn[2][2], begins=begins, still=still)
     return Motion(omega, velocity, vertical, depth, parent.strength, before, plane)
 
 
-def _plane(parent: AxisTurn | None, turn: Turn, link: Link, *, begins: bool, still: bool) -> AxisTurn | None:
+def _plane(parent: AxisTurn | None, turn: Turn, way: float | Node, *, begins: bool, still: bool) -> AxisTurn | None:
     """The turn of a body from the plane that it moves in, which a hinge on what does not turn begins; else None.
 
+    way: of the joint's axis on the parent's, 1 or -1 in a plane.
     still: all but the angle is alike about the axis, so that the plane may as well turn with the first body.
     """
     if turn.angle is None:
         return None
-    over = link.turn[2][2]  # the joint's axis on the parent's
     if turn.still:
-        return parent and AxisTurn(2, parent.cos, over * parent.sin, over * parent.angle)
+        return parent and AxisTurn(2, parent.cos, way * parent.sin, way * parent.angle)
     if parent:
-        return in_a_row(parent, turn, over)
+        return in_a_row(parent, turn, way)
     if begins:
         return about_z(ZERO if still else turn.angle)
     return None
@@ -145,12 +147,12 @@ def _velocity_at(motion: Motion, offset: Triple) -> Triple:
     return velocity
 
 
-def energy(motion: Motion, link: Link, joint: JointType, q: Sequence[Node], u: Sequence[Node]) -> Node:
+def energy(motion: Motion, at: LinkState) -> Node:
     """L_i = K_i - P_i with the first moment m c and the inertia J about the joint, without the center's velocity.
 
     K = m v.v / 2 + m c . (v x w) + w . J w / 2,  P = m g h + g u . m c + spring.
     """
-    own, inertia = motion.in_body_axes(), link.inertia
+    own, link, inertia = motion.in_body_axes(), at.link, at.link.inertia
     omega, v = own.omega, motion.velocity
     with cg.tag(KINETIC):
         translation = 0.5 * link.mass * spatial.dot(v, v)
@@ -162,25 +164,14 @@ def energy(motion: Motion, link: Link, joint: JointType, q: Sequence[Node], u: S
         else:
             terms = [coupling, rotation] if translation.value == 0.0 else [translation, rotation, coupling]
         terms += [inertia[i][j] * (omega[i] * omega[j]) for i in range(3) for j in range(i)]
-        terms.append(0.5 * link.armature * spatial.total([velocity * velocity for velocity in u]))
+        terms.append(0.5 * link.armature * spatial.total([velocity * velocity for velocity in at.u]))
         kinetic = spatial.total(terms)
     with cg.tag(POTENTIAL):
         weight = scaled(motion.strength, link.moment)
         potential = link.mass * motion.strength * motion.depth + spatial.dot(own.vertical, weight)
-        for stretch in _stretches(link, joint, q):
+        for stretch in at.stretches():
             potential = potential + 0.5 * link.stiffness * (stretch * stretch)
     return kinetic - potential
-
-
-def spring_forces(link: Link, joint: JointType, q: Sequence[Node], u: Sequence[Node]) -> list[BiasForce]:
-    """The velocities that the joint's spring works on, and its forces."""
-    return [(velocity, link.stiffness * x) for velocity, x in zip(u, _stretches(link, joint, q), strict=False)]
-
-
-def _stretches(link: Link, joint: JointType, q: Sequence[Node]) -> Sequence[Node]:
-    """One for each velocity, or none where there is no spring."""
-    absent = not isinstance(link.stiffness, Node) and not link.stiffness
-    return [] if absent else joint.stretches(q, link.spring_reference)
 
 
 class Acceleration(NamedTuple):
@@ -210,31 +201,22 @@ def acceleration_in_space(omega: Triple, rate: Twist, tags: tuple[str, ...]) -> 
     return Acceleration(rate.angular, rate.linear, tensor, tensor, tags)
 
 
-def propagate_acceleration(
-    parent: Acceleration,
-    before: Motion,
-    after: Motion,
-    link: Link,
-    joint: JointType,
-    q: Sequence[Node],
-    u: Sequence[Node],
-    u_dot: Sequence[Node],
-) -> Acceleration:
-    """A link's acceleration from its parent's: `after` is `propagate_motion(before, link, joint, q, u)`.
+def propagate_acceleration(parent: Acceleration, before: Motion, after: Motion, at: LinkState) -> Acceleration:
+    """A link's acceleration from its parent's: `after` is `propagate_motion(before, at)`.
 
     a = R^T (a_parent + T offset) + 2 omega x v_joint + a_joint,  alpha = R^T alpha_parent + omega x omega_joint +
     alpha_joint, with the parent's omega in the axes of the motion.
     """
-    stays, turn, relative = before.keeps_plane(link, joint), after.turn, joint.velocity(q, u)
+    stays, turn, joint, q = before.keeps(at), after.turn, at.joint, at.moved
+    relative = joint.velocity(q, at.u)
     with cg.tag(*parent.tags):
         linear = parent.linear if stays else before.into(parent.linear)
-        linear = plus(linear, _times(parent.swept if stays else parent.tensor, joint_translation(link, joint, q)))
-        linear = turn.into(spatial.rotate_transpose(link.turn, linear))
-        rate, omega = joint.acceleration(q, u), turn.into(spatial.rotate_transpose(link.turn, before.omega))
+        linear = turn.into(at.into(plus(linear, _times(parent.swept if stays else parent.tensor, at.place))))
+        rate, omega = joint.acceleration(q, at.u), turn.into(at.into(before.omega))
         linear = plus(plus(linear, rate.linear), cross(omega, scaled(2.0, relative.linear)))
     with cg.tag(KINETIC):  # velocities are linear in u, so that those of u_dot are their rates at constant q
-        angular = plus(turn.into(spatial.rotate_transpose(link.turn, parent.angular)), rate.angular)
-        change = joint.velocity(q, u_dot)
+        angular = plus(turn.into(at.into(parent.angular)), rate.angular)
+        change = joint.velocity(q, at.u_dot)
         angular = plus(plus(angular, cross(omega, relative.angular)), change.angular)
         linear = plus(linear, change.linear)
         tensor = swept = _tensor(after.omega, angular)
@@ -245,21 +227,13 @@ def propagate_acceleration(
     return Acceleration(angular, linear, tensor, swept, parent.tags)
 
 
-def wrench(
-    acceleration: Acceleration,
-    motion: Motion,
-    link: Link,
-    joint: JointType,
-    q: Sequence[Node],
-    u: Sequence[Node],
-    u_dot: Sequence[Node],
-) -> list[BiasForce]:
+def wrench(acceleration: Acceleration, motion: Motion, at: LinkState) -> list[BiasForce]:
     """The wrench, each component paired with the velocity it works on; the spring's and the armature's force likewise.
 
     f = m a + T h, n = J alpha + omega x J omega + h x a, for the tensor T and the first moment h.
     """
     w, alpha, a, tensor = motion.omega, acceleration.angular, acceleration.linear, acceleration.tensor
-    inertia = link.full_inertia
+    link, inertia = at.link, at.link.full_inertia
     with cg.tag(KINETIC):
         force, torque = _times(acceleration.swept, link.moment), []
         for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
@@ -270,9 +244,9 @@ def wrench(
         force = plus(scaled(link.mass, a), force)
         torque = [a + b for a, b in zip(torque, cross(link.moment, motion.into(a)), strict=True)]
     with cg.tag(POTENTIAL):
-        springs = spring_forces(link, joint, q, u)
+        springs = at.springs()
     with cg.tag(KINETIC):
-        armatures = [(velocity, link.armature * rate) for velocity, rate in zip(u, u_dot, strict=True)]
+        armatures = [(velocity, link.armature * rate) for velocity, rate in zip(at.u, at.u_dot, strict=True)]
     return [*zip((*motion.velocity, *motion.omega), (*force, *torque), strict=True), *springs, *armatures]
 
 

@@ -10,58 +10,79 @@ that each entry is one product of six numbers.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
+
+import numpy as np
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import topological
+from cgraph.extend import as_node, topological
 
-from ..algebra.spatial import STILL, ZERO, Triple, combined, cross, plus, scaled
+from ..algebra import spatial
+from ..algebra.inertia import Inertia, symmetric
+from ..algebra.spatial import STILL, ZERO, Triple, combined, cross, plus
 from ..algebra.spatial_vectors import Twist, Wrench
-from ..algebra.turns import UNIT, Axes, AxisTurn, constant_turns
-from ..joints import JointType
-from .composite_inertia import CompositeInertia, Shift, Step, rigid
-from .links import Link
+from ..algebra.turns import NEXT, UNIT, Axes, AxisTurn, Turn, constant_turns
+from .links import Link, LinkState
 from .outward import KINETIC
 
 FEW = 6  # freedoms in a row; up to so many, columns in the axes of the first body are not tried
+Carriable = TypeVar("Carriable", Inertia, Wrench)
+
+
+class Shift(NamedTuple):
+    """A move to a point from which the old one is `offset` away."""
+
+    offset: Triple
+
+
+Step = Turn | Shift
+
+
+def carried(value: Carriable, steps: Sequence[Step]) -> Carriable:
+    """An inertia or a wrench after these steps outwards."""
+    for step in steps:
+        value = value.about(step.offset) if isinstance(step, Shift) else value.turned(step)
+    return value
 
 
 class Carried(NamedTuple):
-    """A body on its parent.  names: of the body, for tags.  first: the place of its first velocity among all."""
+    """A link with the planes that it and its parent move in, see `Motion`."""
 
-    name: str
-    parent: int
-    link: Link
-    joint: JointType
-    q: Sequence[Node]
-    first: int
-    plane: AxisTurn | None  # see `Motion`
-    before: AxisTurn | None  # of its parent
+    at: LinkState
+    plane: AxisTurn | None
+    before: AxisTurn | None
 
     @property
-    def twists(self) -> list[Twist]:
-        """The columns S of its velocities, in the axes of its motion."""
-        return self.joint.columns(self.q)
-
-    def own(self) -> CompositeInertia:
-        """Its inertia in the axes of its motion."""
-        alone = rigid(self.link)
+    def inertia(self) -> Inertia:
+        """Its own, in the axes of its motion."""
+        alone = rigid(self.at.link)
         return alone.turned(self.plane) if self.plane else alone
 
+    @property
     def turn(self) -> list[Step]:
         """From its axes to those of its joint; none where S is the same in both."""
-        turn = self.joint.turn(self.q)
-        return [] if self.plane or turn.still else [turn]
+        return [] if self.plane or self.at.turn.still else [self.at.turn]
 
+    @property
     def outwards(self) -> list[Step]:
         """From the axes of its joint, about its origin, to those of its parent's motion, about the parent's origin."""
-        plane, link = self.before, self.link
-        steps = [*_shifts(self.joint.translation(self.q)), *constant_turns(link.turn)]
+        plane, link = self.before, self.at.link
+        steps: list[Step] = [Shift(self.at.shift), *constant_turns(link.turn)]
         if plane and self.plane:
-            return [*steps, *_shifts(plane.out(link.place))]
-        steps += _shifts(link.place)
-        return [*steps, plane] if plane else steps
+            return [*steps, Shift(plane.out(link.place))]
+        return [*steps, Shift(link.place), plane] if plane else [*steps, Shift(link.place)]
+
+
+def rigid(link: Link) -> Inertia:
+    """Of a link alone, about its origin."""
+    full = [[as_node(each) for each in row] for row in link.full_inertia]
+    second = [[-full[i][j] for j in range(3)] for i in range(3)]
+    diagonal = np.array([spatial.plain(full[i][i]) for i in range(3)])
+    for i, (j, k) in enumerate(NEXT):
+        both = spatial.added(diagonal[j : j + 1], diagonal[k : k + 1])
+        second[i][i] = as_node(0.5 * spatial.added(both, -diagonal[i : i + 1])[0])
+    return Inertia(as_node(link.mass), link.moment, symmetric(second), full[2][2])
 
 
 def mass_matrix_columns(bodies: Sequence[Carried], n: int) -> list[list[Node]]:
@@ -86,27 +107,27 @@ def size_of(rows: Sequence[Sequence[Node]]) -> int:
 
 def _columns(bodies: Sequence[Carried], lower: list[list[Node]]) -> list[list[Wrench]]:
     """I S of all freedoms, in the axes of their joints; their own entries go into the matrix."""
-    carried: list[CompositeInertia | None] = [None] * len(bodies)
+    composites: list[Inertia | None] = [None] * len(bodies)
     columns: list[list[Wrench]] = [[] for _ in bodies]
     for i in reversed(range(len(bodies))):
-        body = bodies[i]
-        with cg.tag(body.name, KINETIC):
-            whole, others = body.own(), carried[i]
-            whole = whole if others is None else whole.plus(others)
-            turned = whole.through(body.turn())
-            if body.joint.has_axis:
-                wrenches = columns[i] = [turned.wrench(body.twists[0])]
+        body, at = bodies[i], bodies[i].at
+        with cg.tag(at.name, KINETIC):
+            others, twists = composites[i], at.columns
+            whole = body.inertia if others is None else body.inertia.plus(others)
+            turned = carried(whole, body.turn)
+            if at.joint.has_axis:
+                wrenches = columns[i] = [turned.wrench(twist) for twist in twists]
             else:
-                wrenches = [whole.wrench(twist) for twist in body.twists]
-                columns[i] = [_through(body.turn(), wrench) for wrench in wrenches]
+                wrenches = [whole.wrench(twist) for twist in twists]
+                columns[i] = [carried(wrench, body.turn) for wrench in wrenches]
             for k, wrench in enumerate(wrenches):
-                row = lower[body.first + k]
-                for j, twist in enumerate(body.twists[: k + 1], body.first):
+                row = lower[at.first + k]
+                for j, twist in enumerate(twists[: k + 1], at.first):
                     row[j] = twist.power(wrench)
-                row[body.first + k] = row[body.first + k] + body.link.armature
-            if body.parent >= 0:
-                moved, others = turned.through(body.outwards()), carried[body.parent]
-                carried[body.parent] = moved if others is None else others.plus(moved)
+                row[at.first + k] = row[at.first + k] + at.link.armature
+            if at.parent >= 0:
+                moved, others = carried(turned, body.outwards), composites[at.parent]
+                composites[at.parent] = moved if others is None else others.plus(moved)
     return columns
 
 
@@ -115,15 +136,15 @@ def _by_bodies(
 ) -> list[list[Node]]:
     """The other entries, each in the axes of the body between."""
     for i, wrenches in enumerate(columns):
-        at, turn = bodies[i], list[Step]()
-        while at.parent >= 0:
-            with cg.tag(at.name, KINETIC):
-                wrenches = [_through([*turn, *at.outwards()], wrench) for wrench in wrenches]
-            at = bodies[at.parent]
-            turn = at.turn()
-            with cg.tag(at.name, KINETIC):
-                for k, wrench in enumerate(wrenches, bodies[i].first):
-                    for j, twist in enumerate(at.twists, at.first):
+        body, turn = bodies[i], list[Step]()
+        while body.at.parent >= 0:
+            with cg.tag(body.at.name, KINETIC):
+                wrenches = [carried(wrench, [*turn, *body.outwards]) for wrench in wrenches]
+            body = bodies[body.at.parent]
+            turn = body.turn
+            with cg.tag(body.at.name, KINETIC):
+                for k, wrench in enumerate(wrenches, bodies[i].at.first):
+                    for j, twist in enumerate(body.at.columns, body.at.first):
                         lower[k][j] = twist.power(wrench)
     return lower
 
@@ -135,17 +156,17 @@ def _by_first_bodies(
     frames: list[Frame] = []
     twists: list[list[Twist]] = []
     for body, wrenches in zip(bodies, columns, strict=True):
-        with cg.tag(body.name, KINETIC):
-            joint = frames[body.parent].of(body.outwards()) if body.parent >= 0 else None
-            frames.append(joint.of(body.turn()) if joint else FIRST)
-            twists.append([frames[-1].twist(twist) for twist in body.twists])
-            at = body.parent
-            for k, wrench in enumerate(wrenches if joint else (), body.first):
-                seen, at = joint.wrench(wrench), body.parent  # type: ignore[union-attr]
-                while at >= 0:
-                    for j, twist in enumerate(twists[at], bodies[at].first):
+        at = body.at
+        with cg.tag(at.name, KINETIC):
+            joint = frames[at.parent].of(body.outwards) if at.parent >= 0 else None
+            frames.append(joint.of(body.turn) if joint else FIRST)
+            twists.append([frames[-1].twist(twist) for twist in at.columns])
+            for k, wrench in enumerate(wrenches if joint else (), at.first):
+                seen, outer = joint.wrench(wrench), at.parent  # type: ignore[union-attr]
+                while outer >= 0:
+                    for j, twist in enumerate(twists[outer], bodies[outer].at.first):
                         lower[k][j] = twist.power(seen)
-                    at = bodies[at].parent
+                    outer = bodies[outer].at.parent
     return lower
 
 
@@ -160,7 +181,7 @@ class Frame(NamedTuple):
         axes, origin = self
         for step in reversed(steps):
             if isinstance(step, Shift):
-                origin = plus(origin, scaled(step.by, axes[step.axis]))
+                origin = plus(origin, combined(axes, step.offset))
             else:
                 axes = step.columns(axes)
         return Frame(axes, origin)
@@ -181,16 +202,6 @@ FIRST = Frame(UNIT, STILL)
 def _longest(bodies: Sequence[Carried]) -> int:
     """The most freedoms from the world to a tip."""
     counts: list[int] = []
-    for body in bodies:
-        counts.append(len(body.joint.velocities) + (counts[body.parent] if body.parent >= 0 else 0))
+    for at in [body.at for body in bodies]:
+        counts.append(len(at.u) + (counts[at.parent] if at.parent >= 0 else 0))
     return max(counts)
-
-
-def _through(steps: Sequence[Step], wrench: Wrench) -> Wrench:
-    for step in steps:
-        wrench = step.wrench(wrench) if isinstance(step, Shift) else wrench.turned(step)
-    return wrench
-
-
-def _shifts(moved: Triple) -> list[Step]:
-    return [Shift(k, by) for k, by in enumerate(moved) if by.value != 0.0]

@@ -23,54 +23,45 @@ from cgraph.extend import as_node
 from ..algebra import spatial
 from ..algebra.spatial import STILL, ZERO, Triple, cross, plus, scaled
 from ..algebra.spatial_vectors import Twist, Wrench
-from ..joints import JointType
-from .links import Link
-from .outward import KINETIC, POTENTIAL, Motion, joint_translation, spring_forces
+from .links import Link, LinkState
+from .outward import KINETIC, POTENTIAL, Motion
 
 COMPOSITE = "momentum"  # tag of what composite momenta are made of, and of the rates made of them
 
 
-class CompositeMomentum(NamedTuple):
+class SubtreeMomentum(NamedTuple):
     """Of a body and all that it carries, about the body's origin, in the axes of its motion."""
 
     mass: Node
     moment: Triple
     momentum: Wrench
 
-    def plus(self, other: CompositeMomentum) -> CompositeMomentum:
+    def plus(self, other: SubtreeMomentum) -> SubtreeMomentum:
         """Of both."""
         with cg.tag(POTENTIAL):
             mass, moment = self.mass + other.mass, plus(self.moment, other.moment)
         with cg.tag(KINETIC):
-            return CompositeMomentum(mass, moment, self.momentum.plus(other.momentum))
+            return SubtreeMomentum(mass, moment, self.momentum.plus(other.momentum))
 
 
-def body_momentum(motion: Motion, link: Link) -> CompositeMomentum:
+def body_momentum(motion: Motion, link: Link) -> SubtreeMomentum:
     """Of the body alone: f = m v + w x h, n = J w + h x v. In a plane n_z is a momentum, and the rest has no part."""
     h, w, v, mass = motion.out(link.moment), motion.omega, motion.velocity, as_node(link.mass)
     with cg.tag(KINETIC):
         force = plus(scaled(mass, v), cross(w, h))
         torque = STILL
         if not motion.plane:
-            inertia = [[link.inertia[max(i, j)][min(i, j)] for j in range(3)] for i in range(3)]
-            torque = plus(spatial.rotate(inertia, w), cross(h, v))
-    return CompositeMomentum(mass, h, Wrench(torque, force))
+            torque = plus(spatial.rotate(link.full_inertia, w), cross(h, v))
+    return SubtreeMomentum(mass, h, Wrench(torque, force))
 
 
-def stated(
-    composite: CompositeMomentum,
-    link: Link,
-    joint: JointType,
-    q: Sequence[Node],
-    u: Sequence[Node],
-    p: Sequence[Node],
-) -> CompositeMomentum:
-    """With the momenta p of the joint's velocities u in place of the shares of (n, f) that they are."""
+def with_known_momenta(composite: SubtreeMomentum, at: LinkState, p: Sequence[Node]) -> SubtreeMomentum:
+    """With the momenta p of the joint's velocities in place of the shares of (n, f) that they are."""
     torque, force = list(composite.momentum.torque), list(composite.momentum.force)
-    own = [momentum - link.armature * velocity for momentum, velocity in zip(p, u, strict=True)]
-    if joint.sliding:
-        force = list(joint.turn(q).into((own[0], own[1], own[2])))
-    for twist, momentum in list(zip(joint.columns(q), own, strict=True))[joint.sliding :]:
+    own = [momentum - at.link.armature * velocity for momentum, velocity in zip(p, at.u, strict=True)]
+    if at.joint.sliding:
+        force = list(at.turn.into((own[0], own[1], own[2])))
+    for twist, momentum in list(zip(at.columns, own, strict=True))[at.joint.sliding :]:
         shares = [each.value for each in (*twist.angular, *twist.linear)]
         if sorted(map(str, shares)) == ["0.0"] * 5 + ["1.0"]:
             k = shares.index(1.0)
@@ -79,49 +70,39 @@ def stated(
 
 
 def momentum_rates(
-    composite: CompositeMomentum,
-    parent: Motion,
-    motion: Motion,
-    link: Link,
-    joint: JointType,
-    q: Sequence[Node],
-    u: Sequence[Node],
-    p: Sequence[Node],
+    composite: SubtreeMomentum, parent: Motion, motion: Motion, at: LinkState, p: Sequence[Node]
 ) -> list[Node]:
-    """The rates of the momenta p of a joint's velocities u, without applied forces; the spring's among them."""
+    """The rates of the momenta p of a joint's velocities, without applied forces; the spring's among them."""
     rates: list[Node] = []
-    if joint.sliding:  # along the joint's axes, which turn with the parent
+    if at.joint.sliding:  # along the joint's axes, which turn with the parent: -(omega x p + m g)
         carrier = parent.in_body_axes()
         with cg.tag(KINETIC):
-            x, y, z = (p[k] - link.armature * u[k] for k in range(3))
-            turned = cross(spatial.rotate_transpose(link.turn, carrier.omega), (x, y, z))
+            x, y, z = (p[k] - at.link.armature * at.u[k] for k in range(3))
+            turned = cross(at.into(carrier.omega), (x, y, z))
         with cg.tag(POTENTIAL):
-            up = spatial.rotate_transpose(link.turn, scaled(parent.strength, carrier.vertical))
+            up = at.into(scaled(parent.strength, carrier.vertical))
             rates = [-(a + composite.mass * b) for a, b in zip(turned, up, strict=True)]
     with cg.tag(KINETIC):
         carried = composite.momentum.carried(Twist(motion.omega, motion.velocity))
     with cg.tag(POTENTIAL):
         up = scaled(motion.strength, motion.vertical)  # gravity is -up
         loss = carried.plus(Wrench(cross(composite.moment, up), scaled(composite.mass, up)))
-        rates += [-twist.power(loss) for twist in joint.columns(q)[len(rates) :]]
-        springs = [force for _, force in spring_forces(link, joint, q, u)] or [ZERO] * len(rates)
+        rates += [-twist.power(loss) for twist in at.columns[len(rates) :]]
+        springs = [force for _, force in at.springs()] or [ZERO] * len(rates)
         return [rate - spring for rate, spring in zip(rates, springs, strict=True)]
 
 
-def about_parent(
-    composite: CompositeMomentum, parent: Motion, motion: Motion, link: Link, joint: JointType, q: Sequence[Node]
-) -> CompositeMomentum:
-    """The same about the parent's origin, in the axes of the parent's motion."""
-    stays, offset = parent.keeps_plane(link, joint), parent.out(joint_translation(link, joint, q))
-
+def about_parent(composite: SubtreeMomentum, parent: Motion, motion: Motion, at: LinkState) -> SubtreeMomentum:
+    """About the parent's origin, in the axes of the parent's motion."""
+    stays, offset = parent.keeps(at), parent.out(at.place)
     back = motion.turn.reversed  # not `out`, for the sake of products that other equations have as well
 
     def turned(vector: Triple) -> Triple:
-        vector = spatial.rotate(link.turn, back.into(vector))
+        vector = spatial.rotate(at.link.turn, back.into(vector))
         return vector if stays else parent.out(vector)
 
     with cg.tag(POTENTIAL):
         moment = plus(turned(composite.moment), scaled(composite.mass, offset))
     with cg.tag(KINETIC):
         momentum = Wrench(turned(composite.momentum.torque), turned(composite.momentum.force)).about(offset)
-    return CompositeMomentum(composite.mass, moment, momentum)
+    return SubtreeMomentum(composite.mass, moment, momentum)

@@ -1,0 +1,166 @@
+"""The torques of a tree of bodies with their derivatives, in closed form: column by column, from the tips down.
+
+With the composite I, B, f of all that a freedom j carries, all about the same point, and i between it and the world:
+
+    dtau_i/dq_j = S_i . (I psi''_j + 2 B psi'_j + S_j x f),   dtau_j/dq_i = psi''_i . I S_j + psi'_i . 2 B^T S_j
+    dtau_i/du_j = S_i . (I (psi'_j + S'_j) + 2 B S_j),        dtau_j/du_i = (psi'_i + S'_i) . I S_j + S_i . 2 B^T S_j
+    M_ij = M_ji = S_i . I S_j
+
+(See `motion_columns`; of one stage of a joint, the right column holds of both.) Bodies on different branches have
+nothing to do with one another. All is taken about the origin of body i, whose own numbers then keep their digits
+however far it is from the base: wrenches are carried down from j to i.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import cgraph as cg
+from cgraph import Node
+from cgraph.extend import Builder, building, cotangents
+
+from ...systems.torque_derivatives import TorqueDerivatives
+from ..algebra.spatial import ZERO, Triple, dot
+from ..algebra.spatial_vectors import Wrench
+from .links import Link, LinkState
+from .motion_columns import Column, Frame, Tags, frames_of, trees_in_a_plane
+from .moving_inertia import MovingInertia, moving_body
+from .outward import KINETIC, POTENTIAL
+
+
+class Reaction(NamedTuple):
+    """What a freedom of all that it carries takes: wrenches about a point, and 2 B^T S, a torque alone.
+
+    tags: the energies that the first comes of.
+    """
+
+    displaced: Wrench  # I psi'' + 2 B psi' + S x f
+    moved: Wrench  # I (psi' + S') + 2 B S
+    accelerated: Wrench  # I S
+    couple: Triple
+    tags: Tags
+
+    def about(self, offset: Triple) -> Reaction:
+        """About another point, from which this one is `offset` away."""
+        with cg.tag(KINETIC):
+            moved, accelerated = self.moved.about(offset), self.accelerated.about(offset)
+        with cg.tag(*self.tags):
+            return Reaction(self.displaced.about(offset), moved, accelerated, self.couple, self.tags)
+
+
+def torque_derivatives(states: Sequence[LinkState], up: Triple, build: Builder) -> TorqueDerivatives:
+    """Of links, parents first, with springs, without dampers and forces.
+
+    up: the acceleration of the world against free fall.
+    """
+    n = sum([len(at.u) for at in states])
+    result = TorqueDerivatives([ZERO] * n, *[[[ZERO] * n for _ in range(n)] for _ in range(3)])
+    tags = (KINETIC, POTENTIAL) if any([x.value != 0.0 for x in up]) else (KINETIC,)  # of accelerations
+    with building(build):
+        frames = frames_of(states, up, tags)
+        composites: list[MovingInertia | None] = [None] * len(states)
+        for i, flat in reversed(list(enumerate(trees_in_a_plane(states)))):
+            at, frame, carried = states[i], frames[i], composites[i]
+            link = _about_z(at.link) if flat else at.link
+            with cg.tag(at.name):
+                alone = moving_body(link, frame.axes, frame.velocity, frame.acceleration, tags)
+            composite = alone if carried is None else alone.plus(carried)
+            with cg.tag(at.name):
+                reactions = [(column, _reaction(column, composite, tags)) for column in frame.columns]
+                for column, _ in reactions:
+                    with cg.tag(*tags):
+                        result.torques[column.velocity] = column.motion.power(composite.wrench)
+                _fill(result, frames, states, i, reactions)
+            if at.parent >= 0:
+                moved, carried = composite.about(frame.offset), composites[at.parent]
+                composites[at.parent] = moved if carried is None else moved.plus(carried)
+        for at in states:
+            with cg.tag(at.name, KINETIC):
+                for k, rate in enumerate(at.u_dot, at.first):
+                    result.torques[k] = result.torques[k] + at.link.armature * rate
+                    result.mass[k][k] = result.mass[k][k] + at.link.armature
+            with cg.tag(at.name, POTENTIAL):
+                _add_spring(result, at, build)
+    return result
+
+
+def _add_spring(result: TorqueDerivatives, at: LinkState, build: Builder) -> None:
+    """The forces of a spring, and their slopes by displacements, G^T d/dq."""
+    rate, end = at.joint.rate(at.q, at.u), at.first + len(at.u)
+    for i, (_, force) in enumerate(at.springs(), at.first):
+        result.torques[i] = result.torques[i] + force
+        seeds: dict[Node, Node] = {}
+        for node, slope in zip(rate, cotangents({force: cg.constant(1.0)}, at.q, build), strict=True):
+            seeds[node] = seeds.get(node, ZERO) + slope
+        for j, slope in zip(range(at.first, end), cotangents(seeds, at.u, build), strict=True):
+            result.by_q[i][j] = result.by_q[i][j] + slope
+
+
+def _about_z(link: Link) -> Link:
+    """The link with the only moment of inertia that counts where all joints turn about z: it does not turn itself."""
+    return replace(link, inertia=[[0.0], [0.0, 0.0], [0.0, 0.0, link.inertia[2][2]]])
+
+
+def _fill(
+    result: TorqueDerivatives,
+    frames: Sequence[Frame],
+    states: Sequence[LinkState],
+    at: int,
+    reactions: Sequence[tuple[Column, Reaction]],
+) -> None:
+    """All entries of the freedoms of a body with their own and those between it and the world."""
+    for inner, reaction in reactions:
+        for outer in frames[at].columns:
+            _enter(result, outer, inner, reaction)
+    while states[at].parent >= 0:
+        reactions = [(column, reaction.about(frames[at].offset)) for column, reaction in reactions]
+        at = states[at].parent
+        for inner, reaction in reactions:
+            for outer in frames[at].columns:
+                _enter_both(result, outer, inner, reaction)
+
+
+def _reaction(column: Column, of: MovingInertia, tags: Tags) -> Reaction:
+    """Of a freedom at the base of the composite.  tags: the energies that accelerations come of."""
+    motion = column.motion
+    with cg.tag(KINETIC):
+        double = motion.scaled(2.0)
+        moved = of.inertia.wrench(column.rate).plus(of.coriolis(double))
+        accelerated, couple = of.inertia.wrench(motion), of.coriolis_transpose(double)
+    with cg.tag(*tags):
+        displaced = of.inertia.wrench(column.carried_rate).plus(of.coriolis(column.carried.scaled(2.0)))
+        displaced = displaced.plus(of.wrench.carried(motion))
+    return Reaction(displaced, moved, accelerated, couple, tags)
+
+
+def _enter_both(result: TorqueDerivatives, outer: Column, inner: Column, reaction: Reaction) -> None:
+    """outer: between the world and inner, whose reaction is about the origin of the outer's body."""
+    i, j = outer.velocity, inner.velocity
+    with cg.tag(*reaction.tags):
+        result.by_q[i][j] = outer.motion.power(reaction.displaced)
+        result.by_q[j][i] = _displaced_by(outer, reaction)
+    with cg.tag(KINETIC):
+        result.by_qd[i][j] = outer.motion.power(reaction.moved)
+        result.by_qd[j][i] = outer.rate.power(reaction.accelerated) + dot(outer.motion.angular, reaction.couple)
+        result.mass[i][j] = result.mass[j][i] = outer.motion.power(reaction.accelerated)
+
+
+def _enter(result: TorqueDerivatives, outer: Column, inner: Column, reaction: Reaction) -> None:
+    """Freedoms of one joint."""
+    i, j = outer.velocity, inner.velocity
+    if outer.stage < inner.stage:
+        _enter_both(result, outer, inner, reaction)
+    elif outer.stage == inner.stage:
+        with cg.tag(*reaction.tags):
+            result.by_q[j][i] = _displaced_by(outer, reaction)
+        with cg.tag(KINETIC):
+            result.by_qd[i][j] = outer.motion.power(reaction.moved)
+            if i <= j:
+                result.mass[i][j] = result.mass[j][i] = outer.motion.power(reaction.accelerated)
+
+
+def _displaced_by(outer: Column, reaction: Reaction) -> Node:
+    """What a displacement of the outer freedom changes at the inner one."""
+    return outer.carried_rate.power(reaction.accelerated) + dot(outer.carried.angular, reaction.couple)
