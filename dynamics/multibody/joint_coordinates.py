@@ -8,11 +8,13 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
+import cgraph as cg
 from cgraph import Node
 from cgraph.extend import Array
 
 from ..systems.quasi_velocities import QuasiVelocities
 from .body import WORLD, Body
+from .joints import JointType
 from .parameters import Quantities
 
 Value = TypeVar("Value")
@@ -86,10 +88,17 @@ def neutral(bodies: Sequence[Body]) -> list[float]:
     return [value for body in bodies for value in body.joint.type.neutral]
 
 
+def _are_rates(kind: JointType) -> bool:
+    """Whether the velocities of a joint are the rates of its coordinates."""
+    q = cg.variables([f"q{k}" for k in range(len(kind.coordinates))])
+    u = cg.variables([f"qd{k}" for k in range(len(kind.velocities))])
+    return list(kind.rate(q, u)) == u
+
+
 def quasi_velocities(bodies: Sequence[Body]) -> QuasiVelocities | None:
     """How the joints' velocities move their coordinates; None where they are all rates of coordinates."""
     types = [body.joint.type for body in bodies]
-    if coordinate_names(bodies) == velocity_names(bodies):
+    if all([_are_rates(kind) for kind in {*types}]):
         return None
 
     def rate(q: Sequence[Node], u: Sequence[Node]) -> list[Node]:

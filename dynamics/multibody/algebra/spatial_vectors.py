@@ -63,8 +63,7 @@ class Wrench(NamedTuple):
 
     def about(self, offset: Triple) -> Wrench:
         """The same about another point, from which this one is `offset` away."""
-        (a, b, c), (x, y, z), (f, g, h) = self.torque, offset, self.force
-        return Wrench((a + y * h - z * g, b + z * f - x * h, c + x * g - y * f), self.force)
+        return Wrench(plus(self.torque, cross(offset, self.force)), self.force)
 
 
 REST, IDLE = Twist(STILL, STILL), Wrench(STILL, STILL)

@@ -35,6 +35,11 @@ class Shift(NamedTuple):
 
     offset: Triple
 
+    def wrench(self, old: Wrench) -> Wrench:
+        """About the new point; term by term, so that no constant changes its sign."""
+        (a, b, c), (x, y, z), (f, g, h) = old.torque, self.offset, old.force
+        return Wrench((a + y * h - z * g, b + z * f - x * h, c + x * g - y * f), old.force)
+
 
 Step = Turn | Shift
 
@@ -42,7 +47,10 @@ Step = Turn | Shift
 def carried(value: Carriable, steps: Sequence[Step]) -> Carriable:
     """An inertia or a wrench after these steps outwards."""
     for step in steps:
-        value = value.about(step.offset) if isinstance(step, Shift) else value.turned(step)
+        if not isinstance(step, Shift):
+            value = value.turned(step)
+        else:
+            value = step.wrench(value) if isinstance(value, Wrench) else value.about(step.offset)
     return value
 
 
