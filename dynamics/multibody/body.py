@@ -15,15 +15,27 @@ from cgraph import Node
 from cgraph.extend import Array, check_name, is_finite
 
 from .algebra import spatial
-from .errors import (
-    MechanismError as MechanismError,  # noqa: PLC0414 (who needs a body imports them from here)
-    MechanismWarning as MechanismWarning,  # noqa: PLC0414
-)
 from .joints import COMPOSITIONS, TYPES, JointType
 from .parameters import Quantities, Quantity, entries, evaluated, names_in, symbol, vanishes
 
 WORLD = "world"
 ROUNDING = 1e-9  # of the largest entry: what is left of an inertia or a rotation that came through text
+
+
+class MechanismError(ValueError):
+    """A mechanism that cannot be: which body, what was given, and what was needed."""
+
+
+class MechanismWarning(UserWarning):
+    """What a mechanism has not of the file that it was read from, or a body that cannot be, but can be calculated with.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> import dynamics as dyn
+    >>> with warnings.catch_warnings():
+    ...     warnings.simplefilter("error", dyn.MechanismWarning)  # a model that lacks something is no model
+    """
 
 
 @dataclass(frozen=True, eq=False)

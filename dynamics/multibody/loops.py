@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -12,13 +12,15 @@ import cgraph as cg
 from cgraph import Node
 from cgraph.extend import Array, Builder, building, check_name, is_finite
 
+from ..equations.constraints.nearly_redundant_rows import without_nearly_redundant
+from ..systems.constraints import Constraints, LoopRow
 from .algebra import spatial
 from .algebra.spatial import ZERO, Triple
 from .body import WORLD, Body, Joint, MechanismError, checked_rotation, vector
-from .joint_coordinates import places
 from .joints import COMPOSITIONS
-from .sweeps.kinematic_chain import KinematicChain
-from .sweeps.kinematic_tree import locked_at
+from .sweeps.kinematic_chain import KinematicChain, kinematic_chains
+from .sweeps.kinematic_tree import Carrier
+from .sweeps.links import LinkState
 
 ROWS = {
     "point": ("x", "y", "z"),
@@ -121,7 +123,63 @@ class Loop:
         return tuple([f"{self.label} {row}" for row in SLIPS]) if self.kind == "rolling" else ()
 
 
-def check_loop(loop: Loop, bodies: Mapping[str, Body]) -> None:
+def check_loops(loops: Sequence[Loop], bodies: Sequence[Body]) -> None:
+    """Raises MechanismError for a loop that its bodies cannot have, and for two of one name."""
+    named = {body.name: body for body in bodies}
+    for loop in loops:
+        _check_loop(loop, named)
+    labels = [loop.label for loop in loops]
+    if len(set(labels)) < len(labels):
+        twice = next(label for label in labels if labels.count(label) > 1)
+        raise MechanismError(f"two loops have the name {twice!r}")
+
+
+def position_rows(
+    loops: Sequence[Loop],
+    moving: Sequence[Body],
+    carriers: Mapping[str, Carrier],
+    locked: Mapping[str, ArrayLike],
+    states: Sequence[LinkState],
+) -> dict[str, Node]:
+    """phi(q) of all loops.  locked: coordinates of joints that stand still.  states: of the links that move."""
+    coordinates = {name: cg.constant(float(np.ravel(at)[0])) for name, at in locked.items()}
+    coordinates |= {at.name: at.q[0] for at in states}
+    rows: dict[str, Node] = {}
+    for loop in loops:
+        if loop.kind == "coupling":
+            phi = [_coupling_row(loop, coordinates)]
+        else:
+            ends = [carriers[name] for name in (loop.body, loop.to)]
+            phi = _loop_rows(loop, *kinematic_chains(ends, moving, states))
+        rows |= dict(zip(loop.rows, phi, strict=True))
+    return rows
+
+
+def of_loops(constraints: Constraints, loops: Sequence[Loop], moving: Sequence[Body]) -> Constraints:
+    """The constraints with what is known of the rows of loops, less those that nearly follow from others.
+
+    A coupling is exact: its row counts as it is.
+    """
+    constraints.turning = [unit == "rad/s" for body in moving for unit in body.joint.type.velocity_units]
+    constraints.loop_rows = {
+        name: LoopRow(loop.label, " about " in name.removeprefix(loop.label), loop.tolerance)
+        for loop in loops
+        if loop.kind != "coupling"
+        for name in (*loop.rows, *loop.velocity_rows)
+    }
+    return without_nearly_redundant(constraints)
+
+
+def velocity_rows(loops: Sequence[Loop], chain: Callable[[str], KinematicChain]) -> dict[str, Node]:
+    """Velocities that are zero in loops that roll.  chain: the joints between a body and the world."""
+    rows: dict[str, Node] = {}
+    for loop in loops:
+        if loop.velocity_rows:
+            rows |= dict(zip(loop.velocity_rows, _slip_rows(loop, chain(loop.body), chain(loop.to)), strict=True))
+    return rows
+
+
+def _check_loop(loop: Loop, bodies: Mapping[str, Body]) -> None:
     """Raises MechanismError unless the loop's bodies are there and its numbers are what its kind needs."""
     if not isinstance(loop, Loop):
         raise MechanismError(f"loops must be of the type Loop, got {type(loop).__name__}: {loop!r:.60}")
@@ -164,7 +222,7 @@ def _has_one_coordinate(joint: Joint) -> bool:
     return joint.kind not in COMPOSITIONS and len(joint.type.coordinates) == 1
 
 
-def loop_rows(loop: Loop, body: KinematicChain, to: KinematicChain) -> list[Node]:
+def _loop_rows(loop: Loop, body: KinematicChain, to: KinematicChain) -> list[Node]:
     """phi of a loop that holds frames, of which these are the placements."""
     with building(Builder()), cg.tag(loop.label):
         gap = spatial.plus(body.place_of(loop.at), spatial.scaled(-1.0, to.place_of(loop.to_at)))
@@ -202,7 +260,7 @@ def _rotation_rows(axes: Sequence[Triple], to: Sequence[Triple]) -> list[Node]:
     return [scale * (yz - zy), scale * (zx - xz), scale * (xy - yx)]
 
 
-def slip_rows(loop: Loop, body: KinematicChain, to: KinematicChain) -> list[Node]:
+def _slip_rows(loop: Loop, body: KinematicChain, to: KinematicChain) -> list[Node]:
     """The velocity of a rolling wheel's lowest point against the plane, along two axes of it; in the world's axes."""
     with building(Builder()), cg.tag(loop.label):
         axis, target = _axes(loop)
@@ -219,21 +277,13 @@ def slip_rows(loop: Loop, body: KinematicChain, to: KinematicChain) -> list[Node
         return [spatial.dot(x, slip), spatial.dot(y, slip)]
 
 
-def coupling_row(loop: Loop, bodies: Sequence[Body], all_bodies: Mapping[str, Body], locked: Mapping[str, ArrayLike],
-                 q: Sequence[Node]) -> Node:  # fmt: skip
+def _coupling_row(loop: Loop, coordinates: Mapping[str, Node]) -> Node:
     """q - (c0 + c1 q_to + ..) of a coupling; a locked joint is a number."""
-    index: dict[str, int] = {body.name: place.q.start for body, place in zip(bodies, places(bodies), strict=True)}
-
-    def coordinate(name: str) -> Node:
-        if name in index:
-            return q[index[name]]
-        return cg.constant(float(locked_at(all_bodies[name], locked[name])[0]))
-
     with building(Builder()), cg.tag(loop.label):
         value = ZERO
         for coefficient in reversed(loop.coefficients[1:]):
-            value = (value + float(coefficient)) * coordinate(loop.to)
-        return coordinate(loop.body) - (value + float(loop.coefficients[0]))
+            value = (value + float(coefficient)) * coordinates[loop.to]
+        return coordinates[loop.body] - (value + float(loop.coefficients[0]))
 
 
 def _axes(loop: Loop) -> list[Array]:

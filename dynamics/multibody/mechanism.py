@@ -23,12 +23,10 @@ from .forces.external_force import Force, generalized_forces
 from .forces.joint_force import JointForce, add_joint_forces, check_any_force
 from .joint_coordinates import coordinate_names, lengths, per_velocity, quasi_velocities, velocity_names
 from .joint_positions import skeleton
-from .loop_equations import check_loops, of_loops, position_rows, velocity_rows
-from .loops import Loop
-from .modification import attach_subtree, detach_subtree, lock_joint, map_state, subtree_of, unlock_joint
+from .loops import Loop, check_loops, of_loops, position_rows, velocity_rows
+from .modification import Subtree, attach_subtree, detach_subtree, lock_joint, map_state, subtree_of, unlock_joint
 from .parameters import Quantity, bound, entries, names_in, symbol
 from .structure import Structure, bound_body, bound_force, changed, listed, require_values, used_names
-from .subtree import Subtree
 from .sweeps.kinematic_chain import KinematicChain, kinematic_chains
 from .sweeps.kinematic_tree import Carrier, lock_joints, merge_fixed_bodies, parents_first, require_inertia, resists
 from .sweeps.links import Link
@@ -112,7 +110,7 @@ class Mechanism(Structure):
         carried = {body.name for body in self.bodies}
         for force in self.forces:
             check_any_force(force, carried, self.bodies)
-        check_loops(self)
+        check_loops(self.loops, self.bodies)
         used = used_names(self.bodies, self.gravity, self.forces)
         for name in self.parameters:
             if name not in used:
@@ -210,13 +208,15 @@ class Mechanism(Structure):
             forces=self._generalized_forces if self.forces else None,
             damping=per_velocity(self.moving, [symbol(body.joint.damping) for body in self.moving]),
             quasi_velocities=quasi_velocities(self.moving),
-            constraints=lambda q, t: position_rows(self, self.moving, self.carriers, self._equations.states(q, ())),
-            velocity_constraints=lambda q, qd, t: velocity_rows(self, lambda body: self._chain(body, q, qd)),
+            constraints=lambda q, t: position_rows(
+                self.loops, self.moving, self.carriers, self.locked, self._equations.states(q, ())
+            ),
+            velocity_constraints=lambda q, qd, t: velocity_rows(self.loops, lambda body: self._chain(body, q, qd)),
             lengths=lengths(self._bound.moving),
             require_values=self._require_values,
             surely_regular=all([bool(body.joint.armature) or resists(body) for body in self._bound.moving]),
         )
-        system.constraints = of_loops(system.constraints, self, self.moving)
+        system.constraints = of_loops(system.constraints, self.loops, self.moving)
         return system
 
     def _require_values(self, values: Mapping[str, ArrayLike], bodies: Sequence[Body] | None = None) -> None:

@@ -53,10 +53,6 @@ class Ball(SpatialJoint):
         """Of length 1."""
         return quaternion.normalized(q)
 
-    def placement(self, axis: Array, at: Array) -> tuple[Array, Array]:
-        """A rotation."""
-        return spatial.from_quaternion(at), np.zeros(3)
-
     def resists(self, mass: float, inertia: Array) -> bool:
         """Inertia about every axis, more than rounding leaves of the largest."""
         moments = np.linalg.eigvalsh(inertia)

@@ -59,10 +59,6 @@ class Free(SpatialJoint):
         """With a quaternion of length 1."""
         return [*q[:3], *quaternion.normalized(q[3:])]
 
-    def placement(self, axis: Array, at: Array) -> tuple[Array, Array]:
-        """A rotation and a displacement."""
-        return spatial.from_quaternion(at[3:]), at[:3]
-
     def resists(self, mass: float, inertia: Array) -> bool:
         """Mass, and inertia about every axis through the center of mass; see `require_inertia`."""
         moments = np.linalg.eigvalsh(inertia)

@@ -9,7 +9,7 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import Array, tangents, topological
+from cgraph.extend import Array, Builder, building, tangents, topological
 
 from ..algebra import spatial
 from ..algebra.spatial import STILL, ZERO, Triple, cross, plus
@@ -25,12 +25,11 @@ class JointType(ABC):
 
     kind: the word for it in `Joint.kind`.  mjcf, urdf: the words for it in those files; "" where they have none.
     moves: whether it has a coordinate; of "fixed" no function below is asked but `placement`.
-    turns: whether it turns the body.  limited: whether URDF demands limits of it.  geared: whether its velocities can
-    have an inertia of their own, an armature.  pitched: whether it needs a `Joint.pitch`, see `with_pitch`.
+    limited: whether URDF demands limits of it.  geared: whether its velocities can have an inertia of their own, an
+    armature.  pitched: whether it needs a `Joint.pitch`, see `with_pitch`.
     sprung: whether it can have a spring.
     has_axis: whether it moves the body about and along `Joint.axis` alone, which is then z of the body's motion: then
-    the origin of the body's frame may be anywhere on it.  measured_about_axis: whether its coordinate is an angle about
-    that axis and nothing else, so that axes turned about it are an offset of the coordinate.
+    the origin of the body's frame may be anywhere on it.
     sliding: how many of the velocities, the first ones, move the body along the joint's axes, one after another.
     coordinates, velocities: what they are called after the joint's name; "" of a single one, which has the joint's.
     units, velocity_units: of the coordinates, "1" of those without, and of the velocities.
@@ -41,13 +40,11 @@ class JointType(ABC):
     kind: str
     mjcf = urdf = ""
     moves = True
-    turns = True
     limited = False
     geared = True
     pitched = False
     sprung = False
     has_axis = False
-    measured_about_axis = False
     sliding = 0
     coordinates: tuple[str, ...] = ("",)
     velocities: tuple[str, ...] = ("",)
@@ -55,6 +52,16 @@ class JointType(ABC):
     velocity_units: tuple[str, ...] = ("rad/s",)
     neutral: tuple[float, ...] = (0.0,)
     groups: tuple[int, ...] = (0,)
+
+    @property
+    def turns(self) -> bool:
+        """Whether it turns the body."""
+        return True
+
+    @property
+    def measured_about_axis(self) -> bool:
+        """Whether its coordinate is an angle about the axis and nothing else: axes turned about it are an offset."""
+        return False
 
     def with_pitch(self, pitch: float) -> JointType:
         """The type of a joint with that pitch [m/rad], where joints of the kind differ by it."""
@@ -133,10 +140,28 @@ class JointType(ABC):
 
 
 class AxialJoint(JointType):
-    """A joint with one coordinate, which turns the body about the joint's axis, slides it along that, or both."""
+    """A joint with one coordinate, which turns the body about the joint's axis, slides it along that, or both.
+
+    The body turns by `angle` and moves by `shift`, of which a type of joint gives one or both.
+    """
 
     sprung = True
     has_axis = True
+
+    @property
+    def turns(self) -> bool:
+        """Whether a coordinate turns the body."""
+        return self._turned(1.0) != 0.0
+
+    @property
+    def slides(self) -> bool:
+        """Whether a coordinate moves the body along the axis."""
+        return self._shifted(1.0) != 0.0
+
+    @property
+    def measured_about_axis(self) -> bool:
+        """Whether the coordinate is the angle about the axis and nothing else."""
+        return self._turned(1.0) == 1.0 and not self.slides
 
     def stretches(self, q: Sequence[Node], reference: float | Node) -> Sequence[Node]:
         """From the coordinate where it pulls nowhere."""
@@ -162,9 +187,46 @@ class AxialJoint(JointType):
         """About and along z."""
         return Twist((ZERO, ZERO, self.angle(u[0])), (ZERO, ZERO, self.shift(u[0])))
 
+    def placement(self, axis: Array, at: Array) -> tuple[Array, Array]:
+        """A rotation about the axis and a displacement along it."""
+        x = float(at[0]) if self.moves else 0.0
+        return spatial.rotation(axis, self._turned(x)) if self.turns else np.eye(3), axis * self._shifted(x)
+
+    def resists(self, mass: float, inertia: Array) -> bool:
+        """Mass of what slides, or inertia about the axis of what turns."""
+        return bool((self.slides and mass > 0.0) or (self.turns and inertia[2, 2] > 0.0))
+
+    def unobservable(self, mass: float, moment: Array, inertia: Array) -> tuple[float, Array, Array]:
+        """What a turn about the axis and a shift along it leave as it is.
+
+        Of what does not slide, the mass and the first moment along the axis; of what turns, the inertia that is alike
+        about every axis across, else all of it.
+        """
+        along = (0.0, 0.0, 1.0) if self.turns else (1.0, 1.0, 1.0)
+        alike = inertia[1, 1] * np.diag([1.0, 1.0, 0.0]) if self.turns else inertia
+        return (0.0, np.zeros(3), alike) if self.slides else (mass, moment * along, alike)
+
+    def _turned(self, x: float) -> float:
+        """The angle of a coordinate that is a number."""
+        with building(Builder()):
+            return float(spatial.plain(self.angle(cg.constant(x))))
+
+    def _shifted(self, x: float) -> float:
+        """The shift of a coordinate that is a number."""
+        with building(Builder()):
+            return float(spatial.plain(self.shift(cg.constant(x))))
+
 
 class SpatialJoint(JointType):
     """A joint of several freedoms, which turns the body by a matrix."""
+
+    def placement(self, axis: Array, at: Array) -> tuple[Array, Array]:
+        """By its rotation and translation."""
+        with building(Builder()):
+            q = [cg.constant(x) for x in at.tolist()]
+            turn = [[spatial.plain(each) for each in row] for row in self.rotation(q)]
+            shift = [spatial.plain(each) for each in self.translation(q)]
+        return spatial.snapped(np.array(turn, dtype=np.float64)), np.array(shift, dtype=np.float64)
 
     @abstractmethod
     def rotation(self, q: Sequence[Node]) -> NodeMatrix:
