@@ -234,10 +234,7 @@ def _number(what: str, value: Any, unit: str = "", minimum: float = 0.0) -> floa
 
 def _check_names(what: str, value: str | Node) -> None:
     for name in names_in([value]):
-        try:
-            check_name(f"a parameter of {what}", name, spaces=False)
-        except (TypeError, ValueError) as error:
-            raise MechanismError(str(error)) from None
+        checked_name(f"a parameter of {what}", name, spaces=False)
 
 
 def _mass(what: str, value: object) -> float | Node:
@@ -255,7 +252,7 @@ def checked(body: Body) -> Body:
     """
     if not isinstance(body, Body):
         raise MechanismError(f"bodies must be of the type Body, got {type(body).__name__}: {body!r:.60}")
-    _check_name("a body", body.name)
+    checked_name("a body", body.name)
     if body.name == WORLD:
         raise MechanismError(f"a body needs a name other than {WORLD!r}")
     where, joint = f"body {body.name!r}", body.joint
@@ -280,7 +277,7 @@ def _checked_joint(where: str, joint: Joint) -> Joint:
     if not isinstance(joint, Joint):
         raise MechanismError(f"{where}: joint must be of the type Joint, got {type(joint).__name__}: {joint!r:.60}")
     if not isinstance(joint.name, str) or joint.name:
-        _check_name(f"the joint of {where}", joint.name)
+        checked_name(f"the joint of {where}", joint.name)
     axis = unit_axis(f"{where}: axis", joint.axis)
     if joint.second_axis is not None:
         raise MechanismError(f"{where}: a joint of the kind {joint.kind!r} has no second axis")
@@ -305,9 +302,10 @@ def _pitch(where: str, joint: Joint) -> float:
     return float(pitch)
 
 
-def _check_name(what: str, name: str) -> None:
+def checked_name(what: str, name: str, *, spaces: bool = True) -> None:
+    """Raises MechanismError for what is no name."""
     try:
-        check_name(what, name)
+        check_name(what, name, spaces=spaces)
     except (TypeError, ValueError) as error:
         raise MechanismError(str(error)) from None
 

@@ -10,13 +10,13 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import Array, Builder, building, check_name, is_finite
+from cgraph.extend import Array, Builder, building, is_finite
 
 from ..equations.constraints.nearly_redundant_rows import without_nearly_redundant
 from ..systems.constraints import Constraints, LoopRow
 from .algebra import spatial
 from .algebra.spatial import ZERO, Triple
-from .body import WORLD, Body, Joint, MechanismError, checked_rotation, vector
+from .body import WORLD, Body, Joint, MechanismError, checked_name, checked_rotation, vector
 from .joints import COMPOSITIONS
 from .sweeps.kinematic_chain import KinematicChain, kinematic_chains
 from .sweeps.kinematic_tree import Carrier
@@ -186,10 +186,7 @@ def _check_loop(loop: Loop, bodies: Mapping[str, Body]) -> None:
     for name in (loop.body, loop.to):
         if not isinstance(name, str) or (name not in bodies and (name != WORLD or name is loop.body)):
             raise MechanismError(f"there is a loop on the unknown body {name!r:.80}")
-    try:
-        check_name("a loop", loop.label)
-    except (TypeError, ValueError) as error:
-        raise MechanismError(str(error)) from None
+    checked_name("a loop", loop.label)
     where = f"loop {loop.label!r}"
     for what in ("at", "to_at"):
         vector(f"{where}: {what}", getattr(loop, what))

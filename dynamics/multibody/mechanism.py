@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import cast
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Array, Builder, building, require_flag, require_mapping
+from cgraph.extend import Array, Builder, building, real_array, require_flag, require_mapping
 
 from ..systems.arguments import parameter_value
 from ..systems.body_system import BodySystem
@@ -21,12 +22,20 @@ from .body import WORLD, Body, Joint, MechanismError, MechanismWarning, quantiti
 from .composed_joints import locked_parts, outer_names, require_parents
 from .forces.external_force import Force, generalized_forces
 from .forces.joint_force import JointForce, add_joint_forces, check_any_force
-from .joint_coordinates import coordinate_names, lengths, per_velocity, quasi_velocities, velocity_names
+from .joint_coordinates import (
+    coordinate_names,
+    lengths,
+    neutral,
+    per_velocity,
+    places,
+    quasi_velocities,
+    velocity_names,
+)
 from .joint_positions import skeleton
 from .loops import Loop, check_loops, of_loops, position_rows, velocity_rows
-from .modification import Subtree, attach_subtree, detach_subtree, lock_joint, map_state, subtree_of, unlock_joint
+from .modification import ModifiableStructure
 from .parameters import Quantity, bound, entries, names_in, symbol
-from .structure import Structure, bound_body, bound_force, changed, listed, require_values, used_names
+from .structure import bound_body, bound_force, changed, listed, require_values, used_names
 from .sweeps.kinematic_chain import KinematicChain, kinematic_chains
 from .sweeps.kinematic_tree import Carrier, lock_joints, merge_fixed_bodies, parents_first, require_inertia, resists
 from .sweeps.links import Link
@@ -49,7 +58,7 @@ SHOWN = 6  # names of a kind that a repr shows, at most
 
 
 @dataclass(frozen=True, eq=False)
-class Mechanism(Structure):
+class Mechanism(ModifiableStructure):
     """A tree of rigid bodies under gravity. Coordinates are its moving joints, parents first.
 
     Parameters
@@ -301,39 +310,6 @@ class Mechanism(Structure):
         forces = tuple([bound_force(force, chosen) for force in self.forces])
         return changed(self, chosen, bodies=bodies, gravity=bound(self.gravity, chosen), forces=forces)
 
-    def lock(self, body: str, at: float | ArrayLike | None = None) -> Mechanism:
-        """The mechanism with the joint of a body standing still at a coordinate [rad or m], or several; by default 0.
-
-        Of a ball or free joint the coordinates are as many as it has, by default neutral.
-        The body and all that is welded to it become one inertia with its parent. Raises MechanismError for an unknown
-        body or one without a joint, and a coordinate that is not finite.
-        """
-        return lock_joint(self, body, at)
-
-    def unlock(self, body: str) -> Mechanism:
-        """The mechanism with a locked joint free again. Raises MechanismError for one that is not locked."""
-        return unlock_joint(self, body)
-
-    def subtree(self, body: str) -> Subtree:
-        """A body and all that it carries, as `attach` takes it. Raises MechanismError for an unknown body."""
-        return subtree_of(self, body)
-
-    def detach(self, body: str) -> Mechanism:
-        """The mechanism without a body and all that it carries, and without the loops that held these.
-
-        Raises MechanismError for an unknown body.
-        """
-        return detach_subtree(self, body)
-
-    def attach(self, subtree: Subtree | Body | Iterable[Body], to: str | None = None) -> Mechanism:
-        """The mechanism with a subtree, a body, or several of which the first carries the others, hung on a body.
-
-        to: a body's name or "world"; by default what the first names as its parent. A subtree that goes back where it
-        was taken off gives the same mechanism again, with its loops after the others. Raises MechanismError as a
-        Mechanism does, also for a loop of the subtree with a body that is not there.
-        """
-        return attach_subtree(self, subtree, to)
-
     def map_state_from(self, other: Mechanism, q: ArrayLike, qd: ArrayLike) -> tuple[Array, Array]:
         """The state (q, qd) of another mechanism as one of this: joints of bodies of the same name keep theirs.
 
@@ -341,7 +317,21 @@ class Mechanism(Structure):
         states of another shape.
         """
         other = require_mechanism(other, "map_state_from")
-        return map_state(self.moving, other.moving, locked_parts(other.bodies, other.locked), q, qd)
+        rows = [real_array(name, each) for name, each in (("q", q), ("qd", qd))]
+        counts = len(other.coordinates), len(other.velocities)
+        for name, row, count in zip(("q", "qd"), rows, counts, strict=True):
+            if row.shape != (count,):
+                raise ValueError(f"{name} must have shape ({count},), one for each joint, got {row.shape}")
+        states = zip(other.moving, places(other.moving), strict=True)
+        theirs = {body.name: (rows[0][place.q], rows[1][place.u]) for body, place in states}
+        locked = locked_parts(other.bodies, other.locked)
+        result = np.array(neutral(self.moving)), np.zeros(len(self.velocities))
+        for body, place in zip(self.moving, places(self.moving), strict=True):
+            if body.name in theirs:
+                result[0][place.q], result[1][place.u] = theirs[body.name]
+            elif body.name in locked:
+                result[0][place.q] = locked[body.name]
+        return result
 
 
 def as_mechanism(model: Model) -> Mechanism | None:

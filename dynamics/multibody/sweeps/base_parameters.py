@@ -16,7 +16,6 @@ import numpy as np
 
 from cgraph.extend import Array, Builder, building
 
-from ..algebra import spatial
 from ..joints import JointType
 from .links import Link, Numbers
 
@@ -75,9 +74,4 @@ def _count(link: Link) -> int:
 
 def _seen_by_parent(link: Link, given: Numbers) -> Numbers:
     """What is given at the link's joint, about the parent's origin and in its axes."""
-    turn, place = np.array(link.turn, dtype=np.float64), link.offset
-    moment, inertia = spatial.product(turn, given.moment), spatial.product(turn, given.inertia, turn.T)
-    crossed = np.outer(place, moment)
-    inertia = spatial.added(inertia, 2.0 * np.trace(crossed) * np.eye(3) - crossed - crossed.T)
-    moved = spatial.parallel_axis(inertia, given.mass, place)
-    return Numbers(given.mass, spatial.added(moment, given.mass * place), moved)
+    return given.turned(np.array(link.turn, dtype=np.float64)).about(link.offset)

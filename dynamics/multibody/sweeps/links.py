@@ -33,6 +33,18 @@ class Numbers(NamedTuple):
         """With other signs."""
         return Numbers(-self.mass, -self.moment, -self.inertia)
 
+    def turned(self, turn: Array) -> Numbers:
+        """In other axes, in which those of now are the columns of a turn."""
+        moment, inertia = spatial.product(turn, self.moment), spatial.product(turn, self.inertia, turn.T)
+        return Numbers(self.mass, moment, inertia)
+
+    def about(self, offset: Array) -> Numbers:
+        """About a point from which this one is r away: J + 2 (r . h) 1 - r h^T - h r^T + m (r^2 1 - r r^T)."""
+        crossed = np.outer(offset, self.moment)
+        inertia = spatial.added(self.inertia, 2.0 * np.trace(crossed) * np.eye(3) - crossed - crossed.T)
+        moved = spatial.parallel_axis(inertia, self.mass, offset)
+        return Numbers(self.mass, spatial.added(self.moment, self.mass * offset), moved)
+
 
 @dataclass(frozen=True, eq=False)
 class Link:
@@ -92,7 +104,12 @@ class Link:
         """The link with these numbers added to its own."""
         mass, moment, inertia = self.inertial
         moment, inertia = spatial.added(moment, added.moment), spatial.added(inertia, added.inertia)
-        return replace(self, mass=mass + added.mass, moment=spatial.constant(moment), inertia=inertia.tolist())
+        return self.with_inertial(Numbers(mass + added.mass, moment, inertia))
+
+    def with_inertial(self, numbers: Numbers) -> Link:
+        """The link with these numbers in place of its own."""
+        mass, moment, inertia = numbers
+        return replace(self, mass=mass, moment=spatial.constant(moment), inertia=inertia.tolist())
 
 
 class LinkState(NamedTuple):
