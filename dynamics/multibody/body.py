@@ -27,7 +27,7 @@ class MechanismError(ValueError):
 
 
 class MechanismWarning(UserWarning):
-    """What a mechanism has not of the file that it was read from, or a body that cannot be, but can be calculated with.
+    """A mechanism lacks something of the file it was read from, or has a body that cannot be but can be calculated.
 
     Examples
     --------
@@ -116,7 +116,7 @@ class Joint:
 
     @property
     def type(self) -> JointType:
-        """What the library knows of joints of this kind and pitch. Raises MechanismError for one that is several."""
+        """Type of joints of this kind and pitch. Raises MechanismError for a joint that is several."""
         if self.kind in COMPOSITIONS:
             raise MechanismError(f"a joint of the kind {self.kind!r} is several, and each of these has a type")
         return TYPES[self.kind].with_pitch(self.pitch)
@@ -175,7 +175,7 @@ class Body:
 
     @property
     def coordinate(self) -> str:
-        """What the coordinate of its joint is called."""
+        """Name of the coordinate of its joint."""
         return self.joint.name or self.name
 
 
@@ -208,7 +208,7 @@ def shape_of(value: Any) -> tuple[int, ...]:
 
 
 def quantities(what: str, value: object, shape: tuple[int, ...] = (3,)) -> Array:
-    """As `vector`, or an array of objects: floats, and nodes where there are parameters."""
+    """Array of floats as `vector` gives it, or of floats and nodes, as objects, where there are parameters."""
     known = entries(value)
     if not any([isinstance(each, str | Node) for each in known]):
         return vector(what, value, shape)
@@ -338,7 +338,7 @@ def _inertia(what: str, given: object, beside: float = 0.0) -> Array:
 
 
 def moment_rounding(scale: float, beside: float) -> float:
-    """What counts as 0 of a principal moment, beside the largest entry and the inertia of the mass about the joint."""
+    """Rounding of a principal moment, beside the largest entry and the inertia of the mass about the joint."""
     return ROUNDING * scale + spatial.SNAP * beside
 
 

@@ -29,7 +29,7 @@ class Places(NamedTuple):
 
 
 def places(bodies: Sequence[Body]) -> list[Places]:
-    """Of the joints of moving bodies."""
+    """Places of the coordinates and velocities of the joints of moving bodies."""
     result, q, u = [], 0, 0
     for body in bodies:
         kind = body.joint.type
@@ -47,12 +47,12 @@ def parts(
 
 
 def coordinate_names(bodies: Sequence[Body]) -> tuple[str, ...]:
-    """Of all joints: the joint's, with a word for the coordinate where it has several."""
+    """Names of all coordinates: the joint's, with a word for the coordinate where it has several."""
     return tuple([_called(body, name) for body in bodies for name in body.joint.type.coordinates])
 
 
 def velocity_names(bodies: Sequence[Body]) -> tuple[str, ...]:
-    """Of all joints, likewise."""
+    """Names of all velocities: the joint's, with a word for the velocity where it has several."""
     return tuple([_called(body, name) for body in bodies for name in body.joint.type.velocities])
 
 
@@ -66,7 +66,7 @@ def per_velocity(bodies: Sequence[Body], values: Sequence[Value]) -> list[Value]
 
 
 def lengths(bodies: Sequence[Body]) -> tuple[float, ...]:
-    """What length [m] 1 of a coordinate stands for, of all, then of all velocities in a second; 0 where none is known.
+    """Length [m] that 1 of each coordinate stands for, then 1 of each velocity in a second; 0 where none is known.
 
     1 of slides. An angle is as large as the way of a point that it moves by the largest length of the bodies, of
     numbers: where their joints are on one another, where their mass is, and over which it is spread.

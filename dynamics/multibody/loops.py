@@ -36,7 +36,7 @@ ROUNDING = 1e-9  # of the lengths of a loop: what is left of rows that numbers f
 
 @dataclass(frozen=True, eq=False)
 class Loop:
-    """What holds a body of a tree to another, or the coordinate of its joint to another's.
+    """Constraint that holds a body of a tree to another, or the coordinate of its joint to another's.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ class Loop:
 
     @property
     def label(self) -> str:
-        """What its rows are called."""
+        """Name of the loop, with which those of its rows begin."""
         return self.name or f"{self.body} to {self.to}"
 
     @property

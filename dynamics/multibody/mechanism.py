@@ -243,7 +243,7 @@ class Mechanism(ModifiableStructure):
 
     @property
     def links(self) -> list[Link]:
-        """What the motion and energy of each of the moving bodies is made of."""
+        """Links of the moving bodies: the numbers of which motion and energy are made."""
         return self._equations.links
 
     @property

@@ -51,7 +51,7 @@ class TreeEquations:
 
     @cached_property
     def links(self) -> list[Link]:
-        """What motion and energy of each body are made of, in the body's own frame."""
+        """Links of the bodies, in the bodies' own frames."""
         return self._regrouped(self._own)[0] if self.base_parameters else self._own
 
     @cached_property
@@ -93,7 +93,7 @@ class TreeEquations:
 
     @cached_property
     def whole(self) -> TreeEquations | None:
-        """The same without base numbers, where these are larger than the bodies' by decades; else None."""
+        """Equations without base numbers, where these are larger than the bodies' by decades; else None."""
         numbers = zip(self._fewest, self._links[0], strict=True)
         if not self._numeric or all([_size(few) <= UNEVEN * _size(own) for few, own in numbers]):
             return None
@@ -195,7 +195,7 @@ class TreeEquations:
         return rates
 
     def torque_derivatives(self, state: MotionState, build: Builder) -> TorqueDerivatives | None:
-        """Of all bodies, with their springs."""
+        """Torques of all bodies, with their springs, and their derivatives."""
         if not self._turning:
             return None
         from .sweeps.torque_derivatives import torque_derivatives

@@ -27,13 +27,13 @@ class Inertia(NamedTuple):
     about_z: Node | None = None
 
     def plus(self, other: Inertia) -> Inertia:
-        """Of both, about the same point."""
+        """Sum of two inertias about the same point."""
         about_z = None if self.about_z is None or other.about_z is None else self.about_z + other.about_z
         lower = [[self.second[i][j] + other.second[i][j] for j in range(i + 1)] for i in range(3)]
         return Inertia(self.mass + other.mass, plus(self.moment, other.moment), symmetric(lower), about_z)
 
     def about(self, offset: Triple) -> Inertia:
-        """About another point, from which this one is `offset` away: b + offset in place of b."""
+        """Inertia about a point from which this one is `offset` away, b + offset in place of b."""
         old, r = self.moment, offset
         new = plus(old, scaled(self.mass, r))
         more = [r[i] * (old[i] + new[i]) for i in range(3)]  # 2 r h + m r^2
@@ -49,7 +49,7 @@ class Inertia(NamedTuple):
         return Inertia(self.mass, new, symmetric(second), about_z)
 
     def turned(self, turn: Turn) -> Inertia:
-        """In the axes before a turn."""
+        """Inertia in the axes before a turn."""
         second = rows(turn.second_moments(self.second))
         about_z = self.about_z if turn.about_z or self.about_z is None else second[0][0] + second[1][1]
         return Inertia(self.mass, turn.out(self.moment), second, about_z)

@@ -29,7 +29,7 @@ class Ball(SpatialJoint):
     sprung = True
 
     def rotation(self, q: Sequence[Node]) -> NodeMatrix:
-        """That of the quaternion."""
+        """Rotation of the quaternion."""
         return quaternion.rotation(q)
 
     def velocity(self, q: Sequence[Node], u: Sequence[Node]) -> Twist:
@@ -38,7 +38,7 @@ class Ball(SpatialJoint):
         return Twist((x, y, z), STILL)
 
     def rate(self, q: Sequence[Node], u: Sequence[Node]) -> Sequence[Node]:
-        """That of the quaternion."""
+        """Rate of the quaternion."""
         return quaternion.rate(q, u)
 
     def structure(self, u: Sequence[Node], p: Sequence[Node]) -> Sequence[Node]:
@@ -50,7 +50,7 @@ class Ball(SpatialJoint):
         return quaternion.rotation_vector(q)
 
     def normalized(self, q: Sequence[Node]) -> Sequence[Node]:
-        """Of length 1."""
+        """Quaternion of length 1."""
         return quaternion.normalized(q)
 
     def resists(self, mass: float, inertia: Array) -> bool:

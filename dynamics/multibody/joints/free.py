@@ -32,7 +32,7 @@ class Free(SpatialJoint):
     sliding = 3
 
     def rotation(self, q: Sequence[Node]) -> NodeMatrix:
-        """That of the quaternion."""
+        """Rotation of the quaternion."""
         return quaternion.rotation(q[3:])
 
     def translation(self, q: Sequence[Node]) -> Triple:
@@ -44,7 +44,7 @@ class Free(SpatialJoint):
         return Twist((u[3], u[4], u[5]), self.turn(q).into((u[0], u[1], u[2])))
 
     def acceleration(self, q: Sequence[Node], u: Sequence[Node]) -> Twist:
-        """None: the velocities are the angular velocity, and rates of a place."""
+        """Zero: the velocities are the angular velocity, and rates of a place."""
         return REST
 
     def rate(self, q: Sequence[Node], u: Sequence[Node]) -> Sequence[Node]:
@@ -52,11 +52,11 @@ class Free(SpatialJoint):
         return [*u[:3], *quaternion.rate(q[3:], u[3:])]
 
     def structure(self, u: Sequence[Node], p: Sequence[Node]) -> Sequence[Node]:
-        """0, and omega x the angular momentum."""
+        """Zero, and omega x the angular momentum."""
         return [ZERO, ZERO, ZERO, *quaternion.structure(u[3:], p[3:])]
 
     def normalized(self, q: Sequence[Node]) -> Sequence[Node]:
-        """With a quaternion of length 1."""
+        """Coordinates with a quaternion of length 1."""
         return [*q[:3], *quaternion.normalized(q[3:])]
 
     def resists(self, mass: float, inertia: Array) -> bool:

@@ -120,7 +120,7 @@ class JointType(ABC):
         return []
 
     def normalized(self, q: Sequence[Node]) -> Sequence[Node]:
-        """The same configuration, with a quaternion of length 1."""
+        """Coordinates of the same configuration with a quaternion of length 1."""
         return q
 
     @abstractmethod
@@ -197,7 +197,7 @@ class AxialJoint(JointType):
         return bool((self.slides and mass > 0.0) or (self.turns and inertia[2, 2] > 0.0))
 
     def unobservable(self, mass: float, moment: Array, inertia: Array) -> tuple[float, Array, Array]:
-        """What a turn about the axis and a shift along it leave as it is.
+        """Part of the inertia that a turn about the axis and a shift along it leave as it is.
 
         Of what does not slide, the mass and the first moment along the axis; of what turns, the inertia that is alike
         about every axis across, else all of it.

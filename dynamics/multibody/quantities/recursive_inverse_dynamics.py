@@ -105,7 +105,7 @@ class _Kernels(NamedTuple):
 
 @memo(64)
 def _kernels(joint: JointType) -> _Kernels:
-    """What a link with that type of joint needs, whatever its numbers are."""
+    """Kernels of a link on that type of joint, whatever its numbers are."""
     parent, velocity, bars = _variables("s", MOTION), _variables("v", 3), _variables("bar", WRENCH)
     q = _variables("q", len(joint.coordinates))
     qd, qdd = (_variables(name, len(joint.velocities)) for name in ("qd", "qdd"))

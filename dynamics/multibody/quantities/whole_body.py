@@ -30,7 +30,7 @@ POINTS = ("origin", "center of mass")
 
 
 class Moments(NamedTuple):
-    """What the bodies that move have together."""
+    """Mass, first moment and momentum of the bodies that move together."""
 
     mass: Node
     first: Triple  # sum of m r
@@ -160,7 +160,7 @@ def _center(model: Model, what: str) -> tuple[System, Triple, Triple, Moments]:
 
 
 def _moments(mechanism: Mechanism) -> Moments:
-    """Of the bodies with their own inertia, which base parameters would put on others."""
+    """Moments of the bodies with their own inertia, which base parameters would put on others."""
     mechanism = replace(mechanism, base_parameters=False) if mechanism.base_parameters else mechanism
     system = mechanism.system
     ground = cg.variables([f"qd{system.n + i}" for i in range(9)])  # after the joints'; no parameter has such a name

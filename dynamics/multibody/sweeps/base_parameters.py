@@ -73,5 +73,5 @@ def _count(link: Link) -> int:
 
 
 def _seen_by_parent(link: Link, given: Numbers) -> Numbers:
-    """What is given at the link's joint, about the parent's origin and in its axes."""
+    """Inertial numbers at the link's joint, about the parent's origin and in its axes."""
     return given.turned(np.array(link.turn, dtype=np.float64)).about(link.offset)

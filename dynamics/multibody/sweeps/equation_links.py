@@ -61,16 +61,16 @@ class _Placed(NamedTuple):
         return self._replace(turn=spatial.snapped(back @ self.turn), place=place)
 
     def along(self, move: float) -> _Placed:
-        """With the origin moved along its own axis."""
+        """Link with its origin moved along its own axis."""
         place = spatial.added(self.place, move * self.turn[:, 2])
         return self._replace(place=place, own=self.own.about(np.array([0.0, 0.0, -move])), moved=move)
 
     def turned(self, angle: float) -> _Placed:
-        """Of a hinge, with its axes turned about its own."""
+        """Link on a hinge with its axes turned about the hinge's."""
         return self._replace(own=self.own.turned(_about_z(-angle)), angle=angle)
 
     def to_normal(self, parent_moved: float) -> _Placed:
-        """With its origin on the common normal with the parent's axis, unless that is far away."""
+        """Link with its origin on the common normal with the parent's axis, unless that is far away."""
         (x, y, z), place = self.turn[:, 2], self.place
         across = x * x + y * y
         move = -(place[0] * x + place[1] * y) / across if across else -place[2] / z
@@ -78,7 +78,7 @@ class _Placed(NamedTuple):
         return self.along(float(move)) if self.joint.has_axis and abs(move) <= most else self
 
     def less_turned(self) -> tuple[_Placed, float]:
-        """Of a hinge, without what turns it about its own axis before it turns, but for quarters; and how far that is.
+        """Link without its constant turn about the hinge's axis, but for quarters; and the angle of that turn.
 
         As it is where its axis is across no axis of the parent's.
         """
@@ -172,7 +172,7 @@ def _extent(body: Numbers) -> float:
 
 
 def _within_quarter(angle: float) -> float:
-    """What is left of an angle beside quarter turns; no rounding of one."""
+    """Rest of an angle beside quarter turns; no rounding of one."""
     rest = angle - round(angle / (math.pi / 2)) * (math.pi / 2)
     return rest if abs(rest) > spatial.SNAP else 0.0
 

@@ -30,16 +30,16 @@ class Numbers(NamedTuple):
     inertia: Array  # (3, 3)
 
     def negated(self) -> Numbers:
-        """With other signs."""
+        """Numbers with other signs."""
         return Numbers(-self.mass, -self.moment, -self.inertia)
 
     def turned(self, turn: Array) -> Numbers:
-        """In other axes, in which those of now are the columns of a turn."""
+        """Numbers in other axes, in which those of now are the columns of a turn."""
         moment, inertia = spatial.product(turn, self.moment), spatial.product(turn, self.inertia, turn.T)
         return Numbers(self.mass, moment, inertia)
 
     def about(self, offset: Array) -> Numbers:
-        """About a point from which this one is r away: J + 2 (r . h) 1 - r h^T - h r^T + m (r^2 1 - r r^T)."""
+        """Numbers about a point from which this one is r away: J + 2 (r . h) 1 - r h^T - h r^T + m (r^2 1 - r r^T)."""
         crossed = np.outer(offset, self.moment)
         inertia = spatial.added(self.inertia, 2.0 * np.trace(crossed) * np.eye(3) - crossed - crossed.T)
         moved = spatial.parallel_axis(inertia, self.mass, offset)

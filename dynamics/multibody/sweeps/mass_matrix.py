@@ -36,7 +36,7 @@ class Shift(NamedTuple):
     offset: Triple
 
     def wrench(self, old: Wrench) -> Wrench:
-        """About the new point; term by term, so that no constant changes its sign."""
+        """Wrench about the new point; term by term, so that no constant changes its sign."""
         (a, b, c), (x, y, z), (f, g, h) = old.torque, self.offset, old.force
         return Wrench((a + y * h - z * g, b + z * f - x * h, c + x * g - y * f), old.force)
 
@@ -63,7 +63,7 @@ class Carried(NamedTuple):
 
     @property
     def inertia(self) -> Inertia:
-        """Its own, in the axes of its motion."""
+        """Inertia of the link alone, in the axes of its motion."""
         alone = rigid(self.at.link)
         return alone.turned(self.plane) if self.plane else alone
 
@@ -83,7 +83,7 @@ class Carried(NamedTuple):
 
 
 def rigid(link: Link) -> Inertia:
-    """Of a link alone, about its origin."""
+    """Inertia of a link alone, about its origin."""
     full = [[as_node(each) for each in row] for row in link.full_inertia]
     second = [[-full[i][j] for j in range(3)] for i in range(3)]
     diagonal = np.array([spatial.plain(full[i][i]) for i in range(3)])
@@ -195,12 +195,12 @@ class Frame(NamedTuple):
         return Frame(axes, origin)
 
     def twist(self, own: Twist) -> Twist:
-        """One in these axes, about the origin of the body on the world."""
+        """Twist in these axes, about the origin of the body on the world."""
         angular = combined(self.axes, own.angular)
         return Twist(angular, plus(combined(self.axes, own.linear), cross(self.origin, angular)))
 
     def wrench(self, own: Wrench) -> Wrench:
-        """Likewise."""
+        """Wrench in these axes, about the origin of the body on the world."""
         return Wrench(combined(self.axes, own.torque), combined(self.axes, own.force)).about(self.origin)
 
 

@@ -81,7 +81,7 @@ def trees_in_a_plane(states: Sequence[LinkState]) -> list[bool]:
 
 
 def _root_frame(up: Triple, at: LinkState, tags: Tags, *, in_plane: bool) -> Frame:
-    """Of a body on the world.  in_plane: so move it and all that it carries.
+    """Frame of a body on the world.  in_plane: so move it and all that it carries.
 
     All that a tree needs is alike in any axes, so they are those that this body has just now, or, of a tree in a plane
     and of velocities along them, those of its joint.
@@ -98,7 +98,7 @@ def _root_frame(up: Triple, at: LinkState, tags: Tags, *, in_plane: bool) -> Fra
 
 
 def _next_frame(parent: Frame, at: LinkState, tags: Tags, *, in_plane: bool) -> Frame:
-    """Of a body that another carries."""
+    """Frame of a body that another carries."""
     before, turn = MatrixTurn(at.link.turn).columns(parent.axes), at.turn
     offset = plus(combined(parent.axes, at.link.place), combined(before, at.shift))
     if in_plane:

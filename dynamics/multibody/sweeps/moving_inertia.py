@@ -32,13 +32,13 @@ class MovingInertia(NamedTuple):
     wrench: Wrench
 
     def plus(self, other: MovingInertia) -> MovingInertia:
-        """Of both, about the same point."""
+        """Sum of two about the same point."""
         moment = [plus(a, b) for a, b in zip(self.velocity_moment, other.velocity_moment, strict=True)]
         momentum, wrench = plus(self.momentum, other.momentum), self.wrench.plus(other.wrench)
         return MovingInertia(self.inertia.plus(other.inertia), momentum, rows(moment), wrench)
 
     def about(self, offset: Triple) -> MovingInertia:
-        """About another point, from which this one is `offset` away: b + offset in place of b."""
+        """Sums about a point from which this one is `offset` away, b + offset in place of b."""
         moment = [plus(row, scaled(p, offset)) for row, p in zip(self.velocity_moment, self.momentum, strict=True)]
         return MovingInertia(self.inertia.about(offset), self.momentum, rows(moment), self.wrench.about(offset))
 

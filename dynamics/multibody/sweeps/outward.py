@@ -196,7 +196,7 @@ def base_acceleration(ground: Motion) -> Acceleration:
 
 
 def acceleration_in_space(omega: Triple, rate: Twist, tags: tuple[str, ...]) -> Acceleration:
-    """That of a body with angular velocity omega that does not move in a plane, in its axes."""
+    """Acceleration of a body with angular velocity omega that does not move in a plane, in its axes."""
     tensor = _tensor(omega, rate.angular)
     return Acceleration(rate.angular, rate.linear, tensor, tensor, tags)
 

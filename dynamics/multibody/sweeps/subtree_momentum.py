@@ -30,14 +30,14 @@ COMPOSITE = "momentum"  # tag of what composite momenta are made of, and of the 
 
 
 class SubtreeMomentum(NamedTuple):
-    """Of a body and all that it carries, about the body's origin, in the axes of its motion."""
+    """Mass, first moment and momentum of a body and what it carries, about its origin, in its motion's axes."""
 
     mass: Node
     moment: Triple
     momentum: Wrench
 
     def plus(self, other: SubtreeMomentum) -> SubtreeMomentum:
-        """Of both."""
+        """Sum of two about the same point."""
         with cg.tag(POTENTIAL):
             mass, moment = self.mass + other.mass, plus(self.moment, other.moment)
         with cg.tag(KINETIC):
@@ -45,7 +45,7 @@ class SubtreeMomentum(NamedTuple):
 
 
 def body_momentum(motion: Motion, link: Link) -> SubtreeMomentum:
-    """Of the body alone: f = m v + w x h, n = J w + h x v. In a plane n_z is a momentum, and the rest has no part."""
+    """Momentum of the body alone, f = m v + w x h, n = J w + h x v; in a plane f alone, as n_z is one of p."""
     h, w, v, mass = motion.out(link.moment), motion.omega, motion.velocity, as_node(link.mass)
     with cg.tag(KINETIC):
         force = plus(scaled(mass, v), cross(w, h))
@@ -56,7 +56,7 @@ def body_momentum(motion: Motion, link: Link) -> SubtreeMomentum:
 
 
 def with_known_momenta(composite: SubtreeMomentum, at: LinkState, p: Sequence[Node]) -> SubtreeMomentum:
-    """With the momenta p of the joint's velocities in place of the shares of (n, f) that they are."""
+    """Momentum with the momenta p of the joint's velocities in place of the shares of (n, f) that they are."""
     torque, force = list(composite.momentum.torque), list(composite.momentum.force)
     own = [momentum - at.link.armature * velocity for momentum, velocity in zip(p, at.u, strict=True)]
     if at.joint.sliding:
@@ -93,7 +93,7 @@ def momentum_rates(
 
 
 def about_parent(composite: SubtreeMomentum, parent: Motion, motion: Motion, at: LinkState) -> SubtreeMomentum:
-    """About the parent's origin, in the axes of the parent's motion."""
+    """Momentum about the parent's origin, in the axes of the parent's motion."""
     stays, offset = parent.keeps(at), parent.out(at.place)
     back = motion.turn.reversed  # not `out`, for the sake of products that other equations have as well
 

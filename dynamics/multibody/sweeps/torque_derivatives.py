@@ -31,7 +31,7 @@ from .outward import KINETIC, POTENTIAL
 
 
 class Reaction(NamedTuple):
-    """What a freedom of all that it carries takes: wrenches about a point, and 2 B^T S, a torque alone.
+    """Wrenches that a freedom takes of all that it carries, about a point, and 2 B^T S, a torque alone.
 
     tags: the energies that the first comes of.
     """
@@ -43,7 +43,7 @@ class Reaction(NamedTuple):
     tags: Tags
 
     def about(self, offset: Triple) -> Reaction:
-        """About another point, from which this one is `offset` away."""
+        """Reaction about a point from which this one is `offset` away."""
         with cg.tag(KINETIC):
             moved, accelerated = self.moved.about(offset), self.accelerated.about(offset)
         with cg.tag(*self.tags):
@@ -51,7 +51,7 @@ class Reaction(NamedTuple):
 
 
 def torque_derivatives(states: Sequence[LinkState], up: Triple, build: Builder) -> TorqueDerivatives:
-    """Of links, parents first, with springs, without dampers and forces.
+    """Torques of links, parents first, and their derivatives, with springs, without dampers and forces.
 
     up: the acceleration of the world against free fall.
     """
@@ -123,7 +123,7 @@ def _fill(
 
 
 def _reaction(column: Column, of: MovingInertia, tags: Tags) -> Reaction:
-    """Of a freedom at the base of the composite.  tags: the energies that accelerations come of."""
+    """Reaction of a freedom at the base of the composite.  tags: the energies that accelerations come of."""
     motion = column.motion
     with cg.tag(KINETIC):
         double = motion.scaled(2.0)
@@ -162,5 +162,5 @@ def _enter(result: TorqueDerivatives, outer: Column, inner: Column, reaction: Re
 
 
 def _displaced_by(outer: Column, reaction: Reaction) -> Node:
-    """What a displacement of the outer freedom changes at the inner one."""
+    """Change of the force at the inner freedom by a displacement of the outer one."""
     return outer.carried_rate.power(reaction.accelerated) + dot(outer.carried.angular, reaction.couple)
