@@ -14,6 +14,7 @@ from ...equations.formulations.formulations import inverse_dynamics
 from ...systems.model import Model
 from ...systems.system import System
 from ..algebra import spatial
+from ..algebra.turns import MatrixTurn
 from ..body import WORLD, quantities
 from ..joint_coordinates import quasi_velocities
 from ..mechanism import Mechanism, as_mechanism
@@ -129,12 +130,8 @@ def _symbolic(known: Link, axes: Array, pi: list[Node]) -> Link:
     mass, x, y, z, *lower = pi
     entries = dict(zip(_LOWER, lower, strict=True))
     inertia = [[entries[max(i, j), min(i, j)] for j in range(3)] for i in range(3)]
-    half = [
-        spatial.rotate_transpose(axes.tolist(), (row[0], row[1], row[2])) for row in inertia
-    ]  # I axes, as I is symmetric
-    columns = [spatial.rotate_transpose(axes.tolist(), (half[0][j], half[1][j], half[2][j])) for j in range(3)]
-    turned = [[columns[j][i] for j in range(3)] for i in range(3)]
-    moment = spatial.rotate_transpose(axes.tolist(), (x, y, z))
+    into = MatrixTurn(axes.T.tolist())
+    moment, turned = into.out((x, y, z)), into.second_moments(inertia)
     return replace(
         known, mass=mass, moment=moment, inertia=turned, damping=0.0, stiffness=0.0, spring_reference=0.0, armature=0.0
     )
