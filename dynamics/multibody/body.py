@@ -16,6 +16,7 @@ from cgraph.extend import Array, check_name, is_finite
 
 from .algebra import spatial
 from .joints import COMPOSITIONS, TYPES, JointType
+from .joints.consistency import contradiction
 from .parameters import Quantities, Quantity, entries, evaluated, names_in, symbol, vanishes
 
 WORLD = "world"
@@ -283,6 +284,8 @@ def _checked_joint(where: str, joint: Joint) -> Joint:
         raise MechanismError(f"{where}: a joint of the kind {joint.kind!r} has no second axis")
     orientation = spatial.snapped(checked_rotation(f"{where}: orientation", joint.orientation))
     pitch = _pitch(where, joint)
+    if joint.type.moves and (wrong := contradiction(joint.type)):
+        raise MechanismError(f"{where}: the type of joints of the kind {joint.kind!r} contradicts itself: {wrong}")
     given = {name: check(f"{where}: {name}", getattr(joint, name)) for name, check in JOINT_QUANTITIES.items()}
     no = f"{where}: a joint of the kind {joint.kind!r} has no"
     if not (joint.type.sprung or vanishes(given["stiffness"])):

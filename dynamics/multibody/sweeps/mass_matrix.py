@@ -131,7 +131,7 @@ def _columns(bodies: Sequence[Carried], lower: list[list[Node]]) -> list[list[Wr
             for k, wrench in enumerate(wrenches):
                 row = lower[at.first + k]
                 for j, twist in enumerate(twists[: k + 1], at.first):
-                    row[j] = twist.power(wrench)
+                    row[j] = twist.power(wrench)  # S_j . I S_k
                 row[at.first + k] = row[at.first + k] + at.link.armature
             if at.parent >= 0:
                 moved, others = carried(turned, body.outwards), composites[at.parent]
@@ -153,7 +153,7 @@ def _by_bodies(
             with cg.tag(body.at.name, KINETIC):
                 for k, wrench in enumerate(wrenches, bodies[i].at.first):
                     for j, twist in enumerate(body.at.columns, body.at.first):
-                        lower[k][j] = twist.power(wrench)
+                        lower[k][j] = twist.power(wrench)  # M_kj = S_j . I S_k, both in the axes of body j
     return lower
 
 
@@ -173,7 +173,7 @@ def _by_first_bodies(
                 seen, outer = joint.wrench(wrench), at.parent  # type: ignore[union-attr]
                 while outer >= 0:
                     for j, twist in enumerate(twists[outer], bodies[outer].at.first):
-                        lower[k][j] = twist.power(seen)
+                        lower[k][j] = twist.power(seen)  # both in the axes of the first body
                     outer = bodies[outer].at.parent
     return lower
 

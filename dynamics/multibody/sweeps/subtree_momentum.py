@@ -86,7 +86,7 @@ def momentum_rates(
         carried = composite.momentum.carried(Twist(motion.omega, motion.velocity))
     with cg.tag(POTENTIAL):
         up = scaled(motion.strength, motion.vertical)  # gravity is -up
-        loss = carried.plus(Wrench(cross(composite.moment, up), scaled(composite.mass, up)))
+        loss = carried.plus(Wrench(cross(composite.moment, up), scaled(composite.mass, up)))  # -(n_dot, f_dot)
         rates += [-twist.power(loss) for twist in at.columns[len(rates) :]]
         springs = [force for _, force in at.springs()] or [ZERO] * len(rates)
         return [rate - spring for rate, spring in zip(rates, springs, strict=True)]

@@ -201,11 +201,11 @@ def _reaction(column: Column, of: MovingInertia, tags: Tags) -> Reaction:
     motion = column.motion
     with cg.tag(KINETIC):
         double = motion.scaled(2.0)
-        moved = of.inertia.wrench(column.rate).plus(of.coriolis(double))
+        moved = of.inertia.wrench(column.rate).plus(of.coriolis(double))  # I (psi' + S') + 2 B S
         accelerated, couple = of.inertia.wrench(motion), of.coriolis_transpose(double)
     with cg.tag(*tags):
         displaced = of.inertia.wrench(column.carried_rate).plus(of.coriolis(column.carried.scaled(2.0)))
-        displaced = displaced.plus(of.wrench.carried(motion))
+        displaced = displaced.plus(of.wrench.carried(motion))  # I psi'' + 2 B psi' + S x f
     return Reaction(displaced, moved, accelerated, couple, tags)
 
 
@@ -213,10 +213,10 @@ def _enter_both(result: TorqueDerivatives, outer: Column, inner: Column, reactio
     """outer: between the world and inner, whose reaction is about the origin of the outer's body."""
     i, j = outer.velocity, inner.velocity
     with cg.tag(*reaction.tags):
-        result.by_q[i][j] = outer.motion.power(reaction.displaced)
+        result.by_q[i][j] = outer.motion.power(reaction.displaced)  # dtau_i/dq_j = S_i . (I psi''_j + ..)
         result.by_q[j][i] = _displaced_by(outer, reaction)
     with cg.tag(KINETIC):
-        result.by_qd[i][j] = outer.motion.power(reaction.moved)
+        result.by_qd[i][j] = outer.motion.power(reaction.moved)  # dtau_i/du_j = S_i . (I (psi'_j + S'_j) + 2 B S_j)
         result.by_qd[j][i] = outer.rate.power(reaction.accelerated) + dot(outer.motion.angular, reaction.couple)
         result.mass[i][j] = result.mass[j][i] = outer.motion.power(reaction.accelerated)
 
