@@ -120,7 +120,8 @@ def _check_placement(where: str, joint: Joint) -> None:
     """Raises MechanismError for what the parts have not apart: a place, a name, and a pitch, which none has."""
     quantities(f"{where}: position", joint.position)
     checked_rotation(f"{where}: orientation", joint.orientation)
-    checked_name(f"the joint of {where}", joint.name or "default")
+    if not isinstance(joint.name, str) or joint.name:
+        checked_name(f"the joint of {where}", joint.name)
     if not is_finite(joint.pitch) or joint.pitch:
         raise MechanismError(f"{where}: only a screw has a pitch, not {joint.kind!r}, got {joint.pitch!r:.80} m/rad")
 

@@ -186,7 +186,7 @@ def _check_loop(loop: Loop, bodies: Mapping[str, Body]) -> None:
     for name in (loop.body, loop.to):
         if not isinstance(name, str) or (name not in bodies and (name != WORLD or name is loop.body)):
             raise MechanismError(f"there is a loop on the unknown body {name!r:.80}")
-    checked_name("a loop", loop.label)
+    checked_name("a loop", loop.label if isinstance(loop.name, str) else loop.name)
     where = f"loop {loop.label!r}"
     for what in ("at", "to_at"):
         vector(f"{where}: {what}", getattr(loop, what))
