@@ -45,7 +45,7 @@ class Random(SpatialJoint):
 
     def __init__(self, seed: int, *, mixed: bool) -> None:
         rng = np.random.default_rng((seed, mixed))
-        count = int(rng.integers(2, 5))
+        count = int(rng.integers(2, 4))
         kinds = ["revolute", *rng.choice(["revolute", "prismatic", "screw"], count - 1)]
         axes = [axis / np.linalg.norm(axis) for axis in rng.normal(size=(count, 3))]
         points = [*(0.3 * rng.normal(size=(count - 1, 3))), np.zeros(3)]  # the last is at the body's origin
@@ -124,7 +124,7 @@ class Twins(NamedTuple):
 def twins(seed: int, joint: Random) -> Twins:
     """joint: in `TYPES`. Two trees in three have no other joint of several freedoms."""
     rng = np.random.default_rng((seed, 1))
-    count = int(rng.integers(2, 5))
+    count = int(rng.integers(2, 4))
     at, bodies, apart = int(rng.integers(count)), list[dyn.Body](), list[dyn.Body]()
     kinds = ["revolute", "prismatic", "screw"] + (["ball", "free", "free (body axes)", "universal"] * (seed % 3 == 0))
     armature = 0.0 if np.any(joint.mixing != np.eye(len(joint.parts))) else 0.2
