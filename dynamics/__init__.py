@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from .multibody.changes.pruning import EFFECTS, OmittedTerm, PruneResult, prune
     from .multibody.forces.joint_force import Actuator, JointForce, JointFriction, JointLimit
     from .multibody.mechanism import Body, Force, Joint, Loop, Mechanism, MechanismError, MechanismWarning
+    from .multibody.modification import Subtree
     from .multibody.quantities.frames import (
         frame_acceleration,
         frame_bias_acceleration,
@@ -54,7 +55,6 @@ if TYPE_CHECKING:
     from .multibody.quantities.recursive_inverse_dynamics import RecursiveInverseDynamics
     from .multibody.quantities.regressor import inertial_parameters, regressor
     from .multibody.quantities.whole_body import center_of_mass, center_of_mass_jacobian, spatial_momentum
-    from .multibody.subtree import Subtree
     from .multiprecision.reference import reference
     from .multiprecision.solution import Reference
     from .scenes.scenes import Scene

@@ -19,7 +19,7 @@ from cgraph.util.caches import kept_results
 ROOT = Path(__file__).parents[1]
 HOME = "cgraph.util.caches"
 MOST = 25
-WEAK = {"cgraph.core.label", "dynamics.multibody.sweeps.link_cache"}  # have weak tables, which docs/design.md explains
+WEAK = {"cgraph.core.label", "dynamics.multibody.structure"}  # have weak tables, which docs/design.md explains
 # Tables that a module or a call of `register` fills, by the name that their rows are asked for by.
 TABLES = {
     "cgraph.core.row.ROWS",

@@ -27,7 +27,7 @@ def _directive(package, name):
         members = ["   :members:", "   :imported-members:", f"   :exclude-members: {elsewhere}"]
         return [f".. automodule:: {package}.{name}", *members, ""]
     if inspect.isclass(value):
-        inherited = ["   :inherited-members:"] if name == "Compiled" else []  # its base has no page
+        inherited = ["   :inherited-members:"] if name in ("Compiled", "Mechanism") else []  # bases without a page
         return [f".. autoclass:: {package}.{name}", "   :members:", *inherited, ""]
     kind = "autofunction" if callable(value) else "autodata"
     return [f".. {kind}:: {package}.{name}", ""]

@@ -15,7 +15,7 @@ from cgraph.extend import Array, require_flag
 from ..multibody.algebra import spatial
 from ..multibody.body import moment_rounding
 from ..multibody.forces.joint_force import JointForce, JointFriction
-from ..multibody.joints import TYPES, SpatialJoint
+from ..multibody.joints import COMPOSITIONS, TYPES
 from ..multibody.loops import Loop
 from ..multibody.mechanism import WORLD, Body, Joint, Mechanism, MechanismError
 from .left_out import listed, present, refused_or_left_out
@@ -153,7 +153,7 @@ def _joint(joint: Element, name: str, child: str) -> Joint:
     fields: dict[str, Any] = dict(zip(("position", "orientation"), origin_of(joint, where), strict=True))
     if kinds[word] != "fixed":
         axis, dynamics = _one(joint, where, "axis"), _one(joint, where, "dynamics")
-        if not isinstance(TYPES.get(kinds[word]), SpatialJoint):
+        if kinds[word] in COMPOSITIONS or TYPES[kinds[word]].has_axis:
             fields["axis"] = (1.0, 0.0, 0.0) if axis is None else _numbers(axis, where, "xyz", 3)
         fields["damping"] = 0.0 if dynamics is None else _numbers(dynamics, where, "damping", 1, "0")[0]
     return Joint(kinds[word], name="" if name == child else name, **fields)

@@ -10,7 +10,6 @@ import numpy as np
 from cgraph.extend import Array
 
 from ..multibody.algebra.spatial import SNAP
-from ..multibody.joints import AxialJoint
 from ..multibody.mechanism import WORLD, Body, MechanismError
 
 SMALLEST = 1e-15  # kg, kg m^2: of a body that moves MuJoCo takes nothing below its mjMINVAL
@@ -88,9 +87,7 @@ def _turning(bodies: Sequence[Body]) -> dict[str, tuple[Array | None, str]]:
         if body.joint.type.turns:
             axis = np.asarray(body.joint.axis)
             alone = (
-                isinstance(body.joint.type, AxialJoint)
-                and spin is not None
-                and float(np.linalg.norm(np.cross(spin, axis))) <= SNAP
+                body.joint.type.has_axis and spin is not None and float(np.linalg.norm(np.cross(spin, axis))) <= SNAP
             )
             spin, nearest = axis if alone else None, body.name
         result[body.name] = spin, nearest

@@ -12,7 +12,6 @@ import numpy as np
 from cgraph.extend import Array, real_number
 
 from ..multibody.algebra import spatial
-from ..multibody.joints import AxialJoint
 from ..multibody.mechanism import WORLD, Body, Mechanism, MechanismError, require_mechanism
 from ..systems.model import Model
 from .stand_ins import ROUNDING, with_stand_ins
@@ -117,7 +116,7 @@ def _body_lines(body: Body, mass: float, moments: str) -> list[str]:
     if joint.type.moves:
         _require_joint(body)
         spring = f'damping="{joint.damping!r}" armature="{joint.armature!r}"'
-        if isinstance(joint.type, AxialJoint):
+        if joint.type.has_axis:
             spring = f'springref="{joint.spring_reference!r}" axis="{numbers(joint.axis)}" {spring}'
         if joint.type.sprung:
             spring = f'stiffness="{joint.stiffness!r}" {spring}'

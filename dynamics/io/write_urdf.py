@@ -10,7 +10,6 @@ from numpy.typing import ArrayLike
 
 from cgraph.extend import Array
 
-from ..multibody.joints import AxialJoint
 from ..multibody.mechanism import WORLD, Body, MechanismError, require_mechanism
 from ..multibody.parameters import vanishes
 from ..systems.model import Model
@@ -100,7 +99,7 @@ def _joint_lines(body: Body, name: str, mimic: str) -> list[str]:
         if getattr(joint, what):
             raise MechanismError(f"URDF has no {what}, body {body.name!r} has {getattr(joint, what)!r}")
     dynamics = f'<dynamics damping="{joint.damping!r}"/>'
-    if not isinstance(joint.type, AxialJoint):
+    if not joint.type.has_axis:
         return [opened, ends, place, f"    {dynamics}", "  </joint>"]
     limits = f'lower="{-FAR!r}" upper="{FAR!r}" ' if joint.type.limited else ""
     return [

@@ -15,15 +15,28 @@ from cgraph import Node
 from cgraph.extend import Array, check_name, is_finite
 
 from .algebra import spatial
-from .errors import (
-    MechanismError as MechanismError,  # noqa: PLC0414 (who needs a body imports them from here)
-    MechanismWarning as MechanismWarning,  # noqa: PLC0414
-)
 from .joints import COMPOSITIONS, TYPES, JointType
+from .joints.consistency import contradiction
 from .parameters import Quantities, Quantity, entries, evaluated, names_in, symbol, vanishes
 
 WORLD = "world"
 ROUNDING = 1e-9  # of the largest entry: what is left of an inertia or a rotation that came through text
+
+
+class MechanismError(ValueError):
+    """A mechanism that cannot be: which body, what was given, and what was needed."""
+
+
+class MechanismWarning(UserWarning):
+    """A mechanism lacks something of the file it was read from, or has a body that cannot be but can be calculated.
+
+    Examples
+    --------
+    >>> import warnings
+    >>> import dynamics as dyn
+    >>> with warnings.catch_warnings():
+    ...     warnings.simplefilter("error", dyn.MechanismWarning)  # a model that lacks something is no model
+    """
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +117,7 @@ class Joint:
 
     @property
     def type(self) -> JointType:
-        """What the library knows of joints of this kind and pitch. Raises MechanismError for one that is several."""
+        """Type of joints of this kind and pitch. Raises MechanismError for a joint that is several."""
         if self.kind in COMPOSITIONS:
             raise MechanismError(f"a joint of the kind {self.kind!r} is several, and each of these has a type")
         return TYPES[self.kind].with_pitch(self.pitch)
@@ -163,7 +176,7 @@ class Body:
 
     @property
     def coordinate(self) -> str:
-        """What the coordinate of its joint is called."""
+        """Name of the coordinate of its joint."""
         return self.joint.name or self.name
 
 
@@ -196,7 +209,7 @@ def shape_of(value: Any) -> tuple[int, ...]:
 
 
 def quantities(what: str, value: object, shape: tuple[int, ...] = (3,)) -> Array:
-    """As `vector`, or an array of objects: floats, and nodes where there are parameters."""
+    """Array of floats as `vector` gives it, or of floats and nodes, as objects, where there are parameters."""
     known = entries(value)
     if not any([isinstance(each, str | Node) for each in known]):
         return vector(what, value, shape)
@@ -222,10 +235,7 @@ def _number(what: str, value: Any, unit: str = "", minimum: float = 0.0) -> floa
 
 def _check_names(what: str, value: str | Node) -> None:
     for name in names_in([value]):
-        try:
-            check_name(f"a parameter of {what}", name, spaces=False)
-        except (TypeError, ValueError) as error:
-            raise MechanismError(str(error)) from None
+        checked_name(f"a parameter of {what}", name, spaces=False)
 
 
 def _mass(what: str, value: object) -> float | Node:
@@ -243,7 +253,7 @@ def checked(body: Body) -> Body:
     """
     if not isinstance(body, Body):
         raise MechanismError(f"bodies must be of the type Body, got {type(body).__name__}: {body!r:.60}")
-    _check_name("a body", body.name)
+    checked_name("a body", body.name)
     if body.name == WORLD:
         raise MechanismError(f"a body needs a name other than {WORLD!r}")
     where, joint = f"body {body.name!r}", body.joint
@@ -268,12 +278,14 @@ def _checked_joint(where: str, joint: Joint) -> Joint:
     if not isinstance(joint, Joint):
         raise MechanismError(f"{where}: joint must be of the type Joint, got {type(joint).__name__}: {joint!r:.60}")
     if not isinstance(joint.name, str) or joint.name:
-        _check_name(f"the joint of {where}", joint.name)
+        checked_name(f"the joint of {where}", joint.name)
     axis = unit_axis(f"{where}: axis", joint.axis)
     if joint.second_axis is not None:
         raise MechanismError(f"{where}: a joint of the kind {joint.kind!r} has no second axis")
     orientation = spatial.snapped(checked_rotation(f"{where}: orientation", joint.orientation))
     pitch = _pitch(where, joint)
+    if joint.type.moves and (wrong := contradiction(joint.type)):
+        raise MechanismError(f"{where}: the type of joints of the kind {joint.kind!r} contradicts itself: {wrong}")
     given = {name: check(f"{where}: {name}", getattr(joint, name)) for name, check in JOINT_QUANTITIES.items()}
     no = f"{where}: a joint of the kind {joint.kind!r} has no"
     if not (joint.type.sprung or vanishes(given["stiffness"])):
@@ -293,9 +305,10 @@ def _pitch(where: str, joint: Joint) -> float:
     return float(pitch)
 
 
-def _check_name(what: str, name: str) -> None:
+def checked_name(what: str, name: str, *, spaces: bool = True) -> None:
+    """Raises MechanismError for what is no name."""
     try:
-        check_name(what, name)
+        check_name(what, name, spaces=spaces)
     except (TypeError, ValueError) as error:
         raise MechanismError(str(error)) from None
 
@@ -328,7 +341,7 @@ def _inertia(what: str, given: object, beside: float = 0.0) -> Array:
 
 
 def moment_rounding(scale: float, beside: float) -> float:
-    """What counts as 0 of a principal moment, beside the largest entry and the inertia of the mass about the joint."""
+    """Rounding of a principal moment, beside the largest entry and the inertia of the mass about the joint."""
     return ROUNDING * scale + spatial.SNAP * beside
 
 

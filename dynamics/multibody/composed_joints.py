@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import Array, check_name, is_finite, require_mapping
+from cgraph.extend import Array, is_finite, require_mapping
 
 from .algebra import spatial
 from .body import (
@@ -20,6 +20,7 @@ from .body import (
     Body,
     Joint,
     MechanismError,
+    checked_name,
     checked_rotation,
     quantities,
     unit_axis,
@@ -119,10 +120,8 @@ def _check_placement(where: str, joint: Joint) -> None:
     """Raises MechanismError for what the parts have not apart: a place, a name, and a pitch, which none has."""
     quantities(f"{where}: position", joint.position)
     checked_rotation(f"{where}: orientation", joint.orientation)
-    try:
-        check_name(f"the joint of {where}", joint.name or "default")
-    except (TypeError, ValueError) as error:
-        raise MechanismError(str(error)) from None
+    if not isinstance(joint.name, str) or joint.name:
+        checked_name(f"the joint of {where}", joint.name)
     if not is_finite(joint.pitch) or joint.pitch:
         raise MechanismError(f"{where}: only a screw has a pitch, not {joint.kind!r}, got {joint.pitch!r:.80} m/rad")
 

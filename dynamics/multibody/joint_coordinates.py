@@ -8,14 +8,17 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
+import cgraph as cg
 from cgraph import Node
 from cgraph.extend import Array
 
 from ..systems.quasi_velocities import QuasiVelocities
 from .body import WORLD, Body
+from .joints import JointType
 from .parameters import Quantities
 
 Value = TypeVar("Value")
+_FORCES = {"rad/s": "N m", "m/s": "N"}
 
 
 class Places(NamedTuple):
@@ -26,7 +29,7 @@ class Places(NamedTuple):
 
 
 def places(bodies: Sequence[Body]) -> list[Places]:
-    """Of the joints of moving bodies."""
+    """Places of the coordinates and velocities of the joints of moving bodies."""
     result, q, u = [], 0, 0
     for body in bodies:
         kind = body.joint.type
@@ -44,12 +47,12 @@ def parts(
 
 
 def coordinate_names(bodies: Sequence[Body]) -> tuple[str, ...]:
-    """Of all joints: the joint's, with a word for the coordinate where it has several."""
+    """Names of all coordinates: the joint's, with a word for the coordinate where it has several."""
     return tuple([_called(body, name) for body in bodies for name in body.joint.type.coordinates])
 
 
 def velocity_names(bodies: Sequence[Body]) -> tuple[str, ...]:
-    """Of all joints, likewise."""
+    """Names of all velocities: the joint's, with a word for the velocity where it has several."""
     return tuple([_called(body, name) for body in bodies for name in body.joint.type.velocities])
 
 
@@ -63,7 +66,7 @@ def per_velocity(bodies: Sequence[Body], values: Sequence[Value]) -> list[Value]
 
 
 def lengths(bodies: Sequence[Body]) -> tuple[float, ...]:
-    """What length [m] 1 of a coordinate stands for, of all, then of all velocities in a second; 0 where none is known.
+    """Length [m] that 1 of each coordinate stands for, then 1 of each velocity in a second; 0 where none is known.
 
     1 of slides. An angle is as large as the way of a point that it moves by the largest length of the bodies, of
     numbers: where their joints are on one another, where their mass is, and over which it is spread.
@@ -86,10 +89,32 @@ def neutral(bodies: Sequence[Body]) -> list[float]:
     return [value for body in bodies for value in body.joint.type.neutral]
 
 
+def display_units(bodies: Sequence[Body]) -> dict[str, str]:
+    """{name in a graph: unit} of moving bodies: "1" of the entries of a quaternion, "N m" of a torque."""
+    units: dict[str, str] = {}
+    types = [body.joint.type for body in bodies]
+    for i, unit in enumerate([each for kind in types for each in kind.units]):
+        rate = "1/s" if unit == "1" else f"{unit}/s"
+        units |= {f"q{i}": unit, f"q{i}_old": unit, f"q{i}_dot": rate}
+    for i, unit in enumerate([each for kind in types for each in kind.velocity_units]):
+        acceleration, force = unit.replace("/s", "/s\u00b2"), _FORCES[unit]
+        units |= {f"qd{i}": unit, f"qd{i}_old": unit, f"qd{i}_dot": acceleration, f"qdd{i}": acceleration}
+        units |= {f"{kind}{i}": force for kind in ("tau", "bias", "gravity")}
+        units |= {f"p{i}": f"{force} s", f"p{i}_dot": force}
+    return units
+
+
+def _are_rates(kind: JointType) -> bool:
+    """Whether the velocities of a joint are the rates of its coordinates."""
+    q = cg.variables([f"q{k}" for k in range(len(kind.coordinates))])
+    u = cg.variables([f"qd{k}" for k in range(len(kind.velocities))])
+    return list(kind.rate(q, u)) == u
+
+
 def quasi_velocities(bodies: Sequence[Body]) -> QuasiVelocities | None:
     """How the joints' velocities move their coordinates; None where they are all rates of coordinates."""
     types = [body.joint.type for body in bodies]
-    if coordinate_names(bodies) == velocity_names(bodies):
+    if all([_are_rates(kind) for kind in {*types}]):
         return None
 
     def rate(q: Sequence[Node], u: Sequence[Node]) -> list[Node]:

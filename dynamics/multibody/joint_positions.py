@@ -21,7 +21,7 @@ _FLAT = 1e-9  # of the largest extent: a direction in which nothing moves or lie
 
 
 class Bodies(Protocol):
-    """What a mechanism has that is needed here."""
+    """Fields of a mechanism that a drawing needs."""
 
     @property
     def bodies(self) -> Sequence[Body]:
@@ -33,7 +33,7 @@ class Bodies(Protocol):
 
     @property
     def loops(self) -> Sequence[Loop]:
-        """What closes the tree."""
+        """Loops that close the tree."""
 
     def position(self, body: str, at: ArrayLike = ...) -> Graph:
         """Where a point of a body is: outputs x, y, z."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -10,16 +10,17 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import Array, Builder, building, check_name, is_finite
+from cgraph.extend import Array, Builder, building, is_finite
 
+from ..equations.constraints.nearly_redundant_rows import without_nearly_redundant
+from ..systems.constraints import Constraints, LoopRow
 from .algebra import spatial
 from .algebra.spatial import ZERO, Triple
-from .body import WORLD, Body, Joint, MechanismError, checked_rotation, vector
-from .joint_coordinates import places
+from .body import WORLD, Body, Joint, MechanismError, checked_name, checked_rotation, vector
 from .joints import COMPOSITIONS
-from .sweeps.forward_kinematics import KinematicChain
-from .sweeps.kinematic_tree import locked_at
-from .sweeps.relative_placement import RelativePlacement
+from .sweeps.kinematic_chain import KinematicChain, kinematic_chains
+from .sweeps.kinematic_tree import Carrier
+from .sweeps.links import LinkState
 
 ROWS = {
     "point": ("x", "y", "z"),
@@ -35,7 +36,7 @@ ROUNDING = 1e-9  # of the lengths of a loop: what is left of rows that numbers f
 
 @dataclass(frozen=True, eq=False)
 class Loop:
-    """What holds a body of a tree to another, or the coordinate of its joint to another's.
+    """Constraint that holds a body of a tree to another, or the coordinate of its joint to another's.
 
     Parameters
     ----------
@@ -108,7 +109,7 @@ class Loop:
 
     @property
     def label(self) -> str:
-        """What its rows are called."""
+        """Name of the loop, with which those of its rows begin."""
         return self.name or f"{self.body} to {self.to}"
 
     @property
@@ -122,17 +123,70 @@ class Loop:
         return tuple([f"{self.label} {row}" for row in SLIPS]) if self.kind == "rolling" else ()
 
 
-def check_loop(loop: Loop, bodies: Mapping[str, Body]) -> None:
+def check_loops(loops: Sequence[Loop], bodies: Sequence[Body]) -> None:
+    """Raises MechanismError for a loop that its bodies cannot have, and for two of one name."""
+    named = {body.name: body for body in bodies}
+    for loop in loops:
+        _check_loop(loop, named)
+    labels = [loop.label for loop in loops]
+    if len(set(labels)) < len(labels):
+        twice = next(label for label in labels if labels.count(label) > 1)
+        raise MechanismError(f"two loops have the name {twice!r}")
+
+
+def position_rows(
+    loops: Sequence[Loop],
+    moving: Sequence[Body],
+    carriers: Mapping[str, Carrier],
+    locked: Mapping[str, ArrayLike],
+    states: Sequence[LinkState],
+) -> dict[str, Node]:
+    """phi(q) of all loops.  locked: coordinates of joints that stand still.  states: of the links that move."""
+    coordinates = {name: cg.constant(float(np.ravel(at)[0])) for name, at in locked.items()}
+    coordinates |= {at.name: at.q[0] for at in states}
+    rows: dict[str, Node] = {}
+    for loop in loops:
+        if loop.kind == "coupling":
+            phi = [_coupling_row(loop, coordinates)]
+        else:
+            ends = [carriers[name] for name in (loop.body, loop.to)]
+            phi = _loop_rows(loop, *kinematic_chains(ends, moving, states))
+        rows |= dict(zip(loop.rows, phi, strict=True))
+    return rows
+
+
+def of_loops(constraints: Constraints, loops: Sequence[Loop], moving: Sequence[Body]) -> Constraints:
+    """The constraints with what is known of the rows of loops, less those that nearly follow from others.
+
+    A coupling is exact: its row counts as it is.
+    """
+    constraints.turning = [unit == "rad/s" for body in moving for unit in body.joint.type.velocity_units]
+    constraints.loop_rows = {
+        name: LoopRow(loop.label, " about " in name.removeprefix(loop.label), loop.tolerance)
+        for loop in loops
+        if loop.kind != "coupling"
+        for name in (*loop.rows, *loop.velocity_rows)
+    }
+    return without_nearly_redundant(constraints)
+
+
+def velocity_rows(loops: Sequence[Loop], chain: Callable[[str], KinematicChain]) -> dict[str, Node]:
+    """Velocities that are zero in loops that roll.  chain: the joints between a body and the world."""
+    rows: dict[str, Node] = {}
+    for loop in loops:
+        if loop.velocity_rows:
+            rows |= dict(zip(loop.velocity_rows, _slip_rows(loop, chain(loop.body), chain(loop.to)), strict=True))
+    return rows
+
+
+def _check_loop(loop: Loop, bodies: Mapping[str, Body]) -> None:
     """Raises MechanismError unless the loop's bodies are there and its numbers are what its kind needs."""
     if not isinstance(loop, Loop):
         raise MechanismError(f"loops must be of the type Loop, got {type(loop).__name__}: {loop!r:.60}")
     for name in (loop.body, loop.to):
         if not isinstance(name, str) or (name not in bodies and (name != WORLD or name is loop.body)):
             raise MechanismError(f"there is a loop on the unknown body {name!r:.80}")
-    try:
-        check_name("a loop", loop.label)
-    except (TypeError, ValueError) as error:
-        raise MechanismError(str(error)) from None
+    checked_name("a loop", loop.label if isinstance(loop.name, str) else loop.name)
     where = f"loop {loop.label!r}"
     for what in ("at", "to_at"):
         vector(f"{where}: {what}", getattr(loop, what))
@@ -165,26 +219,29 @@ def _has_one_coordinate(joint: Joint) -> bool:
     return joint.kind not in COMPOSITIONS and len(joint.type.coordinates) == 1
 
 
-def loop_rows(loop: Loop, body: RelativePlacement, to: RelativePlacement) -> list[Node]:
+def _loop_rows(loop: Loop, body: KinematicChain, to: KinematicChain) -> list[Node]:
     """phi of a loop that holds frames, of which these are the placements."""
     with building(Builder()), cg.tag(loop.label):
-        gap = spatial.plus(body.point(loop.at), spatial.scaled(-1.0, to.point(loop.to_at)))
+        gap = spatial.plus(body.place_of(loop.at), spatial.scaled(-1.0, to.place_of(loop.to_at)))
         if loop.kind == "distance":
             length = float(loop.length)
             return [(0.5 / length) * (spatial.dot(gap, gap) - length * length)]
         if loop.kind == "rolling":
             axis, target = _axes(loop)
-            normal = to.direction(target[:, 2])
-            tilt = spatial.dot(body.direction(axis[:, 2]), normal)
+            normal = to.axis(target[:, 2])
+            tilt = spatial.dot(body.axis(axis[:, 2]), normal)
             return [spatial.dot(gap, normal) - float(loop.length) * cg.sqrt(1.0 - tilt * tilt)]
         rows = list(gap)
         if loop.kind == "hinge":
             axis, target = _axes(loop)
-            along = body.direction(axis[:, 2])
-            rows += [-spatial.dot(to.direction(target[:, 1]), along), spatial.dot(to.direction(target[:, 0]), along)]
+            along = body.axis(axis[:, 2])
+            rows += [
+                -spatial.dot(to.axis(target[:, 1]), along),
+                spatial.dot(to.axis(target[:, 0]), along),
+            ]
         if loop.kind == "weld":
-            x, y, z = (body.direction(column) for column in np.asarray(loop.orientation, dtype=np.float64))
-            x_to, y_to, z_to = (to.direction(column) for column in np.eye(3))
+            x, y, z = (body.axis(column) for column in np.asarray(loop.orientation, dtype=np.float64))
+            x_to, y_to, z_to = (to.axis(column) for column in np.eye(3))
             rows += _rotation_rows((x, y, z), (x_to, y_to, z_to))
     return _without_rounding(rows, [*body.lengths(loop.at), *to.lengths(loop.to_at)])
 
@@ -200,7 +257,7 @@ def _rotation_rows(axes: Sequence[Triple], to: Sequence[Triple]) -> list[Node]:
     return [scale * (yz - zy), scale * (zx - xz), scale * (xy - yx)]
 
 
-def slip_rows(loop: Loop, body: KinematicChain, to: KinematicChain) -> list[Node]:
+def _slip_rows(loop: Loop, body: KinematicChain, to: KinematicChain) -> list[Node]:
     """The velocity of a rolling wheel's lowest point against the plane, along two axes of it; in the world's axes."""
     with building(Builder()), cg.tag(loop.label):
         axis, target = _axes(loop)
@@ -217,21 +274,13 @@ def slip_rows(loop: Loop, body: KinematicChain, to: KinematicChain) -> list[Node
         return [spatial.dot(x, slip), spatial.dot(y, slip)]
 
 
-def coupling_row(loop: Loop, bodies: Sequence[Body], all_bodies: Mapping[str, Body], locked: Mapping[str, ArrayLike],
-                 q: Sequence[Node]) -> Node:  # fmt: skip
+def _coupling_row(loop: Loop, coordinates: Mapping[str, Node]) -> Node:
     """q - (c0 + c1 q_to + ..) of a coupling; a locked joint is a number."""
-    index: dict[str, int] = {body.name: place.q.start for body, place in zip(bodies, places(bodies), strict=True)}
-
-    def coordinate(name: str) -> Node:
-        if name in index:
-            return q[index[name]]
-        return cg.constant(float(locked_at(all_bodies[name], locked[name])[0]))
-
     with building(Builder()), cg.tag(loop.label):
         value = ZERO
         for coefficient in reversed(loop.coefficients[1:]):
-            value = (value + float(coefficient)) * coordinate(loop.to)
-        return coordinate(loop.body) - (value + float(loop.coefficients[0]))
+            value = (value + float(coefficient)) * coordinates[loop.to]
+        return coordinates[loop.body] - (value + float(loop.coefficients[0]))
 
 
 def _axes(loop: Loop) -> list[Array]:

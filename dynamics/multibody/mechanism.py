@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import cast
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Array, Builder, building, require_flag, require_mapping
+from cgraph.extend import Array, Builder, building, real_array, require_flag, require_mapping
 
 from ..systems.arguments import parameter_value
 from ..systems.body_system import BodySystem
@@ -21,18 +22,23 @@ from .body import WORLD, Body, Joint, MechanismError, MechanismWarning, quantiti
 from .composed_joints import locked_parts, outer_names, require_parents
 from .forces.external_force import Force, generalized_forces
 from .forces.joint_force import JointForce, add_joint_forces, check_any_force
-from .joint_coordinates import coordinate_names, lengths, per_velocity, quasi_velocities, velocity_names
+from .joint_coordinates import (
+    coordinate_names,
+    lengths,
+    neutral,
+    per_velocity,
+    places,
+    quasi_velocities,
+    velocity_names,
+)
 from .joint_positions import skeleton
-from .loop_equations import check_loops, of_loops, position_rows, velocity_rows
-from .loops import Loop
-from .mechanism_fields import Structure, changed, listed, summary
-from .modification import attach_subtree, detach_subtree, lock_joint, map_state, subtree_of, unlock_joint
-from .parameter_values import bound_body, bound_force, require_values, used_names
-from .parameters import bound, entries, names_in, symbol
-from .subtree import Subtree
-from .sweeps.forward_kinematics import KinematicChain, kinematic_chain
-from .sweeps.inertial_numbers import Link
+from .loops import Loop, check_loops, of_loops, position_rows, velocity_rows
+from .modification import ModifiableStructure
+from .parameters import Quantity, bound, entries, names_in, symbol
+from .structure import bound_body, bound_force, changed, listed, require_values, used_names
+from .sweeps.kinematic_chain import KinematicChain, kinematic_chains
 from .sweeps.kinematic_tree import Carrier, lock_joints, merge_fixed_bodies, parents_first, require_inertia, resists
+from .sweeps.links import Link
 from .tree_equations import TreeEquations
 
 __all__ = [
@@ -48,9 +54,11 @@ __all__ = [
     "require_mechanism",
 ]
 
+SHOWN = 6  # names of a kind that a repr shows, at most
+
 
 @dataclass(frozen=True, eq=False)
-class Mechanism(Structure):
+class Mechanism(ModifiableStructure):
     """A tree of rigid bodies under gravity. Coordinates are its moving joints, parents first.
 
     Parameters
@@ -111,7 +119,7 @@ class Mechanism(Structure):
         carried = {body.name for body in self.bodies}
         for force in self.forces:
             check_any_force(force, carried, self.bodies)
-        check_loops(self)
+        check_loops(self.loops, self.bodies)
         used = used_names(self.bodies, self.gravity, self.forces)
         for name in self.parameters:
             if name not in used:
@@ -125,7 +133,19 @@ class Mechanism(Structure):
         self._require_values(self.parameters, bodies)
 
     def __repr__(self) -> str:
-        return f"<Mechanism of {'; '.join(summary(self, self.coordinates))}>"
+        counted = (
+            f"{len(self.bodies)} bodies, {len(self.coordinates)} coordinate(s) {_first(self.coordinates)}".rstrip()
+        )
+        named = {
+            "locked": list(self.locked),
+            "forces on": [force.body for force in self.forces],
+            "loops": [loop.label for loop in self.loops],
+        }
+        parts = [counted + (", ..." if len(self.coordinates) > SHOWN else "")]
+        parts += [f"{what} {_first(names)}" for what, names in named.items() if names]
+        parts += [f"parameters {', '.join(self.parameter_values)}"] if self.parameter_values else []
+        parts += [f"gravity {', '.join([_shown(each) for each in entries(self.gravity)])}"]
+        return f"<Mechanism of {'; '.join(parts)}>"
 
     @cached_property
     def parts(self) -> tuple[Body, ...]:
@@ -197,13 +217,15 @@ class Mechanism(Structure):
             forces=self._generalized_forces if self.forces else None,
             damping=per_velocity(self.moving, [symbol(body.joint.damping) for body in self.moving]),
             quasi_velocities=quasi_velocities(self.moving),
-            constraints=lambda q, t: position_rows(self, self.moving, self.carriers, self.links, q),
-            velocity_constraints=lambda q, qd, t: velocity_rows(self, lambda body: self._chain(body, q, qd)),
+            constraints=lambda q, t: position_rows(
+                self.loops, self.moving, self.carriers, self.locked, self._equations.states(q, ())
+            ),
+            velocity_constraints=lambda q, qd, t: velocity_rows(self.loops, lambda body: self._chain(body, q, qd)),
             lengths=lengths(self._bound.moving),
             require_values=self._require_values,
             surely_regular=all([bool(body.joint.armature) or resists(body) for body in self._bound.moving]),
         )
-        system.constraints = of_loops(system.constraints, self, self.moving)
+        system.constraints = of_loops(system.constraints, self.loops, self.moving)
         return system
 
     def _require_values(self, values: Mapping[str, ArrayLike], bodies: Sequence[Body] | None = None) -> None:
@@ -216,11 +238,12 @@ class Mechanism(Structure):
         return add_joint_forces(total, self.forces, self.moving, (q, qd), p)
 
     def _chain(self, body: str, q: Sequence[Node], qd: Sequence[Node]) -> KinematicChain:
-        return kinematic_chain(self.carriers[body], self.moving, self.links, q, qd)
+        ends = [self.carriers[name] for name in (body, WORLD)]
+        return kinematic_chains(ends, self.moving, self._equations.states(q, qd))[0]
 
     @property
     def links(self) -> list[Link]:
-        """What the motion and energy of each of the moving bodies is made of."""
+        """Links of the moving bodies: the numbers of which motion and energy are made."""
         return self._equations.links
 
     @property
@@ -287,39 +310,6 @@ class Mechanism(Structure):
         forces = tuple([bound_force(force, chosen) for force in self.forces])
         return changed(self, chosen, bodies=bodies, gravity=bound(self.gravity, chosen), forces=forces)
 
-    def lock(self, body: str, at: float | ArrayLike | None = None) -> Mechanism:
-        """The mechanism with the joint of a body standing still at a coordinate [rad or m], or several; by default 0.
-
-        Of a ball or free joint the coordinates are as many as it has, by default neutral.
-        The body and all that is welded to it become one inertia with its parent. Raises MechanismError for an unknown
-        body or one without a joint, and a coordinate that is not finite.
-        """
-        return lock_joint(self, body, at)
-
-    def unlock(self, body: str) -> Mechanism:
-        """The mechanism with a locked joint free again. Raises MechanismError for one that is not locked."""
-        return unlock_joint(self, body)
-
-    def subtree(self, body: str) -> Subtree:
-        """A body and all that it carries, as `attach` takes it. Raises MechanismError for an unknown body."""
-        return subtree_of(self, body)
-
-    def detach(self, body: str) -> Mechanism:
-        """The mechanism without a body and all that it carries, and without the loops that held these.
-
-        Raises MechanismError for an unknown body.
-        """
-        return detach_subtree(self, body)
-
-    def attach(self, subtree: Subtree | Body | Iterable[Body], to: str | None = None) -> Mechanism:
-        """The mechanism with a subtree, a body, or several of which the first carries the others, hung on a body.
-
-        to: a body's name or "world"; by default what the first names as its parent. A subtree that goes back where it
-        was taken off gives the same mechanism again, with its loops after the others. Raises MechanismError as a
-        Mechanism does, also for a loop of the subtree with a body that is not there.
-        """
-        return attach_subtree(self, subtree, to)
-
     def map_state_from(self, other: Mechanism, q: ArrayLike, qd: ArrayLike) -> tuple[Array, Array]:
         """The state (q, qd) of another mechanism as one of this: joints of bodies of the same name keep theirs.
 
@@ -327,7 +317,21 @@ class Mechanism(Structure):
         states of another shape.
         """
         other = require_mechanism(other, "map_state_from")
-        return map_state(self.moving, other.moving, locked_parts(other.bodies, other.locked), q, qd)
+        rows = [real_array(name, each) for name, each in (("q", q), ("qd", qd))]
+        counts = len(other.coordinates), len(other.velocities)
+        for name, row, count in zip(("q", "qd"), rows, counts, strict=True):
+            if row.shape != (count,):
+                raise ValueError(f"{name} must have shape ({count},), one for each joint, got {row.shape}")
+        states = zip(other.moving, places(other.moving), strict=True)
+        theirs = {body.name: (rows[0][place.q], rows[1][place.u]) for body, place in states}
+        locked = locked_parts(other.bodies, other.locked)
+        result = np.array(neutral(self.moving)), np.zeros(len(self.velocities))
+        for body, place in zip(self.moving, places(self.moving), strict=True):
+            if body.name in theirs:
+                result[0][place.q], result[1][place.u] = theirs[body.name]
+            elif body.name in locked:
+                result[0][place.q] = locked[body.name]
+        return result
 
 
 def as_mechanism(model: Model) -> Mechanism | None:
@@ -341,6 +345,15 @@ def require_mechanism(model: Model, what: str) -> Mechanism:
     if mechanism is None:
         raise MechanismError(f"{what} takes rigid bodies, a Mechanism or a scene of one, got {model!r:.80}")
     return mechanism
+
+
+def _first(names: Sequence[str]) -> str:
+    return ", ".join(names[:SHOWN])
+
+
+def _shown(number: Quantity) -> str:
+    names = names_in([number])
+    return f"({', '.join(names)})" if names else f"{float(number):g}"
 
 
 def _point(body: str, at: ArrayLike) -> Array:

@@ -15,20 +15,22 @@ from cgraph.extend import Array, Builder, building, hessian_nodes
 from ..systems.system import BiasForce
 from ..systems.torque_derivatives import MotionState, TorqueDerivatives
 from .algebra import spatial
-from .algebra.spatial import ZERO
-from .body import WORLD, Body, quantities
-from .joint_coordinates import parts, places
-from .joints import AxialJoint, JointType, moving_type
-from .mechanism_fields import Structure
-from .sweeps import newton_euler
-from .sweeps.base_parameters import base_parameter_links
-from .sweeps.body_motion import Motion, ground
-from .sweeps.composite_inertia import without_axial_moments
-from .sweeps.composite_momentum import COMPOSITE, CompositeMomentum, about_parent, body_momentum, momentum_rates, stated
+from .body import Body, quantities
+from .joints import JointType
+from .structure import Moved, Structure
+from .sweeps.base_parameters import base_parameter_links, without_axial_moments
 from .sweeps.equation_links import equation_links
-from .sweeps.inertial_numbers import Link
-from .sweeps.link_cache import Moved
-from .sweeps.mass_matrix_columns import Carried, mass_matrix_columns, size_of
+from .sweeps.links import Link, LinkState, link_states, parents_of
+from .sweeps.mass_matrix import Carried, mass_matrix_columns, size_of
+from .sweeps.outward import Acceleration, Motion, base_acceleration, ground, propagate_acceleration, wrench
+from .sweeps.subtree_momentum import (
+    COMPOSITE,
+    SubtreeMomentum,
+    about_parent,
+    body_momentum,
+    momentum_rates,
+    with_known_momenta,
+)
 
 WORTH = 0.9  # of the nodes of a mass matrix from the Lagrangian, at most, for one by composite inertias
 UNEVEN = 200.0  # times a body's moments of inertia, at most, for base numbers that are not looked at further
@@ -45,12 +47,11 @@ class TreeEquations:
     @cached_property
     def parents(self) -> list[int]:
         """For each body the index of the one that carries it, -1 for the world."""
-        index = {body.name: i for i, body in enumerate(self.bodies)}
-        return [index.get(body.parent, -1) for body in self.bodies]
+        return parents_of(self.bodies)
 
     @cached_property
     def links(self) -> list[Link]:
-        """What motion and energy of each body are made of, in the body's own frame."""
+        """Links of the bodies, in the bodies' own frames."""
         return self._regrouped(self._own)[0] if self.base_parameters else self._own
 
     @cached_property
@@ -61,15 +62,14 @@ class TreeEquations:
     def ground(self) -> Motion:
         """The world at rest."""
         inner = [link for link, parent in zip(self.links, self.parents, strict=True) if parent >= 0]
-        axial = all([isinstance(body.joint.type, AxialJoint) for body in self.bodies])
+        axial = all([joint.has_axis for joint in self._types])
         in_plane = axial and all([link.parallel for link in inner])
         return self.shared.ground(ground(self.gravity, in_plane=in_plane))
 
     @cached_property
     def _turning(self) -> bool:
         """Whether the directions of all joints turn with their bodies, which closed forms take for granted."""
-        joints = {moving_type(body.joint.type) for body in self.bodies}
-        return all([isinstance(joint, AxialJoint) or joint.turns_with_body for joint in joints])
+        return all([joint.turns_with_body for joint in set(self._types)])
 
     @cached_property
     def _own(self) -> list[Link]:
@@ -93,7 +93,7 @@ class TreeEquations:
 
     @cached_property
     def whole(self) -> TreeEquations | None:
-        """The same without base numbers, where these are larger than the bodies' by decades; else None."""
+        """Equations without base numbers, where these are larger than the bodies' by decades; else None."""
         numbers = zip(self._fewest, self._links[0], strict=True)
         if not self._numeric or all([_size(few) <= UNEVEN * _size(own) for few, own in numbers]):
             return None
@@ -108,6 +108,16 @@ class TreeEquations:
     def _numeric(self) -> bool:
         """Whether no link has parameters."""
         return not any([isinstance(number, Node) for link in self._own for number in link.numbers])
+
+    def states(
+        self,
+        q: Sequence[Node],
+        u: Sequence[Node],
+        links: Sequence[Link] | None = None,
+        u_dot: Sequence[Node] | None = None,
+    ) -> list[LinkState]:
+        """The links, by default the bodies' own, at a state."""
+        return link_states(self.bodies, links or self.links, self.parents, q, u, u_dot)
 
     @cached_property
     def _hinged_chain(self) -> bool:
@@ -132,31 +142,27 @@ class TreeEquations:
 
     def bias_forces(self, q: Sequence[Node], qd: Sequence[Node], qdd: Sequence[Node] | None) -> list[BiasForce]:
         """The wrenches of all bodies at these accelerations, with the velocities that they work on."""
-        forces: list[BiasForce] = []
+        forces, accelerations = list[BiasForce](), list[Acceleration]()
         with building(Builder()):
-            accelerations = {WORLD: newton_euler.base_acceleration(self.ground)}
-            rates = [(qdd or [ZERO] * len(qd))[place.u] for place in places(self.bodies)]
-            rows = zip(self.bodies, self._fewest, self._moved(q, qd), parts(self.bodies, q, qd), rates, strict=True)
-            for body, link, moved, (x, u), u_dot in rows:
-                joint = moving_type(body.joint.type)
-                with cg.tag(body.name):
-                    acceleration = accelerations[body.name] = newton_euler.propagate_acceleration(
-                        accelerations[body.parent], moved.parent, moved.motion, link, joint, link.at(x), u, u_dot
-                    )
-                    forces += newton_euler.wrench(acceleration, moved.motion, link, joint, x, u, u_dot)
+            base = base_acceleration(self.ground)
+            states = self.states(q, qd, self._fewest, qdd)
+            for at, moved in zip(states, self._moved(q, qd), strict=True):
+                with cg.tag(at.name):
+                    parent = accelerations[at.parent] if at.parent >= 0 else base
+                    accelerations.append(propagate_acceleration(parent, moved.parent, moved.motion, at))
+                    forces += wrench(accelerations[-1], moved.motion, at)
         return forces
 
     def mass_matrix(self, q: Sequence[Node], qd: Sequence[Node], lagrangian: Node, build: Builder) -> list[list[Node]]:
         """The lower triangle of M by composite inertias; or from the Lagrangian, where that takes fewer nodes."""
-        joints = [moving_type(joint) for joint in self._types]
         links = self._regrouped(equation_links(self._own, self._types, self.parents, outwards=True))[0]
         with building(build):
-            links = without_axial_moments(links if self._numeric else self._fewest, joints, self.parents)
-            motions = [moved.motion.plane for moved in self._moved(q, qd, links)]
-            rows = zip(self.bodies, self.parents, links, joints, motions, places(self.bodies), strict=True)
+            links = without_axial_moments(links if self._numeric else self._fewest, self._types, self.parents)
+            planes = [moved.motion.plane for moved in self._moved(q, qd, links)]
+            states = self.states(q, qd, links)
             carried = [
-                Carried(body.name, k, link, joint, link.at(q[at.q]), at.u.start, plane, motions[k] if k >= 0 else None)
-                for body, k, link, joint, plane, at in rows
+                Carried(at, plane, planes[at.parent] if at.parent >= 0 else None)
+                for at, plane in zip(states, planes, strict=True)
             ]
             columns = mass_matrix_columns(carried, len(qd))
         if self._hinged_chain:
@@ -172,41 +178,38 @@ class TreeEquations:
         if not self._turning:
             return None
         with building(Builder()):
-            rows = list(zip(self.bodies, self._fewest, self._moved(q, qd), parts(self.bodies, q, qd), strict=True))
-            composites: list[CompositeMomentum] = []
-            for body, link, moved, _ in rows:
-                with cg.tag(body.name, COMPOSITE):
-                    composites.append(body_momentum(moved.motion, link))
-            rates, at = list[Node](), places(self.bodies)
-            for i in reversed(range(len(rows))):
-                body, link, moved, (x, u) = rows[i]
-                joint = moving_type(body.joint.type)
-                with cg.tag(body.name, COMPOSITE):
-                    composites[i] = stated(composites[i], link, joint, link.at(x), u, p[at[i].u])
-                    motions = (moved.parent, moved.motion)
-                    rates[:0] = momentum_rates(composites[i], *motions, link, joint, x, u, p[at[i].u])
-                    if (k := self.parents[i]) >= 0:
-                        carried = about_parent(composites[i], *motions, link, joint, link.at(x))
-                        composites[k] = composites[k].plus(carried)
+            states, all_moved = self.states(q, qd, self._fewest), self._moved(q, qd)
+            composites: list[SubtreeMomentum] = []
+            for at, moved in zip(states, all_moved, strict=True):
+                with cg.tag(at.name, COMPOSITE):
+                    composites.append(body_momentum(moved.motion, at.link))
+            rates = list[Node]()
+            for i, at in reversed(list(enumerate(states))):
+                motions, own = all_moved[i][:2], p[at.first : at.first + len(at.u)]
+                with cg.tag(at.name, COMPOSITE):
+                    composites[i] = with_known_momenta(composites[i], at, own)
+                    rates[:0] = momentum_rates(composites[i], *motions, at, own)
+                    if at.parent >= 0:
+                        carried = about_parent(composites[i], *motions, at)
+                        composites[at.parent] = composites[at.parent].plus(carried)
         return rates
 
     def torque_derivatives(self, state: MotionState, build: Builder) -> TorqueDerivatives | None:
-        """Of all bodies, with their springs."""
+        """Torques of all bodies, with their springs, and their derivatives."""
         if not self._turning:
             return None
-        from .sweeps.inverse_dynamics_columns import torque_derivatives
+        from .sweeps.torque_derivatives import torque_derivatives
 
         with building(build):
-            up = newton_euler.base_acceleration(self.ground).linear
-            return torque_derivatives(self.bodies, self._links[0], self.parents, up, state, build)
+            up = base_acceleration(self.ground).linear
+            q, u, u_dot = state
+            return torque_derivatives(self.states(q, u, self._links[0], u_dot), up, build)
 
     def _moved(self, q: Sequence[Node], qd: Sequence[Node], links: Sequence[Link] | None = None) -> list[Moved]:
-        motions = {WORLD: self.ground}
-        result = []
-        for body, link, (x, u) in zip(self.bodies, links or self._links[0], parts(self.bodies, q, qd), strict=True):
-            moved = self.shared.moved(motions[body.parent], body, link, x, u)
-            motions[body.name] = moved.motion
-            result.append(moved)
+        result: list[Moved] = []
+        for at in self.states(q, qd, links or self._links[0]):
+            parent = result[at.parent].motion if at.parent >= 0 else self.ground
+            result.append(self.shared.moved(parent, at))
         return result
 
 

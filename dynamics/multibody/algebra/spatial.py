@@ -196,7 +196,7 @@ def rotate(matrix: Matrix, vector: Triple) -> Triple:
     return x, y, z
 
 
-def rotate_about_z(c: Node, s: Node, vector: Triple) -> Triple:
-    """R_z^T vector: its components in axes turned about z by the angle with cosine c and sine s."""
-    x, y, z = vector
-    return c * x + s * y, c * y - s * x, z
+def combined(columns: Sequence[Triple], vector: Triple) -> Triple:
+    """The vector whose components are along these columns."""
+    x, y, z = (scaled(factor, column) for factor, column in zip(vector, columns, strict=True))
+    return plus(plus(x, y), z)

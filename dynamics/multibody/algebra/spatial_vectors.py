@@ -7,6 +7,7 @@ from typing import NamedTuple
 from cgraph import Node
 
 from .spatial import STILL, Triple, cross, dot, plus, scaled
+from .turns import Turn
 
 
 class Twist(NamedTuple):
@@ -29,11 +30,11 @@ class Twist(NamedTuple):
         return Twist(cross(self.angular, other.angular), linear)
 
     def at(self, offset: Triple) -> Twist:
-        """The same motion by another point, `offset` away."""
+        """Twist by the motion of a point `offset` away."""
         return Twist(self.angular, plus(self.linear, cross(self.angular, offset)))
 
     def power(self, wrench: Wrench) -> Node:
-        """What the wrench does along it."""
+        """Power of a wrench along the twist."""
         return dot(self.angular, wrench.torque) + dot(self.linear, wrench.force)
 
 
@@ -56,9 +57,13 @@ class Wrench(NamedTuple):
         torque = plus(cross(velocity.angular, self.torque), cross(velocity.linear, self.force))
         return Wrench(torque, cross(velocity.angular, self.force))
 
+    def turned(self, turn: Turn) -> Wrench:
+        """Wrench in the axes before a turn."""
+        return Wrench(turn.out(self.torque), turn.out(self.force))
+
     def about(self, offset: Triple) -> Wrench:
-        """The same about another point, from which this one is `offset` away."""
+        """Wrench about a point from which this one is `offset` away."""
         return Wrench(plus(self.torque, cross(offset, self.force)), self.force)
 
 
-REST = Twist(STILL, STILL)
+REST, IDLE = Twist(STILL, STILL), Wrench(STILL, STILL)

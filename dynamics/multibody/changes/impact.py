@@ -11,9 +11,10 @@ from numpy.typing import ArrayLike
 from cgraph.extend import Array, real_array
 
 from ...equations.equations_of_motion import forward_dynamics, momentum
+from ...equations.states.arrays_at import arrays_at
 from ..body import Body, MechanismError, vector
 from ..mechanism import Mechanism, require_mechanism
-from ..parameter_values import bound_body
+from ..structure import bound_body
 
 _COMPONENTS = ("x y z", "vx vy vz", "wx wy wz")
 
@@ -222,14 +223,14 @@ def _motion(mechanism: Mechanism, body: Body, q: Array, qd: Array) -> tuple[Free
 
 def _momentum(mechanism: Mechanism, q: Array, qd: Array) -> Array:
     """Generalized momenta M qd, (n,)."""
-    found = momentum(_inertia_alone(mechanism)).evaluate(_named(q=q, qd=qd))
-    return np.array(list(found.values()))
+    alone = _inertia_alone(mechanism)
+    return arrays_at(alone, momentum(alone), q, qd)["p"]
 
 
 def _velocities(mechanism: Mechanism, q: Array, p: Array) -> Array:
     """M^-1 p, (n,): the accelerations at rest under p alone; with loops those that they let through."""
-    found = forward_dynamics(_inertia_alone(mechanism)).evaluate(_named(q=q, qd=np.zeros_like(p), tau=p))
-    return np.array([found[f"qdd{i}"] for i in range(len(p))])
+    alone = _inertia_alone(mechanism)
+    return arrays_at(alone, forward_dynamics(alone), q, tau=p)["qdd"]
 
 
 def _inertia_alone(mechanism: Mechanism) -> Mechanism:

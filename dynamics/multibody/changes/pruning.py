@@ -59,7 +59,7 @@ class OmittedTerm:
 
 @dataclass(frozen=True, eq=False)
 class PruneResult:
-    """What is left of a model after `prune`, and accounts of the rest, made on demand.
+    """Rest of a model after `prune`, with accounts of what was left out, made on demand.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ class PruneResult:
 
     @cached_property
     def omitted(self) -> tuple[OmittedTerm, ...]:
-        """What was in the full graph, in the order in which it was taken out: the nodes add up to the difference."""
+        """Terms of the full graph in the order in which they were taken out: their nodes add up to the difference."""
         before, result = self.full, []
         for step in self.steps[1:]:
             after = self.graph if step is self.steps[-1] else step.graph(self.equations)
@@ -102,7 +102,7 @@ class PruneResult:
 
     @cached_property
     def absent(self) -> tuple[OmittedTerm, ...]:
-        """What the model as given has not, so that no graph of it has nodes for it, each counted by putting it in.
+        """Terms that the model as given lacks, so that no graph has nodes for them, each counted by putting it in.
 
         Gravity as on earth or, along the axes of some joints, askew; 0.3 for damping, stiffness and armature; a body of
         1 kg for one without mass; a hinge in place of a weld.
@@ -119,7 +119,7 @@ class PruneResult:
 
     @cached_property
     def remains(self) -> tuple[OmittedTerm, ...]:
-        """What is in the graph though no motion shows it; and the nodes that `regroup` would save."""
+        """Terms of the graph that no motion shows, and the nodes that `regroup` would save."""
         fewer = _regrouped(self.steps[-1])
         if fewer is None:
             return ()
@@ -146,7 +146,7 @@ class _Step:
     why: str = ""
 
     def graph(self, equations: Equations) -> Graph:
-        """Of inverse dynamics the smaller of the two small graphs, which may be the other one once numbers are in."""
+        """Graph of the equations; of inverse dynamics the smaller of two, which numbers may exchange."""
         if equations is not inverse_dynamics:
             return self._graph(equations)
         return min([self._graph(partial(equations, formulation=name)) for name in SMALL], key=size)

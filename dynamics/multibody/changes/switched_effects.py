@@ -13,8 +13,8 @@ from ..body import Body
 from ..composed_joints import locked_parts, parts_of
 from ..joint_coordinates import places
 from ..mechanism import Mechanism, as_mechanism
-from ..mechanism_fields import changed
 from ..parameters import vanishes
+from ..structure import changed
 
 EFFECTS = ("gravity", "damping", "springs", "armature", "forces")
 FREE_FALL = (0.0, 0.0, -9.81)  # m/s^2, put in to count what gravity would take

@@ -16,7 +16,7 @@ from cgraph.extend import Builder, building, cotangents, topological
 
 from ..algebra.spatial import ZERO, Triple
 from ..body import MechanismError, vector
-from ..sweeps.forward_kinematics import KinematicChain
+from ..sweeps.kinematic_chain import KinematicChain
 
 FORCE = "force"  # tag
 FRAMES = ("world", "body")

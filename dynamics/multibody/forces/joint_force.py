@@ -56,7 +56,7 @@ class JointForce(ABC):
 
     @property
     def names(self) -> set[str]:
-        """The same as a set."""
+        """Set of the names of its parameters."""
         return set(self.components)
 
     @abstractmethod

@@ -10,7 +10,8 @@ from cgraph import Node
 from cgraph.extend import Array
 
 from ..algebra import spatial
-from ..algebra.spatial import STILL, Triple
+from ..algebra.spatial import STILL
+from ..algebra.spatial_vectors import Twist
 from . import quaternion
 from .joint_type import NodeMatrix, SpatialJoint
 
@@ -28,24 +29,16 @@ class Ball(SpatialJoint):
     sprung = True
 
     def rotation(self, q: Sequence[Node]) -> NodeMatrix:
-        """That of the quaternion."""
+        """Rotation of the quaternion."""
         return quaternion.rotation(q)
 
-    def angular_velocity(self, q: Sequence[Node], u: Sequence[Node]) -> Triple:
-        """The velocities themselves."""
+    def velocity(self, q: Sequence[Node], u: Sequence[Node]) -> Twist:
+        """The velocities are the angular velocity."""
         x, y, z = u
-        return x, y, z
-
-    def angular_acceleration(self, q: Sequence[Node], u: Sequence[Node]) -> Triple:
-        """0: the velocities are its components."""
-        return STILL
-
-    def linear_acceleration(self, q: Sequence[Node], u: Sequence[Node]) -> Triple:
-        """0."""
-        return STILL
+        return Twist((x, y, z), STILL)
 
     def rate(self, q: Sequence[Node], u: Sequence[Node]) -> Sequence[Node]:
-        """That of the quaternion."""
+        """Rate of the quaternion."""
         return quaternion.rate(q, u)
 
     def structure(self, u: Sequence[Node], p: Sequence[Node]) -> Sequence[Node]:
@@ -57,12 +50,8 @@ class Ball(SpatialJoint):
         return quaternion.rotation_vector(q)
 
     def normalized(self, q: Sequence[Node]) -> Sequence[Node]:
-        """Of length 1."""
+        """Quaternion of length 1."""
         return quaternion.normalized(q)
-
-    def placement(self, axis: Array, at: Array) -> tuple[Array, Array]:
-        """A rotation."""
-        return spatial.from_quaternion(at), np.zeros(3)
 
     def resists(self, mass: float, inertia: Array) -> bool:
         """Inertia about every axis, more than rounding leaves of the largest."""

@@ -10,7 +10,8 @@ from cgraph import Node
 from cgraph.extend import Array
 
 from ..algebra import spatial
-from ..algebra.spatial import STILL, ZERO, Triple
+from ..algebra.spatial import ZERO, Triple
+from ..algebra.spatial_vectors import REST, Twist
 from . import quaternion
 from .joint_type import NodeMatrix, SpatialJoint
 
@@ -31,44 +32,32 @@ class Free(SpatialJoint):
     sliding = 3
 
     def rotation(self, q: Sequence[Node]) -> NodeMatrix:
-        """That of the quaternion."""
+        """Rotation of the quaternion."""
         return quaternion.rotation(q[3:])
 
     def translation(self, q: Sequence[Node]) -> Triple:
         """The first three coordinates."""
         return q[0], q[1], q[2]
 
-    def angular_velocity(self, q: Sequence[Node], u: Sequence[Node]) -> Triple:
-        """The last three velocities."""
-        return u[3], u[4], u[5]
+    def velocity(self, q: Sequence[Node], u: Sequence[Node]) -> Twist:
+        """The last three are angular; the first three are turned into the body's axes."""
+        return Twist((u[3], u[4], u[5]), self.turn(q).into((u[0], u[1], u[2])))
 
-    def linear_velocity(self, q: Sequence[Node], u: Sequence[Node]) -> Triple:
-        """The first three, turned into the body's axes."""
-        return spatial.rotate_transpose(self.rotation(q), (u[0], u[1], u[2]))
-
-    def angular_acceleration(self, q: Sequence[Node], u: Sequence[Node]) -> Triple:
-        """0: three of the velocities are its components."""
-        return STILL
-
-    def linear_acceleration(self, q: Sequence[Node], u: Sequence[Node]) -> Triple:
-        """0: the others are rates of a place."""
-        return STILL
+    def acceleration(self, q: Sequence[Node], u: Sequence[Node]) -> Twist:
+        """Zero: the velocities are the angular velocity, and rates of a place."""
+        return REST
 
     def rate(self, q: Sequence[Node], u: Sequence[Node]) -> Sequence[Node]:
         """The linear velocities, and the rate of the quaternion."""
         return [*u[:3], *quaternion.rate(q[3:], u[3:])]
 
     def structure(self, u: Sequence[Node], p: Sequence[Node]) -> Sequence[Node]:
-        """0, and omega x the angular momentum."""
+        """Zero, and omega x the angular momentum."""
         return [ZERO, ZERO, ZERO, *quaternion.structure(u[3:], p[3:])]
 
     def normalized(self, q: Sequence[Node]) -> Sequence[Node]:
-        """With a quaternion of length 1."""
+        """Coordinates with a quaternion of length 1."""
         return [*q[:3], *quaternion.normalized(q[3:])]
-
-    def placement(self, axis: Array, at: Array) -> tuple[Array, Array]:
-        """A rotation and a displacement."""
-        return spatial.from_quaternion(at[3:]), at[:3]
 
     def resists(self, mass: float, inertia: Array) -> bool:
         """Mass, and inertia about every axis through the center of mass; see `require_inertia`."""

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 from cgraph import Node
 
-from ..algebra import spatial
-from ..algebra.spatial import Triple, cross
+from ..algebra.spatial import STILL, cross
+from ..algebra.spatial_vectors import Twist
 from . import quaternion
 from .free import Free
 
@@ -20,18 +20,17 @@ class FreeBodyAxes(Free):
     sliding = 0
     geared = False  # of a velocity in axes that turn, it would be a mass
 
-    def linear_velocity(self, q: Sequence[Node], u: Sequence[Node]) -> Triple:
-        """The first three."""
-        return u[0], u[1], u[2]
+    def velocity(self, q: Sequence[Node], u: Sequence[Node]) -> Twist:
+        """The last three are angular, the first three linear."""
+        return Twist((u[3], u[4], u[5]), (u[0], u[1], u[2]))
 
-    def linear_acceleration(self, q: Sequence[Node], u: Sequence[Node]) -> Triple:
+    def acceleration(self, q: Sequence[Node], u: Sequence[Node]) -> Twist:
         """omega x v, as the axes of constant velocities turn."""
-        return cross((u[3], u[4], u[5]), (u[0], u[1], u[2]))
+        return Twist(STILL, cross((u[3], u[4], u[5]), (u[0], u[1], u[2])))
 
     def rate(self, q: Sequence[Node], u: Sequence[Node]) -> Sequence[Node]:
         """The linear velocity in the joint's axes, and the rate of the quaternion."""
-        x, y, z = (spatial.dot((row[0], row[1], row[2]), (u[0], u[1], u[2])) for row in self.rotation(q))
-        return [x, y, z, *quaternion.rate(q[3:], u[3:])]
+        return [*self.turn(q).out((u[0], u[1], u[2])), *quaternion.rate(q[3:], u[3:])]
 
     def structure(self, u: Sequence[Node], p: Sequence[Node]) -> Sequence[Node]:
         """(omega x p_v, omega x p_w + v x p_v)."""

@@ -9,9 +9,12 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import Array, tangents, topological
+from cgraph.extend import Array, Builder, building, tangents, topological
 
+from ..algebra import spatial
 from ..algebra.spatial import STILL, ZERO, Triple, cross, plus
+from ..algebra.spatial_vectors import Twist
+from ..algebra.turns import MatrixTurn, Turn, about_z
 
 NodeMatrix = Sequence[Sequence[Node]]  # (3, 3), rows
 ONE = cg.constant(1.0)
@@ -22,9 +25,12 @@ class JointType(ABC):
 
     kind: the word for it in `Joint.kind`.  mjcf, urdf: the words for it in those files; "" where they have none.
     moves: whether it has a coordinate; of "fixed" no function below is asked but `placement`.
-    turns: whether it turns the body.  limited: whether URDF demands limits of it.  geared: whether its velocities can
-    have an inertia of their own, an armature.  pitched: whether it needs a `Joint.pitch`, see `with_pitch`.
+    limited: whether URDF demands limits of it.  geared: whether its velocities can have an inertia of their own, an
+    armature.  pitched: whether it needs a `Joint.pitch`, see `with_pitch`.
     sprung: whether it can have a spring.
+    has_axis: whether it moves the body about and along `Joint.axis` alone, which is then z of the body's motion: then
+    the origin of the body's frame may be anywhere on it.
+    sliding: how many of the velocities, the first ones, move the body along the joint's axes, one after another.
     coordinates, velocities: what they are called after the joint's name; "" of a single one, which has the joint's.
     units, velocity_units: of the coordinates, "1" of those without, and of the velocities.
     neutral: the coordinates where the body stands at the joint.
@@ -34,11 +40,12 @@ class JointType(ABC):
     kind: str
     mjcf = urdf = ""
     moves = True
-    turns = True
     limited = False
     geared = True
     pitched = False
     sprung = False
+    has_axis = False
+    sliding = 0
     coordinates: tuple[str, ...] = ("",)
     velocities: tuple[str, ...] = ("",)
     units: tuple[str, ...] = ("rad",)
@@ -46,9 +53,56 @@ class JointType(ABC):
     neutral: tuple[float, ...] = (0.0,)
     groups: tuple[int, ...] = (0,)
 
+    @property
+    def turns(self) -> bool:
+        """Whether it turns the body."""
+        return True
+
+    @property
+    def measured_about_axis(self) -> bool:
+        """Whether its coordinate is an angle about the axis and nothing else: axes turned about it are an offset."""
+        return False
+
     def with_pitch(self, pitch: float) -> JointType:
         """The type of a joint with that pitch [m/rad], where joints of the kind differ by it."""
         return self
+
+    def axes(self, axis: Array) -> Array:
+        """Axes of the body's motion, as columns in the body's own."""
+        return spatial.to_z(axis) if self.has_axis else np.eye(3)
+
+    @abstractmethod
+    def turn(self, q: Sequence[Node]) -> Turn:
+        """Turn from the axes that the body has at neutral coordinates, the joint's, to those that it has."""
+
+    def translation(self, q: Sequence[Node]) -> Triple:
+        """Where the body's origin is, in the joint's axes [m]."""
+        return STILL
+
+    @abstractmethod
+    def velocity(self, q: Sequence[Node], u: Sequence[Node]) -> Twist:
+        """Velocity S(q) u of the body against the joint, in the body's axes [rad/s], [m/s]. Linear in u."""
+
+    def acceleration(self, q: Sequence[Node], u: Sequence[Node]) -> Twist:
+        """Acceleration of the body against the joint at constant u: (w_dot, v_dot + w x v) along q_dot = G u."""
+        angular, linear = velocity = self.velocity(q, u)
+        moving = {x: dot for x, dot in zip(q, self.rate(q, u), strict=True) if x.value is None}
+        dots = tangents(moving, [*angular, *linear])
+        rates = [[dots.get(node, ZERO) for node in part] for part in velocity]
+        (a, b, c), (x, y, z) = rates
+        return Twist((a, b, c), plus((x, y, z), cross(angular, linear)))
+
+    def columns(self, q: Sequence[Node]) -> list[Twist]:
+        """Columns of S(q): how each velocity moves the body."""
+        count = len(self.velocities)
+        return [self.velocity(q, [ONE if i == k else ZERO for i in range(count)]) for k in range(count)]
+
+    @property
+    def turns_with_body(self) -> bool:
+        """Whether all columns but those of sliding velocities are constant in the body's axes."""
+        q = cg.variables([f"q{k}" for k in range(len(self.coordinates))])
+        columns = self.columns(q)[self.sliding :]
+        return not {*q} & {*topological([node for column in columns for part in column for node in part])}
 
     def rate(self, q: Sequence[Node], u: Sequence[Node]) -> Sequence[Node]:
         """Rates of the coordinates, G(q) u."""
@@ -66,7 +120,7 @@ class JointType(ABC):
         return []
 
     def normalized(self, q: Sequence[Node]) -> Sequence[Node]:
-        """The same configuration, with a quaternion of length 1."""
+        """Coordinates of the same configuration with a quaternion of length 1."""
         return q
 
     @abstractmethod
@@ -88,10 +142,26 @@ class JointType(ABC):
 class AxialJoint(JointType):
     """A joint with one coordinate, which turns the body about the joint's axis, slides it along that, or both.
 
-    Nodes are over the child's axes, in which the joint's axis is z, and stand for their z component.
+    The body turns by `angle` and moves by `shift`, of which a type of joint gives one or both.
     """
 
     sprung = True
+    has_axis = True
+
+    @property
+    def turns(self) -> bool:
+        """Whether a coordinate turns the body."""
+        return self._turned(1.0) != 0.0
+
+    @property
+    def slides(self) -> bool:
+        """Whether a coordinate moves the body along the axis."""
+        return self._shifted(1.0) != 0.0
+
+    @property
+    def measured_about_axis(self) -> bool:
+        """Whether the coordinate is the angle about the axis and nothing else."""
+        return self._turned(1.0) == 1.0 and not self.slides
 
     def stretches(self, q: Sequence[Node], reference: float | Node) -> Sequence[Node]:
         """From the coordinate where it pulls nowhere."""
@@ -105,63 +175,63 @@ class AxialJoint(JointType):
         """How far the coordinate moves the body's origin [m]; of its rate, the velocity. Linear in it."""
         return ZERO
 
+    def turn(self, q: Sequence[Node]) -> Turn:
+        """About z."""
+        return about_z(self.angle(q[0]))
+
+    def translation(self, q: Sequence[Node]) -> Triple:
+        """Along z."""
+        return ZERO, ZERO, self.shift(q[0])
+
+    def velocity(self, q: Sequence[Node], u: Sequence[Node]) -> Twist:
+        """About and along z."""
+        return Twist((ZERO, ZERO, self.angle(u[0])), (ZERO, ZERO, self.shift(u[0])))
+
+    def placement(self, axis: Array, at: Array) -> tuple[Array, Array]:
+        """A rotation about the axis and a displacement along it."""
+        x = float(at[0]) if self.moves else 0.0
+        return spatial.rotation(axis, self._turned(x)) if self.turns else np.eye(3), axis * self._shifted(x)
+
+    def resists(self, mass: float, inertia: Array) -> bool:
+        """Mass of what slides, or inertia about the axis of what turns."""
+        return bool((self.slides and mass > 0.0) or (self.turns and inertia[2, 2] > 0.0))
+
+    def unobservable(self, mass: float, moment: Array, inertia: Array) -> tuple[float, Array, Array]:
+        """Part of the inertia that a turn about the axis and a shift along it leave as it is.
+
+        Of what does not slide, the mass and the first moment along the axis; of what turns, the inertia that is alike
+        about every axis across, else all of it.
+        """
+        along = (0.0, 0.0, 1.0) if self.turns else (1.0, 1.0, 1.0)
+        alike = inertia[1, 1] * np.diag([1.0, 1.0, 0.0]) if self.turns else inertia
+        return (0.0, np.zeros(3), alike) if self.slides else (mass, moment * along, alike)
+
+    def _turned(self, x: float) -> float:
+        """The angle of a coordinate that is a number."""
+        with building(Builder()):
+            return float(spatial.plain(self.angle(cg.constant(x))))
+
+    def _shifted(self, x: float) -> float:
+        """The shift of a coordinate that is a number."""
+        with building(Builder()):
+            return float(spatial.plain(self.shift(cg.constant(x))))
+
 
 class SpatialJoint(JointType):
-    """A joint of several freedoms. Its motion is in the body's axes where nothing else is said.
+    """A joint of several freedoms, which turns the body by a matrix."""
 
-    sliding: how many of the velocities, the first ones, move the body along the joint's axes, one after another. The
-    others are along axes that turn with the body.
-    """
-
-    sliding = 0
+    def placement(self, axis: Array, at: Array) -> tuple[Array, Array]:
+        """By its rotation and translation."""
+        with building(Builder()):
+            q = [cg.constant(x) for x in at.tolist()]
+            turn = [[spatial.plain(each) for each in row] for row in self.rotation(q)]
+            shift = [spatial.plain(each) for each in self.translation(q)]
+        return spatial.snapped(np.array(turn, dtype=np.float64)), np.array(shift, dtype=np.float64)
 
     @abstractmethod
     def rotation(self, q: Sequence[Node]) -> NodeMatrix:
         """The body's axes as columns, in those that it has at neutral coordinates: the joint's."""
 
-    def translation(self, q: Sequence[Node]) -> Triple:
-        """Where the body's origin is, in the joint's axes [m]."""
-        return STILL
-
-    @abstractmethod
-    def angular_velocity(self, q: Sequence[Node], u: Sequence[Node]) -> Triple:
-        """Of the body against the joint [rad/s]."""
-
-    def linear_velocity(self, q: Sequence[Node], u: Sequence[Node]) -> Triple:
-        """Of the body's origin against the joint [m/s]."""
-        return STILL
-
-    def angular_acceleration(self, q: Sequence[Node], u: Sequence[Node]) -> Triple:
-        """Of the body against the joint, at constant velocities u [rad/s^2]: the rate of the angular velocity."""
-        return self._rate_along(q, u, self.angular_velocity(q, u))
-
-    def linear_acceleration(self, q: Sequence[Node], u: Sequence[Node]) -> Triple:
-        """Of the body's origin against the joint, at constant velocities u [m/s^2]: v_dot + omega x v."""
-        velocity = self.linear_velocity(q, u)
-        return plus(self._rate_along(q, u, velocity), cross(self.angular_velocity(q, u), velocity))
-
-    def _rate_along(self, q: Sequence[Node], u: Sequence[Node], vector: Triple) -> Triple:
-        """The rate of a vector of nodes over q and u as q moves with u, which is constant."""
-        moving = {x: dot for x, dot in zip(q, self.rate(q, u), strict=True) if x.value is None}
-        dots = tangents(moving, vector)
-        x, y, z = (dots.get(node, ZERO) for node in vector)
-        return x, y, z
-
-    @property
-    def turns_with_body(self) -> bool:
-        """Whether the directions of all velocities but the sliding ones are constant in the body's axes."""
-        q, u = cg.variables([f"q{k}" for k in range(len(self.coordinates))]), [ZERO] * len(self.velocities)
-        for k in range(self.sliding, len(u)):
-            unit = [*u[:k], ONE, *u[k + 1 :]]
-            if {*q} & {*topological([*self.angular_velocity(q, unit), *self.linear_velocity(q, unit)])}:
-                return False
-        return True
-
-
-MovingJoint = AxialJoint | SpatialJoint  # every type but that of a joint without coordinates
-
-
-def moving_type(joint: JointType) -> MovingJoint:
-    """The type of a joint that has coordinates."""
-    assert isinstance(joint, AxialJoint | SpatialJoint)
-    return joint
+    def turn(self, q: Sequence[Node]) -> Turn:
+        """By the matrix."""
+        return MatrixTurn(self.rotation(q))

@@ -4,12 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from cgraph import Node
-from cgraph.extend import Array
 
-from ..algebra import spatial
 from .joint_type import AxialJoint, JointType
 
 
@@ -36,18 +32,6 @@ class Screw(AxialJoint):
     def shift(self, x: Node) -> Node:
         """The pitch times the coordinate."""
         return self.pitch * x
-
-    def placement(self, axis: Array, at: Array) -> tuple[Array, Array]:
-        """A rotation about the axis and a displacement along it."""
-        return spatial.rotation(axis, float(at[0])), axis * (self.pitch * at[0])
-
-    def resists(self, mass: float, inertia: Array) -> bool:
-        """Mass, or inertia about the axis."""
-        return mass > 0.0 or float(inertia[2, 2]) > 0.0
-
-    def unobservable(self, mass: float, moment: Array, inertia: Array) -> tuple[float, Array, Array]:
-        """The inertia that is alike about every axis across."""
-        return 0.0, np.zeros(3), inertia[1, 1] * np.diag([1.0, 1.0, 0.0])
 
 
 JOINT = Screw()

@@ -24,7 +24,7 @@ from ..algebra import spatial
 from ..algebra.spatial import ZERO
 from ..body import vector
 from ..mechanism import require_mechanism
-from ..sweeps.forward_kinematics import KinematicChain
+from ..sweeps.kinematic_chain import KinematicChain
 
 AXES = ("world", "body")
 

@@ -19,12 +19,19 @@ from cgraph import Compiled, Graph, Node
 from cgraph.extend import Array, Builder, building, cotangents, memo, real_array
 
 from ..algebra.spatial import STILL, ZERO, Triple
+from ..algebra.spatial_vectors import Twist
 from ..joint_coordinates import places
-from ..joints import MovingJoint, moving_type
+from ..joints import JointType
 from ..mechanism import Mechanism, require_mechanism
-from ..sweeps import newton_euler
-from ..sweeps.body_motion import Motion, ground, propagate_motion
-from ..sweeps.inertial_numbers import Link
+from ..sweeps.links import Link, LinkState
+from ..sweeps.outward import (
+    Motion,
+    acceleration_in_space,
+    ground,
+    propagate_acceleration,
+    propagate_motion,
+    wrench,
+)
 
 MOTION, WRENCH = 9, 6  # numbers: angular velocity, angular and linear acceleration; force and moment
 
@@ -62,7 +69,7 @@ class RecursiveInverseDynamics:
         self.n = len(mechanism.velocities)
         self._parents = mechanism.parents
         self._links = [[float(number) for number in link.numbers] for link in mechanism.links]
-        self._kernels = [_kernels(moving_type(body.joint.type)) for body in mechanism.moving]
+        self._kernels = [_kernels(body.joint.type) for body in mechanism.moving]
         self._places = places(mechanism.moving)
         self._ground = [float(each) for each in (*STILL, *STILL, *rest.vertical)]  # as upward as gravity is strong
 
@@ -97,8 +104,8 @@ class _Kernels(NamedTuple):
 
 
 @memo(64)
-def _kernels(joint: MovingJoint) -> _Kernels:
-    """What a link with that type of joint needs, whatever its numbers are."""
+def _kernels(joint: JointType) -> _Kernels:
+    """Kernels of a link on that type of joint, whatever its numbers are."""
     parent, velocity, bars = _variables("s", MOTION), _variables("v", 3), _variables("bar", WRENCH)
     q = _variables("q", len(joint.coordinates))
     qd, qdd = (_variables(name, len(joint.velocities)) for name in ("qd", "qdd"))
@@ -107,12 +114,11 @@ def _kernels(joint: MovingJoint) -> _Kernels:
     build = Builder()
     with building(build):
         before = Motion(omega, _triple(velocity), STILL, ZERO)
-        motion = propagate_motion(before, link, joint, q, qd)
-        carrier = newton_euler.acceleration_in_space(omega, angular, linear, ())
-        acceleration = newton_euler.propagate_acceleration(carrier, before, motion, link, joint, q, qd, qdd)
-        moved = [*motion.velocity, *motion.omega]
-        pairs = [*zip(moved, bars, strict=True)]
-        pairs += newton_euler.wrench(acceleration, motion, link, joint, q, qd, qdd)
+        at = LinkState("", 0, link, joint, q, qd, qdd)
+        motion = propagate_motion(before, at)
+        carrier = acceleration_in_space(omega, Twist(angular, linear), ())
+        acceleration = propagate_acceleration(carrier, before, motion, at)
+        pairs = [*zip([*motion.velocity, *motion.omega], bars, strict=True), *wrench(acceleration, motion, at)]
         forces: dict[Node, Node] = {}
         for z, force in pairs:
             forces[z] = forces.get(z, ZERO) + force

@@ -14,12 +14,12 @@ from ...equations.formulations.formulations import inverse_dynamics
 from ...systems.model import Model
 from ...systems.system import System
 from ..algebra import spatial
+from ..algebra.turns import MatrixTurn
 from ..body import WORLD, quantities
-from ..joint_coordinates import parts, quasi_velocities
-from ..joints import moving_type
+from ..joint_coordinates import quasi_velocities
 from ..mechanism import Mechanism, as_mechanism
-from ..sweeps.body_motion import energy, ground, propagate_motion
-from ..sweeps.inertial_numbers import Link, axes_of, link
+from ..sweeps.links import Link, axes_of, link, link_states
+from ..sweeps.outward import energy, ground, motions
 
 PARAMETERS = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")  # the order of Pinocchio
 _LOWER = ((0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2))  # entries of I in that order
@@ -112,17 +112,16 @@ def _mechanism(model: Model) -> Mechanism:
 
 
 def _partial_lagrangians(mechanism: Mechanism, q: list[Node], qd: list[Node], pi: list[Node]) -> list[Node]:
-    motions, axes = {WORLD: ground(quantities("gravity", mechanism.gravity))}, {WORLD: np.eye(3)}
+    axes = {body.name: axes_of(body) for body in mechanism.moving} | {WORLD: np.eye(3)}
+    base = ground(quantities("gravity", mechanism.gravity))
     partials = []
     with building(Builder()):
-        states = parts(mechanism.moving, q, qd)
-        for i, body in enumerate(mechanism.moving):
-            axes[body.name] = axes_of(body)
-            known, joint = link(body, axes[body.parent]), moving_type(body.joint.type)
-            with cg.tag(body.name):
-                motions[body.name] = propagate_motion(motions[body.parent], known, joint, *states[i])
-                unknown = _symbolic(known, axes[body.name], pi[10 * i : 10 * i + 10])
-                partials.append(energy(motions[body.name], unknown, joint, *states[i]))
+        links = [link(body, axes[body.parent]) for body in mechanism.moving]
+        states = link_states(mechanism.moving, links, mechanism.parents, q, qd)
+        for i, (at, motion) in enumerate(zip(states, motions(states, base), strict=True)):
+            with cg.tag(at.name):
+                unknown = _symbolic(at.link, axes[at.name], pi[10 * i : 10 * i + 10])
+                partials.append(energy(motion, at._replace(link=unknown)))
     return partials
 
 
@@ -131,12 +130,8 @@ def _symbolic(known: Link, axes: Array, pi: list[Node]) -> Link:
     mass, x, y, z, *lower = pi
     entries = dict(zip(_LOWER, lower, strict=True))
     inertia = [[entries[max(i, j), min(i, j)] for j in range(3)] for i in range(3)]
-    half = [
-        spatial.rotate_transpose(axes.tolist(), (row[0], row[1], row[2])) for row in inertia
-    ]  # I axes, as I is symmetric
-    columns = [spatial.rotate_transpose(axes.tolist(), (half[0][j], half[1][j], half[2][j])) for j in range(3)]
-    turned = [[columns[j][i] for j in range(3)] for i in range(3)]
-    moment = spatial.rotate_transpose(axes.tolist(), (x, y, z))
+    into = MatrixTurn(axes.T.tolist())
+    moment, turned = into.out((x, y, z)), into.second_moments(inertia)
     return replace(
         known, mass=mass, moment=moment, inertia=turned, damping=0.0, stiffness=0.0, spring_reference=0.0, armature=0.0
     )

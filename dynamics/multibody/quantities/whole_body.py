@@ -20,18 +20,17 @@ from ...systems.model import Model
 from ...systems.system import System
 from ..algebra import spatial
 from ..algebra.spatial import ZERO, Triple
-from ..body import WORLD, MechanismError
-from ..joint_coordinates import parts
-from ..joints import moving_type
+from ..body import MechanismError
 from ..mechanism import Mechanism, require_mechanism
-from ..sweeps.body_motion import Motion, energy, propagate_motion
+from ..sweeps.links import link_states
+from ..sweeps.outward import Motion, energy, motions
 from .frames import jacobian_rows
 
 POINTS = ("origin", "center of mass")
 
 
 class Moments(NamedTuple):
-    """What the bodies that move have together."""
+    """Mass, first moment and momentum of the bodies that move together."""
 
     mass: Node
     first: Triple  # sum of m r
@@ -161,24 +160,20 @@ def _center(model: Model, what: str) -> tuple[System, Triple, Triple, Moments]:
 
 
 def _moments(mechanism: Mechanism) -> Moments:
-    """Of the bodies with their own inertia, which base parameters would put on others."""
+    """Moments of the bodies with their own inertia, which base parameters would put on others."""
     mechanism = replace(mechanism, base_parameters=False) if mechanism.base_parameters else mechanism
     system = mechanism.system
     ground = cg.variables([f"qd{system.n + i}" for i in range(9)])  # after the joints'; no parameter has such a name
     linear, angular, vertical = ((ground[i], ground[i + 1], ground[i + 2]) for i in (0, 3, 6))
-    motions = {WORLD: Motion(angular, linear, vertical, ZERO)}
     build = Builder()
     with building(build):
         total: Node = ZERO
         mass: Node = ZERO
-        rows = zip(mechanism.moving, mechanism.links, parts(mechanism.moving, system.q, system.qd), strict=True)
-        for body, link, (q, u) in rows:
-            joint = moving_type(body.joint.type)
-            with cg.tag(body.name):
-                motion = propagate_motion(motions[body.parent], link, joint, q, u)
-                motions[body.name] = motion
-                total = total + energy(motion, link, joint, q, u)
-                mass = mass + link.mass
+        states = link_states(mechanism.moving, mechanism.links, mechanism.parents, system.q, system.qd)
+        for at, motion in zip(states, motions(states, Motion(angular, linear, vertical, ZERO)), strict=True):
+            with cg.tag(at.name):
+                total = total + energy(motion, at)
+                mass = mass + at.link.mass
     bars = cotangents({total: ONE}, ground, build)
     still = folded(substitute(bars, dict.fromkeys(ground, ZERO)), build)
     with building(build):

@@ -11,17 +11,13 @@ numbers in place of ten. What is given to the world shows in no motion and is go
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from cgraph.extend import Array, Builder, building
 
-from ..algebra import spatial
-from ..algebra.spatial import Triple
 from ..joints import JointType
-from .inertial_numbers import Link
+from .links import Link, Numbers
 
 
 def base_parameter_links(
@@ -38,46 +34,44 @@ def base_parameter_links(
     world = np.zeros(3)
     with building(Builder()):
         for i in reversed(range(len(links))):
-            mass, moment, inertia = _numbers(result[i])
-            given = joints[i].unobservable(mass, moment, inertia)
-            less, seen = _with(result[i], -given[0], -given[1], -given[2]), _seen_by_parent(links[i], *given)
+            given = Numbers(*joints[i].unobservable(*result[i].inertial))
+            less, seen = result[i].with_more(given.negated()), _seen_by_parent(links[i], given)
             if parents[i] < 0:
-                result[i], world = less, world + seen[1]
+                result[i], world = less, world + seen.moment
                 continue
             old = result[i], result[parents[i]]
-            new = less, _with(old[1], *seen)
+            new = less, old[1].with_more(seen)
             if not fewer or sum(map(_count, new)) < sum(map(_count, old)):
                 result[i], result[parents[i]] = new
     return result, world
 
 
+def without_axial_moments(links: Sequence[Link], joints: Sequence[JointType], parents: Sequence[int]) -> list[Link]:
+    """The links, those that turn about z without the second moment along it, and those that slide without any.
+
+    Their parents have it in their place. Base parameters leave none of the moment of inertia about y instead, which
+    serves wrenches. Links stay as they are where there are parameters among their numbers.
+    """
+    result = list(links)
+    if not all([link.is_numeric for link in links]):
+        return result
+    for i in reversed(range(len(links))):
+        if joints[i].has_axis:
+            own = result[i].inertial.inertia
+            along = 0.5 * (own[0, 0] + own[1, 1] - own[2, 2]) * np.diag([1.0, 1.0, 0.0])
+            given = Numbers(0.0, np.zeros(3), along if joints[i].turns else own)
+            result[i] = result[i].with_more(given.negated())
+            if parents[i] >= 0:
+                result[parents[i]] = result[parents[i]].with_more(_seen_by_parent(links[i], given))
+    return result
+
+
 def _count(link: Link) -> int:
     """How many inertial numbers are not zero."""
-    mass, moment, inertia = _numbers(link)
+    mass, moment, inertia = link.inertial
     return int(np.count_nonzero([mass, *moment, *inertia[np.tril_indices(3)]]))
 
 
-def _seen_by_parent(link: Link, mass: Any, moment: Array, inertia: Array) -> tuple[Any, Array, Array]:
-    """Mass, first moment and inertia at the link's joint, about the parent's origin and in its axes."""
-    turn, place = np.array(link.turn, dtype=np.float64), _array(link.place)
-    moment, inertia = spatial.product(turn, moment), spatial.product(turn, inertia, turn.T)
-    crossed = np.outer(place, moment)
-    inertia = spatial.added(inertia, 2.0 * np.trace(crossed) * np.eye(3) - crossed - crossed.T)
-    return mass, spatial.added(moment, mass * place), spatial.parallel_axis(inertia, mass, place)
-
-
-def _numbers(link: Link) -> tuple[Any, Array, Array]:
-    """Mass, first moment and inertia: floats, or nodes where there are parameters."""
-    inertia = [[link.inertia[max(i, j)][min(i, j)] for j in range(3)] for i in range(3)]
-    return link.mass, _array(link.moment), np.array(inertia)
-
-
-def _with(link: Link, mass: Any, moment: Array, inertia: Array) -> Link:
-    """The link with these added."""
-    old_mass, old_moment, old_inertia = _numbers(link)
-    moment, inertia = spatial.added(old_moment, moment), spatial.added(old_inertia, inertia)
-    return replace(link, mass=old_mass + mass, moment=spatial.constant(moment), inertia=inertia.tolist())
-
-
-def _array(triple: Triple) -> Array:
-    return np.array([spatial.plain(each) for each in triple])
+def _seen_by_parent(link: Link, given: Numbers) -> Numbers:
+    """Inertial numbers at the link's joint, about the parent's origin and in its axes."""
+    return given.turned(np.array(link.turn, dtype=np.float64)).about(link.offset)

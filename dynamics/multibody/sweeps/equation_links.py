@@ -17,29 +17,25 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cgraph import Node
 from cgraph.extend import Array
 
 from ..algebra import spatial
-from ..joints import AxialJoint, JointType
-from ..joints.revolute import Revolute
-from .inertial_numbers import Link
+from ..joints import JointType
+from .links import Link, Numbers
 
 _FAR = 100.0  # times the extent of a body, at most, for its origin from where it was: two digits of its numbers
 _TURN = 4  # numbers in a turn that is about one axis, less than in one about three: products for every vector
 
 
-class _Numbers(NamedTuple):
-    """A link's numbers as arrays, on the way to others.
+class _Placed(NamedTuple):
+    """A link by its numbers, on the way to others.
 
     reach: how far its origin may be moved [m].  angle: see `Link`.  moved: how far its origin was moved [m].
     """
 
     turn: Array
     place: Array
-    mass: float
-    moment: Array
-    inertia: Array
+    own: Numbers
     joint: JointType
     reach: float = 0.0
     angle: float = 0.0
@@ -54,49 +50,40 @@ class _Numbers(NamedTuple):
     @property
     def numbers(self) -> int:
         """How many there are that other origins and axes may have as zeros."""
-        inertia = self.inertia
-        shown = [self.moment[0], self.moment[1], inertia[0, 1], inertia[0, 2], inertia[1, 2]]
+        _, moment, inertia = self.own
+        shown = [moment[0], moment[1], inertia[0, 1], inertia[0, 2], inertia[1, 2]]
         return self.placed_by + int(np.count_nonzero(shown))
 
-    def carried(self, by: _Numbers) -> _Numbers:
+    def carried(self, by: _Placed) -> _Placed:
         """On the parent as it is now, placed as on the one before its origin was moved and its axes were turned."""
         back = _about_z(-by.angle)
         place = spatial.product(back, spatial.added(self.place, np.array([0.0, 0.0, -by.moved])))
         return self._replace(turn=spatial.snapped(back @ self.turn), place=place)
 
-    def along(self, move: float) -> _Numbers:
-        """With the origin moved along its own axis."""
-        back = np.array([0.0, 0.0, -move])
-        crossed = np.outer(back, self.moment)
-        inertia = spatial.added(self.inertia, 2.0 * np.trace(crossed) * np.eye(3) - crossed - crossed.T)
-        return self._replace(
-            place=spatial.added(self.place, move * self.turn[:, 2]),
-            moment=spatial.added(self.moment, self.mass * back),
-            inertia=spatial.parallel_axis(inertia, self.mass, back),
-            moved=move,
-        )
+    def along(self, move: float) -> _Placed:
+        """Link with its origin moved along its own axis."""
+        place = spatial.added(self.place, move * self.turn[:, 2])
+        return self._replace(place=place, own=self.own.about(np.array([0.0, 0.0, -move])), moved=move)
 
-    def turned(self, angle: float) -> _Numbers:
-        """Of a hinge, with its axes turned about its own."""
-        back = _about_z(-angle)
-        inertia = spatial.product(back, self.inertia, back.T)
-        return self._replace(moment=spatial.product(back, self.moment), inertia=inertia, angle=angle)
+    def turned(self, angle: float) -> _Placed:
+        """Link on a hinge with its axes turned about the hinge's."""
+        return self._replace(own=self.own.turned(_about_z(-angle)), angle=angle)
 
-    def to_normal(self, parent_moved: float) -> _Numbers:
-        """With its origin on the common normal with the parent's axis, unless that is far away."""
+    def to_normal(self, parent_moved: float) -> _Placed:
+        """Link with its origin on the common normal with the parent's axis, unless that is far away."""
         (x, y, z), place = self.turn[:, 2], self.place
         across = x * x + y * y
         move = -(place[0] * x + place[1] * y) / across if across else -place[2] / z
         most = min(self.reach, float(np.linalg.norm(place)) + abs(parent_moved))
-        return self.along(float(move)) if isinstance(self.joint, AxialJoint) and abs(move) <= most else self
+        return self.along(float(move)) if self.joint.has_axis and abs(move) <= most else self
 
-    def less_turned(self) -> tuple[_Numbers, float]:
-        """Of a hinge, without what turns it about its own axis before it turns, but for quarters; and how far that is.
+    def less_turned(self) -> tuple[_Placed, float]:
+        """Link without its constant turn about the hinge's axis, but for quarters; and the angle of that turn.
 
         As it is where its axis is across no axis of the parent's.
         """
         x, y, z = self.turn[:, 2]
-        if (x != 0.0 and y != 0.0) or not isinstance(self.joint, Revolute):
+        if (x != 0.0 and y != 0.0) or not self.joint.measured_about_axis:
             return self, 0.0
         left = np.array(
             [[1.0, 0.0, 0.0], [0.0, z, y], [0.0, -y, z]] if x == 0.0 else [[z, 0.0, x], [0.0, 1.0, 0.0], [-x, 0.0, z]]
@@ -121,10 +108,16 @@ def equation_links(
     for i, parent in enumerate(parents):
         if parent >= 0:
             children[parent].append(i)
-    known = {i: _numbers(*pair) for i, pair in enumerate(zip(links, joints, strict=True)) if _is_numeric(pair[0])}
+    known = {
+        i: _Placed(np.array(link.turn, dtype=np.float64), link.offset, link.inertial, joint)
+        for i, (link, joint) in enumerate(zip(links, joints, strict=True))
+        if link.is_numeric
+    }
     for i in reversed(range(len(links))):  # from the tips: no further than what is carried by the least body
         if i in known:
-            reach = min([_FAR * _extent(known[i]), *[known[child].reach for child in children[i] if child in known]])
+            reach = min(
+                [_FAR * _extent(known[i].own), *[known[child].reach for child in children[i] if child in known]]
+            )
             known[i] = known[i]._replace(reach=reach)
     result = list(links)
     for i, parent in enumerate(parents):
@@ -143,19 +136,19 @@ def equation_links(
     return result
 
 
-def _best(own: _Numbers, parent: _Numbers | None, children: Sequence[_Numbers], further: bool) -> _Numbers:
+def _best(own: _Placed, parent: _Placed | None, children: Sequence[_Placed], further: bool) -> _Placed:
     """Moved and turned so that the fewest numbers of it and of what it carries are left; of as many further out."""
     choices = [own]
-    if isinstance(own.joint, AxialJoint):
-        if parent is not None and isinstance(parent.joint, AxialJoint):
+    if own.joint.has_axis:
+        if parent is not None and parent.joint.has_axis:
             choices.append(own.to_normal(parent.moved))
         else:  # where the first of the children has its normal
             moves = [float(child.to_normal(0.0).place[2]) for child in children[:1]]
             choices += [own.along(move) for move in moves if abs(move) <= own.reach]
-    if isinstance(own.joint, Revolute):
+    if own.joint.measured_about_axis:
         choices += [each.turned(angle) for each in choices for child in children for angle in _turns(each, child)]
 
-    def left(choice: _Numbers) -> tuple[int, bool, bool]:
+    def left(choice: _Placed) -> tuple[int, bool, bool]:
         placed = [each.carried(choice).to_normal(choice.moved) for each in children]
         return (
             choice.numbers + sum([each.placed_by for each in placed]),
@@ -166,20 +159,20 @@ def _best(own: _Numbers, parent: _Numbers | None, children: Sequence[_Numbers], 
     return min(choices, key=left)
 
 
-def _turns(own: _Numbers, child: _Numbers) -> list[float]:
+def _turns(own: _Placed, child: _Placed) -> list[float]:
     """The angle that turns the axes to the common normal with a child's axis, but for quarter turns."""
     placed = child.carried(own).to_normal(own.moved)
     x, y = placed.turn[:2, 2] if placed.turn[:2, 2].any() else placed.place[:2]
     return [_within_quarter(math.atan2(y, x))] if x != 0.0 and y != 0.0 else []
 
 
-def _extent(body: _Numbers) -> float:
+def _extent(body: Numbers) -> float:
     """How far from its origin the mass of a body is, by its moments; infinite without any."""
     return math.sqrt(float(np.abs(body.inertia).max()) / body.mass) if body.mass > 0.0 else math.inf
 
 
 def _within_quarter(angle: float) -> float:
-    """What is left of an angle beside quarter turns; no rounding of one."""
+    """Rest of an angle beside quarter turns; no rounding of one."""
     rest = angle - round(angle / (math.pi / 2)) * (math.pi / 2)
     return rest if abs(rest) > spatial.SNAP else 0.0
 
@@ -188,19 +181,7 @@ def _about_z(angle: float) -> Array:
     return spatial.rotation(np.array([0.0, 0.0, 1.0]), angle)
 
 
-def _is_numeric(link: Link) -> bool:
-    return not any([isinstance(each, Node) for each in link.numbers[:19]])
-
-
-def _numbers(link: Link, joint: JointType) -> _Numbers:
-    place, moment = (np.array([spatial.plain(each) for each in triple]) for triple in (link.place, link.moment))
-    inertia = np.array([[link.inertia[max(i, j)][min(i, j)] for j in range(3)] for i in range(3)])
-    return _Numbers(np.array(link.turn, dtype=np.float64), place, float(link.mass), moment, inertia, joint)
-
-
-def _link(link: Link, to: _Numbers, angle: float) -> Link:
+def _link(link: Link, to: _Placed, angle: float) -> Link:
     """The link in other numbers.  angle: more than its axes are turned by."""
-    place, moment = spatial.constant(to.place), spatial.constant(to.moment)
-    return replace(
-        link, turn=to.turn.tolist(), place=place, moment=moment, inertia=to.inertia.tolist(), angle=to.angle + angle
-    )
+    place, angle = spatial.constant(to.place), to.angle + angle
+    return replace(link.with_inertial(to.own), turn=to.turn.tolist(), place=place, angle=angle)

@@ -15,7 +15,7 @@ from cgraph.extend import Array, Builder, building, is_finite
 from ..algebra import spatial
 from ..body import WORLD, Body, Joint, MechanismError, vector
 from ..parameters import entries, names_in, vanishes
-from .inertial_numbers import MergedBody, axes_of, inertia_in
+from .links import MergedBody, axes_of, inertia_in
 
 
 @dataclass(frozen=True, eq=False)

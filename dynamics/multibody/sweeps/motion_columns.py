@@ -16,23 +16,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-import numpy as np
-
 import cgraph as cg
-from cgraph import Node
-from cgraph.extend import as_node
 
-from ..algebra import spatial
-from ..algebra.spatial import STILL, ZERO, Matrix, Triple
+from ..algebra.spatial import STILL, Triple, combined, plus
 from ..algebra.spatial_vectors import REST, Twist
-from ..joints import AxialJoint, MovingJoint, SpatialJoint
-from .composite_motion import Entries, combined
-from .inertial_numbers import Link
-from .newton_euler import KINETIC
+from ..algebra.turns import UNIT, Axes, MatrixTurn, Turn, in_a_row
+from .links import LinkState
+from .outward import KINETIC
 
 Tags = Sequence[str]
-ONE = cg.constant(1.0)
-UNIT: Entries = tuple([spatial.constant(row) for row in np.eye(3)])  # type: ignore[assignment]
 
 
 class Column(NamedTuple):
@@ -49,130 +41,103 @@ class Column(NamedTuple):
 class Frame(NamedTuple):
     """How a body is placed and moves, by its origin.
 
-    offset: from the parent's origin.  before, angle: the axes are `before` turned about their z by that angle, of a
-    tree in a plane the sum of all angles.
+    offset: from the parent's origin.  before, turn: the axes are `before` turned so, in a tree in a
+    plane by the sum of all angles.
     """
 
     offset: Triple
-    axes: Entries  # columns
+    axes: Axes  # columns
     velocity: Twist
     acceleration: Twist  # in space, against free fall
     columns: Sequence[Column]
-    before: Entries
-    angle: Node
+    before: Axes
+    turn: Turn
 
 
-class Freedoms(NamedTuple):
-    """The joint of a body with its state: the index of its first velocity, coordinates, velocities, accelerations.
+def frames_of(states: Sequence[LinkState], up: Triple, tags: Tags) -> list[Frame]:
+    """How all links, parents first, are placed and move.
 
-    tags: the energies that accelerations come of.
+    up: the acceleration of the world against free fall.  tags: the energies that accelerations come of.
     """
+    flat, frames = trees_in_a_plane(states), list[Frame]()
+    for at, in_plane in zip(states, flat, strict=True):
+        with cg.tag(at.name):
+            if at.parent < 0:
+                frames.append(_root_frame(up, at, tags, in_plane=in_plane))
+            else:
+                frames.append(_next_frame(frames[at.parent], at, tags, in_plane=in_plane))
+    return frames
 
-    start: int
-    q: Sequence[Node]
-    u: Sequence[Node]
-    u_dot: Sequence[Node]
-    tags: Tags
+
+def trees_in_a_plane(states: Sequence[LinkState]) -> list[bool]:
+    """For each link whether all axes of its tree are parallel."""
+    roots: list[int] = []
+    flat: dict[int, bool] = {}
+    for i, at in enumerate(states):
+        roots.append(roots[at.parent] if at.parent >= 0 else i)
+        along = at.joint.has_axis and (at.parent < 0 or at.link.parallel)
+        flat[roots[i]] = flat.get(roots[i], True) and along
+    return [flat[root] for root in roots]
 
 
-def root_frame(up: Triple, link: Link, joint: MovingJoint, state: Freedoms, *, in_plane: bool) -> Frame:
-    """Of a body on the world.  up: the acceleration against free fall.  in_plane: so move all that it carries.
+def _root_frame(up: Triple, at: LinkState, tags: Tags, *, in_plane: bool) -> Frame:
+    """Frame of a body on the world.  in_plane: so move it and all that it carries.
 
     All that a tree needs is alike in any axes, so they are those that this body has just now, or, of a tree in a plane
     and of velocities along them, those of its joint.
     """
-    angle = joint.angle(state.q[0]) if isinstance(joint, AxialJoint) else ZERO
-    with cg.tag(*state.tags):
-        up = spatial.rotate_transpose(link.turn, up)
-    if isinstance(joint, SpatialJoint):
-        turn = joint.rotation(state.q)
-        turned = _transposed(turn)
-        if not joint.sliding:
-            turned = UNIT
-            with cg.tag(*state.tags):
-                up = spatial.rotate_transpose(turn, up)
-    elif in_plane:
-        turned = _turned(UNIT, angle)
+    turn, axes = at.turn, UNIT
+    with cg.tag(*tags):
+        up = at.into(up)
+    if in_plane or at.joint.sliding:
+        axes = turn.columns(UNIT)
     else:
-        turned = UNIT
-        with cg.tag(*state.tags):
-            up = spatial.rotate_about_z(cg.cos(angle), cg.sin(angle), up)  # of a slide by 0
-    return _moved(joint, state, UNIT, turned, Frame(STILL, turned, REST, Twist(STILL, up), (), UNIT, angle))
+        with cg.tag(*tags):
+            up = turn.into(up)
+    return _moved(at, tags, UNIT, Frame(STILL, axes, REST, Twist(STILL, up), (), UNIT, turn))
 
 
-def next_frame(parent: Frame, link: Link, joint: MovingJoint, state: Freedoms, *, in_plane: bool) -> Frame:
-    """Of a body that another carries."""
-    before = _product(parent.axes, link.turn)
-    offset, angle = combined(parent.axes, link.place), ZERO
-    if isinstance(joint, SpatialJoint):
-        offset = spatial.plus(offset, combined(before, joint.translation(state.q)))
-        axes = _product(before, joint.rotation(state.q))
-    else:
-        offset = spatial.plus(offset, spatial.scaled(joint.shift(state.q[0]), before[2]))
-        angle = joint.angle(state.q[0])
-        if in_plane:
-            before, angle = _product(parent.before, link.turn), link.turn[2][2] * parent.angle + angle
-        axes = _turned(before, angle)
+def _next_frame(parent: Frame, at: LinkState, tags: Tags, *, in_plane: bool) -> Frame:
+    """Frame of a body that another carries."""
+    before, turn = MatrixTurn(at.link.turn).columns(parent.axes), at.turn
+    offset = plus(combined(parent.axes, at.link.place), combined(before, at.shift))
+    if in_plane:
+        before = MatrixTurn(at.link.turn).columns(parent.before)
+        turn = in_a_row(parent.turn, turn, at.link.turn[2][2])
     with cg.tag(KINETIC):
         velocity = parent.velocity.at(offset)
-    with cg.tag(*state.tags):
+    with cg.tag(*tags):
         acceleration = parent.acceleration.at(offset)
-    return _moved(joint, state, before, axes, Frame(offset, axes, velocity, acceleration, (), before, angle))
+    return _moved(at, tags, before, Frame(offset, turn.columns(before), velocity, acceleration, (), before, turn))
 
 
-def _moved(joint: MovingJoint, state: Freedoms, before: Entries, axes: Entries, frame: Frame) -> Frame:
+def _moved(at: LinkState, tags: Tags, before: Axes, frame: Frame) -> Frame:
     """The frame with the motion of the joint, as long as it has that of the body that carries it.
 
     before: the axes of the joint.
     """
-    if isinstance(joint, AxialJoint):
-        turn, shift = joint.angle(ONE), joint.shift(ONE)
-        return _stage(frame, 0, [Twist(spatial.scaled(turn, axes[2]), spatial.scaled(shift, axes[2]))], state)
-    sliding = joint.sliding
+    sliding = at.joint.sliding
     if sliding:
-        frame = _stage(frame, 0, [Twist(STILL, axis) for axis in before[:sliding]], state)
-    units = [[ONE if i == k else ZERO for i in range(len(state.u))] for k in range(sliding, len(state.u))]
-    parts = [(joint.angular_velocity(state.q, u), joint.linear_velocity(state.q, u)) for u in units]
-    return _stage(frame, sliding, [Twist(combined(axes, w), combined(axes, v)) for w, v in parts], state)
+        frame = _stage(frame, 0, [Twist(STILL, axis) for axis in before[:sliding]], at, tags)
+    turned = [Twist(combined(frame.axes, w), combined(frame.axes, v)) for w, v in at.columns[sliding:]]
+    return _stage(frame, sliding, turned, at, tags)
 
 
-def _stage(frame: Frame, first: int, motions: Sequence[Twist], state: Freedoms) -> Frame:
+def _stage(frame: Frame, first: int, motions: Sequence[Twist], at: LinkState, tags: Tags) -> Frame:
     """The frame with the motion of the joint's freedoms from `first` on."""
     velocity, acceleration = frame.velocity, frame.acceleration
     along, columns = REST, []
     with cg.tag(KINETIC):
-        carried = [velocity.cross(motion) for motion in motions]
+        carried = [velocity.cross(motion) for motion in motions]  # psi'
         for k, motion in enumerate(motions, first):
-            along = along.plus(motion.scaled(state.u[k]))
+            along = along.plus(motion.scaled(at.u[k]))  # S u
         rates = [slow.scaled(2.0) for slow in carried]
         if len(motions) > 1:
-            rates = [rate.plus(along.cross(motion)) for rate, motion in zip(rates, motions, strict=True)]
-    with cg.tag(*state.tags):
+            rates = [rate.plus(along.cross(motion)) for rate, motion in zip(rates, motions, strict=True)]  # psi' + S'
+    with cg.tag(*tags):
         for k, (motion, slow, rate) in enumerate(zip(motions, carried, rates, strict=True), first):
-            twice = frame.acceleration.cross(motion).plus(velocity.cross(slow))
-            columns.append(Column(state.start + k, first, motion, slow, twice, rate))
-            change = slow.scaled(state.u[k]).plus(motion.scaled(state.u_dot[k]))
-            acceleration = acceleration.plus(change)
+            twice = frame.acceleration.cross(motion).plus(velocity.cross(slow))  # psi''
+            columns.append(Column(at.first + k, first, motion, slow, twice, rate))
+            acceleration = acceleration.plus(slow.scaled(at.u[k]).plus(motion.scaled(at.u_dot[k])))
     velocity = velocity.plus(along)
     return frame._replace(velocity=velocity, acceleration=acceleration, columns=[*frame.columns, *columns])
-
-
-def _turned(columns: Entries, angle: Node) -> Entries:
-    """The columns of A R_z."""
-    if angle.value == 0.0:
-        return columns
-    c, s = cg.cos(angle), cg.sin(angle)
-    x, y, z = columns
-    along = [c * a + s * b for a, b in zip(x, y, strict=True)]
-    across = [c * b - s * a for a, b in zip(x, y, strict=True)]
-    return (along[0], along[1], along[2]), (across[0], across[1], across[2]), z
-
-
-def _product(columns: Entries, matrix: Matrix) -> Entries:
-    """The columns of A B, of those of A and the rows of B."""
-    x, y, z = (combined(columns, (as_node(a), as_node(b), as_node(c))) for a, b, c in zip(*matrix, strict=True))
-    return x, y, z
-
-
-def _transposed(matrix: Matrix) -> Entries:
-    return _product(UNIT, matrix)

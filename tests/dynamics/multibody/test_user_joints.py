@@ -6,13 +6,15 @@ from collections.abc import Callable, Sequence
 from functools import reduce
 
 import numpy as np
-from pytest import MonkeyPatch, fixture, mark
+from pytest import MonkeyPatch, fixture, mark, raises
 
 import cgraph as cg
 import dynamics as dyn
 from dynamics.multibody.algebra import spatial
 from dynamics.multibody.algebra.spatial import Triple
+from dynamics.multibody.algebra.spatial_vectors import Twist
 from dynamics.multibody.joints import TYPES, SpatialJoint
+from dynamics.multibody.joints.consistency import contradiction
 from dynamics.verification.certificate import certify
 from tests.dynamics.models import Array
 from tests.dynamics.units import Units, in_units
@@ -51,12 +53,12 @@ class Angles(SpatialJoint):
         turns = [turn(axis, q[k]) for k, (kind, axis) in enumerate(self.hinges) if kind == "revolute"]
         return reduce(lambda a, b: [[spatial.dot(tuple(r), tuple(c)) for c in zip(*b, strict=True)] for r in a], turns)
 
-    def angular_velocity(self, q: Nodes, u: Nodes) -> Triple:
+    def velocity(self, q: Nodes, u: Nodes) -> Twist:
         omega = spatial.STILL
         for k, (kind, axis) in enumerate(self.hinges):
             if kind == "revolute":
                 omega = spatial.plus(spatial.rotate_transpose(turn(axis, q[k]), omega), along(axis, u[k]))
-        return omega
+        return Twist(omega, spatial.STILL)
 
     def placement(self, axis: Array, at: Array) -> tuple[Array, Array]:
         raise NotImplementedError
@@ -76,8 +78,9 @@ class Polar(Angles):
     def translation(self, q: Nodes) -> Triple:
         return q[1] * cg.cos(q[0]), q[1] * cg.sin(q[0]), ZERO
 
-    def linear_velocity(self, q: Nodes, u: Nodes) -> Triple:
-        return spatial.rotate_transpose(turn(X, q[2]), (u[1], q[1] * u[0], ZERO))
+    def velocity(self, q: Nodes, u: Nodes) -> Twist:
+        moved = spatial.rotate_transpose(turn(X, q[2]), (u[1], q[1] * u[0], ZERO))
+        return super().velocity(q, u)._replace(linear=moved)
 
 
 class Still(Angles):
@@ -85,8 +88,8 @@ class Still(Angles):
 
     kind = "still"
 
-    def angular_acceleration(self, q: Nodes, u: Nodes) -> Triple:
-        return spatial.STILL
+    def acceleration(self, q: Nodes, u: Nodes) -> Twist:
+        return super().acceleration(q, u)._replace(angular=spatial.STILL)
 
 
 class Constant(Angles):
@@ -94,6 +97,73 @@ class Constant(Angles):
 
     kind = "constant"
     turns_with_body = True
+
+
+class Faster(Angles):
+    """With a velocity that its turn has not."""
+
+    kind = "faster"
+
+    def velocity(self, q: Nodes, u: Nodes) -> Twist:
+        return super().velocity(q, u).scaled(2.0)
+
+
+class Squared(Angles):
+    """With a velocity that is not linear, and rates to it."""
+
+    kind = "squared"
+
+    def rate(self, q: Nodes, u: Nodes) -> Nodes:
+        return [x * x for x in u]
+
+    def velocity(self, q: Nodes, u: Nodes) -> Twist:
+        return super().velocity(q, self.rate(q, u))
+
+
+class Turned(Angles):
+    """That is turned from the joint at neutral coordinates."""
+
+    kind = "turned"
+    neutral = (0.5, 0.0, 0.0)
+
+
+class Bent(Angles):
+    """With velocities about axes of the body, whose brackets it does not know."""
+
+    kind = "bent"
+    velocities = ("x", "y", "z")
+
+    def rate(self, q: Nodes, u: Nodes) -> Nodes:
+        c, s, cosine, sine = cg.cos(q[2]), cg.sin(q[2]), cg.cos(q[1]), cg.sin(q[1])
+        yaw = (s * u[1] + c * u[2]) / cosine
+        return [yaw, c * u[1] - s * u[2], u[0] + yaw * sine]
+
+    def velocity(self, q: Nodes, u: Nodes) -> Twist:
+        return Twist((u[0], u[1], u[2]), spatial.STILL)
+
+
+WRONG = {
+    Faster(): "its velocity must be the rate of its turn and translation, along the rates of its coordinates",
+    Squared(): "its velocity must be linear in u",
+    Still(): "its acceleration must be the rate of its velocity at constant u",
+    Turned(): "its turn and translation must be none at neutral coordinates",
+    Constant(): "its velocities must be along axes that turn with the body, as it says, at all coordinates",
+    Bent(): "structure does not belong to rate",
+}
+
+
+@mark.parametrize("joint", WRONG, ids=lambda joint: joint.kind)
+def test_a_type_that_contradicts_itself_is_refused_in_a_sentence(joint: Angles, monkeypatch: MonkeyPatch) -> None:
+    monkeypatch.setitem(TYPES, joint.kind, joint)
+    body = dyn.Body("b", dyn.Joint(joint.kind), mass=1.0, inertia=(1.0, 1.0, 1.0))
+    with raises(dyn.MechanismError, match="body 'b': the type of joints of the kind") as said:
+        dyn.Mechanism([body])
+    assert WRONG[joint] in str(said.value)
+
+
+def test_no_type_of_the_library_contradicts_itself() -> None:
+    own = [joint.with_pitch(0.3) for joint in TYPES.values() if type(joint).__module__.startswith("dynamics.")]
+    assert not [joint.kind for joint in own if joint.moves and contradiction(joint)]
 
 
 @fixture(autouse=True)
@@ -182,8 +252,9 @@ def test_nothing_depends_on_the_unit_of_length(kind: str, length: float) -> None
         assert np.array_equal(there[name], factor * array)
 
 
-def test_the_certificate_looks_at_bias_and_derivatives() -> None:
-    """Of a type of joint that is wrong about itself, each finds its own."""
+def test_the_certificate_looks_at_bias_and_derivatives(monkeypatch: MonkeyPatch) -> None:
+    """Of a type of joint that is wrong about itself, and was not refused, each finds its own."""
+    monkeypatch.setattr("dynamics.multibody.body.contradiction", lambda joint: "")
     said = {
         kind: {each.equation.partition(" ")[0] for each in certify(twins(kind, 11)[0], 2).residuals if not each.passed}
         for kind in ("angles", "polar", "still", "constant")

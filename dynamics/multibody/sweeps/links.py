@@ -1,0 +1,229 @@
+"""Inertial numbers: a body's mass, first moment and inertia in the axes of its joint, of which its energy is made."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from cgraph import Node
+from cgraph.extend import Array, Builder, building
+
+from ..algebra import spatial
+from ..algebra.spatial import Matrix, Triple
+from ..algebra.spatial_vectors import Twist
+from ..algebra.turns import Turn
+from ..body import Body
+from ..joint_coordinates import places
+from ..joints import JointType
+from ..parameters import symbol
+
+
+class Numbers(NamedTuple):
+    """Inertial numbers: floats, or nodes where there are parameters."""
+
+    mass: Any
+    moment: Array  # (3,)
+    inertia: Array  # (3, 3)
+
+    def negated(self) -> Numbers:
+        """Numbers with other signs."""
+        return Numbers(-self.mass, -self.moment, -self.inertia)
+
+    def turned(self, turn: Array) -> Numbers:
+        """Numbers in other axes, in which those of now are the columns of a turn."""
+        moment, inertia = spatial.product(turn, self.moment), spatial.product(turn, self.inertia, turn.T)
+        return Numbers(self.mass, moment, inertia)
+
+    def about(self, offset: Array) -> Numbers:
+        """Numbers about a point from which this one is r away: J + 2 (r . h) 1 - r h^T - h r^T + m (r^2 1 - r r^T)."""
+        crossed = np.outer(offset, self.moment)
+        inertia = spatial.added(self.inertia, 2.0 * np.trace(crossed) * np.eye(3) - crossed - crossed.T)
+        moved = spatial.parallel_axis(inertia, self.mass, offset)
+        return Numbers(self.mass, spatial.added(self.moment, self.mass * offset), moved)
+
+
+@dataclass(frozen=True, eq=False)
+class Link:
+    """A body in the axes of its motion: numbers, or nodes that stand for them.
+
+    turn, place: its axes as columns, and its origin at q = 0, in the parent's axes.  moment: m c.  inertia: about the
+    origin.  angle: of a hinge, how far the axes are turned about its own beside its coordinate [rad].
+    """
+
+    turn: Matrix  # (3, 3)
+    place: Triple
+    mass: float | Node
+    moment: Triple
+    inertia: Matrix  # (3, 3), the lower triangle counts
+    damping: float | Node
+    stiffness: float | Node
+    spring_reference: float | Node
+    armature: float | Node
+    angle: float = 0.0
+
+    @cached_property
+    def parallel(self) -> bool:
+        """Whether the joint's axis is along that of the parent's joint, or against it."""
+        across = (self.turn[0][2], self.turn[1][2], self.turn[2][0], self.turn[2][1])
+        return all([float(each) == 0.0 for each in across])
+
+    @cached_property
+    def numbers(self) -> list[float | Node]:
+        """Turn, place, mass, moment, inertia (lower triangle), damping, stiffness, spring reference, armature."""
+        turn = [each for row in self.turn for each in row]
+        lower = [self.inertia[i][j] for i in range(3) for j in range(i + 1)]
+        others = (self.damping, self.stiffness, self.spring_reference, self.armature)
+        return [spatial.plain(each) for each in (*turn, *self.place, self.mass, *self.moment, *lower, *others)]
+
+    @property
+    def full_inertia(self) -> list[list[float | Node]]:
+        """The inertia with its upper triangle."""
+        return [[spatial.plain(self.inertia[max(i, j)][min(i, j)]) for j in range(3)] for i in range(3)]
+
+    @cached_property
+    def is_numeric(self) -> bool:
+        """Whether there are no parameters among the numbers of place and inertia."""
+        return not any([isinstance(each, Node) for each in self.numbers[:19]])
+
+    @property
+    def inertial(self) -> Numbers:
+        """Mass, first moment and inertia as arrays."""
+        moment = np.array([spatial.plain(each) for each in self.moment])
+        return Numbers(self.mass, moment, np.array(self.full_inertia))
+
+    @property
+    def offset(self) -> Array:
+        """The place as an array, (3,)."""
+        return np.array([spatial.plain(each) for each in self.place])
+
+    def with_more(self, added: Numbers) -> Link:
+        """The link with these numbers added to its own."""
+        mass, moment, inertia = self.inertial
+        moment, inertia = spatial.added(moment, added.moment), spatial.added(inertia, added.inertia)
+        return self.with_inertial(Numbers(mass + added.mass, moment, inertia))
+
+    def with_inertial(self, numbers: Numbers) -> Link:
+        """The link with these numbers in place of its own."""
+        mass, moment, inertia = numbers
+        return replace(self, mass=mass, moment=spatial.constant(moment), inertia=inertia.tolist())
+
+
+class LinkState(NamedTuple):
+    """A link on its joint, at the state of that.
+
+    name: of its body, for tags.  parent: index of the link that carries it, -1 for the world.  first: place of the
+    joint's first velocity among all.
+    """
+
+    name: str
+    parent: int
+    link: Link
+    joint: JointType
+    q: Sequence[Node]
+    u: Sequence[Node]
+    u_dot: Sequence[Node] = ()
+    first: int = 0
+
+    @property
+    def moved(self) -> Sequence[Node]:
+        """The coordinates by which the axes move."""
+        return [self.q[0] + self.link.angle] if self.link.angle else self.q
+
+    @property
+    def turn(self) -> Turn:
+        """From the joint's axes to the link's."""
+        return self.joint.turn(self.moved)
+
+    @property
+    def shift(self) -> Triple:
+        """Where the joint has the link's origin, in the joint's axes [m]."""
+        return self.joint.translation(self.moved)
+
+    @property
+    def place(self) -> Triple:
+        """Where the link's origin is from its parent's, in the parent's axes [m]."""
+        return spatial.plus(self.link.place, spatial.rotate(self.link.turn, self.shift))
+
+    @property
+    def columns(self) -> list[Twist]:
+        """How each velocity of the joint moves the link, in the link's axes."""
+        return self.joint.columns(self.moved)
+
+    def into(self, vector: Triple) -> Triple:
+        """A vector in the parent's axes, in those of the joint."""
+        return spatial.rotate_transpose(self.link.turn, vector)
+
+    def springs(self) -> list[tuple[Node, Node]]:
+        """The velocities that the joint's spring works on, and its forces."""
+        return [(velocity, self.link.stiffness * x) for velocity, x in zip(self.u, self.stretches(), strict=False)]
+
+    def stretches(self) -> Sequence[Node]:
+        """How far the spring is stretched along each velocity; nothing where there is no spring."""
+        absent = not isinstance(self.link.stiffness, Node) and not self.link.stiffness
+        return [] if absent else self.joint.stretches(self.q, self.link.spring_reference)
+
+
+def link_states(
+    bodies: Sequence[Body],
+    links: Sequence[Link],
+    parents: Sequence[int],
+    q: Sequence[Node],
+    u: Sequence[Node],
+    u_dot: Sequence[Node] | None = None,
+) -> list[LinkState]:
+    """The links of moving bodies, parents first, at a state of all.  parents: their indices.  u_dot: by default 0."""
+    rates = [spatial.ZERO] * len(u) if u_dot is None else u_dot
+    rows = zip(bodies, parents, links, places(bodies), strict=True)
+    return [
+        LinkState(body.name, parent, each, body.joint.type, q[at.q], u[at.u], rates[at.u], at.u.start)
+        for body, parent, each, at in rows
+    ]
+
+
+def parents_of(bodies: Sequence[Body]) -> list[int]:
+    """For each body the index of the one that carries it, -1 for the world."""
+    index = {body.name: i for i, body in enumerate(bodies)}
+    return [index.get(body.parent, -1) for body in bodies]
+
+
+def axes_of(body: Body) -> Array:
+    """The axes of the body's motion, as columns in the body's; where its joint has an axis, the third is that."""
+    return body.joint.type.axes(np.asarray(body.joint.axis))
+
+
+@dataclass(frozen=True, eq=False)
+class MergedBody(Body):
+    """A body with others welded to it that are not merged into its inertia, since there are parameters among theirs.
+
+    welded: bodies in the same frame, of which mass, center and inertia count.
+    """
+
+    welded: tuple[Body, ...] = ()
+
+
+def inertia_in(axes: Array, body: Body) -> tuple[Any, Array, Array]:
+    """Mass, center of mass (3,), and inertia about the joint (3, 3) of a body alone, in these axes of it."""
+    mass, center = symbol(body.mass), spatial.product(axes.T, np.asarray(body.center))
+    about_center = spatial.product(axes.T, np.asarray(body.inertia), axes)
+    return mass, center, spatial.parallel_axis(about_center, mass, center)
+
+
+def link(body: Body, outer: Array) -> Link:
+    """The link of a body whose parent moves in the axes `outer`."""
+    axes, joint = axes_of(body), body.joint
+    with building(Builder()):
+        turn, place = spatial.joint_placement(outer, joint.orientation, np.asarray(joint.position), axes)
+        mass, center, inertia = inertia_in(axes, body)
+        moment = mass * center
+        for other in body.welded if isinstance(body, MergedBody) else ():
+            more, center, about_joint = inertia_in(axes, other)
+            mass, moment, inertia = mass + more, moment + more * center, spatial.added(inertia, about_joint)
+        moment = spatial.constant(moment)
+    damping, stiffness, reference, armature = map(
+        symbol, (joint.damping, joint.stiffness, joint.spring_reference, joint.armature)
+    )
+    return Link(turn.tolist(), place, mass, moment, inertia.tolist(), damping, stiffness, reference, armature)

@@ -1,0 +1,240 @@
+"""The torques of a tree of bodies with their derivatives, in closed form: column by column, from the tips down.
+
+With the composite I, B, f of all that a freedom j carries, all about the same point, and i between it and the world:
+
+    dtau_i/dq_j = S_i . (I psi''_j + 2 B psi'_j + S_j x f),   dtau_j/dq_i = psi''_i . I S_j + psi'_i . 2 B^T S_j
+    dtau_i/du_j = S_i . (I (psi'_j + S'_j) + 2 B S_j),        dtau_j/du_i = (psi'_i + S'_i) . I S_j + S_i . 2 B^T S_j
+    M_ij = M_ji = S_i . I S_j
+
+(See `motion_columns`; of one stage of a joint, the right column holds of both.) Bodies on different branches have
+nothing to do with one another. All is taken about the origin of body i, whose own numbers then keep their digits
+however far it is from the base: wrenches are carried down from j to i.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import cgraph as cg
+from cgraph import Node
+from cgraph.extend import Builder, as_node, building, cotangents
+
+from ...systems.torque_derivatives import TorqueDerivatives
+from ..algebra.inertia import Inertia, Rows, rows, symmetric, traced
+from ..algebra.spatial import ZERO, Triple, combined, cross, dot, plus, scaled
+from ..algebra.spatial_vectors import IDLE, Twist, Wrench
+from ..algebra.turns import NEXT, Axes
+from .links import Link, LinkState
+from .motion_columns import Column, Frame, Tags, frames_of, trees_in_a_plane
+from .outward import KINETIC, POTENTIAL
+
+
+class MovingInertia(NamedTuple):
+    """Sums over the mass of a body and all that it carries, about a point, in axes that stand still.
+
+    For points b of mass dm, whose velocities are b' = v + w x b, the sums over dm of 1, b, b b^T, b' and b' b^T say
+    what any change of velocity or acceleration takes. Of the last, C = v h^T + [w] Sigma, come all Coriolis forces of a
+    body: b x 2 (x x b') adds up to 2 (tr(C) x - C x) for an angular velocity x.
+
+    velocity_moment: of b' b^T, the C above.  wrench: of the accelerations b'', their rate of momentum, with gravity.
+    """
+
+    inertia: Inertia
+    momentum: Triple
+    velocity_moment: Rows
+    wrench: Wrench
+
+    def plus(self, other: MovingInertia) -> MovingInertia:
+        """Sum of two about the same point."""
+        moment = [plus(a, b) for a, b in zip(self.velocity_moment, other.velocity_moment, strict=True)]
+        momentum, wrench = plus(self.momentum, other.momentum), self.wrench.plus(other.wrench)
+        return MovingInertia(self.inertia.plus(other.inertia), momentum, rows(moment), wrench)
+
+    def about(self, offset: Triple) -> MovingInertia:
+        """Sums about a point from which this one is `offset` away, b + offset in place of b."""
+        moment = [plus(row, scaled(p, offset)) for row, p in zip(self.velocity_moment, self.momentum, strict=True)]
+        return MovingInertia(self.inertia.about(offset), self.momentum, rows(moment), self.wrench.about(offset))
+
+    def coriolis(self, velocity: Twist) -> Wrench:
+        """B velocity, half of what a change of the velocity takes. Linear velocities take none."""
+        return Wrench(traced(self.velocity_moment, velocity.angular), cross(velocity.angular, self.momentum))
+
+    def coriolis_transpose(self, velocity: Twist) -> Triple:
+        """B^T velocity, a torque."""
+        columns = rows(list(zip(*self.velocity_moment, strict=True)))
+        return plus(traced(columns, velocity.angular), cross(self.momentum, velocity.linear))
+
+
+def moving_body(link: Link, axes: Axes, velocity: Twist, acceleration: Twist, tags: Sequence[str]) -> MovingInertia:
+    """A body alone, about its origin.
+
+    axes: the body's as columns.  acceleration: in space, against free fall.  tags: the energies that it comes of.
+    """
+    moment, (w, v) = combined(axes, link.moment), velocity
+    inertia = Inertia(as_node(link.mass), moment, _rotated_second(link, axes))
+    momentum = plus(scaled(inertia.mass, v), cross(w, moment))
+    spun = zip(*[cross(w, column) for column in inertia.second], strict=True)  # [w] Sigma, as Sigma is symmetric
+    spread = rows([plus(scaled(x, moment), (row[0], row[1], row[2])) for x, row in zip(v, spun, strict=True)])
+    still = MovingInertia(inertia, momentum, spread, IDLE)
+    with cg.tag(*tags):
+        return still._replace(wrench=inertia.wrench(acceleration).plus(still.coriolis(velocity)))
+
+
+def _rotated_second(link: Link, axes: Axes) -> Rows:
+    """R Sigma R^T, with a multiple of 1 taken out, which does not turn."""
+    inertia = [[as_node(each) for each in row] for row in link.full_inertia]
+    diagonal = [0.5 * (inertia[j][j] + inertia[k][k] - inertia[i][i]) for i, (j, k) in enumerate(NEXT)]
+    k = 0 if diagonal[0] is diagonal[1] or diagonal[0].value == diagonal[1].value is not None else 1
+    alike = diagonal[k]
+    rest = [[diagonal[i] - alike if i == j else -inertia[i][j] for j in range(3)] for i in range(3)]
+    # With halves on the diagonal, sum over i >= j of rest_ij (r_i r_j^T + r_j r_i^T).
+    lower = [[rest[i][j] if j < i else 0.5 * rest[i][i] if j == i else ZERO for j in range(3)] for i in range(3)]
+    scaled_axes = [combined(axes, (row[0], row[1], row[2])) for row in lower]
+    entries = []
+    for i in range(3):
+        row = []
+        for j in range(i + 1):
+            total = alike if i == j else ZERO
+            for axis, other in zip(axes, scaled_axes, strict=True):
+                total = total + (2.0 * (axis[i] * other[i]) if i == j else axis[i] * other[j] + axis[j] * other[i])
+            row.append(total)
+        entries.append(row)
+    return symmetric(entries)
+
+
+class Reaction(NamedTuple):
+    """Wrenches that a freedom takes of all that it carries, about a point, and 2 B^T S, a torque alone.
+
+    tags: the energies that the first comes of.
+    """
+
+    displaced: Wrench  # I psi'' + 2 B psi' + S x f
+    moved: Wrench  # I (psi' + S') + 2 B S
+    accelerated: Wrench  # I S
+    couple: Triple
+    tags: Tags
+
+    def about(self, offset: Triple) -> Reaction:
+        """Reaction about a point from which this one is `offset` away."""
+        with cg.tag(KINETIC):
+            moved, accelerated = self.moved.about(offset), self.accelerated.about(offset)
+        with cg.tag(*self.tags):
+            return Reaction(self.displaced.about(offset), moved, accelerated, self.couple, self.tags)
+
+
+def torque_derivatives(states: Sequence[LinkState], up: Triple, build: Builder) -> TorqueDerivatives:
+    """Torques of links, parents first, and their derivatives, with springs, without dampers and forces.
+
+    up: the acceleration of the world against free fall.
+    """
+    n = sum([len(at.u) for at in states])
+    result = TorqueDerivatives([ZERO] * n, *[[[ZERO] * n for _ in range(n)] for _ in range(3)])
+    tags = (KINETIC, POTENTIAL) if any([x.value != 0.0 for x in up]) else (KINETIC,)  # of accelerations
+    with building(build):
+        frames = frames_of(states, up, tags)
+        composites: list[MovingInertia | None] = [None] * len(states)
+        for i, flat in reversed(list(enumerate(trees_in_a_plane(states)))):
+            at, frame, carried = states[i], frames[i], composites[i]
+            link = _about_z(at.link) if flat else at.link
+            with cg.tag(at.name):
+                alone = moving_body(link, frame.axes, frame.velocity, frame.acceleration, tags)
+            composite = alone if carried is None else alone.plus(carried)
+            with cg.tag(at.name):
+                reactions = [(column, _reaction(column, composite, tags)) for column in frame.columns]
+                for column, _ in reactions:
+                    with cg.tag(*tags):
+                        result.torques[column.velocity] = column.motion.power(composite.wrench)
+                _fill(result, frames, states, i, reactions)
+            if at.parent >= 0:
+                moved, carried = composite.about(frame.offset), composites[at.parent]
+                composites[at.parent] = moved if carried is None else moved.plus(carried)
+        for at in states:
+            with cg.tag(at.name, KINETIC):
+                for k, rate in enumerate(at.u_dot, at.first):
+                    result.torques[k] = result.torques[k] + at.link.armature * rate
+                    result.mass[k][k] = result.mass[k][k] + at.link.armature
+            with cg.tag(at.name, POTENTIAL):
+                _add_spring(result, at, build)
+    return result
+
+
+def _add_spring(result: TorqueDerivatives, at: LinkState, build: Builder) -> None:
+    """The forces of a spring, and their slopes by displacements, G^T d/dq."""
+    rate, end = at.joint.rate(at.q, at.u), at.first + len(at.u)
+    for i, (_, force) in enumerate(at.springs(), at.first):
+        result.torques[i] = result.torques[i] + force
+        seeds: dict[Node, Node] = {}
+        for node, slope in zip(rate, cotangents({force: cg.constant(1.0)}, at.q, build), strict=True):
+            seeds[node] = seeds.get(node, ZERO) + slope
+        for j, slope in zip(range(at.first, end), cotangents(seeds, at.u, build), strict=True):
+            result.by_q[i][j] = result.by_q[i][j] + slope
+
+
+def _about_z(link: Link) -> Link:
+    """The link with the only moment of inertia that counts where all joints turn about z: it does not turn itself."""
+    return replace(link, inertia=[[0.0], [0.0, 0.0], [0.0, 0.0, link.inertia[2][2]]])
+
+
+def _fill(
+    result: TorqueDerivatives,
+    frames: Sequence[Frame],
+    states: Sequence[LinkState],
+    at: int,
+    reactions: Sequence[tuple[Column, Reaction]],
+) -> None:
+    """All entries of the freedoms of a body with their own and those between it and the world."""
+    for inner, reaction in reactions:
+        for outer in frames[at].columns:
+            _enter(result, outer, inner, reaction)
+    while states[at].parent >= 0:
+        reactions = [(column, reaction.about(frames[at].offset)) for column, reaction in reactions]
+        at = states[at].parent
+        for inner, reaction in reactions:
+            for outer in frames[at].columns:
+                _enter_both(result, outer, inner, reaction)
+
+
+def _reaction(column: Column, of: MovingInertia, tags: Tags) -> Reaction:
+    """Reaction of a freedom at the base of the composite.  tags: the energies that accelerations come of."""
+    motion = column.motion
+    with cg.tag(KINETIC):
+        double = motion.scaled(2.0)
+        moved = of.inertia.wrench(column.rate).plus(of.coriolis(double))  # I (psi' + S') + 2 B S
+        accelerated, couple = of.inertia.wrench(motion), of.coriolis_transpose(double)
+    with cg.tag(*tags):
+        displaced = of.inertia.wrench(column.carried_rate).plus(of.coriolis(column.carried.scaled(2.0)))
+        displaced = displaced.plus(of.wrench.carried(motion))  # I psi'' + 2 B psi' + S x f
+    return Reaction(displaced, moved, accelerated, couple, tags)
+
+
+def _enter_both(result: TorqueDerivatives, outer: Column, inner: Column, reaction: Reaction) -> None:
+    """outer: between the world and inner, whose reaction is about the origin of the outer's body."""
+    i, j = outer.velocity, inner.velocity
+    with cg.tag(*reaction.tags):
+        result.by_q[i][j] = outer.motion.power(reaction.displaced)  # dtau_i/dq_j = S_i . (I psi''_j + ..)
+        result.by_q[j][i] = _displaced_by(outer, reaction)
+    with cg.tag(KINETIC):
+        result.by_qd[i][j] = outer.motion.power(reaction.moved)  # dtau_i/du_j = S_i . (I (psi'_j + S'_j) + 2 B S_j)
+        result.by_qd[j][i] = outer.rate.power(reaction.accelerated) + dot(outer.motion.angular, reaction.couple)
+        result.mass[i][j] = result.mass[j][i] = outer.motion.power(reaction.accelerated)
+
+
+def _enter(result: TorqueDerivatives, outer: Column, inner: Column, reaction: Reaction) -> None:
+    """Freedoms of one joint."""
+    i, j = outer.velocity, inner.velocity
+    if outer.stage < inner.stage:
+        _enter_both(result, outer, inner, reaction)
+    elif outer.stage == inner.stage:
+        with cg.tag(*reaction.tags):
+            result.by_q[j][i] = _displaced_by(outer, reaction)
+        with cg.tag(KINETIC):
+            result.by_qd[i][j] = outer.motion.power(reaction.moved)
+            if i <= j:
+                result.mass[i][j] = result.mass[j][i] = outer.motion.power(reaction.accelerated)
+
+
+def _displaced_by(outer: Column, reaction: Reaction) -> Node:
+    """Change of the force at the inner freedom by a displacement of the outer one."""
+    return outer.carried_rate.power(reaction.accelerated) + dot(outer.carried.angular, reaction.couple)

@@ -1,0 +1,354 @@
+"""Random types of joints of a user's own, whose directions depend on their coordinates, in random trees.
+
+Every graph of a mechanism is held against the same tree with a chain of joints of one axis in the place of such a
+joint, against Lagrange's equations by differences of the energies, and against the dense equations of M and the bias.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from pytest import MonkeyPatch, mark
+
+import cgraph as cg
+import dynamics as dyn
+from dynamics.multibody.algebra import spatial
+from dynamics.multibody.algebra.spatial import Triple
+from dynamics.multibody.algebra.spatial_vectors import Twist
+from dynamics.multibody.joint_coordinates import places
+from dynamics.multibody.joints import TYPES, SpatialJoint
+from tests.dynamics.mechanisms import Array, random_body, random_joint, random_state
+from tests.slow import slow
+
+ROUNDING = 1e-10  # of the largest of its kind, in some thousand sums; M is not well conditioned in every tree
+THROUGH_STEP = 1e-6  # the same of what is divided by a step of 1e-3
+STEP, DIFFERENCES = 1e-5, 1e-7  # of the coordinates, and what its square leaves
+ZERO, ONE = cg.constant(0.0), cg.constant(1.0)
+PITCH = 0.3
+Nodes = Sequence[cg.Node]
+
+
+class Part(NamedTuple):
+    """A hinge, a slide or a screw in the chain that a random joint is, at rest in the axes of the joint."""
+
+    kind: str
+    axis: Array  # (3,), of length 1
+    place: Array  # (3,) [m]
+
+
+class Random(SpatialJoint):
+    """A chain of parts as one joint: q turns and moves the body by one after another, and qdot = G u, G constant."""
+
+    kind = "random"
+
+    def __init__(self, seed: int, *, mixed: bool) -> None:
+        rng = np.random.default_rng((seed, mixed))
+        count = int(rng.integers(2, 4))
+        kinds = ["revolute", *rng.choice(["revolute", "prismatic", "screw"], count - 1)]
+        axes = [axis / np.linalg.norm(axis) for axis in rng.normal(size=(count, 3))]
+        points = [*(0.3 * rng.normal(size=(count - 1, 3))), np.zeros(3)]  # the last is at the body's origin
+        self.parts = [Part(str(kind), axis, place) for kind, axis, place in zip(kinds, axes, points, strict=True)]
+        self.coordinates = tuple([f"x{k}" for k in range(count)])
+        self.velocities = tuple([f"w{k}" for k in range(count)]) if seed % 4 < 2 else self.coordinates
+        self.units = tuple(["m" if part.kind == "prismatic" else "rad" for part in self.parts])
+        self.velocity_units = tuple([f"{unit}/s" for unit in self.units])
+        self.neutral, self.groups = (0.0,) * count, tuple(range(count))
+        self.mixing = np.eye(count) + 0.3 * rng.normal(size=(count, count)) if mixed else np.eye(count)
+
+    def _steps(self, q: Nodes) -> Iterator[tuple[list[list[cg.Node]], Triple, Part]]:
+        """Of each part its turn, and from where the last one has its origin to where this one has, before the turn."""
+        before = np.zeros(3)
+        for x, part in zip(q, self.parts, strict=True):
+            turn = [[ONE if i == j else ZERO for j in range(3)] for i in range(3)]
+            if part.kind != "prismatic":
+                across = np.cross(np.eye(3), part.axis)
+                for i in range(3):
+                    for j in range(3):
+                        turn[i][j] = turn[i][j] + across[i, j] * cg.sin(x)
+                        turn[i][j] = turn[i][j] + (across @ across)[i, j] * (1.0 - cg.cos(x))
+            offset = spatial.constant(part.place - before)
+            yield turn, spatial.plus(offset, spatial.scaled(_slide(part, x), spatial.constant(part.axis))), part
+            before = part.place
+
+    def rotation(self, q: Nodes) -> list[list[cg.Node]]:
+        columns = [spatial.constant(axis) for axis in np.eye(3)]
+        for turn, _, _ in reversed(list(self._steps(q))):
+            columns = [spatial.rotate(turn, column) for column in columns]
+        return [[columns[j][i] for j in range(3)] for i in range(3)]
+
+    def translation(self, q: Nodes) -> Triple:
+        point = spatial.STILL
+        for turn, offset, _ in reversed(list(self._steps(q))):
+            point = spatial.plus(offset, spatial.rotate(turn, point))
+        return point
+
+    def velocity(self, q: Nodes, u: Nodes) -> Twist:
+        omega, velocity = spatial.STILL, spatial.STILL
+        for (turn, offset, part), rate in zip(self._steps(q), self.rate(q, u), strict=True):
+            velocity = spatial.plus(velocity, spatial.cross(omega, offset))
+            axis = spatial.constant(part.axis)
+            spin = ZERO if part.kind == "prismatic" else rate
+            omega = spatial.plus(spatial.rotate_transpose(turn, omega), spatial.scaled(spin, axis))
+            slide = spatial.scaled(_slide(part, rate), axis)
+            velocity = spatial.plus(spatial.rotate_transpose(turn, velocity), slide)
+        return Twist(omega, velocity)
+
+    def rate(self, q: Nodes, u: Nodes) -> Nodes:
+        return [spatial.total([float(g) * x for g, x in zip(row, u, strict=True)]) for row in self.mixing]
+
+    def placement(self, axis: Array, at: Array) -> tuple[Array, Array]:
+        raise NotImplementedError
+
+    def resists(self, mass: float, inertia: Array) -> bool:
+        return mass > 0.0
+
+
+def _slide(part: Part, x: cg.Node) -> cg.Node:
+    return {"revolute": ZERO, "prismatic": x, "screw": PITCH * x}[part.kind]
+
+
+class Twins(NamedTuple):
+    """A tree with a random joint, and the same with a chain of massless bodies in its place.
+
+    mixing: qd of the second is this times qd of the first.
+    """
+
+    model: dyn.Mechanism
+    twin: dyn.Mechanism
+    mixing: Array
+    columns: list[int]  # of a regressor of the second, those of the bodies that both have
+
+
+def twins(seed: int, joint: Random) -> Twins:
+    """joint: in `TYPES`. Two trees in three have no other joint of several freedoms."""
+    rng = np.random.default_rng((seed, 1))
+    count = int(rng.integers(2, 4))
+    at, bodies, apart = int(rng.integers(count)), list[dyn.Body](), list[dyn.Body]()
+    kinds = ["revolute", "prismatic", "screw"] + (["ball", "free", "free (body axes)", "universal"] * (seed % 3 == 0))
+    armature = 0.0 if np.any(joint.mixing != np.eye(len(joint.parts))) else 0.2
+    for i in range(count):
+        parent, name = f"b{rng.integers(i)}" if i else "world", f"b{i}"
+        if i != at:
+            kind = str(rng.choice(kinds))
+            none = ("stiffness", "spring_reference", "armature", *(["pitch"] if kind != "screw" else []))
+            others = dict.fromkeys(none, 0.0) if kind not in ("revolute", "prismatic") else {}
+            body = random_body(name, kind, parent, rng, joint=random_joint(kind, rng, **others))
+            bodies.append(body)
+            apart.append(body)
+            continue
+        placed: dict[str, Any] = {"position": 0.3 * rng.normal(size=3), "orientation": _rotation(rng)}
+        body = random_body(name, "random", parent, rng, joint=dyn.Joint("random", armature=armature, **placed))
+        bodies.append(body)
+        before, outer = np.zeros(3), parent
+        for k, part in enumerate(joint.parts):
+            position, last = part.place - before, k + 1 == len(joint.parts)
+            if not k:
+                position = placed["position"] + placed["orientation"] @ position
+            pitch = PITCH if part.kind == "screw" else 0.0
+            turned = {"orientation": placed["orientation"]} if not k else {}
+            single = dyn.Joint(part.kind, part.axis, position, armature=armature, pitch=pitch, **turned)
+            inner = name if last else f"{name}.{k}"
+            own = {"mass": body.mass, "center": body.center, "inertia": body.inertia} if last else {}
+            apart.append(dyn.Body(inner, single, outer, **own))
+            before, outer = part.place, inner
+    gravity = 5.0 * rng.normal(size=3)
+    model, twin = dyn.Mechanism(bodies, gravity), dyn.Mechanism(apart, gravity)
+    mixing = np.eye(model.system.n)
+    place = {body.name: each.u for body, each in zip(model.moving, places(model.moving), strict=True)}[f"b{at}"]
+    mixing[place, place] = joint.mixing
+    both = {body.name for body in model.moving}
+    columns = [10 * i + k for i, body in enumerate(twin.moving) if body.name in both for k in range(10)]
+    return Twins(model, twin, mixing, columns)
+
+
+def _rotation(rng: np.random.Generator) -> Array:
+    return spatial.from_quaternion(rng.normal(size=4))
+
+
+def _state(given: Twins, seed: int) -> tuple[dict[str, Array], dict[str, Array]]:
+    """A state of the first as the graphs have it, and the same of the second."""
+    q, qd, qdd, tau = random_state(given.model, seed)
+    inverse = np.linalg.inv(given.mixing)
+    first = {"q": q, "qd": qd, "qdd": qdd, "tau": tau, "p": tau}
+    second = {"qd": given.mixing @ qd, "qdd": given.mixing @ qdd, "tau": inverse.T @ tau, "p": inverse.T @ tau}
+    return first, first | second
+
+
+def _values(graph: cg.Graph, state: dict[str, Array]) -> Array:
+    """All outputs in a row."""
+    named = {f"{name}{k}": float(x) for name, row in state.items() for k, x in enumerate(row)}
+    if "dt" in graph.input_names:  # embedded: with the state before
+        old = {"q": state["q"] - 1e-3 * state["qd"], "qd": state["qd"] - 1e-3 * state["qdd"]}
+        named |= {f"{name}{k}_old": float(x) for name, row in old.items() for k, x in enumerate(row)} | {"dt": 1e-3}
+    values = graph.evaluate({name: named[name] for name in graph.input_names})
+    return np.array(list(values.values()), dtype=np.float64)
+
+
+Rows = Callable[[Array, Twins], Array]  # values of the second as those of the first
+
+
+def _alike(values: Array, given: Twins) -> Array:
+    return values
+
+
+def _forces(values: Array, given: Twins) -> Array:
+    return given.mixing.T @ values
+
+
+def _matrix(values: Array, given: Twins) -> Array:
+    n = given.model.system.n
+    squares = values.reshape(-1, n, n)
+    return (given.mixing.T @ squares @ given.mixing).ravel()
+
+
+def _torques_and_matrices(values: Array, given: Twins) -> Array:
+    n = given.model.system.n
+    return np.concatenate([_forces(values[:n], given), _matrix(values[n:], given)])
+
+
+def _accelerations(values: Array, given: Twins) -> Array:
+    return np.linalg.solve(given.mixing, values)
+
+
+def _state_rate(values: Array, given: Twins) -> Array:
+    nq = given.model.system.nq
+    return np.concatenate([values[:nq], _accelerations(values[nq:], given)])
+
+
+def _momentum_rate(values: Array, given: Twins) -> Array:
+    nq = given.model.system.nq
+    return np.concatenate([values[:nq], _forces(values[nq:], given)])
+
+
+def _inverse(values: Array, given: Twins) -> Array:
+    n, back = given.model.system.n, np.linalg.inv(given.mixing)
+    return (back @ values.reshape(n, n) @ back.T).ravel()
+
+
+def _columns(values: Array, given: Twins) -> Array:
+    return (values.reshape(-1, given.model.system.n) @ given.mixing).ravel()
+
+
+def _regressor(values: Array, given: Twins) -> Array:
+    return (given.mixing.T @ values.reshape(given.model.system.n, -1)[:, given.columns]).ravel()
+
+
+def _state_space(values: Array, given: Twins) -> Array:
+    n, inverse = given.model.system.n, np.linalg.inv(given.mixing)
+    both, back = np.kron(np.eye(2), given.mixing), np.kron(np.eye(2), inverse)
+    a, b = values[: 4 * n * n].reshape(2 * n, 2 * n), values[4 * n * n :].reshape(2 * n, n)
+    return np.concatenate([(back @ a @ both).ravel(), (back @ b @ inverse.T).ravel()])
+
+
+def _state_space_of_momenta(values: Array, given: Twins) -> Array:
+    n, g, back = given.model.system.n, given.mixing, np.linalg.inv(given.mixing)
+    out, into = np.block([[back, 0 * g], [0 * g, g.T]]), np.block([[g, 0 * g], [0 * g, back.T]])
+    a, b = values[: 4 * n * n].reshape(2 * n, 2 * n), values[4 * n * n :].reshape(2 * n, n)
+    return np.concatenate([(out @ a @ into).ravel(), (out @ b @ back.T).ravel()])
+
+
+LAST: Callable[[dyn.Mechanism], str] = lambda model: model.bodies[-1].name  # noqa: E731 (a name for a short function)
+AT = (0.3, -0.2, 0.1)
+GRAPHS: dict[str, tuple[Callable[[dyn.Mechanism], cg.Graph], Rows]] = {
+    "inverse dynamics": (dyn.inverse_dynamics, _forces),
+    **{name: (lambda m, name=name: dyn.inverse_dynamics(m, name), _forces) for name in dyn.FORMULATIONS},
+    "forward dynamics": (dyn.forward_dynamics, _accelerations),
+    "state equation": (dyn.state_equation, _state_rate),
+    "mass matrix": (dyn.mass_matrix, _matrix),
+    "inverse mass matrix": (dyn.inverse_mass_matrix, _inverse),
+    "bias": (dyn.bias, _forces),
+    "gravity": (dyn.gravity_force, _forces),
+    "coriolis": (dyn.coriolis, _matrix),
+    "momentum": (dyn.momentum, _forces),
+    "momentum rate": (dyn.momentum_rate, _forces),
+    "energy": (dyn.energy, _alike),
+    "kinetic": (dyn.kinetic_energy, _alike),
+    "potential": (dyn.potential_energy, _alike),
+    "derivatives": (dyn.inverse_dynamics_derivatives, _torques_and_matrices),
+    "state space": (dyn.state_space, _state_space),
+    "state space of momenta": (lambda m: dyn.state_space(m, form="momentum"), _state_space_of_momenta),
+    "hamiltonian": (dyn.hamiltonian, _alike),
+    "hamilton equations": (dyn.hamilton_equations, _momentum_rate),
+    "regressor": (dyn.regressor, _regressor),
+    "center of mass": (dyn.center_of_mass, _alike),
+    "its Jacobian": (dyn.center_of_mass_jacobian, _columns),
+    "spatial momentum": (dyn.spatial_momentum, _alike),
+    "momentum about the center": (lambda m: dyn.spatial_momentum(m, "center of mass"), _alike),
+    "placement": (lambda m: dyn.frame_placement(m, LAST(m), AT), _alike),
+    "velocity": (lambda m: dyn.frame_velocity(m, LAST(m), AT, "body"), _alike),
+    "acceleration": (lambda m: dyn.frame_acceleration(m, LAST(m), AT), _alike),
+    "bias acceleration": (lambda m: dyn.frame_bias_acceleration(m, LAST(m), AT), _alike),
+    "jacobian": (lambda m: dyn.frame_jacobian(m, LAST(m), AT), _columns),
+    "jacobian rate": (lambda m: dyn.frame_jacobian_rate(m, LAST(m), AT), _columns),
+    "motion": (lambda m: m.motion(LAST(m), AT), _alike),
+}
+EMBEDDED = ("euler_embedded", "kinetic_only", "kinetic_only_exact")  # in the velocities of the coordinates alone
+
+
+def _error(value: Array, reference: Array) -> float:
+    scale = float(np.abs(reference).max())
+    return float(np.abs(value - reference).max()) / scale if scale else float(np.abs(value).max())
+
+
+def _given(seed: int, monkeypatch: MonkeyPatch) -> Twins:
+    joint = Random(seed, mixed=seed % 2 == 1)
+    monkeypatch.setitem(TYPES, joint.kind, joint)
+    return twins(seed, joint)
+
+
+FEW = (0, 3)
+SEEDS = [*FEW, *slow(*[seed for seed in range(100) if seed not in FEW])]
+
+
+@mark.parametrize("seed", SEEDS)
+def test_every_graph_is_that_of_its_joints_of_one_axis(seed: int, monkeypatch: MonkeyPatch) -> None:
+    given = _given(seed, monkeypatch)
+    first, second = _state(given, seed + 7)
+    worst: dict[str, float] = {}
+    for name, (derive, as_first) in GRAPHS.items():
+        if name in EMBEDDED and given.model.system.kinematics.quasi is not None:
+            continue
+        value = _values(derive(given.model), first)
+        worst[name] = _error(value, as_first(_values(derive(given.twin), second), given))
+    recursive = [dyn.RecursiveInverseDynamics(model) for model in given[:2]]
+    torques = [run(*[s[k] for k in ("q", "qd", "qdd")]) for run, s in zip(recursive, (first, second), strict=True)]
+    worst["body by body"] = _error(torques[0], _forces(torques[1], given))
+    wrong = {name: e for name, e in worst.items() if not e < (THROUGH_STEP if name in EMBEDDED else ROUNDING)}
+    assert not wrong
+
+
+@mark.parametrize("seed", SEEDS)
+def test_the_equations_are_lagrange_s_by_differences_and_one_another_s(seed: int, monkeypatch: MonkeyPatch) -> None:
+    model = _given(seed, monkeypatch).model
+    system, (q, qd, qdd, tau) = model.system, random_state(model, seed + 3)
+    state = {"q": q, "qd": qd, "qdd": qdd, "tau": tau}
+    names = ("inverse dynamics", "forward dynamics", "mass matrix", "bias", "inverse mass matrix", "coriolis")
+    torque, acceleration, mass, bias, inverse, coriolis = (_values(GRAPHS[name][0](model), state) for name in names)
+    mass, inverse, coriolis = (each.reshape(system.n, system.n) for each in (mass, inverse, coriolis))
+    damping = _values(dyn.damping_force(model), state)
+    # Dense: tau = M qdd + h + D qd, M qdd = tau - h - D qd, M M^-1 = 1, and h = C qd + g
+    assert _error(mass @ qdd + bias + damping, torque) < ROUNDING
+    assert _error(mass @ acceleration + bias + damping, tau) < ROUNDING
+    assert _error(mass @ inverse, np.eye(system.n)) < ROUNDING
+    gravity = _values(dyn.gravity_force(model), state)
+    assert _error(coriolis @ qd + gravity, bias) < ROUNDING
+    # d/dt dL/du - (G^T dL/dq - ad) by differences along the motion, where ad is 0
+    if len(system.kinematics.groups) == len(set(system.kinematics.groups)):
+        kinetic, potential, momentum = dyn.kinetic_energy(model), dyn.potential_energy(model), dyn.momentum(model)
+        rates = cg.Graph([*system.q, *system.qd], {f"{k}": node for k, node in enumerate(system.q_dot)})
+
+        def lagrangian(at: Array) -> Array:
+            return _values(kinetic, {"q": at, "qd": qd}) - _values(potential, {"q": at, "qd": qd})
+
+        def along(v: Array) -> Array:
+            return _values(rates, {"q": q, "qd": v})
+
+        ends = [{"q": q + h * along(qd), "qd": qd + h * qdd} for h in (STEP, -STEP)]
+        rate = (_values(momentum, ends[0]) - _values(momentum, ends[1])) / (2 * STEP)
+        slopes = [
+            (lagrangian(q + STEP * along(e)) - lagrangian(q - STEP * along(e)))[0] / (2 * STEP)
+            for e in np.eye(system.n)
+        ]
+        assert _error(rate - np.array(slopes) + damping, torque) < DIFFERENCES
