@@ -11,14 +11,21 @@ if TYPE_CHECKING:
     from .equations.constraints.constraint_lint import ConstraintLint, lint_constraints
     from .equations.constraints.constraint_rank import ConstraintWarning
     from .equations.constraints.integrability import integrable_rows
-    from .equations.coriolis import coriolis, damping_force
+    from .equations.coriolis import coriolis
     from .equations.energies import energy, kinetic_energy, potential_energy
-    from .equations.equations_of_motion import bias, forward_dynamics, gravity_force, mass_matrix, momentum
+    from .equations.equations_of_motion import (
+        bias,
+        damping_force,
+        forward_dynamics,
+        gravity_force,
+        inverse_mass_matrix,
+        mass_matrix,
+        momentum,
+    )
     from .equations.formulations.formulation_sizes import formulation_sizes
     from .equations.formulations.formulations import FORMULATIONS, inverse_dynamics, momentum_rate
     from .equations.formulations.spurious_nodes import spurious_nodes
     from .equations.formulations.verdict import Verdict, formulation_verdict
-    from .equations.inverse_mass_matrix import inverse_mass_matrix
     from .equations.linearization.inverse_dynamics_derivatives import inverse_dynamics_derivatives
     from .equations.linearization.linearization import linearize, state_space
     from .equations.linearization.linearize_many import linearize_many

@@ -115,8 +115,7 @@ def _solved(system: System, terms: BiasTerms, method: str, check: bool) -> Graph
         # What stands at the coordinates already. Elimination takes the inertial terms where they are, at their
         # velocity nodes, and carries them to the coordinates on its way; a dense solve needs the whole bias here.
         at_rest = terms.gradient if not method.startswith("dense") else [-force for force in terms.bias(system, build)]
-        with cg.tag("damping"):
-            braking = [damping * qd for damping, qd in zip(system.damping, system.qd, strict=True)]
+        braking = system.braking(build)
         rhs = [
             tau + force - brake + applied
             for tau, force, brake, applied in zip(system.tau, at_rest, braking, terms.forces, strict=True)

@@ -35,10 +35,10 @@ class BiasTerms(NamedTuple):
 
 
 def bias_terms(system: System, qdd: Sequence[Node] | None = None) -> BiasTerms:
-    """As the system states its forces (`System.bias_forces`), or else derived from its Lagrangian.  qdd: see there."""
-    stated = system.bias_forces(qdd)
-    if stated is None:
+    """As bodies state their forces, or else derived from the Lagrangian.  qdd: accelerations, 0 if None."""
+    if system.body_terms is None:
         return bias_terms_of_lagrangian(system, qdd)
+    stated = system.body_terms.equations.bias_forces(system.q, system.qd, qdd)
     pairs = [node for pair in stated for node in pair]
     build = Builder()
     rates, n = system.constraints.rates, system.n

@@ -94,7 +94,7 @@ def mass_solve(system: System, build: Builder, method: str) -> MassSolve:
     return linear(b, solve_nodes(lagrangian, system.qd, b, build))
 
 
-def shorter(system: System, make: Callable[[str], Sized]) -> Sized:
+def smaller_solution(system: System, make: Callable[[str], Sized]) -> Sized:
     """What `make` makes by one of the methods: by the dense one where paths are short and that saves nodes."""
     eliminated = make("recursive")
     if _longest_path(system.lagrangian, system.qd) > DENSE_PATH:

@@ -11,12 +11,14 @@ from ..systems.arguments import TIME
 from ..systems.model import Model, as_ode, as_system, system_of
 from ..systems.system import System
 from .constraints.constraints import held_still
+from .equation import Equation, Output
 from .equations_of_motion import SOLUTIONS, forward_dynamics
 from .formulations.formulations import ZERO
 
 FORMS = ("velocity", "momentum")  # of a motion: states (q, qd) or (q, p)
 
 
+@Equation("q qd tau", Output("q{}_dot", ("nq",)), Output("qd{}_dot", ("n",))).describes
 def state_equation(model: Model, method: str = "auto") -> Graph:
     """The time derivative of a model's state, xdot = f(x, tau, t).
 
@@ -29,11 +31,8 @@ def state_equation(model: Model, method: str = "auto") -> Graph:
 
     Returns
     -------
-    Graph
-        Of a mechanical model: inputs q0.., qd0.., tau0.., t if needed, parameters; outputs q0_dot.., qd0_dot.. with
-        q_dot = qd, or G(q) qd of `QuasiVelocities`, and qd_dot from `forward_dynamics`, 0 where constraints that do not
-        depend on time leave no motion. Of an OdeSystem: inputs its
-        states, t if needed, parameters; outputs `<state>_dot`.
+    q_dot is qd, or G(q) qd of `QuasiVelocities`, and qd_dot that of `forward_dynamics`, 0 where constraints that do not
+    depend on time leave no motion. Of an OdeSystem: inputs its states, t if needed, parameters; outputs `<state>_dot`.
 
     Raises
     ------

@@ -11,7 +11,7 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import Builder, building, cotangents, folded, is_finite, tangents, topological
 
-from .arguments import names_of, node_or_number, sequence
+from .arguments import names_of, node_or_number, require_known, sequence
 from .quasi_velocities import Function, QuasiVelocities
 
 ONE, ZERO = cg.constant(1.0), cg.constant(0.0)
@@ -146,9 +146,7 @@ class Kinematics:
             raise ValueError(f"{what} must give {count} values, got {len(given)}")
         nodes = [node_or_number(what, value) for value in given]
         known = set(topological([node for part in arguments for node in part])) | set(self.q)
-        for node in topological(nodes):
-            if node.op.name == "variable" and node not in known:
-                raise ValueError(f"{what} uses {node.name!r}, which is none of its arguments")
+        require_known(what, nodes, known, "none of its arguments")
         return nodes
 
     def _numbers(self, what: str, given: object, default: Sequence[float]) -> tuple[float, ...]:

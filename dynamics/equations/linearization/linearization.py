@@ -12,8 +12,8 @@ from cgraph.extend import Array, require_choice
 
 from ...systems.model import Model, as_system
 from ...systems.system import System
+from ..equation import Equation, Output, shortened
 from ..equations_of_motion import forward_dynamics
-from ..shorter_form import shorter_form
 from ..singular_mass_matrix import raise_if_singular
 from ..state_equation import FORMS
 from ..states.evaluate_at import evaluate_at
@@ -22,6 +22,7 @@ from .linearization_parts import LinearizationParts, linearization_parts
 from .symmetric_linearization import SymmetricParts
 
 
+@Equation("q qd tau", Output("A_{}_{}", ("2n", "2n")), Output("B_{}_{}", ("2n", "n"))).describes
 def state_space(model: Model, *, form: str = "velocity") -> Graph:
     """A and B of d(xdot) = A dx + B dtau, x = (q, qd), or x = (q, p) of the momentum form, at any state.
 
@@ -50,17 +51,13 @@ def state_space(model: Model, *, form: str = "velocity") -> Graph:
 
     Parameters
     ----------
-    model : Model
-        A system, a mechanism or a scene with n coordinates.
     form : {"velocity", "momentum"}
         Of x, as of `simulate`.
 
     Returns
     -------
-    Graph
-        Inputs q0.., qd0.., tau0.., or q0.., p0.., t if needed, parameters; outputs A_0_0, .., (2n, 2n), and B_0_0, ..,
-        (2n, n), row by row. The velocities of p are those of `hamilton_equations`, with its error where L is not
-        quadratic in them.
+    Of the momentum form the inputs are q0.., p0.., without tau0... The velocities of p are those of
+    `hamilton_equations`, with its error where L is not quadratic in them.
 
     Raises
     ------
@@ -70,8 +67,6 @@ def state_space(model: Model, *, form: str = "velocity") -> Graph:
         For the momentum form of a model with constraints.
     ValueError
         For the momentum form of a model with a parameter that is called like a momentum.
-    TypeError
-        For what is no model, or has no Lagrangian.
 
     Examples
     --------
@@ -86,10 +81,8 @@ def state_space(model: Model, *, form: str = "velocity") -> Graph:
     {'A_0_0': 0.0, 'A_0_1': 0.25, 'A_1_0': -20.0, 'A_1_1': 0.0, 'B_0_0': 0.0, 'B_1_0': 1.0}
     """
     if require_choice("form", form, FORMS) == "velocity":
-        return shorter_form(as_system(model), lambda system: linearization_parts(system).written_out())
-    return shorter_form(
-        as_system(model), lambda system: SymmetricParts(system, momenta=True).of_momenta(), mirrored=True
-    )
+        return shortened(as_system(model), lambda system: linearization_parts(system).written_out())
+    return shortened(as_system(model), lambda system: SymmetricParts(system, momenta=True).of_momenta(), mirrored=True)
 
 
 def parts_of(system: System, form: str) -> LinearizationParts | SymmetricParts:

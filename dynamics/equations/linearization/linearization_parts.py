@@ -18,7 +18,7 @@ from cgraph.extend import Array, Builder, building, folded, topological, with_re
 from ...systems.system import System
 from ..accelerations import BY_ENERGY, accelerations
 from ..formulations.formulations import ONE, ZERO
-from ..mass_matrix_solve import MassSolve, inverse, mass_solve, shorter
+from ..mass_matrix_solve import MassSolve, inverse, mass_solve, smaller_solution
 from .held_linearization import held_sides
 from .inverse_dynamics_derivatives import torque_derivatives
 
@@ -102,7 +102,7 @@ class LinearizationParts(NamedTuple):
 def linearization_parts(system: System) -> LinearizationParts:
     """Raises SingularMassMatrixError for a coordinate without inertia."""
     if not len(system.constraints):
-        return shorter(system, lambda method: _parts(system, method))
+        return smaller_solution(system, lambda method: _parts(system, method))
     solved, build = accelerations(system), Builder()
     sides, solve = held_sides(system, solved, build)
     return LinearizationParts(solved.inputs, sides, solve, system.kinematics.brackets(build), build)

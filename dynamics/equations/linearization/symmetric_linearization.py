@@ -25,7 +25,7 @@ from cgraph.extend import Array, Builder, building, cotangents, folded, hessian_
 
 from ...systems.system import System
 from ..formulations.formulations import ONE, ZERO
-from ..mass_matrix_solve import MassSolve, inverse, mass_solve, shorter
+from ..mass_matrix_solve import MassSolve, inverse, mass_solve, smaller_solution
 from ..momentum.hamiltonian import ITERATIONS
 from ..momentum.legendre import Legendre
 from .inverse_dynamics_derivatives import state_slopes
@@ -86,7 +86,7 @@ class SymmetricParts:
             gradient = system.kinematics.pulled_back(cotangents({lagrangian: ONE}, system.q, build), build)
             slopes = state_slopes(system, gradient, build)
             mixed, second = _transposed([row[n:] for row in slopes]), [row[:n] for row in slopes]
-        return shorter(system, lambda method: Blocks(mass_solve(system, build, method), mixed, second))
+        return smaller_solution(system, lambda method: Blocks(mass_solve(system, build, method), mixed, second))
 
     @cached_property
     def derivatives(self) -> tuple[Rows, Rows, Rows]:

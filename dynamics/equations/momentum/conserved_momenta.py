@@ -59,7 +59,9 @@ def _rates(system: System) -> list[Node]:
     """Rates of the momenta at tau = 0, as short as they get."""
     build = Builder()
     p = new_variables("p", system.n, system.parameters)
-    stated: Sequence[Node] | None = system.momentum_rates(p)
+    stated: Sequence[Node] | None = None
+    if system.body_terms is not None:
+        stated = system.body_terms.equations.momentum_rates(system.q, system.qd, p)
     if stated is None:
         (lagrangian,) = folded([system.lagrangian], build)
         bars = cotangents({lagrangian: ONE}, [*system.q, *system.qd], build)

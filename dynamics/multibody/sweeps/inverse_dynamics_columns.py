@@ -21,7 +21,7 @@ import cgraph as cg
 from cgraph import Node
 from cgraph.extend import Builder, building, cotangents
 
-from ...systems.torque_derivatives import MotionState, TorqueDerivatives
+from ...systems.body_terms import MotionState, TorqueDerivatives
 from ..algebra.spatial import ZERO, Triple, dot
 from ..algebra.spatial_vectors import Wrench
 from ..body import Body

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import cgraph as cg
 from cgraph import Node
 
-from ...systems.system import BiasForce
+from ...systems.body_terms import BiasForce
 from ..algebra import spatial
 from ..algebra.spatial import STILL, ZERO, Triple
 from ..joints import AxialJoint, MovingJoint, SpatialJoint

@@ -8,7 +8,8 @@ from pytest import approx
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.equations.coriolis import coriolis, damping_force
+from dynamics.equations.coriolis import coriolis
+from dynamics.equations.equations_of_motion import damping_force
 from dynamics.equations.states.evaluate_at import evaluate_at
 from dynamics.multibody.builders.planar_arm import planar_links
 from dynamics.systems.model import as_system
