@@ -399,7 +399,7 @@ CALLS |= {
     "extend.require_sequence": call(lambda value: extend.require_sequence("value", value, "texts", str), ["a"]),
     "extend.require_texts": call(lambda value: extend.require_texts("value", value), {"a": "b"}),
     "extend.require_whole": call(lambda value, least: extend.require_whole("value", value, least), 3, 0),
-    "extend.rounding_spread": call(extend.rounding_spread, GRAPH, {}),
+    "extend.rounding_spread": call(extend.rounding_spread, GRAPH, {}, {}),
     "extend.runner": call(extend.runner, PROGRAM, "python", fast=False, fma=True),
     "extend.scipy_integrate": call(extend.scipy_integrate, "what"),
     "extend.share": call(extend.share, abs, range(3), 2),

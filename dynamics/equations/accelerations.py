@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from functools import cache
+from typing import Any
+
+import numpy as np
 
 import cgraph as cg
 from cgraph import Graph
@@ -18,13 +22,14 @@ from .constraints.constraints import (
     solved_by_elimination,
     unknown_names,
 )
-from .inertia_rank import without_inertia
+from .inertia_rank import TORQUE, without_inertia
 from .singular_mass_matrix import SingularMassMatrixError, no_inertia
 
 DENSE_UP_TO = 7  # coordinates; beyond, the dense graph is larger on a tree of bodies, and takes long to build
 WORTH = 0.9  # of the recursive graph's nodes, at most, for the dense one: elimination keeps more digits
 BY_ENERGY = "dense by energy"  # with the Hessian of L, also where bodies give an M of fewer nodes
 TURN = 10  # products that a sine takes as long as, about
+DRAWN = 64  # states at which accelerations are looked at for their size
 GROWTH = 3.0  # times the rounding of the safest graph, at most, at sample points
 
 
@@ -79,7 +84,7 @@ def accelerations(system: System, method: str = "auto", check: bool = False) -> 
         ) from None
     if not graphs:
         raise SingularMassMatrixError(no_inertia(system, failure)) from None
-    chosen = _smallest(graphs, WORTH if methods[-1] == "dense" else 1.0, system.parameters)
+    chosen = _smallest(system, graphs, WORTH if methods[-1] == "dense" else 1.0)
     if not system.surely_regular:
         if held:
             _require_inertia_without_constraints(system)
@@ -88,18 +93,51 @@ def accelerations(system: System, method: str = "auto", check: bool = False) -> 
     return chosen
 
 
-def _smallest(graphs: Sequence[Graph], worth: float, values: Mapping[str, float]) -> Graph:
+def _smallest(system: System, graphs: Sequence[Graph], worth: float) -> Graph:
     """Of graphs, the safest first, the smallest whose roundings carry little further than those of the first.
 
     worth: of the nodes of the one before, at most, for the last.
     """
-    safe = chosen = graphs[0]
+    chosen = graphs[0]
+    spread = cache(lambda graph: rounding_spread(graph, system.parameters, _sizes(system, graphs[0])))
     for graph in graphs[1:]:
         limit = worth if graph is graphs[-1] else 1.0
-        smaller = _cost(graph) < limit * _cost(chosen)
-        if smaller and rounding_spread(graph, values) <= GROWTH * rounding_spread(safe, values):
+        if _cost(graph) < limit * _cost(chosen) and spread(graph) <= GROWTH * spread(graphs[0]):
             chosen = graph
     return chosen
+
+
+def _sizes(system: System, accelerations: Graph) -> dict[str, float]:
+    """Sizes of states, torques and accelerations of bodies, which change with the units of mass, length and time.
+
+    Angles are of size 1, places of the length L that an angle of 1 moves the bodies by. With A, the acceleration of
+    bodies at rest, speeds are of size sqrt(A L), and torques are such that they accelerate by A, too. Of a Lagrangian
+    alone units are unknown: all is of size 1.
+    """
+    if system.body_terms is None:
+        return {}
+    ways = [length or 1.0 for length in system.lengths]  # m of a unit
+    longest = next((length for length in ways if length != 1.0), 1.0)
+    of_q, of_u = np.array(ways[: system.nq]), np.array(ways[system.nq :])
+    rng = np.random.default_rng(0)
+    at: dict[str, Any] = dict.fromkeys(accelerations.input_names, 0.0) | dict(system.parameters)
+    at |= {f"q{i}": longest / way * rng.normal(size=DRAWN) for i, way in enumerate(of_q)}
+
+    def largest(force: float) -> float:
+        """Acceleration [m/s^2] by a force [N] along all velocities, the largest of them, in the median over states."""
+        with np.errstate(all="ignore"):
+            values = accelerations.evaluate(at | {f"tau{i}": force * way for i, way in enumerate(of_u)})
+            rows = [np.broadcast_to(np.abs(values[f"qdd{i}"] * way), DRAWN) for i, way in enumerate(of_u)]
+            return float(np.median(np.max(rows, axis=0)))
+
+    falling, by_force = largest(0.0), largest(TORQUE) / TORQUE
+    rate = falling if 0.0 < falling < np.inf else longest
+    force = rate / by_force if 0.0 < by_force < np.inf else 1.0
+    sizes = {f"q{i}": longest / way for i, way in enumerate(of_q)}
+    for i, way in enumerate(of_u):
+        sizes |= {f"qd{i}": np.sqrt(rate * longest) / way, f"tau{i}": force * way, f"qdd{i}": rate / way}
+    others = [name for name in accelerations.outputs if name not in sizes]
+    return sizes | dict.fromkeys(others, np.inf)  # multipliers, which have units of rows: they are not compared
 
 
 def _cost(graph: Graph) -> int:
