@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     from .equations.momentum.hamiltonian import hamilton_equations, hamiltonian
     from .equations.singular_mass_matrix import SingularMassMatrixError, raise_if_singular
     from .equations.state_equation import state_equation
-    from .equations.states.arrays_at import arrays_at
     from .equations.states.consistent_state import consistent_state
+    from .equations.states.evaluate import arrays_at
     from .equations.states.freedom import Freedom, freedom
     from .equations.torque_decomposition import torque_by_joint_motion, torque_by_link
     from .equations.torque_table import TorqueTable

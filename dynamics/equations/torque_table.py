@@ -14,7 +14,7 @@ from cgraph.extend import Array, Names, html_table, require_whole, topological
 
 from ..systems.display_names import display_names
 from ..systems.system import System
-from .states.evaluate_at import evaluate_at
+from .states.evaluate import evaluate
 
 STRUCTURAL_ZERO = "·"  # a cell that is zero by structure, at every state
 LONGEST_EXPRESSION = 40  # characters of a cell that is written out, with q0 for the coordinate's name
@@ -110,7 +110,7 @@ class TorqueTable:
         ValueError
             For another shape, a number that is not finite, or an unknown parameter.
         """
-        flat = evaluate_at(self.system, self.graph, {"q": q, "qd": qd, "qdd": qdd}, t, parameters)
+        flat = evaluate(self.system, self.graph, {"q": q, "qd": qd, "qdd": qdd}, t, parameters)
         if flat.ndim != 1:
             raise ValueError(f"a table has one state, q, qd and qdd of the shape ({self.system.n},)")
         return replace(self, values=flat.reshape(len(self.rows), len(self.columns)))

@@ -16,7 +16,7 @@ from ..equation import Equation, Output, shortened
 from ..equations_of_motion import forward_dynamics
 from ..singular_mass_matrix import raise_if_singular
 from ..state_equation import FORMS
-from ..states.evaluate_at import evaluate_at
+from ..states.evaluate import evaluate
 from ..states.initial_value import normalized
 from .linearization_parts import LinearizationParts, linearization_parts
 from .symmetric_linearization import SymmetricParts
@@ -155,7 +155,7 @@ def linearize(
     """
     system, parts = as_system(model), parts_of(as_system(model), require_choice("form", form, FORMS))
     graphs = parts.in_columns()
-    flat = evaluate_at(system, graphs.shared, {"q": q, "qd": qd, "tau": tau}, t, parameters)
+    flat = evaluate(system, graphs.shared, {"q": q, "qd": qd, "tau": tau}, t, parameters)
     if flat.ndim != 1:
         raise ValueError("linearize takes one state, got rows of several; see linearize_many")
     factors, sides, rest = np.split(flat, [graphs.factors, graphs.factors + graphs.sides])
@@ -172,7 +172,7 @@ def _raise_what_is_not_finite(
 ) -> None:
     """The state has a quaternion without a length, or a mass matrix that is singular, or numbers leave float64."""
     normalized(system, np.concatenate([np.asarray(state[name], dtype=np.float64) for name in ("q", "qd")]))
-    info = evaluate_at(system, forward_dynamics(system, check=True), state, t, parameters)[-1]
+    info = evaluate(system, forward_dynamics(system, check=True), state, t, parameters)[-1]
     if np.isfinite(info):
         raise_if_singular(system, info)
     raise ValueError("there is no linearization at this state: its numbers leave the range of float64")

@@ -27,7 +27,7 @@ from ...systems.system import System
 from ..equations_of_motion import forward_dynamics
 from ..formulations.formulations import ONE, ZERO
 from ..state_equation import FORMS
-from ..states.evaluate_at import InputRows
+from ..states.evaluate import input_rows
 from .linearization_parts import ColumnGraphs, LinearizationParts, linearization_parts
 from .symmetric_linearization import SymmetricParts
 
@@ -100,7 +100,7 @@ def linearize_many(
     """
     system = as_system(model)
     function, count = _function(system, require_choice("form", form, FORMS)), thread_count(threads)
-    values = function.inputs({"q": q, "qd": qd, "tau": tau}, t, parameters)
+    values = input_rows(system, function.inputs, {"q": q, "qd": qd, "tau": tau}, t, parameters)
     if values.ndim != 2:
         raise ValueError("linearize_many takes rows of states, got one state; see linearize")
     return function(values, count)
@@ -114,7 +114,7 @@ class _Function:
 
     def __init__(self, system: System, form: str) -> None:
         inputs, self._write = _way(system) if form == "velocity" else _symmetric_way(system)
-        self._n, self.inputs = system.n, InputRows(system, [str(each.name) for each in inputs])
+        self._n, self.inputs = system.n, [str(each.name) for each in inputs]
 
     def __call__(self, values: Array, threads: int) -> tuple[Array, Array]:
         matrices = np.empty((len(values), 2 * self._n, 3 * self._n))

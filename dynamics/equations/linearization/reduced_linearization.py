@@ -15,7 +15,7 @@ from ...systems.model import Model, as_system
 from ...systems.system import System
 from ..constraints.constraint_rank import DEPENDENT, independent_rows
 from ..constraints.row_numbers import equilibrated
-from ..states.evaluate_at import evaluate_at
+from ..states.evaluate import evaluate
 from ..states.initial_value import initial_value
 from .inverse_dynamics_derivatives import state_slopes
 from .linearization import linearize
@@ -137,7 +137,7 @@ def _slopes(
         return np.zeros((0, 2 * system.n))
     entries = [entry for row in state_slopes(system, rates, Builder()) for entry in row]
     graph = system.graph({str(k): entry for k, entry in enumerate(entries)}, system.q, system.qd)
-    return evaluate_at(system, graph, state, t, parameters).reshape(len(rates), -1)
+    return evaluate(system, graph, state, t, parameters).reshape(len(rates), -1)
 
 
 def _following(system: System, kept: tuple[int, ...], matrix: Array) -> list[int]:

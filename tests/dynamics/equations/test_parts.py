@@ -23,8 +23,8 @@ def with_momenta(mechanism: dyn.Mechanism) -> cg.Graph:
 # Each has the other among its outputs, or is the other where some inputs are 0 and terms are added: bias at qdd = 0,
 # gravity at qd = 0, momentum M qd without gravity. No part of one another are the Coriolis matrix and the bias, which
 # has gravity, the regressor and inverse dynamics, which has armature, damping and numbers of bodies folded, and the
-# linear form and forward dynamics, whose terms that are linear have slopes that are numbers. One exception is known: what
-# slides carry at general angles is summed in closed forms, and is not in inverse dynamics.
+# linear form and forward dynamics, whose terms that are linear have slopes that are numbers. One exception is known:
+# what slides carry at general angles is summed in closed forms, and is not in inverse dynamics.
 WHOLES: dict[Callable[[dyn.Mechanism], cg.Graph], tuple[Callable[[dyn.Mechanism], cg.Graph], ...]] = {
     dyn.gravity_force: (dyn.bias, dyn.inverse_dynamics, dyn.forward_dynamics),
     dyn.bias: (dyn.inverse_dynamics, dyn.forward_dynamics, dense),
