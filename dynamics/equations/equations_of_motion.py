@@ -66,7 +66,8 @@ def inverse_mass_matrix(system: System) -> Iterator[list[Node]]:
     """
     free, build = system.without_constraints, Builder()
     accelerations(free)  # raises where M is singular
-    yield entries(inverse(smaller_solution(free, lambda method: mass_solve(free, build, method)), build))
+    solve = smaller_solution(free, lambda method: mass_solve(free, build, method), lambda each: each.size(system.n))
+    yield entries(inverse(solve, build))
 
 
 @Equation("q qd", Output("bias{}", ("n",), FORCE))

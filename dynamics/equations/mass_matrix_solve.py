@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from typing import NamedTuple, Protocol, TypeVar
+from typing import NamedTuple, TypeVar
 
 import cgraph as cg
 from cgraph import Graph, Node
@@ -31,15 +31,7 @@ WORTH = 0.8  # of the nodes by elimination, at most, for the dense one: eliminat
 Rows = Sequence[Sequence[Node]]
 
 
-class HasSize(Protocol):
-    """Something made of nodes."""
-
-    @property
-    def size(self) -> int:
-        """How many."""
-
-
-Sized = TypeVar("Sized", bound=HasSize)
+Solution = TypeVar("Solution")
 
 
 class MassSolve(NamedTuple):
@@ -64,10 +56,9 @@ class MassSolve(NamedTuple):
                 result.append([new.get(node, node) for node in self.x])
         return result
 
-    @property
-    def size(self) -> int:
-        """How many nodes the columns of M^-1 take, about."""
-        return len(topological(self.x)) + len(self.x) * len(self.column)
+    def size(self, sides: int) -> int:
+        """How many nodes the solutions of so many right-hand sides take, about."""
+        return len(topological(self.x)) + sides * len(self.column)
 
     def split(self) -> tuple[list[Node], Graph]:
         """What a column reads of the factorization, and the graph of one: inputs p0.., of those, b0..; outputs x0..."""
@@ -94,13 +85,13 @@ def mass_solve(system: System, build: Builder, method: str) -> MassSolve:
     return linear(b, solve_nodes(lagrangian, system.qd, b, build))
 
 
-def smaller_solution(system: System, make: Callable[[str], Sized]) -> Sized:
+def smaller_solution(system: System, make: Callable[[str], Solution], size: Callable[[Solution], int]) -> Solution:
     """What `make` makes by one of the methods: by the dense one where paths are short and that saves nodes."""
     eliminated = make("recursive")
     if _longest_path(system.lagrangian, system.qd) > DENSE_PATH:
         return eliminated
     with suppress(SingularError, SingularMassMatrixError):  # which needs rows exchanged
-        if (dense := make("dense")).size < WORTH * eliminated.size:
+        if size(dense := make("dense")) < WORTH * size(eliminated):
             return dense
     return eliminated
 
@@ -108,8 +99,13 @@ def smaller_solution(system: System, make: Callable[[str], Sized]) -> Sized:
 def inverse(solve: MassSolve, build: Builder) -> list[list[Node]]:
     """Rows of M^-1: of the symmetric entries those with fewer operations, where the column is of a later coordinate."""
     n = len(solve.x)
-    columns = solve.solutions([[ONE if i == j else ZERO for i in range(len(solve.b))] for j in range(n)], build)
+    columns = solve.solutions(units(n, len(solve.b)), build)
     return [[columns[max(i, j)][min(i, j)] for j in range(n)] for i in range(n)]
+
+
+def units(count: int, length: int) -> list[list[Node]]:
+    """The first unit vectors of this length."""
+    return [[ONE if i == j else ZERO for i in range(length)] for j in range(count)]
 
 
 def _longest_path(lagrangian: Node, velocities: Sequence[Node]) -> int:

@@ -19,7 +19,7 @@ from ..state_equation import FORMS
 from ..states.evaluate import evaluate
 from ..states.initial_value import normalized
 from .linearization_parts import LinearizationParts, linearization_parts
-from .symmetric_linearization import SymmetricParts
+from .momentum_parts import momentum_parts, of_momenta
 
 
 @Equation("q qd tau", Output("A_{}_{}", ("2n", "2n")), Output("B_{}_{}", ("2n", "n"))).describes
@@ -82,14 +82,12 @@ def state_space(model: Model, *, form: str = "velocity") -> Graph:
     """
     if require_choice("form", form, FORMS) == "velocity":
         return shortened(as_system(model), lambda system: linearization_parts(system).written_out())
-    return shortened(as_system(model), lambda system: SymmetricParts(system, momenta=True).of_momenta(), mirrored=True)
+    return shortened(as_system(model), of_momenta, mirrored=True)
 
 
-def parts_of(system: System, form: str) -> LinearizationParts | SymmetricParts:
+def parts_of(system: System, form: str) -> LinearizationParts:
     """The parts of the linearization of a form, over (q, qd)."""
-    if form == "velocity":
-        return linearization_parts(system)
-    return SymmetricParts(system)
+    return linearization_parts(system) if form == "velocity" else momentum_parts(system)
 
 
 def linearize(

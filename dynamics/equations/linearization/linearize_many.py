@@ -29,7 +29,7 @@ from ..formulations.formulations import ONE, ZERO
 from ..state_equation import FORMS
 from ..states.evaluate import input_rows
 from .linearization_parts import ColumnGraphs, LinearizationParts, linearization_parts
-from .symmetric_linearization import SymmetricParts
+from .momentum_parts import momentum_parts
 
 # Nodes; beyond, the columns share one piece of code: of 18 000 nodes, machine code is made in half the time and takes a
 # third longer, of 200 000 in a fifth of the time, and takes no longer.
@@ -140,13 +140,13 @@ def _way(system: System) -> tuple[Sequence[Node], Write]:
 
 
 def _symmetric_way(system: System) -> tuple[Sequence[Node], Write]:
-    parts = SymmetricParts(system)
+    parts = momentum_parts(system)
     return parts.inputs, _written_out(parts) if parts.size < LONGER * WRITTEN_OUT else _assembled(parts)
 
 
-def _assembled(parts: SymmetricParts) -> Write:
+def _assembled(parts: LinearizationParts) -> Write:
     """X, M^-1 and the rest in machine code, and their products by NumPy."""
-    graphs, n = parts.in_columns(), len(parts.brackets)
+    graphs, n = parts.in_columns(), parts.n
     outputs = len(graphs.shared.outputs)
     registers = {"state": len(graphs.shared.inputs), "factors": graphs.factors}
     registers |= {f"{name}{i}": graphs.columns for name in ("b", "x") for i in range(n)}
@@ -168,9 +168,9 @@ def _assembled(parts: SymmetricParts) -> Write:
     return write
 
 
-def _written_out(parts: LinearizationParts | SymmetricParts) -> Write:
+def _written_out(parts: LinearizationParts) -> Write:
     """Rows that are the same at every state are no business of the machine code's."""
-    graph, n = parts.written_out(), len(parts.brackets)
+    graph, n = parts.written_out(), parts.n
     rows = [
         [graph.outputs[f"A_{i}_{j}" if j < 2 * n else f"B_{i}_{j - 2 * n}"] for j in range(3 * n)] for i in range(2 * n)
     ]
@@ -210,7 +210,7 @@ def _by_jacobian(system: System) -> tuple[Sequence[Node], Write]:
 
 
 def _in_columns(parts: LinearizationParts) -> Write:
-    n = len(parts.brackets)
+    n = parts.n
     program = linearization_program(parts.in_columns(), n)
     run, same = runner(program), 6 * n * n - program.width
 

@@ -1,4 +1,4 @@
-"""The parts of a linearization with constraints: their rows are differentiated with the multipliers that hold them."""
+"""Right-hand sides of a linearization with constraints, whose rows are differentiated with their multipliers."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ..mass_matrix_solve import MassSolve, linear
 from .inverse_dynamics_derivatives import state_slopes
 
 
-def held_sides(system: System, solved: Graph, build: Builder) -> tuple[list[list[Node]], MassSolve]:
+def constrained_sides(system: System, solved: Graph, build: Builder) -> tuple[list[list[Node]], MassSolve]:
     """Right-hand sides of the 2n numbers of x, (n + m,), and the solution for one: dqdd of
 
     M dqdd - J^T dlambda = dtau - d(tau - J^T lambda)/dx dx,  J dqdd = -d(dz/dt)/dx dx,  z the rates of constraints.
