@@ -7,7 +7,7 @@ import textwrap
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import update_wrapper
-from inspect import cleandoc
+from inspect import cleandoc, signature
 from itertools import product
 from types import FunctionType
 from typing import Protocol, TypeVar
@@ -20,7 +20,14 @@ from ..systems.system import System
 
 LONGEST = 200  # nodes of a graph whose outputs are written anew
 WIDTH = 116  # letters of a line in a docstring
-MODEL = "model : Model\n    A system, a mechanism or a scene, with nq coordinates and n velocities."
+COMMON = {  # parameters that mean the same in every function that has them
+    "model": "model : Model\n    A system, a mechanism or a scene, with nq coordinates and n velocities.",
+    "q": "q : array_like, (nq,)\n    Coordinates [rad or m].",
+    "qd": "qd : array_like, (n,)\n    Velocities [rad/s or m/s].",
+    "tau": "tau : array_like, (n,)\n    Applied forces [N m or N], by default 0.",
+    "t": "t : float\n    Time [s], for a model that depends on it.",
+    "parameters": "parameters : mapping of str to float, optional\n    Values in place of the model's own.",
+}
 NO_MODEL = "TypeError\n    For what is no model, or has no Lagrangian."
 SECTIONS = ("Parameters", "Returns", "Warns", "Raises", "Examples")
 
@@ -65,8 +72,8 @@ class Equation:
 
     As a decorator of a derivation, which gives the nodes of all outputs of a system in one or more forms, it makes the
     public function of a model: the smallest graph of these forms, its outputs named. `describes` is the decorator of a
-    function that has options of its own, and makes its graph itself. Both write the tables of the docstring, before
-    what stands in it: the model under Parameters, inputs and outputs under Returns, and what is no model under Raises.
+    function that has options of its own, and makes its graph itself. Both write the tables of the docstring, as
+    `documented` does, with inputs and outputs under Returns.
 
     inputs: kinds of variables, as "q qd tau"; t and parameters follow.  rewritten: whether `shortened` is asked.
     """
@@ -93,21 +100,10 @@ class Equation:
 
     def describes(self, function: Documented) -> Documented:
         """The function, with the tables of this equation in its docstring."""
-        assert isinstance(function, FunctionType)
-        if function.__doc__ is None:  # python -OO
-            return function
-        head, *found = re.split(r"^(\w+)\n-+\n", cleandoc(function.__doc__), flags=re.MULTILINE)
-        sections = dict(zip(found[::2], map(str.strip, found[1::2]), strict=True))
-        given = sections.get("Parameters", "")
-        sections["Parameters"] = given if re.match(r"model\b", given) else f"{MODEL}\n{given}".strip()
-        sections["Returns"] = self._returns(sections.get("Returns", ""))
-        raised = sections.get("Raises", "")
-        sections["Raises"] = raised if "TypeError" in raised else f"{raised}\n{NO_MODEL}".strip()
-        tables = [f"{name}\n{'-' * len(name)}\n{sections[name]}\n" for name in SECTIONS if name in sections]
-        function.__doc__ = "\n".join([f"{head.strip()}\n", *tables])
-        return function
+        return documented(function, self._returns)
 
     def _returns(self, more: str) -> str:
+        """What stands under Returns, and more of it."""
         inputs = ", ".join([f"{kind}0.." for kind in self.inputs])
         outputs = f"output{'s' * (len(self.outputs) > 1 or bool(self.outputs[0].shape))}"
         text = f"Inputs {inputs}, t if needed, parameters; {outputs} {'; '.join(map(str, self.outputs))}. {more}"
@@ -115,6 +111,29 @@ class Equation:
 
     def _of(self, derivation: Derivation) -> Callable[[System], Graph]:
         return lambda system: min([cg.simplify(self.graph(system, nodes)) for nodes in derivation(system)], key=_size)
+
+
+def documented(function: Documented, returns: Callable[[str], str] = str) -> Documented:
+    """The function, with what its docstring leaves out: parameters that mean the same everywhere, and what is no model.
+
+    returns: what stands under Returns, from what is said there.
+    """
+    assert isinstance(function, FunctionType)
+    if function.__doc__ is None:  # python -OO
+        return function
+    head, *found = re.split(r"^(\w+)\n-+\n", cleandoc(function.__doc__), flags=re.MULTILINE)
+    sections = dict(zip(found[::2], map(str.strip, found[1::2]), strict=True))
+    told: dict[str, str] = {}
+    for entry in filter(None, re.split(r"\n(?=\S)", sections.get("Parameters", ""))):
+        told |= {name.strip(): entry for name in entry.partition("\n")[0].partition(" : ")[0].split(",")}
+    parameters = [told.get(name) or COMMON[name] for name in signature(function).parameters]
+    raised = sections.get("Raises", "")
+    sections["Parameters"] = "\n".join(dict.fromkeys(parameters))
+    sections["Returns"] = returns(sections.get("Returns", ""))
+    sections["Raises"] = raised if "TypeError" in raised else f"{raised}\n{NO_MODEL}".strip()
+    tables = [f"{name}\n{'-' * len(name)}\n{sections[name]}\n" for name in SECTIONS if name in sections]
+    function.__doc__ = "\n".join([f"{head.strip()}\n", *tables])
+    return function
 
 
 def shortened(system: System, derive: Callable[[System], Graph], *, mirrored: bool = False) -> Graph:

@@ -11,6 +11,7 @@ from cgraph.extend import Builder, building, cotangents, folded, tangents
 from ..systems.model import Model, as_system
 from ..systems.system import System
 from .coriolis import coriolis_matrix, require_quadratic
+from .equation import documented
 from .equations_of_motion import bias, gravity_force
 from .formulations.formulations import ONE, ZERO
 from .torque_table import TorqueTable
@@ -18,6 +19,7 @@ from .torque_table import TorqueTable
 _ENERGIES = {"kinetic", "potential"}
 
 
+@documented
 def torque_by_link(model: Model) -> TorqueTable:
     """Row k, column i: what the partial Lagrangian L_k has of tau_i, d/dt dL_k/dqd_i - dL_k/dq_i.
 
@@ -26,20 +28,10 @@ def torque_by_link(model: Model) -> TorqueTable:
     whatever the state: such cells are zero by structure. Of a mechanism written with base parameters
     (`base_parameters`) a row is not what its body alone takes.
 
-    Parameters
-    ----------
-    model : Model
-        A system, a mechanism or a scene with n coordinates.
-
     Returns
     -------
     TorqueTable
         (links and what follows, n) torques [N m or N]; columns add up to tau.
-
-    Raises
-    ------
-    TypeError
-        For what is no model, or has no Lagrangian.
 
     Examples
     --------
@@ -62,16 +54,12 @@ def torque_by_link(model: Model) -> TorqueTable:
     return TorqueTable("torque by link", (*names, *outside), system.velocities, system, graph, sum_axis=0)
 
 
+@documented
 def torque_by_joint_motion(model: Model) -> TorqueTable:
     """Row i, column j: the torque at joint i for the motion of joint j, M_ij qdd_j + C_ij qd_j.
 
     C is that of Christoffel's symbols (`coriolis`): of a Coriolis force, which two velocities make together, each has
     half. Columns of gravity (all that is there at rest), damping and applied forces follow, where the model has them.
-
-    Parameters
-    ----------
-    model : Model
-        A system, a mechanism or a scene with n coordinates.
 
     Returns
     -------
@@ -82,8 +70,6 @@ def torque_by_joint_motion(model: Model) -> TorqueTable:
     ------
     ValueError
         For an L that is not quadratic in the velocities.
-    TypeError
-        For what is no model, or has no Lagrangian.
 
     Examples
     --------

@@ -13,6 +13,7 @@ from cgraph.extend import Builder, cotangents, topological
 from ...systems.constraints import Constraints
 from ...systems.model import Model, as_system
 from ...systems.system import System
+from ..equation import documented
 from ..formulations.formulations import ONE
 from .integrability import integrable_rows
 
@@ -69,6 +70,7 @@ class ConstraintLint:
         return {"ok": self.ok, "integrable": dict(self.integrable), "vakonomic": dict(self.vakonomic)}
 
 
+@documented
 def lint_constraints(model: Model) -> ConstraintLint:
     """Say of every row of velocities whether it is integrable, and whether L has a multiplier of one that is not.
 
@@ -76,11 +78,6 @@ def lint_constraints(model: Model) -> ConstraintLint:
     the motion by J^T lambda, as `System(velocity_constraints=)` has it. With multipliers in L, L + mu . (A qd), the
     action is stationary among the motions that meet the rows, which is another motion (vakonomic). A coordinate
     without a velocity in L is such a multiplier if the slope of L along it is linear in velocities.
-
-    Parameters
-    ----------
-    model : Model
-        A system, a mechanism or a scene.
 
     Returns
     -------

@@ -22,6 +22,7 @@ from cgraph.extend import Array, Builder, building, tangents, topological
 from ...systems.kinematics import ZERO
 from ...systems.model import Model, as_system
 from ...systems.system import System
+from ..equation import documented
 from ..substitute import substitute
 from .row_numbers import RowNumbers
 
@@ -29,6 +30,7 @@ STATES = 3
 ROUNDING = 1e-9  # of the size of a row and its slopes
 
 
+@documented
 def integrable_rows(model: Model) -> dict[str, bool]:
     """Which constraints hold positions: those given as such, and rows of velocities that could be (holonomic ones).
 

@@ -19,6 +19,7 @@ from cgraph.extend import Builder, Names, building, cotangents, folded, require_
 from ...systems.display_names import display_names
 from ...systems.model import Model, as_system
 from ...systems.system import System
+from ..equation import documented
 from .blame import blame
 from .formulations import ONE, THROUGH_STEP, inverse_dynamics, torques
 
@@ -196,13 +197,12 @@ class Verdict:
         }
 
 
+@documented
 def formulation_verdict(model: Model, formulation: str = "euler_embedded") -> Verdict:
     """Whether the torque by a formulation is that of the chain rule, by how much it is off, and what is to blame.
 
     Parameters
     ----------
-    model : Model
-        A system, a mechanism or a scene.
     formulation : str
         One of `FORMULATIONS`.
 
@@ -215,8 +215,6 @@ def formulation_verdict(model: Model, formulation: str = "euler_embedded") -> Ve
     ------
     ValueError
         For an unknown formulation.
-    TypeError
-        For what is no model, or has no Lagrangian.
 
     Examples
     --------

@@ -12,7 +12,7 @@ from cgraph.extend import Array, require_choice
 
 from ...systems.model import Model, as_system
 from ...systems.system import System
-from ..equation import Equation, Output, shortened
+from ..equation import Equation, Output, documented, shortened
 from ..equations_of_motion import forward_dynamics
 from ..singular_mass_matrix import raise_if_singular
 from ..state_equation import FORMS
@@ -90,6 +90,7 @@ def parts_of(system: System, form: str) -> LinearizationParts:
     return linearization_parts(system) if form == "velocity" else momentum_parts(system)
 
 
+@documented
 def linearize(
     model: Model,
     q: ArrayLike,
@@ -110,16 +111,10 @@ def linearize(
 
     Parameters
     ----------
-    model : Model
-        A system, a mechanism or a scene with n coordinates.
     q, qd, tau : array_like, (nq,) and (n,)
         Coordinates [rad or m], velocities, and applied forces [N m or N].
     form : {"velocity", "momentum"}
         Of x, as of `simulate`. The state is given by velocities in both, so that nothing is iterated.
-    t : float
-        Time [s], for a model that depends on it.
-    parameters : mapping of str to float
-        Values in place of the model's.
 
     Returns
     -------

@@ -24,6 +24,7 @@ from cgraph.extend import (
 
 from ...systems.model import Model, as_system
 from ...systems.system import System
+from ..equation import documented
 from ..equations_of_motion import forward_dynamics
 from ..formulations.formulations import ONE, ZERO
 from ..state_equation import FORMS
@@ -42,6 +43,7 @@ MATRICES = 1024  # states whose parts are in memory at a time, before they are m
 BLOCK = 64  # states that are run between looks at the keyboard, and that a thread takes at a time
 
 
+@documented
 def linearize_many(
     model: Model,
     q: ArrayLike,
@@ -67,16 +69,10 @@ def linearize_many(
 
     Parameters
     ----------
-    model : Model
-        A system, a mechanism or a scene with n velocities.
     q, qd, tau : array_like, (N, nq) and (N, n)
         Coordinates [rad or m], their velocities, and applied forces [N m or N]; one row is the same for all.
     form : {"velocity", "momentum"}
         Of x, as of `linearize`; the states are q and qd in both.
-    t : float
-        Time [s], for a model that depends on it.
-    parameters : mapping of str to float
-        Values in place of the model's.
     threads : int, optional
         How many share the states; None: one for each core.
 

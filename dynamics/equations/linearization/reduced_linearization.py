@@ -15,6 +15,7 @@ from ...systems.model import Model, as_system
 from ...systems.system import System
 from ..constraints.constraint_rank import DEPENDENT, independent_rows
 from ..constraints.row_numbers import equilibrated
+from ..equation import documented
 from ..states.evaluate import evaluate
 from ..states.initial_value import initial_value
 from .inverse_dynamics_derivatives import state_slopes
@@ -49,6 +50,7 @@ class ReducedLinearization(NamedTuple):
     displacements: Array
 
 
+@documented
 def reduced_linearization(
     model: Model,
     q: ArrayLike,
@@ -75,12 +77,6 @@ def reduced_linearization(
     q, qd : array_like, (nq,) and (n,)
         Coordinates [rad or m] and velocities. A state that does not meet the constraints is moved onto them, with a
         ConstraintWarning.
-    tau : array_like, (n,)
-        Applied forces [N m or N], by default 0.
-    t : float
-        Time [s], for a model that depends on it.
-    parameters : mapping of str to float
-        Values in place of the model's.
 
     Returns
     -------

@@ -10,9 +10,11 @@ from cgraph.extend import Builder, as_node, building, columns, cotangents, folde
 from ...systems.arguments import new_variables
 from ...systems.model import Model, as_system
 from ...systems.system import System
+from ..equation import documented
 from ..formulations.formulations import ONE, ZERO
 
 
+@documented
 def conserved_momenta(model: Model) -> tuple[str, ...]:
     """The velocities whose momenta p = dL/dqd are constant while no tau acts on them: cyclic coordinates (Noether).
 
@@ -21,20 +23,10 @@ def conserved_momenta(model: Model) -> tuple[str, ...]:
     conserved all the same, by an identity that no fold knows; what is named is at every state and for all values of
     the parameters.
 
-    Parameters
-    ----------
-    model : Model
-        A system, a mechanism or a scene.
-
     Returns
     -------
     tuple of str
         Names of velocities, which of a system without quasi-velocities are those of coordinates.
-
-    Raises
-    ------
-    TypeError
-        For what is no model, or has no Lagrangian.
 
     Examples
     --------

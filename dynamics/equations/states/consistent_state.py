@@ -14,12 +14,14 @@ from cgraph.extend import Array, real_number
 from ...systems.model import Model, as_system
 from ..constraints.constraint_rank import ConstraintWarning
 from ..constraints.projection import projected
+from ..equation import documented
 from .initial_value import given_start
 
 MOVED = "the velocities do not meet the constraints and were moved onto them"
 ROUNDING = 1e-9  # of the largest velocity, those of angles and lengths by what they move
 
 
+@documented
 def consistent_state(
     model: Model, q: ArrayLike, qd: ArrayLike, t: float = 0.0, parameters: Mapping[str, float] | None = None
 ) -> tuple[Array, Array]:
@@ -27,14 +29,10 @@ def consistent_state(
 
     Parameters
     ----------
-    model : Model
-        A system, a mechanism or a scene.
     q, qd : array_like, (nq,) and (n,)
         Where to start.
     t : float
         Time [s], for constraints that depend on it.
-    parameters : mapping, optional
-        {name: value} in place of the model's own.
 
     Returns
     -------

@@ -19,12 +19,14 @@ from ...systems.model import Model, as_system
 from ...systems.system import System
 from ..constraints.constraint_rank import ConstraintWarning
 from ..constraints.nearly_redundant_rows import lost_rank
+from ..equation import documented
 
 STATE = ("q", "qd", "qdd", "tau")  # the prefixes of a graph's inputs, each an array of one number a coordinate
 State = Mapping[str, ArrayLike | None]
 _ENTRY = re.compile(r"(.*?[^\d_])((?:_\d+)+|\d+)")  # M_0_1, h_2, tau0
 
 
+@documented
 def arrays_at(
     model: Model,
     graph: Graph | Compiled,
@@ -42,18 +44,12 @@ def arrays_at(
 
     Parameters
     ----------
-    model : Model
-        A system, a mechanism or a scene with n velocities, and nq coordinates.
     graph : Graph or Compiled
         Of the model, such as `mass_matrix(model)`: inputs among q0.., qd0.., qdd0.., tau0.., t and the parameters.
     q : array_like, (nq,) or (N, nq)
         Coordinates [rad or m]; by default 0, quaternions neutral.
     qd, qdd, tau : array_like, (n,) or (N, n)
         Velocities, accelerations, and applied forces [N m or N]; by default 0.
-    t : float
-        Time [s], for a model that depends on it.
-    parameters : mapping of str to float
-        Values in place of the model's.
 
     Returns
     -------

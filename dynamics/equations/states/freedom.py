@@ -13,6 +13,7 @@ from cgraph.extend import real_number
 
 from ...systems.model import Model, as_system
 from ..constraints.nearly_redundant_rows import left_at
+from ..equation import documented
 from .initial_value import given_start
 
 TOLERANCE = 2e-4  # as of a Loop
@@ -55,6 +56,7 @@ class Freedom:
         return f"{self.freedoms} freedom(s): {len(self.shares)} constraint row(s) of rank {self.rank}{rest}"
 
 
+@documented
 def freedom(
     model: Model,
     q: ArrayLike,
@@ -72,16 +74,12 @@ def freedom(
 
     Parameters
     ----------
-    model : Model
-        A system, a mechanism or a scene with n velocities.
     q : array_like, (nq,)
         Coordinates [rad or m], which need not meet the constraints.
     tolerance : float
         From 0 to 1: what of a row, of the largest of its loop, is taken for rounding of lengths and axes.
     t : float
         Time [s], for constraints that depend on it.
-    parameters : mapping, optional
-        {name: value} in place of the model's own.
 
     Returns
     -------
