@@ -8,9 +8,8 @@ if TYPE_CHECKING:
     from cgraph import __version__ as __version__
 
     from . import scenes
-    from .equations.constraints.constraint_lint import ConstraintLint, lint_constraints
     from .equations.constraints.constraint_rank import ConstraintWarning
-    from .equations.constraints.integrability import integrable_rows
+    from .equations.constraints.integrability import ConstraintLint, integrable_rows, lint_constraints
     from .equations.coriolis import coriolis
     from .equations.energies import energy, kinetic_energy, potential_energy
     from .equations.equations_of_motion import (
@@ -22,9 +21,9 @@ if TYPE_CHECKING:
         mass_matrix,
         momentum,
     )
+    from .equations.formulations.blame import spurious_nodes
     from .equations.formulations.formulation_sizes import formulation_sizes
     from .equations.formulations.formulations import FORMULATIONS, inverse_dynamics, momentum_rate
-    from .equations.formulations.spurious_nodes import spurious_nodes
     from .equations.formulations.verdict import Verdict, formulation_verdict
     from .equations.linearization.inverse_dynamics_derivatives import inverse_dynamics_derivatives
     from .equations.linearization.linearization import linearize, state_space

@@ -22,8 +22,7 @@ from .constraints.constraints import (
     solved_by_elimination,
     unknown_names,
 )
-from .inertia_rank import TORQUE, without_inertia
-from .singular_mass_matrix import SingularMassMatrixError, no_inertia
+from .singular_mass_matrix import TORQUE, SingularMassMatrixError, no_inertia, without_inertia
 
 DENSE_UP_TO = 7  # coordinates; beyond, the dense graph is larger on a tree of bodies, and takes long to build
 WORTH = 0.9  # of the recursive graph's nodes, at most, for the dense one: elimination keeps more digits

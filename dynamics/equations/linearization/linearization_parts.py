@@ -7,6 +7,7 @@ tau. M is factored once; a column is then a graph of its own, small, and alike f
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,14 +15,27 @@ from numpy.typing import NDArray
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Array, Builder, as_node, building, folded, topological, with_reciprocals
+from cgraph.extend import (
+    Array,
+    Builder,
+    SingularError,
+    as_node,
+    building,
+    cotangents,
+    folded,
+    solve_nodes,
+    tangents,
+    topological,
+    with_reciprocals,
+)
 
 from ...systems.system import System
-from ..accelerations import BY_ENERGY, accelerations
+from ..accelerations import BY_ENERGY, DENSE_UP_TO, accelerations
+from ..constraints.constraints import DenseSolver, Rows as ConstraintRows, constraint_rows
 from ..equation import entries
-from ..mass_matrix_solve import MassSolve, Rows, mass_solve, smaller_solution, units
-from .constrained_sides import constrained_sides
-from .inverse_dynamics_derivatives import torque_derivatives
+from ..formulations.formulations import ONE, ZERO, torques
+from ..mass_matrix_solve import MassSolve, Rows, linear, mass_solve, smaller_solution, units
+from .inverse_dynamics_derivatives import state_slopes, torque_derivatives
 
 Matrix = NDArray[Any]  # of numbers, (.., n, k), or of nodes, (n, k)
 
@@ -131,7 +145,7 @@ def linearization_parts(system: System) -> LinearizationParts:
     if not len(system.constraints):
         return smaller_solution(system, lambda method: _parts(system, method), lambda parts: parts.size)
     solved, build = accelerations(system), Builder()
-    sides, solve = constrained_sides(system, solved, build)
+    sides, solve = _constrained_sides(system, solved, build)
     rest = {"C": system.kinematics.brackets(build)}
     return LinearizationParts(solved.inputs, sides, solve, rest, velocity_form, build)
 
@@ -144,3 +158,49 @@ def _parts(system: System, method: str) -> LinearizationParts:
         sides = [[-row[j] for row in rows] for rows in (slopes.by_q, slopes.by_qd) for j in range(n)]
     solve, rest = mass_solve(system, build, method), {"C": system.kinematics.brackets(build)}
     return LinearizationParts(qdd.inputs, sides, solve, rest, velocity_form, build)
+
+
+def _constrained_sides(system: System, solved: Graph, build: Builder) -> tuple[list[list[Node]], MassSolve]:
+    """Right-hand sides of the 2n numbers of x, (n + m,), and the solution for one: dqdd of
+
+    M dqdd - J^T dlambda = dtau - d(tau - J^T lambda)/dx dx,  J dqdd = -d(dz/dt)/dx dx,  z the rates of constraints.
+
+    solved: the accelerations and multipliers.
+    """
+    n = system.n
+    lagrangian, *rates = folded([system.lagrangian, *system.constraints.rates], build)
+    rows = constraint_rows(system, rates)
+    partials = _slopes(system, rows, solved, build)
+    with building(build):
+        sides = [[-row[j] for row in partials] for j in range(2 * n)]
+    b = cg.variables([f"b{i}#" for i in range(n + len(rows.multipliers))])
+    return sides, linear(b, _solved(system, lagrangian, rows, b, build)[:n])
+
+
+def _solved(system: System, lagrangian: Node, rows: ConstraintRows, side: Sequence[Node], build: Builder) -> list[Node]:
+    """(dqdd, -dlambda) for a right-hand side: densely up to 7 coordinates, where that goes without exchanging rows."""
+    if system.n <= DENSE_UP_TO:
+        with suppress(SingularError):
+            return DenseSolver(system, lagrangian, rows, build).solve(side)
+    function, s = rows.function(lagrangian, build), rows.multipliers
+    return solve_nodes(function, [*system.qd, *s], side, build, multipliers=s)
+
+
+def _slopes(system: System, rows: ConstraintRows, solved: Graph, build: Builder) -> list[list[Node]]:
+    """Rows of d(tau - J^T lambda, dz/dt)/d(q, qd), (n + m, 2n), where qdd and lambda are as solved.
+
+    Of quasi-velocities by displacements xi, dq = G xi.
+    """
+    tau, s = cg.simplify(torques(system)), rows.multipliers
+    held = cotangents(dict(zip(rows.rates, s, strict=True)), system.qd, build)
+    x_dot = dict(zip([*system.q, *system.qd], [*system.q_dot, *system.qdd], strict=True)) | {system.t: ONE}
+    dots = tangents(x_dot, rows.rates, build)
+    with building(build):
+        equations = [torque - force for torque, force in zip(tau.outputs.values(), held, strict=True)]
+    equations += [dots.get(z, ZERO) for z in rows.rates]
+    slopes = entries(state_slopes(system, equations, build))
+    at = {name: node for name, node in solved.outputs.items() if name in {str(each.name) for each in (*system.qdd, *s)}}
+    graph = Graph([*tau.inputs, *s, *system.tau], {str(k): entry for k, entry in enumerate(slopes)})
+    flat = list(cg.specialize(graph, at).outputs.values())
+    width = 2 * system.n
+    return [flat[i : i + width] for i in range(0, len(flat), width)]
