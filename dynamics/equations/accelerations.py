@@ -16,10 +16,8 @@ from ..systems.constraints import ConstraintError
 from ..systems.system import System
 from .bias_terms import BiasTerms, bias_terms
 from .constraints.constraints import (
-    DenseSolver,
     constraint_rows,
     multiplier_outputs,
-    solved_by_elimination,
     unknown_names,
 )
 from .singular_mass_matrix import TORQUE, SingularMassMatrixError, no_inertia, without_inertia
@@ -161,10 +159,10 @@ def _solved(system: System, terms: BiasTerms, method: str, check: bool) -> Graph
         rhs += [-change for change in system.constraints.rate_changes(rows.rates, build)]
     if not method.startswith("dense"):
         order: Order = "balanced" if method == "balanced" else "recursive"
-        solved = solved_by_elimination(system, terms, rows, rhs, inertial, build, check, order)
+        solved = rows.solve(system, terms.lagrangian, rhs, build, at=inertial, check=check, order=order)
     else:
-        solver = DenseSolver(system, terms.lagrangian, rows, build, composites=method == "dense")
-        solved = solver.solve(rhs, check)
+        of_bodies = method == "dense"
+        solved = rows.solve_densely(system, terms.lagrangian, rhs, build, composites=of_bodies, check=check)
     end = system.n + len(rows.kept)
     outputs = {f"qdd{i}": node for i, node in enumerate(solved[: system.n])}
     outputs |= multiplier_outputs(system, rows, solved[system.n : end], build)

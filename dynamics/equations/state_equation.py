@@ -8,7 +8,7 @@ from cgraph import Graph
 from cgraph.extend import kept_by_first, require_choice
 
 from ..systems.arguments import TIME
-from ..systems.model import Model, as_ode, as_system, system_of
+from ..systems.model import Equations, Model, as_equations, as_system
 from ..systems.system import System
 from .constraints.constraints import held_still
 from .equation import Equation, Output
@@ -51,14 +51,13 @@ def state_equation(model: Model, method: str = "auto") -> Graph:
     {'q0_dot': 2.0, 'qd0_dot': 2.0}
     """
     require_choice("method", method, SOLUTIONS)
-    return with_multipliers(model, method)[0]
+    return with_multipliers(as_equations(model), method)[0]
 
 
-def with_multipliers(model: Model, method: str = "auto") -> tuple[Graph, Graph | None]:
+def with_multipliers(model: Equations, method: str = "auto") -> tuple[Graph, Graph | None]:
     """The state equation, and over the same inputs the multipliers of its constraints by name; None without any."""
-    ode = as_ode(model)
-    if ode is not None:
-        return ode.graph, None
+    if model.ode is not None:
+        return model.ode.graph, None
     system = as_system(model)
     solved = forward_dynamics(system, method)
     outputs = {f"q{i}_dot": rate for i, rate in enumerate(system.q_dot)}
@@ -73,7 +72,7 @@ def normalization(model: Model) -> Graph | None:
 
     Inputs and outputs the states.
     """
-    system = system_of(model)
+    system = model.system
     quasi = None if system is None else system.kinematics.quasi
     if system is None or quasi is None or quasi.normalized is None:
         return None
@@ -92,8 +91,7 @@ class StateInputs(NamedTuple):
 
 def state_inputs(model: Model) -> StateInputs:
     """The names behind `state_equation(model)`, without building it."""
-    ode = as_ode(model)
-    if ode is not None:
+    if (ode := model.ode) is not None:
         return StateInputs(ode.states, (), ode.extra_inputs[:1] == [ode.t], dict(ode.parameters))
     system = as_system(model)
     return _inputs_of(system)._replace(parameters=dict(system.parameters))  # which a person may change

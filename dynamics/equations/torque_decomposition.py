@@ -6,14 +6,14 @@ from collections.abc import Sequence
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import Builder, building, cotangents, folded, tangents
+from cgraph.extend import Builder, building, folded
 
 from ..systems.model import Model, as_system
 from ..systems.system import System
 from .coriolis import coriolis_matrix, require_quadratic
-from .equation import documented
+from .equation import documented, mirrored
 from .equations_of_motion import bias, gravity_force
-from .formulations.formulations import ONE, ZERO
+from .formulations.formulations import lagrange_sweeps
 from .torque_table import TorqueTable
 
 _ENERGIES = {"kinetic", "potential"}
@@ -89,10 +89,8 @@ def torque_by_joint_motion(model: Model) -> TorqueTable:
     coriolis = coriolis_matrix(system, forces, build, mass)
     n = system.n
     with building(build):
-        rows = [
-            [mass[max(i, j)][min(i, j)] * system.qdd[j] + coriolis[i][j] * system.qd[j] for j in range(n)]
-            for i in range(n)
-        ]
+        pairs = zip(mirrored(mass), coriolis, strict=True)
+        rows = [[m[j] * system.qdd[j] + c[j] * system.qd[j] for j in range(n)] for m, c in pairs]
     outside = {"gravity": folded(gravity_force(system).outputs.values(), build)} | _damping_and_forces(system, build)
     columns = {name: column for name, column in outside.items() if any(entry.value != 0.0 for entry in column)}
     for column in columns.values():
@@ -104,21 +102,16 @@ def torque_by_joint_motion(model: Model) -> TorqueTable:
 
 
 def _torque_of(system: System, partial: Node, build: Builder) -> list[Node]:
-    """Lagrange's equation of one partial Lagrangian, as the chain rule has it: a reverse sweep, then a forward one."""
-    bars = cotangents({partial: ONE}, [*system.q, *system.qd], build)
-    momenta = bars[system.nq :]
-    gradient = system.kinematics.slopes(bars[: system.nq], momenta, build)
-    x_dot = dict(zip([*system.q, *system.qd], [*system.q_dot, *system.qdd], strict=True))
-    dots = tangents(x_dot | ({system.t: ONE} if system.t in system.extra_inputs else {}), momenta, build)
+    """Lagrange's equation of one partial Lagrangian, by the chain rule."""
+    _, rate, gradient = lagrange_sweeps(system, partial, build)
     with building(build):
-        return [dots.get(p, ZERO) - slope for p, slope in zip(momenta, gradient, strict=True)]
+        return [p_dot - slope for p_dot, slope in zip(rate, gradient, strict=True)]
 
 
 def _damping_and_forces(system: System, build: Builder) -> dict[str, list[Node]]:
     """Torques against damping and against applied forces, each where there is any."""
+    damping = system.braking(build)
     with building(build):
-        with cg.tag("damping"):
-            damping = [coefficient * qd for coefficient, qd in zip(system.damping, system.qd, strict=True)]
         applied = [-force for force in folded(system.forces, build)]
     rows = {"damping": damping, "applied": applied}
     return {name: row for name, row in rows.items() if any(entry.value != 0.0 for entry in row)}

@@ -14,7 +14,7 @@ from cgraph.extend import TANGENT, Builder, building, cotangents, require_choice
 
 from ...systems.model import Model, as_system
 from ...systems.system import System
-from ..bias_terms import bias_terms
+from ..bias_terms import bias_terms, state_rate
 from ..equation import LONGEST, Equation, Output, shortened
 from ..substitute import substitute
 
@@ -37,15 +37,19 @@ class LagrangeTerms(NamedTuple):
 
 def chain_rule(system: System) -> LagrangeTerms:
     """Section 3: d/dt p = grad_x p . xdot for p = dL/dqd, x = (q, qd), contracted: one reverse sweep, one forward."""
-    build = Builder()
+    momentum, rate, gradient = lagrange_sweeps(system, system.lagrangian, Builder())
+    return LagrangeTerms([*system.q, *system.qd, *system.qdd], system.q, system.qd, momentum, rate, gradient)
+
+
+def lagrange_sweeps(system: System, lagrangian: Node, build: Builder) -> tuple[list[Node], list[Node], list[Node]]:
+    """p = dL/dqd, d/dt p and dL/dq of a Lagrangian or a part of it."""
     # The reverse sweep over L gives both dL/dq and p = dL/dqd; q and qd are independent inputs (Section 2.2).
-    bars = cotangents({system.lagrangian: ONE}, [*system.q, *system.qd], build)
+    bars = cotangents({lagrangian: ONE}, [*system.q, *system.qd], build)
     momentum = bars[system.nq :]
     gradient = system.kinematics.slopes(bars[: system.nq], momentum, build)
     # Eq. (4) with y = p: a forward sweep along xdot = (qd, qdd) is the product grad_x p . xdot, never written out.
-    dots = tangents(_state_rate(system), momentum, build)
-    rate = [dots.get(p, ZERO) for p in momentum]
-    return LagrangeTerms([*system.q, *system.qd, *system.qdd], system.q, system.qd, momentum, rate, gradient)
+    dots = tangents(state_rate(system, system.qdd), momentum, build)
+    return momentum, [dots.get(p, ZERO) for p in momentum], gradient
 
 
 def chain_rule_literal(system: System) -> LagrangeTerms:
@@ -53,7 +57,7 @@ def chain_rule_literal(system: System) -> LagrangeTerms:
     bars = cotangents({system.lagrangian: ONE}, [*system.q, *system.qd])
     momentum = bars[system.nq :]
     gradient = system.kinematics.slopes(bars[: system.nq], momentum, Builder())
-    x_dot = _state_rate(system)
+    x_dot = state_rate(system, system.qdd)
     rate = []
     for p in momentum:
         partials = cotangents({p: ONE}, list(x_dot))  # grad_x p, 2n nodes
@@ -254,12 +258,6 @@ def _forces(system: System, terms: LagrangeTerms) -> list[Node]:
     if terms.q is system.q:
         return list(system.forces)
     return substitute(system.forces, dict(zip([*system.q, *system.qd], [*terms.q, *terms.qd], strict=True)))
-
-
-def _state_rate(system: System) -> dict[Node, Node]:
-    """xdot for x = (q, qd), and 1 for t if the Lagrangian depends on it."""
-    rate = dict(zip([*system.q, *system.qd], [*system.q_dot, *system.qdd], strict=True))
-    return rate | ({system.t: ONE} if system.t in system.extra_inputs else {})
 
 
 class _Embedding:

@@ -23,7 +23,6 @@ from cgraph.extend import (
     building,
     cotangents,
     folded,
-    solve_nodes,
     tangents,
     topological,
     with_reciprocals,
@@ -31,7 +30,8 @@ from cgraph.extend import (
 
 from ...systems.system import System
 from ..accelerations import BY_ENERGY, DENSE_UP_TO, accelerations
-from ..constraints.constraints import DenseSolver, Rows as ConstraintRows, constraint_rows
+from ..bias_terms import state_rate
+from ..constraints.constraints import Rows as ConstraintRows, constraint_rows
 from ..equation import entries
 from ..formulations.formulations import ONE, ZERO, torques
 from ..mass_matrix_solve import MassSolve, Rows, linear, mass_solve, smaller_solution, units
@@ -181,9 +181,8 @@ def _solved(system: System, lagrangian: Node, rows: ConstraintRows, side: Sequen
     """(dqdd, -dlambda) for a right-hand side: densely up to 7 coordinates, where that goes without exchanging rows."""
     if system.n <= DENSE_UP_TO:
         with suppress(SingularError):
-            return DenseSolver(system, lagrangian, rows, build).solve(side)
-    function, s = rows.function(lagrangian, build), rows.multipliers
-    return solve_nodes(function, [*system.qd, *s], side, build, multipliers=s)
+            return rows.solve_densely(system, lagrangian, side, build)
+    return rows.solve(system, lagrangian, side, build)
 
 
 def _slopes(system: System, rows: ConstraintRows, solved: Graph, build: Builder) -> list[list[Node]]:
@@ -193,8 +192,7 @@ def _slopes(system: System, rows: ConstraintRows, solved: Graph, build: Builder)
     """
     tau, s = cg.simplify(torques(system)), rows.multipliers
     held = cotangents(dict(zip(rows.rates, s, strict=True)), system.qd, build)
-    x_dot = dict(zip([*system.q, *system.qd], [*system.q_dot, *system.qdd], strict=True)) | {system.t: ONE}
-    dots = tangents(x_dot, rows.rates, build)
+    dots = tangents(state_rate(system, system.qdd) | {system.t: ONE}, rows.rates, build)
     with building(build):
         equations = [torque - force for torque, force in zip(tau.outputs.values(), held, strict=True)]
     equations += [dots.get(z, ZERO) for z in rows.rates]

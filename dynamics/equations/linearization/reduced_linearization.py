@@ -104,7 +104,7 @@ def reduced_linearization(
     """
     system, start = as_system(model), initial_value(model, q, qd, 0.0, parameters, t)
     n, at = system.n, (start.x[: system.nq], start.x[system.nq :])
-    kept = independent_rows(system.constraints) if len(system.constraints) else ()
+    kept = independent_rows(system.constraints)
     slopes = _slopes(system, kept, dict(zip(("q", "qd"), at, strict=True)), t, parameters)
     holonomic = sum(k < len(system.constraints.positions) for k in kept)
     following = _following(system, kept, slopes[:, n:])
