@@ -84,6 +84,14 @@ def parameter_value(name: str, value: float) -> float:
     return float(value)
 
 
+def finite_time(t: float) -> float:
+    """The time [s]. Raises TypeError or ValueError for what is no finite number."""
+    time = real_number("t", t)
+    if not math.isfinite(time):
+        raise ValueError(f"t must be finite, got {t!r} s")
+    return time
+
+
 def new_variables(stem: str, count: int, taken: Collection[str]) -> list[Node]:
     """Variables of this stem and a number, with more underscores where a name is taken."""
     while any(f"{stem}{k}" in taken for k in range(count)):

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Compiled, Graph
-from cgraph.extend import Array, kept_by_first, real_array, real_number, require_mapping
+from cgraph.extend import Array, kept_by_first, real_array, require_mapping
 
-from ...systems.arguments import TIME
+from ...systems.arguments import TIME, finite_time
 from ...systems.model import Model, as_system
 from ...systems.system import System
 from ..constraints.constraint_rank import ConstraintWarning
@@ -136,10 +136,7 @@ def _numbers(system: System, t: float, parameters: Mapping[str, float] | None) -
         raise ValueError(f"the system has no parameter {unknown[0]!r} (it has {has})")
     if parameters:
         system.require_values({**system.parameters, **parameters})
-    time = real_number("t", t)
-    if not math.isfinite(time):
-        raise ValueError(f"t must be finite, got {time!r}")
-    return {TIME: time, **system.parameters, **parameters}
+    return {TIME: finite_time(t), **system.parameters, **parameters}
 
 
 def _arrays(system: System, state: State) -> tuple[dict[str, Array], tuple[int, ...]]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -11,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from cgraph.extend import real_number
 
+from ...systems.arguments import finite_time
 from ...systems.model import Model, as_system
 from ..constraints.nearly_redundant_rows import left_at
 from ..equation import documented
@@ -103,12 +103,10 @@ def freedom(
     >>> print(dyn.freedom(dyn.System(energy, "x y z", constraints=rods), [1.0, 0.0, 0.0]))
     2 freedom(s): 2 constraint row(s) of rank 1; redundant at tolerance 0.0002: 'again' (0.0e+00 of it is new)
     """
-    system, share, time = as_system(model), real_number("tolerance", tolerance), real_number("t", t)
+    system, share, time = as_system(model), real_number("tolerance", tolerance), finite_time(t)
     if not 0.0 <= share < 1.0:
         raise ValueError(f"tolerance must be at least 0 and less than 1, got {tolerance!r}")
-    if not math.isfinite(time):
-        raise ValueError(f"t must be finite, got {t!r} s")
-    start = given_start(model, q, np.zeros(system.n), 0.0, parameters)
+    start = given_start(system, q, np.zeros(system.n), 0.0, parameters)
     values = {name: start.bound[name] for name in system.parameters}
     whole = system.constraints.whole or system.constraints
     kept, shares, _ = left_at(whole, start.x[: system.nq], time, values, share)
