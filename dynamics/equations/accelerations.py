@@ -62,8 +62,8 @@ def accelerations(system: System, method: str = "auto", check: bool = False) -> 
 
     Raises SingularMassMatrixError, see `forward_dynamics`.
     """
-    held = bool(len(system.constraints))
-    short = system.n <= DENSE_UP_TO and not (held and check)
+    constrained = bool(len(system.constraints))
+    short = system.n <= DENSE_UP_TO and not (constrained and check)
     methods = [method] if method != "auto" else ["recursive", "dense"] if short else ["recursive"]
     ways = [(system, each) for each in methods]
     if (whole := system.whole) is not None:
@@ -83,7 +83,7 @@ def accelerations(system: System, method: str = "auto", check: bool = False) -> 
         raise SingularMassMatrixError(no_inertia(system, failure)) from None
     chosen = _smallest(system, graphs, WORTH if methods[-1] == "dense" else 1.0)
     if not system.surely_regular:
-        if held:
+        if constrained:
             _require_inertia_without_constraints(system)
         else:
             require_inertia(system, chosen)
@@ -91,7 +91,7 @@ def accelerations(system: System, method: str = "auto", check: bool = False) -> 
 
 
 def _smallest(system: System, graphs: Sequence[Graph], worth: float) -> Graph:
-    """Of graphs, the safest first, the smallest whose roundings carry little further than those of the first.
+    """Smallest of graphs, the safest first, whose roundings carry little further than those of the first.
 
     worth: of the nodes of the one before, at most, for the last.
     """

@@ -41,7 +41,7 @@ def state_rate(system: System, qdd: Sequence[Node] | None) -> dict[Node, Node]:
 
 
 def bias_terms(system: System, qdd: Sequence[Node] | None = None) -> BiasTerms:
-    """As bodies state their forces, or else derived from the Lagrangian.  qdd: accelerations, 0 if None."""
+    """Terms as bodies state them, or else derived from the Lagrangian.  qdd: accelerations, 0 if None."""
     if system.body_terms is None:
         return bias_terms_of_lagrangian(system, qdd)
     stated = system.body_terms.equations.bias_forces(system.q, system.qd, qdd)

@@ -103,7 +103,7 @@ class Equation:
         return documented(function, self._returns)
 
     def _returns(self, more: str) -> str:
-        """What stands under Returns, and more of it."""
+        """Section Returns: inputs, outputs, and more of them."""
         inputs = ", ".join([f"{kind}0.." for kind in self.inputs])
         outputs = f"output{'s' * (len(self.outputs) > 1 or bool(self.outputs[0].shape))}"
         text = f"Inputs {inputs}, t if needed, parameters; {outputs} {'; '.join(map(str, self.outputs))}. {more}"

@@ -61,7 +61,7 @@ class MassSolve(NamedTuple):
         return len(topological(self.x)) + sides * len(self.column)
 
     def split(self) -> tuple[list[Node], Graph]:
-        """What a column reads of the factorization, and the graph of one: inputs p0.., of those, b0..; outputs x0..."""
+        """Factors that a column reads, and the graph of a column: inputs p0.., the factors, b0..; outputs x0..."""
         moving = {*self.b, *self.column}
         read = dict.fromkeys([arg for node in self.column for arg in node.args if arg not in moving])
         factors = [node for node in read if node.value is None]
@@ -74,7 +74,7 @@ class MassSolve(NamedTuple):
 
 
 def mass_solve(system: System, build: Builder, method: str) -> MassSolve:
-    """By elimination on the graph of L, "recursive", or by LDL^T of the matrix, "dense".
+    """Solution by elimination on the graph of L, "recursive", or by LDL^T of the matrix, "dense".
 
     Raises SingularError for an M that is singular at every state.
     """
@@ -86,7 +86,7 @@ def mass_solve(system: System, build: Builder, method: str) -> MassSolve:
 
 
 def smaller_solution(system: System, make: Callable[[str], Solution], size: Callable[[Solution], int]) -> Solution:
-    """What `make` makes by one of the methods: by the dense one where paths are short and that saves nodes."""
+    """Solution that `make` makes by elimination, or densely where paths are short and that saves nodes."""
     eliminated = make("recursive")
     if _longest_path(system.lagrangian, system.qd) > DENSE_PATH:
         return eliminated
@@ -116,7 +116,7 @@ def _longest_path(lagrangian: Node, velocities: Sequence[Node]) -> int:
 
 
 def linear(b: list[Node], x: list[Node]) -> MassSolve:
-    """Of nodes x that are linear in b; what divides a column multiplies it, once inverted for all."""
+    """Solution of nodes x that are linear in b; a divisor of a column multiplies it, once inverted for all."""
     moving, column = set(b), []
     new: dict[Node, Node] = {}
     inverses: dict[Node, Node] = {}

@@ -79,7 +79,7 @@ def raise_if_singular(model: Model, info: ArrayLike) -> None:
 
 
 def no_inertia(system: System, error: SingularError) -> str:
-    """What a pivot that is not positive says of a coordinate."""
+    """Sentence on the coordinate whose pivot is not positive."""
     name = system.velocities[error.index]
     if error.regular:
         return f"the mass matrix is not positive definite: coordinate {name!r} has an inertia that is not positive"

@@ -10,7 +10,7 @@ from cgraph.extend import kept_by_first, require_choice
 from ..systems.arguments import TIME
 from ..systems.model import Equations, Model, as_equations, as_system
 from ..systems.system import System
-from .constraints.constraints import held_still
+from .constraints.constraints import leave_no_motion
 from .equation import Equation, Output
 from .equations_of_motion import SOLUTIONS, forward_dynamics
 from .formulations.formulations import ZERO
@@ -61,10 +61,10 @@ def with_multipliers(model: Equations, method: str = "auto") -> tuple[Graph, Gra
     system = as_system(model)
     solved = forward_dynamics(system, method)
     outputs = {f"q{i}_dot": rate for i, rate in enumerate(system.q_dot)}
-    still = held_still(system)  # the rounding of accelerations that are 0 is all that steps could be chosen by
+    still = leave_no_motion(system)  # the rounding of accelerations that are 0 is all that steps could be chosen by
     outputs |= {f"qd{i}_dot": ZERO if still else solved.outputs[f"qdd{i}"] for i in range(system.n)}
-    held = {name: solved.outputs[f"lambda{k}"] for k, name in enumerate(system.constraints.names)}
-    return Graph(solved.inputs, outputs), Graph(solved.inputs, held) if held else None
+    multipliers = {name: solved.outputs[f"lambda{k}"] for k, name in enumerate(system.constraints.names)}
+    return Graph(solved.inputs, outputs), Graph(solved.inputs, multipliers) if multipliers else None
 
 
 def normalization(model: Model) -> Graph | None:
@@ -81,7 +81,7 @@ def normalization(model: Model) -> Graph | None:
 
 
 class StateInputs(NamedTuple):
-    """What the inputs of a state equation are, in the order of the graph."""
+    """Inputs of a state equation by what they are, in the order of the graph."""
 
     states: tuple[str, ...]  # as many as outputs, and in their order
     applied: tuple[str, ...]  # tau0.., constant during a run

@@ -118,7 +118,7 @@ def _damping_and_forces(system: System, build: Builder) -> dict[str, list[Node]]
 
 
 def _names_of_partials(system: System) -> list[str]:
-    """Of the partial Lagrangians: their one tag, as a link's or a body's; else L1, L2, ..."""
+    """Names of the partial Lagrangians: their one tag, as a link's or a body's; else L1, L2, ..."""
     names: Sequence[str] = [_single_tag(partial.tags - _ENERGIES) for partial in system.partial_lagrangians]
     unique = all(names) and len(set(names)) == len(names)
     return list(names) if unique else [f"L{k + 1}" for k in range(len(names))]

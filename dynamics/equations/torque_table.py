@@ -127,13 +127,13 @@ class TorqueTable:
         return html_table(head, rows, title=self.title)
 
     def to_markdown(self, digits: int = 4) -> str:
-        """The same as a Markdown table."""
+        """Markdown of the table."""
         head, *body = [[cell.replace("|", "\\|") for cell in row] for row in self._cells(digits)]
         ruled = [head, ["---", *["---:"] * (len(head) - 1)], *body]
         return "".join(f"| {' | '.join(row)} |\n" for row in ruled)
 
     def to_latex(self, digits: int = 4) -> str:
-        """The same as a LaTeX `tabular` that needs no package."""
+        """LaTeX of the table, a `tabular` that needs no package."""
         head, *body = [" & ".join(map(_latex, row)) + r" \\" for row in self._cells(digits)]
         columns = "l" + "r" * len(self._cells(digits)[0][1:])
         lines = [rf"\begin{{tabular}}{{{columns}}}", r"\hline", head, r"\hline", *body, r"\hline", r"\end{tabular}"]

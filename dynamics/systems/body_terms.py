@@ -33,13 +33,13 @@ class BodyEquations(Protocol):
 
     @property
     def whole(self) -> BodyEquations | None:
-        """The same with all inertial numbers of all bodies, where fewer may cost digits."""
+        """Equations with all inertial numbers of all bodies, where fewer may cost digits."""
 
     def bias_forces(self, q: Sequence[Node], qd: Sequence[Node], qdd: Sequence[Node] | None) -> Sequence[BiasForce]:
         """Forces f at velocities z with sum of f dz/dqd = d/dt dL/dqd - dL/dq: the bias, where qdd is None, 0."""
 
     def regrouped_lagrangians(self, q: Sequence[Node], qd: Sequence[Node]) -> list[Node]:
-        """Those of as few inertial numbers as there can be, with the same derivatives in sum."""
+        """Lagrangians of as few inertial numbers as there can be, with the same derivatives in sum."""
 
     def mass_matrix(self, q: Sequence[Node], qd: Sequence[Node], lagrangian: Node, build: Builder) -> list[list[Node]]:
         """The lower triangle of M by composite inertias."""
@@ -53,7 +53,7 @@ class BodyEquations(Protocol):
 
 @dataclass(frozen=True)
 class BodyTerms:
-    """What a system of rigid bodies has beside its Lagrangian.
+    """Terms of a system of rigid bodies beside its Lagrangian.
 
     lengths: as of `System`.  surely_regular: each body alone has inertia along the velocities of its joint, so that no
     motion is without.  require_values: raises ValueError for values of parameters with which the bodies cannot be.

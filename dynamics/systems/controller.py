@@ -71,7 +71,7 @@ def controlled(
     controller: Callable[..., Sequence[Node | float]],
     parameters: Mapping[str, float] | None = None,
 ) -> Controlled:
-    """See `with_controller`. For a controller with the same graph as one of the last few, the same nodes."""
+    """Result of `with_controller`. For a controller with the same graph as one of the last few, the same nodes."""
     system = model.system
     if system is None:
         raise TypeError("a controller gives forces, and none act on a system of first order: write it into the rate")
@@ -105,7 +105,7 @@ def _controlled(request: _Request) -> Controlled:
 
 
 def with_closed_form(model: Equations, tau: Any, parameters: object) -> tuple[Equations, Any, Sequence[Node] | None]:
-    """What moves, the constant force on it, and the whole applied force as nodes; of a first-order model None.
+    """Moving system, the constant force on it, and the whole applied force as nodes; of a first-order model None.
 
     tau: a controller in closed form, or the constant force.  parameters: of the run, {name: value}; those that the
     model does not have are the controller's.

@@ -87,7 +87,7 @@ class Kinematics:
         return [list(row) for row in zip(*columns, strict=True)]
 
     def normalized(self, q: Sequence[Node]) -> list[Node]:
-        """The same configuration with the constraint of the coordinates met."""
+        """The configuration with the constraint of the coordinates met."""
         if self.quasi is None or self.quasi.normalized is None:
             return list(q)
         return self._called("normalized", self.quasi.normalized, len(self.q), list(q))
@@ -115,7 +115,7 @@ class Kinematics:
         self._compare(graph, n)
 
     def _compare(self, graph: Graph, n: int) -> None:
-        """At random states about neutral coordinates and others, row by row, as rows may have any unit."""
+        """Compare terms at random states about neutral coordinates and others, row by row: each may have its unit."""
         rng, nq, compared = np.random.default_rng(0), len(self.q), False
         neutral = np.array(self.neutral)
         for start in (neutral, neutral, np.zeros(nq), np.zeros(nq)):

@@ -144,7 +144,7 @@ class System:
 
     @property
     def whole(self) -> System | None:
-        """The same with all inertial numbers of all bodies, where fewer may cost digits; else None."""
+        """The system with all inertial numbers of all bodies, where fewer may cost digits; else None."""
         if self.body_terms is None or (equations := self.body_terms.equations.whole) is None:
             return None
         return self.changed(body_terms=replace(self.body_terms, equations=equations))
@@ -306,7 +306,7 @@ class System:
 
 
 def generalized_forces(what: str, function: Callable[..., object], system: System, p: Parameters) -> list[Node]:
-    """What a function of (q, qd, t) or (q, qd, t, p) gives: a node for each velocity. Raises what is wrong with it."""
+    """Forces of a function of (q, qd, t) or (q, qd, t, p), a node for each velocity. Raises what is wrong with it."""
     value = call_user_function(what, function, system.q, system.qd, system.t, p)
     applied = sequence(f"{what} must give", value)
     if len(applied) != system.n:

@@ -33,7 +33,7 @@ class Rows(NamedTuple):
 
     @classmethod
     def of(cls, kept: tuple[int, ...], rates: Sequence[Node]) -> Rows:
-        """Those that are kept of all rows."""
+        """The kept ones of all rows, with multipliers."""
         return cls(kept, [rates[k] for k in kept], cg.variables([f"lambda{k}" for k in kept]))
 
     def solve(
@@ -68,7 +68,7 @@ class Rows(NamedTuple):
         composites: bool = False,
         check: bool = False,
     ) -> list[Node]:
-        """The same by LDL^T of the whole matrix, multipliers eliminated last; the info only where there are no rows.
+        """(udot, s) by LDL^T of the whole matrix, multipliers eliminated last; the info only where there are no rows.
 
         composites: take M as bodies give it, `System.mass_matrix`, which has fewer nodes than the Hessian of L; its
         entries are rounded as wholes, and a factorization may lose the more digits, the worse M is.
@@ -89,14 +89,14 @@ def constraint_rows(system: System, rates: Sequence[Node]) -> Rows:
     return Rows.of(independent_rows(system.constraints), rates)
 
 
-def held_still(system: System) -> bool:
-    """Whether constraints that do not depend on time leave no motion: as many independent ones as velocities."""
+def leave_no_motion(system: System) -> bool:
+    """Whether constraints do not depend on time and admit no motion: as many independent ones as velocities."""
     rates = system.constraints.rates
     return len(rates) >= system.n == len(independent_rows(system.constraints)) and system.t not in topological(rates)
 
 
 def unknown_names(system: System) -> list[str]:
-    """What `solve_nodes` solves for, in words: velocities, then independent constraints."""
+    """Unknowns of `solve_nodes` in words: velocities, then independent constraints."""
     names = [f"constraint {system.constraints.names[k]!r}" for k in independent_rows(system.constraints)]
     return [*[f"coordinate {name!r}" for name in system.velocities], *names]
 

@@ -240,10 +240,10 @@ def lint_constraints(model: Model) -> ConstraintLint:
     alone = _judged(system)
     names = system.constraints.names[len(system.constraints.positions) :]
     rows = _multiplied(system)
-    held = _judged(_with_rows(system, rows)) if rows else {}
+    among = _judged(_with_rows(system, rows)) if rows else {}
     return ConstraintLint(
         {name: alone[name] for name in names},
-        {name: None if held[name] is None else not held[name] for name in rows},
+        {name: None if among[name] is None else not among[name] for name in rows},
     )
 
 
@@ -261,7 +261,7 @@ def _judged(system: System) -> dict[str, bool | None]:
 
 
 def _with_rows(system: System, rows: Mapping[str, Node]) -> System:
-    """The system held by these rows of velocities alone."""
+    """The system constrained by these rows of velocities alone."""
     given = (system.kinematics, system.t, system.parameters, None, lambda q, u, t, p: dict(rows))
     return system.changed(constraints=Constraints(*given), extra_inputs=system.extra_inputs)
 

@@ -17,7 +17,7 @@ from .formulations import COUPLING, ONE, THROUGH_STEP, ZERO
 
 
 class Blame(NamedTuple):
-    """What a graph has from the derivative through the step.
+    """Nodes and edges that a graph has from the derivative through the step.
 
     nodes: they serve nothing else.  edges: by these it enters what is sound, or another use of a sound node is wrong.
     cancelled: outputs that have no such edge left, since simplification took it away together with a right one.
@@ -29,7 +29,7 @@ class Blame(NamedTuple):
 
 
 def blame(system: System, formulation: str, derive: Callable[[System, str, Node], Graph], graph: Graph) -> Blame:
-    """What of the graph is there by the derivative through the step, whether its value is 0 or not.
+    """Blame for what the graph has by the derivative through the step, whether its value is 0 or not.
 
     derive: `torques` or `momenta`, of which `graph` is the simplified graph by this formulation.
 

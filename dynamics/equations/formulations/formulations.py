@@ -71,7 +71,7 @@ def chain_rule_literal(system: System) -> LagrangeTerms:
 
 
 def euler_embedded(system: System) -> LagrangeTerms:
-    """By definition, eq. (3) and Figure 1: dL/dqd is taken through q = qd dt + q_old, which is wrong."""
+    """The definition, eq. (3) and Figure 1: dL/dqd is taken through q = qd dt + q_old, which is wrong."""
     return _embedded(system, system.lagrangian)
 
 

@@ -33,7 +33,7 @@ _DIFFERS = "This is not the torque of the chain rule, however small dt is"
 
 
 class Excess(NamedTuple):
-    """What the torque of one velocity has too much.
+    """Excess in the torque of one velocity.
 
     symbol: "dL/dq.y".  formula: in a person's names, empty where it is long.  value: at the state of the verdict.
     """
@@ -166,7 +166,7 @@ class Verdict:
 
     @property
     def lacking(self) -> str:
-        """What is missing where the wrong term has cancelled a right one, in a sentence; empty where nothing is."""
+        """Sentence on right terms that the wrong one has cancelled; empty where there are none."""
         if not self.missing:
             return ""
         called = Names(self.graph, self.names)
@@ -182,7 +182,7 @@ class Verdict:
         return f"There by mistake: {what}, {alone if count else 'and no node by itself'}: {texts}."
 
     def to_dict(self) -> dict[str, Json]:
-        """The same for JSON; nodes are numbered as in `graph.nodes`, an edge is [source, target, argument slot]."""
+        """The verdict for JSON; nodes are numbered as in `graph.nodes`, an edge is [source, target, argument slot]."""
         number = {node: i for i, node in enumerate(self.graph.nodes)}
         return {
             "formulation": self.formulation,

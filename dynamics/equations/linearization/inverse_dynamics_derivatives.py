@@ -48,7 +48,7 @@ def inverse_dynamics_derivatives(system: System) -> Iterator[list[Node]]:
 
 
 def torque_derivatives(system: System, qdd: Sequence[Node], build: Builder) -> TorqueDerivatives:
-    """At these accelerations, with damping and applied forces."""
+    """Derivatives at these accelerations, with damping and applied forces."""
     stated = None
     if system.body_terms is not None and system.n > 1:  # of one coordinate, these are longer
         stated = system.body_terms.equations.torque_derivatives((system.q, system.qd, qdd), build)
@@ -68,7 +68,7 @@ def torque_derivatives(system: System, qdd: Sequence[Node], build: Builder) -> T
 
 
 def _derived(system: System, qdd: Sequence[Node], build: Builder) -> TorqueDerivatives:
-    """By differentiation of inverse dynamics, a reverse sweep from each torque; M from that of the energy."""
+    """Derivatives from inverse dynamics by a reverse sweep from each torque; M from that of the energy."""
     at = dict(zip(system.qdd, qdd, strict=True))
     torque = folded(list(cg.simplify(torques(system)).outputs.values()), build)
     slopes, n = state_slopes(system, torque, build), system.n

@@ -98,7 +98,7 @@ class LinearizationParts(NamedTuple):
         return linear_graph(self.inputs, *self.matrices())
 
     def in_columns(self) -> ColumnGraphs:
-        """The same with the columns left to a graph of one."""
+        """A graph of the state's part, and one of a column."""
         factors, column = self.solve.split()
         outputs = {f"p{k}": node for k, node in enumerate(factors)}
         columns = [*self.sides, *units(self.n, len(self.solve.b))]
@@ -141,7 +141,7 @@ def velocity_form(_: Matrix, x: Matrix, inverse: Matrix, brackets: Matrix) -> tu
 
 
 def linearization_parts(system: System) -> LinearizationParts:
-    """Of the velocity form. Raises SingularMassMatrixError for a coordinate without inertia."""
+    """Parts of the velocity form. Raises SingularMassMatrixError for a coordinate without inertia."""
     if not len(system.constraints):
         return smaller_solution(system, lambda method: _parts(system, method), lambda parts: parts.size)
     solved, build = accelerations(system), Builder()
@@ -191,10 +191,10 @@ def _slopes(system: System, rows: ConstraintRows, solved: Graph, build: Builder)
     Of quasi-velocities by displacements xi, dq = G xi.
     """
     tau, s = cg.simplify(torques(system)), rows.multipliers
-    held = cotangents(dict(zip(rows.rates, s, strict=True)), system.qd, build)
+    pulls = cotangents(dict(zip(rows.rates, s, strict=True)), system.qd, build)
     dots = tangents(state_rate(system, system.qdd) | {system.t: ONE}, rows.rates, build)
     with building(build):
-        equations = [torque - force for torque, force in zip(tau.outputs.values(), held, strict=True)]
+        equations = [torque - force for torque, force in zip(tau.outputs.values(), pulls, strict=True)]
     equations += [dots.get(z, ZERO) for z in rows.rates]
     slopes = entries(state_slopes(system, equations, build))
     at = {name: node for name, node in solved.outputs.items() if name in {str(each.name) for each in (*system.qdd, *s)}}

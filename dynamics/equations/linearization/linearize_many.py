@@ -183,7 +183,7 @@ def _written_out(parts: LinearizationParts) -> Write:
 
 
 def _by_jacobian(system: System) -> tuple[Sequence[Node], Write]:
-    """One state after another, by the Jacobian of forward dynamics: of systems whose velocities are rates."""
+    """States one after another, by the Jacobian of forward dynamics: of systems whose velocities are rates."""
     graph, n = forward_dynamics(system), system.n
     compiled, wrt = cg.compile(graph), [*system.q, *system.qd, *system.tau]
     entries = np.arange(3 * n * n).reshape(n, 3 * n)
@@ -219,7 +219,7 @@ def _in_columns(parts: LinearizationParts) -> Write:
 
 
 def linearization_program(graphs: ColumnGraphs, n: int) -> Program:
-    """One pass linearizes at the register "state", and records (A B), (2n, 3n), row by row.
+    """Program of which a pass linearizes at the register "state", and records (A B), (2n, 3n), row by row.
 
     Without the upper half, (0 1 0), where velocities are rates of coordinates. Columns by tau are for themselves: of
     their solutions the upper triangle counts, so that they are symmetric to the last bit.

@@ -41,7 +41,7 @@ def momentum_form(
 
 
 def momentum_parts(system: System) -> LinearizationParts:
-    """Over (q, u). Raises SingularMassMatrixError, ConstraintError and ValueError as `hamilton_equations`."""
+    """Parts of the momentum form over (q, u). Raises what `hamilton_equations` raises."""
     return _parts(Legendre(system, Builder(), ITERATIONS), momenta=False)
 
 

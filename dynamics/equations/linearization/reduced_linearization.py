@@ -23,7 +23,7 @@ from .linearization import linearize
 
 
 class ReducedLinearization(NamedTuple):
-    """The linear motion of a held system in displacements that are independent of one another.
+    """The linear motion of a constrained system in displacements that are independent of one another.
 
     Parameters
     ----------

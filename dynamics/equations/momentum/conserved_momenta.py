@@ -43,8 +43,8 @@ def conserved_momenta(model: Model) -> tuple[str, ...]:
     for form in (system, system.shortened):
         if form is not None:
             constant |= {i for i, rate in enumerate(_rates(form)) if rate.value == 0.0} - _jumping(form)
-    held = _held(system)
-    return tuple([name for i, name in enumerate(system.velocities) if i in constant - held])
+    constrained = _constrained(system)
+    return tuple([name for i, name in enumerate(system.velocities) if i in constant - constrained])
 
 
 def _rates(system: System) -> list[Node]:
@@ -79,7 +79,7 @@ def _jumping(system: System) -> set[int]:
     return moving
 
 
-def _held(system: System) -> set[int]:
+def _constrained(system: System) -> set[int]:
     """The velocities that constraints depend on."""
     slopes = [cotangents({rate: ONE}, system.qd, Builder()) for rate in system.constraints.rates]
     return {i for row in slopes for i, slope in enumerate(row) if slope.value != 0.0}

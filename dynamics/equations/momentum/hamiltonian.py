@@ -127,7 +127,7 @@ def velocities(system: System) -> Graph:
 
 
 def missing_momenta(system: System) -> Graph | None:
-    """What `velocities` leave of the momenta, missing0.. as of `hamilton_equations`; None where nothing is iterated."""
+    """Momenta that `velocities` do not reach, missing0.. as of `hamilton_equations`; None where nothing is iterated."""
     transform = Legendre(system, Builder(), ITERATIONS)
     return None if transform.quadratic else cg.simplify(system.graph(_missing(transform), system.q, transform.p))
 
@@ -157,7 +157,7 @@ def _equations(system: System, iterations: int, check: bool, order: Order) -> Gr
 
 
 def _missing(transform: Legendre) -> dict[str, Node]:
-    """What the iteration for the velocities leaves of the momenta, p - dL/dqd; 0 where there is none."""
+    """Momenta that the iteration for the velocities does not reach, p - dL/dqd; 0 where there is none."""
     left = [ZERO] * transform.system.n
     if not transform.quadratic:
         here = transform.at(transform.momenta)

@@ -157,7 +157,7 @@ def _arrays(system: System, state: State) -> tuple[dict[str, Array], tuple[int, 
 
 
 def _rows(system: System, name: str, values: ArrayLike | None) -> Array:
-    """One part of the state, checked: (n,) or (N, n)."""
+    """Part of a state, checked: (n,) or (N, n)."""
     known = system.coordinates if name == "q" else system.velocities
     n = len(known)
     if values is None:

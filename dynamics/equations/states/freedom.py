@@ -21,7 +21,7 @@ TOLERANCE = 2e-4  # as of a Loop
 
 @dataclass(frozen=True)
 class Freedom:
-    """What constraints leave of a model's motions at a state; see `freedom`.
+    """Freedoms that constraints leave a model at a state; see `freedom`.
 
     Parameters
     ----------

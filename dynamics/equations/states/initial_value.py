@@ -21,7 +21,7 @@ PAST = 1e-14  # of the end: some roundings, by which a last time may lie past it
 
 
 class InitialValue(NamedTuple):
-    """Where a motion starts, and the numbers of every other input of its state equation."""
+    """Start of a motion, and the numbers of every other input of its state equation."""
 
     x: Array  # (m,): q, normalized, and then qd, or the states of an OdeSystem
     states: tuple[str, ...]  # names of x
@@ -29,7 +29,7 @@ class InitialValue(NamedTuple):
 
 
 class InitialValues(NamedTuple):
-    """Where N motions start, and the other inputs of their state equation: one number for all, or one for each."""
+    """Starts of N motions, and the other inputs of their state equation: one number for all, or one for each."""
 
     x: Array  # (N, m)
     states: tuple[str, ...]
