@@ -42,6 +42,10 @@ class GraphOfModel(Protocol):
         """The graph of the model."""
 
 
+EQUATIONS: dict[str, Equation] = {}
+"""Rows by the name of their public function, of the files that are imported."""
+
+
 @dataclass(frozen=True)
 class Output:
     """A number, a vector or a matrix among the outputs of an equation.
@@ -100,6 +104,7 @@ class Equation:
 
     def describes(self, function: Documented) -> Documented:
         """The function, with the tables of this equation in its docstring."""
+        EQUATIONS[function.__name__] = self
         return documented(function, self._returns)
 
     def _returns(self, more: str) -> str:

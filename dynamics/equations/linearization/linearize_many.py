@@ -95,33 +95,25 @@ def linearize_many(
     ([-15.0, 15.0], (2, 2, 1))
     """
     system = as_system(model)
-    function, count = _function(system, require_choice("form", form, FORMS)), thread_count(threads)
-    values = input_rows(system, function.inputs, {"q": q, "qd": qd, "tau": tau}, t, parameters)
+    inputs, write = _writer(system, require_choice("form", form, FORMS))
+    count = thread_count(threads)
+    values = input_rows(system, inputs, {"q": q, "qd": qd, "tau": tau}, t, parameters)
     if values.ndim != 2:
         raise ValueError("linearize_many takes rows of states, got one state; see linearize")
-    return function(values, count)
+    n = system.n
+    matrices = np.empty((len(values), 2 * n, 3 * n))
+    write(values, matrices, count)
+    return matrices[:, :, : 2 * n], matrices[:, :, 2 * n :]
 
 
-class _Function:
-    """A and B of many states, in machine code.
-
-    write: rows (N, n_in) of the inputs and a number of threads to (A B), (N, 2n, 3n).
-    """
-
-    def __init__(self, system: System, form: str) -> None:
-        inputs, self._write = _way(system) if form == "velocity" else _symmetric_way(system)
-        self._n, self.inputs = system.n, [str(each.name) for each in inputs]
-
-    def __call__(self, values: Array, threads: int) -> tuple[Array, Array]:
-        matrices = np.empty((len(values), 2 * self._n, 3 * self._n))
-        self._write(values, matrices, threads)
-        return matrices[:, :, : 2 * self._n], matrices[:, :, 2 * self._n :]
+Write = Callable[[Array, Array, int], None]  # rows (N, n_in) and a number of threads to (A B), (N, 2n, 3n)
 
 
-_function = kept_by_first(_Function)
-
-
-Write = Callable[[Array, Array, int], None]
+@kept_by_first
+def _writer(system: System, form: str) -> tuple[list[str], Write]:
+    """The inputs, and machine code that writes A and B of many states."""
+    inputs, write = _way(system) if form == "velocity" else _momentum_way(system)
+    return [str(each.name) for each in inputs], write
 
 
 def _way(system: System) -> tuple[Sequence[Node], Write]:
@@ -135,7 +127,7 @@ def _way(system: System) -> tuple[Sequence[Node], Write]:
     return _by_jacobian(system) if rates else (parts.inputs, _in_columns(parts))
 
 
-def _symmetric_way(system: System) -> tuple[Sequence[Node], Write]:
+def _momentum_way(system: System) -> tuple[Sequence[Node], Write]:
     parts = momentum_parts(system)
     return parts.inputs, _written_out(parts) if parts.size < LONGER * WRITTEN_OUT else _assembled(parts)
 
