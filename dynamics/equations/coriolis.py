@@ -7,10 +7,10 @@ from collections.abc import Iterator, Sequence
 from cgraph import Node
 from cgraph.extend import Builder, building, folded, tangents, topological
 
+from ..systems.kinematics import ONE, ZERO
 from ..systems.system import System
 from .equation import Equation, Output, entries, mirrored
 from .equations_of_motion import bias
-from .formulations.formulations import ONE, ZERO
 from .substitute import substitute
 
 

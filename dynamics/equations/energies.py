@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from cgraph import Node
 from cgraph.extend import Builder, building, cotangents
 
+from ..systems.kinematics import ONE, ZERO
 from ..systems.system import System
 from .equation import Equation, Output
-from .formulations.formulations import ONE, ZERO
 from .substitute import substitute
 
 

@@ -7,13 +7,13 @@ from collections.abc import Iterator
 from cgraph import Graph, Node
 from cgraph.extend import Builder, cotangents, require_choice, require_flag
 
+from ..systems.kinematics import ONE, ZERO
 from ..systems.model import Model, as_system
 from ..systems.system import System
 from .accelerations import accelerations
 from .bias_terms import bias_terms, bias_terms_of_lagrangian
 from .constraints.constraints import require_no_constraints
 from .equation import Equation, Output, entries, mirrored, shortened
-from .formulations.formulations import ONE, ZERO
 from .mass_matrix_solve import inverse, mass_solve, smaller_solution
 from .substitute import substitute
 

@@ -8,12 +8,12 @@ from cgraph import Graph
 from cgraph.extend import kept_by_first, require_choice
 
 from ..systems.arguments import TIME
+from ..systems.kinematics import ZERO
 from ..systems.model import Equations, Model, as_equations, as_system
 from ..systems.system import System
 from .constraints.constraints import leave_no_motion
 from .equation import Equation, Output
 from .equations_of_motion import SOLUTIONS, forward_dynamics
-from .formulations.formulations import ZERO
 
 FORMS = ("velocity", "momentum")  # of a motion: states (q, qd) or (q, p)
 

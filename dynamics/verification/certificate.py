@@ -17,11 +17,12 @@ from cgraph.extend import Array, Builder, cotangents, real_number, require_whole
 from ..equations.coriolis import coriolis, require_quadratic
 from ..equations.energies import energy
 from ..equations.equations_of_motion import bias, forward_dynamics, gravity_force, mass_matrix
-from ..equations.formulations.formulations import ONE, ZERO, inverse_dynamics
+from ..equations.formulations.formulations import inverse_dynamics
 from ..equations.singular_mass_matrix import balanced
 from ..equations.states.evaluate import evaluate
 from ..equations.torque_decomposition import torque_by_joint_motion, torque_by_link
 from ..equations.torque_table import TorqueTable
+from ..systems.kinematics import ONE, ZERO
 from ..systems.model import Model, as_system
 from ..systems.system import System
 from . import peer_agreement as agreement

@@ -19,8 +19,8 @@ import cgraph as cg
 from cgraph import Node
 from cgraph.extend import Builder, Order, building, cotangents, hessian_nodes, ldl_solve, solve_nodes, topological
 
+from ...systems.kinematics import ONE, ZERO
 from ...systems.system import System
-from ..formulations.formulations import ONE, ZERO
 from .constraint_rank import independent_rows
 
 

@@ -18,8 +18,8 @@ from cgraph import Graph, Node, extend
 from cgraph.extend import Array, Builder, building, folded, kept_by_first
 
 from ...systems.constraints import ConstraintError
+from ...systems.kinematics import ZERO
 from ...systems.system import System
-from ..formulations.formulations import ZERO
 from ..substitute import substitute
 from .constraint_rank import ConstraintWarning, independent_rows
 from .constraints import Rows

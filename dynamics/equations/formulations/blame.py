@@ -12,8 +12,9 @@ from cgraph import Edge, Graph, Node
 from cgraph.extend import Builder, folded, require_graph
 
 from ...systems.arguments import new_variables
+from ...systems.kinematics import ONE, ZERO
 from ...systems.system import System
-from .formulations import COUPLING, ONE, THROUGH_STEP, ZERO
+from .formulations import COUPLING, THROUGH_STEP
 
 
 class Blame(NamedTuple):

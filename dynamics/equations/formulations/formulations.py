@@ -12,6 +12,7 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import TANGENT, Builder, building, cotangents, require_choice, require_flag, tangents
 
+from ...systems.kinematics import ONE, ZERO
 from ...systems.model import Model, as_system
 from ...systems.system import System
 from ..bias_terms import bias_terms, state_rate
@@ -21,7 +22,6 @@ from ..substitute import substitute
 EULER = "euler"  # tag of the embedded relations q = qd dt + q_old and qd = qdd dt + qd_old
 COUPLING = "q of qd"  # tag of the product qd dt in the first of them, through which dL/dqd reaches dL/dq
 LAGRANGIAN = "lagrangian"  # tag of what the author left untagged: derivatives of it would take a relation's tag instead
-ONE, ZERO = cg.constant(1.0), cg.constant(0.0)
 
 
 class LagrangeTerms(NamedTuple):

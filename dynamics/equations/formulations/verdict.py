@@ -17,11 +17,12 @@ from cgraph import Edge, Graph, Node, extend
 from cgraph.extend import Builder, Names, building, cotangents, folded, require_mapping, shortened
 
 from ...systems.display_names import display_names
+from ...systems.kinematics import ONE
 from ...systems.model import Model, as_system
 from ...systems.system import System
 from ..equation import documented
 from .blame import blame
-from .formulations import ONE, THROUGH_STEP, inverse_dynamics, torques
+from .formulations import THROUGH_STEP, inverse_dynamics, torques
 
 if TYPE_CHECKING:
     from cgraph.extend import Json

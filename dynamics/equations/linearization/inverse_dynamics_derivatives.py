@@ -9,9 +9,10 @@ from cgraph import Node
 from cgraph.extend import Builder, building, cotangents, folded
 
 from ...systems.body_terms import TorqueDerivatives
+from ...systems.kinematics import ONE
 from ...systems.system import System
 from ..equation import Equation, Output, entries, mirrored
-from ..formulations.formulations import ONE, torques
+from ..formulations.formulations import torques
 from ..substitute import substitute
 
 ROWS = ("n", "n")

@@ -22,11 +22,11 @@ from cgraph.extend import (
     thread_count,
 )
 
+from ...systems.kinematics import ONE, ZERO
 from ...systems.model import Model, as_system
 from ...systems.system import System
 from ..equation import documented
 from ..equations_of_motion import forward_dynamics
-from ..formulations.formulations import ONE, ZERO
 from ..state_equation import FORMS
 from ..states.evaluate import input_rows
 from .linearization_parts import ColumnGraphs, LinearizationParts, linearization_parts

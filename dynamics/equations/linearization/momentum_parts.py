@@ -18,9 +18,9 @@ import numpy as np
 from cgraph import Graph
 from cgraph.extend import Builder, building, cotangents, folded, hessian_nodes
 
+from ...systems.kinematics import ONE
 from ...systems.system import System
 from ..equation import entries, mirrored
-from ..formulations.formulations import ONE
 from ..mass_matrix_solve import Rows, mass_solve, smaller_solution
 from ..momentum.hamiltonian import ITERATIONS
 from ..momentum.legendre import Legendre

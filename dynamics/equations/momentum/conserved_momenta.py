@@ -8,10 +8,10 @@ from cgraph import Node
 from cgraph.extend import Builder, as_node, building, columns, cotangents, folded, shortened, topological
 
 from ...systems.arguments import new_variables
+from ...systems.kinematics import ONE, ZERO
 from ...systems.model import Model, as_system
 from ...systems.system import System
 from ..equation import documented
-from ..formulations.formulations import ONE, ZERO
 
 
 @documented

@@ -8,10 +8,10 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import Builder, Order, building, cotangents, require_choice, require_flag, require_whole
 
+from ...systems.kinematics import ONE, ZERO
 from ...systems.model import Model, as_system
 from ...systems.system import System
 from ..equation import Equation, Output, shortened
-from ..formulations.formulations import ONE, ZERO
 from .legendre import Legendre, dot
 
 ITERATIONS = 40  # Newton's, for a Lagrangian that is not quadratic in the velocities

@@ -12,9 +12,9 @@ from cgraph import Node
 from cgraph.extend import Builder, Order, SingularError, building, cotangents, folded, solve_tangents, topological
 
 from ...systems.constraints import ConstraintError
+from ...systems.kinematics import ONE, ZERO
 from ...systems.system import System
 from ..accelerations import require_inertia
-from ..formulations.formulations import ONE, ZERO
 from ..singular_mass_matrix import SingularMassMatrixError, no_inertia
 
 SHORTER, LONGER = (
