@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -95,11 +94,14 @@ def _smallest(system: System, graphs: Sequence[Graph], worth: float) -> Graph:
 
     worth: of the nodes of the one before, at most, for the last.
     """
-    chosen = graphs[0]
-    spread = cache(lambda graph: rounding_spread(graph, system.parameters, _sizes(system, graphs[0])))
+    chosen, most = graphs[0], None
     for graph in graphs[1:]:
         limit = worth if graph is graphs[-1] else 1.0
-        if _cost(graph) < limit * _cost(chosen) and spread(graph) <= GROWTH * spread(graphs[0]):
+        if _cost(graph) >= limit * _cost(chosen):
+            continue
+        sizes = _sizes(system, graphs[0])
+        most = most or GROWTH * rounding_spread(graphs[0], system.parameters, sizes)
+        if rounding_spread(graph, system.parameters, sizes) <= most:
             chosen = graph
     return chosen
 
