@@ -470,7 +470,7 @@ RECORDS = """
 # code, which looks at nothing, and into the names of nodes.
 LEFT_OUT = """cg.recording_lines cg.clear_cache cg.clear_caches cg.Compiled.bind cg.Compiled.values cg.Graph.check
     cg.Graph.counts cg.Graph.listing cg.Graph.only_output cg.Graph.to_networkx dyn.System.braking
-    dyn.System.changed dyn.System.mass_matrix dyn.System.require_values
+    dyn.System.changed dyn.System.mass_matrix dyn.System.require_known dyn.System.require_values
     dyn.JointForce.along dyn.JointForce.check dyn.JointLimit.along dyn.JointLimit.check dyn.JointFriction.along
     dyn.JointFriction.check dyn.Actuator.along dyn.Actuator.check
     extend.Array extend.columns extend.doors extend.Order extend.Polynomial extend.Builder extend.Runner

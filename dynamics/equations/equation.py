@@ -93,7 +93,8 @@ class Equation:
             return shortened(system, self._of(derivation)) if self.rewritten else self._of(derivation)(system)
 
         update_wrapper(graph, derivation, ("__module__", "__name__", "__qualname__", "__doc__"))
-        del graph.__wrapped__  # type: ignore[attr-defined]  # its signature is its own
+        graph.__signature__ = signature(graph, follow_wrapped=False)  # type: ignore[attr-defined]
+        graph.__annotations__ = {"model": Model, "return": Graph}  # not the derivation's, whose source is shown
         return self.describes(graph)
 
     def graph(self, system: System, nodes: Sequence[Node]) -> Graph:
