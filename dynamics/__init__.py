@@ -8,17 +8,23 @@ if TYPE_CHECKING:
     from cgraph import __version__ as __version__
 
     from . import scenes
-    from .equations.constraints.constraint_lint import ConstraintLint, lint_constraints
     from .equations.constraints.constraint_rank import ConstraintWarning
-    from .equations.constraints.integrability import integrable_rows
-    from .equations.coriolis import coriolis, damping_force
+    from .equations.constraints.integrability import ConstraintLint, integrable_rows, lint_constraints
+    from .equations.coriolis import coriolis
     from .equations.energies import energy, kinetic_energy, potential_energy
-    from .equations.equations_of_motion import bias, forward_dynamics, gravity_force, mass_matrix, momentum
+    from .equations.equations_of_motion import (
+        bias,
+        damping_force,
+        forward_dynamics,
+        gravity_force,
+        inverse_mass_matrix,
+        mass_matrix,
+        momentum,
+    )
+    from .equations.formulations.blame import spurious_nodes
     from .equations.formulations.formulation_sizes import formulation_sizes
     from .equations.formulations.formulations import FORMULATIONS, inverse_dynamics, momentum_rate
-    from .equations.formulations.spurious_nodes import spurious_nodes
     from .equations.formulations.verdict import Verdict, formulation_verdict
-    from .equations.inverse_mass_matrix import inverse_mass_matrix
     from .equations.linearization.inverse_dynamics_derivatives import inverse_dynamics_derivatives
     from .equations.linearization.linearization import linearize, state_space
     from .equations.linearization.linearize_many import linearize_many
@@ -27,8 +33,8 @@ if TYPE_CHECKING:
     from .equations.momentum.hamiltonian import hamilton_equations, hamiltonian
     from .equations.singular_mass_matrix import SingularMassMatrixError, raise_if_singular
     from .equations.state_equation import state_equation
-    from .equations.states.arrays_at import arrays_at
     from .equations.states.consistent_state import consistent_state
+    from .equations.states.evaluate import arrays_at
     from .equations.states.freedom import Freedom, freedom
     from .equations.torque_decomposition import torque_by_joint_motion, torque_by_link
     from .equations.torque_table import TorqueTable

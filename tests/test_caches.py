@@ -26,6 +26,7 @@ TABLES = {
     "cgraph.operations.operation.OPS",
     "cgraph.operations.operation.BY_UFUNC",
     "cgraph.program.statement.STATEMENTS",
+    "dynamics.equations.equation.EQUATIONS",
     "dynamics.experiments.trust.random_lagrangians.FAMILIES",
     f"{HOME}._memos",
 }

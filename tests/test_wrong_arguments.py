@@ -254,7 +254,7 @@ CALLS = {
     "dyn.Mechanism": call(dyn.Mechanism, [body()], (0.0, 0.0, -9.81), (), {}, {}, False, left_out=(), loops=()),
     "dyn.OdeSystem": call(dyn.OdeSystem, lambda x, t: [-x[0]], ["x"], {}),
     "dyn.System": call(
-        dyn.System, lagrangian, ["a"], {}, None, 0.0, None, constraints=None, velocity_constraints=None
+        dyn.System, lagrangian, ["a"], {}, None, 0.0, None, constraints=None, velocity_constraints=None, body_terms=None
     ),
     "dyn.Scene": call(dyn.Scene, "s", "about", *SCENE),
     "dyn.RecursiveInverseDynamics()": call(dyn.RecursiveInverseDynamics(ARM), [0.0], [0.0], [0.0]),
@@ -399,7 +399,7 @@ CALLS |= {
     "extend.require_sequence": call(lambda value: extend.require_sequence("value", value, "texts", str), ["a"]),
     "extend.require_texts": call(lambda value: extend.require_texts("value", value), {"a": "b"}),
     "extend.require_whole": call(lambda value, least: extend.require_whole("value", value, least), 3, 0),
-    "extend.rounding_spread": call(extend.rounding_spread, GRAPH, {}),
+    "extend.rounding_spread": call(extend.rounding_spread, GRAPH, {}, {}),
     "extend.runner": call(extend.runner, PROGRAM, "python", fast=False, fma=True),
     "extend.scipy_integrate": call(extend.scipy_integrate, "what"),
     "extend.share": call(extend.share, abs, range(3), 2),
@@ -469,10 +469,8 @@ RECORDS = """
 # Nothing to give; types; decorators; what a mechanism calls; what empties the user's caches; the fast way into compiled
 # code, which looks at nothing, and into the names of nodes.
 LEFT_OUT = """cg.recording_lines cg.clear_cache cg.clear_caches cg.Compiled.bind cg.Compiled.values cg.Graph.check
-    cg.Graph.counts cg.Graph.listing cg.Graph.only_output cg.Graph.to_networkx dyn.System.bias_forces
-    dyn.System.mass_matrix
-    dyn.System.require_values dyn.System.momentum_rates
-    dyn.System.torque_derivatives
+    cg.Graph.counts cg.Graph.listing cg.Graph.only_output cg.Graph.to_networkx dyn.System.braking
+    dyn.System.changed dyn.System.mass_matrix dyn.System.require_known dyn.System.require_values
     dyn.JointForce.along dyn.JointForce.check dyn.JointLimit.along dyn.JointLimit.check dyn.JointFriction.along
     dyn.JointFriction.check dyn.Actuator.along dyn.Actuator.check
     extend.Array extend.columns extend.doors extend.Order extend.Polynomial extend.Builder extend.Runner

@@ -62,7 +62,7 @@ def _errors(node: Node, points: dict[str, Array]) -> tuple[Array, Array]:
 _POINTS, _SIGNS = 256, 1021  # samples, whose mean is certain to a tenth; operations with signs of their own
 
 
-def rounding_spread(graph: Graph, values: Mapping[str, float]) -> float:
+def rounding_spread(graph: Graph, values: Mapping[str, float], sizes: Mapping[str, float] | None = None) -> float:
     """How far outputs move where the results of all operations are off by one part in 2^30, either way at random.
 
     A running bound adds sizes where errors cancel, as they do by the thousand in an elimination.
@@ -73,6 +73,8 @@ def rounding_spread(graph: Graph, values: Mapping[str, float]) -> float:
         Any graph.
     values : mapping of str to float
         Inputs that have these values, such as parameters. The others are normally distributed, the same every time.
+    sizes : mapping of str to float, optional
+        What inputs are drawn of, and outputs compared by, where they have units; 1 of those that are not named.
 
     Returns
     -------
@@ -96,10 +98,13 @@ def rounding_spread(graph: Graph, values: Mapping[str, float]) -> float:
     """
     require_graph("rounding_spread", graph)
     require_mapping("values", values, "name: number")
+    known_sizes = {} if sizes is None else require_mapping("sizes", sizes, "name: number")
     rng = np.random.default_rng(0)
     factors = 1.0 + UNIT * rng.choice([-1.0, 1.0], size=(_SIGNS, 2 * _POINTS))
     factors[:, :_POINTS] = 1.0
-    samples: dict[str, Value] = {name: np.tile(rng.normal(size=_POINTS), 2) for name in graph.input_names}
+    samples: dict[str, Value] = {
+        name: known_sizes.get(name, 1.0) * np.tile(rng.normal(size=_POINTS), 2) for name in graph.input_names
+    }
     samples |= values
     known: dict[Node, Value] = {}
     with np.errstate(all="ignore"):
@@ -109,7 +114,9 @@ def rounding_spread(graph: Graph, values: Mapping[str, float]) -> float:
                 known[node] = value * factors[k % _SIGNS] if columns(node.op).rounding else value
             else:
                 known[node] = samples[node.name or ""] if node.value is None else node.value
-        found = np.array([np.broadcast_to(known[node], 2 * _POINTS) for node in graph.outputs.values()])
+        found = np.array(
+            [np.broadcast_to(known[node], 2 * _POINTS) / known_sizes.get(k, 1.0) for k, node in graph.outputs.items()]
+        )
         exact, moved = found[:, :_POINTS], found[:, _POINTS:]
         spread = np.abs(moved - exact).max(axis=0) / np.abs(exact).max(axis=0)
     usable = spread[np.isfinite(spread)]

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
 
 import cgraph as cg
 from cgraph import Graph
@@ -12,19 +15,17 @@ from ..systems.constraints import ConstraintError
 from ..systems.system import System
 from .bias_terms import BiasTerms, bias_terms
 from .constraints.constraints import (
-    DenseSolver,
     constraint_rows,
     multiplier_outputs,
-    solved_by_elimination,
     unknown_names,
 )
-from .inertia_rank import without_inertia
-from .singular_mass_matrix import SingularMassMatrixError, no_inertia
+from .singular_mass_matrix import TORQUE, SingularMassMatrixError, no_inertia, without_inertia
 
 DENSE_UP_TO = 7  # coordinates; beyond, the dense graph is larger on a tree of bodies, and takes long to build
 WORTH = 0.9  # of the recursive graph's nodes, at most, for the dense one: elimination keeps more digits
 BY_ENERGY = "dense by energy"  # with the Hessian of L, also where bodies give an M of fewer nodes
 TURN = 10  # products that a sine takes as long as, about
+DRAWN = 64  # states at which accelerations are looked at for their size
 GROWTH = 3.0  # times the rounding of the safest graph, at most, at sample points
 
 
@@ -60,8 +61,8 @@ def accelerations(system: System, method: str = "auto", check: bool = False) -> 
 
     Raises SingularMassMatrixError, see `forward_dynamics`.
     """
-    held = bool(len(system.constraints))
-    short = system.n <= DENSE_UP_TO and not (held and check)
+    constrained = bool(len(system.constraints))
+    short = system.n <= DENSE_UP_TO and not (constrained and check)
     methods = [method] if method != "auto" else ["recursive", "dense"] if short else ["recursive"]
     ways = [(system, each) for each in methods]
     if (whole := system.whole) is not None:
@@ -79,27 +80,63 @@ def accelerations(system: System, method: str = "auto", check: bool = False) -> 
         ) from None
     if not graphs:
         raise SingularMassMatrixError(no_inertia(system, failure)) from None
-    chosen = _smallest(graphs, WORTH if methods[-1] == "dense" else 1.0, system.parameters)
+    chosen = _smallest(system, graphs, WORTH if methods[-1] == "dense" else 1.0)
     if not system.surely_regular:
-        if held:
+        if constrained:
             _require_inertia_without_constraints(system)
         else:
             require_inertia(system, chosen)
     return chosen
 
 
-def _smallest(graphs: Sequence[Graph], worth: float, values: Mapping[str, float]) -> Graph:
-    """Of graphs, the safest first, the smallest whose roundings carry little further than those of the first.
+def _smallest(system: System, graphs: Sequence[Graph], worth: float) -> Graph:
+    """Smallest of graphs, the safest first, whose roundings carry little further than those of the first.
 
     worth: of the nodes of the one before, at most, for the last.
     """
-    safe = chosen = graphs[0]
+    chosen, most = graphs[0], None
     for graph in graphs[1:]:
         limit = worth if graph is graphs[-1] else 1.0
-        smaller = _cost(graph) < limit * _cost(chosen)
-        if smaller and rounding_spread(graph, values) <= GROWTH * rounding_spread(safe, values):
+        if _cost(graph) >= limit * _cost(chosen):
+            continue
+        sizes = _sizes(system, graphs[0])
+        most = most or GROWTH * rounding_spread(graphs[0], system.parameters, sizes)
+        if rounding_spread(graph, system.parameters, sizes) <= most:
             chosen = graph
     return chosen
+
+
+def _sizes(system: System, accelerations: Graph) -> dict[str, float]:
+    """Sizes of states, torques and accelerations of bodies, which change with the units of mass, length and time.
+
+    Angles are of size 1, places of the length L that an angle of 1 moves the bodies by. With A, the acceleration of
+    bodies at rest, speeds are of size sqrt(A L), and torques are such that they accelerate by A, too. Of a Lagrangian
+    alone units are unknown: all is of size 1.
+    """
+    if system.body_terms is None:
+        return {}
+    ways = [length or 1.0 for length in system.lengths]  # m of a unit
+    longest = next((length for length in ways if length != 1.0), 1.0)
+    of_q, of_u = np.array(ways[: system.nq]), np.array(ways[system.nq :])
+    rng = np.random.default_rng(0)
+    at: dict[str, Any] = dict.fromkeys(accelerations.input_names, 0.0) | dict(system.parameters)
+    at |= {f"q{i}": longest / way * rng.normal(size=DRAWN) for i, way in enumerate(of_q)}
+
+    def largest(force: float) -> float:
+        """Acceleration [m/s^2] by a force [N] along all velocities, the largest of them, in the median over states."""
+        with np.errstate(all="ignore"):
+            values = accelerations.evaluate(at | {f"tau{i}": force * way for i, way in enumerate(of_u)})
+            rows = [np.broadcast_to(np.abs(values[f"qdd{i}"] * way), DRAWN) for i, way in enumerate(of_u)]
+            return float(np.median(np.max(rows, axis=0)))
+
+    falling, by_force = largest(0.0), largest(TORQUE) / TORQUE
+    rate = falling if 0.0 < falling < np.inf else longest
+    force = rate / by_force if 0.0 < by_force < np.inf else 1.0
+    sizes = {f"q{i}": longest / way for i, way in enumerate(of_q)}
+    for i, way in enumerate(of_u):
+        sizes |= {f"qd{i}": np.sqrt(rate * longest) / way, f"tau{i}": force * way, f"qdd{i}": rate / way}
+    others = [name for name in accelerations.outputs if name not in sizes]
+    return sizes | dict.fromkeys(others, np.inf)  # multipliers, which have units of rows: they are not compared
 
 
 def _cost(graph: Graph) -> int:
@@ -115,8 +152,7 @@ def _solved(system: System, terms: BiasTerms, method: str, check: bool) -> Graph
         # What stands at the coordinates already. Elimination takes the inertial terms where they are, at their
         # velocity nodes, and carries them to the coordinates on its way; a dense solve needs the whole bias here.
         at_rest = terms.gradient if not method.startswith("dense") else [-force for force in terms.bias(system, build)]
-        with cg.tag("damping"):
-            braking = [damping * qd for damping, qd in zip(system.damping, system.qd, strict=True)]
+        braking = system.braking(build)
         rhs = [
             tau + force - brake + applied
             for tau, force, brake, applied in zip(system.tau, at_rest, braking, terms.forces, strict=True)
@@ -125,10 +161,10 @@ def _solved(system: System, terms: BiasTerms, method: str, check: bool) -> Graph
         rhs += [-change for change in system.constraints.rate_changes(rows.rates, build)]
     if not method.startswith("dense"):
         order: Order = "balanced" if method == "balanced" else "recursive"
-        solved = solved_by_elimination(system, terms, rows, rhs, inertial, build, check, order)
+        solved = rows.solve(system, terms.lagrangian, rhs, build, at=inertial, check=check, order=order)
     else:
-        solver = DenseSolver(system, terms.lagrangian, rows, build, composites=method == "dense")
-        solved = solver.solve(rhs, check)
+        of_bodies = method == "dense"
+        solved = rows.solve_densely(system, terms.lagrangian, rhs, build, composites=of_bodies, check=check)
     end = system.n + len(rows.kept)
     outputs = {f"qdd{i}": node for i, node in enumerate(solved[: system.n])}
     outputs |= multiplier_outputs(system, rows, solved[system.n : end], build)

@@ -34,11 +34,17 @@ class BiasTerms(NamedTuple):
             return [force - slope for force, slope in zip(inertial, self.gradient, strict=True)]
 
 
+def state_rate(system: System, qdd: Sequence[Node] | None) -> dict[Node, Node]:
+    """xdot of x = (q, qd), and 1 for t if anything depends on it.  qdd: accelerations, 0 if None."""
+    rate = dict(zip(system.q, system.q_dot, strict=True)) | dict(zip(system.qd, qdd or (), strict=qdd is not None))
+    return rate | ({system.t: ONE} if system.t in system.extra_inputs else {})
+
+
 def bias_terms(system: System, qdd: Sequence[Node] | None = None) -> BiasTerms:
-    """As the system states its forces (`System.bias_forces`), or else derived from its Lagrangian.  qdd: see there."""
-    stated = system.bias_forces(qdd)
-    if stated is None:
+    """Terms as bodies state them, or else derived from the Lagrangian.  qdd: accelerations, 0 if None."""
+    if system.body_terms is None:
         return bias_terms_of_lagrangian(system, qdd)
+    stated = system.body_terms.equations.bias_forces(system.q, system.qd, qdd)
     pairs = [node for pair in stated for node in pair]
     build = Builder()
     rates, n = system.constraints.rates, system.n
@@ -68,8 +74,6 @@ def bias_terms_of_lagrangian(system: System, qdd: Sequence[Node] | None = None) 
     if system.kinematics.quasi is not None:
         gradient = system.kinematics.slopes(gradient, momenta, build)
     # d/dt dL/dz: eq. (4) of the paper with xdot = (qd, qdd), and 1 for t, one forward sweep.
-    x_dot = dict(zip(system.q, system.q_dot, strict=True)) | dict(zip(system.qd, qdd or (), strict=qdd is not None))
-    x_dot |= {system.t: ONE} if system.t in system.extra_inputs else {}
-    dots = tangents(x_dot, momenta, build)
+    dots = tangents(state_rate(system, qdd), momenta, build)
     inertial = {velocity: dots[p] for velocity, p in zip(velocities, momenta, strict=True) if p in dots}
     return BiasTerms(lagrangian, forces, inertial, gradient, rates)

@@ -1,22 +1,22 @@
-"""The Coriolis matrix of Christoffel's symbols, and viscous damping, as graphs."""
+"""The Coriolis matrix of Christoffel's symbols as a graph."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
-import cgraph as cg
-from cgraph import Graph, Node
+from cgraph import Node
 from cgraph.extend import Builder, building, folded, tangents, topological
 
-from ..systems.model import Model, as_system
+from ..systems.kinematics import ONE, ZERO
 from ..systems.system import System
+from .equation import Equation, Output, entries, mirrored
 from .equations_of_motion import bias
-from .formulations.formulations import ONE, ZERO
 from .substitute import substitute
 
 
-def coriolis(model: Model) -> Graph:
-    """C(q, qd) with C qd + gravity_force = bias and dM/dt - 2 C skew.
+@Equation("q qd", Output("C_{}_{}", ("n", "n"), "N m s or N s"), rewritten=False)
+def coriolis(system: System) -> Iterator[list[Node]]:
+    """Coriolis matrix C(q, qd) with C qd + gravity_force = bias and dM/dt - 2 C skew.
 
     The Coriolis force is quadratic in qd with Christoffel's symbols as coefficients, c_i = sum_jk Gamma_ijk qd_j qd_k,
     and these are symmetric in j and k. So C = (d bias / d qd) / 2: one forward sweep a column over the graph of the
@@ -25,22 +25,10 @@ def coriolis(model: Model) -> Graph:
     Quasi-velocities bring the brackets of their columns, C = (d bias / d qd) / 2 - M c(qd, .) / 2, without which
     dM/dt - 2 C would not be skew.
 
-    Parameters
-    ----------
-    model : Model
-        A system, a mechanism or a scene with n coordinates.
-
-    Returns
-    -------
-    Graph
-        Inputs q0.., qd0.., t if needed, parameters; outputs C_0_0, C_0_1, .. row by row, (n, n) [N m s or N s].
-
     Raises
     ------
     ValueError
         For an L that is not quadratic in the velocities.
-    TypeError
-        For what is no model, or has no Lagrangian.
 
     Examples
     --------
@@ -49,14 +37,11 @@ def coriolis(model: Model) -> Graph:
     >>> dyn.coriolis(slider).evaluate({"q0": 2.0, "q1": 0.0, "qd0": 3.0, "qd1": 5.0})
     {'C_0_0': 0.0, 'C_0_1': -10.0, 'C_1_0': 10.0, 'C_1_1': 6.0}
     """
-    system = as_system(model)
     require_quadratic(system)
     build = Builder()
     (lagrangian,) = folded([system.lagrangian], Builder())
     mass = [] if system.kinematics.quasi is None else system.mass_matrix(lagrangian, build)
-    rows = coriolis_matrix(system, folded(bias(system).outputs.values(), build), build, mass)
-    outputs = {f"C_{i}_{j}": entry for i, row in enumerate(rows) for j, entry in enumerate(row)}
-    return cg.simplify(system.graph(outputs, system.q, system.qd))
+    yield entries(coriolis_matrix(system, folded(bias(system).outputs.values(), build), build, mass))
 
 
 def coriolis_matrix(
@@ -71,18 +56,18 @@ def coriolis_matrix(
     """
     n = system.n
     columns = [tangents({velocity: ONE}, forces, build) for velocity in system.qd]  # one sweep gives db/dqd_j
-    partials = [column.get(force, ZERO) for force in forces for column in columns]  # db/dqd, row by row
-    linear = folded(substitute(partials, dict.fromkeys(system.qd, ZERO)), build)  # G
+    partials = [[column.get(force, ZERO) for column in columns] for force in forces]  # db/dqd
+    linear = folded(substitute(entries(partials), dict.fromkeys(system.qd, ZERO)), build)  # G
     with building(build):
-        entries = [0.5 * (a + b) for a, b in zip(partials, linear, strict=True)]
-    rows = [entries[i * n : (i + 1) * n] for i in range(n)]
+        halves = [0.5 * (a + b) for a, b in zip(entries(partials), linear, strict=True)]
+    rows = [halves[i * n : (i + 1) * n] for i in range(n)]
     if system.kinematics.quasi is None:
         return rows
-    brackets = system.kinematics.brackets(build)
-    with building(build):
+    brackets, whole = system.kinematics.brackets(build), mirrored(mass)
+    with building(build):  # - M c(qd, .) / 2
         for i in range(n):
             for j in range(n):
-                taken = sum([mass[max(i, k)][min(i, k)] * brackets[k][j] for k in range(n)], ZERO)
+                taken = sum([whole[i][k] * brackets[k][j] for k in range(n)], ZERO)
                 rows[i][j] = rows[i][j] - 0.5 * taken
     return rows
 
@@ -98,34 +83,3 @@ def require_quadratic(system: System) -> None:
                 "the Lagrangian must be quadratic in the velocities, "
                 f"its mass matrix depends on that of {name!r} ({velocity.name})"
             )
-
-
-def damping_force(model: Model) -> Graph:
-    """The force that viscous damping takes, D qd.
-
-    Parameters
-    ----------
-    model : Model
-        A system, a mechanism or a scene with n coordinates.
-
-    Returns
-    -------
-    Graph
-        Inputs q0.., qd0.., t if needed, parameters; outputs damping0.., (n,) [N m or N].
-
-    Raises
-    ------
-    TypeError
-        For what is no model, or has no Lagrangian.
-
-    Examples
-    --------
-    >>> import dynamics as dyn
-    >>> arm = dyn.planar_arm(masses=[1.0], lengths=[1.0], damping=0.5)
-    >>> dyn.damping_force(arm).evaluate({"q0": 0.0, "qd0": 3.0})
-    {'damping0': 1.5}
-    """
-    system = as_system(model)
-    with building(Builder()), cg.tag("damping"):
-        taken = [damping * qd for damping, qd in zip(system.damping, system.qd, strict=True)]
-    return system.graph({f"damping{i}": node for i, node in enumerate(taken)}, system.q, system.qd)

@@ -2,35 +2,20 @@
 
 from __future__ import annotations
 
-import cgraph as cg
-from cgraph import Graph, Node
+from collections.abc import Iterator
+
+from cgraph import Node
 from cgraph.extend import Builder, building, cotangents
 
-from ..systems.body_system import BodySystem
-from ..systems.model import Model, as_system
+from ..systems.kinematics import ONE, ZERO
 from ..systems.system import System
-from .formulations.formulations import ONE, ZERO
-from .shorter_form import shorter_form
+from .equation import Equation, Output
 from .substitute import substitute
 
 
-def energy(model: Model) -> Graph:
+@Equation("q qd", Output("E", (), "J"))
+def energy(system: System) -> Iterator[list[Node]]:
     """Total energy E = qd . dL/dqd - L, which is K + P for a kinetic energy quadratic in qd.
-
-    Parameters
-    ----------
-    model : Model
-        A system, a mechanism or a scene.
-
-    Returns
-    -------
-    Graph
-        Inputs q0.., qd0.., t if needed, parameters; output E [J].
-
-    Raises
-    ------
-    TypeError
-        For what is no model, or has no Lagrangian.
 
     Examples
     --------
@@ -39,37 +24,12 @@ def energy(model: Model) -> Graph:
     >>> dyn.energy(spring).evaluate({"q0": 1.0, "qd0": 2.0})
     {'E': 4.0}
     """
-
-    def derive(system: System) -> Graph:
-        build = Builder()
-        bars = cotangents({system.lagrangian: ONE}, system.qd, build)
-        with building(build):
-            total: Node = ZERO
-            for p, qd in zip(bars, system.qd, strict=True):
-                total = total + p * qd
-            total = total - system.lagrangian
-        return cg.simplify(system.graph({"E": total}, system.q, system.qd))
-
-    return shorter_form(as_system(model), derive)
+    yield [_legendre(system, system.lagrangian)]
 
 
-def kinetic_energy(model: Model) -> Graph:
+@Equation("q qd", Output("K", (), "J"))
+def kinetic_energy(system: System) -> Iterator[list[Node]]:
     """The part K of the energy that motion adds, K = E - P; of bodies and springs the usual one.
-
-    Parameters
-    ----------
-    model : Model
-        A system, a mechanism or a scene.
-
-    Returns
-    -------
-    Graph
-        Inputs q0.., qd0.., t if needed, parameters; output K [J].
-
-    Raises
-    ------
-    TypeError
-        For what is no model, or has no Lagrangian.
 
     Examples
     --------
@@ -78,31 +38,22 @@ def kinetic_energy(model: Model) -> Graph:
     >>> dyn.kinetic_energy(spring).evaluate({"q0": 1.0, "qd0": 2.0})
     {'K': 2.0}
     """
+    if system.body_terms is not None:
+        yield [system.kinetic]
+        return
+    motion = _legendre(system, system.kinetic)
+    with building(Builder()):  # of the terms T of L that depend on qd; where they are quadratic, T itself
+        total = motion + _at_rest(system)
+    yield [total]
 
-    def derive(system: System) -> Graph:
-        return cg.simplify(system.graph({"K": _kinetic(system)}, system.q, system.qd))
 
-    return shorter_form(as_system(model), derive)
-
-
-def potential_energy(model: Model) -> Graph:
+@Equation("q qd", Output("P", (), "J"))
+def potential_energy(system: System) -> Iterator[list[Node]]:
     """The energy at rest, P = -L at qd = 0: that of gravity and springs.
-
-    Parameters
-    ----------
-    model : Model
-        A system, a mechanism or a scene.
 
     Returns
     -------
-    Graph
-        Inputs q0.., qd0.., t if needed, parameters; output P [J]. Of bodies it is 0 where all of them are at the
-        world's origin, and springs at their reference.
-
-    Raises
-    ------
-    TypeError
-        For what is no model, or has no Lagrangian.
+    Of bodies P is 0 where all of them are at the world's origin, and springs at their reference.
 
     Examples
     --------
@@ -111,24 +62,17 @@ def potential_energy(model: Model) -> Graph:
     >>> dyn.potential_energy(spring).evaluate({"q0": 1.0, "qd0": 2.0})
     {'P': 2.0}
     """
-
-    def derive(system: System) -> Graph:
-        with building(Builder()):
-            at_rest = system.potential - _at_rest(system)
-        return cg.simplify(system.graph({"P": at_rest}, system.q, system.qd))
-
-    return shorter_form(as_system(model), derive)
+    with building(Builder()):
+        at_rest = system.potential - _at_rest(system)
+    yield [at_rest]
 
 
-def _kinetic(system: System) -> Node:
-    """qd . dT/dqd - T + T(qd = 0) for the terms T of L that depend on qd: T itself where it is quadratic."""
-    if isinstance(system, BodySystem):
-        return system.kinetic
+def _legendre(system: System, lagrangian: Node) -> Node:
+    """qd . dL/dqd - L."""
     build = Builder()
-    momenta = cotangents({system.kinetic: ONE}, system.qd, build)
+    momenta = cotangents({lagrangian: ONE}, system.qd, build)
     with building(build):
-        work = sum([p * qd for p, qd in zip(momenta, system.qd, strict=True)], ZERO)
-        return work - system.kinetic + _at_rest(system)
+        return sum([p * qd for p, qd in zip(momenta, system.qd, strict=True)], ZERO) - lagrangian
 
 
 def _at_rest(system: System) -> Node:

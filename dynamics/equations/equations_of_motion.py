@@ -1,43 +1,33 @@
-"""Equations of motion as graphs: mass matrix, bias, momentum, and forward dynamics."""
+"""Equations of motion as graphs: mass matrix and its inverse, bias, gravity, momentum, damping, forward dynamics."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator
 
-import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import Builder, cotangents, require_choice, require_flag
 
+from ..systems.kinematics import ONE, ZERO
 from ..systems.model import Model, as_system
 from ..systems.system import System
-from .accelerations import accelerations, mass_matrix_graph
+from .accelerations import accelerations
 from .bias_terms import bias_terms, bias_terms_of_lagrangian
 from .constraints.constraints import require_no_constraints
-from .formulations.formulations import ONE, ZERO
-from .shorter_form import shorter_form
+from .equation import Equation, Output, entries, mirrored, shortened
+from .mass_matrix_solve import inverse, mass_solve, smaller_solution
 from .substitute import substitute
 
 FEW = 2  # coordinates up to which a bias is also derived from the Lagrangian
+INERTIA, FORCE = "kg m^2, kg m or kg", "N m or N"
 
 
-def mass_matrix(model: Model) -> Graph:
-    """M(q), the part of tau that multiplies qdd: M = d2L/dqd2.
-
-    Parameters
-    ----------
-    model : Model
-        A system, a mechanism or a scene with n coordinates.
+@Equation("q qd", Output("M_{}_{}", ("n", "n"), INERTIA))
+def mass_matrix(system: System) -> Iterator[list[Node]]:
+    """Mass matrix M(q) = d2L/dqd2, the part of tau that multiplies qdd.
 
     Returns
     -------
-    Graph
-        Inputs q0.., qd0.. (M depends on qd only for a Lagrangian that is not quadratic), t if needed, parameters.
-        Outputs M_0_0, M_0_1, .. row by row, (n, n), symmetric [kg m^2, kg m or kg].
-
-    Raises
-    ------
-    TypeError
-        For what is no model, or has no Lagrangian.
+    M is symmetric, and depends on qd only for a Lagrangian that is not quadratic in it.
 
     Examples
     --------
@@ -46,28 +36,45 @@ def mass_matrix(model: Model) -> Graph:
     >>> dyn.mass_matrix(arm).evaluate({"q0": 0.1, "qd0": 0.0})
     {'M_0_0': 4.0}
     """
-    return shorter_form(as_system(model), mass_matrix_graph)
+    yield entries(mirrored(system.mass_matrix(system.lagrangian)))
 
 
-def bias(model: Model) -> Graph:
-    """Coriolis, centrifugal and gravity force together: tau at qdd = 0 without damping and applied forces.
+@Equation("q qd", Output("Minv_{}_{}", ("n", "n"), "1/(kg m^2), 1/(kg m) or 1/kg"))
+def inverse_mass_matrix(system: System) -> Iterator[list[Node]]:
+    """Inverse mass matrix M(q)^-1: what accelerations take of forces, d qdd / d tau.
 
-    tau + forces - damping * qd = M qdd + bias.
-
-    Parameters
-    ----------
-    model : Model
-        A system, a mechanism or a scene with n coordinates.
+    One factorization serves all columns, and only half of the symmetric entries is computed. Of a tree of bodies M^-1
+    has no zeros: all that is connected moves. To solve with one right-hand side, `forward_dynamics` takes far less.
+    Constraints are left out.
 
     Returns
     -------
-    Graph
-        Inputs q0.., qd0.., t if needed, parameters; outputs bias0.., (n,) [N m or N].
+    M^-1 is symmetric.
 
     Raises
     ------
-    TypeError
-        For what is no model, or has no Lagrangian.
+    SingularMassMatrixError
+        For a coordinate without inertia.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> arm = dyn.planar_arm(masses=[1.0, 1.0], lengths=[1.0, 1.0])
+    >>> at = dyn.arrays_at(arm, dyn.inverse_mass_matrix(arm), q=[0.0, 1.5707963267948966])
+    >>> at["Minv"].round(6).tolist()
+    [[0.75, -0.75], [-0.75, 3.75]]
+    """
+    free, build = system.without_constraints, Builder()
+    accelerations(free)  # raises where M is singular
+    solve = smaller_solution(free, lambda method: mass_solve(free, build, method), lambda each: each.size(system.n))
+    yield entries(inverse(solve, build))
+
+
+@Equation("q qd", Output("bias{}", ("n",), FORCE))
+def bias(system: System) -> Iterator[list[Node]]:
+    """Coriolis, centrifugal and gravity force together: tau at qdd = 0 without damping and applied forces.
+
+    tau + forces - damping * qd = M qdd + bias.
 
     Examples
     --------
@@ -76,36 +83,15 @@ def bias(model: Model) -> Graph:
     >>> dyn.bias(arm).evaluate({"q0": 1.5707963267948966, "qd0": 3.0})
     {'bias0': 9.81}
     """
-
-    def derive(system: System) -> Graph:
-        free = system.without_constraints  # whose tags shared nodes would have
-        terms = [bias_terms(free)]
-        if system.n <= FEW:  # of a joint or two the energy has no more than the bodies
-            terms += [bias_terms_of_lagrangian(form) for form in free.forms]
-        return _smallest_graph(
-            [system.graph(_named("bias", each.bias(free, Builder())), system.q, system.qd) for each in terms]
-        )
-
-    return shorter_form(as_system(model), derive)
+    free = system.without_constraints  # whose tags shared nodes would have
+    yield bias_terms(free).bias(free, Builder())
+    if system.n <= FEW:  # of a joint or two the energy has no more than the bodies
+        yield from [bias_terms_of_lagrangian(form).bias(free, Builder()) for form in free.forms]
 
 
-def gravity_force(model: Model) -> Graph:
+@Equation("q qd", Output("gravity{}", ("n",), FORCE))
+def gravity_force(system: System) -> Iterator[list[Node]]:
     """The bias at rest: dP/dq, from gravity and springs.
-
-    Parameters
-    ----------
-    model : Model
-        A system, a mechanism or a scene with n coordinates.
-
-    Returns
-    -------
-    Graph
-        Inputs q0.., qd0.., t if needed, parameters; outputs gravity0.., (n,) [N m or N].
-
-    Raises
-    ------
-    TypeError
-        For what is no model, or has no Lagrangian.
 
     Examples
     --------
@@ -116,34 +102,14 @@ def gravity_force(model: Model) -> Graph:
     %2 = mul 4.905 %1  # primal; link 1, potential
     output gravity0 = %2
     """
-
-    def derive(system: System) -> Graph:
-        free, graphs = system.without_constraints, []
-        for terms in [bias_terms_of_lagrangian(form) for form in free.forms] + [bias_terms(free)]:
-            at_rest = substitute(terms.bias(free, Builder()), dict.fromkeys(system.qd, ZERO))
-            graphs.append(system.graph(_named("gravity", at_rest), system.q, system.qd))
-        return _smallest_graph(graphs)
-
-    return shorter_form(as_system(model), derive)
+    free = system.without_constraints
+    for terms in [bias_terms_of_lagrangian(form) for form in free.forms] + [bias_terms(free)]:
+        yield substitute(terms.bias(free, Builder()), dict.fromkeys(system.qd, ZERO))
 
 
-def momentum(model: Model) -> Graph:
+@Equation("q qd", Output("p{}", ("n",), "kg m^2/s or kg m/s"))
+def momentum(system: System) -> Iterator[list[Node]]:
     """Generalized momenta p = dL/dqd.
-
-    Parameters
-    ----------
-    model : Model
-        A system, a mechanism or a scene with n coordinates.
-
-    Returns
-    -------
-    Graph
-        Inputs q0.., qd0.., t if needed, parameters; outputs p0.., (n,) [kg m^2/s or kg m/s].
-
-    Raises
-    ------
-    TypeError
-        For what is no model, or has no Lagrangian.
 
     Examples
     --------
@@ -152,36 +118,35 @@ def momentum(model: Model) -> Graph:
     >>> dyn.momentum(block).evaluate({"q0": 0.0, "qd0": 3.0, "m": 2.0})
     {'p0': 6.0}
     """
-
-    def derive(system: System) -> Graph:
-        momenta = [cotangents({form.lagrangian: ONE}, system.qd) for form in system.forms]
-        return _smallest_graph([system.graph(_named("p", bars), system.q, system.qd) for bars in momenta])
-
-    return shorter_form(as_system(model), derive)
+    for form in system.forms:
+        yield cotangents({form.lagrangian: ONE}, system.qd)
 
 
-def _named(name: str, nodes: Sequence[Node]) -> dict[str, Node]:
-    """The nodes as outputs, numbered."""
-    return {f"{name}{i}": node for i, node in enumerate(nodes)}
+@Equation("q qd", Output("damping{}", ("n",), FORCE), rewritten=False)
+def damping_force(system: System) -> Iterator[list[Node]]:
+    """The force that viscous damping takes, D qd.
 
-
-def _smallest_graph(graphs: Sequence[Graph]) -> Graph:
-    """The one with the fewest nodes, simplified; of equal ones the first."""
-    return min([cg.simplify(graph) for graph in graphs], key=lambda graph: len(graph.nodes))
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> arm = dyn.planar_arm(masses=[1.0], lengths=[1.0], damping=0.5)
+    >>> dyn.damping_force(arm).evaluate({"q0": 0.0, "qd0": 3.0})
+    {'damping0': 1.5}
+    """
+    yield system.braking(Builder())
 
 
 SOLUTIONS = ("auto", "recursive", "dense", "balanced")
 
 
+@Equation("q qd tau", Output("qdd{}", ("n",), "rad/s^2 or m/s^2")).describes
 def forward_dynamics(model: Model, method: str = "auto", *, check: bool = False) -> Graph:
     """Accelerations: qdd = M^-1 (tau + forces - damping * qd - bias), from the Lagrangian.
 
-    A mechanism states its bias itself (`System.bias_forces`); of others it is derived.
+    A mechanism states its bias itself; of others it is derived.
 
     Parameters
     ----------
-    model : Model
-        A system, a mechanism or a scene with n coordinates.
     method : {"auto", "recursive", "dense", "balanced"}
         "recursive": elimination on the graph of L without forming M (`cg.hessian_solve`); for a tree of bodies the
         number of nodes is linear in n. "dense": M factored as LDL^T; smaller for some short arms, and less accurate
@@ -198,10 +163,8 @@ def forward_dynamics(model: Model, method: str = "auto", *, check: bool = False)
 
     Returns
     -------
-    Graph
-        Inputs q0.., qd0.., tau0.., t if needed, parameters; outputs qdd0.., (n,) [rad/s^2 or m/s^2]. With constraints
-        then lambda0.., (m,): M qdd = tau + forces - damping * qd - bias + J^T lambda, for the rows J of all
-        constraints. Those that follow from others are left out, with a warning that names them; theirs are 0.
+    With constraints then lambda0.., (m,): M qdd = tau + forces - damping * qd - bias + J^T lambda, for the rows J of
+    all constraints. Those that follow from others are left out, with a warning that names them; theirs are 0.
 
     Raises
     ------
@@ -212,8 +175,6 @@ def forward_dynamics(model: Model, method: str = "auto", *, check: bool = False)
         An indefinite M that is regular is solved with.
     ValueError
         For an unknown method, or one that takes no constraints.
-    TypeError
-        For what is no model, or has no Lagrangian.
 
     Examples
     --------
@@ -233,8 +194,9 @@ def forward_dynamics(model: Model, method: str = "auto", *, check: bool = False)
     """
     require_choice("method", method, SOLUTIONS)
     require_flag("check", check)
-    if check and method == "dense" and len(as_system(model).constraints):
+    system = as_system(model)
+    if check and method == "dense" and len(system.constraints):
         raise ValueError('check needs method="recursive" or "auto" where there are constraints, got "dense"')
     if method == "balanced":
-        require_no_constraints(as_system(model))
-    return shorter_form(as_system(model), lambda system: accelerations(system, method, check))
+        require_no_constraints(system)
+    return shortened(system, lambda form: accelerations(form, method, check))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from typing import NamedTuple, Protocol, TypeVar
+from typing import NamedTuple, TypeVar
 
 import cgraph as cg
 from cgraph import Graph, Node
@@ -21,8 +21,8 @@ from cgraph.extend import (
     topological,
 )
 
+from ..systems.kinematics import ONE, ZERO
 from ..systems.system import System
-from .formulations.formulations import ONE, ZERO
 from .singular_mass_matrix import SingularMassMatrixError
 
 DENSE_PATH = 12  # coordinates from the world to a tip; a dense factorization loses digits with about their fourth power
@@ -31,15 +31,7 @@ WORTH = 0.8  # of the nodes by elimination, at most, for the dense one: eliminat
 Rows = Sequence[Sequence[Node]]
 
 
-class HasSize(Protocol):
-    """Something made of nodes."""
-
-    @property
-    def size(self) -> int:
-        """How many."""
-
-
-Sized = TypeVar("Sized", bound=HasSize)
+Solution = TypeVar("Solution")
 
 
 class MassSolve(NamedTuple):
@@ -64,13 +56,12 @@ class MassSolve(NamedTuple):
                 result.append([new.get(node, node) for node in self.x])
         return result
 
-    @property
-    def size(self) -> int:
-        """How many nodes the columns of M^-1 take, about."""
-        return len(topological(self.x)) + len(self.x) * len(self.column)
+    def size(self, sides: int) -> int:
+        """How many nodes the solutions of so many right-hand sides take, about."""
+        return len(topological(self.x)) + sides * len(self.column)
 
     def split(self) -> tuple[list[Node], Graph]:
-        """What a column reads of the factorization, and the graph of one: inputs p0.., of those, b0..; outputs x0..."""
+        """Factors that a column reads, and the graph of a column: inputs p0.., the factors, b0..; outputs x0..."""
         moving = {*self.b, *self.column}
         read = dict.fromkeys([arg for node in self.column for arg in node.args if arg not in moving])
         factors = [node for node in read if node.value is None]
@@ -83,7 +74,7 @@ class MassSolve(NamedTuple):
 
 
 def mass_solve(system: System, build: Builder, method: str) -> MassSolve:
-    """By elimination on the graph of L, "recursive", or by LDL^T of the matrix, "dense".
+    """Solution by elimination on the graph of L, "recursive", or by LDL^T of the matrix, "dense".
 
     Raises SingularError for an M that is singular at every state.
     """
@@ -94,13 +85,13 @@ def mass_solve(system: System, build: Builder, method: str) -> MassSolve:
     return linear(b, solve_nodes(lagrangian, system.qd, b, build))
 
 
-def shorter(system: System, make: Callable[[str], Sized]) -> Sized:
-    """What `make` makes by one of the methods: by the dense one where paths are short and that saves nodes."""
+def smaller_solution(system: System, make: Callable[[str], Solution], size: Callable[[Solution], int]) -> Solution:
+    """Solution that `make` makes by elimination, or densely where paths are short and that saves nodes."""
     eliminated = make("recursive")
     if _longest_path(system.lagrangian, system.qd) > DENSE_PATH:
         return eliminated
     with suppress(SingularError, SingularMassMatrixError):  # which needs rows exchanged
-        if (dense := make("dense")).size < WORTH * eliminated.size:
+        if size(dense := make("dense")) < WORTH * size(eliminated):
             return dense
     return eliminated
 
@@ -108,8 +99,13 @@ def shorter(system: System, make: Callable[[str], Sized]) -> Sized:
 def inverse(solve: MassSolve, build: Builder) -> list[list[Node]]:
     """Rows of M^-1: of the symmetric entries those with fewer operations, where the column is of a later coordinate."""
     n = len(solve.x)
-    columns = solve.solutions([[ONE if i == j else ZERO for i in range(len(solve.b))] for j in range(n)], build)
+    columns = solve.solutions(units(n, len(solve.b)), build)
     return [[columns[max(i, j)][min(i, j)] for j in range(n)] for i in range(n)]
+
+
+def units(count: int, length: int) -> list[list[Node]]:
+    """The first unit vectors of this length."""
+    return [[ONE if i == j else ZERO for i in range(length)] for j in range(count)]
 
 
 def _longest_path(lagrangian: Node, velocities: Sequence[Node]) -> int:
@@ -120,7 +116,7 @@ def _longest_path(lagrangian: Node, velocities: Sequence[Node]) -> int:
 
 
 def linear(b: list[Node], x: list[Node]) -> MassSolve:
-    """Of nodes x that are linear in b; what divides a column multiplies it, once inverted for all."""
+    """Solution of nodes x that are linear in b; a divisor of a column multiplies it, once inverted for all."""
     moving, column = set(b), []
     new: dict[Node, Node] = {}
     inverses: dict[Node, Node] = {}

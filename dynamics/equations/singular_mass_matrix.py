@@ -1,15 +1,26 @@
-"""The error of a mass matrix that is singular, and the look at what a graph says of one."""
+"""Singular mass matrices: their error, what a graph says of one, and motions without inertia, looked for by numbers."""
 
 from __future__ import annotations
+
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import SingularError, real_array
+import cgraph as cg
+from cgraph import Graph, Node, extend
+from cgraph.extend import Array, SingularError, real_array, solve_nodes, topological
 
 from ..systems.model import Model, as_system
 from ..systems.system import System
 from .constraints.constraints import unknown_names
+from .substitute import substitute
+
+STATES = 3
+TORQUE = 2.0**200  # so large that no other force counts
+ROUNDINGS = 8  # of constants, tried at a state
+PLACES = 8  # units in its last place, by which a constant of a body may be off that was made of others
+SPARE = 1e-3  # what rounding may do to M^-1, relative, where M is not looked at closely
 
 
 class SingularMassMatrixError(ValueError):
@@ -72,8 +83,91 @@ def raise_if_singular(model: Model, info: ArrayLike) -> None:
 
 
 def no_inertia(system: System, error: SingularError) -> str:
-    """What a pivot that is not positive says of a coordinate."""
+    """Sentence on the coordinate whose pivot is not positive."""
     name = system.velocities[error.index]
     if error.regular:
         return f"the mass matrix is not positive definite: coordinate {name!r} has an inertia that is not positive"
     return f"the mass matrix is singular: coordinate {name!r} has no inertia, or none that others do not share"
+
+
+def balanced(matrix: Array) -> Array:
+    """s_i M_ij s_j with rows whose largest entries are about 1, for powers of two s: Ruiz's scaling, a few turns.
+
+    matrix: (..., n, n), symmetric. A row of zeros stays.
+    """
+    scale = np.ones(matrix.shape[:-1])
+    for _ in range(4):
+        rows = np.abs(scale[..., :, None] * matrix * scale[..., None, :]).max(axis=-1)
+        scale = scale * 2.0 ** -np.round(0.5 * np.log2(np.where(rows > 0.0, rows, 1.0)))
+    return scale[..., :, None] * matrix * scale[..., None, :]
+
+
+def without_inertia(system: System, accelerations: Graph, mass_matrix: Callable[[], Graph]) -> list[int]:
+    """The coordinates of which no digit of the acceleration is certain at some random states; [] where M has full rank.
+
+    accelerations: the graph of forward dynamics. Its M^-1 mostly shows at once that there is nothing to fear. A pivot
+    that is all rounding leaves no digit; one that is small, since a mass is, leaves them all. Constants that are folded
+    on the way do not tell how they were rounded. So where digits stay, M x = tau is solved anew with those of L as
+    inputs, which are moved in their last place.
+    """
+    n, rng = system.n, np.random.default_rng(0)
+    found: set[int] = set()
+    unfolded: tuple[Graph, dict[str, float]] | None = None
+    for k in range(STATES):
+        point = {name: 10.0**-k * float(rng.uniform(0.5, 1.5)) for name in accelerations.input_names}
+        point |= {f"tau{i}": TORQUE * point[f"tau{i}"] for i in range(n)}
+        inverse = _inverse(accelerations, point, n)
+        finite = np.isfinite(inverse).all(axis=1)
+        if not finite.all():
+            graph = mass_matrix()
+            entries = graph.evaluate({name: point[name] for name in graph.input_names})
+            inertia = np.array([*entries.values()], dtype=np.float64).reshape(n, n)
+            if not np.isfinite(inertia).all():
+                continue  # there is no M at this state
+            if np.linalg.eigvalsh(balanced(inertia))[0] * SPARE > np.finfo(float).eps * n:
+                return []  # it is a force that overflows
+            found |= set(np.flatnonzero(~finite).tolist())  # a pivot is zero
+            continue
+        if np.linalg.cond(balanced(inverse), 1) * np.finfo(float).eps * n < SPARE:
+            return []
+        digits = extend.certain_digits(accelerations, point)
+        lost = {i for i in range(n) if digits[f"qdd{i}"] == 0.0}
+        if not lost:
+            unfolded = unfolded or _unfolded(system)
+            lost = _moved_by_rounding(*unfolded, point)
+        if not lost:
+            return []
+        found |= lost
+    return sorted(found)
+
+
+def _unfolded(system: System) -> tuple[Graph, dict[str, float]]:
+    """The solution of M x = tau with the constants of L as inputs, and their values by name; exponents stay."""
+    nodes = topological([system.lagrangian])
+    exponents = {node.args[1].value for node in nodes if node.op.name == "pow"}
+    values = {node.value for node in nodes if node.value is not None} - exponents - {0.0, 1.0, -1.0}
+    inputs = {value: cg.variable(f"constant{k}#") for k, value in enumerate(sorted(values))}
+    replacement = {node: inputs[node.value] for node in nodes if node.value in inputs}
+    (lagrangian,) = substitute([system.lagrangian], replacement)
+    solution = solve_nodes(lagrangian, system.qd, system.tau)
+    variables: list[Node] = [node for node in topological(solution) if not node.args and node.value is None]
+    graph = Graph(variables, {f"qdd{i}": node for i, node in enumerate(solution)})
+    return graph, {str(node.name): value for value, node in inputs.items()}
+
+
+def _moved_by_rounding(graph: Graph, constants: Mapping[str, float], point: Mapping[str, float]) -> set[int]:
+    """The outputs that change by half of their size or more as the constants change in their last place."""
+    steps = np.random.default_rng(0).integers(-PLACES, PLACES + 1, (len(constants), ROUNDINGS))
+    moved = {name: x + steps[k] * np.spacing(x) for k, (name, x) in enumerate(constants.items())}
+    with np.errstate(all="ignore"):
+        results = graph.evaluate({name: moved.get(name, point.get(name, 0.0)) for name in graph.input_names})
+        moves = [not np.isfinite(x).all() or np.ptp(x) > 0.5 * np.abs(x).max() for x in results.values()]
+    return set(np.flatnonzero(moves).tolist())
+
+
+def _inverse(accelerations: Graph, point: dict[str, float], n: int) -> Array:
+    """M^-1 (n, n), from the accelerations at large torques on one coordinate at a time."""
+    torques = {f"tau{i}": TORQUE * np.eye(n)[i] for i in range(n)}
+    with np.errstate(all="ignore"):
+        values = accelerations.evaluate(point | torques)
+        return np.array([np.broadcast_to(values[f"qdd{i}"], n) for i in range(n)]) / TORQUE

@@ -8,15 +8,17 @@ from cgraph import Graph
 from cgraph.extend import kept_by_first, require_choice
 
 from ..systems.arguments import TIME
-from ..systems.model import Model, as_ode, as_system, system_of
+from ..systems.kinematics import ZERO
+from ..systems.model import Equations, Model, as_equations, as_system
 from ..systems.system import System
-from .constraints.constraints import held_still
+from .constraints.constraints import leave_no_motion
+from .equation import Equation, Output
 from .equations_of_motion import SOLUTIONS, forward_dynamics
-from .formulations.formulations import ZERO
 
 FORMS = ("velocity", "momentum")  # of a motion: states (q, qd) or (q, p)
 
 
+@Equation("q qd tau", Output("q{}_dot", ("nq",)), Output("qd{}_dot", ("n",))).describes
 def state_equation(model: Model, method: str = "auto") -> Graph:
     """The time derivative of a model's state, xdot = f(x, tau, t).
 
@@ -29,11 +31,8 @@ def state_equation(model: Model, method: str = "auto") -> Graph:
 
     Returns
     -------
-    Graph
-        Of a mechanical model: inputs q0.., qd0.., tau0.., t if needed, parameters; outputs q0_dot.., qd0_dot.. with
-        q_dot = qd, or G(q) qd of `QuasiVelocities`, and qd_dot from `forward_dynamics`, 0 where constraints that do not
-        depend on time leave no motion. Of an OdeSystem: inputs its
-        states, t if needed, parameters; outputs `<state>_dot`.
+    q_dot is qd, or G(q) qd of `QuasiVelocities`, and qd_dot that of `forward_dynamics`, 0 where constraints that do not
+    depend on time leave no motion. Of an OdeSystem: inputs its states, t if needed, parameters; outputs `<state>_dot`.
 
     Raises
     ------
@@ -52,21 +51,20 @@ def state_equation(model: Model, method: str = "auto") -> Graph:
     {'q0_dot': 2.0, 'qd0_dot': 2.0}
     """
     require_choice("method", method, SOLUTIONS)
-    return with_multipliers(model, method)[0]
+    return with_multipliers(as_equations(model), method)[0]
 
 
-def with_multipliers(model: Model, method: str = "auto") -> tuple[Graph, Graph | None]:
+def with_multipliers(model: Equations, method: str = "auto") -> tuple[Graph, Graph | None]:
     """The state equation, and over the same inputs the multipliers of its constraints by name; None without any."""
-    ode = as_ode(model)
-    if ode is not None:
-        return ode.graph, None
+    if model.ode is not None:
+        return model.ode.graph, None
     system = as_system(model)
     solved = forward_dynamics(system, method)
     outputs = {f"q{i}_dot": rate for i, rate in enumerate(system.q_dot)}
-    still = held_still(system)  # the rounding of accelerations that are 0 is all that steps could be chosen by
+    still = leave_no_motion(system)  # the rounding of accelerations that are 0 is all that steps could be chosen by
     outputs |= {f"qd{i}_dot": ZERO if still else solved.outputs[f"qdd{i}"] for i in range(system.n)}
-    held = {name: solved.outputs[f"lambda{k}"] for k, name in enumerate(system.constraints.names)}
-    return Graph(solved.inputs, outputs), Graph(solved.inputs, held) if held else None
+    multipliers = {name: solved.outputs[f"lambda{k}"] for k, name in enumerate(system.constraints.names)}
+    return Graph(solved.inputs, outputs), Graph(solved.inputs, multipliers) if multipliers else None
 
 
 def normalization(model: Model) -> Graph | None:
@@ -74,7 +72,7 @@ def normalization(model: Model) -> Graph | None:
 
     Inputs and outputs the states.
     """
-    system = system_of(model)
+    system = model.system
     quasi = None if system is None else system.kinematics.quasi
     if system is None or quasi is None or quasi.normalized is None:
         return None
@@ -83,7 +81,7 @@ def normalization(model: Model) -> Graph | None:
 
 
 class StateInputs(NamedTuple):
-    """What the inputs of a state equation are, in the order of the graph."""
+    """Inputs of a state equation by what they are, in the order of the graph."""
 
     states: tuple[str, ...]  # as many as outputs, and in their order
     applied: tuple[str, ...]  # tau0.., constant during a run
@@ -93,8 +91,7 @@ class StateInputs(NamedTuple):
 
 def state_inputs(model: Model) -> StateInputs:
     """The names behind `state_equation(model)`, without building it."""
-    ode = as_ode(model)
-    if ode is not None:
+    if (ode := model.ode) is not None:
         return StateInputs(ode.states, (), ode.extra_inputs[:1] == [ode.t], dict(ode.parameters))
     system = as_system(model)
     return _inputs_of(system)._replace(parameters=dict(system.parameters))  # which a person may change

@@ -6,18 +6,20 @@ from collections.abc import Sequence
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import Builder, building, cotangents, folded, tangents
+from cgraph.extend import Builder, building, folded
 
 from ..systems.model import Model, as_system
 from ..systems.system import System
 from .coriolis import coriolis_matrix, require_quadratic
+from .equation import documented, mirrored
 from .equations_of_motion import bias, gravity_force
-from .formulations.formulations import ONE, ZERO
+from .formulations.formulations import lagrange_sweeps
 from .torque_table import TorqueTable
 
 _ENERGIES = {"kinetic", "potential"}
 
 
+@documented
 def torque_by_link(model: Model) -> TorqueTable:
     """Row k, column i: what the partial Lagrangian L_k has of tau_i, d/dt dL_k/dqd_i - dL_k/dq_i.
 
@@ -26,20 +28,10 @@ def torque_by_link(model: Model) -> TorqueTable:
     whatever the state: such cells are zero by structure. Of a mechanism written with base parameters
     (`base_parameters`) a row is not what its body alone takes.
 
-    Parameters
-    ----------
-    model : Model
-        A system, a mechanism or a scene with n coordinates.
-
     Returns
     -------
     TorqueTable
         (links and what follows, n) torques [N m or N]; columns add up to tau.
-
-    Raises
-    ------
-    TypeError
-        For what is no model, or has no Lagrangian.
 
     Examples
     --------
@@ -62,16 +54,12 @@ def torque_by_link(model: Model) -> TorqueTable:
     return TorqueTable("torque by link", (*names, *outside), system.velocities, system, graph, sum_axis=0)
 
 
+@documented
 def torque_by_joint_motion(model: Model) -> TorqueTable:
     """Row i, column j: the torque at joint i for the motion of joint j, M_ij qdd_j + C_ij qd_j.
 
     C is that of Christoffel's symbols (`coriolis`): of a Coriolis force, which two velocities make together, each has
     half. Columns of gravity (all that is there at rest), damping and applied forces follow, where the model has them.
-
-    Parameters
-    ----------
-    model : Model
-        A system, a mechanism or a scene with n coordinates.
 
     Returns
     -------
@@ -82,8 +70,6 @@ def torque_by_joint_motion(model: Model) -> TorqueTable:
     ------
     ValueError
         For an L that is not quadratic in the velocities.
-    TypeError
-        For what is no model, or has no Lagrangian.
 
     Examples
     --------
@@ -103,10 +89,8 @@ def torque_by_joint_motion(model: Model) -> TorqueTable:
     coriolis = coriolis_matrix(system, forces, build, mass)
     n = system.n
     with building(build):
-        rows = [
-            [mass[max(i, j)][min(i, j)] * system.qdd[j] + coriolis[i][j] * system.qd[j] for j in range(n)]
-            for i in range(n)
-        ]
+        pairs = zip(mirrored(mass), coriolis, strict=True)
+        rows = [[m[j] * system.qdd[j] + c[j] * system.qd[j] for j in range(n)] for m, c in pairs]
     outside = {"gravity": folded(gravity_force(system).outputs.values(), build)} | _damping_and_forces(system, build)
     columns = {name: column for name, column in outside.items() if any(entry.value != 0.0 for entry in column)}
     for column in columns.values():
@@ -118,28 +102,23 @@ def torque_by_joint_motion(model: Model) -> TorqueTable:
 
 
 def _torque_of(system: System, partial: Node, build: Builder) -> list[Node]:
-    """Lagrange's equation of one partial Lagrangian, as the chain rule has it: a reverse sweep, then a forward one."""
-    bars = cotangents({partial: ONE}, [*system.q, *system.qd], build)
-    momenta = bars[system.nq :]
-    gradient = system.kinematics.slopes(bars[: system.nq], momenta, build)
-    x_dot = dict(zip([*system.q, *system.qd], [*system.q_dot, *system.qdd], strict=True))
-    dots = tangents(x_dot | ({system.t: ONE} if system.t in system.extra_inputs else {}), momenta, build)
+    """Lagrange's equation of one partial Lagrangian, by the chain rule."""
+    _, rate, gradient = lagrange_sweeps(system, partial, build)
     with building(build):
-        return [dots.get(p, ZERO) - slope for p, slope in zip(momenta, gradient, strict=True)]
+        return [p_dot - slope for p_dot, slope in zip(rate, gradient, strict=True)]
 
 
 def _damping_and_forces(system: System, build: Builder) -> dict[str, list[Node]]:
     """Torques against damping and against applied forces, each where there is any."""
+    damping = system.braking(build)
     with building(build):
-        with cg.tag("damping"):
-            damping = [coefficient * qd for coefficient, qd in zip(system.damping, system.qd, strict=True)]
         applied = [-force for force in folded(system.forces, build)]
     rows = {"damping": damping, "applied": applied}
     return {name: row for name, row in rows.items() if any(entry.value != 0.0 for entry in row)}
 
 
 def _names_of_partials(system: System) -> list[str]:
-    """Of the partial Lagrangians: their one tag, as a link's or a body's; else L1, L2, ..."""
+    """Names of the partial Lagrangians: their one tag, as a link's or a body's; else L1, L2, ..."""
     names: Sequence[str] = [_single_tag(partial.tags - _ENERGIES) for partial in system.partial_lagrangians]
     unique = all(names) and len(set(names)) == len(names)
     return list(names) if unique else [f"L{k + 1}" for k in range(len(names))]

@@ -14,7 +14,7 @@ from cgraph.extend import Array, Names, html_table, require_whole, topological
 
 from ..systems.display_names import display_names
 from ..systems.system import System
-from .states.evaluate_at import evaluate_at
+from .states.evaluate import evaluate
 
 STRUCTURAL_ZERO = "·"  # a cell that is zero by structure, at every state
 LONGEST_EXPRESSION = 40  # characters of a cell that is written out, with q0 for the coordinate's name
@@ -110,7 +110,7 @@ class TorqueTable:
         ValueError
             For another shape, a number that is not finite, or an unknown parameter.
         """
-        flat = evaluate_at(self.system, self.graph, {"q": q, "qd": qd, "qdd": qdd}, t, parameters)
+        flat = evaluate(self.system, self.graph, {"q": q, "qd": qd, "qdd": qdd}, t, parameters)
         if flat.ndim != 1:
             raise ValueError(f"a table has one state, q, qd and qdd of the shape ({self.system.n},)")
         return replace(self, values=flat.reshape(len(self.rows), len(self.columns)))
@@ -127,13 +127,13 @@ class TorqueTable:
         return html_table(head, rows, title=self.title)
 
     def to_markdown(self, digits: int = 4) -> str:
-        """The same as a Markdown table."""
+        """Markdown of the table."""
         head, *body = [[cell.replace("|", "\\|") for cell in row] for row in self._cells(digits)]
         ruled = [head, ["---", *["---:"] * (len(head) - 1)], *body]
         return "".join(f"| {' | '.join(row)} |\n" for row in ruled)
 
     def to_latex(self, digits: int = 4) -> str:
-        """The same as a LaTeX `tabular` that needs no package."""
+        """LaTeX of the table, a `tabular` that needs no package."""
         head, *body = [" & ".join(map(_latex, row)) + r" \\" for row in self._cells(digits)]
         columns = "l" + "r" * len(self._cells(digits)[0][1:])
         lines = [rf"\begin{{tabular}}{{{columns}}}", r"\hline", head, r"\hline", *body, r"\hline", r"\end{tabular}"]

@@ -43,7 +43,7 @@ def velocity_nodes(output: Node, q: Sequence[Node], qd: Sequence[Node], t: Node,
 
 
 class _Recognition:
-    """What is known of the nodes visited so far.
+    """Knowledge of the nodes visited so far.
 
     moving: nodes that depend on velocities or on time.
     position: {z: f} of the velocity nodes, f None where it is not a node of the graph.

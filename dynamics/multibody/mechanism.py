@@ -15,7 +15,7 @@ from cgraph import Graph, Node
 from cgraph.extend import Array, Builder, building, real_array, require_flag, require_mapping
 
 from ..systems.arguments import parameter_value
-from ..systems.body_system import BodySystem
+from ..systems.body_terms import BodyTerms
 from ..systems.model import Model
 from ..systems.system import System
 from .body import WORLD, Body, Joint, MechanismError, MechanismWarning, quantities, vector
@@ -209,8 +209,8 @@ class Mechanism(ModifiableStructure):
         """The Lagrangian system: a partial Lagrangian for each body, tagged with name and energy; forces likewise."""
         if not self.moving:
             raise MechanismError("the mechanism has no joint that moves")
-        system = BodySystem(
-            self._equations,
+        regular = all([bool(body.joint.armature) or resists(body) for body in self._bound.moving])
+        system = System(
             lambda q, qd, t: self._equations.partial_lagrangians(q, qd),
             self.coordinates,
             self.parameter_values,
@@ -221,9 +221,7 @@ class Mechanism(ModifiableStructure):
                 self.loops, self.moving, self.carriers, self.locked, self._equations.states(q, ())
             ),
             velocity_constraints=lambda q, qd, t: velocity_rows(self.loops, lambda body: self._chain(body, q, qd)),
-            lengths=lengths(self._bound.moving),
-            require_values=self._require_values,
-            surely_regular=all([bool(body.joint.armature) or resists(body) for body in self._bound.moving]),
+            body_terms=BodyTerms(self._equations, lengths(self._bound.moving), regular, self._require_values),
         )
         system.constraints = of_loops(system.constraints, self.loops, self.moving)
         return system

@@ -12,8 +12,7 @@ import cgraph as cg
 from cgraph import Node
 from cgraph.extend import Array, Builder, building, hessian_nodes
 
-from ..systems.system import BiasForce
-from ..systems.torque_derivatives import MotionState, TorqueDerivatives
+from ..systems.body_terms import BiasForce, MotionState, TorqueDerivatives
 from .algebra import spatial
 from .body import Body, quantities
 from .joints import JointType

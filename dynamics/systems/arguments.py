@@ -12,7 +12,7 @@ from typing import Any, NoReturn
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import check_name, is_finite, real_number, require_mapping
+from cgraph.extend import check_name, is_finite, real_number, require_mapping, topological
 
 TIME = "t"
 _RESERVED = re.compile(r"(q|qd|qdd|tau|lambda)\d+(_old)?|t|dt")
@@ -29,7 +29,7 @@ class Parameters(dict[str, Node]):
         raise ValueError(f"the system has no parameter {name!r} (it has {has}); give it to `parameters`")
 
 
-def names_of(what: str, kind: str, names: Sequence[str] | str) -> tuple[str, ...]:
+def names_of(what: str, kind: str, names: Sequence[str] | str, *, spaces: bool = True) -> tuple[str, ...]:
     """Names of that kind, from a sequence or one string with spaces between. Raises TypeError or ValueError."""
     if isinstance(names, str):
         names = names.split()
@@ -38,7 +38,7 @@ def names_of(what: str, kind: str, names: Sequence[str] | str) -> tuple[str, ...
     if not names:
         raise ValueError(f"{what} needs at least one {kind}")
     for name in names:
-        check_name(f"a {kind}", name)
+        check_name(f"a {kind}", name, spaces=spaces)
     if len(set(names)) < len(names):
         raise ValueError(f"{kind} names must differ, got {', '.join(names)}")
     return tuple(names)
@@ -82,6 +82,14 @@ def parameter_value(name: str, value: float) -> float:
     if isinstance(value, bool) or not is_finite(value):
         raise ValueError(f"parameter {name!r} must be a finite number, got {value!r}")
     return float(value)
+
+
+def finite_time(t: float) -> float:
+    """The time [s]. Raises TypeError or ValueError for what is no finite number."""
+    time = real_number("t", t)
+    if not math.isfinite(time):
+        raise ValueError(f"t must be finite, got {t!r} s")
+    return time
 
 
 def new_variables(stem: str, count: int, taken: Collection[str]) -> list[Node]:
@@ -132,6 +140,13 @@ def _plain_code(function: Callable[..., object]) -> CodeType | None:
         return None
     code = function.__code__
     return None if code.co_kwonlyargcount or code.co_flags & inspect.CO_VARARGS else code
+
+
+def require_known(what: str, nodes: Iterable[Node], known: Collection[Node], otherwise: str) -> None:
+    """Raises ValueError for a variable among nodes that is none of the known ones, in words `otherwise`."""
+    for node in topological(list(nodes)):
+        if node.op.name == "variable" and node not in known:
+            raise ValueError(f"{what} uses {node.name!r}, which is {otherwise}")
 
 
 def sequence(what: str, value: Any) -> list[Any]:

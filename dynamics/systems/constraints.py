@@ -101,7 +101,7 @@ class Constraints:
         return [dots.get(z, ZERO) for z in rates]
 
     def without(self, dropped: Mapping[int, float]) -> Constraints:
-        """With 0 for some rows, which are open by so much."""
+        """The constraints with 0 for some rows, which are open by so much."""
         other, count = copy(self), len(self.positions)
         other.__dict__.pop("rates", None)
         rows = [ZERO if k in dropped else row for k, row in enumerate((*self.positions, *self.velocities))]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from copy import copy
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -13,7 +12,7 @@ from cgraph.extend import memo, topological
 
 from .arguments import Parameters, parameter_items, parameter_value
 from .model import Equations, Model, as_equations
-from .system import System, generalized_forces, require_known
+from .system import System, generalized_forces
 
 KEPT = 16  # systems that stay for another run
 
@@ -72,7 +71,7 @@ def controlled(
     controller: Callable[..., Sequence[Node | float]],
     parameters: Mapping[str, float] | None = None,
 ) -> Controlled:
-    """See `with_controller`. For a controller with the same graph as one of the last few, the same nodes."""
+    """Result of `with_controller`. For a controller with the same graph as one of the last few, the same nodes."""
     system = model.system
     if system is None:
         raise TypeError("a controller gives forces, and none act on a system of first order: write it into the rate")
@@ -83,7 +82,7 @@ def controlled(
     p = Parameters(names)
     with cg.tag("controller"):
         forces = generalized_forces("the controller", controller, system, p)
-    require_known("the controller", forces, system, p)
+    system.require_known("the controller", forces, p)
     used = {node.name for node in topological(forces)}
     if unused := [name for name in gains if name not in used]:
         has = ", ".join(system.parameters) or "none"
@@ -106,7 +105,7 @@ def _controlled(request: _Request) -> Controlled:
 
 
 def with_closed_form(model: Equations, tau: Any, parameters: object) -> tuple[Equations, Any, Sequence[Node] | None]:
-    """What moves, the constant force on it, and the whole applied force as nodes; of a first-order model None.
+    """Moving system, the constant force on it, and the whole applied force as nodes; of a first-order model None.
 
     tau: a controller in closed form, or the constant force.  parameters: of the run, {name: value}; those that the
     model does not have are the controller's.
@@ -124,11 +123,6 @@ def _numbered(forces: Sequence[Node]) -> dict[str, Node]:
 
 def _with_forces(system: System, forces: Sequence[Node], parameters: Mapping[str, float]) -> System:
     """The system with these forces besides its own, and these parameters."""
-    changes: dict[str, object] = {"parameters": system.parameters | dict(parameters)}
     pairs = zip(system.forces, forces, strict=True)
-    changes["forces"] = tuple([more if own.value == 0.0 else own + more for own, more in pairs])
-    other = copy(system)
-    for name in ("extra_inputs", "shortened", "without_constraints"):
-        other.__dict__.pop(name, None)
-    other.__dict__ |= changes
-    return other
+    both = tuple([more if own.value == 0.0 else own + more for own, more in pairs])
+    return system.changed(parameters=system.parameters | dict(parameters), forces=both)

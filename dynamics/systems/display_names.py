@@ -1,4 +1,4 @@
-"""What a person calls the inputs and outputs of a model's graphs: q.knee for q2, tau.base.wx for tau3."""
+"""Names for a person of the inputs and outputs of a model's graphs: q.knee for q2, tau.base.wx for tau3."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ _OF_VELOCITIES = ("qd{}", "qd{}_old", "qd{}_dot", "qdd{}", "tau{}", "bias{}", "g
 
 
 def display_names(model: Model) -> dict[str, str]:
-    """What a person calls the inputs and outputs of a model's graphs: {"q2": "q.knee", "tau3": "tau.base.wx"}.
+    """Names for a person of the inputs and outputs of a model's graphs: {"q2": "q.knee", "tau3": "tau.base.wx"}.
 
     Graphs number coordinates and velocities; `cg.why`, `cg.why_not`, `cg.lint`, `cg.to_c`, `viz.to_dot` and `viz.page`
     take these as their `names`, show them, and read them as well as the graph's.

@@ -11,7 +11,7 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import Builder, building, cotangents, folded, is_finite, tangents, topological
 
-from .arguments import names_of, node_or_number, sequence
+from .arguments import names_of, node_or_number, require_known, sequence
 from .quasi_velocities import Function, QuasiVelocities
 
 ONE, ZERO = cg.constant(1.0), cg.constant(0.0)
@@ -87,7 +87,7 @@ class Kinematics:
         return [list(row) for row in zip(*columns, strict=True)]
 
     def normalized(self, q: Sequence[Node]) -> list[Node]:
-        """The same configuration with the constraint of the coordinates met."""
+        """The configuration with the constraint of the coordinates met."""
         if self.quasi is None or self.quasi.normalized is None:
             return list(q)
         return self._called("normalized", self.quasi.normalized, len(self.q), list(q))
@@ -115,7 +115,7 @@ class Kinematics:
         self._compare(graph, n)
 
     def _compare(self, graph: Graph, n: int) -> None:
-        """At random states about neutral coordinates and others, row by row, as rows may have any unit."""
+        """Compare terms at random states about neutral coordinates and others, row by row: each may have its unit."""
         rng, nq, compared = np.random.default_rng(0), len(self.q), False
         neutral = np.array(self.neutral)
         for start in (neutral, neutral, np.zeros(nq), np.zeros(nq)):
@@ -146,9 +146,7 @@ class Kinematics:
             raise ValueError(f"{what} must give {count} values, got {len(given)}")
         nodes = [node_or_number(what, value) for value in given]
         known = set(topological([node for part in arguments for node in part])) | set(self.q)
-        for node in topological(nodes):
-            if node.op.name == "variable" and node not in known:
-                raise ValueError(f"{what} uses {node.name!r}, which is none of its arguments")
+        require_known(what, nodes, known, "none of its arguments")
         return nodes
 
     def _numbers(self, what: str, given: object, default: Sequence[float]) -> tuple[float, ...]:

@@ -93,11 +93,6 @@ def as_equations(model: Model) -> Equations:
     return as_system(model) if ode is None else ode
 
 
-def system_of(model: Model) -> System | None:
-    """The Lagrangian system of a model; None of one of first order."""
-    return as_equations(model).system
-
-
 def _made(model: object) -> object:
     """The model. Raises TypeError for a class of models, which has no coordinates before one is made."""
     if isinstance(model, type):

@@ -7,9 +7,19 @@ from functools import cached_property
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import check_name, topological
+from cgraph.extend import topological
 
-from .arguments import TIME, Parameters, call_user_function, node_or_number, parameter_items, parameter_value, sequence
+from .arguments import (
+    TIME,
+    Parameters,
+    call_user_function,
+    names_of,
+    node_or_number,
+    parameter_items,
+    parameter_value,
+    require_known,
+    sequence,
+)
 
 RESERVED = (TIME, "dt")
 
@@ -46,7 +56,9 @@ class OdeSystem:
         states: Sequence[str],
         parameters: Mapping[str, float] | None = None,
     ) -> None:
-        self.states = _state_names(states)
+        self.states = names_of("a system", "state", states, spaces=False)
+        if named := [name for name in RESERVED if name in self.states]:
+            raise ValueError(f"a state cannot be called {named[0]!r}, which is the name of time; choose another")
         self.parameters = {name: parameter_value(name, value) for name, value in parameter_items(parameters)}
         if shared := [name for name in self.states if name in self.parameters]:
             raise ValueError(f"{shared[0]!r} is both a state and a parameter; choose another name for one of them")
@@ -58,11 +70,9 @@ class OdeSystem:
         self.rates = tuple(
             [node_or_number(f"the rate of {name!r}", x) for name, x in zip(self.states, values, strict=True)]
         )
+        names = ", ".join((*self.states, *self.parameters))
         known = {*self.x, self.t, *p.values()}
-        for node in topological(self.rates):
-            if node.op.name == "variable" and node not in known:
-                names = ", ".join((*self.states, *self.parameters))
-                raise ValueError(f"the rate uses {node.name!r}, which is no state, parameter or t (it has {names})")
+        require_known("the rate", self.rates, known, f"no state, parameter or t (it has {names})")
 
     @property
     def coordinates(self) -> tuple[str, ...]:
@@ -119,18 +129,3 @@ class OdeSystem:
     def __repr__(self) -> str:
         parameters = f", parameters {', '.join(self.parameters)}" if self.parameters else ""
         return f"<OdeSystem of {self.n} state(s) {', '.join(self.states[:6])}{parameters}>"
-
-
-def _state_names(names: Sequence[str]) -> tuple[str, ...]:
-    if isinstance(names, str):
-        names = names.split()
-    names = sequence("states must be", names)
-    if not names:
-        raise ValueError("a system needs at least one state")
-    for name in names:
-        check_name("a state", name, spaces=False)
-        if name in RESERVED:
-            raise ValueError(f"a state cannot be called {name!r}, which is the name of time; choose another")
-    if len(set(names)) < len(names):
-        raise ValueError(f"state names must differ, got {', '.join(names)}")
-    return tuple(names)

@@ -5,13 +5,14 @@ from __future__ import annotations
 import numbers
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
+from dataclasses import replace
 from functools import cached_property
 
 from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph, Node, extend
-from cgraph.extend import Builder, require_sequence, topological
+from cgraph.extend import Builder, building, require_sequence, topological
 
 from .arguments import (
     TIME,
@@ -21,14 +22,13 @@ from .arguments import (
     node_or_number,
     parameter_items,
     parameter_value,
+    require_known,
     sequence,
 )
+from .body_terms import BodyTerms
 from .constraints import Constraints
 from .kinematics import Kinematics
 from .quasi_velocities import QuasiVelocities
-from .torque_derivatives import TorqueDerivatives
-
-BiasForce = tuple[Node, Node]  # a velocity, and the force that works on it
 
 
 class System:
@@ -61,6 +61,8 @@ class System:
         of the system without them.
     velocity_constraints : callable
         (q, qd, t) or (q, qd, t, p) to rows that are 0 and linear in qd, such as those of rolling (nonholonomic).
+    body_terms : BodyTerms, optional
+        What rigid bodies know of their equations beside L; a `Mechanism` hands it in.
 
     Raises
     ------
@@ -86,9 +88,13 @@ class System:
         quasi_velocities: QuasiVelocities | None = None,
         constraints: Callable[..., object] | None = None,
         velocity_constraints: Callable[..., object] | None = None,
+        body_terms: BodyTerms | None = None,
     ) -> None:
-        self.kinematics = Kinematics(coordinates, quasi_velocities)
-        self._require_consistent()
+        if not isinstance(body_terms, BodyTerms | None):
+            raise TypeError(f"body_terms must be BodyTerms, got {type(body_terms).__name__}: {body_terms!r:.60}")
+        self.kinematics, self.body_terms = Kinematics(coordinates, quasi_velocities), body_terms
+        if body_terms is None:  # the types of joints are known to be consistent
+            self.kinematics.require_consistent()
         self.parameters = {name: parameter_value(name, value) for name, value in parameter_items(parameters)}
         self.damping = coefficients("damping", damping, self.velocities)
         p = Parameters(self.parameters)
@@ -102,18 +108,21 @@ class System:
         if forces is not None:
             with cg.tag("force"):
                 self.forces = tuple(generalized_forces("forces", forces, self, p))
-        self._require_parameters(p)
+        damped = [each for each in self.damping if isinstance(each, Node)]
+        require_known("damping", damped, p.values(), f"no parameter (it has {', '.join(p) or 'none'})")
         self.constraints = Constraints(self.kinematics, self.t, self.parameters, constraints, velocity_constraints)
-        require_known("the system", self._given, self, p)
+        self.require_known("the system", self._given, p)
 
-    def _require_parameters(self, p: Mapping[str, Node]) -> None:
-        """Raises ValueError for a damping that depends on anything else."""
-        for node in topological([each for each in self.damping if isinstance(each, Node)]):
-            if node.op.name == "variable" and node not in p.values():
-                raise ValueError(f"damping uses {node.name!r}, which is no parameter (it has {', '.join(p) or 'none'})")
+    def require_known(self, what: str, nodes: Sequence[Node], parameters: Mapping[str, Node]) -> None:
+        """Raises ValueError for a variable that is neither of the state, nor t, nor one of these parameters."""
+        names = ", ".join((*self.coordinates, *parameters))
+        known = {*self.q, *self.qd, self.t, *parameters.values()}
+        require_known(what, nodes, known, f"no coordinate, parameter or t (it has {names})")
 
     def require_values(self, values: Mapping[str, ArrayLike]) -> None:
-        """Raises ValueError for values of the parameters, one or N of each, that cannot be; here none."""
+        """Raises ValueError for values of the parameters, one or N of each, with which the bodies cannot be."""
+        if self.body_terms is not None:
+            self.body_terms.require_values(values)
 
     @property
     def system(self) -> System:
@@ -125,15 +134,20 @@ class System:
         """None: no first-order system."""
         return None
 
-    @property
+    @cached_property
     def forms(self) -> list[System]:
-        """The system, and others with the same motion whose energy may take fewer nodes."""
-        return [self]
+        """The system, and of bodies one with the energy of base numbers, which is another but for its derivatives."""
+        if self.body_terms is None:
+            return [self]
+        fewest = self.body_terms.equations.regrouped_lagrangians(self.q, self.qd)
+        return [self, self.changed(partial_lagrangians=tuple(fewest), extra_inputs=self.extra_inputs)]
 
     @property
     def whole(self) -> System | None:
-        """The same system with forces of more terms and fewer roundings, where that may count; else None."""
-        return None
+        """The system with all inertial numbers of all bodies, where fewer may cost digits; else None."""
+        if self.body_terms is None or (equations := self.body_terms.equations.whole) is None:
+            return None
+        return self.changed(body_terms=replace(self.body_terms, equations=equations))
 
     @property
     def mechanism(self) -> None:
@@ -162,8 +176,11 @@ class System:
 
     @property
     def lengths(self) -> tuple[float, ...]:
-        """What 1 of coordinates, then velocities, counts beside 1 of others, where sizes are compared; else 0."""
-        return (1.0,) * (self.nq + self.n)
+        """Scale of each coordinate and velocity in comparisons of size [m, of bodies]; 0 if it has none.
+
+        1 of lengths, and of angles what they move the bodies by.
+        """
+        return (1.0,) * (self.nq + self.n) if self.body_terms is None else self.body_terms.lengths
 
     @property
     def q(self) -> list[Node]:
@@ -229,25 +246,7 @@ class System:
 
     @cached_property
     def _split(self) -> tuple[Node, Node]:
-        moving = set(self.qd)
-        for node in topological([self.lagrangian]):
-            if any(arg in moving for arg in node.args):
-                moving.add(node)
-        kinetic: list[Node] = []
-        potential: list[Node] = []
-        stack = [(1, self.lagrangian)]
-        while stack:  # take sums apart until each term has velocities in it throughout, or none
-            sign, node = stack.pop()
-            if node.op.name in ("add", "sub") and node in moving:
-                a, b = node.args
-                stack += [(-sign if node.op.name == "sub" else sign, b), (sign, a)]
-            elif node.op.name == "neg" and node in moving:
-                stack.append((-sign, node.args[0]))
-            elif node in moving:
-                kinetic.append(node if sign > 0 else -node)
-            else:
-                potential.append(node if sign < 0 else -node)
-        return _sum(kinetic), _sum(potential)
+        return _kinetic_and_potential(self.lagrangian, self.qd)
 
     @cached_property
     def shortened(self) -> System | None:
@@ -260,48 +259,41 @@ class System:
         )
         if [*kinetic, *potential, *forces] == [self.kinetic, self.potential, *self.forces]:
             return None
-        other = copy(self)
-        for name in ("lagrangian", "_split", "kinetic", "potential"):
-            other.__dict__.pop(name, None)
-        other.__dict__ |= {"extra_inputs": self.extra_inputs, "shortened": None}
-        other.partial_lagrangians, other.forces = (kinetic[0], -potential[0]), tuple(forces)
-        return other
+        given = {"partial_lagrangians": (kinetic[0], -potential[0]), "forces": tuple(forces)}
+        return self.changed(**given, extra_inputs=self.extra_inputs, shortened=None)
 
     @cached_property
     def without_constraints(self) -> System:
         """The system without what holds it."""
+        free = Constraints(self.kinematics, self.t, self.parameters, None, None)
+        return self.changed(constraints=free, extra_inputs=self.extra_inputs)
+
+    def changed(self, **given: object) -> System:
+        """A copy with these attributes in place of its own; what follows from attributes is derived anew."""
         other = copy(self)
-        other.constraints = Constraints(self.kinematics, self.t, self.parameters, None, None)
+        for name in [name for name in vars(self) if isinstance(getattr(System, name, None), cached_property)]:
+            del vars(other)[name]
+        vars(other).update(given)
         return other
 
     @property
     def surely_regular(self) -> bool:
         """Whether M is known to be positive definite; where it is not, `forward_dynamics` looks at its rank."""
-        return False
+        return self.body_terms is not None and self.body_terms.surely_regular
 
     def mass_matrix(self, lagrangian: Node, build: Builder | None = None) -> list[list[Node]]:
-        """The lower triangle of M, the Hessian of L by the velocities.  lagrangian: L, folded where other nodes are."""
-        return extend.hessian_nodes(lagrangian, self.qd, build)
+        """The lower triangle of M, the Hessian of L by the velocities; of bodies by their composites where smaller.
 
-    def bias_forces(self, qdd: Sequence[Node] | None = None) -> Sequence[BiasForce] | None:
-        """Forces f at velocities z, nodes of L, with sum of f dz/dqd = d/dt dL/dqd - dL/dq: the bias, where qdd is 0.
-
-        qdd: accelerations, 0 if None.
-
-        None where nobody knows better than to derive it from L, as here.
+        lagrangian: L, folded where other nodes are.
         """
-        return None
+        if self.body_terms is None:
+            return extend.hessian_nodes(lagrangian, self.qd, build)
+        return self.body_terms.equations.mass_matrix(self.q, self.qd, lagrangian, build or Builder())
 
-    def momentum_rates(self, p: Sequence[Node]) -> Sequence[Node] | None:
-        """dL/dq, of quasi-velocities as `Kinematics.slopes` has it, at velocities qd of momenta p; None likewise."""
-        return None
-
-    def torque_derivatives(self, qdd: Sequence[Node], build: Builder) -> TorqueDerivatives | None:
-        """Torques of a motion and their derivatives, without damping and applied forces; None as for `bias_forces`."""
-        return None
-
-    def _require_consistent(self) -> None:
-        self.kinematics.require_consistent()
+    def braking(self, build: Builder) -> list[Node]:
+        """The force that damping takes, D qd."""
+        with building(build), cg.tag("damping"):
+            return [damping * qd for damping, qd in zip(self.damping, self.qd, strict=True)]
 
     def graph(self, outputs: Mapping[str, Node], *state: Sequence[Node]) -> Graph:
         """A graph over state variables, then t if needed, then the parameters."""
@@ -314,7 +306,7 @@ class System:
 
 
 def generalized_forces(what: str, function: Callable[..., object], system: System, p: Parameters) -> list[Node]:
-    """What a function of (q, qd, t) or (q, qd, t, p) gives: a node for each velocity. Raises what is wrong with it."""
+    """Forces of a function of (q, qd, t) or (q, qd, t, p), a node for each velocity. Raises what is wrong with it."""
     value = call_user_function(what, function, system.q, system.qd, system.t, p)
     applied = sequence(f"{what} must give", value)
     if len(applied) != system.n:
@@ -324,13 +316,27 @@ def generalized_forces(what: str, function: Callable[..., object], system: Syste
     return [node_or_number(f"the force on {name!r}", force) for name, force in pairs]
 
 
-def require_known(what: str, nodes: Sequence[Node], system: System, p: Parameters) -> None:
-    """Raises ValueError for a variable that is neither of the state, nor t, nor a parameter."""
-    known = {*system.q, *system.qd, system.t, *p.values()}
-    for node in topological(nodes):
-        if node.op.name == "variable" and node not in known:
-            names = ", ".join((*system.coordinates, *p))
-            raise ValueError(f"{what} uses {node.name!r}, which is no coordinate, parameter or t (it has {names})")
+def _kinetic_and_potential(lagrangian: Node, velocities: Sequence[Node]) -> tuple[Node, Node]:
+    """Sums of the terms of L with velocities and, their sign turned, without: sums are taken apart until that is so."""
+    moving = set(velocities)
+    for node in topological([lagrangian]):
+        if any(arg in moving for arg in node.args):
+            moving.add(node)
+    kinetic: list[Node] = []
+    potential: list[Node] = []
+    stack = [(1, lagrangian)]
+    while stack:
+        sign, node = stack.pop()
+        if node.op.name in ("add", "sub") and node in moving:
+            a, b = node.args
+            stack += [(-sign if node.op.name == "sub" else sign, b), (sign, a)]
+        elif node.op.name == "neg" and node in moving:
+            stack.append((-sign, node.args[0]))
+        elif node in moving:
+            kinetic.append(node if sign > 0 else -node)
+        else:
+            potential.append(node if sign < 0 else -node)
+    return _sum(kinetic), _sum(potential)
 
 
 def _sum(nodes: Sequence[Node]) -> Node:

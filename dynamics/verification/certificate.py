@@ -17,11 +17,12 @@ from cgraph.extend import Array, Builder, cotangents, real_number, require_whole
 from ..equations.coriolis import coriolis, require_quadratic
 from ..equations.energies import energy
 from ..equations.equations_of_motion import bias, forward_dynamics, gravity_force, mass_matrix
-from ..equations.formulations.formulations import ONE, ZERO, inverse_dynamics
-from ..equations.inertia_rank import balanced
-from ..equations.states.evaluate_at import evaluate_at
+from ..equations.formulations.formulations import inverse_dynamics
+from ..equations.singular_mass_matrix import balanced
+from ..equations.states.evaluate import evaluate
 from ..equations.torque_decomposition import torque_by_joint_motion, torque_by_link
 from ..equations.torque_table import TorqueTable
+from ..systems.kinematics import ONE, ZERO
 from ..systems.model import Model, as_system
 from ..systems.system import System
 from . import peer_agreement as agreement
@@ -126,7 +127,7 @@ class _Checks:
 
     def value(self, graph: Graph, **other: ArrayLike | None) -> Array:
         """Outputs, (N, n_out), at the states, some of them replaced."""
-        return evaluate_at(self.system, graph, {**self.at, **other}, self.t)
+        return evaluate(self.system, graph, {**self.at, **other}, self.t)
 
     def matrix(self, graph: Graph) -> Array:
         """Outputs as (N, n, n)."""

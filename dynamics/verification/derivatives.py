@@ -11,9 +11,9 @@ from cgraph import Graph
 from cgraph.extend import Array, tangents
 
 from ..equations.equations_of_motion import forward_dynamics
-from ..equations.formulations.formulations import ZERO
 from ..equations.linearization.inverse_dynamics_derivatives import inverse_dynamics_derivatives
 from ..equations.linearization.linearization import state_space
+from ..systems.kinematics import ZERO
 from ..systems.system import System
 from .residual import ROUNDING, Residual, worst
 

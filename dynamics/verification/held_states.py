@@ -11,9 +11,9 @@ import cgraph as cg
 from cgraph import Graph
 from cgraph.extend import Array, Builder, cotangents, tangents
 
-from ..equations.formulations.formulations import ONE, ZERO
 from ..equations.states.consistent_state import nearest_state
 from ..systems.constraints import ConstraintError
+from ..systems.kinematics import ONE, ZERO
 from ..systems.system import System
 from .residual import ROUNDING, Residual, worst
 

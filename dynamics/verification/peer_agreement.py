@@ -15,7 +15,7 @@ from cgraph.extend import Array
 
 from ..equations.equations_of_motion import forward_dynamics
 from ..equations.formulations.formulations import inverse_dynamics
-from ..equations.states.evaluate_at import evaluate_at
+from ..equations.states.evaluate import evaluate
 from ..io.load import compiled
 from ..io.mujoco_twin import joint_order, mujoco
 from ..multibody.body import Body, MechanismError
@@ -25,7 +25,7 @@ from ..peers.contender import Peer, UnavailableError
 from ..peers.mujoco import MujocoPeer
 from ..peers.pinocchio import PinocchioPeer
 from ..peers.pinocchio_loops import constrained_accelerations
-from ..systems.model import Model, as_system
+from ..systems.model import Model
 from .residual import PEERS, PROXIMAL, Residual
 
 if TYPE_CHECKING:
@@ -243,7 +243,7 @@ def explanation(model: Mechanism, peer: Asked, at: Mapping[str, Array]) -> str:
 
 def disagreement(model: Mechanism, peer: Asked, at: Mapping[str, Array]) -> float:
     """The largest difference of the torques, relative to the largest torque of its state; over all states."""
-    ours = evaluate_at(as_system(model), inverse_dynamics(model), at)
+    ours = evaluate(model, inverse_dynamics(model), at)
     size = np.maximum(np.abs(ours).max(axis=1), np.finfo(float).tiny)
     return float(np.max(np.abs(ours - peer.inverse(at)).max(axis=1) / size))
 
@@ -263,7 +263,7 @@ def with_loops(model: Model, at: Mapping[str, Array]) -> tuple[list[Residual], l
         return [], [*said, "Pinocchio's constraintDynamics: is not installed"]
     except UnavailableError as error:
         return [], [*said, f"Pinocchio's constraintDynamics: {error}"]
-    ours = evaluate_at(as_system(bodies), forward_dynamics(bodies), at)[:, : theirs.shape[1]]
+    ours = evaluate(bodies, forward_dynamics(bodies), at)[:, : theirs.shape[1]]
     size = np.maximum(np.abs(ours).max(axis=1), np.finfo(float).tiny)
     value = float(np.max(np.abs(ours - theirs).max(axis=1) / size))
     return [Residual("forward dynamics with loops = Pinocchio's constraintDynamics", value, PROXIMAL)], said

@@ -52,6 +52,8 @@ def independent_rows(constraints: Constraints) -> tuple[int, ...]:
 
     Raises ConstraintError where no state is seen that meets all.
     """
+    if not len(constraints):
+        return ()
     numbers = row_numbers(constraints)
     clear: dict[int, list[Array]] = {}  # by rank
     doubtful: list[dict[int, float]] = []

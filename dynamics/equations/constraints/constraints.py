@@ -19,9 +19,8 @@ import cgraph as cg
 from cgraph import Node
 from cgraph.extend import Builder, Order, building, cotangents, hessian_nodes, ldl_solve, solve_nodes, topological
 
+from ...systems.kinematics import ONE, ZERO
 from ...systems.system import System
-from ..bias_terms import BiasTerms
-from ..formulations.formulations import ONE, ZERO
 from .constraint_rank import independent_rows
 
 
@@ -32,12 +31,54 @@ class Rows(NamedTuple):
     rates: list[Node]  # z
     multipliers: list[Node]  # s
 
-    def function(self, lagrangian: Node, build: Builder) -> Node:
-        """F = L + s . z."""
-        with building(build):
-            for s, z in zip(self.multipliers, self.rates, strict=True):
-                lagrangian = lagrangian + s * z
-        return lagrangian
+    @classmethod
+    def of(cls, kept: tuple[int, ...], rates: Sequence[Node]) -> Rows:
+        """The kept ones of all rows, with multipliers."""
+        return cls(kept, [rates[k] for k in kept], cg.variables([f"lambda{k}" for k in kept]))
+
+    def solve(
+        self,
+        system: System,
+        lagrangian: Node,
+        rhs: Sequence[Node],
+        build: Builder,
+        *,
+        written: Builder | None = None,
+        at: dict[Node, Node] | None = None,
+        check: bool = False,
+        order: Order = "recursive",
+    ) -> list[Node]:
+        """(udot, s) and with `check` the info, by elimination on the graph of F.
+
+        written: the builder of L and z, if it is another.
+        """
+        with building(written or build):
+            for weight, z in zip(self.multipliers, self.rates, strict=True):
+                lagrangian = lagrangian + weight * z
+        s = self.multipliers
+        return solve_nodes(lagrangian, [*system.qd, *s], rhs, build, at=at, multipliers=s, check=check, order=order)
+
+    def solve_densely(
+        self,
+        system: System,
+        lagrangian: Node,
+        rhs: Sequence[Node],
+        build: Builder,
+        *,
+        composites: bool = False,
+        check: bool = False,
+    ) -> list[Node]:
+        """(udot, s) by LDL^T of the whole matrix, multipliers eliminated last; the info only where there are no rows.
+
+        composites: take M as bodies give it, `System.mass_matrix`, which has fewer nodes than the Hessian of L; its
+        entries are rounded as wholes, and a factorization may lose the more digits, the worse M is.
+        """
+        slopes, m = [cotangents({z: ONE}, system.qd, build) for z in self.rates], len(self.rates)
+        whole = system.mass_matrix(lagrangian, build) if composites else hessian_nodes(lagrangian, system.qd, build)
+        matrix = [[ZERO] * (k + 1) for k in range(m)]
+        matrix += [[*[slope[i] for slope in slopes], *row[: i + 1]] for i, row in enumerate(whole)]
+        solved = ldl_solve(matrix, [*rhs[system.n :], *rhs[: system.n]], build, check=check and not m)
+        return [*solved[m:], *solved[:m]]
 
 
 def constraint_rows(system: System, rates: Sequence[Node]) -> Rows:
@@ -45,20 +86,18 @@ def constraint_rows(system: System, rates: Sequence[Node]) -> Rows:
 
     Raises ConstraintError for constraints that cannot be met together.
     """
-    kept = independent_rows(system.constraints) if len(system.constraints) else ()
-    return Rows(kept, [rates[k] for k in kept], cg.variables([f"lambda{k}" for k in kept]))
+    return Rows.of(independent_rows(system.constraints), rates)
 
 
-def held_still(system: System) -> bool:
-    """Whether constraints that do not depend on time leave no motion: as many independent ones as velocities."""
+def leave_no_motion(system: System) -> bool:
+    """Whether constraints do not depend on time and admit no motion: as many independent ones as velocities."""
     rates = system.constraints.rates
     return len(rates) >= system.n == len(independent_rows(system.constraints)) and system.t not in topological(rates)
 
 
 def unknown_names(system: System) -> list[str]:
-    """What `solve_nodes` solves for, in words: velocities, then independent constraints."""
-    kept = independent_rows(system.constraints) if len(system.constraints) else ()
-    names = [f"constraint {system.constraints.names[k]!r}" for k in kept]
+    """Unknowns of `solve_nodes` in words: velocities, then independent constraints."""
+    names = [f"constraint {system.constraints.names[k]!r}" for k in independent_rows(system.constraints)]
     return [*[f"coordinate {name!r}" for name in system.velocities], *names]
 
 
@@ -67,44 +106,6 @@ def require_no_constraints(system: System) -> None:
     if len(system.constraints):
         name = system.constraints.names[0]
         raise ValueError(f'method "balanced" needs a system without constraints, got constraint {name!r}')
-
-
-def solved_by_elimination(
-    system: System,
-    terms: BiasTerms,
-    rows: Rows,
-    rhs: Sequence[Node],
-    at: dict[Node, Node],
-    build: Builder,
-    check: bool,
-    order: Order,
-) -> list[Node]:
-    """(udot, s) and with `check` the info, without forming a matrix."""
-    s = rows.multipliers
-    function = rows.function(terms.lagrangian, build)
-    return solve_nodes(function, [*system.qd, *s], rhs, build, at=at, multipliers=s, check=check, order=order)
-
-
-class DenseSolver:
-    """The same by LDL^T of the whole matrix, the rows of the multipliers eliminated last, for any right-hand sides.
-
-    composites: take M as bodies give it, `System.mass_matrix`, which has fewer nodes than the Hessian of L; its entries
-    are rounded as wholes, and a factorization may lose the more digits, the worse M is.
-    """
-
-    def __init__(
-        self, system: System, lagrangian: Node, rows: Rows, build: Builder, *, composites: bool = False
-    ) -> None:
-        slopes = [cotangents({z: ONE}, system.qd, build) for z in rows.rates]
-        whole = system.mass_matrix(lagrangian, build) if composites else hessian_nodes(lagrangian, system.qd, build)
-        self._matrix = [[ZERO] * (k + 1) for k in range(len(slopes))]
-        self._matrix += [[*[slope[i] for slope in slopes], *row[: i + 1]] for i, row in enumerate(whole)]
-        self._n, self._m, self._build = system.n, len(slopes), build
-
-    def solve(self, rhs: Sequence[Node], check: bool = False) -> list[Node]:
-        """(udot, s), and without rows and with `check` the info."""
-        solved = ldl_solve(self._matrix, [*rhs[self._n :], *rhs[: self._n]], self._build, check=check and not self._m)
-        return [*solved[self._m :], *solved[: self._m]]
 
 
 def multiplier_outputs(system: System, rows: Rows, solved: Sequence[Node], build: Builder) -> dict[str, Node]:

@@ -78,7 +78,7 @@ def left_at(constraints: Constraints, q: Array, t: float, parameters: Mapping[st
 
 
 def lost_rank(constraints: Constraints, q: Array, t: float, parameters: Mapping[str, float]) -> str:
-    """What to say of a state where rows that are independent elsewhere are not; "" where they are."""
+    """Sentence on a state where rows depend on one another that are independent elsewhere; "" where they do not."""
     if not len(constraints) or not np.isfinite(q).all():
         return ""
     elsewhere, here = independent_rows(constraints), left_at(constraints, q, t, parameters, DEPENDENT).kept
@@ -92,7 +92,7 @@ def lost_rank(constraints: Constraints, q: Array, t: float, parameters: Mapping[
 
 
 def opened(constraints: Constraints, q: Array, t: float, parameters: Mapping[str, float]) -> str:
-    """What to say of rows that were left out and are far more open than where they were; "" where none is."""
+    """Sentence on rows that were left out and are far more open than where they were; "" where none is."""
     if constraints.whole is None:
         return ""
     numbers = row_numbers(constraints.whole)

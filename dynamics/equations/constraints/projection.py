@@ -15,11 +15,11 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph, Node, extend
-from cgraph.extend import Array, Builder, building, folded, kept_by_first, solve_nodes
+from cgraph.extend import Array, Builder, building, folded, kept_by_first
 
 from ...systems.constraints import ConstraintError
+from ...systems.kinematics import ZERO
 from ...systems.system import System
-from ..formulations.formulations import ZERO
 from ..substitute import substitute
 from .constraint_rank import ConstraintWarning, independent_rows
 from .constraints import Rows
@@ -48,22 +48,18 @@ def projection(system: System) -> Graph | None:
     q, u = system.q, system.qd
     moved = list(q)
     if holonomic:
-        rows = _rows(holonomic, rates)
+        rows = Rows.of(holonomic, rates)
         shift = _correction(system, lagrangian, rows, [positions[k] for k in holonomic], written, build)
         with building(build):
             moved = [x + step for x, step in zip(q, kinematics.rate(shift), strict=True)]
     with building(build):
         moved = kinematics.normalized(moved)
-    rows = _rows(kept, rates)
+    rows = Rows.of(kept, rates)
     change = _correction(system, lagrangian, rows, rows.rates, written, build)
     change = substitute(change, dict(zip(q, moved, strict=True)))
     with building(build):
         velocities = [velocity + step for velocity, step in zip(u, change, strict=True)]
     return cg.simplify(system.graph({f"x{k}": x for k, x in enumerate([*moved, *velocities])}, q, u))
-
-
-def _rows(kept: tuple[int, ...], rates: list[Node]) -> Rows:
-    return Rows(kept, [rates[k] for k in kept], cg.variables([f"lambda{k}" for k in kept]))
 
 
 def _correction(
@@ -72,8 +68,7 @@ def _correction(
     """The shortest displacement that takes gaps off the rows."""
     with building(build):
         rhs = [*[ZERO] * system.n, *[-gap for gap in gaps]]
-    s = rows.multipliers
-    return solve_nodes(rows.function(lagrangian, written), [*system.qd, *s], rhs, build, multipliers=s)[: system.n]
+    return rows.solve(system, lagrangian, rhs, build, written=written)[: system.n]
 
 
 def projected(system: System, x: Array, t: float, parameters: Mapping[str, float]) -> Array:

@@ -228,7 +228,7 @@ row_numbers = kept_by_first(RowNumbers)
 
 
 class Closing(NamedTuple):
-    """Where Newton's method arrived."""
+    """Result of Newton's method."""
 
     point: dict[str, float]
     size: float  # of what is left, in the unit of displacements

@@ -1,4 +1,4 @@
-"""Blame: the nodes and edges that a graph has from a derivative through the embedded step."""
+"""Blame: the nodes and edges that a graph has from a derivative through the embedded step, proved or by their tags."""
 
 from __future__ import annotations
 
@@ -9,15 +9,16 @@ from typing import NamedTuple
 
 import cgraph as cg
 from cgraph import Edge, Graph, Node
-from cgraph.extend import Builder, folded
+from cgraph.extend import Builder, folded, require_graph
 
 from ...systems.arguments import new_variables
+from ...systems.kinematics import ONE, ZERO
 from ...systems.system import System
-from .formulations import ONE, THROUGH_STEP, ZERO
+from .formulations import COUPLING, THROUGH_STEP
 
 
 class Blame(NamedTuple):
-    """What a graph has from the derivative through the step.
+    """Nodes and edges that a graph has from the derivative through the step.
 
     nodes: they serve nothing else.  edges: by these it enters what is sound, or another use of a sound node is wrong.
     cancelled: outputs that have no such edge left, since simplification took it away together with a right one.
@@ -29,7 +30,7 @@ class Blame(NamedTuple):
 
 
 def blame(system: System, formulation: str, derive: Callable[[System, str, Node], Graph], graph: Graph) -> Blame:
-    """What of the graph is there by the derivative through the step, whether its value is 0 or not.
+    """Blame for what the graph has by the derivative through the step, whether its value is 0 or not.
 
     derive: `torques` or `momenta`, of which `graph` is the simplified graph by this formulation.
 
@@ -63,6 +64,38 @@ def blame(system: System, formulation: str, derive: Callable[[System, str, Node]
     cancelled = tuple([name for k, name in enumerate(marked.outputs) if touched & ~left & 1 << k])
     outputs = [graph.outputs[name] for name, node in marked.outputs.items() if node not in wrong]
     return Blame(frozenset(graph.nodes) - _needed(outputs, edges), edges, cancelled)
+
+
+def spurious_nodes(graph: Graph) -> frozenset[Node]:
+    """Nodes that are there only because a derivative was taken through the embedded Euler relation.
+
+    They are the adjoints that the product qd dt of q = qd dt + q_old passes on, the "unnecessary terms" of eq. (3), and
+    all that only these need, whether the author of the Lagrangian tagged anything or not. Where a slope dL/dq does not
+    change along the step, such as a weight m g, the derivative of m g dt is the node m g itself, which is not marked:
+    there an edge is wrong. Whether the torque is wrong, and by which edges, `formulation_verdict` says.
+
+    Parameters
+    ----------
+    graph : Graph
+        One of `inverse_dynamics` or `momentum_rate`, by any formulation.
+
+    Returns
+    -------
+    frozenset of Node
+        Empty for a formulation by the chain rule.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> spring = dyn.scenes.load("spring_mass")
+    >>> [len(dyn.spurious_nodes(dyn.momentum_rate(spring, name))) for name in ("chain_rule", "euler_embedded")]
+    [0, 13]
+    """
+    require_graph("spurious_nodes", graph)
+    coupling = {node for node in graph.nodes if COUPLING in node.tags and "adjoint" in node.roles}
+    entering = frozenset([edge for edge in graph.edges if edge.source in coupling])
+    outputs = [node for node in graph.outputs.values() if node not in coupling]
+    return frozenset(graph.nodes) - _needed(outputs, entering)
 
 
 def _needed(outputs: list[Node], cut: frozenset[Edge]) -> set[Node]:

@@ -10,6 +10,7 @@ from cgraph import Graph, Node
 
 from ...systems.model import Model, as_system
 from ...systems.system import System
+from ..equation import documented
 from .blame import Blame, blame
 from .formulations import inverse_dynamics, momenta, momentum_rate, torques
 from .verdict import formulation_verdict
@@ -52,27 +53,18 @@ def blamed(model: Model, term: str, formulation: str) -> tuple[Graph, Blame]:
     return graph, blame(as_system(model), formulation, written, graph) if differs else Blame()
 
 
+@documented
 def formulation_sizes(model: Model) -> dict[tuple[str, str], FormulationSize]:
     """The sizes of the graphs of the inertial term and of the whole torque, by the paper's three formulations.
 
     The two count differently, since the torque tau = dp/dt - dL/dq needs the branch of dL/dq by right: what serves it,
     too, is not there by mistake; and since the momentum p is an output of the first alone.
 
-    Parameters
-    ----------
-    model : Model
-        A system, a mechanism or a scene.
-
     Returns
     -------
     dict of (str, str) to FormulationSize
         {(term, formulation): size}; terms are "p and dp/dt", drawn in Figures 1 to 3, and "tau", what `cgraph lint` and
         `cgraph inspect` look at.
-
-    Raises
-    ------
-    TypeError
-        For what is no model, or has no Lagrangian.
 
     Examples
     --------

@@ -12,17 +12,16 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import TANGENT, Builder, building, cotangents, require_choice, require_flag, tangents
 
-from ...systems.body_system import BodySystem
+from ...systems.kinematics import ONE, ZERO
 from ...systems.model import Model, as_system
 from ...systems.system import System
-from ..bias_terms import bias_terms
-from ..shorter_form import LONGEST, shorter_form
+from ..bias_terms import bias_terms, state_rate
+from ..equation import LONGEST, Equation, Output, shortened
 from ..substitute import substitute
 
 EULER = "euler"  # tag of the embedded relations q = qd dt + q_old and qd = qdd dt + qd_old
 COUPLING = "q of qd"  # tag of the product qd dt in the first of them, through which dL/dqd reaches dL/dq
 LAGRANGIAN = "lagrangian"  # tag of what the author left untagged: derivatives of it would take a relation's tag instead
-ONE, ZERO = cg.constant(1.0), cg.constant(0.0)
 
 
 class LagrangeTerms(NamedTuple):
@@ -38,15 +37,19 @@ class LagrangeTerms(NamedTuple):
 
 def chain_rule(system: System) -> LagrangeTerms:
     """Section 3: d/dt p = grad_x p . xdot for p = dL/dqd, x = (q, qd), contracted: one reverse sweep, one forward."""
-    build = Builder()
+    momentum, rate, gradient = lagrange_sweeps(system, system.lagrangian, Builder())
+    return LagrangeTerms([*system.q, *system.qd, *system.qdd], system.q, system.qd, momentum, rate, gradient)
+
+
+def lagrange_sweeps(system: System, lagrangian: Node, build: Builder) -> tuple[list[Node], list[Node], list[Node]]:
+    """p = dL/dqd, d/dt p and dL/dq of a Lagrangian or a part of it."""
     # The reverse sweep over L gives both dL/dq and p = dL/dqd; q and qd are independent inputs (Section 2.2).
-    bars = cotangents({system.lagrangian: ONE}, [*system.q, *system.qd], build)
+    bars = cotangents({lagrangian: ONE}, [*system.q, *system.qd], build)
     momentum = bars[system.nq :]
     gradient = system.kinematics.slopes(bars[: system.nq], momentum, build)
     # Eq. (4) with y = p: a forward sweep along xdot = (qd, qdd) is the product grad_x p . xdot, never written out.
-    dots = tangents(_state_rate(system), momentum, build)
-    rate = [dots.get(p, ZERO) for p in momentum]
-    return LagrangeTerms([*system.q, *system.qd, *system.qdd], system.q, system.qd, momentum, rate, gradient)
+    dots = tangents(state_rate(system, system.qdd), momentum, build)
+    return momentum, [dots.get(p, ZERO) for p in momentum], gradient
 
 
 def chain_rule_literal(system: System) -> LagrangeTerms:
@@ -54,7 +57,7 @@ def chain_rule_literal(system: System) -> LagrangeTerms:
     bars = cotangents({system.lagrangian: ONE}, [*system.q, *system.qd])
     momentum = bars[system.nq :]
     gradient = system.kinematics.slopes(bars[: system.nq], momentum, Builder())
-    x_dot = _state_rate(system)
+    x_dot = state_rate(system, system.qdd)
     rate = []
     for p in momentum:
         partials = cotangents({p: ONE}, list(x_dot))  # grad_x p, 2n nodes
@@ -68,7 +71,7 @@ def chain_rule_literal(system: System) -> LagrangeTerms:
 
 
 def euler_embedded(system: System) -> LagrangeTerms:
-    """By definition, eq. (3) and Figure 1: dL/dqd is taken through q = qd dt + q_old, which is wrong."""
+    """The definition, eq. (3) and Figure 1: dL/dqd is taken through q = qd dt + q_old, which is wrong."""
     return _embedded(system, system.lagrangian)
 
 
@@ -119,13 +122,12 @@ THROUGH_STEP: dict[str, Callable[[System], Node]] = {
 }  # the formulations that differentiate by qd through q = qd dt + q_old, and what they differentiate
 
 
+@Equation("q qd qdd", Output("tau{}", ("n",), "N m or N")).describes
 def inverse_dynamics(model: Model, formulation: str | None = None, *, simplify: bool = True) -> Graph:
     """tau of the motion: tau = d/dt dL/dqd - dL/dq + damping * qd - forces, by one of the `FORMULATIONS`.
 
     Parameters
     ----------
-    model : Model
-        A system, a mechanism or a scene with n coordinates.
     formulation : str, optional
         By default the smaller graph of "chain_rule", which is the paper's, and "newton_euler", which takes the
         velocities in L in place of qd. "chain_rule_literal" is the first with every gradient written out.
@@ -136,17 +138,13 @@ def inverse_dynamics(model: Model, formulation: str | None = None, *, simplify: 
 
     Returns
     -------
-    Graph
-        Inputs q0.., qd0.., qdd0.., then t if needed and parameters. With the Euler relation: the state before the
-        step, q0_old.., qd0_old.., then qdd0.., dt, ...; tau is that of the state after the step, qd = qdd dt + qd_old,
-        q = qd dt + q_old. Outputs tau0.., (n,) [N m or N].
+    With the Euler relation the inputs are the state before the step, q0_old.., qd0_old.., then qdd0.., dt, ...; tau is
+    that of the state after the step, qd = qdd dt + qd_old, q = qd dt + q_old.
 
     Raises
     ------
     ValueError
         For an unknown formulation.
-    TypeError
-        For what is no model, or has no Lagrangian.
 
     Examples
     --------
@@ -164,9 +162,9 @@ def inverse_dynamics(model: Model, formulation: str | None = None, *, simplify: 
         names = SMALL if formulation is None else (formulation,)
         return min([torques(system, name) for name in names], key=lambda graph: size(cg.simplify(graph)))
     if formulation is None:
-        return shorter_form(system, _smaller)
+        return shortened(system, _smaller)
     if formulation in SMALL:
-        return shorter_form(system, lambda form: cg.simplify(torques(form, formulation)))
+        return shortened(system, lambda form: cg.simplify(torques(form, formulation)))
     return cg.simplify(torques(system, formulation))
 
 
@@ -177,7 +175,7 @@ def _smaller(system: System) -> Graph:
     take 7 nodes each; so for large graphs, which take long, it is not asked.
     """
     by_velocities = cg.simplify(torques(system, newton_euler.__name__))
-    if isinstance(system, BodySystem) and len(by_velocities.nodes) > max(LONGEST, 10 * system.n):
+    if system.body_terms is not None and len(by_velocities.nodes) > max(LONGEST, 10 * system.n):
         return by_velocities
     return min(cg.simplify(torques(system)), by_velocities, key=size)
 
@@ -205,6 +203,7 @@ def torques(system: System, formulation: str = "chain_rule", through: Node = ONE
     return system.graph(outputs, terms.inputs, [through] if through is not ONE else [])
 
 
+@Equation("q qd qdd", Output("p{}_dot", ("n",), "N m or N")).describes
 def momentum_rate(
     model: Model, formulation: str = "chain_rule", *, simplify: bool = True, keep_momentum: bool = False
 ) -> Graph:
@@ -212,24 +211,21 @@ def momentum_rate(
 
     Parameters
     ----------
-    model, simplify
-        As for `inverse_dynamics`.
     formulation : str
         Any but "newton_euler", which forms no momentum.
+    simplify : bool
+        False leaves the graph as derived.
     keep_momentum : bool
         The momenta p0.. = dL/dqd are outputs too.
 
     Returns
     -------
-    Graph
-        Inputs as of `inverse_dynamics`; outputs p0_dot.., (n,) [N m or N].
+    With the Euler relation the inputs are those of `inverse_dynamics`.
 
     Raises
     ------
     ValueError
         For any other formulation.
-    TypeError
-        For what is no model, or has no Lagrangian.
 
     Examples
     --------
@@ -262,12 +258,6 @@ def _forces(system: System, terms: LagrangeTerms) -> list[Node]:
     if terms.q is system.q:
         return list(system.forces)
     return substitute(system.forces, dict(zip([*system.q, *system.qd], [*terms.q, *terms.qd], strict=True)))
-
-
-def _state_rate(system: System) -> dict[Node, Node]:
-    """xdot for x = (q, qd), and 1 for t if the Lagrangian depends on it."""
-    rate = dict(zip([*system.q, *system.qd], [*system.q_dot, *system.qdd], strict=True))
-    return rate | ({system.t: ONE} if system.t in system.extra_inputs else {})
 
 
 class _Embedding:

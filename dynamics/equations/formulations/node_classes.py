@@ -55,7 +55,7 @@ def formulation_classes(verdicts: Iterable[Verdict]) -> Callable[[Graph], Callab
 
 
 def derivative_class(node: Node) -> str:
-    """What a node of a right formulation is, and of which bodies: by roles and tags.
+    """Class of a node of a right formulation by its roles, and its bodies by its tags.
 
     A rate of a slope is of d/dt dL/dqd. What it has of the rates of dz/dqd, for a velocity z in L, dL/dq has as well:
     in the torque they cancel, and a formulation by velocities has neither (`velocity_nodes`).

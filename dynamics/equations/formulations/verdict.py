@@ -17,10 +17,12 @@ from cgraph import Edge, Graph, Node, extend
 from cgraph.extend import Builder, Names, building, cotangents, folded, require_mapping, shortened
 
 from ...systems.display_names import display_names
+from ...systems.kinematics import ONE
 from ...systems.model import Model, as_system
 from ...systems.system import System
+from ..equation import documented
 from .blame import blame
-from .formulations import ONE, THROUGH_STEP, inverse_dynamics, torques
+from .formulations import THROUGH_STEP, inverse_dynamics, torques
 
 if TYPE_CHECKING:
     from cgraph.extend import Json
@@ -32,7 +34,7 @@ _DIFFERS = "This is not the torque of the chain rule, however small dt is"
 
 
 class Excess(NamedTuple):
-    """What the torque of one velocity has too much.
+    """Excess in the torque of one velocity.
 
     symbol: "dL/dq.y".  formula: in a person's names, empty where it is long.  value: at the state of the verdict.
     """
@@ -165,7 +167,7 @@ class Verdict:
 
     @property
     def lacking(self) -> str:
-        """What is missing where the wrong term has cancelled a right one, in a sentence; empty where nothing is."""
+        """Sentence on right terms that the wrong one has cancelled; empty where there are none."""
         if not self.missing:
             return ""
         called = Names(self.graph, self.names)
@@ -181,7 +183,7 @@ class Verdict:
         return f"There by mistake: {what}, {alone if count else 'and no node by itself'}: {texts}."
 
     def to_dict(self) -> dict[str, Json]:
-        """The same for JSON; nodes are numbered as in `graph.nodes`, an edge is [source, target, argument slot]."""
+        """The verdict for JSON; nodes are numbered as in `graph.nodes`, an edge is [source, target, argument slot]."""
         number = {node: i for i, node in enumerate(self.graph.nodes)}
         return {
             "formulation": self.formulation,
@@ -196,13 +198,12 @@ class Verdict:
         }
 
 
+@documented
 def formulation_verdict(model: Model, formulation: str = "euler_embedded") -> Verdict:
     """Whether the torque by a formulation is that of the chain rule, by how much it is off, and what is to blame.
 
     Parameters
     ----------
-    model : Model
-        A system, a mechanism or a scene.
     formulation : str
         One of `FORMULATIONS`.
 
@@ -215,8 +216,6 @@ def formulation_verdict(model: Model, formulation: str = "euler_embedded") -> Ve
     ------
     ValueError
         For an unknown formulation.
-    TypeError
-        For what is no model, or has no Lagrangian.
 
     Examples
     --------

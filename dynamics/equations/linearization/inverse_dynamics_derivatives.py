@@ -2,45 +2,39 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import cgraph as cg
-from cgraph import Graph, Node
+from cgraph import Node
 from cgraph.extend import Builder, building, cotangents, folded
 
-from ...systems.model import Model, as_system
+from ...systems.body_terms import TorqueDerivatives
+from ...systems.kinematics import ONE
 from ...systems.system import System
-from ...systems.torque_derivatives import TorqueDerivatives
-from ..formulations.formulations import ONE, torques
-from ..shorter_form import shorter_form
+from ..equation import Equation, Output, entries, mirrored
+from ..formulations.formulations import torques
 from ..substitute import substitute
 
-Rows = Sequence[Sequence[Node]]
+ROWS = ("n", "n")
 
 
-def inverse_dynamics_derivatives(model: Model) -> Graph:
-    """tau of a motion with dtau/dq, dtau/dqd and M = dtau/dqdd, at any state.
+@Equation(
+    "q qd qdd",
+    Output("tau{}", ("n",)),
+    Output("dtau_dq_{}_{}", ROWS),
+    Output("dtau_dqd_{}_{}", ROWS),
+    Output("M_{}_{}", ROWS),
+)
+def inverse_dynamics_derivatives(system: System) -> Iterator[list[Node]]:
+    """Torque tau of a motion with dtau/dq, dtau/dqd and M = dtau/dqdd, at any state.
 
     Of bodies they are written in closed form, of other systems by differentiation of `inverse_dynamics`. Of
     quasi-velocities, qdot = G(q) qd, dtau/dq is by small displacements xi with dq = G xi, such as a rotation vector in
     the body's axes, at fixed qd and qdd, so that all are (n, n).
 
-    Parameters
-    ----------
-    model : Model
-        A system, a mechanism or a scene with n velocities.
-
     Returns
     -------
-    Graph
-        Inputs q0.., qd0.., qdd0.., t if needed, parameters; outputs tau0.., (n,), and row by row, (n, n) each,
-        dtau_dq_0_0, .., dtau_dqd_0_0, .. and M_0_0, ... Entries of coordinates on different branches of a tree are the
-        constant 0.
-
-    Raises
-    ------
-    TypeError
-        For what is no model, or has no Lagrangian.
+    Entries of coordinates on different branches of a tree are the constant 0.
 
     Examples
     --------
@@ -50,26 +44,20 @@ def inverse_dynamics_derivatives(model: Model) -> Graph:
     >>> list(at), at["dtau_dq"].round(12).tolist()
     (['tau', 'dtau_dq', 'dtau_dqd', 'M'], [[20.0, 5.0], [5.0, 5.0]])
     """
-
-    def derive(system: System) -> Graph:
-        found = torque_derivatives(system, system.qdd, Builder())
-        outputs = {f"tau{i}": node for i, node in enumerate(found.torques)}
-        for name, rows in (("dtau_dq", found.by_q), ("dtau_dqd", found.by_qd), ("M", found.mass)):
-            outputs |= {f"{name}_{i}_{j}": entry for i, row in enumerate(rows) for j, entry in enumerate(row)}
-        return cg.simplify(system.graph(outputs, system.q, system.qd, system.qdd))
-
-    return shorter_form(as_system(model), derive)
+    found = torque_derivatives(system, system.qdd, Builder())
+    yield [*found.torques, *entries([*found.by_q, *found.by_qd, *found.mass])]
 
 
 def torque_derivatives(system: System, qdd: Sequence[Node], build: Builder) -> TorqueDerivatives:
-    """At these accelerations, with damping and applied forces."""
-    stated = system.torque_derivatives(qdd, build) if system.n > 1 else None  # of one coordinate, these are longer
+    """Derivatives at these accelerations, with damping and applied forces."""
+    stated = None
+    if system.body_terms is not None and system.n > 1:  # of one coordinate, these are longer
+        stated = system.body_terms.equations.torque_derivatives((system.q, system.qd, qdd), build)
     if stated is None:
         return _derived(system, qdd, build)
     torque, by_q, by_qd, _ = stated
+    braking = system.braking(build)
     with building(build):
-        with cg.tag("damping"):
-            braking = [damping * qd for damping, qd in zip(system.damping, system.qd, strict=True)]
         for i, (brake, force) in enumerate(zip(braking, system.forces, strict=True)):
             torque[i] = torque[i] + brake - force
             by_qd[i][i] = by_qd[i][i] + system.damping[i]
@@ -81,15 +69,13 @@ def torque_derivatives(system: System, qdd: Sequence[Node], build: Builder) -> T
 
 
 def _derived(system: System, qdd: Sequence[Node], build: Builder) -> TorqueDerivatives:
-    """By differentiation of inverse dynamics, a reverse sweep from each torque; M from that of the energy."""
+    """Derivatives from inverse dynamics by a reverse sweep from each torque; M from that of the energy."""
     at = dict(zip(system.qdd, qdd, strict=True))
     torque = folded(list(cg.simplify(torques(system)).outputs.values()), build)
-    slopes = state_slopes(system, torque, build)
-    n = system.n
-    flat = folded(substitute([*torque, *_flat(slopes)], at), build)
-    rows = _rows(flat[n:], 2 * n)
-    lower = system.mass_matrix(system.lagrangian, build)
-    mass = [[lower[max(i, j)][min(i, j)] for j in range(n)] for i in range(n)]
+    slopes, n = state_slopes(system, torque, build), system.n
+    flat = folded(substitute([*torque, *entries(slopes)], at), build)
+    rows = [flat[k : k + 2 * n] for k in range(n, len(flat), 2 * n)]
+    mass = mirrored(system.mass_matrix(system.lagrangian, build))
     return TorqueDerivatives(flat[:n], [row[:n] for row in rows], [row[n:] for row in rows], mass)
 
 
@@ -97,11 +83,3 @@ def state_slopes(system: System, nodes: Sequence[Node], build: Builder) -> list[
     """Rows of d(nodes)/d(q, qd), 2n each; of quasi-velocities by displacements xi, dq = G xi."""
     split, bars = system.nq, [cotangents({node: ONE}, [*system.q, *system.qd], build) for node in nodes]
     return [[*system.kinematics.pulled_back(row[:split], build), *row[split:]] for row in bars]
-
-
-def _flat(rows: Rows) -> list[Node]:
-    return [entry for row in rows for entry in row]
-
-
-def _rows(flat: Sequence[Node], width: int) -> list[list[Node]]:
-    return [list(flat[k : k + width]) for k in range(0, len(flat), width)]

@@ -12,16 +12,17 @@ from cgraph.extend import Array, require_choice
 
 from ...systems.model import Model, as_system
 from ...systems.system import System
+from ..equation import Equation, Output, documented, shortened
 from ..equations_of_motion import forward_dynamics
-from ..shorter_form import shorter_form
 from ..singular_mass_matrix import raise_if_singular
 from ..state_equation import FORMS
-from ..states.evaluate_at import evaluate_at
+from ..states.evaluate import evaluate
 from ..states.initial_value import normalized
 from .linearization_parts import LinearizationParts, linearization_parts
-from .symmetric_linearization import SymmetricParts
+from .momentum_parts import momentum_parts, of_momenta
 
 
+@Equation("q qd tau", Output("A_{}_{}", ("2n", "2n")), Output("B_{}_{}", ("2n", "n"))).describes
 def state_space(model: Model, *, form: str = "velocity") -> Graph:
     """A and B of d(xdot) = A dx + B dtau, x = (q, qd), or x = (q, p) of the momentum form, at any state.
 
@@ -50,17 +51,13 @@ def state_space(model: Model, *, form: str = "velocity") -> Graph:
 
     Parameters
     ----------
-    model : Model
-        A system, a mechanism or a scene with n coordinates.
     form : {"velocity", "momentum"}
         Of x, as of `simulate`.
 
     Returns
     -------
-    Graph
-        Inputs q0.., qd0.., tau0.., or q0.., p0.., t if needed, parameters; outputs A_0_0, .., (2n, 2n), and B_0_0, ..,
-        (2n, n), row by row. The velocities of p are those of `hamilton_equations`, with its error where L is not
-        quadratic in them.
+    Of the momentum form the inputs are q0.., p0.., without tau0... The velocities of p are those of
+    `hamilton_equations`, with its error where L is not quadratic in them.
 
     Raises
     ------
@@ -70,8 +67,6 @@ def state_space(model: Model, *, form: str = "velocity") -> Graph:
         For the momentum form of a model with constraints.
     ValueError
         For the momentum form of a model with a parameter that is called like a momentum.
-    TypeError
-        For what is no model, or has no Lagrangian.
 
     Examples
     --------
@@ -86,19 +81,16 @@ def state_space(model: Model, *, form: str = "velocity") -> Graph:
     {'A_0_0': 0.0, 'A_0_1': 0.25, 'A_1_0': -20.0, 'A_1_1': 0.0, 'B_0_0': 0.0, 'B_1_0': 1.0}
     """
     if require_choice("form", form, FORMS) == "velocity":
-        return shorter_form(as_system(model), lambda system: linearization_parts(system).written_out())
-    return shorter_form(
-        as_system(model), lambda system: SymmetricParts(system, momenta=True).of_momenta(), mirrored=True
-    )
+        return shortened(as_system(model), lambda system: linearization_parts(system).written_out())
+    return shortened(as_system(model), of_momenta, mirrored=True)
 
 
-def parts_of(system: System, form: str) -> LinearizationParts | SymmetricParts:
+def parts_of(system: System, form: str) -> LinearizationParts:
     """The parts of the linearization of a form, over (q, qd)."""
-    if form == "velocity":
-        return linearization_parts(system)
-    return SymmetricParts(system)
+    return linearization_parts(system) if form == "velocity" else momentum_parts(system)
 
 
+@documented
 def linearize(
     model: Model,
     q: ArrayLike,
@@ -119,16 +111,10 @@ def linearize(
 
     Parameters
     ----------
-    model : Model
-        A system, a mechanism or a scene with n coordinates.
     q, qd, tau : array_like, (nq,) and (n,)
         Coordinates [rad or m], velocities, and applied forces [N m or N].
     form : {"velocity", "momentum"}
         Of x, as of `simulate`. The state is given by velocities in both, so that nothing is iterated.
-    t : float
-        Time [s], for a model that depends on it.
-    parameters : mapping of str to float
-        Values in place of the model's.
 
     Returns
     -------
@@ -162,7 +148,7 @@ def linearize(
     """
     system, parts = as_system(model), parts_of(as_system(model), require_choice("form", form, FORMS))
     graphs = parts.in_columns()
-    flat = evaluate_at(system, graphs.shared, {"q": q, "qd": qd, "tau": tau}, t, parameters)
+    flat = evaluate(system, graphs.shared, {"q": q, "qd": qd, "tau": tau}, t, parameters)
     if flat.ndim != 1:
         raise ValueError("linearize takes one state, got rows of several; see linearize_many")
     factors, sides, rest = np.split(flat, [graphs.factors, graphs.factors + graphs.sides])
@@ -179,7 +165,7 @@ def _raise_what_is_not_finite(
 ) -> None:
     """The state has a quaternion without a length, or a mass matrix that is singular, or numbers leave float64."""
     normalized(system, np.concatenate([np.asarray(state[name], dtype=np.float64) for name in ("q", "qd")]))
-    info = evaluate_at(system, forward_dynamics(system, check=True), state, t, parameters)[-1]
+    info = evaluate(system, forward_dynamics(system, check=True), state, t, parameters)[-1]
     if np.isfinite(info):
         raise_if_singular(system, info)
     raise ValueError("there is no linearization at this state: its numbers leave the range of float64")

@@ -1,4 +1,4 @@
-"""The parts of a linearization: what the state alone decides, and what every column takes once more.
+"""The parts of a linearization: what the state alone decides, what every column takes once more, and a formula of both.
 
 From tau(q, qd, qdd) = const:  M dqdd = dtau - (d tau / dx) dx, one column for each of the 2n numbers of x and the n of
 tau. M is factored once; a column is then a graph of its own, small, and alike for all.
@@ -6,23 +6,39 @@ tau. M is factored once; a column is then a graph of its own, small, and alike f
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Array, Builder, building, folded, topological, with_reciprocals
+from cgraph.extend import (
+    Array,
+    Builder,
+    SingularError,
+    as_node,
+    building,
+    cotangents,
+    folded,
+    tangents,
+    topological,
+    with_reciprocals,
+)
 
+from ...systems.kinematics import ONE, ZERO
 from ...systems.system import System
-from ..accelerations import BY_ENERGY, accelerations
-from ..formulations.formulations import ONE, ZERO
-from ..mass_matrix_solve import MassSolve, inverse, mass_solve, shorter
-from .held_linearization import held_sides
-from .inverse_dynamics_derivatives import torque_derivatives
+from ..accelerations import BY_ENERGY, DENSE_UP_TO, accelerations
+from ..bias_terms import state_rate
+from ..constraints.constraints import Rows as ConstraintRows, constraint_rows
+from ..equation import entries
+from ..formulations.formulations import torques
+from ..mass_matrix_solve import MassSolve, Rows, linear, mass_solve, smaller_solution, units
+from .inverse_dynamics_derivatives import state_slopes, torque_derivatives
 
-Rows = Sequence[Sequence[Node]]
+Matrix = NDArray[Any]  # of numbers, (.., n, k), or of nodes, (n, k)
 
 
 class ColumnGraphs(NamedTuple):
@@ -44,68 +60,95 @@ class ColumnGraphs(NamedTuple):
         return self.columns * (len(self.column.inputs) - self.factors)
 
 
-def column_graphs(
-    inputs: Sequence[Node], solve: MassSolve, sides: Rows, n: int, rest: Mapping[str, Rows]
-) -> ColumnGraphs:
-    """Of right-hand sides, (n + m,) with m multipliers, those of M^-1 after them, and matrices by name."""
-    factors, column = solve.split()
-    outputs = {f"p{k}": node for k, node in enumerate(factors)}
-    for i in range(len(solve.b)):
-        row = [*[side[i] for side in sides], *_unit(i, n)]
-        outputs |= {f"b_{i}_{j}": entry for j, entry in enumerate(row)}
-    for name, rows in rest.items():
-        outputs |= {f"{name}_{i}_{j}": entry for i, row in enumerate(rows) for j, entry in enumerate(row)}
-    shared = with_reciprocals(cg.simplify(Graph(inputs, outputs)))
-    return ColumnGraphs(shared, cg.simplify(column), len(factors), len(sides) + n)
-
-
 class LinearizationParts(NamedTuple):
-    """sides: right-hand sides, of displacements, then of velocities.  brackets: rows of C(qd), xi_dot = dqd + C xi."""
+    """A and B by a formula of right-hand sides W, their solutions X = M^-1 W, M^-1, and matrices of the state.
+
+    sides: columns of W, (n + m,) with m multipliers.  rest: matrices (n, n) by name.  formula: (W, X, M^-1, *rest) to
+    A, (.., 2n, 2n), and B, (.., 2n, n), of numbers or of nodes.  beside: about how many nodes the formula adds.
+    """
 
     inputs: Sequence[Node]
-    sides: list[list[Node]]
+    sides: Rows
     solve: MassSolve
-    brackets: list[list[Node]]
+    rest: Mapping[str, Rows]
+    formula: Callable[..., tuple[Matrix, Matrix]]
     build: Builder
+    beside: int = 0
+
+    @property
+    def n(self) -> int:
+        """The number of velocities."""
+        return len(self.solve.x)
 
     @property
     def size(self) -> int:
         """How many nodes `written_out` has, about."""
-        shared = topological([*self.solve.x, *[node for side in self.sides for node in side]])
-        return len(shared) + (len(self.sides) + len(self.brackets)) * len(self.solve.column)
+        shared = topological([*self.solve.x, *entries(self.sides)])
+        return len(shared) + (len(self.sides) + self.n) * len(self.solve.column) + self.beside
+
+    def matrices(self) -> tuple[Matrix, Matrix]:
+        """A and B as nodes."""
+        k, inverse_sides = len(self.sides), units(self.n, len(self.solve.b))
+        solved = _matrix(self.solve.solutions([*self.sides, *inverse_sides], self.build)).T
+        with building(self.build):
+            w, x, inverse = _matrix(self.sides).T, solved[:, :k], by_upper(solved[:, k:])
+            return self.formula(w, x, inverse, *map(_matrix, self.rest.values()))
 
     def written_out(self) -> Graph:
         """All entries of A and B."""
-        n = len(self.brackets)
-        columns, by_tau = self.solve.solutions(self.sides, self.build), inverse(self.solve, self.build)
-        rows = [[*row, *_unit(i, n), *[ZERO] * n] for i, row in enumerate(self.brackets)]
-        rows += [[*[column[i] for column in columns], *by_tau[i]] for i in range(n)]
-        outputs = {f"A_{i}_{j}": entry for i, row in enumerate(rows) for j, entry in enumerate(row[: 2 * n])}
-        outputs |= {f"B_{i}_{j}": entry for i, row in enumerate(rows) for j, entry in enumerate(row[2 * n :])}
-        return with_reciprocals(cg.simplify(Graph(self.inputs, outputs)))
+        return linear_graph(self.inputs, *self.matrices())
 
     def in_columns(self) -> ColumnGraphs:
-        """The same with the columns left to a graph of one."""
-        return column_graphs(self.inputs, self.solve, self.sides, len(self.brackets), {"C": self.brackets})
+        """A graph of the state's part, and one of a column."""
+        factors, column = self.solve.split()
+        outputs = {f"p{k}": node for k, node in enumerate(factors)}
+        columns = [*self.sides, *units(self.n, len(self.solve.b))]
+        blocks = {"b": list(zip(*columns, strict=True)), **self.rest}
+        for name, rows in blocks.items():
+            outputs |= {f"{name}_{i}_{j}": entry for i, row in enumerate(rows) for j, entry in enumerate(row)}
+        shared = with_reciprocals(cg.simplify(Graph(self.inputs, outputs)))
+        return ColumnGraphs(shared, cg.simplify(column), len(factors), len(columns))
 
-    def assembled(self, _sides: Array, brackets: Array, solutions: Array) -> tuple[Array, Array]:
-        """A, (.., 2n, 2n), and B, (.., 2n, n), of C(qd), (.., n n), and the solutions of all columns, (.., n 3n)."""
-        n = len(self.brackets)
-        solved = solutions.reshape(*solutions.shape[:-1], n, 3 * n).copy()
-        solved[..., 2 * n :] = mirrored(solved[..., 2 * n :])  # symmetric, by the half that is written out, too
-        top = np.zeros_like(solved)
-        top[..., :n], top[..., n : 2 * n] = brackets.reshape(*brackets.shape[:-1], n, n), np.eye(n)
-        rows = np.concatenate([top, solved], axis=-2)
-        return rows[..., : 2 * n], rows[..., 2 * n :]
+    def assembled(self, sides: Array, rest: Array, solutions: Array) -> tuple[Array, Array]:
+        """A and B as numbers, of the outputs of both graphs, flat: right-hand sides, the rest, and all solutions."""
+        shape, n, k = solutions.shape[:-1], self.n, len(self.sides)
+        w, x = (each.reshape(*shape, -1, k + n) for each in (sides, solutions))
+        matrices = np.moveaxis(rest.reshape(*shape, len(self.rest), n, n), -3, 0)
+        with np.errstate(all="ignore"):  # of an M that is singular, which is said by who asks for a state
+            return self.formula(w[..., :k], x[..., :k], by_upper(x[..., k:]), *matrices)
+
+
+def linear_graph(inputs: Sequence[Node], a: Matrix, b: Matrix) -> Graph:
+    """All entries of A and B of nodes."""
+    outputs = {f"A_{i}_{j}": as_node(entry) for (i, j), entry in np.ndenumerate(a)}
+    outputs |= {f"B_{i}_{j}": as_node(entry) for (i, j), entry in np.ndenumerate(b)}
+    return with_reciprocals(cg.simplify(Graph(inputs, outputs)))
+
+
+def by_upper(matrix: Matrix) -> Matrix:
+    """Symmetric to the last bit, by the upper triangle."""
+    return np.where(np.tri(matrix.shape[-1], dtype=bool).T, matrix, np.swapaxes(matrix, -1, -2))
+
+
+def _matrix(rows: Rows) -> Matrix:
+    return np.array([[*row] for row in rows], dtype=object)
+
+
+def velocity_form(_: Matrix, x: Matrix, inverse: Matrix, brackets: Matrix) -> tuple[Matrix, Matrix]:
+    """A = [[C, 1], [X]] and B = [[0], [M^-1]] with X = -M^-1 d(tau)/dx and the brackets of xi_dot = dqd + C xi."""
+    n = inverse.shape[-1]
+    one, zero = np.broadcast_to(np.eye(n), inverse.shape), np.zeros(inverse.shape)
+    return np.block([[brackets, one], [x[..., :n], x[..., n:]]]), np.block([[zero], [inverse]])
 
 
 def linearization_parts(system: System) -> LinearizationParts:
-    """Raises SingularMassMatrixError for a coordinate without inertia."""
+    """Parts of the velocity form. Raises SingularMassMatrixError for a coordinate without inertia."""
     if not len(system.constraints):
-        return shorter(system, lambda method: _parts(system, method))
+        return smaller_solution(system, lambda method: _parts(system, method), lambda parts: parts.size)
     solved, build = accelerations(system), Builder()
-    sides, solve = held_sides(system, solved, build)
-    return LinearizationParts(solved.inputs, sides, solve, system.kinematics.brackets(build), build)
+    sides, solve = _constrained_sides(system, solved, build)
+    rest = {"C": system.kinematics.brackets(build)}
+    return LinearizationParts(solved.inputs, sides, solve, rest, velocity_form, build)
 
 
 def _parts(system: System, method: str) -> LinearizationParts:
@@ -114,14 +157,49 @@ def _parts(system: System, method: str) -> LinearizationParts:
     slopes = torque_derivatives(system, folded(list(qdd.outputs.values()), build), build)
     with building(build):
         sides = [[-row[j] for row in rows] for rows in (slopes.by_q, slopes.by_qd) for j in range(n)]
-    solve = mass_solve(system, build, method)
-    return LinearizationParts(qdd.inputs, sides, solve, system.kinematics.brackets(build), build)
+    solve, rest = mass_solve(system, build, method), {"C": system.kinematics.brackets(build)}
+    return LinearizationParts(qdd.inputs, sides, solve, rest, velocity_form, build)
 
 
-def mirrored(matrix: Array) -> Array:
-    """Symmetric to the last bit, by the upper triangle."""
-    return np.triu(matrix) + np.swapaxes(np.triu(matrix, 1), -1, -2)
+def _constrained_sides(system: System, solved: Graph, build: Builder) -> tuple[list[list[Node]], MassSolve]:
+    """Right-hand sides of the 2n numbers of x, (n + m,), and the solution for one: dqdd of
+
+    M dqdd - J^T dlambda = dtau - d(tau - J^T lambda)/dx dx,  J dqdd = -d(dz/dt)/dx dx,  z the rates of constraints.
+
+    solved: the accelerations and multipliers.
+    """
+    n = system.n
+    lagrangian, *rates = folded([system.lagrangian, *system.constraints.rates], build)
+    rows = constraint_rows(system, rates)
+    partials = _slopes(system, rows, solved, build)
+    with building(build):
+        sides = [[-row[j] for row in partials] for j in range(2 * n)]
+    b = cg.variables([f"b{i}#" for i in range(n + len(rows.multipliers))])
+    return sides, linear(b, _solved(system, lagrangian, rows, b, build)[:n])
 
 
-def _unit(i: int, n: int) -> list[Node]:
-    return [ONE if i == j else ZERO for j in range(n)]
+def _solved(system: System, lagrangian: Node, rows: ConstraintRows, side: Sequence[Node], build: Builder) -> list[Node]:
+    """(dqdd, -dlambda) for a right-hand side: densely up to 7 coordinates, where that goes without exchanging rows."""
+    if system.n <= DENSE_UP_TO:
+        with suppress(SingularError):
+            return rows.solve_densely(system, lagrangian, side, build)
+    return rows.solve(system, lagrangian, side, build)
+
+
+def _slopes(system: System, rows: ConstraintRows, solved: Graph, build: Builder) -> list[list[Node]]:
+    """Rows of d(tau - J^T lambda, dz/dt)/d(q, qd), (n + m, 2n), where qdd and lambda are as solved.
+
+    Of quasi-velocities by displacements xi, dq = G xi.
+    """
+    tau, s = cg.simplify(torques(system)), rows.multipliers
+    pulls = cotangents(dict(zip(rows.rates, s, strict=True)), system.qd, build)
+    dots = tangents(state_rate(system, system.qdd) | {system.t: ONE}, rows.rates, build)
+    with building(build):
+        equations = [torque - force for torque, force in zip(tau.outputs.values(), pulls, strict=True)]
+    equations += [dots.get(z, ZERO) for z in rows.rates]
+    slopes = entries(state_slopes(system, equations, build))
+    at = {name: node for name, node in solved.outputs.items() if name in {str(each.name) for each in (*system.qdd, *s)}}
+    graph = Graph([*tau.inputs, *s, *system.tau], {str(k): entry for k, entry in enumerate(slopes)})
+    flat = list(cg.specialize(graph, at).outputs.values())
+    width = 2 * system.n
+    return [flat[i : i + width] for i in range(0, len(flat), width)]

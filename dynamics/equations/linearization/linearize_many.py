@@ -22,14 +22,15 @@ from cgraph.extend import (
     thread_count,
 )
 
+from ...systems.kinematics import ONE, ZERO
 from ...systems.model import Model, as_system
 from ...systems.system import System
+from ..equation import documented
 from ..equations_of_motion import forward_dynamics
-from ..formulations.formulations import ONE, ZERO
 from ..state_equation import FORMS
-from ..states.evaluate_at import InputRows
+from ..states.evaluate import input_rows
 from .linearization_parts import ColumnGraphs, LinearizationParts, linearization_parts
-from .symmetric_linearization import SymmetricParts
+from .momentum_parts import momentum_parts
 
 # Nodes; beyond, the columns share one piece of code: of 18 000 nodes, machine code is made in half the time and takes a
 # third longer, of 200 000 in a fifth of the time, and takes no longer.
@@ -42,6 +43,7 @@ MATRICES = 1024  # states whose parts are in memory at a time, before they are m
 BLOCK = 64  # states that are run between looks at the keyboard, and that a thread takes at a time
 
 
+@documented
 def linearize_many(
     model: Model,
     q: ArrayLike,
@@ -67,16 +69,10 @@ def linearize_many(
 
     Parameters
     ----------
-    model : Model
-        A system, a mechanism or a scene with n velocities.
     q, qd, tau : array_like, (N, nq) and (N, n)
         Coordinates [rad or m], their velocities, and applied forces [N m or N]; one row is the same for all.
     form : {"velocity", "momentum"}
         Of x, as of `linearize`; the states are q and qd in both.
-    t : float
-        Time [s], for a model that depends on it.
-    parameters : mapping of str to float
-        Values in place of the model's.
     threads : int, optional
         How many share the states; None: one for each core.
 
@@ -99,33 +95,25 @@ def linearize_many(
     ([-15.0, 15.0], (2, 2, 1))
     """
     system = as_system(model)
-    function, count = _function(system, require_choice("form", form, FORMS)), thread_count(threads)
-    values = function.inputs({"q": q, "qd": qd, "tau": tau}, t, parameters)
+    inputs, write = _writer(system, require_choice("form", form, FORMS))
+    count = thread_count(threads)
+    values = input_rows(system, inputs, {"q": q, "qd": qd, "tau": tau}, t, parameters)
     if values.ndim != 2:
         raise ValueError("linearize_many takes rows of states, got one state; see linearize")
-    return function(values, count)
+    n = system.n
+    matrices = np.empty((len(values), 2 * n, 3 * n))
+    write(values, matrices, count)
+    return matrices[:, :, : 2 * n], matrices[:, :, 2 * n :]
 
 
-class _Function:
-    """A and B of many states, in machine code.
-
-    write: rows (N, n_in) of the inputs and a number of threads to (A B), (N, 2n, 3n).
-    """
-
-    def __init__(self, system: System, form: str) -> None:
-        inputs, self._write = _way(system) if form == "velocity" else _symmetric_way(system)
-        self._n, self.inputs = system.n, InputRows(system, [str(each.name) for each in inputs])
-
-    def __call__(self, values: Array, threads: int) -> tuple[Array, Array]:
-        matrices = np.empty((len(values), 2 * self._n, 3 * self._n))
-        self._write(values, matrices, threads)
-        return matrices[:, :, : 2 * self._n], matrices[:, :, 2 * self._n :]
+Write = Callable[[Array, Array, int], None]  # rows (N, n_in) and a number of threads to (A B), (N, 2n, 3n)
 
 
-_function = kept_by_first(_Function)
-
-
-Write = Callable[[Array, Array, int], None]
+@kept_by_first
+def _writer(system: System, form: str) -> tuple[list[str], Write]:
+    """The inputs, and machine code that writes A and B of many states."""
+    inputs, write = _way(system) if form == "velocity" else _momentum_way(system)
+    return [str(each.name) for each in inputs], write
 
 
 def _way(system: System) -> tuple[Sequence[Node], Write]:
@@ -139,14 +127,14 @@ def _way(system: System) -> tuple[Sequence[Node], Write]:
     return _by_jacobian(system) if rates else (parts.inputs, _in_columns(parts))
 
 
-def _symmetric_way(system: System) -> tuple[Sequence[Node], Write]:
-    parts = SymmetricParts(system)
+def _momentum_way(system: System) -> tuple[Sequence[Node], Write]:
+    parts = momentum_parts(system)
     return parts.inputs, _written_out(parts) if parts.size < LONGER * WRITTEN_OUT else _assembled(parts)
 
 
-def _assembled(parts: SymmetricParts) -> Write:
+def _assembled(parts: LinearizationParts) -> Write:
     """X, M^-1 and the rest in machine code, and their products by NumPy."""
-    graphs, n = parts.in_columns(), len(parts.brackets)
+    graphs, n = parts.in_columns(), parts.n
     outputs = len(graphs.shared.outputs)
     registers = {"state": len(graphs.shared.inputs), "factors": graphs.factors}
     registers |= {f"{name}{i}": graphs.columns for name in ("b", "x") for i in range(n)}
@@ -168,9 +156,9 @@ def _assembled(parts: SymmetricParts) -> Write:
     return write
 
 
-def _written_out(parts: LinearizationParts | SymmetricParts) -> Write:
+def _written_out(parts: LinearizationParts) -> Write:
     """Rows that are the same at every state are no business of the machine code's."""
-    graph, n = parts.written_out(), len(parts.brackets)
+    graph, n = parts.written_out(), parts.n
     rows = [
         [graph.outputs[f"A_{i}_{j}" if j < 2 * n else f"B_{i}_{j - 2 * n}"] for j in range(3 * n)] for i in range(2 * n)
     ]
@@ -187,7 +175,7 @@ def _written_out(parts: LinearizationParts | SymmetricParts) -> Write:
 
 
 def _by_jacobian(system: System) -> tuple[Sequence[Node], Write]:
-    """One state after another, by the Jacobian of forward dynamics: of systems whose velocities are rates."""
+    """States one after another, by the Jacobian of forward dynamics: of systems whose velocities are rates."""
     graph, n = forward_dynamics(system), system.n
     compiled, wrt = cg.compile(graph), [*system.q, *system.qd, *system.tau]
     entries = np.arange(3 * n * n).reshape(n, 3 * n)
@@ -210,7 +198,7 @@ def _by_jacobian(system: System) -> tuple[Sequence[Node], Write]:
 
 
 def _in_columns(parts: LinearizationParts) -> Write:
-    n = len(parts.brackets)
+    n = parts.n
     program = linearization_program(parts.in_columns(), n)
     run, same = runner(program), 6 * n * n - program.width
 
@@ -223,7 +211,7 @@ def _in_columns(parts: LinearizationParts) -> Write:
 
 
 def linearization_program(graphs: ColumnGraphs, n: int) -> Program:
-    """One pass linearizes at the register "state", and records (A B), (2n, 3n), row by row.
+    """Program of which a pass linearizes at the register "state", and records (A B), (2n, 3n), row by row.
 
     Without the upper half, (0 1 0), where velocities are rates of coordinates. Columns by tau are for themselves: of
     their solutions the upper triangle counts, so that they are symmetric to the last bit.

@@ -15,14 +15,15 @@ from ...systems.model import Model, as_system
 from ...systems.system import System
 from ..constraints.constraint_rank import DEPENDENT, independent_rows
 from ..constraints.row_numbers import equilibrated
-from ..states.evaluate_at import evaluate_at
+from ..equation import documented
+from ..states.evaluate import evaluate
 from ..states.initial_value import initial_value
 from .inverse_dynamics_derivatives import state_slopes
 from .linearization import linearize
 
 
 class ReducedLinearization(NamedTuple):
-    """The linear motion of a held system in displacements that are independent of one another.
+    """The linear motion of a constrained system in displacements that are independent of one another.
 
     Parameters
     ----------
@@ -49,6 +50,7 @@ class ReducedLinearization(NamedTuple):
     displacements: Array
 
 
+@documented
 def reduced_linearization(
     model: Model,
     q: ArrayLike,
@@ -75,12 +77,6 @@ def reduced_linearization(
     q, qd : array_like, (nq,) and (n,)
         Coordinates [rad or m] and velocities. A state that does not meet the constraints is moved onto them, with a
         ConstraintWarning.
-    tau : array_like, (n,)
-        Applied forces [N m or N], by default 0.
-    t : float
-        Time [s], for a model that depends on it.
-    parameters : mapping of str to float
-        Values in place of the model's.
 
     Returns
     -------
@@ -108,7 +104,7 @@ def reduced_linearization(
     """
     system, start = as_system(model), initial_value(model, q, qd, 0.0, parameters, t)
     n, at = system.n, (start.x[: system.nq], start.x[system.nq :])
-    kept = independent_rows(system.constraints) if len(system.constraints) else ()
+    kept = independent_rows(system.constraints)
     slopes = _slopes(system, kept, dict(zip(("q", "qd"), at, strict=True)), t, parameters)
     holonomic = sum(k < len(system.constraints.positions) for k in kept)
     following = _following(system, kept, slopes[:, n:])
@@ -137,7 +133,7 @@ def _slopes(
         return np.zeros((0, 2 * system.n))
     entries = [entry for row in state_slopes(system, rates, Builder()) for entry in row]
     graph = system.graph({str(k): entry for k, entry in enumerate(entries)}, system.q, system.qd)
-    return evaluate_at(system, graph, state, t, parameters).reshape(len(rates), -1)
+    return evaluate(system, graph, state, t, parameters).reshape(len(rates), -1)
 
 
 def _following(system: System, kept: tuple[int, ...], matrix: Array) -> list[int]:

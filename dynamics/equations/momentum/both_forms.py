@@ -18,7 +18,7 @@ LAGRANGE, HAMILTON, VELOCITIES_ALONE = "state equation", "Hamilton's equations",
 
 
 class Agreement(NamedTuple):
-    """What both forms of the equations differ by at one state, relative to the largest entry."""
+    """Differences of both forms of the equations at one state, relative to the largest entry."""
 
     velocities: float  # q_dot of p = dL/dqd
     momentum_rates: float  # p_dot, and dp/dt along the accelerations

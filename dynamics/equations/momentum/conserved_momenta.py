@@ -8,11 +8,13 @@ from cgraph import Node
 from cgraph.extend import Builder, as_node, building, columns, cotangents, folded, shortened, topological
 
 from ...systems.arguments import new_variables
+from ...systems.kinematics import ONE, ZERO
 from ...systems.model import Model, as_system
 from ...systems.system import System
-from ..formulations.formulations import ONE, ZERO
+from ..equation import documented
 
 
+@documented
 def conserved_momenta(model: Model) -> tuple[str, ...]:
     """The velocities whose momenta p = dL/dqd are constant while no tau acts on them: cyclic coordinates (Noether).
 
@@ -21,20 +23,10 @@ def conserved_momenta(model: Model) -> tuple[str, ...]:
     conserved all the same, by an identity that no fold knows; what is named is at every state and for all values of
     the parameters.
 
-    Parameters
-    ----------
-    model : Model
-        A system, a mechanism or a scene.
-
     Returns
     -------
     tuple of str
         Names of velocities, which of a system without quasi-velocities are those of coordinates.
-
-    Raises
-    ------
-    TypeError
-        For what is no model, or has no Lagrangian.
 
     Examples
     --------
@@ -51,15 +43,17 @@ def conserved_momenta(model: Model) -> tuple[str, ...]:
     for form in (system, system.shortened):
         if form is not None:
             constant |= {i for i, rate in enumerate(_rates(form)) if rate.value == 0.0} - _jumping(form)
-    held = _held(system)
-    return tuple([name for i, name in enumerate(system.velocities) if i in constant - held])
+    constrained = _constrained(system)
+    return tuple([name for i, name in enumerate(system.velocities) if i in constant - constrained])
 
 
 def _rates(system: System) -> list[Node]:
     """Rates of the momenta at tau = 0, as short as they get."""
     build = Builder()
     p = new_variables("p", system.n, system.parameters)
-    stated: Sequence[Node] | None = system.momentum_rates(p)
+    stated: Sequence[Node] | None = None
+    if system.body_terms is not None:
+        stated = system.body_terms.equations.momentum_rates(system.q, system.qd, p)
     if stated is None:
         (lagrangian,) = folded([system.lagrangian], build)
         bars = cotangents({lagrangian: ONE}, [*system.q, *system.qd], build)
@@ -85,7 +79,7 @@ def _jumping(system: System) -> set[int]:
     return moving
 
 
-def _held(system: System) -> set[int]:
+def _constrained(system: System) -> set[int]:
     """The velocities that constraints depend on."""
     slopes = [cotangents({rate: ONE}, system.qd, Builder()) for rate in system.constraints.rates]
     return {i for row in slopes for i, slope in enumerate(row) if slope.value != 0.0}

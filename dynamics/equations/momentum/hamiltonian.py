@@ -8,29 +8,27 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import Builder, Order, building, cotangents, require_choice, require_flag, require_whole
 
+from ...systems.kinematics import ONE, ZERO
 from ...systems.model import Model, as_system
 from ...systems.system import System
-from ..formulations.formulations import ONE, ZERO
-from ..shorter_form import shorter_form
+from ..equation import Equation, Output, shortened
 from .legendre import Legendre, dot
 
 ITERATIONS = 40  # Newton's, for a Lagrangian that is not quadratic in the velocities
 
 
+@Equation("q p", Output("H", (), "J")).describes
 def hamiltonian(model: Model, *, iterations: int = ITERATIONS, check: bool = False) -> Graph:
     """The Hamiltonian H(q, p) = p . qd - L at the velocities of the momenta p = dL/dqd: the energy.
 
     Parameters
     ----------
-    model : Model
-        A system, a mechanism or a scene with n velocities, without constraints.
     iterations, check
         As of `hamilton_equations`.
 
     Returns
     -------
-    Graph
-        Inputs q0.., p0.., t if needed, parameters; output H [J], and missing0.. where asked for.
+    And missing0.. where asked for.
 
     Raises
     ------
@@ -40,8 +38,6 @@ def hamiltonian(model: Model, *, iterations: int = ITERATIONS, check: bool = Fal
         For a model with constraints.
     ValueError
         For a parameter that is called like a momentum.
-    TypeError
-        For what is no model, or has no Lagrangian.
 
     Examples
     --------
@@ -75,9 +71,10 @@ def hamiltonian(model: Model, *, iterations: int = ITERATIONS, check: bool = Fal
         outputs = {"H": total} | (_missing(transform) if check else {})
         return cg.simplify(system.graph(outputs, system.q, p))
 
-    return shorter_form(as_system(model), derive)
+    return shortened(as_system(model), derive)
 
 
+@Equation("q p tau", Output("q{}_dot", ("nq",)), Output("p{}_dot", ("n",), "N m or N")).describes
 def hamilton_equations(
     model: Model, method: str = "recursive", *, iterations: int = ITERATIONS, check: bool = False
 ) -> Graph:
@@ -89,8 +86,6 @@ def hamilton_equations(
 
     Parameters
     ----------
-    model : Model
-        A system, a mechanism or a scene with n velocities, without constraints.
     method : {"recursive", "balanced"}
         How the velocities are solved for: "recursive", the fewest nodes, or "balanced", with long sums in blocks, which
         is O(log n) deep for a planar chain and takes more nodes, see `cg.hessian_solve`.
@@ -102,11 +97,6 @@ def hamilton_equations(
         Further outputs missing0.., (n,): p - dL/dqd at the velocities, what the iteration leaves of the momenta; 0
         where L is quadratic.
 
-    Returns
-    -------
-    Graph
-        Inputs q0.., p0.., tau0.., t if needed, parameters; outputs q0_dot.., (nq,), and p0_dot.., (n,).
-
     Raises
     ------
     SingularMassMatrixError
@@ -115,8 +105,6 @@ def hamilton_equations(
         For a model with constraints.
     ValueError
         For a parameter that is called like a momentum, or an unknown method.
-    TypeError
-        For what is no model, or has no Lagrangian.
 
     Examples
     --------
@@ -128,7 +116,7 @@ def hamilton_equations(
     count = require_whole("iterations", iterations, 1)
     require_flag("check", check)
     order: Order = "balanced" if require_choice("method", method, get_args(Order)) == "balanced" else "recursive"
-    return shorter_form(as_system(model), lambda system: _equations(system, count, check, order))
+    return shortened(as_system(model), lambda system: _equations(system, count, check, order))
 
 
 def velocities(system: System) -> Graph:
@@ -139,7 +127,7 @@ def velocities(system: System) -> Graph:
 
 
 def missing_momenta(system: System) -> Graph | None:
-    """What `velocities` leave of the momenta, missing0.. as of `hamilton_equations`; None where nothing is iterated."""
+    """Momenta that `velocities` do not reach, missing0.. as of `hamilton_equations`; None where nothing is iterated."""
     transform = Legendre(system, Builder(), ITERATIONS)
     return None if transform.quadratic else cg.simplify(system.graph(_missing(transform), system.q, transform.p))
 
@@ -147,13 +135,14 @@ def missing_momenta(system: System) -> Graph | None:
 def _equations(system: System, iterations: int, check: bool, order: Order) -> Graph:
     build = Builder()
     transform = Legendre(system, build, iterations, order)
-    stated = system.momentum_rates(transform.p)
+    stated = None
+    if system.body_terms is not None:
+        stated = system.body_terms.equations.momentum_rates(system.q, system.qd, transform.p)
     if stated is None:
         gradient = cotangents({transform.lagrangian: ONE}, system.q, build)
         stated = system.kinematics.slopes(gradient, transform.p, build)
+    braking = system.braking(build)
     with building(build):
-        with cg.tag("damping"):
-            braking = [damping * qd for damping, qd in zip(system.damping, system.qd, strict=True)]
         rates = [
             slope + tau + force - brake
             for slope, tau, force, brake in zip(stated, system.tau, system.forces, braking, strict=True)
@@ -168,7 +157,7 @@ def _equations(system: System, iterations: int, check: bool, order: Order) -> Gr
 
 
 def _missing(transform: Legendre) -> dict[str, Node]:
-    """What the iteration for the velocities leaves of the momenta, p - dL/dqd; 0 where there is none."""
+    """Momenta that the iteration for the velocities does not reach, p - dL/dqd; 0 where there is none."""
     left = [ZERO] * transform.system.n
     if not transform.quadratic:
         here = transform.at(transform.momenta)

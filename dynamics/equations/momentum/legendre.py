@@ -11,11 +11,10 @@ import cgraph as cg
 from cgraph import Node
 from cgraph.extend import Builder, Order, SingularError, building, cotangents, folded, solve_tangents, topological
 
-from ...systems.body_system import BodySystem
 from ...systems.constraints import ConstraintError
+from ...systems.kinematics import ONE, ZERO
 from ...systems.system import System
 from ..accelerations import require_inertia
-from ..formulations.formulations import ONE, ZERO
 from ..singular_mass_matrix import SingularMassMatrixError, no_inertia
 
 SHORTER, LONGER = (
@@ -63,7 +62,7 @@ class Legendre:
     @cached_property
     def offset(self) -> list[Node]:
         """b, the momenta at u = 0; 0 of bodies."""
-        if isinstance(self.system, BodySystem):
+        if self.system.body_terms is not None:
             return [ZERO] * self.system.n
         return self.at_rest(self.momenta)
 
@@ -78,7 +77,7 @@ class Legendre:
 
     def tagged(self, nodes: Sequence[Node]) -> list[Node]:
         """The nodes of `at`; what of the velocities has no tags has those that all of their momentum has."""
-        if isinstance(self.system, BodySystem):  # their names are in every part
+        if self.system.body_terms is not None:  # their names are in every part
             return list(nodes)
         tags: dict[Node, frozenset[str]] = {}
         for velocity, momentum in zip(self.velocities, self.momenta, strict=True):
@@ -160,7 +159,7 @@ def _chosen(condition: Node, new: list[Node], old: list[Node]) -> list[Node]:
 
 def is_quadratic(system: System) -> bool:
     """Whether L is quadratic in the velocities, so that they need no iteration."""
-    return isinstance(system, BodySystem) or Legendre(system, Builder(), 1).quadratic
+    return system.body_terms is not None or Legendre(system, Builder(), 1).quadratic
 
 
 def dot(a: Sequence[Node], b: Sequence[Node]) -> Node:

@@ -2,24 +2,27 @@
 
 from __future__ import annotations
 
-import math
 import warnings
 from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import Array, real_number
+from cgraph.extend import Array
 
+from ...systems.arguments import finite_time
 from ...systems.model import Model, as_system
+from ...systems.system import System
 from ..constraints.constraint_rank import ConstraintWarning
 from ..constraints.projection import projected
+from ..equation import documented
 from .initial_value import given_start
 
 MOVED = "the velocities do not meet the constraints and were moved onto them"
 ROUNDING = 1e-9  # of the largest velocity, those of angles and lengths by what they move
 
 
+@documented
 def consistent_state(
     model: Model, q: ArrayLike, qd: ArrayLike, t: float = 0.0, parameters: Mapping[str, float] | None = None
 ) -> tuple[Array, Array]:
@@ -27,14 +30,10 @@ def consistent_state(
 
     Parameters
     ----------
-    model : Model
-        A system, a mechanism or a scene.
     q, qd : array_like, (nq,) and (n,)
         Where to start.
     t : float
         Time [s], for constraints that depend on it.
-    parameters : mapping, optional
-        {name: value} in place of the model's own.
 
     Returns
     -------
@@ -63,17 +62,16 @@ def consistent_state(
     >>> q.round(12).tolist(), qd.round(12).tolist()
     ([0.6, 0.8], [0.64, -0.48])
     """
-    given = given_start(model, q, qd, 0.0, parameters)
-    place, velocity = nearest_state(model, q, qd, t, parameters)
     system = as_system(model)
-    before, lengths = given.x[system.nq :], np.array(system.lengths[system.nq :])
-    lengths[lengths == 0.0] = 1.0  # of no known length
+    start, state = _projected(system, q, qd, t, parameters)
+    before, velocity = start[system.nq :], state[system.nq :]
+    lengths = np.array([length or 1.0 for length in system.lengths[system.nq :]])  # 0 is no known length
     change = lengths * np.abs(velocity - before)
     if change.max(initial=0.0) > ROUNDING * (lengths * np.maximum(np.abs(before), np.abs(velocity))).max(initial=0.0):
         k = int(change.argmax())
         text = f"velocity {system.velocities[k]!r} from {before[k]:.3g} to {velocity[k]:.3g}"
         warnings.warn(f"{MOVED}, the most {text}", ConstraintWarning, stacklevel=2)
-    return place, velocity
+    return state[: system.nq], velocity
 
 
 def nearest_state(
@@ -81,9 +79,14 @@ def nearest_state(
 ) -> tuple[Array, Array]:
     """`consistent_state` of velocities that nobody chose, such as random ones: without a warning."""
     system = as_system(model)
-    time = real_number("t", t)
-    if not math.isfinite(time):
-        raise ValueError(f"t must be finite, got {t!r} s")
-    start = given_start(model, q, qd, 0.0, parameters)
-    state = projected(system, start.x, time, {name: start.bound[name] for name in system.parameters})
+    _, state = _projected(system, q, qd, t, parameters)
     return state[: system.nq], state[system.nq :]
+
+
+def _projected(
+    system: System, q: ArrayLike, qd: ArrayLike, t: float, parameters: Mapping[str, float] | None
+) -> tuple[Array, Array]:
+    """The state as it is given, (nq + n,), and moved onto the constraints."""
+    time = finite_time(t)
+    start = given_start(system, q, qd, 0.0, parameters)
+    return start.x, projected(system, start.x, time, {name: start.bound[name] for name in system.parameters})

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -11,8 +10,10 @@ from numpy.typing import ArrayLike
 
 from cgraph.extend import real_number
 
+from ...systems.arguments import finite_time
 from ...systems.model import Model, as_system
 from ..constraints.nearly_redundant_rows import left_at
+from ..equation import documented
 from .initial_value import given_start
 
 TOLERANCE = 2e-4  # as of a Loop
@@ -20,7 +21,7 @@ TOLERANCE = 2e-4  # as of a Loop
 
 @dataclass(frozen=True)
 class Freedom:
-    """What constraints leave of a model's motions at a state; see `freedom`.
+    """Freedoms that constraints leave a model at a state; see `freedom`.
 
     Parameters
     ----------
@@ -55,6 +56,7 @@ class Freedom:
         return f"{self.freedoms} freedom(s): {len(self.shares)} constraint row(s) of rank {self.rank}{rest}"
 
 
+@documented
 def freedom(
     model: Model,
     q: ArrayLike,
@@ -72,16 +74,12 @@ def freedom(
 
     Parameters
     ----------
-    model : Model
-        A system, a mechanism or a scene with n velocities.
     q : array_like, (nq,)
         Coordinates [rad or m], which need not meet the constraints.
     tolerance : float
         From 0 to 1: what of a row, of the largest of its loop, is taken for rounding of lengths and axes.
     t : float
         Time [s], for constraints that depend on it.
-    parameters : mapping, optional
-        {name: value} in place of the model's own.
 
     Returns
     -------
@@ -105,12 +103,10 @@ def freedom(
     >>> print(dyn.freedom(dyn.System(energy, "x y z", constraints=rods), [1.0, 0.0, 0.0]))
     2 freedom(s): 2 constraint row(s) of rank 1; redundant at tolerance 0.0002: 'again' (0.0e+00 of it is new)
     """
-    system, share, time = as_system(model), real_number("tolerance", tolerance), real_number("t", t)
+    system, share, time = as_system(model), real_number("tolerance", tolerance), finite_time(t)
     if not 0.0 <= share < 1.0:
         raise ValueError(f"tolerance must be at least 0 and less than 1, got {tolerance!r}")
-    if not math.isfinite(time):
-        raise ValueError(f"t must be finite, got {t!r} s")
-    start = given_start(model, q, np.zeros(system.n), 0.0, parameters)
+    start = given_start(system, q, np.zeros(system.n), 0.0, parameters)
     values = {name: start.bound[name] for name in system.parameters}
     whole = system.constraints.whole or system.constraints
     kept, shares, _ = left_at(whole, start.x[: system.nq], time, values, share)

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from cgraph.extend import Array, real_array
 
 from ...systems.arguments import parameter_value, per_coordinate
-from ...systems.model import Model, system_of
+from ...systems.model import Model
 from ..constraints.projection import projected_start
 from ..state_equation import StateInputs, normalization, state_inputs
 
@@ -21,7 +21,7 @@ PAST = 1e-14  # of the end: some roundings, by which a last time may lie past it
 
 
 class InitialValue(NamedTuple):
-    """Where a motion starts, and the numbers of every other input of its state equation."""
+    """Start of a motion, and the numbers of every other input of its state equation."""
 
     x: Array  # (m,): q, normalized, and then qd, or the states of an OdeSystem
     states: tuple[str, ...]  # names of x
@@ -29,7 +29,7 @@ class InitialValue(NamedTuple):
 
 
 class InitialValues(NamedTuple):
-    """Where N motions start, and the other inputs of their state equation: one number for all, or one for each."""
+    """Starts of N motions, and the other inputs of their state equation: one number for all, or one for each."""
 
     x: Array  # (N, m)
     states: tuple[str, ...]
@@ -76,7 +76,7 @@ def initial_values(
     many: else one motion, whose arguments have no axis N.
     """
     start = _given(model, q, qd, tau, parameters, many=many)
-    system = system_of(model)
+    system = model.system
     if system is None or not len(system.constraints):
         return start
     rows = []
@@ -108,7 +108,7 @@ def _given(
     many: bool,
 ) -> InitialValues:
     """The starts as they are given."""
-    inputs, system = state_inputs(model), system_of(model)
+    inputs, system = state_inputs(model), model.system
     n = len(inputs.applied)
     nq = len(inputs.states) - n
     bound, varied = _parameters(inputs, parameters, many=many)

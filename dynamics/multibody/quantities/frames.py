@@ -17,7 +17,7 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import Array, Builder, building, cotangents, require_choice, tangents
 
-from ...equations.formulations.formulations import ONE
+from ...systems.kinematics import ONE
 from ...systems.model import Model
 from ...systems.system import System
 from ..algebra import spatial

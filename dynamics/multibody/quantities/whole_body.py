@@ -14,8 +14,8 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import Builder, building, cotangents, folded, require_choice
 
-from ...equations.formulations.formulations import ONE
 from ...equations.substitute import substitute
+from ...systems.kinematics import ONE
 from ...systems.model import Model
 from ...systems.system import System
 from ..algebra import spatial

@@ -19,7 +19,7 @@ import cgraph as cg
 from cgraph import Node
 from cgraph.extend import Array, Builder, as_node, building
 
-from ...systems.system import BiasForce
+from ...systems.body_terms import BiasForce
 from ..algebra import spatial
 from ..algebra.spatial import STILL, ZERO, Triple, cross, plus, scaled
 from ..algebra.spatial_vectors import Twist

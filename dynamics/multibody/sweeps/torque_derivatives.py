@@ -21,7 +21,7 @@ import cgraph as cg
 from cgraph import Node
 from cgraph.extend import Builder, as_node, building, cotangents
 
-from ...systems.torque_derivatives import TorqueDerivatives
+from ...systems.body_terms import TorqueDerivatives
 from ..algebra.inertia import Inertia, Rows, rows, symmetric, traced
 from ..algebra.spatial import ZERO, Triple, combined, cross, dot, plus, scaled
 from ..algebra.spatial_vectors import IDLE, Twist, Wrench

@@ -8,8 +8,9 @@ from pytest import approx
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.equations.coriolis import coriolis, damping_force
-from dynamics.equations.states.evaluate_at import evaluate_at
+from dynamics.equations.coriolis import coriolis
+from dynamics.equations.equations_of_motion import damping_force
+from dynamics.equations.states.evaluate import evaluate
 from dynamics.multibody.builders.planar_arm import planar_links
 from dynamics.systems.model import as_system
 from tests.dynamics.mechanisms import EVERY_FAMILY, FAMILIES
@@ -26,7 +27,7 @@ SCLERONOMIC = {name: MODELS[name] for name in ("arm of 1", "arm of 3", "coupled 
 
 def matrix(graph: cg.Graph, model: object, **state: Array) -> Array:
     n = as_system(model).n
-    return evaluate_at(as_system(model), graph, state).reshape(-1, n, n)
+    return evaluate(model, graph, state).reshape(-1, n, n)
 
 
 @pytest.mark.parametrize("name", EVERY_FAMILY)
@@ -62,7 +63,7 @@ def test_it_gives_the_bias_and_leaves_a_skew_matrix(name: str) -> None:
     system, given = as_system(model), states(model, 10)
     q, qd = given["q"], given["qd"]
     found = matrix(coriolis(model), model, q=q, qd=qd)
-    bias, gravity = (evaluate_at(system, graph, given) for graph in (dyn.bias(model), dyn.gravity_force(model)))
+    bias, gravity = (evaluate(system, graph, given) for graph in (dyn.bias(model), dyn.gravity_force(model)))
     assert np.einsum("sij,sj->si", found, qd) + gravity == approx(bias, abs=ROUNDING * abs(bias).max())
     along = cg.jvp(dyn.mass_matrix(model), system.q)
     values = {f"q{i}": q[:, i] for i in range(system.n)} | {f"q{i}_dot": qd[:, i] for i in range(system.n)}
@@ -88,5 +89,5 @@ def test_damping_takes_its_coefficient_times_the_velocity() -> None:
     arm = random_arm(3)
     graph = damping_force(arm)
     qd = np.array([1.0, -2.0, 3.0])
-    assert evaluate_at(arm.system, graph, {"qd": qd, "q": qd}) == approx(np.array(arm.system.damping) * qd)
+    assert evaluate(arm.system, graph, {"qd": qd, "q": qd}) == approx(np.array(arm.system.damping) * qd)
     assert {tag for node in graph.nodes for tag in node.tags} == {"damping"}

@@ -10,7 +10,7 @@ import dynamics as dyn
 from dynamics.equations.linearization import linearize_many as many
 from dynamics.equations.linearization.linearization import linearize, state_space
 from dynamics.equations.linearization.linearization_parts import linearization_parts
-from dynamics.equations.states.evaluate_at import evaluate_at
+from dynamics.equations.states.evaluate import evaluate
 from dynamics.peers.translate import translated
 from dynamics.systems.model import as_system
 from tests.dynamics.mechanisms import FAMILIES, random_mechanism, turned_arm
@@ -46,7 +46,7 @@ def test_it_is_the_slope_of_forward_dynamics(name: str) -> None:
     n, t, accelerations = system.n, 0.3, dyn.forward_dynamics(model)
 
     def rate(x: Array) -> Array:
-        qdd = evaluate_at(system, accelerations, {"q": x[:n], "qd": x[n : 2 * n], "tau": x[2 * n :]}, t)
+        qdd = evaluate(system, accelerations, {"q": x[:n], "qd": x[n : 2 * n], "tau": x[2 * n :]}, t)
         return np.concatenate([x[n : 2 * n], qdd])
 
     expected = differences(rate, np.concatenate([state["q"], state["qd"], state["tau"]]))
@@ -101,7 +101,7 @@ def test_the_graph_takes_many_states_and_is_smaller_than_that_of_forward_dynamic
     assert len(graph.nodes) < 4_200  # 8 300 of the Jacobian of forward dynamics
     assert len(state_space(arm, form="momentum").nodes) < 0.75 * len(graph.nodes)
     given = states(arm, 3)
-    rows = evaluate_at(arm.system, graph, given)
+    rows = evaluate(arm.system, graph, given)
     one = np.concatenate([each.ravel() for each in linearize(arm, *(given[name][1] for name in ("q", "qd", "tau")))])
     assert rows[1] == approx(one, rel=ONE_BY_ONE, abs=ONE_BY_ONE)
 

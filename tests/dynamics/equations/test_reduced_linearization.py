@@ -12,7 +12,7 @@ import pytest
 import cgraph as cg
 import dynamics as dyn
 from dynamics.equations.states.consistent_state import nearest_state
-from dynamics.equations.states.evaluate_at import Array, evaluate_at
+from dynamics.equations.states.evaluate import Array, evaluate
 from tests.dynamics.linkages import four_bar, scaled_four_bar
 from tests.dynamics.mechanisms import random_body
 from tests.slow import slow
@@ -58,7 +58,7 @@ def test_a_four_bar_is_its_differences_along_the_loop() -> None:
     chosen, x = [names.index(name) for name in reduced.states], np.concatenate([q, qd])
 
     def rate(state: Array) -> Array:
-        qdd = evaluate_at(system, accelerations, {"q": state[:3], "qd": state[3:], "tau": tau})
+        qdd = evaluate(system, accelerations, {"q": state[:3], "qd": state[3:], "tau": tau})
         return np.concatenate([state[3:], qdd])
 
     def along(column: Array) -> tuple[Array, Array]:

@@ -12,7 +12,7 @@ import cgraph as cg
 import dynamics as dyn
 from cgraph.extend import Array, Builder, cotangents
 from dynamics.equations.linearization import linearize_many as many
-from dynamics.equations.linearization.symmetric_linearization import SymmetricParts
+from dynamics.equations.linearization.momentum_parts import momentum_parts
 from dynamics.equations.momentum.hamiltonian import velocities
 from dynamics.systems.model import as_system
 from tests.slow import slow
@@ -201,7 +201,7 @@ def test_units_and_the_order_of_coordinates_are_no_part_of_it() -> None:
 def test_of_a_chain_it_keeps_the_digits_whatever_the_condition_of_its_mass_matrix() -> None:
     """S - W^T M^-1 W cancels by ten in this chain: it is off by 1e-13 of its entries, rounding alone by 2e-14."""
     chain, n = dyn.planar_arm([1.0] * 5, [1.0, 1e-3, 1.0, 1e-3, 1.0], gravity=0.0), 5
-    graph = SymmetricParts(chain.system).written_out()
+    graph = momentum_parts(chain.system).written_out()
     q = [0.3, -0.4, 0.9, 1.3, -0.2]
     at = {f"{kind}{i}": x for kind in ("q", "qd") for i, x in enumerate(q)}
     exact = cg.double_double(graph)

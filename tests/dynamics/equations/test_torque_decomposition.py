@@ -9,11 +9,10 @@ import pytest
 from pytest import approx
 
 import dynamics as dyn
-from dynamics.equations.states.evaluate_at import evaluate_at
+from dynamics.equations.states.evaluate import evaluate
 from dynamics.equations.torque_decomposition import torque_by_joint_motion, torque_by_link
 from dynamics.equations.torque_table import TorqueTable
 from dynamics.multibody.builders.planar_arm import planar_links
-from dynamics.systems.model import as_system
 from tests.dynamics.mechanisms import FAMILIES, PLAIN, turned_tree
 from tests.dynamics.models import MODELS, Array, at, random_arm, states
 from tests.slow import slow
@@ -32,7 +31,7 @@ def test_the_cells_add_up_to_inverse_dynamics(name: str, table: str) -> None:
     model = EVERY[name]()
     state = at(states(model, 1), 0)
     found = TABLES[table](model).at(state["q"], state["qd"], state["qdd"], t=0.4)
-    tau = evaluate_at(as_system(model), dyn.inverse_dynamics(model), state, 0.4)
+    tau = evaluate(model, dyn.inverse_dynamics(model), state, 0.4)
     assert found.total == approx(tau, abs=ROUNDING * abs(tau).max())
 
 
@@ -47,7 +46,7 @@ def lighter(arm: dyn.Mechanism, without: int) -> dyn.Mechanism:
 def test_a_link_s_row_is_what_is_lost_without_the_link(k: int) -> None:
     arm = random_arm(3)
     state = at(states(arm, 1), 0)
-    whole, less = (evaluate_at(arm.system, dyn.inverse_dynamics(each), state) for each in (arm, lighter(arm, k)))
+    whole, less = (evaluate(arm.system, dyn.inverse_dynamics(each), state) for each in (arm, lighter(arm, k)))
     row = torque_by_link(arm).at(state["q"], state["qd"], state["qdd"]).values[k]
     assert row == approx(whole - less, abs=LOST)
 
@@ -82,7 +81,7 @@ def test_motion_of_one_joint_alone_fills_its_column_alone() -> None:
     arm = random_arm(3, damped=False)
     values = torque_by_joint_motion(arm).at(np.array([0.1, 0.5, -0.3]), qdd=np.array([0.0, 2.0, 0.0])).values
     assert (values[:, [0, 2]] == 0.0).all()
-    mass = evaluate_at(arm.system, dyn.mass_matrix(arm), {"q": [0.1, 0.5, -0.3]}).reshape(3, 3)
+    mass = evaluate(arm.system, dyn.mass_matrix(arm), {"q": [0.1, 0.5, -0.3]}).reshape(3, 3)
     assert values[:, 1] == approx(2.0 * mass[:, 1])
 
 

@@ -13,7 +13,7 @@ import pytest
 import cgraph as cg
 import dynamics as dyn
 from dynamics.equations.states.consistent_state import nearest_state
-from dynamics.equations.states.evaluate_at import Array
+from dynamics.equations.states.evaluate import Array
 
 from ..linkages import bar, four_bar
 

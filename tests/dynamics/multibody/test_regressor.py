@@ -7,7 +7,7 @@ import pytest
 from pytest import approx
 
 import dynamics as dyn
-from dynamics.equations.states.evaluate_at import evaluate_at
+from dynamics.equations.states.evaluate import evaluate
 from dynamics.multibody.quantities.regressor import inertial_parameters, regressor
 from tests.dynamics.mechanisms import EVERY_FAMILY, FAMILIES, turned_arm
 from tests.dynamics.models import Array, at, states
@@ -17,7 +17,7 @@ ROUNDING = 1e-12
 
 def value(mechanism: dyn.Mechanism, state: dict[str, Array]) -> Array:
     n = mechanism.system.n
-    return evaluate_at(mechanism.system, regressor(mechanism), state).reshape(-1, n, n, 10)
+    return evaluate(mechanism.system, regressor(mechanism), state).reshape(-1, n, n, 10)
 
 
 @pytest.mark.parametrize("family", EVERY_FAMILY)
@@ -28,7 +28,7 @@ def test_times_the_parameters_it_is_the_torque_of_the_bodies(family: str) -> Non
     armature, damping, stiffness, rest = np.array(
         [(j.armature, j.damping, j.stiffness, j.spring_reference) for j in joints]
     ).T
-    tau = evaluate_at(mechanism.system, dyn.inverse_dynamics(mechanism), given)
+    tau = evaluate(mechanism.system, dyn.inverse_dynamics(mechanism), given)
     tau = tau - armature * given["qdd"] - damping * given["qd"] - stiffness * (given["q"] - rest)
     found = np.einsum("sikp,kp->si", value(mechanism, given), inertial_parameters(mechanism))
     assert found == approx(tau, abs=ROUNDING * abs(tau).max())
@@ -74,9 +74,9 @@ def test_pinocchio_s_coriolis_matrix_and_gravity_are_ours(family: str) -> None:
     matrix = pinocchio.computeCoriolisMatrix(twin.model, twin.data, q, qd)[np.ix_(twin.order, twin.order)]
     weight = pinocchio.computeGeneralizedGravity(twin.model, twin.data, q)[twin.order]
     weight = weight + twin.stiffness * (state["q"] - twin.spring_reference)
-    found = evaluate_at(mechanism.system, coriolis(mechanism), state).reshape(n, n)
+    found = evaluate(mechanism.system, coriolis(mechanism), state).reshape(n, n)
     assert found == approx(matrix, abs=ROUNDING * abs(matrix).max())
-    gravity = evaluate_at(mechanism.system, dyn.gravity_force(mechanism), state)
+    gravity = evaluate(mechanism.system, dyn.gravity_force(mechanism), state)
     assert gravity == approx(weight, abs=ROUNDING * abs(weight).max())
 
 

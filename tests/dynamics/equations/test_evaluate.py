@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import dynamics as dyn
-from dynamics.equations.states.evaluate_at import evaluate_at
+from dynamics.equations.states.evaluate import evaluate
 
 
 def slider() -> dyn.System:
@@ -19,13 +19,13 @@ def slider() -> dyn.System:
 def test_what_is_left_out_is_zero_and_parameters_have_the_system_s_values() -> None:
     system = slider()
     graph = dyn.inverse_dynamics(system)
-    assert evaluate_at(system, graph, {"q": [1.0, 1.0], "qdd": [3.0, 0.0]}).tolist() == [6.0, 0.0]
-    assert evaluate_at(system, graph, {"qd": [0.0, 4.0]}, parameters={"m": 5.0}).tolist() == [0.0, 4.0]
+    assert evaluate(system, graph, {"q": [1.0, 1.0], "qdd": [3.0, 0.0]}).tolist() == [6.0, 0.0]
+    assert evaluate(system, graph, {"qd": [0.0, 4.0]}, parameters={"m": 5.0}).tolist() == [0.0, 4.0]
 
 
 def test_one_state_beside_many_serves_them_all() -> None:
     system = slider()
-    many = evaluate_at(system, dyn.inverse_dynamics(system), {"qd": [0.0, 1.0], "qdd": np.eye(2)})
+    many = evaluate(system, dyn.inverse_dynamics(system), {"qd": [0.0, 1.0], "qdd": np.eye(2)})
     assert many.tolist() == [[2.0, 1.0], [0.0, 3.0]]
 
 
@@ -40,7 +40,7 @@ def test_one_state_beside_many_serves_them_all() -> None:
 def test_wrong_numbers_are_named_with_their_coordinate(state: dict[str, object], words: str) -> None:
     system = slider()
     with pytest.raises(ValueError, match=words):
-        evaluate_at(system, dyn.inverse_dynamics(system), state)
+        evaluate(system, dyn.inverse_dynamics(system), state)
 
 
 def test_a_person_reads_the_coordinate_s_name() -> None:

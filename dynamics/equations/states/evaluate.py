@@ -1,28 +1,32 @@
-"""Arrays at a state: the numbers of a model's graph, matrices and vectors in their shapes."""
+"""Values of a model's graphs at states given as arrays, flat or as the matrices and vectors that outputs spell."""
 
 from __future__ import annotations
 
 import math
 import re
 import warnings
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from itertools import groupby
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Compiled, Graph
-from cgraph.extend import Array, kept_by_first
+from cgraph.extend import Array, kept_by_first, real_array, require_mapping
 
+from ...systems.arguments import TIME, finite_time
 from ...systems.model import Model, as_system
 from ...systems.system import System
 from ..constraints.constraint_rank import ConstraintWarning
 from ..constraints.nearly_redundant_rows import lost_rank
-from .evaluate_at import InputRows, evaluate_at
+from ..equation import documented
 
+STATE = ("q", "qd", "qdd", "tau")  # the prefixes of a graph's inputs, each an array of one number a coordinate
+State = Mapping[str, ArrayLike | None]
 _ENTRY = re.compile(r"(.*?[^\d_])((?:_\d+)+|\d+)")  # M_0_1, h_2, tau0
 
 
+@documented
 def arrays_at(
     model: Model,
     graph: Graph | Compiled,
@@ -40,18 +44,12 @@ def arrays_at(
 
     Parameters
     ----------
-    model : Model
-        A system, a mechanism or a scene with n velocities, and nq coordinates.
     graph : Graph or Compiled
         Of the model, such as `mass_matrix(model)`: inputs among q0.., qd0.., qdd0.., tau0.., t and the parameters.
     q : array_like, (nq,) or (N, nq)
         Coordinates [rad or m]; by default 0, quaternions neutral.
     qd, qdd, tau : array_like, (n,) or (N, n)
         Velocities, accelerations, and applied forces [N m or N]; by default 0.
-    t : float
-        Time [s], for a model that depends on it.
-    parameters : mapping of str to float
-        Values in place of the model's.
 
     Returns
     -------
@@ -81,9 +79,9 @@ def arrays_at(
     if unknown := [node.name for node in graph.inputs if node not in known]:
         raise ValueError(f"the graph has the input {unknown[0]!r}, which is no state or parameter of the model")
     if function is None:
-        flat = evaluate_at(system, graph, state, t, parameters)
+        flat = evaluate(system, graph, state, t, parameters)
     else:
-        x = InputRows(system, graph.input_names)(state, t, parameters)
+        x = input_rows(system, graph.input_names, state, t, parameters)
         flat = function.batch(x.T).T if x.ndim == 2 else function(x)
     _warn_of_lost_rank(system, flat, state, t, parameters)
     arrays: dict[str, Array] = {}
@@ -95,8 +93,91 @@ def arrays_at(
     return arrays
 
 
+def evaluate(
+    model: Model, graph: Graph, state: State, t: float = 0.0, parameters: Mapping[str, float] | None = None
+) -> Array:
+    """The outputs, (n_out,) or (N, n_out), at a state {"q": .., "qd": .., "qdd": .., "tau": ..}, (n,) or (N, n) each.
+
+    What of the state is None or missing is zero, coordinates neutral. Parameters have the model's values unless given.
+    Raises ValueError for another shape, what is not finite, or a parameter that the model does not have.
+    """
+    values, shape = _input_values(as_system(model), graph.input_names, state, t, parameters)
+    outputs = graph.evaluate(values).values()
+    return np.stack([np.broadcast_to(np.asarray(each, dtype=np.float64), shape) for each in outputs], axis=-1)
+
+
+def input_rows(
+    system: System, names: Sequence[str], state: State, t: float, parameters: Mapping[str, float] | None
+) -> Array:
+    """Inputs by their names, (N, n_in), or (n_in,) of one state, which `evaluate` takes likewise."""
+    values, shape = _input_values(system, names, state, t, parameters)
+    rows = np.empty((*shape, len(names)))
+    for k, value in enumerate(values.values()):
+        rows[..., k] = value
+    return rows
+
+
+def _input_values(
+    system: System, names: Sequence[str], state: State, t: float, parameters: Mapping[str, float] | None
+) -> tuple[dict[str, float | Array], tuple[int, ...]]:
+    """Values of those inputs, and () or (N,)."""
+    values: dict[str, float | Array] = {**_numbers(system, t, parameters)}
+    arrays, shape = _arrays(system, state)
+    for name, rows in arrays.items():
+        values |= {f"{name}{i}": column if rows.ndim == 2 else float(column) for i, column in enumerate(rows.T)}
+    return {name: values[name] for name in names}, shape
+
+
+def _numbers(system: System, t: float, parameters: Mapping[str, float] | None) -> dict[str, float]:
+    """Time and parameters, the system's values unless given."""
+    parameters = {} if parameters is None else require_mapping("parameters", parameters, "name: number")
+    if unknown := sorted(map(str, set(parameters) - set(system.parameters))):
+        has = ", ".join(system.parameters) or "none"
+        raise ValueError(f"the system has no parameter {unknown[0]!r} (it has {has})")
+    if parameters:
+        system.require_values({**system.parameters, **parameters})
+    return {TIME: finite_time(t), **system.parameters, **parameters}
+
+
+def _arrays(system: System, state: State) -> tuple[dict[str, Array], tuple[int, ...]]:
+    """The parts of a state, checked, (n,) or (N, n) each, and () or (N,)."""
+    arrays = {name: _rows(system, name, state.get(name)) for name in STATE}
+    shapes = {(), *[rows.shape[:-1] for rows in arrays.values()]}
+    if len(shapes) <= 2:
+        return arrays, max(shapes)  # () and (N,)
+    shape: tuple[int, ...] = ()
+    for name, rows in arrays.items():
+        try:
+            shape = np.broadcast_shapes(shape, rows.shape[:-1])
+        except ValueError:
+            raise ValueError(
+                f"the arrays of a state must have as many rows, or one, got {len(rows)} of {name} after {shape[0]}"
+            ) from None
+    return arrays, shape
+
+
+def _rows(system: System, name: str, values: ArrayLike | None) -> Array:
+    """Part of a state, checked: (n,) or (N, n)."""
+    known = system.coordinates if name == "q" else system.velocities
+    n = len(known)
+    if values is None:
+        return np.array(system.kinematics.neutral) if name == "q" else np.zeros(n)
+    rows = real_array(name, values)
+    if rows.ndim not in (1, 2) or rows.shape[-1] != n:
+        names = ", ".join(known[:8]) + (", ..." if n > 8 else "")
+        raise ValueError(
+            f"{name} must have the shape ({n},) or (N, {n}), one number for each of {names}; got {rows.shape}"
+        )
+    finite = np.isfinite(rows)
+    if not np.logical_and.reduce(finite, axis=None):
+        at = tuple(np.argwhere(~finite)[0].tolist())
+        where = f" in row {at[0]}" if rows.ndim == 2 else ""
+        raise ValueError(f"{name} must be finite, got {rows[at]} for {known[at[-1]]!r}{where}")
+    return rows
+
+
 def _warn_of_lost_rank(
-    system: System, flat: Array, state: Mapping[str, ArrayLike | None], t: float, parameters: Mapping[str, float] | None
+    system: System, flat: Array, state: State, t: float, parameters: Mapping[str, float] | None
 ) -> None:
     """A ConstraintWarning where values are not finite, since rows of constraints follow from others at a state."""
     finite = np.isfinite(flat).all(axis=-1)

@@ -1,0 +1,68 @@
+"""The row of an equation is what its graph has: names and shapes of outputs, inputs, docstring, refusal."""
+
+import inspect
+
+import numpy as np
+import pytest
+
+import dynamics as dyn
+from dynamics.equations.equation import EQUATIONS, Equation, Output
+from tests.dynamics.mechanisms import floating, random_mechanism
+from tests.test_docstrings import lacks
+
+ROWS = [name for name in dyn.__all__ if getattr(dyn, name) is not None and name in EQUATIONS]
+MODELS = {
+    "chain": random_mechanism(2, ["revolute", "prismatic"], 1),
+    "free": floating("free", random_mechanism(1, ["revolute"], 1)),  # more coordinates than velocities
+    "spring": dyn.System(lambda q, qd, t, p: 0.5 * qd[0] ** 2 - p["k"] * t * q[0] ** 2, "x", {"k": 2.0}, damping=0.1),
+}
+
+
+def test_every_row_is_looked_at() -> None:
+    assert len(ROWS) >= 17
+    assert set(EQUATIONS) - {"loss"} == set(ROWS)
+
+
+@pytest.mark.parametrize("model", MODELS)
+@pytest.mark.parametrize("name", ROWS)
+def test_a_graph_has_the_inputs_and_the_outputs_of_its_row(name: str, model: str) -> None:
+    row, system = EQUATIONS[name], dyn.as_system(MODELS[model])
+    graph = getattr(dyn, name)(MODELS[model])
+    assert list(graph.outputs) == [output for each in row.outputs for output in each.of(system)]
+    counts = {"q": system.nq, "qd": system.n, "qdd": system.n, "tau": system.n, "p": system.n}
+    state = [f"{kind}{i}" for kind in row.inputs for i in range(counts[kind])]
+    assert list(graph.input_names) == [*state, *[str(node.name) for node in system.extra_inputs]]
+
+
+@pytest.mark.parametrize("name", ROWS)
+def test_a_row_writes_the_tables_of_the_docstring(name: str) -> None:
+    function = getattr(dyn, name)
+    assert lacks(function) == []
+    text, signature = inspect.getdoc(function) or "", inspect.signature(function)
+    words = " ".join(text.split())
+    assert next(iter(signature.parameters)) == "model"
+    for output in EQUATIONS[name].outputs:
+        assert str(output).split()[0].rstrip(",") in text
+        assert output.unit in words
+    for section in ("Parameters", "Returns", "Raises", "Examples"):
+        assert f"\n{section}\n---" in text
+
+
+@pytest.mark.parametrize("name", [name for name in ROWS if name != "state_equation"])
+def test_what_has_no_lagrangian_is_refused_in_a_sentence(name: str) -> None:
+    with pytest.raises(TypeError, match="first-order system, which has no Lagrangian"):
+        getattr(dyn, name)(dyn.OdeSystem(lambda x, t: [-x[0]], "x"))
+    with pytest.raises(TypeError, match="expected a System, a mechanism or a scene, got"):
+        getattr(dyn, name)(np.zeros(3))
+
+
+def test_of_several_forms_the_smallest_graph_counts() -> None:
+    @Equation("q qd", Output("loss", (), "W"))
+    def loss(system: dyn.System):  # type: ignore[no-untyped-def]
+        """Power."""
+        yield [system.qd[0] * system.qd[0] + system.q[0] - system.q[0]]
+        yield [system.qd[0] * system.qd[0]]
+
+    arm = dyn.planar_arm([1.0], [1.0])
+    assert len([node for node in loss(arm).nodes if node.args]) == 1
+    assert str(inspect.signature(loss)) == "(model: 'Model') -> 'Graph'"
