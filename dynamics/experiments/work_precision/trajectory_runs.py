@@ -15,7 +15,7 @@ from cgraph.extend import Array
 
 from ...equations.state_equation import state_inputs
 from ...integrators import METHODS, Problem, derive
-from ...simulation.recorder import Recorder
+from ...simulation.outcome import Recorder
 from ...simulation.run_options import SCIPY, RunOptions
 from ...simulation.steps.integration import integration
 from ...simulation.steps.scipy_solvers import ScipyIntegration, scipy_solver

@@ -23,19 +23,16 @@ from ..applied_forces import with_applied
 from ..events.event import Event, as_events
 from ..events.event_log import split_crossings
 from ..events.event_program import EventProgram, event_program
-from ..missed_momenta import missed_momenta
 from ..outcome import INTERRUPTED
 from ..progress_bar import Progress
-from ..row_values import converted
+from ..row_values import converted, missed_momenta
 from ..run_options import METHOD, RunOptions, room, time_span
 from ..sampled_controller import SampledController
 from ..steps.equal_steps import EqualSteps, even_steps, step_count
 from ..steps.step_program import StepProgram, pickled_steps, step_program
 from ..trajectory import SimulationWarning
-from .chunk import Chunk, Part, not_begun
 from .ensemble import Ensemble, EnsembleStats, ensemble_stats
-from .task import Task
-from .vectorized import iterates
+from .task import Chunk, Part, Task, iterates, not_begun
 from .workers import Map, Workers, checked, finished
 
 VECTOR = 8  # lanes, or a multiple of them, of every processor: a chunk of trajectories side by side is whole vectors

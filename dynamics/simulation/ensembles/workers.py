@@ -15,8 +15,7 @@ import numpy as np
 
 from cgraph.extend import Array, thread_count
 
-from .chunk import Chunk, Part
-from .task import Task
+from .task import Chunk, Part, Task
 
 Map = Callable[[Callable[[Chunk], Part], Sequence[Chunk]], Iterable[Part]]
 Workers = int | Map | None

@@ -12,11 +12,11 @@ import numpy as np
 from cgraph.extend import Array
 
 from ..estimates.state_sizes import StateSizes
-from ..missed_momenta import missed_momenta
+from ..row_values import missed_momenta
 from ..steps.step_program import state_kinds
-from .legs import Legs
 from .motion import Leg, MotionError
 from .motion_run import MotionRun
+from .segments import Legs
 
 ROUNDING = 1e-10  # of the largest component of its kind: where one is that small, rounding is no error of it
 LAWLESS = 0.1  # of the size of a component: a difference above it follows no power of the step

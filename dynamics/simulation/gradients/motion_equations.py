@@ -1,13 +1,10 @@
-"""Motion equations: what steps and their derivatives read of a problem, with what parameters alone decide apart.
-
-Of xdot = f(x, t, p) = g(x, t, c(p)) the numbers c, such as products of masses and lengths, are computed once for a
-motion, and cotangents are collected by c at every stage and pulled back to p once.
-"""
+"""Point functions: graphs compiled for a point or many side by side, and their pullbacks, made once."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -17,8 +14,26 @@ from cgraph.extend import Array, Builder, folded, kept_by_first, topological
 
 from ...integrators import Problem
 from ...systems.arguments import new_variables
-from .point_functions import at, compiled, pulled_back
 from .rate_pullback import RatePullback, rate_pullback, rebuilt
+
+
+@kept_by_first
+def compiled(graph: Graph, backend: str) -> Any:
+    """The graph as a function."""
+    return cg.compile(graph, backend)
+
+
+@kept_by_first
+def pulled_back(graph: Graph, backend: str) -> Any:
+    """J^T y_bar as a function of the inputs, then y_bar."""
+    return cg.compile(cg.simplify(cg.vjp(graph)), backend)
+
+
+def at(function: Any, x: Array) -> Array:
+    """The outputs, (k,) at a point (n,), or (k, N) at points (n, N)."""
+    values: Array = function(x) if x.ndim == 1 else function.batch(x)
+    return values
+
 
 ARITHMETIC = ("add", "sub", "mul", "neg")
 PARAMETERS = ("tau", "p", "c")  # registers: what the parameters of the problem are, end to end

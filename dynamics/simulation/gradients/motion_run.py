@@ -15,8 +15,7 @@ from cgraph.extend import Array, Runner, Tape, run_passes
 from ..steps.dense_output import Indices
 from ..steps.stepping import nonfinite, unsolved
 from .motion import MotionError, MotionRequest
-from .motion_programs import Along, MotionPrograms
-from .motion_steps import LOSS
+from .motion_programs import LOSS, Along, MotionPrograms
 
 MOST_RECORDED = 128 * 2**20  # bytes of what is recorded of steps; of more, checkpoints are kept
 PIECE = 4096  # passes between two looks at Python

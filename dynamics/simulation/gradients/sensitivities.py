@@ -18,9 +18,8 @@ from ..applied_forces import Constant
 from ..events.event import Event, as_events
 from ..trajectory import SimulationWarning
 from .doubts import doubts
-from .legs import legs_of
 from .motion import START, TORQUE, VELOCITY, MotionRequest, motion_of
-from .pushed_legs import pushed_legs
+from .segments import legs_of, pushed_legs
 
 
 @dataclass(frozen=True, eq=False)

@@ -60,7 +60,6 @@ def integration(
 
 def _watched(leg: Callable[[RunOptions], Integration], options: RunOptions, events: EventProgram) -> Integration:
     """A run with events; without them what watches is not loaded."""
-    from ..events.event_log import EventLog
-    from ..events.watched import WatchedIntegration
+    from ..events.event_log import EventLog, WatchedIntegration
 
     return WatchedIntegration(leg, options, EventLog(events))
