@@ -49,7 +49,7 @@ LOOSE = 1e-6  # of a momentum, or so much of the largest: what an iteration may 
 SLOW = 1e-2  # of the largest velocity: below, one counts as no smaller
 
 
-def missed_momenta(
+def unreached_momenta(
     problem: Problem,
     times: Array,
     rows: Array,

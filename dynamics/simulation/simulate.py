@@ -21,7 +21,7 @@ from .events.event import Event, as_events
 from .events.event_program import event_program
 from .outcome import INTERRUPTED, REACHED, Recorder, outcome
 from .progress_bar import Progress
-from .row_values import converted, missed_momenta
+from .row_values import converted, unreached_momenta
 from .run_options import METHOD, TABLES, RunOptions, room, time_span
 from .steps.dense_output import StepBlock
 from .steps.integration import integration_of
@@ -173,7 +173,7 @@ def simulate(
 
     # Put the result together
     held = None if hold is None else hold.held
-    if missed := missed_momenta(stepped, *rows, start=(t0, start.x, x)):
+    if missed := unreached_momenta(stepped, *rows, start=(t0, start.x, x)):
         stats = replace(stats, warnings=(*stats.warnings, *missed))
     early = not stats.success and not stats.message.startswith(INTERRUPTED)
     for text in [*([f"the run {stats.message}"] if early else []), *stats.warnings]:

@@ -25,7 +25,7 @@ from ..events.event_log import split_crossings
 from ..events.event_program import EventProgram, event_program
 from ..outcome import INTERRUPTED
 from ..progress_bar import Progress
-from ..row_values import converted, missed_momenta
+from ..row_values import converted, unreached_momenta
 from ..run_options import METHOD, RunOptions, room, time_span
 from ..sampled_controller import SampledController
 from ..steps.equal_steps import EqualSteps, even_steps, step_count
@@ -186,7 +186,9 @@ def _ensemble(
     times, rows, nq, each = options.row_times, whole.rows, problem.nq, [*zip(*starts, strict=True)]
     logs = [split_crossings(watch, log, nq, p) for log, (*_, p) in zip(whole.happened, each, strict=True)]
     crossings = {event.name: tuple([named[event.name] for named in logs]) for event in watch.events}
-    missed = [missed_momenta(problem, times, rows[k], p, start=(options.t0, q, x)) for k, (q, x, p) in enumerate(each)]
+    missed = [
+        unreached_momenta(problem, times, rows[k], p, start=(options.t0, q, x)) for k, (q, x, p) in enumerate(each)
+    ]
     stats = ensemble_stats(whole.stats, missed, seconds)
     states = converted(problem.velocities, times, rows, starts[2][:, None])
     momenta = rows[:, :, nq:] if problem.momenta else None

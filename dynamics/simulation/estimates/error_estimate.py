@@ -24,11 +24,10 @@ from ..steps.equal_steps import SAME, EqualSteps, equal_steps
 from ..steps.step_program import StepProgram
 from ..steps.stepping import FixedStepIntegration, Integration
 from .runs_beside import LATE, SHARE, Course, Difference, Law, States, courses, even, together
-from .state_sizes import StateSizes
+from .state_sizes import off_by
 from .unresolved import missed, turning, unresolved
 
 LEAST = 2.0  # times a difference that of steps twice as long is, at least, where the error has a law
-ROUNDING = 1e-10  # of the largest component of its kind: where one is that small, rounding is no error of it
 LAWLESS = 0.1  # of the size of a component: a difference above it follows no power of the step
 UNIT = 2.0**-52  # the last bit of a number near 1
 NUDGE = 8.0 * UNIT  # of each component, by which runs beside start aside: what roundings grow to is part of the error
@@ -194,9 +193,7 @@ class Estimator:
         first = self._differences[0]
         if not first.compared and np.isnan(first.lost).all():
             return [ErrorEstimate(math.nan, math.nan, "")] * len(self._size)
-        kinds = [0] * self.program.size if self.program.ordinary else self.program.kinds
-        sizes = StateSizes(0.0, kinds, self.program.groups, 0.0, self.program.lengths)
-        scale = self._size + ROUNDING * sizes.largest_of_kind(self._size)
+        scale = self.program.kinds.scale(self._size)
         least = UNIT * math.sqrt(self._steps)
         largest, last = (
             np.maximum(least, self._errors([np.where(change > 0.0, change / scale, 0.0) for change in changes]))
@@ -208,7 +205,7 @@ class Estimator:
         resolved = math.pi * max(1.0, 0.5 * self.program.order) / self._longest  # rad/s: two evaluations in a turn
         largest[self._turning > resolved] = last[self._turning > resolved] = math.inf
         options = self.options
-        beyond = ~(largest * scale <= options.absolute + options.relative * scale)
+        allowed = options.absolute + options.relative * scale
         result = []
         for k in range(len(scale)):
             said = ""
@@ -220,10 +217,8 @@ class Estimator:
             elif not math.isnan(first.lost[k]):
                 at = f"t = {first.lost[k]:.6g} s"
                 said = f"{UNKNOWN}: beside it a run of other steps stops, or takes another course, at {at}"
-            elif beyond[k].any():
-                worst = int(np.argmax(np.where(beyond[k], largest[k], -1.0)))
-                name = self.program.components[worst]
-                said = f"the state is off by an estimated {largest[k, worst]:.2g} of the size of {name}"
+            else:
+                said = off_by(largest[k], scale[k], allowed[k], self.program.components)
             result.append(ErrorEstimate(float(largest[k].max()), float(last[k].max()), said and self._sentence(said)))
         return result
 

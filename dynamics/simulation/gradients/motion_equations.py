@@ -30,8 +30,8 @@ def pulled_back(graph: Graph, backend: str) -> Any:
 
 
 def at(function: Any, x: Array) -> Array:
-    """The outputs, (k,) at a point (n,), or (k, N) at points (n, N)."""
-    values: Array = function(x) if x.ndim == 1 else function.batch(x)
+    """The outputs, (k, N), at points (n, N)."""
+    values: Array = function(x[:, 0])[:, None] if x.shape[1] == 1 else function.batch(x)
     return values
 
 
@@ -64,7 +64,7 @@ class MotionEquations:
         return dict(zip(PARAMETERS, (self.forces, len(self.names), count), strict=True))
 
     def values(self, p: Array, backend: str) -> Array:
-        """p and c, (P + C,), or (P + C, N) of N motions, from p."""
+        """p and c, (P + C, N), from p (P, N)."""
         if self.numbers is None:
             return p
         return np.concatenate([p, at(compiled(self.numbers, backend), p)])
@@ -77,7 +77,7 @@ class MotionEquations:
         return bars[:count] + at(pulled_back(self.numbers, backend), np.concatenate([p, bars[count:]]))
 
     def columns(self, p: Array, backend: str) -> Array:
-        """Tangents of p and c along every one of p, (P + C, P)."""
+        """Tangents of p and c along every one of p (P,), (P + C, P)."""
         unit = np.eye(len(self.names))
         if self.numbers is None:
             return unit

@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,7 +20,7 @@ from ..events.event import Event, as_events
 from ..trajectory import SimulationWarning
 from .doubts import doubts
 from .motion import START, TORQUE, VELOCITY, MotionRequest, motion_of
-from .segments import legs_of, pushed_legs
+from .segments import segments_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,17 +123,17 @@ def sensitivities(
     >>> result["m"][[100, 200]].round(4).tolist()
     [[-0.1275, 0.4627], [0.0445, -0.6321]]
     """
-    options = {"dt": dt, "max_step": max_step, "rtol": rtol, "atol": atol, "first_step": first_step, "backend": backend}
-    options["estimate_error"] = estimate_error
-    watched = as_events(events)
-    motion = motion_of(model, q, qd, (t_end, t0, t_span), method, tau, parameters, wrt, options, form, watched)
+    options: dict[str, Any] = {"dt": dt, "max_step": max_step, "rtol": rtol, "atol": atol, "first_step": first_step}
+    options |= {"estimate_error": estimate_error, "backend": backend}
+    span, watched = (t_end, t0, t_span), as_events(events)
+    motion = motion_of(model, q, qd, span, method, tau, parameters, wrt, form, watched, **options)
     if motion.each_step:
-        raise ValueError(f"tau must be constant, (n,), got shape {motion.tau.shape}: gradient takes a row a step")
+        raise ValueError(f"tau must be constant, (n,), got shape {motion.tau.shape[:-1]}: gradient takes a row a step")
     directions, columns = _directions(motion)
-    legs = legs_of(motion, watched, forwards=True)
-    for text in doubts(legs, 0.0, {})[0]:
+    segments = segments_of(motion, watched, forwards=True)
+    for text in doubts(segments, np.zeros(1), {})[0]:
         warnings.warn(text, SimulationWarning, stacklevel=2)
-    t, x, t_dot, x_dot = pushed_legs(legs, directions)
+    t, x, t_dot, x_dot = segments.tangents(directions)
     derivatives = {name: x_dot[:, :, place] for name, place in columns.items()}
     times = {name: t_dot[:, place] for name, place in columns.items()}
     nq = motion.problem.nq
@@ -143,7 +144,7 @@ def _directions(motion: MotionRequest) -> tuple[dict[str, Array], dict[str, int 
     """Tangents of x, tau and p, a column for each number of `wrt`; and where the columns of each name are."""
     problem, nq, equations = motion.problem, motion.problem.nq, motion.equations
     names = equations.names
-    along = equations.columns(motion.values[: len(names)], motion.backend) if motion.by_parameters else np.empty(0)
+    along = equations.columns(motion.values[: len(names), 0], motion.backend) if motion.by_parameters else np.empty(0)
     count = len(names)
     blocks: dict[str, dict[str, Array]] = {}
     for name in motion.wrt:
@@ -181,5 +182,5 @@ def _displacements(motion: MotionRequest) -> Array:
     rates = cg.jacobian(
         Graph([*system.q, *system.qd], {f"{k}": rate for k, rate in enumerate(system.q_dot)}), system.qd
     )
-    values = rates.evaluate(dict(zip(rates.input_names, [*motion.x.tolist()], strict=True)))
+    values = rates.evaluate(dict(zip(rates.input_names, motion.x[:, 0].tolist(), strict=True)))
     return np.array(list(values.values()), dtype=np.float64).reshape(nq, system.n)

@@ -169,7 +169,7 @@ class AdaptiveIntegration(NativeIntegration):
         return np.array(list(rate.evaluate(values).values()), dtype=np.float64)
 
     def _fresh_sizes(self) -> StateSizes:
-        return StateSizes(self.relative, self.program.kinds, self.program.groups, SMALLEST_ATOL, self.program.lengths)
+        return StateSizes(self.program.kinds, self.relative, SMALLEST_ATOL)
 
     def _first_step(self, x: Array) -> tuple[float, float]:
         """The first step, and how far ahead the sizes of the states were seen, where they choose atol."""
@@ -199,8 +199,7 @@ class AdaptiveIntegration(NativeIntegration):
 
     def _after_start(self, x: Array, rate: Array) -> Array | None:
         """The rate right after the start, where a force jumps there: it changes in the first instant, and no more."""
-        assert self.sizes is not None
-        options, largest = self.options, self.sizes.largest_of_kind
+        options, largest = self.options, self.program.kinds.largest_of_kind
         if not self.program.timed:
             return None
         instant = max(float(np.spacing(abs(options.t0))), COLLAPSE * options.length)
@@ -231,8 +230,7 @@ class AdaptiveIntegration(NativeIntegration):
         At rest each step may move one component more, the next of a chain; the first moves none where a force begins
         at 0.
         """
-        assert self.sizes is not None
-        largest, states, moved = self.sizes.largest_of_kind, [x], [0, 0]
+        largest, states, moved = self.program.kinds.largest_of_kind, [x], [0, 0]
         size = largest(x)
         while len(states) < 3 or (moved[-1] < len(x) and moved[-1] > moved[-3]):
             states.append(states[-1] + h * rate)

@@ -27,7 +27,7 @@ class FlatPosition:
 
     def __init__(self, program: StepProgram) -> None:
         self.rows, self.nq, self.components = program.rows, program.nq, program.components
-        self.lengths = np.array(program.lengths[self.nq :])
+        self.lengths = np.array(program.kinds.lengths[self.nq :])
         self.sizes, self.least = np.zeros(0), 0.0
         self._mark, self._ends, self._far = (0, 0.0), np.zeros((0, 0)), False
 
