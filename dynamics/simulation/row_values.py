@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,15 @@ from ..integrators import Problem
 from .estimates.state_sizes import OTHERS
 
 BLOCK = 4096  # rows that are taken at once
+LOOSE = 1e-6  # of a momentum, or so much of the largest: what an iteration may leave of it; of a velocity the same
+SLOW = 1e-2  # of the largest velocity: below, one counts as no smaller
+
+
+def values_of(graph: Graph, inputs: Iterable[Any], *shape: int) -> Array:
+    """The outputs of a graph, (k, *shape), at numbers or arrays for its inputs."""
+    with np.errstate(all="ignore"):
+        values = graph.evaluate(dict(zip(graph.input_names, inputs, strict=True))).values()
+    return np.array([np.broadcast_to(value, shape) for value in values], np.float64).reshape(len(values), *shape)
 
 
 def converted(graph: Graph | None, times: ArrayLike, states: Array, parameters: ArrayLike = 0.0) -> Array:
@@ -35,18 +45,11 @@ def row_values(graph: Graph, times: ArrayLike, states: Array, parameters: ArrayL
     *shape, m = states.shape
     rows, t, count = states.reshape(-1, m), np.broadcast_to(times, shape).reshape(-1), len(graph.inputs) - m - 1
     held = np.broadcast_to(parameters, (*shape, count)).reshape(len(rows), count)
-    names, result = graph.input_names, np.empty((len(rows), len(graph.outputs)))
-    with np.errstate(all="ignore"):
-        for start in range(0, len(rows), BLOCK):
-            part = slice(start, start + BLOCK)
-            values: dict[str, Any] = dict(zip(names, [*rows[part].T, t[part], *held[part].T], strict=True))
-            for column, value in enumerate(graph.evaluate(values).values()):
-                result[part, column] = value
+    result = np.empty((len(rows), len(graph.outputs)))
+    for start in range(0, len(rows), BLOCK):
+        part = slice(start, start + BLOCK)
+        result[part] = values_of(graph, [*rows[part].T, t[part], *held[part].T], len(t[part])).T
     return result.reshape(*shape, len(graph.outputs))
-
-
-LOOSE = 1e-6  # of a momentum, or so much of the largest: what an iteration may leave of it; of a velocity the same
-SLOW = 1e-2  # of the largest velocity: below, one counts as no smaller
 
 
 def unreached_momenta(

@@ -25,7 +25,7 @@ from ..run_options import RunOptions
 from ..steps.equal_steps import EqualSteps, equal_steps
 from ..steps.integration import integration
 from ..steps.step_program import CompiledSteps, StepProgram, compile_steps
-from ..steps.stepping import StoppedError, begin_equal, failed_step, nonfinite
+from ..steps.stepping import NativeRun, StoppedError, begin_equal, failed_step
 from ..trajectory import Stats
 
 WORK = 2**21  # nodes computed in a block: half a millisecond for each vector
@@ -192,12 +192,10 @@ class VectorizedIntegration:
         if not self._live.any():
             return
         before, at, m = self._memories.copy(), self._at, self.program.size
-        if self.estimator is None:
-            record = self.runner.run_many(self._memories, steps, every).rows
-        else:
-            seen = math.gcd(every, self._seen)
-            record, states = _advanced(self.code, self._memories, steps, seen)
-            record = record[every // seen - 1 :: every // seen]
+        seen = every if self.estimator is None else math.gcd(every, self._seen)
+        record, states = _advanced(self.code, self._memories, steps, seen)
+        record = record[every // seen - 1 :: every // seen]
+        if self.estimator is not None:
             self.estimator.add(states)
         if due:
             kept = record[: self.part.rows.shape[1] - self._at]  # t_end itself may be no row
@@ -205,10 +203,8 @@ class VectorizedIntegration:
             self._at += len(kept)
         failed = self._live & (self.runner.read(self._memories, "nonfinite")[0] != 0.0)
         for k in np.flatnonzero(failed).tolist():
-            if self.code.stops:
-                self._failed_step(k, before[:, [k]], at, every if due else 0)
-            else:
-                self._locate_failure(k, before[:, [k]], steps)
+            done = self._fail(k, before[:, [k]], steps)
+            self._good[k] = at + done // every if due else at
         self._live &= ~failed
         if failed.any() and self._live.any():
             self._memories[:, ~self._live] = self._memories[:, np.flatnonzero(self._live)[:1]]
@@ -232,29 +228,25 @@ class VectorizedIntegration:
         counts = (steps, 0, evaluations, self._longest, 0.0)
         self.part.stats[k] = ended(self._method, counts, status, error=error)
 
-    def _failed_step(self, k: int, memory: Array, at: int, every: int) -> None:
-        """Of trajectory k, which stopped in the block that began with this memory, (size, 1), and row `at`."""
-        runner, after = self.runner, self._memories[:, [k]]
-        t, count, evaluations = (runner.read(after, name)[0, 0] for name in ("t", "count", "evaluations"))
-        steps = int(count - runner.read(memory, "count")[0, 0]) - 1
-        self._good[k] = at + steps // every if every else at
-        runner.run_many(memory, steps, max(1, steps))
-        singular = runner.read(after, "singular")[0, 0] if "singular" in runner.program.registers else 0.0
-        before, x = (runner.read(each, "x")[:, 0] for each in (memory, after))
-        status = failed_step(self.program.components, t, before, x, int(singular))
-        self._note(k, self._done + steps, int(evaluations), status)
+    def _fail(self, k: int, memory: Array, steps: int) -> int:
+        """Note the step of a block of so many, begun with this memory, (size, 1), at which trajectory k failed.
 
-    def _locate_failure(self, k: int, memory: Array, steps: int) -> None:
-        """Where trajectory k stopped being finite in the block that began with this memory, (size, 1)."""
-        bad = ~np.isfinite(self.part.rows[k, : self._at]).all(axis=1)
-        self._good[k] = np.argmax(bad) if bad.any() else self._at
-        evaluations = self.runner.read(memory, "evaluations")
-        so_far = evaluations[0, 0]
+        How many were done before.
+        """
+        read, begun = self.runner.read, memory.copy()
         rows = self.runner.run_many(memory, steps, 1).rows[:, :, 0]
-        row = int(np.argmax(~np.isfinite(rows).all(axis=1)))
-        done = so_far + (row + 1) * (evaluations[0, 0] - so_far) / steps
-        what = nonfinite(self.program.components, rows[row, 1 : 1 + self.program.size])
-        self._note(k, self._done + row, int(done), f"stopped at t = {rows[row, 0]:.6g} s: {what}")
+        times, states = rows[:, 0], rows[:, 1 : 1 + self.program.size]
+        if self.code.stops:  # the lane makes no more
+            done = int(read(memory, "count")[0, 0] - read(begun, "count")[0, 0]) - 1
+        else:
+            done = int(np.argmax(~np.isfinite(states).all(axis=1)))
+        before = states[done - 1] if done else read(begun, "x")[:, 0]
+        singular = read(memory, "singular")[0, 0] if "singular" in self.runner.program.registers else 0.0
+        first, last = (read(each, "evaluations")[0, 0] for each in (begun, memory))
+        evaluations = first + (done + 1) * (last - first) / (done + 1 if self.code.stops else steps)
+        status = failed_step(self.program.components, times[done], before, states[done], int(singular))
+        self._note(k, self._done + done, int(evaluations), status)
+        return done
 
 
 @dataclass(frozen=True)
@@ -305,7 +297,7 @@ class Task:
             compiled = _compiled(self.pickled, self.options.backend)
         events = _event_program(self.events) if self.events else None
         for k, x in enumerate(chunk.x):
-            run = integration(compiled, self.options, chunk.p[k].tolist(), stopped, events=events)
+            run = integration(NativeRun(compiled, self.options, chunk.p[k].tolist(), stopped), events=events)
             recorder = Recorder(x, self.options.times, self.options.t0, self.options.direction)
             part.stats[k] = outcome(run, x, recorder, self.options)
             if isinstance(run, WatchedIntegration):

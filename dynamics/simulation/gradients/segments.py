@@ -19,6 +19,7 @@ from cgraph.extend import Array, kept_by_first
 
 from ..events.event import Event
 from ..events.event_program import WatchedEvent, event_program
+from ..row_values import values_of
 from .motion import TORQUE, MotionError, MotionRequest, Segment
 from .motion_equations import PARAMETERS
 from .motion_programs import LOSS, MotionPrograms, ProgramRequest, motion_programs
@@ -241,8 +242,7 @@ def _through(graph: Graph | None, motion: MotionRequest, x: Array, t: float) -> 
 def _evaluated(graph: Graph, points: Array) -> Array:
     """The outputs, (k, N), of a graph at points (n, N)."""
     count = points.shape[1]
-    values = graph.evaluate(dict(zip(graph.input_names, points if count > 1 else points[:, 0].tolist(), strict=True)))
-    return np.array([np.broadcast_to(value, count) for value in values.values()], dtype=np.float64).reshape(-1, count)
+    return values_of(graph, points if count > 1 else points[:, 0].tolist(), count)
 
 
 def _pushed(
@@ -263,10 +263,6 @@ def _observed(motion: MotionRequest, rows: Rows, inputs: Array) -> Rows:
     moved = cg.jvp(graph)
     values = [*rows.x.T, rows.t, *motion.force_at_end, *motion.values]
     tangents = [*rows.x_dot.swapaxes(0, 1), rows.t_dot, *inputs]
-    points = dict(zip(graph.input_names, [np.reshape(each, (-1, 1)) for each in values], strict=True))
-    along = points | dict(zip(moved.input_names[len(values) :], tangents, strict=True))
-    x, x_dot = (
-        np.stack([np.broadcast_to(each, (len(rows.t), count)) for each in values.values()], axis=1)
-        for values, count in ((graph.evaluate(points), 1), (moved.evaluate(along), len(inputs.T)))
-    )
-    return rows._replace(x=x[:, :, 0], x_dot=x_dot)
+    points, shape = [np.reshape(each, (-1, 1)) for each in values], rows.t_dot.shape
+    x, x_dot = values_of(graph, points, len(rows.t), 1), values_of(moved, [*points, *tangents], *shape)
+    return rows._replace(x=x[:, :, 0].T, x_dot=x_dot.swapaxes(0, 1))

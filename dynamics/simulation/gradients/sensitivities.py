@@ -17,6 +17,7 @@ from cgraph.extend import Array
 from ...systems.model import Model
 from ..applied_forces import Constant
 from ..events.event import Event, as_events
+from ..row_values import values_of
 from ..trajectory import SimulationWarning
 from .doubts import doubts
 from .motion import START, TORQUE, VELOCITY, MotionRequest, motion_of
@@ -143,35 +144,22 @@ def sensitivities(
 def _directions(motion: MotionRequest) -> tuple[dict[str, Array], dict[str, int | slice]]:
     """Tangents of x, tau and p, a column for each number of `wrt`; and where the columns of each name are."""
     problem, nq, equations = motion.problem, motion.problem.nq, motion.equations
-    names = equations.names
-    along = equations.columns(motion.values[: len(names), 0], motion.backend) if motion.by_parameters else np.empty(0)
-    count = len(names)
-    blocks: dict[str, dict[str, Array]] = {}
-    for name in motion.wrt:
-        if name == START:
-            moved = np.zeros((problem.size, problem.size - nq if problem.system is not None else nq))
-            moved[:nq] = _displacements(motion)
-            blocks[name] = {"x": moved}
-        elif name == VELOCITY:
-            blocks[name] = {"x": np.eye(problem.size)[:, nq:]}
-        elif name == TORQUE:
-            blocks[name] = {TORQUE: np.eye(motion.forces)}
-        else:
-            column = along[:, [names.index(name)]]
-            blocks[name] = {"p": column[:count], "c": column[count:]}
-    widths = {name: next(iter(block.values())).shape[1] for name, block in blocks.items()}
-    total = sum(widths.values())
     lengths = {"x": problem.size, **equations.lengths}
-    directions = {register: np.zeros((length, total)) for register, length in lengths.items()}
+    begin = dict(zip(lengths, np.cumsum([0, *lengths.values()]), strict=False))  # of rows, those of each register
+    units = np.eye(sum(lengths.values()))
+    by = {VELOCITY: units[:, nq : problem.size], TORQUE: units[:, begin[TORQUE] :][:, : motion.forces]}
+    if motion.by_parameters:
+        along = units[:, begin["p"] :] @ equations.columns(motion.values[: len(equations.names), 0], motion.backend)
+        by |= {name: along[:, [k]] for k, name in enumerate(equations.names)}
+    if START in motion.wrt:
+        by[START] = units[:, :nq] @ _displacements(motion)
     columns: dict[str, int | slice] = {}
     at = 0
-    for name, block in blocks.items():
-        end = at + widths[name]
-        for register, values in block.items():
-            directions[register][:, at:end] = values
-        columns[name] = slice(at, end) if name in (START, VELOCITY, TORQUE) else at
-        at = end
-    return directions, columns
+    for name in motion.wrt:
+        columns[name] = slice(at, at + by[name].shape[1]) if name in (START, VELOCITY, TORQUE) else at
+        at += by[name].shape[1]
+    whole = np.concatenate([by[name] for name in motion.wrt], axis=1)
+    return {name: whole[begin[name] :][:length] for name, length in lengths.items()}, columns
 
 
 def _displacements(motion: MotionRequest) -> Array:
@@ -182,5 +170,4 @@ def _displacements(motion: MotionRequest) -> Array:
     rates = cg.jacobian(
         Graph([*system.q, *system.qd], {f"{k}": rate for k, rate in enumerate(system.q_dot)}), system.qd
     )
-    values = rates.evaluate(dict(zip(rates.input_names, motion.x[:, 0].tolist(), strict=True)))
-    return np.array(list(values.values()), dtype=np.float64).reshape(nq, system.n)
+    return values_of(rates, motion.x[:, 0].tolist()).reshape(nq, system.n)

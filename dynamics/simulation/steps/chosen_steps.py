@@ -12,12 +12,11 @@ from cgraph.extend import Array, Runner
 
 from ...integrators.step_control import COLLAPSE, DONE, RESOLUTION, RUNNING, SMALLEST_ATOL, TOO_SMALL
 from ..estimates.state_sizes import StateSizes
+from ..row_values import values_of
 from ..run_options import RunOptions
-from ..sampled_controller import Hold
 from .dense_output import StepBlock
 from .flat_position import FlatPosition
-from .step_program import CompiledSteps
-from .stepping import FIRST_PASSES, NativeIntegration, nonfinite
+from .stepping import FIRST_PASSES, NativeIntegration, NativeRun, nonfinite
 
 LEAP = 1e-2  # of the whole run: the first step that is tried
 TRIALS = 60  # of a first step
@@ -33,15 +32,9 @@ HELD, SHARE = 100, 0.25  # steps at the stability limit, of all, from which on a
 class AdaptiveIntegration(NativeIntegration):
     """Steps chosen by the method."""
 
-    def __init__(
-        self,
-        compiled: CompiledSteps,
-        options: RunOptions,
-        parameters: Sequence[float] = (),
-        stopped: Callable[[], bool] = lambda: False,
-        control: Hold | None = None,
-    ) -> None:
-        super().__init__(compiled, options, parameters, stopped, control)
+    def __init__(self, run: NativeRun) -> None:
+        super().__init__(run)
+        options = run.options
         self.relative = max(options.relative, self.program.finest)
         self.absolute = np.broadcast_to(np.maximum(options.absolute, SMALLEST_ATOL), self.program.size)
         self.sizes = self._fresh_sizes() if options.atol is None else None
@@ -164,9 +157,7 @@ class AdaptiveIntegration(NativeIntegration):
         return f"{where}the step, {h:.3g} s, is below the resolution of the time; fastest is {fastest}"
 
     def _rate(self, t: float, x: Array) -> Array:
-        rate = self.program.rate
-        values = dict(zip(rate.input_names, [*x.tolist(), t, *self.parameters], strict=True))
-        return np.array(list(rate.evaluate(values).values()), dtype=np.float64)
+        return values_of(self.program.rate, [*x.tolist(), t, *self.parameters])
 
     def _fresh_sizes(self) -> StateSizes:
         return StateSizes(self.program.kinds, self.relative, SMALLEST_ATOL)

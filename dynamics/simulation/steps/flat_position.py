@@ -12,6 +12,7 @@ import numpy as np
 
 from cgraph.extend import Array
 
+from ..row_values import values_of
 from .step_program import StepProgram
 
 NEAR = 0.1  # of the least singular value at the start: one that is less is on its way to 0
@@ -91,6 +92,5 @@ class FlatPosition:
         n = len(x) - self.nq
         velocities = np.concatenate([np.diag(1.0 / self.lengths), np.zeros((n, 1))], axis=1)
         inputs = [*x[: self.nq].tolist(), *velocities, t, *parameters]
-        rates = self.rows.evaluate(dict(zip(self.rows.input_names, inputs, strict=True)))
-        values = np.stack([np.broadcast_to(rate, n + 1) for rate in rates.values()])
+        values = values_of(self.rows, inputs, n + 1)
         return np.asarray(values[:, :-1] - values[:, -1:])
