@@ -83,7 +83,7 @@ class Estimator:
         self._missed = np.zeros((k, m))  # by how much steps across jumps and kinks are off
         self._unresolved = unresolved(self.program.rate)
         self._end: States | None = None  # of what was compared
-        self._begun = self.options.t0  # the leg [s]
+        self._begun = self.options.t0  # the segment [s]
 
     def begin(self, x: Array, stretches: Sequence[EqualSteps], *, shorter: bool = False) -> None:
         """The runs start from x (k, m), on these steps."""
@@ -105,7 +105,7 @@ class Estimator:
         """Whether it looks at all steps, for one may pass a jump or a kink."""
         return not self.longer or self._unresolved.branches is not None
 
-    def leg(self, stretches: Sequence[EqualSteps]) -> None:
+    def segment(self, stretches: Sequence[EqualSteps]) -> None:
         """After a reset, the runs go on with these steps."""
         lasted, self._begun = abs(stretches[0].begin - self._begun), stretches[0].begin
         for beside in self._beside:
@@ -256,7 +256,7 @@ class RunEstimate:
     def __init__(self, run: Integration, x: Array, options: RunOptions) -> None:
         self._run, self._x, self._options = run, x[None], options
         self._estimator: Estimator | None = None
-        self._leg: FixedStepIntegration | None = None
+        self._segment: FixedStepIntegration | None = None
         self._stretch: EqualSteps | None = None
         self.seconds = 0.0  # spent here
 
@@ -269,22 +269,22 @@ class RunEstimate:
         self.seconds += time.perf_counter() - begin
 
     def _add(self, block: StepBlock) -> None:
-        leg = self._run.leg
-        assert isinstance(leg, FixedStepIntegration)
-        controlled = leg.control is not None
+        segment = self._run.segment
+        assert isinstance(segment, FixedStepIntegration)
+        controlled = segment.control is not None
         if not len(block.t) or (controlled and block.h[0] == 0.0):
             return
         if self._estimator is None:
-            sparse = leg is self._run
-            p = np.array([leg.parameters])
-            self._estimator = Estimator(leg.program, self._options, p, self._beside, sparse=sparse)
-            self._estimator.begin(self._x, leg.stretches, shorter=controlled)
-        elif leg is not self._leg and not controlled:
-            self._estimator.leg(leg.stretches)
-        self._leg = leg
-        if controlled and leg.stretch is not self._stretch:
-            self._stretch = leg.stretch
-            self._estimator.restart(block.x_old[:1], leg.stretch, np.array([leg.parameters]))
+            sparse = segment is self._run
+            p = np.array([segment.parameters])
+            self._estimator = Estimator(segment.program, self._options, p, self._beside, sparse=sparse)
+            self._estimator.begin(self._x, segment.stretches, shorter=controlled)
+        elif segment is not self._segment and not controlled:
+            self._estimator.segment(segment.stretches)
+        self._segment = segment
+        if controlled and segment.stretch is not self._stretch:
+            self._stretch = segment.stretch
+            self._estimator.restart(block.x_old[:1], segment.stretch, np.array([segment.parameters]))
         self._estimator.add(States(block.t, block.x[None], 0 if controlled else self._run.resets))
 
     def result(self) -> ErrorEstimate | None:
@@ -296,10 +296,10 @@ class RunEstimate:
 
     def _beside(self, course: Course, x: Array, p: Array) -> Iterator[States]:
         """The states of a run on another course."""
-        run, leg = self._run, self._run.leg
-        assert isinstance(leg, FixedStepIntegration)
-        other: Integration = leg.beside(course.stretches, p[0].tolist())
-        if leg.control is None and run is not leg:  # with events
+        run, segment = self._run, self._run.segment
+        assert isinstance(segment, FixedStepIntegration)
+        other: Integration = segment.beside(course.stretches, p[0].tolist())
+        if segment.control is None and run is not segment:  # with events
             from ..events.event_log import WatchedIntegration
 
             assert isinstance(run, WatchedIntegration)
@@ -308,7 +308,7 @@ class RunEstimate:
             yield States(block.t, block.x[None], other.resets)
             at, t = course.stretches[0].begin, float(block.t[-1])
             if block.h[0] == 0.0 and abs(at - t) <= course.late:  # a reset, which the run had at another time
-                aside = leg.beside(equal_steps([t, at], course.longest), p[0].tolist()).blocks(block.x[-1])
+                aside = segment.beside(equal_steps([t, at], course.longest), p[0].tolist()).blocks(block.x[-1])
                 for one in [block] if at == t else aside:
                     if one.t[-1] == at:
                         yield States(one.t[-1:], one.x[None, -1:], other.resets)

@@ -29,7 +29,7 @@ class Law(NamedTuple):
 
 
 class Course:
-    """The steps of a run beside, in each leg: those of the first run, made others."""
+    """The steps of a run beside, in each segment: those of the first run, made others."""
 
     def __init__(self, doublings: int) -> None:
         """doublings: of the length of steps, -1 for half of it."""
@@ -39,7 +39,7 @@ class Course:
         self.longest, self.late = 0.0, 0.0  # s; that its resets may differ from those of the first run [s]
 
     def follow(self, stretches: Sequence[EqualSteps], lasted: float = 0.0) -> None:
-        """The first run is in a leg of these steps, after one that lasted so long [s]."""
+        """The first run is in a segment of these steps, after one that lasted so long [s]."""
         made = halved(stretches) if self._doublings < 0 else list(stretches)
         for _ in range(self._doublings):
             made = doubled(made)
@@ -137,7 +137,7 @@ class Difference:
         self.largest[new] = self.last[new] = math.inf
 
     def compare(self, resets: int) -> None:
-        """The states that both have of the leg after so many resets."""
+        """The states that both have of the segment after so many resets."""
         first, other = (together(stream, resets) for stream in self._streams)
         if first is None or other is None:
             return
@@ -160,7 +160,7 @@ class Difference:
 
 
 def together(stream: list[States], resets: int) -> States | None:
-    """The states of a leg as one, which alone stay in the stream with those of later ones; None if there are none."""
+    """The states of a segment as one, which alone stay in the stream with those of later ones; None if there are none."""
     here = [states for states in stream if states.resets == resets]
     stream[:] = [states for states in stream if states.resets > resets]
     if not here:

@@ -16,7 +16,7 @@ Flags = np.ndarray[Any, np.dtype[np.bool_]]
 
 CELLS = 8  # of a step before the first split, so that it is looked at sixteen times at least
 NODES = 0.5 - 0.5 * np.cos(np.pi * np.arange(CELLS + 1) / CELLS)  # not evenly spaced: no oscillation hides between them
-MOST = 1024  # cells of a step
+MOST_CELLS = 1024  # cells of a step
 COARSER = 8.0  # than a neighbor a cell may not be: it would agree by chance
 SHORTEST = 2.0**-48  # of a step, a cell
 DECAY = 16.0  # of what a cubic misses, from a cell to its halves
@@ -113,7 +113,7 @@ class Cells(NamedTuple):
 
 
 def event_cells(steps: WatchedSteps) -> tuple[Cells, Flags]:
-    """The cells of all steps in order, and for which steps, (steps,), `MOST` were too few."""
+    """The cells of all steps in order, and for which steps, (steps,), `MOST_CELLS` were too few."""
     count = len(steps.block.t)
     cells = _split(steps, _whole(steps), bounded=False)
     worst = cells.miss.reshape(count, 2 * CELLS).max(axis=1)
@@ -124,7 +124,7 @@ def event_cells(steps: WatchedSteps) -> tuple[Cells, Flags]:
         unresolved = ~cells.resolved() & (width > SHORTEST)
         split = unresolved | (cells.beside(np.minimum, width) * COARSER < width)
         size = np.bincount(cells.rows, minlength=count) + np.bincount(cells.rows[split], minlength=count)
-        late = (size > MOST)[cells.rows]
+        late = (size > MOST_CELLS)[cells.rows]
         beyond[cells.rows[unresolved & late]] = True
         split &= ~late
         if not split.any():

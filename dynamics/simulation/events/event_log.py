@@ -20,7 +20,7 @@ from ..steps.dense_output import UNIT, StepBlock
 from ..steps.equal_steps import EqualSteps
 from ..steps.stepping import FixedStepIntegration, Integration
 from ..trajectory import Crossings
-from .event_cells import MOST, Flags, WatchedSteps
+from .event_cells import MOST_CELLS, Flags, WatchedSteps
 from .event_location import Crossing, Side, crossings
 from .event_program import EventProgram
 
@@ -30,7 +30,7 @@ AT_ONCE = 32  # restarts of the run in a row, at one instant or of contacts that
 RESETS = 10_000  # one after another before a restart: more than bodies that touch need to come apart
 MISSED = (
     "may have been missed, first after t = {:.6g} s: its quantity turns too often for "
-    f"{MOST} looks in a step; shorter steps (max_step or dt) find all"
+    f"{MOST_CELLS} looks in a step; shorter steps (max_step or dt) find all"
 )
 UNSIDED = (
     "starts at zero and leaves it at t = {:.6g} s, where nothing is reset: it has no direction, which would tell on "
@@ -265,20 +265,20 @@ def split_crossings(
 
 
 class WatchedIntegration(Integration):
-    """A run with events, in legs: each starts where the options say, or from the state that a reset leaves.
+    """A run with events, in segments: each starts where the options say, or from the state that a reset leaves.
 
-    leg: makes the integration of a leg from its options.
+    segment: makes the integration of a segment from its options.
     """
 
-    def __init__(self, leg: Callable[[RunOptions], Integration], options: RunOptions, log: EventLog) -> None:
+    def __init__(self, segment: Callable[[RunOptions], Integration], options: RunOptions, log: EventLog) -> None:
         super().__init__(log.program.components)
-        self._make, self.options, self.log = leg, options, log
-        self._legs: list[Integration] = []
+        self._make, self.options, self.log = segment, options, log
+        self._segments: list[Integration] = []
 
     @property
-    def leg(self) -> Integration:
+    def segment(self) -> Integration:
         """The part of the run that it is in: what makes its steps since the last reset."""
-        return self._legs[-1]
+        return self._segments[-1]
 
     @property
     def resetting(self) -> bool:
@@ -286,11 +286,11 @@ class WatchedIntegration(Integration):
         return any(event.reset is not None for event in self.log.program.events)
 
     def beside(self, steps: Callable[[float], Sequence[EqualSteps]]) -> WatchedIntegration:
-        """The same run with other equal steps: those of a leg from the time on at which it begins."""
-        first, options = self._legs[0], replace(self.options, max_steps=math.inf)
+        """The same run with other equal steps: those of a segment from the time on at which it begins."""
+        first, options = self._segments[0], replace(self.options, max_steps=math.inf)
         assert isinstance(first, FixedStepIntegration)
         return WatchedIntegration(
-            lambda leg: first.beside(steps(leg.t0), first.parameters), options, EventLog(self.log.program)
+            lambda segment: first.beside(steps(segment.t0), first.parameters), options, EventLog(self.log.program)
         )
 
     def crossings(self, nq: int, parameters: ArrayLike = 0.0) -> dict[str, Crossings]:
@@ -301,7 +301,7 @@ class WatchedIntegration(Integration):
         """The steps from x (m,) on, some at a time. A reset is a step of no length."""
         options, log = self.options, self.log
         while True:
-            yield from self._leg(options, x)
+            yield from self._segment(options, x)
             if self.status or log.restart is None:
                 return
             (t, before, x_new), log.restart = log.restart, None
@@ -312,10 +312,10 @@ class WatchedIntegration(Integration):
                 return
             options, x = self._rest(t), x_new
 
-    def _leg(self, options: RunOptions, x: Array) -> Iterator[StepBlock]:
+    def _segment(self, options: RunOptions, x: Array) -> Iterator[StepBlock]:
         """The steps up to an event after which the run does not go on as it did, or to the end."""
         run, log, last = self._make(options), self.log, options.t0
-        self._legs.append(run)
+        self._segments.append(run)
         rejected, evaluations = self.rejected, self.evaluations
         for block in run.blocks(x):
             log.parameters = run.parameters
@@ -338,8 +338,8 @@ class WatchedIntegration(Integration):
 
     def _count(self, run: Integration, rejected: int, evaluations: int) -> None:
         self.rejected, self.evaluations = rejected + run.rejected, evaluations + run.evaluations
-        self.jacobians = sum(leg.jacobians for leg in self._legs)
-        self.factorizations = sum(leg.factorizations for leg in self._legs)
+        self.jacobians = sum(segment.jacobians for segment in self._segments)
+        self.factorizations = sum(segment.factorizations for segment in self._segments)
         self.largest, self.stiff = max(self.largest, run.largest), self.stiff or run.stiff
         self.slope = run.slope
         self.warnings = list(dict.fromkeys([*self.warnings, *run.warnings, *self.log.warnings]))

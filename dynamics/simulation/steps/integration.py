@@ -30,8 +30,8 @@ def integration_of(
     if (name := options.scipy_solver) is not None:
         from .scipy_solvers import ScipyIntegration, scipy_solver
 
-        leg = partial(ScipyIntegration, scipy_solver(problem, name, options.backend), between=between)
-        return leg(options) if events is None else _watched(leg, options, events)
+        segment = partial(ScipyIntegration, scipy_solver(problem, name, options.backend), between=between)
+        return segment(options) if events is None else _watched(segment, options, events)
     method = METHODS[options.method]
     program = step_program(problem, method, dense=method.adaptive and (between or options.times is not None))
     run = NativeRun(compile_steps(program, options.backend), options, parameters, control=hold)
@@ -42,14 +42,14 @@ def integration(run: NativeRun, *, every_step: bool = False, events: EventProgra
     """A run, before its first step.  every_step: of equal steps, keep those between times of t_eval too."""
     options = run.options
     if events is not None:
-        return _watched(lambda leg: integration(run._replace(options=leg), every_step=True), options, events)
+        return _watched(lambda segment: integration(run._replace(options=segment), every_step=True), options, events)
     if run.compiled.program.adaptive:
         return AdaptiveIntegration(run)
     return FixedStepIntegration(run, every_step=every_step or options.times is None or options.estimated)
 
 
-def _watched(leg: Callable[[RunOptions], Integration], options: RunOptions, events: EventProgram) -> Integration:
+def _watched(segment: Callable[[RunOptions], Integration], options: RunOptions, events: EventProgram) -> Integration:
     """A run with events; without them what watches is not loaded."""
     from ..events.event_log import EventLog, WatchedIntegration
 
-    return WatchedIntegration(leg, options, EventLog(events))
+    return WatchedIntegration(segment, options, EventLog(events))

@@ -67,7 +67,7 @@ class Integration(ABC):
         self.parameters: list[float] = []
 
     @property
-    def leg(self) -> Integration:
+    def segment(self) -> Integration:
         """The part of the run that it is in: what makes its steps since the last reset."""
         return self
 
