@@ -160,7 +160,7 @@ class Difference:
 
 
 def together(stream: list[States], resets: int) -> States | None:
-    """The states of a segment as one, which alone stay in the stream with those of later ones; None if there are none."""
+    """The states of a segment as one, which alone stay in the stream with later ones; None if there are none."""
     here = [states for states in stream if states.resets == resets]
     stream[:] = [states for states in stream if states.resets > resets]
     if not here:
