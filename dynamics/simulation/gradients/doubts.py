@@ -36,11 +36,13 @@ def doubts(
     for sentences in (_unreached(segments), _half_steps(segments), [] if slopes is None else _grown(segments, *slopes)):
         for texts, more in zip(said, sentences, strict=False):  # no sentences: of no motion
             texts += more
+    whole = [each.reshape(-1, len(said)) for each in gradients.values()]
+    suspects = [] if not whole or np.isfinite(np.concatenate(whole)).all() else [*gradients]
     for k, texts in enumerate(said):
         if not np.isfinite(values[k]):
             texts.append(f"the loss is {values[k]} of a motion that is finite")
         else:
-            bad = [name for name, each in gradients.items() if not np.isfinite(each[..., k]).all()]
+            bad = [name for name in suspects if not np.isfinite(gradients[name][..., k]).all()]
             texts += [f"the loss is {values[k]:.6g}, and its gradient by {name!r} is not finite" for name in bad]
     return said
 

@@ -197,10 +197,9 @@ def motion_of(
     problem = in_form(derive(moving, {name: value for name, value in start.bound.items() if name not in free}), form)
     equations, columns = motion_equations(problem, len(inputs)), start.bound | start.varied
     count = len(start.x)
-    forces, values = (
-        np.array([np.broadcast_to(columns[name], count) for name in each], dtype=np.float64).reshape(len(each), count)
-        for each in (inputs, equations.names)
-    )
+    forces, values = (np.empty((len(each), count)) for each in (inputs, equations.names))
+    for row, name in zip([*forces, *values], [*inputs, *equations.names], strict=True):
+        row[:] = columns[name]
     if rows is not None:
         forces = np.broadcast_to(np.moveaxis(rows, 0, -1), (*rows.shape[1:], count))
     chosen_steps = run.adaptive or events
