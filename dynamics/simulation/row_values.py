@@ -21,9 +21,10 @@ SLOW = 1e-2  # of the largest velocity: below, one counts as no smaller
 
 def values_of(graph: Graph, inputs: Iterable[Any], *shape: int) -> Array:
     """The outputs of a graph, (k, *shape), at numbers or arrays for its inputs."""
-    with np.errstate(all="ignore"):
-        values = graph.evaluate(dict(zip(graph.input_names, inputs, strict=True))).values()
-    return np.array([np.broadcast_to(value, shape) for value in values], np.float64).reshape(len(values), *shape)
+    result = np.empty((len(graph.outputs), *shape))
+    for k, value in enumerate(graph.evaluate(dict(zip(graph.input_names, inputs, strict=True))).values()):
+        result[k] = value
+    return result
 
 
 def converted(graph: Graph | None, times: ArrayLike, states: Array, parameters: ArrayLike = 0.0) -> Array:
@@ -46,9 +47,10 @@ def row_values(graph: Graph, times: ArrayLike, states: Array, parameters: ArrayL
     rows, t, count = states.reshape(-1, m), np.broadcast_to(times, shape).reshape(-1), len(graph.inputs) - m - 1
     held = np.broadcast_to(parameters, (*shape, count)).reshape(len(rows), count)
     result = np.empty((len(rows), len(graph.outputs)))
-    for start in range(0, len(rows), BLOCK):
-        part = slice(start, start + BLOCK)
-        result[part] = values_of(graph, [*rows[part].T, t[part], *held[part].T], len(t[part])).T
+    with np.errstate(all="ignore"):
+        for start in range(0, len(rows), BLOCK):
+            part = slice(start, start + BLOCK)
+            result[part] = values_of(graph, [*rows[part].T, t[part], *held[part].T], len(t[part])).T
     return result.reshape(*shape, len(graph.outputs))
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +15,8 @@ OTHERS = 1e-4  # of the largest component of its kind, below which one counts as
 ROUNDING = 1e-10  # of the largest component of its kind: where one is that small, rounding is no error of it
 
 
-class StateKinds(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class StateKinds:
     """Which components of a state can be compared, (m,) each.
 
     kinds, groups: the same number for those of one kind, as coordinates, or of one quantity, as a quaternion's.
@@ -26,15 +28,21 @@ class StateKinds(NamedTuple):
     groups: tuple[int, ...]
     lengths: tuple[float, ...]
     ordinary: bool
+    _lengths: Array = field(init=False, repr=False)
+    _alike: Flags = field(init=False, repr=False)  # which are of one kind, (m, m)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "_lengths", np.array(self.lengths))
+        object.__setattr__(self, "_alike", _same(self.kinds))
 
     def largest_of_kind(self, values: Array) -> Array:
         """For each component the largest size of those of its kind, as one of its own, (.., m)."""
-        result: Array = _largest(np.array(self.lengths) * values, self.kinds) / self.lengths
+        result: Array = _largest(self._lengths * values, self._alike) / self._lengths
         return result
 
     def scale(self, size: Array) -> Array:
         """What errors are measured by, of components that have been so large, (.., m)."""
-        alike = self._replace(kinds=(0,) * len(self.kinds)) if self.ordinary else self
+        alike = replace(self, kinds=(0,) * len(self.kinds)) if self.ordinary else self
         result: Array = size + ROUNDING * alike.largest_of_kind(size)
         return result
 
@@ -47,14 +55,14 @@ class StateSizes:
     """
 
     def __init__(self, kinds: StateKinds, rtol: float, least: float) -> None:
-        self.kinds, self._rtol, self._least = kinds, rtol, least
+        self.kinds, self._rtol, self._least, self._one = kinds, rtol, least, _same(kinds.groups)
         self._sizes = np.zeros(len(kinds.kinds))
 
     def see(self, states: Array) -> None:
         """Note the sizes of these states, (.., m)."""
         with np.errstate(invalid="ignore"):
             largest = np.abs(np.where(np.isfinite(states), states, 0.0)).max(axis=0, initial=0.0)
-        self._sizes = np.maximum(self._sizes, _largest(largest, self.kinds.groups))
+        self._sizes = np.maximum(self._sizes, _largest(largest, self._one))
 
     def tolerance(self) -> Array:
         """The tolerance, (m,), by the states noted so far."""
@@ -63,10 +71,15 @@ class StateSizes:
         return result
 
 
-def _largest(values: Array, numbers: tuple[int, ...]) -> Array:
-    """For each the largest size of those of the same number, (.., m)."""
-    number = np.array(numbers)
-    largest: Array = np.where(number[:, None] == number, np.abs(values)[..., None, :], 0.0).max(axis=-1)
+def _same(numbers: tuple[int, ...]) -> Flags:
+    """Which are the same, (m, m)."""
+    same: Flags = np.equal.outer(numbers, numbers)
+    return same
+
+
+def _largest(values: Array, alike: Flags) -> Array:
+    """For each the largest size of those alike, (.., m)."""
+    largest: Array = np.where(alike, np.abs(values)[..., None, :], 0.0).max(axis=-1)
     return largest
 
 

@@ -76,7 +76,8 @@ class StepBlock(NamedTuple):
             return total
         between = self._replace(normalization=None).states_at(rows, s)
         inputs = [*_with_time(self.normalization, between, self.times_at(rows, s)), *total.T]
-        return values_of(_tangent(self.normalization, self.x.shape[1]), inputs, len(s)).T
+        with np.errstate(all="ignore"):
+            return values_of(_tangent(self.normalization, self.x.shape[1]), inputs, len(s)).T
 
     def rounding(self, rows: Indices, t: Array, x: Array) -> tuple[Array, Array]:
         """By how much states x (k, m) in these steps may be off, (k, m), and the times t (k,), for being rounded."""
@@ -100,7 +101,8 @@ def normalized(normalization: Graph | None, states: Array, times: Array) -> Arra
     """States (T, m) at the times (T,) with the constraints of the coordinates met."""
     if normalization is None:
         return states
-    return values_of(normalization, _with_time(normalization, states, times), len(states)).T
+    with np.errstate(all="ignore"):
+        return values_of(normalization, _with_time(normalization, states, times), len(states)).T
 
 
 def _with_time(normalization: Graph, states: Array, times: Array) -> list[Array]:
