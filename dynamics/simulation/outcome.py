@@ -17,6 +17,13 @@ from .steps.dense_output import StepBlock
 from .steps.stepping import Integration, StoppedError
 from .trajectory import Stats
 
+IMPLICIT = ("radau", "rodas")
+OTHERS = ("radau", "dop853")  # of the rate the first takes no derivative by the time, and the second none at all
+TRIED = 1000  # trials of steps of a method, at most
+LONGER = 4.0  # times as long as those of the run are steps that are worth a word
+REACHED = "reached t_end"
+INTERRUPTED = "interrupted"  # what the message of a run that Ctrl-C ended begins with
+
 
 class Recorder:
     """The rows of a trajectory that starts with x at t0: every step, or the states at `times`.
@@ -59,47 +66,6 @@ class Recorder:
         """Times (T,) and states (T, m)."""
         times, states = zip(*self._parts, strict=True)
         return np.concatenate(times), np.concatenate(states)
-
-
-IMPLICIT = ("radau", "rodas")
-OTHERS = ("radau", "dop853")  # of the rate the first takes no derivative by the time, and the second none at all
-TRIED = 1000  # trials of steps of a method, at most
-LONGER = 4.0  # times as long as those of the run are steps that are worth a word
-
-
-def advise(
-    run: Integration, reached: float, options: RunOptions, x: Array, again: Callable[[RunOptions], Integration] | None
-) -> None:
-    """Name the method in the warning of a run that is stiff, or in the status of one that lacks a derivative.
-
-    None where all of them stop, or take steps as short, or come no farther.
-
-    reached: how far the run has come [s].  x: where it started, (m,).  again: the same run by other options;
-    None where a controller decides, which may remember what it has seen.
-    """
-    if not (run.stiff or run.slope) or again is None:
-        return
-    length = LONGER * abs(reached - options.t0) / max(run.steps, 1)
-    for name in OTHERS if run.slope else IMPLICIT:
-        trial, t = again(replace(options, method=name, t_eval=None, max_steps=TRIED)), options.t0
-        try:
-            with np.errstate(all="ignore"):
-                for block in trial.blocks(x):
-                    t = float(block.t[-1]) if len(block.t) else t
-        except KeyboardInterrupt:  # of a run that is done
-            return
-        text = f"; try method={name!r}, which comes to t = {t:.6g} s in {counted(trial.steps, 'step')}"
-        if run.slope and not trial.status:
-            run.status += text
-            return
-        whole = trial.steps + trial.rejected < TRIED
-        if not run.slope and not (trial.status and whole) and abs(t - options.t0) >= length * trial.steps > 0.0:
-            run.warnings[run.warnings.index(run.stiff)] += text
-            return
-
-
-REACHED = "reached t_end"
-INTERRUPTED = "interrupted"  # what the message of a run that Ctrl-C ended begins with
 
 
 def outcome(
@@ -155,3 +121,34 @@ def ended(
         known and known.last,
         (*said, known.warning) if known and known.warning else tuple(said),
     )
+
+
+def advise(
+    run: Integration, reached: float, options: RunOptions, x: Array, again: Callable[[RunOptions], Integration] | None
+) -> None:
+    """Name the method in the warning of a run that is stiff, or in the status of one that lacks a derivative.
+
+    None where all of them stop, or take steps as short, or come no farther.
+
+    reached: how far the run has come [s].  x: where it started, (m,).  again: the same run by other options;
+    None where a controller decides, which may remember what it has seen.
+    """
+    if not (run.stiff or run.slope) or again is None:
+        return
+    length = LONGER * abs(reached - options.t0) / max(run.steps, 1)
+    for name in OTHERS if run.slope else IMPLICIT:
+        trial, t = again(replace(options, method=name, t_eval=None, max_steps=TRIED)), options.t0
+        try:
+            with np.errstate(all="ignore"):
+                for block in trial.blocks(x):
+                    t = float(block.t[-1]) if len(block.t) else t
+        except KeyboardInterrupt:  # of a run that is done
+            return
+        text = f"; try method={name!r}, which comes to t = {t:.6g} s in {counted(trial.steps, 'step')}"
+        if run.slope and not trial.status:
+            run.status += text
+            return
+        whole = trial.steps + trial.rejected < TRIED
+        if not run.slope and not (trial.status and whole) and abs(t - options.t0) >= length * trial.steps > 0.0:
+            run.warnings[run.warnings.index(run.stiff)] += text
+            return

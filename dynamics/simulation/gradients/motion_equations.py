@@ -16,25 +16,6 @@ from ...integrators import Problem
 from ...systems.arguments import new_variables
 from .rate_pullback import RatePullback, rate_pullback, rebuilt
 
-
-@kept_by_first
-def compiled(graph: Graph, backend: str) -> Any:
-    """The graph as a function."""
-    return cg.compile(graph, backend)
-
-
-@kept_by_first
-def pulled_back(graph: Graph, backend: str) -> Any:
-    """J^T y_bar as a function of the inputs, then y_bar."""
-    return cg.compile(cg.simplify(cg.vjp(graph)), backend)
-
-
-def at(function: Any, x: Array) -> Array:
-    """The outputs, (k, N), at points (n, N)."""
-    values: Array = function(x[:, 0])[:, None] if x.shape[1] == 1 else function.batch(x)
-    return values
-
-
 ARITHMETIC = ("add", "sub", "mul", "neg")
 PARAMETERS = ("tau", "p", "c")  # registers: what the parameters of the problem are, end to end
 
@@ -166,3 +147,21 @@ def _apart(
     used = [node for node in edge if node in alone]
     numbers = dict(zip(used, new_variables("number", len(used), taken), strict=True))
     return {variable: node for node, variable in numbers.items()}, rebuilt(copies, numbers, build)
+
+
+@kept_by_first
+def compiled(graph: Graph, backend: str) -> Any:
+    """The graph as a function."""
+    return cg.compile(graph, backend)
+
+
+@kept_by_first
+def pulled_back(graph: Graph, backend: str) -> Any:
+    """J^T y_bar as a function of the inputs, then y_bar."""
+    return cg.compile(cg.simplify(cg.vjp(graph)), backend)
+
+
+def at(function: Any, x: Array) -> Array:
+    """The outputs, (k, N), at points (n, N)."""
+    values: Array = function(x[:, 0])[:, None] if x.shape[1] == 1 else function.batch(x)
+    return values
