@@ -12,9 +12,10 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import Array, Builder, folded, kept_by_first, topological
 
+from ...equations.substitute import substitute
 from ...integrators import Problem
 from ...systems.arguments import new_variables
-from .rate_pullback import RatePullback, rate_pullback, rebuilt
+from .rate_pullback import RatePullback, rate_pullback
 
 ARITHMETIC = ("add", "sub", "mul", "neg")
 PARAMETERS = ("tau", "p", "c")  # registers: what the parameters of the problem are, end to end
@@ -146,7 +147,7 @@ def _apart(
             edge |= dict.fromkeys(node.args)
     used = [node for node in edge if node in alone]
     numbers = dict(zip(used, new_variables("number", len(used), taken), strict=True))
-    return {variable: node for node, variable in numbers.items()}, rebuilt(copies, numbers, build)
+    return {variable: node for node, variable in numbers.items()}, substitute(copies, numbers)
 
 
 @kept_by_first

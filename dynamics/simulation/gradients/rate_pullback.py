@@ -17,6 +17,7 @@ from cgraph.extend import Builder, SingularError, building, cotangents, folded, 
 from ...equations.accelerations import DENSE_UP_TO
 from ...equations.bias_terms import bias_terms
 from ...equations.constraints.constraints import DenseSolver, constraint_rows
+from ...equations.substitute import substitute
 from ...integrators import Problem
 from ...systems.arguments import new_variables
 from ...systems.system import System
@@ -58,8 +59,8 @@ class RatePullback:
             for node, bar in zip(q_dot, self.bars, strict=False):  # the other bars are those of accelerations
                 seeds[node] = seeds[node] + bar if node in seeds else bar
         known = dict(zip(shared, self.shared.values(), strict=True))
-        known |= dict(zip(self.mu, rebuilt(solved, known, build), strict=True))
-        pulled = rebuilt(cotangents(seeds, wrt, build), known, build)
+        known |= dict(zip(self.mu, substitute(solved, known), strict=True))
+        pulled = substitute(cotangents(seeds, wrt, build), known)
         outputs = {f"{k}": node for k, node in enumerate(pulled)}
         return cg.simplify(Graph([*self.inputs, *self.values, *self.shared.values(), *self.bars], outputs))
 
@@ -107,15 +108,6 @@ def _more_than(rate: Graph, nodes: Sequence[Node]) -> int:
     """How many nodes these take besides those of the rate, whose solution they may share."""
     copies = folded([*rate.outputs.values(), *nodes], Builder())
     return len(topological(copies)) - len(topological(copies[: len(rate.outputs)]))
-
-
-def rebuilt(nodes: Sequence[Node], replacement: Mapping[Node, Node], build: Builder) -> list[Node]:
-    """Copies of nodes with others in place of some that they reach."""
-    new = dict(replacement)
-    for node in topological(nodes):
-        if node not in new:
-            new[node] = build(node.op, tuple([new[arg] for arg in node.args]), node.label) if node.args else node
-    return [new[node] for node in nodes]
 
 
 def _power(system: System, mu: Sequence[Node], qdd: Sequence[Node]) -> Node:
