@@ -260,8 +260,8 @@ def _estimate(problem: Problem, z: tuple[str, ...]) -> list[Statement]:
     none, none2 = cg.variables("nonfinite_real nonfinite_complex")
     halved = Graph([error, converged, none, none2], {"error": cg.where(converged, error + none + none2, HALVES)})
     return [
-        nonfinite("real"),
-        nonfinite("complex"),
+        nonfinite("nonfinite_real", "real"),
+        nonfinite("nonfinite_complex", "complex"),
         *once,
         Call(doubt, ("error", "accepted", "h_old"), ("again",)),
         If("again", twice),

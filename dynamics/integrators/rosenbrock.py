@@ -91,7 +91,11 @@ def rodas_step(problem: Problem, method: Rosenbrock = RODAS5P) -> Step:
         [_matrix(method.gamma), Factor("matrix", "pivots"), *_stages(method, problem)],
         prepare=[*slopes, *by_time],
         start=[identity(m)],
-        error=[*measured(stages[-1], m), nonfinite("matrix"), added("error", "nonfinite_matrix", "error")],
+        error=[
+            *measured(stages[-1], m),
+            nonfinite("nonfinite_matrix", "matrix"),
+            added("error", "nonfinite_matrix", "error"),
+        ],
         estimate=method.order,
         dense=_dense(method, stages),
         dense_lengths={f"{name}{k + 1}": m for name, count in names for k in range(count)},
