@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from cgraph.extend import Array, Runner
 
 from ...integrators.step_control import COLLAPSE, DONE, RESOLUTION, RUNNING, SMALLEST_ATOL, TOO_SMALL
 from ..estimates.state_sizes import StateSizes
 from ..row_values import values_of
-from ..run_options import RunOptions
 from .dense_output import StepBlock
 from .flat_position import FlatPosition
 from .stepping import FIRST_PASSES, NativeIntegration, NativeRun, nonfinite
@@ -167,10 +165,9 @@ class AdaptiveIntegration(NativeIntegration):
         options = self.options
         if self.sizes is None and (options.first_step is not None or self.program.starts):
             return options.first_step or options.length, 0.0
-        start: dict[str, ArrayLike] = {"x": x, "p": self.parameters}
         rate = self._rate(options.t0, x)
         if self.sizes is None:
-            return first_step(self.runner, self.program.order, options, start, rate, self._scale), 0.0
+            return self._confirmed(x, rate), 0.0
         given = options.first_step
         h = min(options.length, options.longest_step) * LEAP if given is None else given
         after = self._after_start(x, rate)
@@ -183,10 +180,38 @@ class AdaptiveIntegration(NativeIntegration):
                 return given, max(given, far)
             if after is not None:  # halving steps only leads to the jump; step control passes it, as any later one
                 return far, far
-            before, h = h, first_step(self.runner, self.program.order, options, start, rate, self._scale)
+            before, h = h, self._confirmed(x, rate)
             if h >= 0.5 * before:
                 break
         return h, max(h, far)
+
+    def _confirmed(self, x: Array, rate: Array) -> float:
+        """A step that two half steps confirm, their difference is within the tolerance, and the first rate, too.
+
+        The estimate of an embedded method can vanish by symmetry, such as at a start from rest, and a guess from the
+        first derivatives can be far off; halving cannot be fooled by either. Of an initial layer that a method damps,
+        both the whole and the half steps keep nothing: there the first rate points much farther than the step goes.
+        """
+        options, runner, order = self.options, self.runner, self.program.order
+        span = options.t_end - options.t0
+        anything = {"rtol": HUGE, "atol": HUGE, "max_step": math.inf, "fresh": 1.0, "accepted": 1.0}
+        anything |= {"t": options.t0, "end": math.copysign(math.inf, span), "error_old": 1.0}
+        memory = runner.memory({"x": x, "p": self.parameters, **anything})
+        least = min(abs(span), max(2.0 * RESOLUTION * abs(options.t0), math.ulp(0.0)))
+        h = max(min(abs(span), options.longest_step) * LEAP, least)
+        for _ in range(TRIALS):
+            with np.errstate(all="ignore"):
+                whole = _forced(runner, memory, [h])
+                size = self._scale(x, whole)
+                change = (whole - _forced(runner, memory, [0.5 * h, 0.5 * h])) / size
+                difference = float(np.sqrt(np.mean(change * change)))
+                ahead = float(np.max(h * np.abs(rate) / np.maximum(np.abs(whole - x), size)))
+            if (difference <= 1.0 and ahead <= AHEAD) or h <= least:
+                break
+            # of tolerances; below a rounding, as of a state that moves evenly, it does not limit the step
+            factor = 0.9 * max(difference, 1e-16) ** (-1.0 / (order + 1)) if math.isfinite(difference) else 0.0
+            h = max(h * min(0.5, max(1e-3, min(factor, AHEAD / max(ahead, AHEAD)))), least)
+        return h
 
     def _after_start(self, x: Array, rate: Array) -> Array | None:
         """The rate right after the start, where a force jumps there: it changes in the first instant, and no more."""
@@ -245,44 +270,6 @@ def _lacking(runner: Runner, memory: Array, components: Sequence[str]) -> str:
             row, column = divmod(int(bad[0]), len(by))
             return f"the derivative of the rate of {components[row]} by {by[column]}"
     return ""
-
-
-def first_step(
-    runner: Runner,
-    order: int,
-    options: RunOptions,
-    start: Mapping[str, ArrayLike],
-    rate: Array,
-    scale: Callable[[Array, Array], Array],
-) -> float:
-    """A step that two half steps confirm, their difference is within the tolerance, and the first rate, too.
-
-    The estimate of an embedded method can vanish by symmetry, such as at a start from rest, and a guess from the first
-    derivatives can be far off; halving cannot be fooled by either. Of an initial layer that a method damps, both the
-    whole and the half steps keep nothing: there the first rate points much farther than the step goes.
-
-    start: registers x and p.  rate: (m,), of the state at the start.  scale: what errors from x to x_new are measured
-    by, (m,).
-    """
-    span, x = options.t_end - options.t0, np.asarray(start["x"])
-    anything = {"rtol": HUGE, "atol": HUGE, "max_step": math.inf, "fresh": 1.0, "accepted": 1.0}
-    anything |= {"t": options.t0, "end": math.copysign(math.inf, span), "error_old": 1.0}
-    memory = runner.memory({**start, **anything})
-    least = min(abs(span), max(2.0 * RESOLUTION * abs(options.t0), math.ulp(0.0)))
-    h = max(min(abs(span), options.longest_step) * LEAP, least)
-    for _ in range(TRIALS):
-        with np.errstate(all="ignore"):
-            whole = _forced(runner, memory, [h])
-            size = scale(x, whole)
-            change = (whole - _forced(runner, memory, [0.5 * h, 0.5 * h])) / size
-            difference = float(np.sqrt(np.mean(change * change)))
-            ahead = float(np.max(h * np.abs(rate) / np.maximum(np.abs(whole - x), size)))
-        if (difference <= 1.0 and ahead <= AHEAD) or h <= least:
-            break
-        # of tolerances; below a rounding, as of a state that moves evenly, it does not limit the step
-        factor = 0.9 * max(difference, 1e-16) ** (-1.0 / (order + 1)) if math.isfinite(difference) else 0.0
-        h = max(h * min(0.5, max(1e-3, min(factor, AHEAD / max(ahead, AHEAD)))), least)
-    return h
 
 
 def _forced(runner: Runner, memory: Array, steps: Sequence[float]) -> Array:
