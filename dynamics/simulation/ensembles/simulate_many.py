@@ -149,7 +149,8 @@ def simulate_many(
     task = Task(pickled_steps(program), sent, count, tuple(grids), pickle.dumps(watch) if watched else b"")
     p = np.array([start.varied[name] for name in problem.parameters]).reshape(-1, len(start.x)).T.copy()
     x = converted(problem.momentum, t0, start.x, p)
-    chunks = _chunks(x, p, _width(len(x), chunk, team, whole=bool(grids)))
+    width = _width(len(x), chunk, team, whole=bool(grids))
+    chunks = [Chunk(k, x[k : k + width], p[k : k + width]) for k in range(0, len(x), width)]
 
     # Integrate, by whoever takes the chunks and compiles the steps
     whole = not_begun(method, 0, np.empty((len(x), count, problem.size)))
@@ -245,10 +246,6 @@ def _grids(program: StepProgram, options: RunOptions, count: int) -> list[EqualS
     if options.times is None:  # every step is a row
         grids = [each._replace(rows=each.steps) for each in grids]
     return grids if sum(grid.steps for grid in grids) <= options.max_steps else []
-
-
-def _chunks(x: Array, p: Array, width: int) -> list[Chunk]:
-    return [Chunk(k, x[k : k + width], p[k : k + width]) for k in range(0, len(x), width)]
 
 
 def _width(count: int, chunk: int | None, workers: int | Map, *, whole: bool) -> int:

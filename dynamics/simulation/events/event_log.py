@@ -270,9 +270,11 @@ class WatchedIntegration(Integration):
     segment: makes the integration of a segment from its options.
     """
 
-    def __init__(self, segment: Callable[[RunOptions], Integration], options: RunOptions, log: EventLog) -> None:
-        super().__init__(log.program.components)
-        self._make, self.options, self.log = segment, options, log
+    def __init__(
+        self, segment: Callable[[RunOptions], Integration], options: RunOptions, program: EventProgram
+    ) -> None:
+        super().__init__(program.components)
+        self._make, self.options, self.log = segment, options, EventLog(program)
         self._segments: list[Integration] = []
 
     @property
@@ -290,7 +292,7 @@ class WatchedIntegration(Integration):
         first, options = self._segments[0], replace(self.options, max_steps=math.inf)
         assert isinstance(first, FixedStepIntegration)
         return WatchedIntegration(
-            lambda segment: first.beside(steps(segment.t0), first.parameters), options, EventLog(self.log.program)
+            lambda segment: first.beside(steps(segment.t0), first.parameters), options, self.log.program
         )
 
     def crossings(self, nq: int, parameters: ArrayLike = 0.0) -> dict[str, Crossings]:

@@ -50,6 +50,6 @@ def integration(run: NativeRun, *, every_step: bool = False, events: EventProgra
 
 def _watched(segment: Callable[[RunOptions], Integration], options: RunOptions, events: EventProgram) -> Integration:
     """A run with events; without them what watches is not loaded."""
-    from ..events.event_log import EventLog, WatchedIntegration
+    from ..events.event_log import WatchedIntegration
 
-    return WatchedIntegration(segment, options, EventLog(events))
+    return WatchedIntegration(segment, options, events)
