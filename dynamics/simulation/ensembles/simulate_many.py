@@ -149,8 +149,7 @@ def simulate_many(
     task = Task(pickled_steps(program), sent, count, tuple(grids), pickle.dumps(watch) if watched else b"")
     p = np.array([start.varied[name] for name in problem.parameters]).reshape(-1, len(start.x)).T.copy()
     x = converted(problem.momentum, t0, start.x, p)
-    width = _width(len(x), chunk, team, whole=bool(grids))
-    chunks = [Chunk(k, x[k : k + width], p[k : k + width]) for k in range(0, len(x), width)]
+    chunks = _chunks(x, p, chunk, team, whole=bool(grids))
 
     # Integrate, by whoever takes the chunks and compiles the steps
     whole = not_begun(method, 0, np.empty((len(x), count, problem.size)))
@@ -248,11 +247,12 @@ def _grids(program: StepProgram, options: RunOptions, count: int) -> list[EqualS
     return grids if sum(grid.steps for grid in grids) <= options.max_steps else []
 
 
-def _width(count: int, chunk: int | None, workers: int | Map, *, whole: bool) -> int:
-    """Trajectories in a chunk; whole: of whole vectors, so that a trajectory has the same neighbors in any chunk."""
+def _chunks(x: Array, p: Array, chunk: int | None, workers: int | Map, *, whole: bool) -> list[Chunk]:
+    """The starts in chunks; whole: of whole vectors, so that a trajectory has the same neighbors in any chunk."""
     if chunk is None:
-        chunk = min(LARGEST, math.ceil(count / (SHARES * (UNKNOWN if callable(workers) else workers))))
-    return math.ceil(chunk / VECTOR) * VECTOR if whole else int(chunk)
+        chunk = min(LARGEST, math.ceil(len(x) / (SHARES * (UNKNOWN if callable(workers) else workers))))
+    width = math.ceil(chunk / VECTOR) * VECTOR if whole else int(chunk)
+    return [Chunk(k, x[k : k + width], p[k : k + width]) for k in range(0, len(x), width)]
 
 
 def _run(task: Task, chunks: Sequence[Chunk], workers: int | Map, whole: Part) -> None:
