@@ -42,6 +42,7 @@ OPTIONAL = {
 }
 
 FILE, CLASS, FUNCTION = 400, 200, 60  # lines at most; of a class and of a function without docstrings
+MODULES = 200  # of ours, which a first run of `simulate` loads at most
 LONGER: dict[str, str] = {}  # {file, or file::name: why it may be longer}
 MODELS = {"Model", "System", "OdeSystem", "Mechanism", "PlanarArm", "Scene"}  # nobody asks which of them it has
 MUJOCO = ("dynamics/io/mujoco_twin.py",)  # its models are MuJoCo's, without types
@@ -217,6 +218,19 @@ def loaded(program: str, folder: Path) -> dict[str, set[str]]:
     )  # fmt: skip
     assert run.returncode == 0, run.stderr
     return {name: set(packages) - {"__mp_main__"} for name, packages in json.loads(run.stdout).items()}
+
+
+def test_a_simulation_loads_what_it_uses() -> None:
+    program = (
+        "import sys, dynamics as dyn\n"
+        "dyn.simulate(dyn.planar_arm([1.0, 0.8], [1.0, 0.8]), [1.0, 0.5], [0.0, 0.0], t_end=1.0)\n"
+        "print(*[name for name in sys.modules if name.partition('.')[0] in ('cgraph', 'dynamics')])"
+    )
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    run = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True)
+    names = run.stdout.split()
+    assert "dynamics.simulation.simulate" in names
+    assert len(names) <= MODULES
 
 
 def test_importing_a_package_loads_numpy_and_the_standard_library(tmp_path: Path) -> None:

@@ -51,6 +51,12 @@ def function(inputs: str, **outputs: float | Node) -> Graph:
     return Graph(cg.variables(inputs), outputs)
 
 
+def end_to_end(count: int, sources: tuple[str, ...], targets: tuple[str, ...]) -> Call:
+    """The numbers of some registers, so many in all, into others."""
+    nodes = cg.variables([f"c{k}" for k in range(count)])
+    return Call(Graph(nodes, {f"c{k}": node for k, node in enumerate(nodes)}), sources, targets)
+
+
 def identity(m: int) -> Call:
     """Register `unit` = the identity matrix, row by row."""
     values = [1.0 if row == column else 0.0 for row in range(m) for column in range(m)]

@@ -12,7 +12,7 @@ from cgraph.extend import Call, Map, Statement, Sum, copied
 from .elementwise import advanced, compensated, stage_time, used, weighted
 from .problem import Problem
 from .step import Step
-from .step_control import SAFETY, SCALE, scale
+from .step_control import SAFETY, SCALE, nonfinite, scale
 from .tableau import Tableau, real_stability
 
 
@@ -38,7 +38,7 @@ def explicit_step(tableau: Tableau, problem: Problem) -> Step:
         rates,
         kept=[copied("rounding_new", "rounding")],
         fixed=("rounding", "rounding_new"),
-        error=[*error, _finite(last), _estimate(estimates, m)],
+        error=[*error, nonfinite("nonfinite_rate", "x_new", last), _estimate(estimates, m)],
         estimate=tableau.estimate,
         handed=[*_at_limit(tableau), copied(last, "slope0")],
         dense=_dense(tableau, problem),
@@ -61,12 +61,6 @@ def _arrival(weights: tuple[float, ...]) -> Map:
     total, rounding = compensated(x, h * weighted(slopes, parts) + before)
     graph = Graph([x, before, h, *slopes], {"x": total, "rounding": rounding})
     return Map(graph, ("x", "rounding", "h", *names), ("x_new", "rounding_new"))
-
-
-def _finite(last: str) -> Sum:
-    """Register `nonfinite_rate`: 0 where the trial arrived at a finite state with a finite rate, else NaN."""
-    x_new, slope = cg.variables("x_new slope")
-    return Sum(Graph([x_new, slope], {"none": (x_new - x_new) + (slope - slope)}), ("x_new", last), "nonfinite_rate")
 
 
 def _squared(weights: tuple[float, ...], target: str) -> Sum:

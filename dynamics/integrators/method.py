@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Call, Program, Statement, Sum
+from cgraph.extend import Call, Program, Statement
 
 from .problem import Problem
 from .step import Step, arriving, rate_calls, with_registers
-from .step_control import HERMITE, chosen, first_pass
+from .step_control import HERMITE, chosen, first_pass, nonfinite
 
 ROUNDING = 16.0 * 2.0**-52  # of the sums of a step
 
@@ -123,8 +123,7 @@ def _advance(evaluations: int) -> list[Statement]:
     names = ("start", "count", "h", "evaluations")
     start, count, h, done = inputs = cg.variables(names)
     outputs = {"t": start + (count + 1.0) * h, "count": count + 1.0, "evaluations": done + float(evaluations)}
-    x = cg.variable("x")
-    return [Call(Graph(inputs, outputs), names, tuple(outputs)), Sum(Graph([x], {"none": x - x}), ("x",), "nonfinite")]
+    return [Call(Graph(inputs, outputs), names, tuple(outputs)), nonfinite("nonfinite", "x")]
 
 
 def _judged(failed: str, singular: bool) -> Call:

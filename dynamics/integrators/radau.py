@@ -16,7 +16,7 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import Call, Factor, FixedPoint, If, Map, Solve, Statement, Sum, added, copied
 
-from .elementwise import combined, identity, stage_time, weighted
+from .elementwise import combined, end_to_end, identity, stage_time, weighted
 from .jacobian_statements import jacobian_statements
 from .problem import Problem
 from .step import Step
@@ -125,20 +125,16 @@ def _matrices(m: int) -> list[Statement]:
     real = Map(Graph([unit, h, slope], {"w": _REAL / h * unit - slope}), ("unit", "h", "jacobian"), ("real",))
     jacobian = [cg.variables([f"j{row}_{column}" for column in range(m)]) for row in range(m)]
     a, b = _COMPLEX.real / h, _COMPLEX.imag / h
-
-    def diagonal(value: Node, row: int) -> list[Node | float]:
-        return [value if column == row else 0.0 for column in range(m)]
-
-    rows: list[list[Node | float]] = []
-    for row in range(m):
-        same = [a - entry if column == row else -entry for column, entry in enumerate(jacobian[row])]
-        rows.append([*same, *diagonal(b, row)])
-    for row in range(m):
-        same = [a - entry if column == row else -entry for column, entry in enumerate(jacobian[row])]
-        rows.append([*diagonal(-b, row), *same])
-    entries: dict[str, Node | float] = {f"{k}": entry for k, entry in enumerate(entry for row in rows for entry in row)}
-    both = Graph([*(entry for row in jacobian for entry in row), h], entries)
-    both_factored: list[Statement] = [Call(both, ("jacobian", "h"), ("complex",)), Factor("complex", "pivots2")]
+    entries: list[Node | float] = []  # [[a - J, b], [-b, a - J]]
+    for upper in (True, False):
+        for k, row in enumerate(jacobian):
+            same = [a - entry if column == k else -entry for column, entry in enumerate(row)]
+            other: list[Node | float] = [0.0] * m
+            other[k] = b if upper else -b
+            entries += [*same, *other] if upper else [*other, *same]
+    outputs = {f"{k}": entry for k, entry in enumerate(entries)}
+    both = Graph([*(entry for row in jacobian for entry in row), h], outputs)
+    both_factored = [Call(both, ("jacobian", "h"), ("complex",)), Factor("complex", "pivots2")]
     return [real, Factor("real", "pivots"), *both_factored]
 
 
@@ -190,9 +186,8 @@ def _turn(problem: Problem, z: tuple[str, ...], w: tuple[str, ...], f: tuple[str
         "2": parts[2] - (a * ws[2] - b * ws[1]),
     }
     rights = Map(Graph(inputs, outputs), ("h", *w, *f), ("right0", "F1", "F2"))
-    lanes = cg.variables([f"c{k}" for k in range(2 * m)])
-    joined = Call(Graph(lanes, {f"{k}": node for k, node in enumerate(lanes)}), ("F1", "F2"), ("right12",))
-    parted = Call(joined.graph, ("right12",), ("F1", "F2"))
+    joined = end_to_end(2 * m, ("F1", "F2"), ("right12",))
+    parted = end_to_end(2 * m, ("right12",), ("F1", "F2"))
     body += [rights, Solve("real", "pivots", "right0"), joined, Solve("complex", "pivots2", "right12"), parted]
     body += [added(name, change, name) for name, change in zip(w, CHANGES, strict=True)]
     return [*body, combined(_T, w, z), added("x", z[2], "x_new")]
@@ -265,8 +260,8 @@ def _estimate(problem: Problem, z: tuple[str, ...]) -> list[Statement]:
     none, none2 = cg.variables("nonfinite_real nonfinite_complex")
     halved = Graph([error, converged, none, none2], {"error": cg.where(converged, error + none + none2, HALVES)})
     return [
-        nonfinite("real"),
-        nonfinite("complex"),
+        nonfinite("nonfinite_real", "real"),
+        nonfinite("nonfinite_complex", "complex"),
         *once,
         Call(doubt, ("error", "accepted", "h_old"), ("again",)),
         If("again", twice),

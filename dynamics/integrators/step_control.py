@@ -205,10 +205,11 @@ def moved(m: int) -> list[Statement]:
     return [total, Call(longer, ("way", "farthest"), ("farthest",)), copied("onto", "x")]
 
 
-def nonfinite(register: str) -> Sum:
-    """Register nonfinite_{register} = 0 where all numbers of a register are finite, else NaN.
+def nonfinite(target: str, *registers: str) -> Sum:
+    """target = 0 where all numbers of registers of one length are finite, else NaN.
 
     Divided by an infinite number, an error is 0: that of a step with infinite pivots.
     """
-    a = cg.variable("a")
-    return Sum(Graph([a], {"none": a - a}), (register,), f"nonfinite_{register}")
+    first, *others = inputs = cg.variables([f"a{k}" for k in range(len(registers))])
+    none = sum([other - other for other in others], first - first)
+    return Sum(Graph(inputs, {"none": none}), registers, target)

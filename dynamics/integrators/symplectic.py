@@ -25,7 +25,7 @@ from cgraph import Graph, Node
 from cgraph.extend import Call, FixedPoint, Map, Statement, Sum, added, copied
 
 from ..systems.arguments import TIME
-from .elementwise import compensated, function, stage_time, weighted
+from .elementwise import compensated, end_to_end, function, stage_time, weighted
 from .momenta import Mechanics, mechanics
 from .problem import Problem, reaches
 from .step import Step
@@ -84,7 +84,7 @@ def _of_momenta(method: Partitioned, problem: Problem, composition: Composition)
     lengths = dict.fromkeys(("q", "v", "momentum", "q_rounding", "momentum_rounding"), n)
     lengths |= {f"{name}{i}": n for name in "QVPFW" for i in stages}
     read = Call(graphs.momentum, ("x", "t", "p"), ("momentum",))
-    start = [_copied(problem.size, ("x",), ("q", "v")), read, *[copied("v", f"V{i}") for i in stages]]
+    start = [end_to_end(problem.size, ("x",), ("q", "v")), read, *[copied("v", f"V{i}") for i in stages]]
     if graphs.separable and method in (SYMPLECTIC_EULER, VERLET):
         body = _explicit(
             method,
@@ -104,7 +104,7 @@ def _of_momenta(method: Partitioned, problem: Problem, composition: Composition)
         body += [_added("q", "V", method.w), _added("momentum", "F", method.w), stage_time("later", 1.0)]
         settled = _velocity(graphs, "q", "v", "momentum", "later", "v")
         body += [settled] * (1 if graphs.quadratic else REPEATS)
-    body = [*_in_turn(composition, body), _copied(problem.size, ("q", "v"), ("x_new",))]
+    body = [*_in_turn(composition, body), end_to_end(problem.size, ("q", "v"), ("x_new",))]
     return _step(method, lengths, start, body)
 
 
@@ -130,7 +130,7 @@ def _of_rates(method: Partitioned, problem: Problem, composition: Composition) -
             turn += [rates([f"{part[1]}{i}" for part in parts], f"time{i}", velocity, i) for i in stages]
         body = [*_iterated(method, turn), *[_added(base, slope, method.w) for base, _, slope, _ in parts]]
     m = problem.size
-    body = [_copied(m, ("x",), bases), *_in_turn(composition, body), _copied(m, bases, ("x_new",))]
+    body = [end_to_end(m, ("x",), bases), *_in_turn(composition, body), end_to_end(m, bases, ("x_new",))]
     return _step(method, dict.fromkeys(names, m // len(parts)), start, body)
 
 
@@ -240,9 +240,3 @@ def _explicit(
     kick = _stage(over(2, 1 if half else 2), "momentum", "F", "momentum")
     body = [*force("t"), kick, *velocity("t"), *after, _added("q", "V", (Fraction(1),)), stage_time("later", 1.0)]
     return [*body, *force("later"), kick] if half else body
-
-
-def _copied(count: int, sources: tuple[str, ...], targets: tuple[str, ...]) -> Call:
-    """The numbers of some registers into others."""
-    nodes = cg.variables([f"c{k}" for k in range(count)])
-    return Call(Graph(nodes, {f"c{k}": node for k, node in enumerate(nodes)}), sources, targets)

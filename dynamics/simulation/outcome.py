@@ -1,26 +1,71 @@
-"""Outcome: one run made to its end, which the recorder is told, and what is to be said of it."""
+"""Outcome: one run made to its end, its rows, its statistics, and the advice of another method."""
 
 from __future__ import annotations
 
 import math
 import time
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from cgraph.extend import Array
+from cgraph.extend import Array, counted
 
-from .estimates.advice import advise
-from .estimates.error_estimate import ErrorEstimate
-from .estimates.run_estimate import RunEstimate
-from .recorder import Recorder
+from .estimates.error_estimate import ErrorEstimate, RunEstimate
 from .run_options import RunOptions
 from .steps.dense_output import StepBlock
 from .steps.stepping import Integration, StoppedError
 from .trajectory import Stats
 
+IMPLICIT = ("radau", "rodas")
+OTHERS = ("radau", "dop853")  # of the rate the first takes no derivative by the time, and the second none at all
+TRIED = 1000  # trials of steps of a method, at most
+LONGER = 4.0  # times as long as those of the run are steps that are worth a word
 REACHED = "reached t_end"
 INTERRUPTED = "interrupted"  # what the message of a run that Ctrl-C ended begins with
+
+
+class Recorder:
+    """The rows of a trajectory that starts with x at t0: every step, or the states at `times`.
+
+    direction: 1.0, or -1.0 for a run back in time, whose times decrease.
+    """
+
+    def __init__(self, x: Array, times: Array | None, t0: float = 0.0, direction: float = 1.0) -> None:
+        self.times, self.direction = times, direction
+        self.last, self._last_state = t0, x  # how far the run has come [s]
+        at_start = int(times is None or times[0] == t0)
+        self._parts = [(np.full(at_start, t0), np.tile(x, (at_start, 1)))]  # times and states
+        self._next = at_start  # of `times`
+        self.size = 0  # bytes
+
+    def add(self, block: StepBlock) -> None:
+        """The rows of these steps."""
+        if not len(block.t):
+            return
+        last, following = float(block.t[-1]), self._next
+        if self.times is None:
+            self._append(block.t, block.x)
+        else:
+            following = int(np.searchsorted(self.direction * self.times, self.direction * last, side="right"))
+            times = self.times[self._next : following]
+            self._append(times, block.at(times))
+        self._next, self.last, self._last_state = following, last, block.x[-1].copy()
+
+    def add_last(self) -> None:
+        """Where a run stopped becomes its last row, also between the times of t_eval."""
+        recorded = [times[-1] for times, _ in self._parts if len(times)]
+        if not recorded or self.direction * (self.last - recorded[-1]) > 0.0:
+            self._append(np.array([self.last]), self._last_state[None])
+
+    def _append(self, times: Array, states: Array) -> None:
+        self._parts.append((times, states))
+        self.size += times.nbytes + states.nbytes
+
+    def table(self) -> tuple[Array, Array]:
+        """Times (T,) and states (T, m)."""
+        times, states = zip(*self._parts, strict=True)
+        return np.concatenate(times), np.concatenate(states)
 
 
 def outcome(
@@ -76,3 +121,34 @@ def ended(
         known and known.last,
         (*said, known.warning) if known and known.warning else tuple(said),
     )
+
+
+def advise(
+    run: Integration, reached: float, options: RunOptions, x: Array, again: Callable[[RunOptions], Integration] | None
+) -> None:
+    """Name the method in the warning of a run that is stiff, or in the status of one that lacks a derivative.
+
+    None where all of them stop, or take steps as short, or come no farther.
+
+    reached: how far the run has come [s].  x: where it started, (m,).  again: the same run by other options;
+    None where a controller decides, which may remember what it has seen.
+    """
+    if not (run.stiff or run.slope) or again is None:
+        return
+    length = LONGER * abs(reached - options.t0) / max(run.steps, 1)
+    for name in OTHERS if run.slope else IMPLICIT:
+        trial, t = again(replace(options, method=name, t_eval=None, max_steps=TRIED)), options.t0
+        try:
+            with np.errstate(all="ignore"):
+                for block in trial.blocks(x):
+                    t = float(block.t[-1]) if len(block.t) else t
+        except KeyboardInterrupt:  # of a run that is done
+            return
+        text = f"; try method={name!r}, which comes to t = {t:.6g} s in {counted(trial.steps, 'step')}"
+        if run.slope and not trial.status:
+            run.status += text
+            return
+        whole = trial.steps + trial.rejected < TRIED
+        if not run.slope and not (trial.status and whole) and abs(t - options.t0) >= length * trial.steps > 0.0:
+            run.warnings[run.warnings.index(run.stiff)] += text
+            return

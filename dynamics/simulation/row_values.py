@@ -1,7 +1,8 @@
-"""Row values: what a graph of the state gives at every row of a trajectory."""
+"""Row values: what graphs of the state give at every row of a trajectory, and momenta that velocities do not reach."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,20 @@ from numpy.typing import ArrayLike
 from cgraph import Graph
 from cgraph.extend import Array
 
+from ..integrators import Problem
+from .estimates.state_sizes import OTHERS
+
 BLOCK = 4096  # rows that are taken at once
+LOOSE = 1e-6  # of a momentum, or so much of the largest: what an iteration may leave of it; of a velocity the same
+SLOW = 1e-2  # of the largest velocity: below, one counts as no smaller
+
+
+def values_of(graph: Graph, inputs: Iterable[Any], *shape: int) -> Array:
+    """The outputs of a graph, (k, *shape), at numbers or arrays for its inputs."""
+    result = np.empty((len(graph.outputs), *shape))
+    for k, value in enumerate(graph.evaluate(dict(zip(graph.input_names, inputs, strict=True))).values()):
+        result[k] = value
+    return result
 
 
 def converted(graph: Graph | None, times: ArrayLike, states: Array, parameters: ArrayLike = 0.0) -> Array:
@@ -32,11 +46,48 @@ def row_values(graph: Graph, times: ArrayLike, states: Array, parameters: ArrayL
     *shape, m = states.shape
     rows, t, count = states.reshape(-1, m), np.broadcast_to(times, shape).reshape(-1), len(graph.inputs) - m - 1
     held = np.broadcast_to(parameters, (*shape, count)).reshape(len(rows), count)
-    names, result = graph.input_names, np.empty((len(rows), len(graph.outputs)))
+    result = np.empty((len(rows), len(graph.outputs)))
     with np.errstate(all="ignore"):
         for start in range(0, len(rows), BLOCK):
             part = slice(start, start + BLOCK)
-            values: dict[str, Any] = dict(zip(names, [*rows[part].T, t[part], *held[part].T], strict=True))
-            for column, value in enumerate(graph.evaluate(values).values()):
-                result[part, column] = value
+            result[part] = values_of(graph, [*rows[part].T, t[part], *held[part].T], len(t[part])).T
     return result.reshape(*shape, len(graph.outputs))
+
+
+def unreached_momenta(
+    problem: Problem,
+    times: Array,
+    rows: Array,
+    parameters: ArrayLike = 0.0,
+    *,
+    start: tuple[float, Array, Array],
+) -> list[str]:
+    """What speaks against rows (T, m) of a problem in momenta, a sentence each.
+
+    parameters: further inputs of the graph, (k,); without them 0, of forces that velocities do not depend on.
+    start: the instant, q and qd, and the state (m,) that they make.
+    """
+    if problem.missing is None or not len(rows):
+        return []
+    said = _other_velocities(problem, *start, parameters)
+    momenta, missing = rows[:, problem.nq :], row_values(problem.missing, times, rows, parameters)
+    sizes = np.abs(momenta).max(axis=0, initial=0.0)
+    bad = np.argwhere(~(np.abs(missing) <= LOOSE * np.maximum(sizes, OTHERS * sizes.max(initial=0.0))))
+    if not len(bad):
+        return said
+    row, k = bad[0].tolist()
+    name, left = problem.components[problem.nq + k], f"{missing[row, k]:.2g} of {momenta[row, k]:.2g}"
+    text = f"at t = {times[row]:.6g} s the velocities do not have the momenta: the iteration leaves {left}, {name}"
+    return [*said, f"{text}; take form='velocity'"]
+
+
+def _other_velocities(problem: Problem, t: float, start: Array, x: Array, parameters: ArrayLike) -> list[str]:
+    """Whether the state that a start makes has other velocities: of an L that is not convex there are several."""
+    nq = problem.nq
+    qd, back = start[nq:], converted(problem.velocities, t, x, parameters)[nq:]
+    bad = np.flatnonzero(np.abs(back - qd) > LOOSE * np.maximum(np.abs(qd), SLOW * np.abs(qd).max(initial=0.0)))
+    if not len(bad) or not qd.any():
+        return []
+    k = int(bad[0])
+    other = f"of the {problem.components[nq + k]} it is {back[k]:.6g} in place of {qd[k]:.6g}"
+    return [f"the momenta of the start belong to other velocities too: {other}; take form='velocity'"]

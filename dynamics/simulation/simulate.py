@@ -19,17 +19,14 @@ from ..systems.model import Model
 from .applied_forces import Applied, Tau, with_applied
 from .events.event import Event, as_events
 from .events.event_program import event_program
-from .missed_momenta import missed_momenta
-from .outcome import INTERRUPTED, REACHED, outcome
+from .outcome import INTERRUPTED, REACHED, Recorder, outcome
 from .progress_bar import Progress
-from .recorder import Recorder
-from .row_values import converted
+from .row_values import converted, unreached_momenta
 from .run_options import METHOD, TABLES, RunOptions, room, time_span
-from .solution import Solution
 from .steps.dense_output import StepBlock
 from .steps.integration import integration_of
 from .steps.stepping import Integration
-from .trajectory import SimulationWarning, Stats, Trajectory
+from .trajectory import SimulationWarning, Solution, Stats, Trajectory
 
 
 def simulate(
@@ -176,7 +173,7 @@ def simulate(
 
     # Put the result together
     held = None if hold is None else hold.held
-    if missed := missed_momenta(stepped, *rows, start=(t0, start.x, x)):
+    if missed := unreached_momenta(stepped, *rows, start=(t0, start.x, x)):
         stats = replace(stats, warnings=(*stats.warnings, *missed))
     early = not stats.success and not stats.message.startswith(INTERRUPTED)
     for text in [*([f"the run {stats.message}"] if early else []), *stats.warnings]:

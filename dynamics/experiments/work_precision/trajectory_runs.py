@@ -15,12 +15,12 @@ from cgraph.extend import Array
 
 from ...equations.state_equation import state_inputs
 from ...integrators import METHODS, Problem, derive
-from ...simulation.recorder import Recorder
+from ...simulation.outcome import Recorder
 from ...simulation.run_options import SCIPY, RunOptions
 from ...simulation.steps.integration import integration
 from ...simulation.steps.scipy_solvers import ScipyIntegration, scipy_solver
 from ...simulation.steps.step_program import CompiledSteps, compile_steps, step_program
-from ...simulation.steps.stepping import Integration
+from ...simulation.steps.stepping import Integration, NativeRun
 from ..setting import Setting
 
 EQUAL, CHOSEN = "equal steps", "chosen steps"
@@ -136,11 +136,11 @@ class Ours(Solver):
         if self.kind == EQUAL and self._at_least(knob) > LONGEST:  # such a run does not look at the clock on its way
             return lambda: Outcome(self.start, status=f"would take longer than {LONGEST:g} s")
         compiled, options = self._plain, self._options(knob, [self.setting.t_end])
-        return lambda: finished(integration(compiled, options), self.start)
+        return lambda: finished(integration(NativeRun(compiled, options)), self.start)
 
     def _at_least(self, knob: float) -> float:
         """Seconds that so many equal steps take, by the first few of them."""
-        run = integration(self._plain, self._options(knob, [self.setting.t_end], TRIAL))
+        run = integration(NativeRun(self._plain, self._options(knob, [self.setting.t_end], TRIAL)))
         begin = time.perf_counter()
         finished(run, self.start)
         return (time.perf_counter() - begin) * knob / min(knob, TRIAL)
@@ -148,7 +148,7 @@ class Ours(Solver):
     def rows(self, knob: float) -> Array:
         """The states at the setting's times, (T, m); NaN from where it stopped."""
         times = self.setting.times
-        return recorded(integration(self._dense, self._options(knob, times)), self.start, times)
+        return recorded(integration(NativeRun(self._dense, self._options(knob, times))), self.start, times)
 
 
 class Scipy(Solver):

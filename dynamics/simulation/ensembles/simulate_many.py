@@ -23,19 +23,16 @@ from ..applied_forces import with_applied
 from ..events.event import Event, as_events
 from ..events.event_log import split_crossings
 from ..events.event_program import EventProgram, event_program
-from ..missed_momenta import missed_momenta
 from ..outcome import INTERRUPTED
 from ..progress_bar import Progress
-from ..row_values import converted
+from ..row_values import converted, unreached_momenta
 from ..run_options import METHOD, RunOptions, room, time_span
 from ..sampled_controller import SampledController
 from ..steps.equal_steps import EqualSteps, even_steps, step_count
 from ..steps.step_program import StepProgram, pickled_steps, step_program
 from ..trajectory import SimulationWarning
-from .chunk import Chunk, Part, not_begun
 from .ensemble import Ensemble, EnsembleStats, ensemble_stats
-from .task import Task
-from .vectorized import iterates
+from .task import Chunk, Part, Task, iterates, not_begun
 from .workers import Map, Workers, checked, finished
 
 VECTOR = 8  # lanes, or a multiple of them, of every processor: a chunk of trajectories side by side is whole vectors
@@ -152,7 +149,7 @@ def simulate_many(
     task = Task(pickled_steps(program), sent, count, tuple(grids), pickle.dumps(watch) if watched else b"")
     p = np.array([start.varied[name] for name in problem.parameters]).reshape(-1, len(start.x)).T.copy()
     x = converted(problem.momentum, t0, start.x, p)
-    chunks = _chunks(x, p, _width(len(x), chunk, team, whole=bool(grids)))
+    chunks = _chunks(x, p, chunk, team, whole=bool(grids))
 
     # Integrate, by whoever takes the chunks and compiles the steps
     whole = not_begun(method, 0, np.empty((len(x), count, problem.size)))
@@ -189,7 +186,9 @@ def _ensemble(
     times, rows, nq, each = options.row_times, whole.rows, problem.nq, [*zip(*starts, strict=True)]
     logs = [split_crossings(watch, log, nq, p) for log, (*_, p) in zip(whole.happened, each, strict=True)]
     crossings = {event.name: tuple([named[event.name] for named in logs]) for event in watch.events}
-    missed = [missed_momenta(problem, times, rows[k], p, start=(options.t0, q, x)) for k, (q, x, p) in enumerate(each)]
+    missed = [
+        unreached_momenta(problem, times, rows[k], p, start=(options.t0, q, x)) for k, (q, x, p) in enumerate(each)
+    ]
     stats = ensemble_stats(whole.stats, missed, seconds)
     states = converted(problem.velocities, times, rows, starts[2][:, None])
     momenta = rows[:, :, nq:] if problem.momenta else None
@@ -248,15 +247,12 @@ def _grids(program: StepProgram, options: RunOptions, count: int) -> list[EqualS
     return grids if sum(grid.steps for grid in grids) <= options.max_steps else []
 
 
-def _chunks(x: Array, p: Array, width: int) -> list[Chunk]:
-    return [Chunk(k, x[k : k + width], p[k : k + width]) for k in range(0, len(x), width)]
-
-
-def _width(count: int, chunk: int | None, workers: int | Map, *, whole: bool) -> int:
-    """Trajectories in a chunk; whole: of whole vectors, so that a trajectory has the same neighbors in any chunk."""
+def _chunks(x: Array, p: Array, chunk: int | None, workers: int | Map, *, whole: bool) -> list[Chunk]:
+    """The starts in chunks; whole: of whole vectors, so that a trajectory has the same neighbors in any chunk."""
     if chunk is None:
-        chunk = min(LARGEST, math.ceil(count / (SHARES * (UNKNOWN if callable(workers) else workers))))
-    return math.ceil(chunk / VECTOR) * VECTOR if whole else int(chunk)
+        chunk = min(LARGEST, math.ceil(len(x) / (SHARES * (UNKNOWN if callable(workers) else workers))))
+    width = math.ceil(chunk / VECTOR) * VECTOR if whole else int(chunk)
+    return [Chunk(k, x[k : k + width], p[k : k + width]) for k in range(0, len(x), width)]
 
 
 def _run(task: Task, chunks: Sequence[Chunk], workers: int | Map, whole: Part) -> None:

@@ -1,31 +1,252 @@
-"""Task: the function that runs chunks of an ensemble, in any thread or process."""
+"""Task: the function that runs chunks of an ensemble, side by side or one by one, in any thread or process."""
 
 from __future__ import annotations
 
+import math
 import pickle
 import threading
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
-from cgraph.extend import Array, memo
+import cgraph as cg
+from cgraph import Graph
+from cgraph.extend import Array, Call, FixedPoint, If, Runner, While, memo, runner
 
-from ..estimates.error_estimate import Estimator
+from ..estimates.error_estimate import ErrorEstimate, Estimator
+from ..estimates.runs_beside import Course, States
+from ..events.event_log import Happening, WatchedIntegration
 from ..events.event_program import EventProgram
-from ..events.watched import WatchedIntegration
-from ..outcome import INTERRUPTED, outcome
-from ..recorder import Recorder
+from ..outcome import INTERRUPTED, Recorder, ended, outcome
 from ..run_options import RunOptions
 from ..steps.equal_steps import EqualSteps, equal_steps
 from ..steps.integration import integration
-from ..steps.step_program import CompiledSteps, compile_steps
-from ..steps.stepping import StoppedError
-from .chunk import Chunk, Part, not_begun
-from .vectorized import VectorCode, VectorizedIntegration, beside, vector_code
+from ..steps.step_program import CompiledSteps, StepProgram, compile_steps
+from ..steps.stepping import NativeRun, StoppedError, begin_equal, failed_step
+from ..trajectory import Stats
 
+WORK = 2**21  # nodes computed in a block: half a millisecond for each vector
+NUMBERS = 2**22  # in the rows of a block
+SEEN = 4  # steps that one of the longest of runs beside stands for
 KEPT = 8  # programs that a process keeps ready
+
+
+@dataclass(frozen=True)
+class Chunk:
+    """Trajectories first, first + 1, ..: their starts x (k, m) and the values p (k, ..) of the problem's parameters."""
+
+    first: int
+    x: Array
+    p: Array
+
+
+@dataclass(frozen=True)
+class Part:
+    """What a chunk gives, or all: rows (k, T, m), NaN from where a trajectory stopped on, and how each run went."""
+
+    first: int
+    rows: Array
+    stats: list[Stats]
+    happened: list[list[Happening]]  # the events of each
+
+    def put(self, part: Part) -> None:
+        """What a part gives, in its place."""
+        here = slice(part.first, part.first + len(part.rows))
+        if not np.may_share_memory(part.rows, self.rows):  # from another process
+            self.rows[here] = part.rows
+        self.stats[here], self.happened[here] = part.stats, part.happened
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether the chunk was not run to its end."""
+        return any(each.message.startswith(INTERRUPTED) for each in self.stats)
+
+
+def not_begun(method: str, first: int, rows: Array) -> Part:
+    """The part of the chunk whose rows are to be here, before its first step."""
+    none = Stats(method, 0, 0, 0, 0.0, 0.0, success=False, message=INTERRUPTED, status=-1)
+    return Part(first, rows, [none] * len(rows), [[] for _ in rows])
+
+
+class VectorCode(NamedTuple):
+    """Machine code for the equal steps of many trajectories, a lane of a vector for each.
+
+    start: what they do before the first, over the same memory.  stops: whether a lane whose step failed makes no more;
+    else it goes on, and its state is not finite.
+    """
+
+    program: StepProgram
+    start: Runner | None
+    one_pass: Runner
+    stops: bool
+
+
+def vector_code(program: StepProgram, backend: str) -> VectorCode:
+    """The steps of a program, without its `stop`: lanes that go on do not stop for one that failed."""
+    steps = replace(program.steps, stop=None)
+    first, start = steps.body[0], None
+    if isinstance(first, If) and first.register == "fresh" and not first.otherwise:
+        start, steps = replace(steps, body=first.body), replace(steps, body=steps.body[1:])
+    stops = iterates(program)
+    if stops:  # equations that were not solved leave a state that is finite
+        registers = {**steps.registers, "live": 1}
+        body = (Call(_LIVE, ("nonfinite",), ("live",)), If("live", tuple(steps.body)))
+        start = start and replace(start, registers=registers)
+        steps = replace(steps, registers=registers, body=body)
+    code = VectorCode(program, None if start is None else runner(start, backend), runner(steps, backend), stops)
+    for each in (code.start, code.one_pass):
+        if each is not None:
+            each.run_many(np.zeros((each.size, 0)), 0)  # the code for vectors is compiled at its first use
+    return code
+
+
+def iterates(program: StepProgram) -> bool:
+    """Whether steps turn as often as numbers say, so that lanes wait for one another."""
+    return any(isinstance(each, While | FixedPoint) for each in program.steps.statements())
+
+
+_NONFINITE = cg.variable("nonfinite")
+_LIVE = Graph([_NONFINITE], {"live": cg.where(_NONFINITE, 0.0, 1.0)})
+
+
+def _start_memories(code: VectorCode, x: Array, p: Array) -> Array:
+    """Memories before the first step from states x (k, m) with parameters p (k, ..), (size, k)."""
+    memories = code.one_pass.memory({"x": x.T, "p": p.T}, len(x))
+    if code.start is not None:
+        code.start.run_many(memories, 1)
+    return memories
+
+
+def _block_limits(code: VectorCode, count: int) -> tuple[int, int]:
+    """Steps, and rows, of `count` trajectories in a block; of `SEEN` at least, or a multiple."""
+    program = code.one_pass.program
+    nodes = sum(len(graph.nodes) for graph in program.graphs())
+    limits = WORK // nodes, NUMBERS // (program.width * count)
+    return SEEN * max(1, limits[0] // SEEN), SEEN * max(1, limits[1] // SEEN)
+
+
+def _advanced(code: VectorCode, memories: Array, steps: int, every: int) -> tuple[Array, States]:
+    """So many steps: the record of each `every`th, and its states."""
+    record, read = code.one_pass.run_many(memories, steps, every).rows, code.one_pass.read
+    farthest = int(np.argmax(read(memories, "count")[0]))  # where one has failed its time stands still
+    times, states = np.ascontiguousarray(record[:, 0, farthest]), record[:, 1 : 1 + code.program.size]
+    failed = np.flatnonzero(read(memories, "nonfinite")[0])
+    if code.stops and len(failed):  # what it leaves may be finite, and is no solution
+        begin, ends = read(memories, "start")[0, failed], read(memories, "t")[0, failed]
+        after = np.abs(times[:, None] - begin) >= np.abs(ends - begin)
+        states = states.copy()
+        states[:, :, failed] = np.where(after[:, None], np.nan, states[:, :, failed])
+    return record, States(times, states.transpose(2, 0, 1))
+
+
+def beside(code: VectorCode, course: Course, x: Array, p: Array) -> Iterator[States]:
+    """The states of runs from x (k, m) with parameters p (k, ..) on another course."""
+    memories, most = _start_memories(code, x, p), min(_block_limits(code, len(x)))
+    for number, stretch in enumerate(course.stretches):
+        begin_equal(code.one_pass, memories, stretch.begin, stretch.h)
+        for done in range(0, stretch.steps, most):
+            steps = min(most, stretch.steps - done)
+            yield _advanced(code, memories, steps, math.gcd(steps, 1 if number else course.every))[1]
+
+
+class VectorizedIntegration:
+    """One run of the trajectories of a chunk, into a part.
+
+    estimator: is told the states after all steps, or, where the grid is even, after those that it looks at.
+    A trajectory whose state is no longer finite is noticed after the block in which it stopped being so. From there its
+    lane repeats a neighbor, since NaN is slow to compute with, and its rows become NaN in the end.
+    """
+
+    def __init__(
+        self,
+        code: VectorCode,
+        options: RunOptions,
+        chunk: Chunk,
+        part: Part,
+        estimator: Estimator | None,
+        *,
+        even: bool,
+    ) -> None:
+        self.code, self.program, self.runner, self.part = code, code.program, code.one_pass, part
+        self.estimator, self._seen = estimator, SEEN if even and estimator and not estimator.every else 1
+        count, total = part.rows.shape[:2]
+        self._memories = _start_memories(code, chunk.x, chunk.p)
+        self._live, self._method = np.ones(count, dtype=bool), options.method
+        self._good = np.full(count, total)  # rows that count
+        self._done, self._longest, self._reached = 0, 0.0, options.t0  # steps; s, a step; s, the time of the last block
+        self._at = int(options.times is None or options.times[0] == options.t0)  # row
+        part.rows[:, : self._at] = chunk.x[:, None]
+        passes, rows = _block_limits(code, count)
+        self.limits = passes if estimator is None else min(passes, rows), rows
+
+    def begin(self, grid: EqualSteps) -> None:
+        """The steps that follow are of this grid."""
+        begin_equal(self.runner, self._memories, grid.begin, grid.h)
+        self._longest = max(self._longest, abs(grid.h))
+
+    def advance(self, steps: int, every: int, due: bool) -> None:
+        """Make steps; those after every `every`th are rows if they are due."""
+        if not self._live.any():
+            return
+        before, at, m = self._memories.copy(), self._at, self.program.size
+        seen = every if self.estimator is None else math.gcd(every, self._seen)
+        record, states = _advanced(self.code, self._memories, steps, seen)
+        record = record[every // seen - 1 :: every // seen]
+        if self.estimator is not None:
+            self.estimator.add(states)
+        if due:
+            kept = record[: self.part.rows.shape[1] - self._at]  # t_end itself may be no row
+            self.part.rows[:, self._at : self._at + len(kept)] = kept[:, 1 : 1 + m].transpose(2, 0, 1)
+            self._at += len(kept)
+        failed = self._live & (self.runner.read(self._memories, "nonfinite")[0] != 0.0)
+        for k in np.flatnonzero(failed).tolist():
+            done = self._fail(k, before[:, [k]], steps)
+            self._good[k] = at + done // every if due else at
+        self._live &= ~failed
+        if failed.any() and self._live.any():
+            self._memories[:, ~self._live] = self._memories[:, np.flatnonzero(self._live)[:1]]
+        self._done += steps
+        self._reached = float(self.runner.read(self._memories, "t")[0, 0])
+
+    def interrupt(self) -> None:
+        """Those that have not failed end here, with the rows that they have."""
+        self._good[self._live] = self._at
+        self.end(f"{INTERRUPTED} after t = {self._reached:.6g} s")
+
+    def end(self, status: str = "", errors: Sequence[ErrorEstimate] = ()) -> None:
+        """Those that have not failed end, at their end or for a reason.  errors: of all, if they are estimated."""
+        evaluations = self.runner.read(self._memories, "evaluations")[0]
+        for k in np.flatnonzero(self._live).tolist():
+            self._note(k, self._done, int(evaluations[k]), status, errors[k] if errors else None)
+        for k in np.flatnonzero(self._good < self.part.rows.shape[1]).tolist():
+            self.part.rows[k, self._good[k] :] = np.nan
+
+    def _note(self, k: int, steps: int, evaluations: int, status: str, error: ErrorEstimate | None = None) -> None:
+        counts = (steps, 0, evaluations, self._longest, 0.0)
+        self.part.stats[k] = ended(self._method, counts, status, error=error)
+
+    def _fail(self, k: int, memory: Array, steps: int) -> int:
+        """Note the step of a block of so many, begun with this memory, (size, 1), at which trajectory k failed.
+
+        How many were done before.
+        """
+        read, begun = self.runner.read, memory.copy()
+        rows = self.runner.run_many(memory, steps, 1).rows[:, :, 0]
+        times, states = rows[:, 0], rows[:, 1 : 1 + self.program.size]
+        if self.code.stops:  # the lane makes no more
+            done = int(read(memory, "count")[0, 0] - read(begun, "count")[0, 0]) - 1
+        else:
+            done = int(np.argmax(~np.isfinite(states).all(axis=1)))
+        before = states[done - 1] if done else read(begun, "x")[:, 0]
+        singular = read(memory, "singular")[0, 0] if "singular" in self.runner.program.registers else 0.0
+        first, last = (read(each, "evaluations")[0, 0] for each in (begun, memory))
+        evaluations = first + (done + 1) * (last - first) / (done + 1 if self.code.stops else steps)
+        status = failed_step(self.program.components, times[done], before, states[done], int(singular))
+        self._note(k, self._done + done, int(evaluations), status)
+        return done
 
 
 @dataclass(frozen=True)
@@ -76,7 +297,7 @@ class Task:
             compiled = _compiled(self.pickled, self.options.backend)
         events = _event_program(self.events) if self.events else None
         for k, x in enumerate(chunk.x):
-            run = integration(compiled, self.options, chunk.p[k].tolist(), stopped, events=events)
+            run = integration(NativeRun(compiled, self.options, chunk.p[k].tolist(), stopped), events=events)
             recorder = Recorder(x, self.options.times, self.options.t0, self.options.direction)
             part.stats[k] = outcome(run, x, recorder, self.options)
             if isinstance(run, WatchedIntegration):

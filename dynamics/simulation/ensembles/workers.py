@@ -15,13 +15,12 @@ import numpy as np
 
 from cgraph.extend import Array, thread_count
 
-from .chunk import Chunk, Part
-from .task import Task
+from .task import Chunk, Part, Task
 
 Map = Callable[[Callable[[Chunk], Part], Sequence[Chunk]], Iterable[Part]]
 Workers = int | Map | None
 LOOK = 0.1  # s: not every system interrupts a wait without an end for Ctrl-C
-MOST = 2**31  # threads
+MOST_THREADS = 2**31  # threads
 
 
 def checked(workers: Workers) -> int | Map:
@@ -30,7 +29,7 @@ def checked(workers: Workers) -> int | Map:
         return workers
     if workers is None:
         return thread_count(None)
-    if isinstance(workers, bool) or not isinstance(workers, (int, np.integer)) or not 1 <= workers <= MOST:
+    if isinstance(workers, bool) or not isinstance(workers, (int, np.integer)) or not 1 <= workers <= MOST_THREADS:
         raise ValueError(
             "workers must be a whole number from 1, None for one on each core, or a function like map, got "
             f"{workers!r:.40}"

@@ -1,1 +1,1 @@
-"""Estimates: how far a run may be off, and advice on methods."""
+"""Estimates: how far a run of equal steps may be off, and how large states are."""

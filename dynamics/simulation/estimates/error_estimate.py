@@ -9,6 +9,7 @@ h^(p + 1). This is the error of the state, phase included, not that of the energ
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -18,15 +19,15 @@ import numpy as np
 from cgraph.extend import Array
 
 from ..run_options import RunOptions
-from ..steps.equal_steps import SAME, EqualSteps
+from ..steps.dense_output import StepBlock
+from ..steps.equal_steps import SAME, EqualSteps, equal_steps
 from ..steps.step_program import StepProgram
-from .courses import LATE, SHARE, Course, Law, courses
-from .state_difference import Difference, States, even, together
-from .state_sizes import StateSizes
+from ..steps.stepping import FixedStepIntegration, Integration
+from .runs_beside import LATE, SHARE, Course, Difference, Law, States, courses, even, together
+from .state_sizes import off_by
 from .unresolved import missed, turning, unresolved
 
 LEAST = 2.0  # times a difference that of steps twice as long is, at least, where the error has a law
-ROUNDING = 1e-10  # of the largest component of its kind: where one is that small, rounding is no error of it
 LAWLESS = 0.1  # of the size of a component: a difference above it follows no power of the step
 UNIT = 2.0**-52  # the last bit of a number near 1
 NUDGE = 8.0 * UNIT  # of each component, by which runs beside start aside: what roundings grow to is part of the error
@@ -82,7 +83,7 @@ class Estimator:
         self._missed = np.zeros((k, m))  # by how much steps across jumps and kinks are off
         self._unresolved = unresolved(self.program.rate)
         self._end: States | None = None  # of what was compared
-        self._begun = self.options.t0  # the leg [s]
+        self._begun = self.options.t0  # the segment [s]
 
     def begin(self, x: Array, stretches: Sequence[EqualSteps], *, shorter: bool = False) -> None:
         """The runs start from x (k, m), on these steps."""
@@ -104,7 +105,7 @@ class Estimator:
         """Whether it looks at all steps, for one may pass a jump or a kink."""
         return not self.longer or self._unresolved.branches is not None
 
-    def leg(self, stretches: Sequence[EqualSteps]) -> None:
+    def segment(self, stretches: Sequence[EqualSteps]) -> None:
         """After a reset, the runs go on with these steps."""
         lasted, self._begun = abs(stretches[0].begin - self._begun), stretches[0].begin
         for beside in self._beside:
@@ -192,9 +193,7 @@ class Estimator:
         first = self._differences[0]
         if not first.compared and np.isnan(first.lost).all():
             return [ErrorEstimate(math.nan, math.nan, "")] * len(self._size)
-        kinds = [0] * self.program.size if self.program.ordinary else self.program.kinds
-        sizes = StateSizes(0.0, kinds, self.program.groups, 0.0, self.program.lengths)
-        scale = self._size + ROUNDING * sizes.largest_of_kind(self._size)
+        scale = self.program.kinds.scale(self._size)
         least = UNIT * math.sqrt(self._steps)
         largest, last = (
             np.maximum(least, self._errors([np.where(change > 0.0, change / scale, 0.0) for change in changes]))
@@ -206,7 +205,7 @@ class Estimator:
         resolved = math.pi * max(1.0, 0.5 * self.program.order) / self._longest  # rad/s: two evaluations in a turn
         largest[self._turning > resolved] = last[self._turning > resolved] = math.inf
         options = self.options
-        beyond = ~(largest * scale <= options.absolute + options.relative * scale)
+        allowed = options.absolute + options.relative * scale
         result = []
         for k in range(len(scale)):
             said = ""
@@ -218,10 +217,8 @@ class Estimator:
             elif not math.isnan(first.lost[k]):
                 at = f"t = {first.lost[k]:.6g} s"
                 said = f"{UNKNOWN}: beside it a run of other steps stops, or takes another course, at {at}"
-            elif beyond[k].any():
-                worst = int(np.argmax(np.where(beyond[k], largest[k], -1.0)))
-                name = self.program.components[worst]
-                said = f"the state is off by an estimated {largest[k, worst]:.2g} of the size of {name}"
+            else:
+                said = off_by(largest[k], scale[k], allowed[k], self.program.components)
             result.append(ErrorEstimate(float(largest[k].max()), float(last[k].max()), said and self._sentence(said)))
         return result
 
@@ -247,3 +244,71 @@ class Estimator:
             f"{what}; rtol = {options.relative:g} allows less: take a dt shorter than {options.step:g} s, or "
             "method='dop853', which chooses its steps"
         )
+
+
+class RunEstimate:
+    """Is told the blocks of a run from x as they come; of a run whose error is not estimated it forgets them.
+
+    Runs beside have resets of their own. The forces of a controller answer the states of the run, and would be others
+    beside it: there each stretch of steps under the same forces is compared by itself, from where the run is.
+    """
+
+    def __init__(self, run: Integration, x: Array, options: RunOptions) -> None:
+        self._run, self._x, self._options = run, x[None], options
+        self._estimator: Estimator | None = None
+        self._segment: FixedStepIntegration | None = None
+        self._stretch: EqualSteps | None = None
+        self.seconds = 0.0  # spent here
+
+    def add(self, block: StepBlock) -> None:
+        """The next steps of the run, or a reset."""
+        if not self._options.estimated:
+            return
+        begin = time.perf_counter()
+        self._add(block)
+        self.seconds += time.perf_counter() - begin
+
+    def _add(self, block: StepBlock) -> None:
+        segment = self._run.segment
+        assert isinstance(segment, FixedStepIntegration)
+        controlled = segment.control is not None
+        if not len(block.t) or (controlled and block.h[0] == 0.0):
+            return
+        if self._estimator is None:
+            sparse = segment is self._run
+            p = np.array([segment.parameters])
+            self._estimator = Estimator(segment.program, self._options, p, self._beside, sparse=sparse)
+            self._estimator.begin(self._x, segment.stretches, shorter=controlled)
+        elif segment is not self._segment and not controlled:
+            self._estimator.segment(segment.stretches)
+        self._segment = segment
+        if controlled and segment.stretch is not self._stretch:
+            self._stretch = segment.stretch
+            self._estimator.restart(block.x_old[:1], segment.stretch, np.array([segment.parameters]))
+        self._estimator.add(States(block.t, block.x[None], 0 if controlled else self._run.resets))
+
+    def result(self) -> ErrorEstimate | None:
+        """After the last step; None where there was none."""
+        begin = time.perf_counter()
+        error = None if self._estimator is None else self._estimator.estimates()[0]
+        self.seconds += time.perf_counter() - begin
+        return error
+
+    def _beside(self, course: Course, x: Array, p: Array) -> Iterator[States]:
+        """The states of a run on another course."""
+        run, segment = self._run, self._run.segment
+        assert isinstance(segment, FixedStepIntegration)
+        other: Integration = segment.beside(course.stretches, p[0].tolist())
+        if segment.control is None and run is not segment:  # with events
+            from ..events.event_log import WatchedIntegration
+
+            assert isinstance(run, WatchedIntegration)
+            other = run.beside(course.steps) if run.resetting else other
+        for block in other.blocks(x[0]):
+            yield States(block.t, block.x[None], other.resets)
+            at, t = course.stretches[0].begin, float(block.t[-1])
+            if block.h[0] == 0.0 and abs(at - t) <= course.late:  # a reset, which the run had at another time
+                aside = segment.beside(equal_steps([t, at], course.longest), p[0].tolist()).blocks(block.x[-1])
+                for one in [block] if at == t else aside:
+                    if one.t[-1] == at:
+                        yield States(one.t[-1:], one.x[None, -1:], other.resets)

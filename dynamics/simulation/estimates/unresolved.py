@@ -11,6 +11,7 @@ from cgraph import Graph, Node, floor, less, variable, where
 from cgraph.extend import Array, Builder, building, kept_by_first
 
 from ...systems.arguments import TIME
+from ..row_values import values_of
 from .state_sizes import Flags
 
 PARTS, TIMES = 16, 10  # into which the way from one state to the next is divided, and again, to find a branch's change
@@ -148,5 +149,4 @@ def _way(branches: Graph, begin: _End, end: _End, p: Array) -> Array:
 def _values(graph: Graph, t: Array, x: Array, p: Array, more: Iterable[Array] = ()) -> Array:
     """Outputs, (.., *shape), at times t, states x (*shape, m) and parameters p (*shape, ..), and further inputs."""
     columns = [*np.moveaxis(x, -1, 0), t, *np.moveaxis(p, -1, 0), *more]
-    values = graph.evaluate(dict(zip(graph.input_names, columns, strict=True)))
-    return np.stack([np.broadcast_to(value, x.shape[:-1]) for value in values.values()])
+    return values_of(graph, columns, *x.shape[:-1])

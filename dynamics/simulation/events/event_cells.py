@@ -16,7 +16,7 @@ Flags = np.ndarray[Any, np.dtype[np.bool_]]
 
 CELLS = 8  # of a step before the first split, so that it is looked at sixteen times at least
 NODES = 0.5 - 0.5 * np.cos(np.pi * np.arange(CELLS + 1) / CELLS)  # not evenly spaced: no oscillation hides between them
-MOST = 1024  # cells of a step
+MOST_CELLS = 1024  # cells of a step
 COARSER = 8.0  # than a neighbor a cell may not be: it would agree by chance
 SHORTEST = 2.0**-48  # of a step, a cell
 DECAY = 16.0  # of what a cubic misses, from a cell to its halves
@@ -65,8 +65,7 @@ class Cells(NamedTuple):
 
     def take(self, which: Flags | Indices) -> Cells:
         """Some of them."""
-        columns: list[Any] = [array[which] for array in self]
-        return Cells(*columns)
+        return Cells._make([array[which] for array in self])
 
     def beside(self, extreme: Callable[[Array, Array], Array], values: Array) -> Array:
         """Of a cell's value and those of its neighbors the smallest or largest."""
@@ -113,7 +112,7 @@ class Cells(NamedTuple):
 
 
 def event_cells(steps: WatchedSteps) -> tuple[Cells, Flags]:
-    """The cells of all steps in order, and for which steps, (steps,), `MOST` were too few."""
+    """The cells of all steps in order, and for which steps, (steps,), `MOST_CELLS` were too few."""
     count = len(steps.block.t)
     cells = _split(steps, _whole(steps), bounded=False)
     worst = cells.miss.reshape(count, 2 * CELLS).max(axis=1)
@@ -124,14 +123,13 @@ def event_cells(steps: WatchedSteps) -> tuple[Cells, Flags]:
         unresolved = ~cells.resolved() & (width > SHORTEST)
         split = unresolved | (cells.beside(np.minimum, width) * COARSER < width)
         size = np.bincount(cells.rows, minlength=count) + np.bincount(cells.rows[split], minlength=count)
-        late = (size > MOST)[cells.rows]
+        late = (size > MOST_CELLS)[cells.rows]
         beyond[cells.rows[unresolved & late]] = True
         split &= ~late
         if not split.any():
             return cells, beyond
         parts = cells.take(~split), _split(steps, cells.take(split), bounded=True)
-        columns: list[Any] = [np.concatenate(pair) for pair in zip(*parts, strict=True)]
-        cells = Cells(*columns)
+        cells = Cells._make([np.concatenate(pair) for pair in zip(*parts, strict=True)])
         cells = cells.take(np.lexsort((cells.a, cells.rows)))
 
 
@@ -157,11 +155,9 @@ def _split(steps: WatchedSteps, cells: Cells, *, bounded: bool) -> Cells:
     g_off = g - 0.5 * (cells.g_a + cells.g_b) - 0.125 * width * (cells.slope_a - cells.slope_b)
     slope_off = width * (slope + 0.25 * (cells.slope_a + cells.slope_b)) - 1.5 * (cells.g_b - cells.g_a)
     off = np.maximum(np.abs(g_off), 0.25 * np.abs(slope_off))
-    miss = (
-        np.maximum(4.0 * cells.beside(np.maximum, cells.beside(np.maximum, off)), cells.miss) / DECAY
-    )  # a cubic that is far off may agree by chance
+    wide = 4.0 * cells.beside(np.maximum, cells.beside(np.maximum, off))  # one that is far off may agree by chance
+    miss = np.maximum(wide, cells.miss) / DECAY
     rounding = steps.rounding(cells.rows, middle) if bounded else cells.rounding
     left = cells._replace(b=middle, g_b=g, slope_b=slope, miss=miss, rounding=rounding)
     right = cells._replace(a=middle, g_a=g, slope_a=slope, miss=miss, rounding=rounding)
-    columns: list[Any] = [np.stack(pair, axis=1).ravel() for pair in zip(left, right, strict=True)]
-    return Cells(*columns)
+    return Cells._make([np.stack(pair, axis=1).ravel() for pair in zip(left, right, strict=True)])

@@ -1,10 +1,11 @@
-"""EventLog: the events of a run, block by block, whether one ends it, and the state from which one restarts it."""
+"""EventLog: the events of a run, block by block, and the run that ends or restarts where one happens."""
 
 from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -14,9 +15,12 @@ from cgraph.extend import Array
 
 from ...integrators.step_control import RESOLUTION
 from ..row_values import converted
+from ..run_options import RunOptions
 from ..steps.dense_output import UNIT, StepBlock
+from ..steps.equal_steps import EqualSteps
+from ..steps.stepping import FixedStepIntegration, Integration
 from ..trajectory import Crossings
-from .event_cells import MOST, Flags, WatchedSteps
+from .event_cells import MOST_CELLS, Flags, WatchedSteps
 from .event_location import Crossing, Side, crossings
 from .event_program import EventProgram
 
@@ -26,7 +30,7 @@ AT_ONCE = 32  # restarts of the run in a row, at one instant or of contacts that
 RESETS = 10_000  # one after another before a restart: more than bodies that touch need to come apart
 MISSED = (
     "may have been missed, first after t = {:.6g} s: its quantity turns too often for "
-    f"{MOST} looks in a step; shorter steps (max_step or dt) find all"
+    f"{MOST_CELLS} looks in a step; shorter steps (max_step or dt) find all"
 )
 UNSIDED = (
     "starts at zero and leaves it at t = {:.6g} s, where nothing is reset: it has no direction, which would tell on "
@@ -258,3 +262,95 @@ def split_crossings(
         states = converted(program.velocities, times, states, parameters)
         result[event.name] = Crossings(times, states[:, :nq], states[:, nq:])
     return result
+
+
+class WatchedIntegration(Integration):
+    """A run with events, in segments: each starts where the options say, or from the state that a reset leaves.
+
+    segment: makes the integration of a segment from its options.
+    """
+
+    def __init__(
+        self, segment: Callable[[RunOptions], Integration], options: RunOptions, program: EventProgram
+    ) -> None:
+        super().__init__(program.components)
+        self._make, self.options, self.log = segment, options, EventLog(program)
+        self._segments: list[Integration] = []
+
+    @property
+    def segment(self) -> Integration:
+        """The part of the run that it is in: what makes its steps since the last reset."""
+        return self._segments[-1]
+
+    @property
+    def resetting(self) -> bool:
+        """Whether there are events that reset the state."""
+        return any(event.reset is not None for event in self.log.program.events)
+
+    def beside(self, steps: Callable[[float], Sequence[EqualSteps]]) -> WatchedIntegration:
+        """The same run with other equal steps: those of a segment from the time on at which it begins."""
+        first, options = self._segments[0], replace(self.options, max_steps=math.inf)
+        assert isinstance(first, FixedStepIntegration)
+        return WatchedIntegration(
+            lambda segment: first.beside(steps(segment.t0), first.parameters), options, self.log.program
+        )
+
+    def crossings(self, nq: int, parameters: ArrayLike = 0.0) -> dict[str, Crossings]:
+        """Of each event by name, where it happened, with states split after nq numbers; parameters: of the problem."""
+        return split_crossings(self.log.program, self.log.happened, nq, parameters)
+
+    def blocks(self, x: Array) -> Iterator[StepBlock]:
+        """The steps from x (m,) on, some at a time. A reset is a step of no length."""
+        options, log = self.options, self.log
+        while True:
+            yield from self._segment(options, x)
+            if self.status or log.restart is None:
+                return
+            (t, before, x_new), log.restart = log.restart, None
+            self.resets = sum(log.program.events[number].reset is not None for number, _, _ in log.happened)
+            instant = np.array([t])
+            yield StepBlock(instant, x_new[None], instant, np.zeros(1), before[None], np.zeros((1, 1, len(x))))
+            if self.event or t == options.t_end:
+                return
+            options, x = self._rest(t), x_new
+
+    def _segment(self, options: RunOptions, x: Array) -> Iterator[StepBlock]:
+        """The steps up to an event after which the run does not go on as it did, or to the end."""
+        run, log, last = self._make(options), self.log, options.t0
+        self._segments.append(run)
+        rejected, evaluations = self.rejected, self.evaluations
+        for block in run.blocks(x):
+            log.parameters = run.parameters
+            kept = log(run.with_dense(block))
+            self.steps += len(kept.t)
+            self._count(run, rejected, evaluations)
+            if len(kept.t):
+                last = float(kept.t[-1])
+                yield kept
+            if log.ended or log.restart is not None:
+                break
+        else:
+            self._count(run, rejected, evaluations)
+            self.status = run.status
+            if run.status and self.steps + self.rejected >= self.options.max_steps:
+                self.status = self.too_many(last, self.options.max_steps)
+            if not run.status:
+                log.finish()
+        self.status, self.event = log.status or self.status, log.ended
+
+    def _count(self, run: Integration, rejected: int, evaluations: int) -> None:
+        self.rejected, self.evaluations = rejected + run.rejected, evaluations + run.evaluations
+        self.jacobians = sum(segment.jacobians for segment in self._segments)
+        self.factorizations = sum(segment.factorizations for segment in self._segments)
+        self.largest, self.stiff = max(self.largest, run.largest), self.stiff or run.stiff
+        self.slope = run.slope
+        self.warnings = list(dict.fromkeys([*self.warnings, *run.warnings, *self.log.warnings]))
+
+    def _rest(self, t: float) -> RunOptions:
+        """The options of the rest of the run from t on, whose first step is chosen anew."""
+        options, times = self.options, self.options.times
+        if times is not None:
+            ahead = times[(times - t) * options.direction > 0.0]
+            times = ahead if len(ahead) else np.array([options.t_end])
+        left = max(1.0, options.max_steps - self.steps - self.rejected)
+        return replace(options, t0=t, t_eval=times, first_step=None, max_steps=left)

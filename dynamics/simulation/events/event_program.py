@@ -15,6 +15,7 @@ from cgraph.extend import Array, Builder, building, columns, topological
 from ...equations.substitute import substitute
 from ...integrators import Problem, quantity, quantity_inputs, state_arguments
 from ...systems.arguments import call_user_function, node_or_number, sequence
+from ..row_values import values_of
 from ..steps.dense_output import UNIT
 from .event import Event
 
@@ -43,17 +44,17 @@ class WatchedEvent:
 
     def value(self, t: Array, x: Array, p: Sequence[float]) -> Array:
         """g, (k,), at times (k,) and states (k, m)."""
-        g: Array = _table(self.values, [*x.T, t, *p], len(t))[0]
+        g: Array = values_of(self.values, [*x.T, t, *p], len(t))[0]
         return g
 
     def slope(self, t: Array, x: Array, p: Sequence[float], x_dot: Array, t_dot: Array) -> Array:
         """The derivative of g, (k,), where x and t have the derivatives x_dot (k, m) and t_dot (k,)."""
-        g: Array = _table(self.slopes, [*x.T, t, *p, *x_dot.T, t_dot], len(t))[0]
+        g: Array = values_of(self.slopes, [*x.T, t, *p, *x_dot.T, t_dot], len(t))[0]
         return g
 
     def error(self, t: Array, x: Array, p: Sequence[float], x_error: Array, t_error: Array) -> Array:
         """What g is off by, (k,), from some roundings, where x and t are off by x_error (k, m) and t_error (k,)."""
-        g: Array = _table(self.errors, [*x.T, t, *p, *x_error.T, t_error], len(t))[0]
+        g: Array = values_of(self.errors, [*x.T, t, *p, *x_error.T, t_error], len(t))[0]
         return ROUNDINGS * g
 
 
@@ -92,12 +93,12 @@ class EventProgram:
 
     def rates(self, t: Array, x: Array, p: Sequence[float]) -> Array:
         """The derivatives of the states by the time, (k, m), at times (k,) and states (k, m)."""
-        return _table(self.rate, [*x.T, t, *p], len(t)).T
+        return values_of(self.rate, [*x.T, t, *p], len(t)).T
 
     def reset(self, number: int, t: float, x: Array, p: Sequence[float]) -> Array:
         """The state (m,) after an event; the same where it resets nothing."""
         graph = self.events[number].reset
-        return x if graph is None else _table(graph, [*x, t, *p], 1)[:, 0]
+        return x if graph is None else values_of(graph, [*x, t, *p], 1)[:, 0]
 
 
 def event_program(problem: Problem, events: Sequence[Event]) -> EventProgram:
@@ -161,8 +162,3 @@ def _errors(graph: Graph, inputs: Sequence[Node]) -> Graph:
             errors[node] = total
     outputs = {name: errors[node] for name, node in graph.outputs.items()}
     return Graph([*graph.inputs, *leaves], outputs)
-
-
-def _table(graph: Graph, columns: Sequence[Array | float], k: int) -> Array:
-    values = graph.evaluate(dict(zip(graph.input_names, columns, strict=True)))
-    return np.array([np.broadcast_to(value, k) for value in values.values()]).reshape(len(values), k)

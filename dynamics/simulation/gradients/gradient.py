@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -12,21 +12,21 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Array, Builder, kept_by_first
+from cgraph.extend import Array, Builder, kept_by_first, memo
 
-from ...integrators import quantity
+from ...integrators import Problem, quantity, quantity_inputs
 from ...systems.model import Model
 from ...systems.system import System
 from ..applied_forces import Constant
 from ..events.event import Event, as_events
 from ..trajectory import SimulationWarning
 from .doubts import doubts
-from .legs import Bars, Legs, legs_of
-from .loss_function import loss_graph, with_slopes
 from .motion import START, TORQUE, VELOCITY, MotionRequest, motion_of
-from .point_functions import at
+from .motion_equations import at
+from .segments import Bars, MotionSegments, segments_of
 
 Loss = Callable[..., Node]
+KEPT = 64  # losses whose graphs stay for another run
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,73 +156,62 @@ def gradient(
     >>> round(result.value, 6), result["q"].round(6).tolist(), result["tau"].shape
     (-0.403412, [-0.880376], (100, 1))
     """
-    options = {"dt": dt, "max_step": max_step, "rtol": rtol, "atol": atol, "first_step": first_step, "backend": backend}
-    options["estimate_error"] = estimate_error
-    watched = as_events(events)
-    motion = motion_of(model, q, qd, (t_end, t0, t_span), method, tau, parameters, wrt, options, form, watched)
-    value, gradients, legs, slopes = differentiated(motion, loss, running, watched)
-    for text in doubts(legs, value, gradients, slopes)[0]:
+    options: dict[str, Any] = {"dt": dt, "max_step": max_step, "rtol": rtol, "atol": atol, "first_step": first_step}
+    options |= {"estimate_error": estimate_error, "backend": backend}
+    span, watched = (t_end, t0, t_span), as_events(events)
+    motion = motion_of(model, q, qd, span, method, tau, parameters, wrt, form, watched, **options)
+    values, slopes, segments, ends = differentiated(motion, loss, running, watched)
+    for text in doubts(segments, values, slopes, ends)[0]:
         warnings.warn(text, SimulationWarning, stacklevel=2)
-    nq, checkpoints = motion.problem.nq, max([run.tape.checkpoints for run in legs.runs])
-    x = legs.end
-    return MotionGradient(float(value), gradients, legs.t, x[:nq], x[nq:], checkpoints)
+    nq, x, checkpoints = motion.problem.nq, segments.end[:, 0], max([run.tape.checkpoints for run in segments.runs])
+    gradients = {name: each[..., 0] if each.ndim > 1 else float(each[0]) for name, each in slopes.items()}
+    return MotionGradient(float(values[0]), gradients, segments.t, x[:nq], x[nq:], checkpoints)
 
 
 def differentiated(
     motion: MotionRequest, loss: Loss | None, running: Loss | None, watched: Sequence[Event] = ()
-) -> tuple[Any, dict[str, Any], Legs, tuple[Array, Array]]:
-    """The loss of a motion, its gradient by names, the motion, and the slopes of the loss by its start and by its end.
-
-    Of N motions side by side all have an axis more, the last.
-    """
+) -> tuple[Array, dict[str, Array], MotionSegments, tuple[Array, Array]]:
+    """Losses (N,) of motions, their gradients (.., N) by names, the motions, and the losses' slopes by both ends."""
     problem = motion.problem
     if loss is None and running is None:
         raise ValueError("a loss is needed: of the end of the motion, `loss`, of how it goes, `running`, or both")
     final = None if loss is None else loss_graph(problem, quantity(problem, "loss", loss))
     total = None if running is None else loss_graph(problem, quantity(problem, "running", running, motion.applied))
-    legs = legs_of(motion, watched, total, forwards=False)
-    value, end = _final(final, motion, legs)
-    start, inputs, rows = legs.pulled(end)
-    return value + legs.loss, _gradients(motion, start, inputs, rows, end), legs, (start, end.x)
+    segments = segments_of(motion, watched, total, forwards=False)
+    values, end = _final(final, motion, segments)
+    start, inputs, rows = segments.pulled(end)
+    return values + segments.loss, _gradients(motion, start, inputs, rows, end), segments, (start, end.x)
 
 
-def _final(graph: Graph | None, motion: MotionRequest, legs: Legs) -> tuple[Any, Bars]:
-    """The final loss, and its slopes."""
-    m = len(legs.x)
+def _final(graph: Graph | None, motion: MotionRequest, segments: MotionSegments) -> tuple[Array, Bars]:
+    """The final losses, (N,), and their slopes."""
+    m, many = segments.x.shape
     if graph is None:
-        inputs = np.zeros((motion.forces + len(motion.values), *legs.x.shape[1:]))
-        return 0.0, Bars(np.zeros_like(legs.x), 0.0, inputs)
-    value, *bars = at(with_slopes(graph, motion.backend), motion.at_end(legs.x, float(legs.t[-1])))
-    return value, Bars(np.array(bars[:m]), bars[m], np.array(bars[m + 1 :]).reshape(-1, *legs.x.shape[1:]))
+        inputs = np.zeros((motion.forces + len(motion.values), many))
+        return np.zeros(many), Bars(np.zeros_like(segments.x), np.zeros(many), inputs)
+    values = at(with_slopes(graph, motion.backend), motion.at_end(segments.x, float(segments.t[-1])))
+    return values[0], Bars(values[1 : m + 1], values[m + 1], values[m + 2 :])
 
 
-def _gradients(motion: MotionRequest, start: Array, inputs: Array, rows: Array, end: Bars) -> dict[str, Any]:
+def _gradients(motion: MotionRequest, start: Array, inputs: Array, rows: Array, end: Bars) -> dict[str, Array]:
     """By the names of `wrt`, from the cotangents of the start, of the inputs, and of the forces of each step."""
-    nq, forces, equations, many = motion.problem.nq, motion.forces, motion.equations, motion.many
-    by_name: dict[str, Any] = {}
+    nq, forces, equations = motion.problem.nq, motion.forces, motion.equations
+    result: dict[str, Array] = {}
     if motion.by_parameters:
         p = motion.values[: len(equations.names)]
-        by_name = dict(zip(equations.names, equations.by_parameters(p, inputs[forces:], motion.backend), strict=True))
-    result: dict[str, Any] = {}
-    for name in motion.wrt:
-        if name == START:
-            result[name] = _displaced(motion, start)
-        elif name == VELOCITY:
-            result[name] = start[nq:]
-        elif name == TORQUE and motion.each_step:
+        result = dict(zip(equations.names, equations.by_parameters(p, inputs[forces:], motion.backend), strict=True))
+    if TORQUE in motion.wrt:
+        if motion.each_step:
             rows[-1] += end.inputs[:forces]  # what the final loss has of the force itself
-            result[name] = rows
-        elif name == TORQUE:
-            result[name] = inputs[:forces]
-        else:
-            result[name] = by_name[name] if many else float(by_name[name])
-    return result
+        result[TORQUE] = rows if motion.each_step else inputs[:forces]
+    result |= {START: _displaced(motion, start), VELOCITY: start[nq:]}
+    return {name: result[name] for name in motion.wrt}
 
 
 def _displaced(motion: MotionRequest, bar: Array) -> Array:
     """The cotangent of the coordinates; of quasi-velocities by displacements, G^T q_bar."""
     system, nq = motion.problem.system, motion.problem.nq
-    if system is None or system.kinematics.quasi is None:
+    if system is None or system.kinematics.quasi is None or START not in motion.wrt:
         return bar[:nq]
     return at(_by_displacements(system, motion.backend), np.concatenate([motion.x[:nq], bar[:nq]]))
 
@@ -233,3 +222,31 @@ def _by_displacements(system: System, backend: str) -> Any:
     bars = cg.variables([f"bar{k}" for k in range(system.nq)])
     pulled = system.kinematics.pulled_back(bars, Builder())
     return cg.compile(Graph([*system.q, *bars], {f"{k}": node for k, node in enumerate(pulled)}), backend)
+
+
+@dataclass(frozen=True)
+class _Quantity:
+    """A quantity of a problem, known by its operations, so that what is derived from it is derived once."""
+
+    problem: Problem
+    structure: str
+    node: Node = field(compare=False)
+
+
+def loss_graph(problem: Problem, node: Node) -> Graph:
+    """The loss over the states, t and parameters; the same object for an equal one."""
+    graph = Graph(quantity_inputs(problem), {"loss": node})
+    return _bound(_Quantity(problem, cg.structure_hash(graph), node))
+
+
+@memo(KEPT)
+def _bound(quantity: _Quantity) -> Graph:
+    return quantity.problem.observed({"loss": quantity.node})
+
+
+@kept_by_first
+def with_slopes(graph: Graph, backend: str) -> Any:
+    """The loss, and its slopes by all inputs, as a function."""
+    slopes = cg.gradient(graph)
+    both = {"loss": graph.only_output()} | {f"slope{k}": node for k, node in enumerate(slopes.outputs.values())}
+    return cg.compile(cg.simplify(Graph(graph.inputs, both)), backend)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -121,49 +122,49 @@ def gradient_many(
     >>> fan["q"].round(4).tolist()
     [[-0.8804], [-1.1123], [-0.595]]
     """
-    options = {"dt": dt, "max_step": max_step, "rtol": rtol, "atol": atol, "first_step": first_step, "backend": backend}
-    options |= {"estimate_error": estimate_error}
-    motions = motion_of(model, q, qd, (t_end, t0, t_span), method, tau, parameters, wrt, options, form, many=True)
+    options: dict[str, Any] = {"dt": dt, "max_step": max_step, "rtol": rtol, "atol": atol, "first_step": first_step}
+    options |= {"estimate_error": estimate_error, "backend": backend}
+    span = (t_end, t0, t_span)
+    motions = motion_of(model, q, qd, span, method, tau, parameters, wrt, form, many=True, **options)
     count, problem, run = motions.many, motions.problem, motions.options
     parts = _parts(motions)
     value, end = np.full(count, np.nan), np.full((count, problem.size), np.nan)
     by_name = {name: np.full((count, *shape), np.nan) for name, shape in _shapes(motions).items()}
     early, said = dict[int, str](), dict[int, str]()
     for part in parts:
-        first = part if isinstance(part, int) else part.start
         try:
-            losses, slopes, legs, ends = differentiated(_some(motions, part), loss, running)
+            losses, slopes, segments, ends = differentiated(_some(motions, part), loss, running)
         except MotionError as error:
-            if isinstance(part, int):
-                early[first] = str(error)
+            if len(part) == 1:
+                early[part[0]] = str(error)
             else:  # one of them has no derivative
-                parts += range(first, part.stop)
+                parts += [range(k, k + 1) for k in part]
             continue
-        arrived, texts = np.atleast_1d(np.isfinite(legs.end).all(axis=0)), doubts(legs, losses, slopes, ends)
-        rows = first + np.flatnonzero(arrived)
-        value[rows], end[rows] = np.atleast_1d(losses)[arrived], _by_motion(legs.end, part)[arrived]
-        for name, array in slopes.items():
-            by_name[name][rows] = _by_motion(array, part)[arrived]
-        for k, whole in enumerate(arrived):
+        arrived = np.array([np.isfinite(end_of_one).all() for end_of_one in segments.end.T])
+        texts = doubts(segments, losses, slopes, ends)
+        rows = part.start + np.flatnonzero(arrived)
+        for table, array in [(value, losses), (end, segments.end), *[(by_name[name], slopes[name]) for name in slopes]]:
+            table[rows] = np.moveaxis(array, -1, 0)[arrived]
+        for number, whole, sentences in zip(part, arrived, texts, strict=True):
             if not whole:
-                early[first + k] = f"the motion {legs.runs[0].stopped(k)}"
-            elif texts[k]:
-                said[first + k] = texts[k][0]
-    for sentences, what in ((early, "stopped early"), (said, "doubtful")):
-        if sentences:
-            first, text = min(sentences.items())
-            text = f"{len(sentences)} of {count} motions {what}: motion {first}: {text}"
+                early[number] = f"the motion {segments.runs[0].stopped(number - part[0])}"
+            elif sentences:
+                said[number] = sentences[0]
+    for each, what in ((early, "stopped early"), (said, "doubtful")):
+        if each:
+            first, text = min(each.items())
+            text = f"{len(each)} of {count} motions {what}: motion {first}: {text}"
             warnings.warn(text, SimulationWarning, stacklevel=2)
-    t = motions.legs[0].t.copy() if motions.legs else np.array([run.t0, run.t_end])
+    t = motions.segments[0].t.copy() if motions.segments else np.array([run.t0, run.t_end])
     return MotionGradients(value, by_name, t, end[:, : problem.nq], end[:, problem.nq :])
 
 
-def _parts(motions: MotionRequest) -> list[int | slice]:
-    """The motions that go one by one, or side by side."""
+def _parts(motions: MotionRequest) -> list[range]:
+    """The motions that go one by one, or side by side, of which a last one goes with those before it."""
     count = motions.many
-    if motions.options.adaptive or (count < FEW and motions.method.step(motions.problem).iterates):
-        return [*range(count)]
-    return [slice(k, min(k + WIDE, count)) for k in range(0, count, WIDE)]
+    alone = motions.options.adaptive or (count < FEW and motions.method.step(motions.problem).iterates)
+    begins = [*(range(count) if alone else range(0, max(1, count - 1), WIDE)), count]
+    return [range(begin, end) for begin, end in itertools.pairwise(begins)]
 
 
 def _shapes(motions: MotionRequest) -> dict[str, tuple[int, ...]]:
@@ -174,13 +175,8 @@ def _shapes(motions: MotionRequest) -> dict[str, tuple[int, ...]]:
     return {name: shapes.get(name, ()) for name in motions.wrt}
 
 
-def _by_motion(array: Any, part: int | slice) -> Array:
-    """With the axis of the motions, of which there may be one, first."""
-    rows = np.asarray(array, dtype=np.float64)
-    return np.moveaxis(rows, -1, 0) if isinstance(part, slice) else rows[None]
-
-
-def _some(motions: MotionRequest, part: int | slice) -> MotionRequest:
-    """One of the motions, or some of them; one by chosen steps with these."""
-    x, tau, values = (array[..., part] for array in (motions.x, motions.tau, motions.values))
-    return replace(motions, x=x, tau=tau, values=values).with_legs()
+def _some(motions: MotionRequest, part: range) -> MotionRequest:
+    """Some of the motions; one by chosen steps with these."""
+    here = slice(part.start, part.stop)
+    x, tau, values = (array[..., here] for array in (motions.x, motions.tau, motions.values))
+    return replace(motions, x=x, tau=tau, values=values).with_segments()

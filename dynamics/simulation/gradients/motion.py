@@ -1,9 +1,10 @@
-"""Motion: what gradients and sensitivities are of, the problem, its start, its steps and what to differentiate by."""
+"""Motions of which there are to be derivatives: the problem, the start, the steps, and what to differentiate by."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,10 +19,13 @@ from ...integrators import METHODS, Method, Problem, derive, in_form
 from ...systems.model import Model
 from ..applied_forces import with_applied
 from ..events.event import Event
+from ..events.event_program import event_program
+from ..outcome import Recorder, advise
+from ..row_values import converted, unreached_momenta
 from ..run_options import METHOD, RunOptions, time_span
 from ..sampled_controller import SampledController
 from ..steps.equal_steps import step_count
-from .accepted_steps import AcceptedSteps, accepted_steps
+from ..steps.integration import integration_of
 from .motion_equations import PARAMETERS, MotionEquations, motion_equations
 
 START, VELOCITY, TORQUE = "q", "qd", "tau"
@@ -30,7 +34,7 @@ EQUAL = "rk4"  # by which equal steps are, unless another method is asked for
 _PLAIN = (float, int, str, bool, type(None))
 
 
-class Leg(NamedTuple):
+class Segment(NamedTuple):
     """A part of a motion.
 
     t: (steps + 1,), where its steps begin and the last one ends.  event: with which it ends, by name, or empty.
@@ -58,20 +62,19 @@ class MotionError(ValueError):
 
 @dataclass(frozen=True, eq=False)
 class MotionRequest:
-    """A motion, whose steps are chosen.
+    """N motions side by side, whose steps are the same; one alone, N = 1.
 
-    x: (m,), where it starts, in q and qd.
-    legs: its parts.  t, h: (steps + 1,), where the steps begin and the last one ends, and (steps,), their lengths.
-    tau: the applied forces that are inputs, (forces,), or where they change with the steps, (steps, forces).
-    values: of the parameters p that stay inputs, and of the numbers c.  wrt: names.
+    x: (m, N), where they start, in q and qd.  segments: their parts.
+    t, h: (steps + 1,), where the steps begin and the last one ends, and (steps,), their lengths.
+    tau: the applied forces that are inputs, (forces, N), or where they change with the steps, (steps, forces, N).
+    values: of the parameters p that stay inputs, and of the numbers c, (.., N).  wrt: names.
     applied: the whole applied force as nodes.  options: of the run.  said: what speaks against it, a sentence each.
-    Of N motions side by side x, tau and values have an axis of N besides, the last.
     """
 
     equations: MotionEquations
     method: Method
     x: Array
-    legs: tuple[Leg, ...]
+    segments: tuple[Segment, ...]
     t: Array
     h: Array
     tau: Array
@@ -97,23 +100,34 @@ class MotionRequest:
         """How many of the applied forces are inputs."""
         return self.equations.forces
 
-    def with_legs(self, events: Sequence[Event] = ()) -> MotionRequest:
-        """The same with the legs that chosen steps and events make, and what speaks against these steps.
+    def with_segments(self, events: Sequence[Event] = ()) -> MotionRequest:
+        """One motion with the segments that chosen steps and events make, and what speaks against these steps.
 
-        Raises MotionError for a motion that does not reach its end.
+        Raises MotionError where the motion does not reach its end, KeyboardInterrupt by Ctrl-C.
         """
-        if self.legs:
+        if self.segments:
             return self
-        problem, run = self.equations.given, self.options
-        parameters = np.concatenate([self.tau, self.values])[: len(problem.parameters)]
-        motion = accepted_steps(problem, run, events, self.x, parameters)
-        if motion.status:
-            raise MotionError(f"the motion did not reach t_end, {motion.status}")
-        return replace(self, legs=_legs(motion, run, events), said=motion.said)
+        problem, options, start = self.equations.given, self.options, self.x[:, 0]
+        parameters = np.concatenate([self.tau, self.values])[: len(problem.parameters), 0]
+        program = event_program(problem, events) if events else None
+        made = partial(integration_of, problem, parameters=parameters.tolist(), events=program, between=bool(events))
+        x = converted(problem.momentum, options.t0, start, parameters)
+        run, recorder = made(options), Recorder(x, None, options.t0, options.direction)
+        with np.errstate(all="ignore"):
+            for block in run.blocks(x):
+                recorder.add(block)
+        advise(run, recorder.last, options, x, made)
+        if run.status:
+            raise MotionError(f"the motion did not reach t_end, {run.status}")
+        t, rows = recorder.table()
+        happened = {name: each.t for name, each in run.crossings(problem.nq, parameters).items()}
+        segments = _segments(t, options, events, happened, ended=bool(run.event))
+        unreached = unreached_momenta(problem, t, rows, parameters, start=(options.t0, start, x))
+        return replace(self, segments=segments, said=(*run.warnings, *unreached))
 
     def at_end(self, x: Array, t: float) -> Array:
-        """The inputs of a graph over the states, t and parameters, at a state and an instant of the last step."""
-        return np.concatenate([x, np.full((1, *x.shape[1:]), t), self.force_at_end, self.values])
+        """The inputs, (.., N), of a graph over the states, t and parameters, at an instant of the last step."""
+        return np.concatenate([x, np.full((1, self.many), t), self.force_at_end, self.values])
 
     @property
     def by_parameters(self) -> bool:
@@ -127,8 +141,8 @@ class MotionRequest:
 
     @property
     def many(self) -> int:
-        """How many motions go side by side; 0 of one alone."""
-        return self.x.shape[1] if self.x.ndim == 2 else 0
+        """How many motions go side by side, N."""
+        return len(self.x.T)
 
     @property
     def force_at_start(self) -> Array:
@@ -150,15 +164,15 @@ def motion_of(
     tau: Any,
     parameters: Mapping[str, ArrayLike] | None,
     wrt: str | Iterable[str] | None,
-    options: Mapping[str, Any],
     form: str,
     events: Sequence[Event] = (),
     *,
     many: bool = False,
+    **options: Any,
 ) -> MotionRequest:
     """The motion of checked arguments.  span: t_end, t0, t_span.  options: those of `simulate` besides.
 
-    many: N motions side by side, of which those by chosen steps have no legs yet.
+    many: N motions side by side, of which those by chosen steps have no segments yet.
     Raises TypeError or ValueError naming the argument, and MotionError for a motion that does not reach its end.
     """
     if isinstance(tau, SampledController):
@@ -182,20 +196,19 @@ def motion_of(
     free = {*inputs, *chosen, *(parameters or ())}  # what a caller changes from call to call stays an input
     problem = in_form(derive(moving, {name: value for name, value in start.bound.items() if name not in free}), form)
     equations, columns = motion_equations(problem, len(inputs)), start.bound | start.varied
-    ones = np.ones(start.x.shape[:1] if many else ())
-    forces, values = (
-        np.array([columns[name] * ones for name in each]).reshape(len(each), *ones.shape)
-        for each in (inputs, equations.names)
-    )
+    count = len(start.x)
+    forces, values = (np.empty((len(each), count)) for each in (inputs, equations.names))
+    for row, name in zip([*forces, *values], [*inputs, *equations.names], strict=True):
+        row[:] = columns[name]
     if rows is not None:
-        forces = np.broadcast_to(np.moveaxis(rows, 0, -1), (*rows.shape[1:], len(start.x))) if many else rows[0]
+        forces = np.broadcast_to(np.moveaxis(rows, 0, -1), (*rows.shape[1:], count))
     chosen_steps = run.adaptive or events
     motion = MotionRequest(
         equations,
         METHODS[run.method],
-        start.x.T.copy() if many else start.x[0],
-        () if chosen_steps else (equal_leg(run, None if rows is None else rows.shape[1]),),
-        np.empty(0),  # of steps, before the legs are run
+        start.x.T.copy(),
+        () if chosen_steps else (equal_segment(run, None if rows is None else rows.shape[1]),),
+        np.empty(0),  # of steps, before the segments are run
         np.empty(0),
         forces,
         rows is not None,
@@ -204,7 +217,7 @@ def motion_of(
         applied.nodes,
         run,
     )
-    return motion if many else motion.with_legs(events)
+    return motion if many else motion.with_segments(events)
 
 
 def options_of(
@@ -261,39 +274,43 @@ def names_of(model: Model, wrt: str | Iterable[str] | None, *, closed: bool) -> 
     return tuple(dict.fromkeys(names))
 
 
-def equal_leg(run: RunOptions, rows: int | None) -> Leg:
+def equal_segment(run: RunOptions, rows: int | None) -> Segment:
     """Equal steps; so many where rows say it."""
     count = step_count(run.length, run.step) if rows is None or run.dt is not None else rows
     if rows is not None and rows != count:
         raise ValueError(f"tau has {rows} rows, and there are {count} steps of dt = {run.step:g} s: leave out dt")
-    return _equal_leg(run.t0, run.t_end, count)
+    return _equal_segment(run.t0, run.t_end, count)
 
 
 @memo(KEPT)
-def _equal_leg(t0: float, t_end: float, count: int) -> Leg:
+def _equal_segment(t0: float, t_end: float, count: int) -> Segment:
     t = np.append(t0 + np.arange(count) * ((t_end - t0) / count), t_end)
     t.flags.writeable = False  # of all who have it
-    return Leg(t, equal=count, end=t_end)
+    return Segment(t, equal=count, end=t_end)
 
 
-def _legs(motion: AcceptedSteps, run: RunOptions, events: Sequence[Event]) -> tuple[Leg, ...]:
-    """The accepted steps of a motion, between the events that reset its state or end it."""
-    starts = np.flatnonzero(np.diff(motion.t) == 0.0) + 1  # rows after a reset
-    parts = np.split(motion.t, starts)
-    legs = []
+def _segments(
+    times: Array, run: RunOptions, events: Sequence[Event], happened: Mapping[str, Array], *, ended: bool
+) -> tuple[Segment, ...]:
+    """The accepted steps of a motion, between the events that reset its state or end it.
+
+    times: (T,), the start, the ends of the steps, and an instant twice where an event resets the state.
+    happened: the instants of the events, by name.  ended: whether one ended the motion.
+    """
+    starts = np.flatnonzero(np.diff(times) == 0.0) + 1  # rows after a reset
+    parts = np.split(times, starts)
+    segments = []
     for number, t in enumerate(parts):
-        ends = number < len(parts) - 1
-        stopped = motion.ended and not ends
+        resets = number < len(parts) - 1
+        stops = ended and not resets
         at = [
-            each.name
-            for each in events
-            if (each.reset if ends else each.terminal) and t[-1] in motion.events[each.name]
+            each.name for each in events if (each.reset if resets else each.terminal) and t[-1] in happened[each.name]
         ]
-        if (ends or stopped) and len(at) != 1:
+        if (resets or stops) and len(at) != 1:
             raise ValueError(
                 f"events {', '.join(at)} happen at one instant, t = {t[-1]:.6g} s, which has no derivative"
             )
         count = 0 if run.adaptive else step_count(run.t_end - t[0], run.step)
         if len(t) > 1:
-            legs.append(Leg(t, at[0] if ends or stopped else "", count, run.t_end))
-    return tuple(legs)
+            segments.append(Segment(t, at[0] if resets or stops else "", count, run.t_end))
+    return tuple(segments)

@@ -1,13 +1,10 @@
-"""Motion equations: what steps and their derivatives read of a problem, with what parameters alone decide apart.
-
-Of xdot = f(x, t, p) = g(x, t, c(p)) the numbers c, such as products of masses and lengths, are computed once for a
-motion, and cotangents are collected by c at every stage and pulled back to p once.
-"""
+"""Point functions: graphs compiled for a point or many side by side, and their pullbacks, made once."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -15,10 +12,10 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import Array, Builder, folded, kept_by_first, topological
 
+from ...equations.substitute import substitute
 from ...integrators import Problem
 from ...systems.arguments import new_variables
-from .point_functions import at, compiled, pulled_back
-from .rate_pullback import RatePullback, rate_pullback, rebuilt
+from .rate_pullback import RatePullback, rate_pullback
 
 ARITHMETIC = ("add", "sub", "mul", "neg")
 PARAMETERS = ("tau", "p", "c")  # registers: what the parameters of the problem are, end to end
@@ -49,7 +46,7 @@ class MotionEquations:
         return dict(zip(PARAMETERS, (self.forces, len(self.names), count), strict=True))
 
     def values(self, p: Array, backend: str) -> Array:
-        """p and c, (P + C,), or (P + C, N) of N motions, from p."""
+        """p and c, (P + C, N), from p (P, N)."""
         if self.numbers is None:
             return p
         return np.concatenate([p, at(compiled(self.numbers, backend), p)])
@@ -62,7 +59,7 @@ class MotionEquations:
         return bars[:count] + at(pulled_back(self.numbers, backend), np.concatenate([p, bars[count:]]))
 
     def columns(self, p: Array, backend: str) -> Array:
-        """Tangents of p and c along every one of p, (P + C, P)."""
+        """Tangents of p and c along every one of p (P,), (P + C, P)."""
         unit = np.eye(len(self.names))
         if self.numbers is None:
             return unit
@@ -150,4 +147,22 @@ def _apart(
             edge |= dict.fromkeys(node.args)
     used = [node for node in edge if node in alone]
     numbers = dict(zip(used, new_variables("number", len(used), taken), strict=True))
-    return {variable: node for node, variable in numbers.items()}, rebuilt(copies, numbers, build)
+    return {variable: node for node, variable in numbers.items()}, substitute(copies, numbers)
+
+
+@kept_by_first
+def compiled(graph: Graph, backend: str) -> Any:
+    """The graph as a function."""
+    return cg.compile(graph, backend)
+
+
+@kept_by_first
+def pulled_back(graph: Graph, backend: str) -> Any:
+    """J^T y_bar as a function of the inputs, then y_bar."""
+    return cg.compile(cg.simplify(cg.vjp(graph)), backend)
+
+
+def at(function: Any, x: Array) -> Array:
+    """The outputs, (k, N), at points (n, N)."""
+    values: Array = function(x[:, 0])[:, None] if x.shape[1] == 1 else function.batch(x)
+    return values

@@ -14,7 +14,10 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import Builder, SingularError, building, cotangents, folded, solve_nodes, tangents, topological
 
+from ...equations.accelerations import DENSE_UP_TO
 from ...equations.bias_terms import bias_terms
+from ...equations.constraints.constraints import DenseSolver, constraint_rows
+from ...equations.substitute import substitute
 from ...integrators import Problem
 from ...systems.arguments import new_variables
 from ...systems.system import System
@@ -56,8 +59,8 @@ class RatePullback:
             for node, bar in zip(q_dot, self.bars, strict=False):  # the other bars are those of accelerations
                 seeds[node] = seeds[node] + bar if node in seeds else bar
         known = dict(zip(shared, self.shared.values(), strict=True))
-        known |= dict(zip(self.mu, rebuilt(solved, known, build), strict=True))
-        pulled = rebuilt(cotangents(seeds, wrt, build), known, build)
+        known |= dict(zip(self.mu, substitute(solved, known), strict=True))
+        pulled = substitute(cotangents(seeds, wrt, build), known)
         outputs = {f"{k}": node for k, node in enumerate(pulled)}
         return cg.simplify(Graph([*self.inputs, *self.values, *self.shared.values(), *self.bars], outputs))
 
@@ -69,39 +72,50 @@ def rate_pullback(problem: Problem) -> RatePullback | None:
         return None
     taken = [*problem.rate.input_names, *system.parameters]
     values, bars, mu = (new_variables(what, n, taken) for what, n in (("value", m), ("bar", m), ("mu", system.n)))
-    build = Builder()
-    accelerations = slice(m - system.n, m)
+    of_accelerations = slice(m - system.n, m)
     try:
-        (lagrangian,) = folded([system.lagrangian], build)
-        solved = solve_nodes(lagrangian, system.qd, bars[accelerations], build)
-        power = _power(system, mu, values[accelerations])
+        power = _power(system, mu, values[of_accelerations])
+        ways = [by(system, bars[of_accelerations]) for by in (_eliminated, _factored)[: 1 + (system.n <= DENSE_UP_TO)]]
     except SingularError:
         return None
-    nodes, more = [power, *solved, *system.q_dot], [*values, *bars, *mu]
+    more = [*values, *bars, *mu]
     inputs = [*system.q, *system.qd, *more, *system.tau, *system.extra_inputs]
     names = [*problem.states, *[str(node.name) for node in more]]
-    bound = problem.bind(names, Graph(inputs, {f"{k}": node for k, node in enumerate(nodes)}))
-    power, *others = bound.outputs.values()
-    return RatePullback(problem.rate.inputs, values, bars, mu, power, others[: system.n], others[system.n :])
+
+    def bound(nodes: Sequence[Node]) -> list[Node]:
+        return [*problem.bind(names, Graph(inputs, {f"{k}": node for k, node in enumerate(nodes)})).outputs.values()]
+
+    power, *q_dot = bound([power, *system.q_dot])
+    solved = min([bound(way) for way in ways], key=lambda nodes: _more_than(problem.rate, nodes))
+    return RatePullback(problem.rate.inputs, values, bars, mu, power, solved, q_dot)
 
 
-def rebuilt(nodes: Sequence[Node], replacement: Mapping[Node, Node], build: Builder) -> list[Node]:
-    """Copies of nodes with others in place of some that they reach."""
-    new = dict(replacement)
-    for node in topological(nodes):
-        if node not in new:
-            new[node] = build(node.op, tuple([new[arg] for arg in node.args]), node.label) if node.args else node
-    return [new[node] for node in nodes]
+def _eliminated(system: System, rhs: Sequence[Node]) -> list[Node]:
+    """M^-1 rhs by elimination, as long chains are solved."""
+    build = Builder()
+    (lagrangian,) = folded([system.lagrangian], build)
+    return solve_nodes(lagrangian, system.qd, rhs, build)
+
+
+def _factored(system: System, rhs: Sequence[Node]) -> list[Node]:
+    """M^-1 rhs by the factors of the whole M, as short chains are solved."""
+    build = Builder()
+    solver = DenseSolver(system, bias_terms(system).lagrangian, constraint_rows(system, []), build, composites=True)
+    return solver.solve(rhs)
+
+
+def _more_than(rate: Graph, nodes: Sequence[Node]) -> int:
+    """How many nodes these take besides those of the rate, whose solution they may share."""
+    copies = folded([*rate.outputs.values(), *nodes], Builder())
+    return len(topological(copies)) - len(topological(copies[: len(rate.outputs)]))
 
 
 def _power(system: System, mu: Sequence[Node], qdd: Sequence[Node]) -> Node:
     """-mu . (M qdd + bias - tau - forces + D qd), each force where it works: on the velocity that mu makes of it."""
-    terms, build = bias_terms(system), Builder()
-    along = tangents(dict(zip(system.qd, mu, strict=True)), [terms.lagrangian, *terms.inertial], build)
-    momentum = along.get(terms.lagrangian, ZERO)  # mu . dL/dqd
-    inertia = tangents(dict(zip(system.qd, qdd, strict=True)), [momentum], build).get(momentum, ZERO)
+    terms, build = bias_terms(system, qdd), Builder()
+    along = tangents(dict(zip(system.qd, mu, strict=True)), list(terms.inertial), build)
+    power = ZERO
     with building(build):
-        power = -inertia
         for velocity, force in terms.inertial.items():
             power = power - force * along.get(velocity, ZERO)
         rows = zip(mu, terms.gradient, system.tau, terms.forces, system.damping, system.qd, strict=True)

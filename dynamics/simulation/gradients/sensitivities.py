@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,11 +17,11 @@ from cgraph.extend import Array
 from ...systems.model import Model
 from ..applied_forces import Constant
 from ..events.event import Event, as_events
+from ..row_values import values_of
 from ..trajectory import SimulationWarning
 from .doubts import doubts
-from .legs import legs_of
 from .motion import START, TORQUE, VELOCITY, MotionRequest, motion_of
-from .pushed_legs import pushed_legs
+from .segments import segments_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,17 +124,17 @@ def sensitivities(
     >>> result["m"][[100, 200]].round(4).tolist()
     [[-0.1275, 0.4627], [0.0445, -0.6321]]
     """
-    options = {"dt": dt, "max_step": max_step, "rtol": rtol, "atol": atol, "first_step": first_step, "backend": backend}
-    options["estimate_error"] = estimate_error
-    watched = as_events(events)
-    motion = motion_of(model, q, qd, (t_end, t0, t_span), method, tau, parameters, wrt, options, form, watched)
+    options: dict[str, Any] = {"dt": dt, "max_step": max_step, "rtol": rtol, "atol": atol, "first_step": first_step}
+    options |= {"estimate_error": estimate_error, "backend": backend}
+    span, watched = (t_end, t0, t_span), as_events(events)
+    motion = motion_of(model, q, qd, span, method, tau, parameters, wrt, form, watched, **options)
     if motion.each_step:
-        raise ValueError(f"tau must be constant, (n,), got shape {motion.tau.shape}: gradient takes a row a step")
+        raise ValueError(f"tau must be constant, (n,), got shape {motion.tau.shape[:-1]}: gradient takes a row a step")
     directions, columns = _directions(motion)
-    legs = legs_of(motion, watched, forwards=True)
-    for text in doubts(legs, 0.0, {})[0]:
+    segments = segments_of(motion, watched, forwards=True)
+    for text in doubts(segments, np.zeros(1), {})[0]:
         warnings.warn(text, SimulationWarning, stacklevel=2)
-    t, x, t_dot, x_dot = pushed_legs(legs, directions)
+    t, x, t_dot, x_dot = segments.tangents(directions)
     derivatives = {name: x_dot[:, :, place] for name, place in columns.items()}
     times = {name: t_dot[:, place] for name, place in columns.items()}
     nq = motion.problem.nq
@@ -143,35 +144,22 @@ def sensitivities(
 def _directions(motion: MotionRequest) -> tuple[dict[str, Array], dict[str, int | slice]]:
     """Tangents of x, tau and p, a column for each number of `wrt`; and where the columns of each name are."""
     problem, nq, equations = motion.problem, motion.problem.nq, motion.equations
-    names = equations.names
-    along = equations.columns(motion.values[: len(names)], motion.backend) if motion.by_parameters else np.empty(0)
-    count = len(names)
-    blocks: dict[str, dict[str, Array]] = {}
-    for name in motion.wrt:
-        if name == START:
-            moved = np.zeros((problem.size, problem.size - nq if problem.system is not None else nq))
-            moved[:nq] = _displacements(motion)
-            blocks[name] = {"x": moved}
-        elif name == VELOCITY:
-            blocks[name] = {"x": np.eye(problem.size)[:, nq:]}
-        elif name == TORQUE:
-            blocks[name] = {TORQUE: np.eye(motion.forces)}
-        else:
-            column = along[:, [names.index(name)]]
-            blocks[name] = {"p": column[:count], "c": column[count:]}
-    widths = {name: next(iter(block.values())).shape[1] for name, block in blocks.items()}
-    total = sum(widths.values())
     lengths = {"x": problem.size, **equations.lengths}
-    directions = {register: np.zeros((length, total)) for register, length in lengths.items()}
+    begin = dict(zip(lengths, np.cumsum([0, *lengths.values()]), strict=False))  # of rows, those of each register
+    units = np.eye(sum(lengths.values()))
+    by = {VELOCITY: units[:, nq : problem.size], TORQUE: units[:, begin[TORQUE] :][:, : motion.forces]}
+    if motion.by_parameters:
+        along = units[:, begin["p"] :] @ equations.columns(motion.values[: len(equations.names), 0], motion.backend)
+        by |= {name: along[:, [k]] for k, name in enumerate(equations.names)}
+    if START in motion.wrt:
+        by[START] = units[:, :nq] @ _displacements(motion)
     columns: dict[str, int | slice] = {}
     at = 0
-    for name, block in blocks.items():
-        end = at + widths[name]
-        for register, values in block.items():
-            directions[register][:, at:end] = values
-        columns[name] = slice(at, end) if name in (START, VELOCITY, TORQUE) else at
-        at = end
-    return directions, columns
+    for name in motion.wrt:
+        columns[name] = slice(at, at + by[name].shape[1]) if name in (START, VELOCITY, TORQUE) else at
+        at += by[name].shape[1]
+    whole = np.concatenate([by[name] for name in motion.wrt], axis=1)
+    return {name: whole[begin[name] :][:length] for name, length in lengths.items()}, columns
 
 
 def _displacements(motion: MotionRequest) -> Array:
@@ -182,5 +170,4 @@ def _displacements(motion: MotionRequest) -> Array:
     rates = cg.jacobian(
         Graph([*system.q, *system.qd], {f"{k}": rate for k, rate in enumerate(system.q_dot)}), system.qd
     )
-    values = rates.evaluate(dict(zip(rates.input_names, [*motion.x.tolist()], strict=True)))
-    return np.array(list(values.values()), dtype=np.float64).reshape(nq, system.n)
+    return values_of(rates, motion.x[:, 0].tolist()).reshape(nq, system.n)

@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from cgraph.extend import Array, Runner
 
 from ...integrators.step_control import COLLAPSE, DONE, RESOLUTION, RUNNING, SMALLEST_ATOL, TOO_SMALL
 from ..estimates.state_sizes import StateSizes
-from ..run_options import RunOptions
-from ..sampled_controller import Hold
+from ..row_values import values_of
 from .dense_output import StepBlock
 from .flat_position import FlatPosition
-from .step_program import CompiledSteps
-from .stepping import FIRST_PASSES, NativeIntegration, nonfinite
+from .stepping import FIRST_PASSES, NativeIntegration, NativeRun, nonfinite
 
 LEAP = 1e-2  # of the whole run: the first step that is tried
 TRIALS = 60  # of a first step
@@ -30,21 +27,129 @@ SUDDEN = 1e-3  # of a kind of rate: a force that jumps at the start changes it b
 HELD, SHARE = 100, 0.25  # steps at the stability limit, of all, from which on a run is called stiff
 
 
-class AdaptiveIntegration(NativeIntegration):
-    """Steps chosen by the method."""
+class StartOfChosenSteps(NativeIntegration):
+    """A run by chosen steps up to its first one: that step, and the tolerances that go with the sizes ahead."""
 
-    def __init__(
-        self,
-        compiled: CompiledSteps,
-        options: RunOptions,
-        parameters: Sequence[float] = (),
-        stopped: Callable[[], bool] = lambda: False,
-        control: Hold | None = None,
-    ) -> None:
-        super().__init__(compiled, options, parameters, stopped, control)
+    def __init__(self, run: NativeRun) -> None:
+        super().__init__(run)
+        options = run.options
         self.relative = max(options.relative, self.program.finest)
         self.absolute = np.broadcast_to(np.maximum(options.absolute, SMALLEST_ATOL), self.program.size)
         self.sizes = self._fresh_sizes() if options.atol is None else None
+
+    def _rate(self, t: float, x: Array) -> Array:
+        return values_of(self.program.rate, [*x.tolist(), t, *self.parameters])
+
+    def _fresh_sizes(self) -> StateSizes:
+        return StateSizes(self.program.kinds, self.relative, SMALLEST_ATOL)
+
+    def _first_step(self, x: Array) -> tuple[float, float]:
+        """The first step, and how far ahead the sizes of the states were seen, where they choose atol."""
+        options = self.options
+        if self.sizes is None and (options.first_step is not None or self.program.starts):
+            return options.first_step or options.length, 0.0
+        rate = self._rate(options.t0, x)
+        if self.sizes is None:
+            return self._confirmed(x, rate), 0.0
+        given = options.first_step
+        h = min(options.length, options.longest_step) * LEAP if given is None else given
+        after = self._after_start(x, rate)
+        for _ in range(ROUNDS):
+            self.sizes = self._fresh_sizes()
+            states, far = self._ahead(x, rate if after is None else after, h)
+            self.sizes.see(states)
+            self.absolute = self.sizes.tolerance()
+            if given is not None:
+                return given, max(given, far)
+            if after is not None:  # halving steps only leads to the jump; step control passes it, as any later one
+                return far, far
+            before, h = h, self._confirmed(x, rate)
+            if h >= 0.5 * before:
+                break
+        return h, max(h, far)
+
+    def _confirmed(self, x: Array, rate: Array) -> float:
+        """A step that two half steps confirm, their difference is within the tolerance, and the first rate, too.
+
+        The estimate of an embedded method can vanish by symmetry, such as at a start from rest, and a guess from the
+        first derivatives can be far off; halving cannot be fooled by either. Of an initial layer that a method damps,
+        both the whole and the half steps keep nothing: there the first rate points much farther than the step goes.
+        """
+        options, runner, order = self.options, self.runner, self.program.order
+        span = options.t_end - options.t0
+        anything = {"rtol": HUGE, "atol": HUGE, "max_step": math.inf, "fresh": 1.0, "accepted": 1.0}
+        anything |= {"t": options.t0, "end": math.copysign(math.inf, span), "error_old": 1.0}
+        memory = runner.memory({"x": x, "p": self.parameters, **anything})
+        least = min(abs(span), max(2.0 * RESOLUTION * abs(options.t0), math.ulp(0.0)))
+        h = max(min(abs(span), options.longest_step) * LEAP, least)
+        for _ in range(TRIALS):
+            with np.errstate(all="ignore"):
+                whole = _forced(runner, memory, [h])
+                size = self._scale(x, whole)
+                change = (whole - _forced(runner, memory, [0.5 * h, 0.5 * h])) / size
+                difference = float(np.sqrt(np.mean(change * change)))
+                ahead = float(np.max(h * np.abs(rate) / np.maximum(np.abs(whole - x), size)))
+            if (difference <= 1.0 and ahead <= AHEAD) or h <= least:
+                break
+            # of tolerances; below a rounding, as of a state that moves evenly, it does not limit the step
+            factor = 0.9 * max(difference, 1e-16) ** (-1.0 / (order + 1)) if math.isfinite(difference) else 0.0
+            h = max(h * min(0.5, max(1e-3, min(factor, AHEAD / max(ahead, AHEAD)))), least)
+        return h
+
+    def _after_start(self, x: Array, rate: Array) -> Array | None:
+        """The rate right after the start, where a force jumps there: it changes in the first instant, and no more."""
+        options, largest = self.options, self.program.kinds.largest_of_kind
+        if not self.program.timed:
+            return None
+        instant = max(float(np.spacing(abs(options.t0))), COLLAPSE * options.length)
+        instant = math.copysign(instant, options.t_end - options.t0)
+        after, later = (self._rate(options.t0 + k * instant, x) for k in (1, 2))
+        with np.errstate(all="ignore"):
+            least = SUDDEN * np.maximum(largest(rate), largest(after))
+            jumps = (np.abs(after - rate) > least) & (np.abs(later - after) <= least)
+        return after if jumps.any() else None
+
+    def _ahead(self, x: Array, rate: Array, h: float) -> tuple[Array, float]:
+        """x and where Euler's steps lead to, (.., m), of h or of so much less that they can be trusted, and their size.
+
+        They move no kind of component by more than its size, and turn no kind of rate: it changes by no more than the
+        larger of before and after.
+        """
+        sign = math.copysign(1.0, self.options.t_end - self.options.t0)
+        with np.errstate(all="ignore"):
+            for _ in range(HALVINGS):
+                if (states := self._euler(x, rate, sign * h)) is not None:
+                    return states, h
+                h *= 0.25
+        return x[None], h
+
+    def _euler(self, x: Array, rate: Array, h: float) -> Array | None:
+        """x and two of Euler's steps, (.., m), or as many as move all that moves; None where they cannot be trusted.
+
+        At rest each step may move one component more, the next of a chain; the first moves none where a force begins
+        at 0.
+        """
+        largest, states, moved = self.program.kinds.largest_of_kind, [x], [0, 0]
+        size = largest(x)
+        while len(states) < 3 or (moved[-1] < len(x) and moved[-1] > moved[-3]):
+            states.append(states[-1] + h * rate)
+            moved.append(int(np.count_nonzero(states[-1])))
+            before, rate = rate, self._rate(self.options.t0 + (len(states) - 1) * h, states[-1])
+            fast = np.maximum(largest(before), largest(rate))
+            if not (((largest(states[-1] - x) <= size) | (size == 0.0)) & (largest(rate - before) <= fast)).all():
+                return None
+        return np.stack(states)
+
+    def _scale(self, x: Array, x_new: Array) -> Array:
+        """What the error of a step is measured by."""
+        return np.asarray(self.absolute + self.relative * np.maximum(np.abs(x), np.abs(x_new)))
+
+
+class AdaptiveIntegration(StartOfChosenSteps):
+    """Steps chosen by the method."""
+
+    def __init__(self, run: NativeRun) -> None:
+        super().__init__(run)
         self._below_rounding = False
         self.flat = FlatPosition(self.program)
 
@@ -165,90 +270,6 @@ class AdaptiveIntegration(NativeIntegration):
         h = self._number(memory, "tried")
         return f"{where}the step, {h:.3g} s, is below the resolution of the time; fastest is {fastest}"
 
-    def _rate(self, t: float, x: Array) -> Array:
-        rate = self.program.rate
-        values = dict(zip(rate.input_names, [*x.tolist(), t, *self.parameters], strict=True))
-        return np.array(list(rate.evaluate(values).values()), dtype=np.float64)
-
-    def _fresh_sizes(self) -> StateSizes:
-        return StateSizes(self.relative, self.program.kinds, self.program.groups, SMALLEST_ATOL, self.program.lengths)
-
-    def _first_step(self, x: Array) -> tuple[float, float]:
-        """The first step, and how far ahead the sizes of the states were seen, where they choose atol."""
-        options = self.options
-        if self.sizes is None and (options.first_step is not None or self.program.starts):
-            return options.first_step or options.length, 0.0
-        start: dict[str, ArrayLike] = {"x": x, "p": self.parameters}
-        rate = self._rate(options.t0, x)
-        if self.sizes is None:
-            return first_step(self.runner, self.program.order, options, start, rate, self._scale), 0.0
-        given = options.first_step
-        h = min(options.length, options.longest_step) * LEAP if given is None else given
-        after = self._after_start(x, rate)
-        for _ in range(ROUNDS):
-            self.sizes = self._fresh_sizes()
-            states, far = self._ahead(x, rate if after is None else after, h)
-            self.sizes.see(states)
-            self.absolute = self.sizes.tolerance()
-            if given is not None:
-                return given, max(given, far)
-            if after is not None:  # halving steps only leads to the jump; step control passes it, as any later one
-                return far, far
-            before, h = h, first_step(self.runner, self.program.order, options, start, rate, self._scale)
-            if h >= 0.5 * before:
-                break
-        return h, max(h, far)
-
-    def _after_start(self, x: Array, rate: Array) -> Array | None:
-        """The rate right after the start, where a force jumps there: it changes in the first instant, and no more."""
-        assert self.sizes is not None
-        options, largest = self.options, self.sizes.largest_of_kind
-        if not self.program.timed:
-            return None
-        instant = max(float(np.spacing(abs(options.t0))), COLLAPSE * options.length)
-        instant = math.copysign(instant, options.t_end - options.t0)
-        after, later = (self._rate(options.t0 + k * instant, x) for k in (1, 2))
-        with np.errstate(all="ignore"):
-            least = SUDDEN * np.maximum(largest(rate), largest(after))
-            jumps = (np.abs(after - rate) > least) & (np.abs(later - after) <= least)
-        return after if jumps.any() else None
-
-    def _ahead(self, x: Array, rate: Array, h: float) -> tuple[Array, float]:
-        """x and where Euler's steps lead to, (.., m), of h or of so much less that they can be trusted, and their size.
-
-        They move no kind of component by more than its size, and turn no kind of rate: it changes by no more than the
-        larger of before and after.
-        """
-        sign = math.copysign(1.0, self.options.t_end - self.options.t0)
-        with np.errstate(all="ignore"):
-            for _ in range(HALVINGS):
-                if (states := self._euler(x, rate, sign * h)) is not None:
-                    return states, h
-                h *= 0.25
-        return x[None], h
-
-    def _euler(self, x: Array, rate: Array, h: float) -> Array | None:
-        """x and two of Euler's steps, (.., m), or as many as move all that moves; None where they cannot be trusted.
-
-        At rest each step may move one component more, the next of a chain; the first moves none where a force begins
-        at 0.
-        """
-        assert self.sizes is not None
-        largest, states, moved = self.sizes.largest_of_kind, [x], [0, 0]
-        size = largest(x)
-        while len(states) < 3 or (moved[-1] < len(x) and moved[-1] > moved[-3]):
-            states.append(states[-1] + h * rate)
-            moved.append(int(np.count_nonzero(states[-1])))
-            before, rate = rate, self._rate(self.options.t0 + (len(states) - 1) * h, states[-1])
-            fast = np.maximum(largest(before), largest(rate))
-            if not (((largest(states[-1] - x) <= size) | (size == 0.0)) & (largest(rate - before) <= fast)).all():
-                return None
-        return np.stack(states)
-
-    def _scale(self, x: Array, x_new: Array) -> Array:
-        """What the error of a step is measured by."""
-        return np.asarray(self.absolute + self.relative * np.maximum(np.abs(x), np.abs(x_new)))
-
 
 def _lacking(runner: Runner, memory: Array, components: Sequence[str]) -> str:
     """The first derivative of the rate that a method takes and that is not finite; empty if all are."""
@@ -258,44 +279,6 @@ def _lacking(runner: Runner, memory: Array, components: Sequence[str]) -> str:
             row, column = divmod(int(bad[0]), len(by))
             return f"the derivative of the rate of {components[row]} by {by[column]}"
     return ""
-
-
-def first_step(
-    runner: Runner,
-    order: int,
-    options: RunOptions,
-    start: Mapping[str, ArrayLike],
-    rate: Array,
-    scale: Callable[[Array, Array], Array],
-) -> float:
-    """A step that two half steps confirm, their difference is within the tolerance, and the first rate, too.
-
-    The estimate of an embedded method can vanish by symmetry, such as at a start from rest, and a guess from the first
-    derivatives can be far off; halving cannot be fooled by either. Of an initial layer that a method damps, both the
-    whole and the half steps keep nothing: there the first rate points much farther than the step goes.
-
-    start: registers x and p.  rate: (m,), of the state at the start.  scale: what errors from x to x_new are measured
-    by, (m,).
-    """
-    span, x = options.t_end - options.t0, np.asarray(start["x"])
-    anything = {"rtol": HUGE, "atol": HUGE, "max_step": math.inf, "fresh": 1.0, "accepted": 1.0}
-    anything |= {"t": options.t0, "end": math.copysign(math.inf, span), "error_old": 1.0}
-    memory = runner.memory({**start, **anything})
-    least = min(abs(span), max(2.0 * RESOLUTION * abs(options.t0), math.ulp(0.0)))
-    h = max(min(abs(span), options.longest_step) * LEAP, least)
-    for _ in range(TRIALS):
-        with np.errstate(all="ignore"):
-            whole = _forced(runner, memory, [h])
-            size = scale(x, whole)
-            change = (whole - _forced(runner, memory, [0.5 * h, 0.5 * h])) / size
-            difference = float(np.sqrt(np.mean(change * change)))
-            ahead = float(np.max(h * np.abs(rate) / np.maximum(np.abs(whole - x), size)))
-        if (difference <= 1.0 and ahead <= AHEAD) or h <= least:
-            break
-        # of tolerances; below a rounding, as of a state that moves evenly, it does not limit the step
-        factor = 0.9 * max(difference, 1e-16) ** (-1.0 / (order + 1)) if math.isfinite(difference) else 0.0
-        h = max(h * min(0.5, max(1e-3, min(factor, AHEAD / max(ahead, AHEAD)))), least)
-    return h
 
 
 def _forced(runner: Runner, memory: Array, steps: Sequence[float]) -> Array:

@@ -12,6 +12,8 @@ import cgraph as cg
 from cgraph import Graph
 from cgraph.extend import Array, kept_by_first
 
+from ..row_values import values_of
+
 if TYPE_CHECKING:
     from cgraph import Compiled
 
@@ -73,8 +75,9 @@ class StepBlock(NamedTuple):
         if self.normalization is None:
             return total
         between = self._replace(normalization=None).states_at(rows, s)
-        columns = _with_times(self.normalization, between, self.times_at(rows, s))
-        return _table(_tangent(self.normalization, self.x.shape[1]), np.concatenate([columns, total], axis=1))
+        inputs = [*_with_time(self.normalization, between, self.times_at(rows, s)), *total.T]
+        with np.errstate(all="ignore"):
+            return values_of(_tangent(self.normalization, self.x.shape[1]), inputs, len(s)).T
 
     def rounding(self, rows: Indices, t: Array, x: Array) -> tuple[Array, Array]:
         """By how much states x (k, m) in these steps may be off, (k, m), and the times t (k,), for being rounded."""
@@ -96,26 +99,21 @@ class StepBlock(NamedTuple):
 
 def normalized(normalization: Graph | None, states: Array, times: Array) -> Array:
     """States (T, m) at the times (T,) with the constraints of the coordinates met."""
-    return states if normalization is None else _table(normalization, _with_times(normalization, states, times))
+    if normalization is None:
+        return states
+    with np.errstate(all="ignore"):
+        return values_of(normalization, _with_time(normalization, states, times), len(states)).T
 
 
-def _with_times(normalization: Graph, states: Array, times: Array) -> Array:
+def _with_time(normalization: Graph, states: Array, times: Array) -> list[Array]:
     """The inputs of a normalization: states, and t where it takes it."""
-    timed = len(normalization.inputs) > states.shape[1]
-    return np.concatenate([states, times[:, None]], axis=1) if timed else states
+    return [*states.T, times][: len(normalization.inputs)]
 
 
 @kept_by_first
 def _tangent(graph: Graph, m: int) -> Graph:
     """Of the outputs, from the inputs and the tangents of the first m."""
     return cg.jvp(graph, list(graph.input_names[:m]))
-
-
-def _table(graph: Graph, columns: Array) -> Array:
-    """Outputs (T, k) of a graph at rows of its inputs."""
-    with np.errstate(all="ignore"):
-        values = graph.evaluate(dict(zip(graph.input_names, columns.T, strict=True)))
-    return np.stack(np.broadcast_arrays(*values.values()), axis=1)
 
 
 @kept_by_first

@@ -12,6 +12,7 @@ import numpy as np
 
 from cgraph.extend import Array
 
+from ..row_values import values_of
 from .step_program import StepProgram
 
 NEAR = 0.1  # of the least singular value at the start: one that is less is on its way to 0
@@ -27,7 +28,7 @@ class FlatPosition:
 
     def __init__(self, program: StepProgram) -> None:
         self.rows, self.nq, self.components = program.rows, program.nq, program.components
-        self.lengths = np.array(program.lengths[self.nq :])
+        self.lengths = np.array(program.kinds.lengths[self.nq :])
         self.sizes, self.least = np.zeros(0), 0.0
         self._mark, self._ends, self._far = (0, 0.0), np.zeros((0, 0)), False
 
@@ -91,6 +92,5 @@ class FlatPosition:
         n = len(x) - self.nq
         velocities = np.concatenate([np.diag(1.0 / self.lengths), np.zeros((n, 1))], axis=1)
         inputs = [*x[: self.nq].tolist(), *velocities, t, *parameters]
-        rates = self.rows.evaluate(dict(zip(self.rows.input_names, inputs, strict=True)))
-        values = np.stack([np.broadcast_to(rate, n + 1) for rate in rates.values()])
+        values = values_of(self.rows, inputs, n + 1)
         return np.asarray(values[:, :-1] - values[:, -1:])

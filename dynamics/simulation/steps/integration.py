@@ -10,8 +10,8 @@ from ...integrators import METHODS, Problem
 from ..run_options import RunOptions
 from ..sampled_controller import Hold
 from .chosen_steps import AdaptiveIntegration
-from .step_program import CompiledSteps, compile_steps, step_program
-from .stepping import FixedStepIntegration, Integration
+from .step_program import compile_steps, step_program
+from .stepping import FixedStepIntegration, Integration, NativeRun
 
 if TYPE_CHECKING:
     from ..events.event_program import EventProgram
@@ -30,37 +30,26 @@ def integration_of(
     if (name := options.scipy_solver) is not None:
         from .scipy_solvers import ScipyIntegration, scipy_solver
 
-        leg = partial(ScipyIntegration, scipy_solver(problem, name, options.backend), between=between)
-        return leg(options) if events is None else _watched(leg, options, events)
+        segment = partial(ScipyIntegration, scipy_solver(problem, name, options.backend), between=between)
+        return segment(options) if events is None else _watched(segment, options, events)
     method = METHODS[options.method]
     program = step_program(problem, method, dense=method.adaptive and (between or options.times is not None))
-    compiled = compile_steps(program, options.backend)
-    return integration(compiled, options, parameters, control=hold, every_step=between, events=events)
+    run = NativeRun(compile_steps(program, options.backend), options, parameters, control=hold)
+    return integration(run, every_step=between, events=events)
 
 
-def integration(
-    compiled: CompiledSteps,
-    options: RunOptions,
-    parameters: Sequence[float] = (),
-    stopped: Callable[[], bool] = lambda: False,
-    control: Hold | None = None,
-    *,
-    every_step: bool = False,
-    events: EventProgram | None = None,
-) -> Integration:
+def integration(run: NativeRun, *, every_step: bool = False, events: EventProgram | None = None) -> Integration:
     """A run, before its first step.  every_step: of equal steps, keep those between times of t_eval too."""
+    options = run.options
     if events is not None:
-        leg = partial(integration, compiled, parameters=parameters, stopped=stopped, control=control, every_step=True)
-        return _watched(leg, options, events)
-    if compiled.program.adaptive:
-        return AdaptiveIntegration(compiled, options, parameters, stopped, control)
-    every_step = every_step or options.times is None or options.estimated
-    return FixedStepIntegration(compiled, options, parameters, stopped, control, every_step=every_step)
+        return _watched(lambda segment: integration(run._replace(options=segment), every_step=True), options, events)
+    if run.compiled.program.adaptive:
+        return AdaptiveIntegration(run)
+    return FixedStepIntegration(run, every_step=every_step or options.times is None or options.estimated)
 
 
-def _watched(leg: Callable[[RunOptions], Integration], options: RunOptions, events: EventProgram) -> Integration:
+def _watched(segment: Callable[[RunOptions], Integration], options: RunOptions, events: EventProgram) -> Integration:
     """A run with events; without them what watches is not loaded."""
-    from ..events.event_log import EventLog
-    from ..events.watched import WatchedIntegration
+    from ..events.event_log import WatchedIntegration
 
-    return WatchedIntegration(leg, options, EventLog(events))
+    return WatchedIntegration(segment, options, events)

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,7 +16,7 @@ from cgraph.extend import Array, scipy_integrate
 
 from ...integrators import Problem
 from ...integrators.step_control import RESOLUTION
-from ..estimates.state_sizes import StateSizes
+from ..estimates.state_sizes import StateKinds
 from ..run_options import SCIPY, RunOptions
 from .dense_output import StepBlock, normalized
 from .step_program import between, state_kinds
@@ -41,7 +40,7 @@ class ScipySolver:
     rate: Any  # f(t, x) -> (m,)
     jacobian: dict[str, Any]  # {"jac": f(t, x) -> (m, m)} where the solver takes it
     normalization: Graph | None  # of the states that it gives, see Problem
-    sizes: Callable[[], StateSizes]  # of none yet
+    kinds: StateKinds
 
 
 def scipy_solver(problem: Problem, name: str, backend: str) -> ScipySolver:
@@ -51,9 +50,8 @@ def scipy_solver(problem: Problem, name: str, backend: str) -> ScipySolver:
     jacobian: dict[str, Any] = {}
     if name in IMPLICIT:
         jacobian["jac"] = lambda t, x: rate.jacobian([*x, t])[:, : problem.size]
-    make, (kinds, groups) = getattr(integrate, name), state_kinds(problem)
-    sizes = partial(StateSizes, 0.0, kinds, groups, 0.0, tuple([size or 1.0 for size in problem.lengths]))
-    return ScipySolver(name, problem.components, make, lambda t, x: rate([*x, t]), jacobian, between(problem), sizes)
+    make, kinds = getattr(integrate, name), state_kinds(problem)
+    return ScipySolver(name, problem.components, make, lambda t, x: rate([*x, t]), jacobian, between(problem), kinds)
 
 
 class _Step(NamedTuple):
@@ -100,7 +98,7 @@ class ScipyIntegration(Integration):
 
     def _judge_atol(self) -> None:
         """Note where the atol that nobody gave, a number in whatever unit, is no small part of a kind of component."""
-        kind = self.solver.sizes().largest_of_kind(self._largest)
+        kind = self.solver.kinds.largest_of_kind(self._largest)
         shares = np.divide(self.options.absolute, kind, out=np.zeros_like(kind), where=kind > 0.0)
         k = int(np.argmax(shares))
         if self.options.atol is None and shares[k] > COARSE:

@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 from cgraph import Graph
-from cgraph.extend import Call, Factor, If, Program, Runner, kept_by_first, runner
+from cgraph.extend import Call, Factor, If, Program, Runner, Statement, kept_by_first, runner
 
 from ...integrators import Method, Problem
 from ...integrators.problem import constraint_rates
 from ...integrators.step_control import moved
+from ..estimates.state_sizes import StateKinds
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,10 +29,7 @@ class StepProgram:
     dense: bool  # whether its record has dense output
     finest: float  # relative tolerance
     starts: bool  # with a first step that the method chooses
-    kinds: tuple[int, ...]  # of the components: the same for those that can be compared, see `System.lengths`
-    lengths: tuple[float, ...]  # of the components: what 1 stands for beside 1 of others of its kind
-    groups: tuple[int, ...]  # of the components: the same for those of one quantity, as a quaternion's
-    ordinary: bool  # of a first-order system, whose states may all round each other
+    kinds: StateKinds
     normalization: Graph | None  # of states, see Problem; with constraints their projection, over states and t
     nq: int  # coordinates in a state, which come first
     rows: Graph | None  # of chosen steps: see `constraint_rates`
@@ -62,7 +60,6 @@ def step_program(problem: Problem, method: Method, *, dense: bool) -> StepProgra
     dense: whether a method that chooses its steps records its dense output.
     Raises SingularMassMatrixError for a coordinate without inertia, ValueError for a method that the model has not.
     """
-    kinds, groups = state_kinds(problem)
     return StepProgram(
         problem.components,
         problem.parameters,
@@ -74,31 +71,30 @@ def step_program(problem: Problem, method: Method, *, dense: bool) -> StepProgra
         dense and method.adaptive,
         method.finest,
         method.starts,
-        kinds,
-        tuple([size or 1.0 for size in problem.lengths]),
-        groups,
-        problem.system is None,
+        state_kinds(problem),
         between(problem),
         problem.nq,
         constraint_rates(problem) if method.adaptive else None,
     )
 
 
-def state_kinds(problem: Problem) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Kinds and groups of the components.
+def state_kinds(problem: Problem) -> StateKinds:
+    """Which components can be compared.
 
     Coordinates are a kind, and velocities; those of no known length are others, and so is a group of several
     coordinates, such as a quaternion.
     """
     system, every = problem.system, tuple(range(problem.size))
+    lengths = tuple([size or 1.0 for size in problem.lengths])
     if system is None:
-        return every, every
+        return StateKinds(every, every, lengths, ordinary=True)
     groups = [system.kinematics.groups.index(group) for group in system.kinematics.groups]  # by their first
     alone = [group if groups.count(group) > 1 else None for group in groups] + [None] * system.n
     kinds = [
         (k < problem.nq, not size, group) for k, (size, group) in enumerate(zip(problem.lengths, alone, strict=True))
     ]
-    return tuple([kinds.index(kind) for kind in kinds]), (*groups, *every[problem.nq :])
+    alike = tuple([kinds.index(kind) for kind in kinds])
+    return StateKinds(alike, (*groups, *every[problem.nq :]), lengths, ordinary=False)
 
 
 def _normalized(steps: Program, problem: Problem, method: Method) -> Program:
@@ -111,13 +107,16 @@ def _normalized(steps: Program, problem: Problem, method: Method) -> Program:
         lengths = {**steps.registers, "onto": problem.size, "way": 1, "farthest": 1}
         onto = Call(problem.projection, ("x", "t", "p"), ("onto",))
         return replace(steps, registers=lengths, body=[*steps.body, If("accepted", (onto, *moved(problem.size)))])
+    arrived = normalizing(problem, "t")
+    body: list[Statement] = [If("accepted", tuple(arrived))] if arrived and method.adaptive else arrived
+    return replace(steps, body=[*steps.body, *body])
+
+
+def normalizing(problem: Problem, time: str) -> list[Statement]:
+    """What is done to register x, a state that a step arrives at, at an instant: its constraints are met."""
     if problem.projection is not None:
-        arrived = Call(problem.projection, ("x", "t", "p"), ("x",))
-    elif problem.normalization is not None:
-        arrived = Call(problem.normalization, ("x",), ("x",))
-    else:
-        return steps
-    return replace(steps, body=[*steps.body, If("accepted", (arrived,)) if method.adaptive else arrived])
+        return [Call(problem.projection, ("x", time, "p"), ("x",))]
+    return [] if problem.normalization is None else [Call(problem.normalization, ("x",), ("x",))]
 
 
 def between(problem: Problem) -> Graph | None:

@@ -7,6 +7,7 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -66,7 +67,7 @@ class Integration(ABC):
         self.parameters: list[float] = []
 
     @property
-    def leg(self) -> Integration:
+    def segment(self) -> Integration:
         """The part of the run that it is in: what makes its steps since the last reset."""
         return self
 
@@ -87,25 +88,29 @@ class Integration(ABC):
         return f"stopped at t = {t:.6g} s after max_steps = {most:g} steps"
 
 
-class NativeIntegration(Integration):
-    """A run of one of our methods.
+class NativeRun(NamedTuple):
+    """What a run of one of our methods is made of.
 
     parameters: values of the program's inputs that are not built in.
     stopped: asked before every block; a run that is stopped raises StoppedError.
     control: the forces that are held over periods, which then are the parameters.
     """
 
-    def __init__(
-        self,
-        compiled: CompiledSteps,
-        options: RunOptions,
-        parameters: Sequence[float] = (),
-        stopped: Callable[[], bool] = lambda: False,
-        control: Hold | None = None,
-    ) -> None:
+    compiled: CompiledSteps
+    options: RunOptions
+    parameters: Sequence[float] = ()
+    stopped: Callable[[], bool] = lambda: False
+    control: Hold | None = None
+
+
+class NativeIntegration(Integration):
+    """A run of one of our methods."""
+
+    def __init__(self, run: NativeRun) -> None:
+        compiled = run.compiled
         super().__init__(compiled.program.components)
-        self.program, self.runner, self.options = compiled.program, compiled.runner, options
-        self.parameters, self._stopped, self.control = list(parameters), stopped, control
+        self.run, self.program, self.runner, self.options = run, compiled.program, compiled.runner, run.options
+        self.parameters, self.control = list(run.parameters), run.control
         self._passes, self._factored = FIRST_PASSES, compiled.factorizations
         self._accepted = True
 
@@ -120,7 +125,7 @@ class NativeIntegration(Integration):
             self.factorizations = self._factored * (self.steps + self.rejected)
 
     def _run(self, memory: Array, passes: int, every: int = 1) -> tuple[Array, int]:
-        if self._stopped():
+        if self.run.stopped():
             raise StoppedError
         return self.runner.run(memory, passes, every)
 
@@ -147,27 +152,20 @@ class FixedStepIntegration(NativeIntegration):
     """
 
     def __init__(
-        self,
-        compiled: CompiledSteps,
-        options: RunOptions,
-        parameters: Sequence[float] = (),
-        stopped: Callable[[], bool] = lambda: False,
-        control: Hold | None = None,
-        *,
-        every_step: bool,
-        stretches: Sequence[EqualSteps] | None = None,
+        self, run: NativeRun, *, every_step: bool = True, stretches: Sequence[EqualSteps] | None = None
     ) -> None:
-        super().__init__(compiled, options, parameters, stopped, control)
-        self.every_step = every_step
+        super().__init__(run)
+        self.every_step, options = every_step, run.options
         if stretches is None:
-            instants = options.instants if control is None else control.instants(options.instants)
+            instants = options.instants if run.control is None else run.control.instants(options.instants)
             stretches = equal_steps(instants, options.step)
         self.stretches, self.stretch = stretches, stretches[0]
 
     def beside(self, stretches: Sequence[EqualSteps], parameters: Sequence[float]) -> FixedStepIntegration:
         """The same by other steps, with parameters in place of a controller."""
-        compiled, options = CompiledSteps(self.program, self.runner), replace(self.options, max_steps=math.inf)
-        return FixedStepIntegration(compiled, options, parameters, self._stopped, every_step=True, stretches=stretches)
+        options = replace(self.options, max_steps=math.inf)
+        run = self.run._replace(options=options, parameters=parameters, control=None)
+        return FixedStepIntegration(run, stretches=stretches)
 
     def blocks(self, x: Array) -> Iterator[StepBlock]:
         """The steps from x (m,) on, some at a time."""

@@ -13,9 +13,10 @@ from pytest import approx, mark, raises
 import cgraph as cg
 import dynamics as dyn
 from dynamics.equations.states.consistent_state import nearest_state
+from dynamics.experiments.speed import bench_scenes
 from dynamics.integrators import METHODS, Tableau, derive, runge_kutta
 from dynamics.simulation.gradients import motion_run
-from dynamics.simulation.gradients.motion_equations import motion_equations
+from dynamics.simulation.gradients.motion_equations import motion_equations, sharing
 from dynamics.simulation.gradients.motion_programs import motion_programs
 from dynamics.simulation.gradients.rate_pullback import rate_pullback
 from dynamics.systems.system import System
@@ -452,6 +453,18 @@ def test_what_parameters_alone_decide_is_in_no_step(make: Any) -> None:
         for node in [] if graph is None else graph.nodes:
             assert not node.args or any([arg not in fixed and arg.value is None for arg in node.args])
     assert len(equations.numbers.outputs) > len(equations.names)
+
+
+@mark.parametrize(("name", "count"), [("planar 3", 162), ("planar 7", 514), ("arm 7", 1565)])
+def test_a_rate_is_pulled_back_by_what_it_has_solved(name: str, count: int) -> None:
+    """Operations, M solved as the rate solves it: of the arm in space by its factors, of the planar ones by bodies."""
+    problem = derive(bench_scenes.load(name).model, {})
+    n = problem.size - problem.nq
+    equations = motion_equations(problem, n)
+    shared = sharing(equations)
+    assert shared is not None
+    pulled = shared[1]([*equations.problem.rate.inputs[: 2 * n]])
+    assert sum([bool(node.args) for node in pulled.nodes]) == count
 
 
 def test_forces_and_parameters_that_a_call_gives_make_nothing_anew() -> None:

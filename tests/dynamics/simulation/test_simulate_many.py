@@ -122,8 +122,8 @@ def test_t_eval_chooses_the_rows(times: Any) -> None:
 
 def test_many_steps_come_in_many_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = [simulate_many(*arms(9), 0.2, "rk4", t_eval=times) for times in (None, [0.05, 0.2], [0.15, 0.2])]
-    monkeypatch.setattr("dynamics.simulation.ensembles.vectorized.WORK", 5000)
-    monkeypatch.setattr("dynamics.simulation.ensembles.vectorized.NUMBERS", 200)
+    monkeypatch.setattr("dynamics.simulation.ensembles.task.WORK", 5000)
+    monkeypatch.setattr("dynamics.simulation.ensembles.task.NUMBERS", 200)
     blocks = [simulate_many(*arms(9), 0.2, "rk4", t_eval=times) for times in (None, [0.05, 0.2], [0.15, 0.2])]
     assert all(map(same, whole, blocks))
 

@@ -17,7 +17,7 @@ import pytest
 from pytest import mark, raises
 
 from cgraph.codegen import llvm_engine
-from dynamics.simulation.ensembles import task, vectorized, workers as workers_module
+from dynamics.simulation.ensembles import task, workers as workers_module
 from dynamics.simulation.ensembles.simulate_many import simulate_many
 from tests.dynamics.ensembles import arms, same
 from tests.dynamics.models import random_arm
@@ -119,8 +119,8 @@ def programs_made() -> int:
 
 def test_threads_make_the_code_once(monkeypatch: pytest.MonkeyPatch) -> None:
     made = []
-    original = vectorized.runner
-    monkeypatch.setattr(vectorized, "runner", lambda *arguments: made.append(arguments) or original(*arguments))
+    original = task.runner
+    monkeypatch.setattr(task, "runner", lambda *arguments: made.append(arguments) or original(*arguments))
     model, q, qd = arms(40, 4)
     simulate_many(model, q, qd, 0.1, "rk4", workers=4, chunk=8)
     simulate_many(model, q, qd, 0.2, "rk4", workers=4, chunk=8)
@@ -203,7 +203,7 @@ def test_an_error_in_a_thread_is_raised_and_leaves_no_thread(monkeypatch: pytest
     def broken(*_: object) -> None:
         raise RuntimeError("broken")
 
-    monkeypatch.setattr("dynamics.simulation.ensembles.vectorized.VectorizedIntegration.advance", broken)
+    monkeypatch.setattr("dynamics.simulation.ensembles.task.VectorizedIntegration.advance", broken)
     with raises(RuntimeError, match="broken"):
         simulate_many(*arms(29), 0.1, "rk4", workers=3, chunk=8)
     assert set(threading.enumerate()) == before
