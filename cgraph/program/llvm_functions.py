@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 
-from ..codegen.arithmetic import Arithmetic
+from ..codegen.arithmetic import Arithmetic, words_of
 from ..codegen.llvm_ir import Address, Body, body, libm_functions
 from ..core.graph import Graph
 
 _ARGUMENT = {"x": "in", "y": "out"}  # by the names that `body` gives to the two sides of a graph
+_ELEMENT = {"x": "from", "y": "to"}  # the same, of an element in its tile
 Lengths = tuple[int, ...]  # of the registers that are a function's arguments
 
 
@@ -97,28 +98,53 @@ class Functions:
         scope += [f"ptr %same{k}" for k in scalars]
         return lines
 
-    def tiled_map(self, graph: Graph, shared: Lengths, lanes: int) -> str:
-        """y = graph(shared, x) of every tile, each number a vector; the last input says how many there are."""
-        arithmetic, known, last = self.arithmetic._replace(lanes=lanes, together=1), _numbers(shared), len(shared)
-        t, sizes = arithmetic.type, {"x": len(graph.inputs) - len(known), "y": len(graph.outputs)}
+    def tiled_map(
+        self, graph: Graph, shared: Lengths, inputs: Lengths, outputs: Lengths, lanes: int, count: int, *, some: bool
+    ) -> str:
+        """y = graph(shared, x) of every tile, each number a vector; of every element, where that would not do.
+
+        So it is with memories side by side, which are vectors themselves, and with functions of the C library.
+
+        inputs, outputs: the numbers of an element in each register.  some: the last input says how many of `count`.
+        """
+        known, in_vectors = _numbers(shared), self.arithmetic.lanes == 1 and not libm_functions(graph)
+        arithmetic = self.arithmetic._replace(lanes=lanes, together=1) if in_vectors else self.arithmetic
+        t, step = arithmetic.type, 1 if in_vectors else lanes
+        among = some and self.arithmetic.lanes > 1  # each memory has a number of tiles of its own
+        places = {"x": _numbers(inputs), "y": _numbers(outputs)}
 
         def address(base: str, name: str, row: int) -> list[str]:
             if base == "x" and row < len(known):
-                return [f"  {name} = getelementptr double, ptr %in{known[row][0]}, i64 {known[row][1]}"]
-            return [f"  {name} = getelementptr {t}, ptr %{base}, i64 {row - len(known) if base == 'x' else row}"]
+                return [f"  {name} = getelementptr {self.arithmetic.type}, ptr %in{known[row][0]}, i64 {known[row][1]}"]
+            if base == "y" and among:
+                return [f"  {name} = getelementptr {t}, ptr %results, i64 {row}"]
+            register, k = places[base][row - len(known) if base == "x" else row]
+            return [f"  {name} = getelementptr {t}, ptr %{_ELEMENT[base]}{register}, i64 {k * step}"]
 
         def lines() -> list[str]:
-            written = self._body(graph, arithmetic, address, scope, len(known))
-            start = [f"  %number = load double, ptr %in{last + 1}, align 8", "  %tiles = fptosi double %number to i64"]
-            here = []
-            for base, register in (("x", f"%in{last}"), ("y", "%out0")):
-                here.append(f"  %{base}.row = mul i64 %i, {sizes[base]}")
-                here.append(f"  %{base} = getelementptr {t}, ptr {register}, i64 %{base}.row")
+            written = self._body(graph, arithmetic, address, scope, len(known) if in_vectors else 0)
+            here = ["  %tile = " + (f"udiv i64 %i, {step}" if step > 1 else "add i64 %i, 0")]
+            here.append("  %lane = " + (f"urem i64 %i, {step}" if step > 1 else "add i64 0, 0"))
+            for base, sizes, first in (("x", inputs, len(shared)), ("y", outputs, 0)):
+                for k, size in enumerate(sizes):
+                    name = f"%{_ELEMENT[base]}{k}"
+                    here.append(f"  {name}.tile = mul i64 %tile, {size * step}")
+                    here.append(f"  {name}.at = add i64 {name}.tile, %lane")
+                    here.append(f"  {name} = getelementptr {t}, ptr %{_ARGUMENT[base]}{first + k}, i64 {name}.at")
+            start, after = (
+                _tiles_text(self.arithmetic, count, f"%in{len(shared) + len(inputs)}", step) if some else [],
+                [],
+            )
+            if among:
+                start += [f"  %results = alloca {t}, i64 {len(places['y'])}, align 64"]
+                after = _among_text(self.arithmetic, places["y"], step)
             body = written._replace(start=[*start, *written.start], lines=[*here, *written.lines])
-            return _loop(body, [], "%tiles")
+            return _loop(body, after, "%steps" if some else count * step)
 
-        scope = [*_pointers("in", shared), "ptr %x", "ptr %y"]
-        return self._define(("tiles", id(graph), shared, lanes), "tiles", lines, last + 2, 1)
+        scope = [*_pointers("in", shared), *_pointers("from", inputs), *_pointers("to", outputs)]
+        scope += ["ptr %results"] if among else []
+        key = ("tiles", id(graph), shared, inputs, outputs, lanes, count, some)
+        return self._define(key, "tiles", lines, len(shared) + len(inputs) + some, len(outputs))
 
     def sum(self, graph: Graph, inputs: Lengths, count: int, shared: Lengths = (), outputs: Lengths = (1,)) -> str:
         """y = sum over i = 0 .. count - 1 of graph(shared, x[i]), added up in this order from 0."""
@@ -205,6 +231,39 @@ class Functions:
             self._names[name,] = name
             self.definitions += text(self.arithmetic)
         return name
+
+
+def _tiles_text(arithmetic: Arithmetic, count: int, register: str, step: int) -> list[str]:
+    """%steps: `step` times the tiles that a register asks for, from one to `count`; of memories, the most."""
+    t, bits, one, most = arithmetic.type, words_of(arithmetic)["b"], arithmetic.number(1.0), arithmetic.number(count)
+    lines = [
+        f"  %asked = load {t}, ptr {register}, align 8",
+        f"  %several = fcmp ogt {t} %asked, {one}",
+        f"  %least = select {bits} %several, {t} %asked, {t} {one}",
+        f"  %fits = fcmp olt {t} %least, {most}",
+        f"  %tiles = select {bits} %fits, {t} %least, {t} {most}",
+    ]
+    if arithmetic.lanes > 1:
+        lines.append(f"  %most = call double @llvm.vector.reduce.fmax.{arithmetic.suffix}({t} %tiles)")
+    whole = f"  %whole = fptosi double {'%most' if arithmetic.lanes > 1 else '%tiles'} to i64"
+    return [*lines, whole, f"  %steps = mul i64 %whole, {step}"]
+
+
+def _among_text(arithmetic: Arithmetic, places: Sequence[tuple[int, int]], step: int) -> list[str]:
+    """The results of an element among its numbers, in memories that ask for its tile."""
+    t, bits = arithmetic.type, words_of(arithmetic)["b"]
+    lines = ["  %tile.next = add i64 %tile, 1", "  %number = uitofp i64 %tile.next to double"]
+    lines += [*arithmetic.splat("%numbers", "%number"), f"  %asks = fcmp ole {t} %numbers, %tiles"]
+    for row, (register, k) in enumerate(places):
+        lines += [
+            f"  %new{row}.at = getelementptr {t}, ptr %results, i64 {row}",
+            f"  %old{row}.at = getelementptr {t}, ptr %to{register}, i64 {k * step}",
+            f"  %new{row} = load {t}, ptr %new{row}.at, align 8",
+            f"  %old{row} = load {t}, ptr %old{row}.at, align 8",
+            f"  %put{row} = select {bits} %asks, {t} %new{row}, {t} %old{row}",
+            f"  store {t} %put{row}, ptr %old{row}.at, align 8",
+        ]
+    return lines
 
 
 def _numbers(registers: Lengths) -> list[tuple[int, int]]:

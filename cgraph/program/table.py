@@ -144,12 +144,15 @@ ROWS = [
     ),
     StatementRow(
         tiles.TiledMap,
-        reads=("shared", "inputs"),
+        reads=("shared", "inputs", "tiles", "outputs"),
         writes=("outputs",),
         run=tiles.run_tiled_map,
         check=tiles.check_tiled_map,
         graph="graph",
         text=tiles.tiled_map_text,
+        beside=tiles.run_tiled_map,
+        jvp=_later("derivatives.tile_rules", "push_tiled_map"),
+        transpose=_later("derivatives.tile_rules", "pull_tiled_map"),
     ),
     StatementRow(
         tiles.Scatter,
@@ -158,6 +161,9 @@ ROWS = [
         run=tiles.run_scatter,
         check=tiles.check_scatter,
         text=tiles.scatter_text,
+        beside=tiles.run_scatter,
+        jvp=_later("derivatives.tile_rules", "push_scatter"),
+        transpose=_later("derivatives.tile_rules", "pull_scatter"),
     ),
 ]
 for _row in ROWS:

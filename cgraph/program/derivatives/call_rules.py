@@ -43,12 +43,12 @@ def push_elements(assignment: Assignment, tangent: Tangent) -> None:
         return
     shared = (*statement.shared, *[tangent.dots[inputs[k]] for k in moving if k < first])
     others = (*statement.inputs, *[tangent.dots[inputs[k]] for k in moving if k >= first])
-    graph = _shared_first(product, lengths, first, moving)
+    graph = shared_first(product, lengths, first, moving)
     results = tuple([tangent.dot(statement.outputs[k]) for k in product.kept])
     tangent.add(type(statement)(graph, others, results, shared))
 
 
-def _shared_first(product: Product, lengths: tuple[int, ...], first: int, moving: Sequence[int]) -> Graph:
+def shared_first(product: Product, lengths: tuple[int, ...], first: int, moving: Sequence[int]) -> Graph:
     """The graph with the inputs that are shared first: numbers, their tangents, then those of elements."""
     graph = product.graph
     assert graph is not None

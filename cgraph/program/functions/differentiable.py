@@ -25,6 +25,7 @@ from ...util.memory import require_memory, require_target
 from ...util.real_arrays import real_array
 from ...util.require import require_flag
 from ...util.scipy_modules import scipy_sparse
+from ...util.threads import thread_count
 from ..program import Program
 from ..runners.runner import Runner
 from .colored_matrix import ColoredMatrix, Derivative, Part, hessian_parts, jacobian_parts
@@ -58,78 +59,114 @@ class Differentiable(ABC):
     def _ready(self, program: Program) -> Runner:
         """A program made ready to run in the same way."""
 
-    @abstractmethod
-    def _point(self, x: ArrayLike) -> Array:
-        """The point, checked."""
+    def _points(self, x: ArrayLike) -> Array:
+        """The point, (n_in,), or points, (N, n_in), checked."""
+        points = real_array("x", x)
+        if points.ndim not in (1, 2) or points.shape[-1] != self.n_in:
+            wanted = f"({self.n_in},), one value for each input, or (N, {self.n_in}), a point a row"
+            raise GraphError(f"x must have shape {wanted}, got {points.shape}")
+        return points
 
-    def jvp(self, x: ArrayLike, X_dot: ArrayLike, *, wrt: Inputs = None) -> Array:
+    def jvp(self, x: ArrayLike, X_dot: ArrayLike, *, wrt: Inputs = None, threads: int | None = 1) -> Array:
         """Products y_dot = J x_dot of the Jacobian at x with directions, side by side in vectors: forward mode.
 
         X_dot: (k, n_in), a direction a row; the result is (k, n_out). Of one direction, (n_in,), it is (n_out,). An
         entry of x_dot that is zero counts for nothing, also where an operation has no slope in it; times a factor that
         is infinite or NaN it is NaN.
+        x: (n_in,), or N points, (N, n_in). X_dot then is (N, n_in), a direction for each, or (N, k, n_in), and the
+        result (N, n_out) or (N, k, n_out); one direction (n_in,) is that of all points.
         wrt: the inputs to differentiate by, n_in of them; by default all.
+        threads: how many may share the points, as of `batch`.
         Raises GraphError for another shape, or an input that is not there.
         """
         chosen = self._chosen(wrt)
-        return self._products(self._forward, chosen, x, "X_dot", X_dot, (self._count(chosen), self.n_out))
+        return self._products(self._forward, chosen, x, "X_dot", X_dot, (self._count(chosen), self.n_out), threads)
 
-    def vjp(self, x: ArrayLike, Y_bar: ArrayLike, *, wrt: Inputs = None) -> Array:
+    def vjp(self, x: ArrayLike, Y_bar: ArrayLike, *, wrt: Inputs = None, threads: int | None = 1) -> Array:
         """Products x_bar = J^T y_bar of the transposed Jacobian at x with cotangents, side by side: reverse mode.
 
         Y_bar: (k, n_out), a cotangent a row; the result is (k, n_in). Of one cotangent, (n_out,), it is (n_in,).
+        x: (n_in,), or N points, (N, n_in). Y_bar then is (N, n_out), a cotangent for each, or (N, k, n_out), and the
+        result (N, n_in) or (N, k, n_in); one cotangent (n_out,) is that of all points.
         wrt: the inputs to differentiate by, n_in of them; by default all.
+        threads: how many may share the points, as of `batch`.
         Raises GraphError for another shape, or an input that is not there.
         """
         chosen = self._chosen(wrt)
-        return self._products(self._reverse, chosen, x, "Y_bar", Y_bar, (self.n_out, self._count(chosen)))
+        return self._products(self._reverse, chosen, x, "Y_bar", Y_bar, (self.n_out, self._count(chosen)), threads)
 
-    def jacobian(self, x: ArrayLike, *, wrt: Inputs = None, sparse: bool = False) -> Any:
+    def jacobian(self, x: ArrayLike, *, wrt: Inputs = None, sparse: bool = False, threads: int | None = 1) -> Any:
         """The Jacobian dy_i/dx_j at x, (n_out, n_in).
 
         Columns that share no row are one direction of a forward sweep, rows that share no column one of a reverse
         sweep, whichever costs less, or both: `cg.sparsity` tells the entries, greedy coloring the directions.
+        x: (n_in,), or N points, (N, n_in), side by side in vectors; the result then is (N, n_out, n_in). Of points in
+        columns, as `batch` takes them, it is `jacobian(X.T)`.
         wrt: the inputs to differentiate by, n_in of them; by default all. With displacements as inputs, a quaternion
         q + G(q) xi, the columns of these at xi = 0 are those of displacements.
-        sparse: give a scipy.sparse.csr_array with the entries of `cg.sparsity`.
+        sparse: give a scipy.sparse.csr_array with the entries of `cg.sparsity`; of N points a list of them.
+        threads: how many may share the points, as of `batch`.
         Raises GraphError for another shape, or an input that is not there; ImportError with `sparse` without SciPy.
-        """
-        return self._matrix(self._jacobian(self._chosen(wrt)), self._point(x), sparse)
 
-    def hessian(self, x: ArrayLike, y_bar: ArrayLike | None = None, *, wrt: Inputs = None, sparse: bool = False) -> Any:
+        >>> x = cg.variable("x")
+        >>> cg.compile(cg.Graph([x], {"y": x * x})).jacobian([[1.0], [2.0], [3.0]]).ravel().tolist()
+        [2.0, 4.0, 6.0]
+        """
+        return self._matrix(self._jacobian(self._chosen(wrt)), self._points(x), sparse, threads)
+
+    def hessian(
+        self,
+        x: ArrayLike,
+        y_bar: ArrayLike | None = None,
+        *,
+        wrt: Inputs = None,
+        sparse: bool = False,
+        threads: int | None = 1,
+    ) -> Any:
         """The Hessian of y_bar . y at x, (n_in, n_in): forward sweeps over the reverse one, never a tensor.
 
         Columns are compressed by a star coloring, which reads an entry or its mirror image.
-        y_bar: (n_out,), the weights of the outputs; not needed for one output.
+        x: (n_in,), or N points, (N, n_in); the result then is (N, n_in, n_in).
+        y_bar: (n_out,), the weights of the outputs, or (N, n_out), of each point; not needed for one output.
         wrt: the inputs to differentiate by, n_in of them; by default all.
-        sparse: give a scipy.sparse.csr_array.
+        sparse: give a scipy.sparse.csr_array; of N points a list of them.
+        threads: how many may share the points, as of `batch`.
         Raises GraphError for another shape, or an input that is not there; ImportError with `sparse` without SciPy.
         """
         if y_bar is None and self.n_out != 1:
             raise GraphError(f"hessian needs y_bar, the weights of the {self.n_out} outputs")
-        weights = real_array("y_bar", [1.0] if y_bar is None else y_bar)
-        if weights.shape != (self.n_out,):
-            raise GraphError(f"y_bar must have shape ({self.n_out},), one weight for each output, got {weights.shape}")
+        points, weights = self._points(x), real_array("y_bar", [1.0] if y_bar is None else y_bar)
+        if weights.shape not in ((self.n_out,), (*points.shape[:-1], self.n_out)):
+            each = f" or {(len(points), self.n_out)}" if points.ndim == 2 else ""
+            raise GraphError(
+                f"y_bar must have shape ({self.n_out},){each}, one weight for each output, got {weights.shape}"
+            )
+        if points.ndim > weights.ndim:
+            weights = np.broadcast_to(weights, (len(points), self.n_out))
         matrix = self._hessian(self._chosen(wrt))
-        return self._matrix(matrix, np.concatenate([self._point(x), weights]), sparse)
+        return self._matrix(matrix, np.concatenate([points, weights], axis=-1), sparse, threads)
 
-    def bind_jacobian(self, x: Array, values: Array, *, wrt: Inputs = None) -> Callable[[], None]:
+    def bind_jacobian(
+        self, x: Array, values: Array, *, wrt: Inputs = None, threads: int | None = 1
+    ) -> Callable[[], None]:
         """A function of nothing that reads x, (n_in,), and writes the Jacobian: the fastest way to it.
 
         values: (n_out, n_in), or one number for each entry of `cg.sparsity`, row by row. What is zero whatever x is set
         to zero here, and not touched by the function. As for `bind`, the arrays are checked here and kept alive, and
         one thread at a time may call it.
+        Of N points x is (N, n_in), and values (N, n_out, n_in) or (N, entries).
         wrt: the inputs to differentiate by, as many as `values` has columns; by default all.
+        threads: how many may share the points, as of `batch`.
         Raises GraphError for arrays that are not contiguous float64 of these shapes, or share memory, and for an input
         that is not there.
         """
-        matrix = self._jacobian(self._chosen(wrt))
-        count = len(matrix.entries.rows)
-        require_memory("x", x, (self.n_in,))
-        require_memory("values", values, matrix.entries.shape, (count,))
+        matrix, count = self._jacobian(self._chosen(wrt)), thread_count(threads)
+        rows = x.shape[:1] if isinstance(x, np.ndarray) and x.ndim == 2 else ()
+        require_memory("x", x, (*rows, self.n_in))
+        require_memory("values", values, (*rows, *matrix.entries.shape), (*rows, len(matrix.entries.rows)))
         require_target("values", values, "x", x)
         values[...] = 0.0
-        return bound(matrix.bind(x, values))
+        return bound(partial(matrix.write, x, values, count) if rows else matrix.bind(x, values))
 
     def _chosen(self, wrt: Inputs) -> Chosen:
         """The numbers of the inputs that `wrt` names."""
@@ -150,28 +187,43 @@ class Differentiable(ABC):
         name: str,
         directions: ArrayLike,
         shape: tuple[int, int],
+        threads: int | None,
     ) -> Array:
         """shape: the numbers of entries of a direction and of a result."""
-        point, rows = self._point(x), real_array(name, directions)
-        if rows.ndim not in (1, 2) or rows.shape[-1] != shape[0]:
-            raise GraphError(f"{name} must have shape (k, {shape[0]}) or ({shape[0]},), got {rows.shape}")
-        matrix = rows if rows.ndim == 2 else rows[None]
-        result = np.empty((len(matrix), shape[1]))
+        count, points, given = thread_count(threads), self._points(x), real_array(name, directions)
+        single, many = points.ndim == 1, len(points)
+        wanted = f"(k, {shape[0]})" if single else f"({many}, {shape[0]}), ({many}, k, {shape[0]})"
+        fits = given.ndim in (1, 2) if single else given.ndim == 1 or (given.ndim in (2, 3) and len(given) == many)
+        if not fits or given.shape[-1] != shape[0]:
+            raise GraphError(f"{name} must have shape {wanted} or ({shape[0]},), got {given.shape}")
+        if not single and given.ndim == 1:
+            given = np.broadcast_to(given, (many, shape[0]))
+        result = np.empty((*given.shape[:-1], shape[1]))
         if not self.n_in:
             result[...] = 0.0
         elif result.size:
-            self._once(name, chosen, lambda _: self._along(derivative(chosen)))(point, matrix, result)
-        return result if rows.ndim == 2 else result[0]
+            products = self._once(name, chosen, lambda _: self._along(derivative(chosen)))
+            rows, flat = given.reshape(-1, shape[0]), result.reshape(-1, shape[1])
+            if single:
+                products(points, rows, flat)
+            else:
+                each = len(rows) // many  # directions
+                products.many(np.repeat(points, each, axis=0) if each > 1 else points, rows, flat, count)
+        return result
 
     def _along(self, derivative: Derivative) -> DirectionProducts:
         return DirectionProducts(derivative, self._ready, self.lanes, self.tiles)
 
-    def _matrix(self, matrix: ColoredMatrix, point: Array, sparse: bool) -> Any:
+    def _matrix(self, matrix: ColoredMatrix, points: Array, sparse: bool, threads: int | None) -> Any:
+        count = thread_count(threads)
         if not require_flag("sparse", sparse):
-            return matrix.values(point, dense=True)
+            return matrix.values(points, True, count)
         module, (columns, starts) = scipy_sparse("a sparse derivative"), matrix.compressed
-        values = matrix.values(point, dense=False)
-        return module.csr_array((values, columns.copy(), starts.copy()), shape=matrix.entries.shape)
+        found = [
+            module.csr_array((values, columns.copy(), starts.copy()), shape=matrix.entries.shape)
+            for values in np.atleast_2d(matrix.values(points, False, count))
+        ]
+        return found if points.ndim == 2 else found[0]
 
     def _jacobian(self, chosen: Chosen) -> ColoredMatrix:
         return self._once("jacobian", chosen, self._make_jacobian)

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...core.evaluation import Array
 from ...util.memory import aligned
+from ...util.threads import write_batch
 from ..program import Program
 from ..runners.runner import Runner
+from ..statements.call import Call
 from .colored_matrix import Derivative, product_statements
 
 
@@ -38,11 +41,12 @@ class DirectionProducts:
         sizes = {"x": len(split.primal.inputs), "p0": len(split.primal.outputs), "tiles0": 1}
         self._tiles = tiles, split.directions, lanes
         self._results = tiles, len(split.linear.outputs), lanes
-        if derivative.guarded is not None:
+        checked = derivative.guarded is not None
+        if checked:
             sizes["check0"] = tiles * lanes
         sizes |= {"s0": math.prod(self._tiles), "y": math.prod(self._results)}
-        self._runner = ready(Program(sizes, product_statements(derivative, 0, "y", lanes), ["y"]))
-        self._careful: DirectionProducts | None = None
+        body = product_statements(derivative, 0, "y", lanes, ("tiles0",), checked=checked)
+        self._runner = ready(Program(sizes, body, ["y"]))
         self._free: list[_Buffers] = []  # pop and append are atomic
 
     def __call__(self, x: Array, directions: Array, result: Array) -> None:
@@ -53,6 +57,24 @@ class DirectionProducts:
             return
         for start in range(0, len(directions), size):  # between blocks, Ctrl-C is heard
             self._block(x, directions[start : start + size], result[start : start + size])
+
+    @cached_property
+    def _beside(self) -> Runner:
+        """What runs a point and one direction, as one register, for many of these side by side."""
+        whole = self._derivative.split.whole()
+        registers = {"x": len(whole.inputs), "y": len(whole.outputs)}
+        return self._how[0](Program(registers, [Call(whole, ("x",), ("y",))], ["y"]))
+
+    def many(self, points: Array, directions: Array, results: Array, threads: int) -> None:
+        """The results, (N, results), of each of N points along a direction of its own, (N, entries)."""
+        rows = np.concatenate([points, directions], axis=1)
+        write_batch(*self._beside._columns("x"), rows.T, results.T, threads)
+        if self._derivative.guarded is not None:
+            again = np.flatnonzero(~np.isfinite(results).all(axis=1))
+            if len(again):
+                found = results[again]
+                self._guarded.many(points[again], directions[again], found, threads)
+                results[again] = found
 
     def _block(self, x: Array, directions: Array, result: Array) -> None:
         try:
@@ -77,7 +99,7 @@ class DirectionProducts:
         found = b"" if buffers.check is None else buffers.check[: 8 * count].tobytes()
         self._free.append(buffers)
         if found.count(0) < len(found):  # zeros, but NaN where a result is infinite or NaN
-            self._in_guard(x, directions, result)
+            self._guarded(x, directions, result)
 
     def _buffers(self) -> _Buffers:
         x, y = np.empty(self._runner.program.registers["x"]), aligned(math.prod(self._results))
@@ -86,8 +108,7 @@ class DirectionProducts:
         found = None if check is None else check.data.cast("B")
         return _Buffers(x.data, s, y.reshape(self._results), registers["tiles0"].data, found, run)
 
-    def _in_guard(self, x: Array, directions: Array, result: Array) -> None:
+    @cached_property
+    def _guarded(self) -> DirectionProducts:
         """By the split in which zeros win, made at its first use."""
-        if self._careful is None:
-            self._careful = DirectionProducts(self._derivative.careful, *self._how)
-        self._careful(x, directions, result)
+        return DirectionProducts(self._derivative.careful, *self._how)

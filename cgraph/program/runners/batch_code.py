@@ -21,13 +21,13 @@ _BATCH = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, *[ctypes.c_int
 class BatchCode:
     """The function of batches of a module; any number of threads may call it at once.
 
-    size: of the memory that a call needs.  columns: whether it takes points in columns, too, and not rows alone.
+    begin: what the memory of a call holds at first.  columns: whether it takes points in columns, not in rows alone.
     """
 
-    def __init__(self, code: Code, lanes: int, size: int, *, columns: bool = True) -> None:
+    def __init__(self, code: Code, lanes: int, begin: Array, *, columns: bool = True) -> None:
         self._rows = code.function("rows", _BATCH)
         self._columns = code.function("batch", _BATCH) if columns else None
-        self._lanes, self._size = lanes, size
+        self._lanes, self._begin = lanes, begin
         self._free: list[Array] = []  # memories
 
     def __call__(self, points: Array, result: Array) -> None:
@@ -59,7 +59,8 @@ class BatchCode:
         try:
             memory = self._free.pop()
         except IndexError:
-            memory = aligned(self._size)
+            memory = aligned(len(self._begin))
+            memory[:] = self._begin
         entry = self._rows if axis else self._columns
         strides = points.strides[axis] // points.itemsize, result.strides[axis] // result.itemsize
         entry(points.ctypes.data, result.ctypes.data, count, *strides, memory.ctypes.data)  # type: ignore[misc]

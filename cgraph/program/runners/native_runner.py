@@ -6,6 +6,7 @@ import ctypes
 import threading
 from collections.abc import Callable, Mapping
 from functools import cached_property, partial
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -133,21 +134,28 @@ class NativeRunner(Runner):
                 self._points[x, y] = PointCode(text, entry, places)
             return self._points[x, y]
 
-    def _columns(self, name: str) -> tuple[int, Callable[[Array, Array], None]]:
+    def _columns(
+        self, name: str, start: Mapping[str, Array] = MappingProxyType({})
+    ) -> tuple[int, Callable[[Array, Array], None]]:
         if name not in self._batches:
             with self._lock:
                 if name not in self._batches:
-                    self._batches[name] = self._batch(name)
+                    self._batches[name] = self._batch(name, start)
         return self._batches[name]
 
-    def _batch(self, name: str) -> tuple[int, BatchCode]:
+    def _batch(self, name: str, start: Mapping[str, Array]) -> tuple[int, BatchCode]:
         """The points in a block, and the machine code."""
         from .batch_code import BatchCode
 
         lanes, text, alone = self._host.lanes, self.batch_text(name), whole_graph(self._fused, name) is not None
         code = self._compiled(text.source, looped=not alone)
         width = max(WORK // max(1, self._nodes) // lanes, 1) * lanes
-        return width, BatchCode(code, lanes, text.size, columns=alone)
+        begin = np.zeros((text.size // lanes, lanes))
+        if start:
+            places = offsets(self._fused_many.registers, 1)
+            for other, numbers in start.items():
+                begin[places[other] : places[other] + len(numbers)] = numbers[:, None]
+        return width, BatchCode(code, lanes, begin.ravel(), columns=alone)
 
     def batch_text(self, name: str) -> Batch:
         """The text in LLVM's language of the function for batches of a register."""

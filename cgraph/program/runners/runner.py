@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +21,7 @@ from ..program import Program
 from ..statement import reads_and_writes, row_of
 from .llvm_ir import offsets
 
-BLOCK = 64  # states of a batch in Python that are run between looks at the keyboard
+BLOCK = 512  # states of a batch in Python that are run between looks at the keyboard
 
 
 class Record(NamedTuple):
@@ -295,11 +296,18 @@ class Runner(ABC):
         write_batch(*self._columns(name), rows.T, result.T, count)
         return result
 
-    def _columns(self, name: str) -> tuple[int, Callable[[Array, Array], None]]:
-        """What writes records, (width, k), of values of a register, (length, k); and the k worth a thread's start."""
+    def _columns(
+        self, name: str, start: Mapping[str, Array] = MappingProxyType({})
+    ) -> tuple[int, Callable[[Array, Array], None]]:
+        """What writes records, (width, k), of values of a register, (length, k); and the k worth a thread's start.
+
+        start: what other registers hold before; those that are not there, zeros, unless a pass left others.
+        """
 
         def write(values: Array, records: Array) -> None:
             memories = self.memory({name: values}, values.shape[1])
+            for other, numbers in start.items():
+                self.write(memories, other, np.broadcast_to(numbers[:, None], (len(numbers), values.shape[1])))
             records[...] = self._run_many(memories, 1, 1, np.empty((1, 0, values.shape[1]))).rows[0]
 
         return BLOCK, write
