@@ -99,7 +99,7 @@ class Functions:
         return lines
 
     def tiled_map(
-        self, graph: Graph, shared: Lengths, inputs: Lengths, outputs: Lengths, lanes: int, count: int, *, some: bool
+        self, graph: Graph, shared: Lengths, inputs: Lengths, outputs: Lengths, lanes: int, count: int, some: bool
     ) -> str:
         """y = graph(shared, x) of every tile, each number a vector; of every element, where that would not do.
 
@@ -123,13 +123,15 @@ class Functions:
 
         def lines() -> list[str]:
             written = self._body(graph, arithmetic, address, scope, len(known) if in_vectors else 0)
-            here = ["  %tile = " + (f"udiv i64 %i, {step}" if step > 1 else "add i64 %i, 0")]
-            here.append("  %lane = " + (f"urem i64 %i, {step}" if step > 1 else "add i64 0, 0"))
+            here = [f"  %tile = udiv i64 %i, {step}", f"  %lane = urem i64 %i, {step}"] if step > 1 else []
             for base, sizes, first in (("x", inputs, len(shared)), ("y", outputs, 0)):
                 for k, size in enumerate(sizes):
                     name = f"%{_ELEMENT[base]}{k}"
-                    here.append(f"  {name}.tile = mul i64 %tile, {size * step}")
-                    here.append(f"  {name}.at = add i64 {name}.tile, %lane")
+                    if step > 1:
+                        here.append(f"  {name}.tile = mul i64 %tile, {size * step}")
+                        here.append(f"  {name}.at = add i64 {name}.tile, %lane")
+                    else:
+                        here.append(f"  {name}.at = mul i64 %i, {size}")
                     here.append(f"  {name} = getelementptr {t}, ptr %{_ARGUMENT[base]}{first + k}, i64 {name}.at")
             start, after = (
                 _tiles_text(self.arithmetic, count, f"%in{len(shared) + len(inputs)}", step) if some else [],
@@ -252,7 +254,10 @@ def _tiles_text(arithmetic: Arithmetic, count: int, register: str, step: int) ->
 def _among_text(arithmetic: Arithmetic, places: Sequence[tuple[int, int]], step: int) -> list[str]:
     """The results of an element among its numbers, in memories that ask for its tile."""
     t, bits = arithmetic.type, words_of(arithmetic)["b"]
-    lines = ["  %tile.next = add i64 %tile, 1", "  %number = uitofp i64 %tile.next to double"]
+    lines = [
+        f"  %tile.next = add i64 {'%tile' if step > 1 else '%i'}, 1",
+        "  %number = uitofp i64 %tile.next to double",
+    ]
     lines += [*arithmetic.splat("%numbers", "%number"), f"  %asks = fcmp ole {t} %numbers, %tiles"]
     for row, (register, k) in enumerate(places):
         lines += [

@@ -5,6 +5,7 @@ from __future__ import annotations
 from ...core.graph import Graph
 from ...core.node import Node, constant
 from ...writing.naming import variables
+from ..statement import Names
 from ..statements.call import Sum, copied, zeroed
 from ..statements.memory import Take
 from ..statements.tiles import Scatter, TiledMap, element_sizes, tile_count
@@ -31,17 +32,18 @@ def push_tiled_map(assignment: Assignment, tangent: Tangent) -> None:
     moved = [k for k in moved if tiled.outputs[k] in tangent.active]
     if not moved:
         return
-    graph, shared, others = Graph([], {"none": 0.0}), (), ()
+    graph, dots = Graph([], {"none": 0.0}), [tangent.dots[inputs[k]] for k in moving]
+    shared: Names = ()
+    others: Names = ()
     if product.graph is not None:
-        graph = shared_first(product, lengths, first, moving)
-        shared = (*tiled.shared, *[tangent.dots[inputs[k]] for k in moving if k < first])
-        others = (*tiled.inputs, *[tangent.dots[inputs[k]] for k in moving if k >= first])
+        graph, common = shared_first(product, lengths, first, moving), sum([k < first for k in moving])
+        shared, others = (*tiled.shared, *dots[:common]), (*tiled.inputs, *dots[common:])
     found = dict(zip(product.kept, split(list(graph.outputs.values()), [sizes[k] for k in product.kept]), strict=True))
     nodes = [node for k in moved for node in found.get(k, [constant(0.0)] * sizes[k])]
     before = [tangent.dots.get(_before(assignment, k)) for k in moved]
-    dots = tuple([tangent.dot(tiled.outputs[k]) for k in moved])
-    tangent.add(*[copied(old, dot) if old else zeroed(dot) for old, dot in zip(before, dots, strict=True)])
-    tangent.add(TiledMap(_graph(graph.inputs, nodes), others, dots, shared, tiled.lanes, tiled.tiles))
+    results = tuple([tangent.dot(tiled.outputs[k]) for k in moved])
+    tangent.add(*[copied(old, dot) if old else zeroed(dot) for old, dot in zip(before, results, strict=True)])
+    tangent.add(TiledMap(_graph(graph.inputs, nodes), others, results, shared, tiled.lanes, tiled.tiles))
 
 
 def pull_tiled_map(assignment: Assignment, adjoint: Adjoint) -> None:

@@ -99,18 +99,26 @@ class ColoredMatrix:
         """The columns and the starts of rows, see `Pattern.compressed`."""
         return self.entries.compressed()
 
-    def values(self, x: Array, dense: bool, threads: int = 1) -> Array:
-        """The entries, or with `dense` the whole matrix, at a point; at points (N, n), of each."""
-        (m, n), rows = self.entries.shape, x.shape[:-1]
-        if dense and m * n > LARGE:
-            matrix = np.zeros((*rows, m, n))
-            matrix[..., self.entries.rows, self.entries.columns] = self.values(x, False, threads)
-            return matrix
-        if not rows:
-            return self._dense(x) if dense else self._entries(x)
-        values = np.empty((*rows, m, n) if dense else (*rows, len(self.entries.rows)))
-        self.write(x, values, threads)
-        return values
+    def values(self, x: Array, dense: bool) -> Array:
+        """The entries, or with `dense` the whole matrix."""
+        if not dense:
+            return self._entries(x)
+        m, n = self.entries.shape
+        return self._dense(x) if m * n <= LARGE else self._filled(self._entries(x))
+
+    def many(self, points: Array, dense: bool, threads: int) -> Array:
+        """`values` of each of the points (N, n)."""
+        m, n = self.entries.shape
+        whole = dense and m * n <= LARGE
+        values = np.empty((len(points), m, n) if whole else (len(points), len(self.entries.rows)))
+        self.write(points, values, threads)
+        return self._filled(values) if dense and not whole else values
+
+    def _filled(self, entries: Array) -> Array:
+        """The whole matrix, or several of them."""
+        matrix = np.zeros((*entries.shape[:-1], *self.entries.shape))
+        matrix[..., self.entries.rows, self.entries.columns] = entries
+        return matrix
 
     def bind(self, x: Array, values: Array) -> Callable[[], None]:
         """A function of nothing that reads x and writes the values: entries, (count,), or into a matrix of zeros."""

@@ -62,7 +62,7 @@ class Differentiable(ABC):
     def _points(self, x: ArrayLike) -> Array:
         """The point, (n_in,), or points, (N, n_in), checked."""
         points = real_array("x", x)
-        if points.ndim not in (1, 2) or points.shape[-1] != self.n_in:
+        if points.shape != (self.n_in,) and (points.ndim != 2 or points.shape[1] != self.n_in):
             wanted = f"({self.n_in},), one value for each input, or (N, {self.n_in}), a point a row"
             raise GraphError(f"x must have shape {wanted}, got {points.shape}")
         return points
@@ -136,7 +136,7 @@ class Differentiable(ABC):
         if y_bar is None and self.n_out != 1:
             raise GraphError(f"hessian needs y_bar, the weights of the {self.n_out} outputs")
         points, weights = self._points(x), real_array("y_bar", [1.0] if y_bar is None else y_bar)
-        if weights.shape not in ((self.n_out,), (*points.shape[:-1], self.n_out)):
+        if weights.shape != (self.n_out,) and weights.shape != (*points.shape[:-1], self.n_out):
             each = f" or {(len(points), self.n_out)}" if points.ndim == 2 else ""
             raise GraphError(
                 f"y_bar must have shape ({self.n_out},){each}, one weight for each output, got {weights.shape}"
@@ -190,39 +190,54 @@ class Differentiable(ABC):
         threads: int | None,
     ) -> Array:
         """shape: the numbers of entries of a direction and of a result."""
-        count, points, given = thread_count(threads), self._points(x), real_array(name, directions)
-        single, many = points.ndim == 1, len(points)
-        wanted = f"(k, {shape[0]})" if single else f"({many}, {shape[0]}), ({many}, k, {shape[0]})"
-        fits = given.ndim in (1, 2) if single else given.ndim == 1 or (given.ndim in (2, 3) and len(given) == many)
-        if not fits or given.shape[-1] != shape[0]:
-            raise GraphError(f"{name} must have shape {wanted} or ({shape[0]},), got {given.shape}")
-        if not single and given.ndim == 1:
-            given = np.broadcast_to(given, (many, shape[0]))
-        result = np.empty((*given.shape[:-1], shape[1]))
+        points, rows = self._points(x), real_array(name, directions)
+        count = 1 if threads == 1 else thread_count(threads)
+        if points.ndim == 2:
+            return self._many_products(derivative, chosen, points, name, rows, shape, count)
+        if rows.ndim not in (1, 2) or rows.shape[-1] != shape[0]:
+            raise GraphError(f"{name} must have shape (k, {shape[0]}) or ({shape[0]},), got {rows.shape}")
+        matrix = rows if rows.ndim == 2 else rows[None]
+        result = np.empty((len(matrix), shape[1]))
         if not self.n_in:
             result[...] = 0.0
         elif result.size:
+            self._once(name, chosen, lambda _: self._along(derivative(chosen)))(points, matrix, result)
+        return result if rows.ndim == 2 else result[0]
+
+    def _many_products(
+        self,
+        derivative: Callable[[Chosen], Derivative],
+        chosen: Chosen,
+        points: Array,
+        name: str,
+        given: Array,
+        shape: tuple[int, int],
+        threads: int,
+    ) -> Array:
+        """Of every point along one direction, or along as many as others."""
+        count = len(points)
+        if given.ndim == 1:
+            given = np.broadcast_to(given, (count, *given.shape))
+        if given.ndim not in (2, 3) or len(given) != count or given.shape[-1] != shape[0]:
+            wanted = f"({count}, {shape[0]}), ({count}, k, {shape[0]}) or ({shape[0]},)"
+            raise GraphError(f"{name} must have shape {wanted} for {count} points, got {given.shape}")
+        result = np.zeros((*given.shape[:-1], shape[1]))
+        if self.n_in and result.size:
             products = self._once(name, chosen, lambda _: self._along(derivative(chosen)))
-            rows, flat = given.reshape(-1, shape[0]), result.reshape(-1, shape[1])
-            if single:
-                products(points, rows, flat)
-            else:
-                each = len(rows) // many  # directions
-                products.many(np.repeat(points, each, axis=0) if each > 1 else points, rows, flat, count)
+            rows = np.repeat(points, given.shape[1], axis=0) if given.ndim == 3 else points
+            products.many(rows, given.reshape(-1, shape[0]), result.reshape(-1, shape[1]), threads)
         return result
 
     def _along(self, derivative: Derivative) -> DirectionProducts:
         return DirectionProducts(derivative, self._ready, self.lanes, self.tiles)
 
     def _matrix(self, matrix: ColoredMatrix, points: Array, sparse: bool, threads: int | None) -> Any:
-        count = thread_count(threads)
+        count = 1 if threads == 1 else thread_count(threads)
         if not require_flag("sparse", sparse):
-            return matrix.values(points, True, count)
+            return matrix.values(points, dense=True) if points.ndim == 1 else matrix.many(points, True, count)
         module, (columns, starts) = scipy_sparse("a sparse derivative"), matrix.compressed
-        found = [
-            module.csr_array((values, columns.copy(), starts.copy()), shape=matrix.entries.shape)
-            for values in np.atleast_2d(matrix.values(points, False, count))
-        ]
+        rows = matrix.many(points, False, count) if points.ndim == 2 else [matrix.values(points, dense=False)]
+        found = [module.csr_array((row, columns.copy(), starts.copy()), shape=matrix.entries.shape) for row in rows]
         return found if points.ndim == 2 else found[0]
 
     def _jacobian(self, chosen: Chosen) -> ColoredMatrix:

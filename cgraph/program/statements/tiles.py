@@ -103,11 +103,11 @@ def run_tiled_map(statement: TiledMap, state: dict[str, Any], execution: Executi
 
 def tiled_map_text(statement: TiledMap, writer: Writer) -> None:
     """As machine code, a tile after another; where memories lie side by side, an element after another."""
-    sizes = [element_sizes(statement, writer.registers, names) for names in (statement.inputs, statement.outputs)]
+    inputs, outputs = (element_sizes(statement, writer.registers, of) for of in (statement.inputs, statement.outputs))
     shared, count = writer.lengths(statement.shared), tile_count(statement, writer.registers)
     if count:
-        some = bool(statement.tiles)
-        name = writer.functions.tiled_map(statement.graph, shared, *sizes, statement.lanes, count, some=some)
+        how = statement.lanes, count, bool(statement.tiles)
+        name = writer.functions.tiled_map(statement.graph, shared, inputs, outputs, *how)
         writer.calls(name, (*statement.shared, *statement.inputs, *statement.tiles), statement.outputs)
 
 
