@@ -12,16 +12,9 @@ from .symmetric_matrix import ZERO, SymmetricMatrix
 
 
 class SingularError(GraphError):
-    """A pivot is the constant zero beside zeros alone, or known not to be positive where it has to be.
+    """A pivot, of row `index`, is the constant zero beside zeros alone, or known not to be positive where it has to be.
 
-    Attributes
-    ----------
-    index : int
-        The row of the pivot.
-    pivot : float
-        Its value.
-    regular : bool
-        Whether the matrix is not singular for all that is known, but not positive definite.
+    regular: whether the matrix is not singular for all that is known, but not positive definite.
     """
 
     def __init__(self, index: int, pivot: float = 0.0, *, regular: bool = False) -> None:

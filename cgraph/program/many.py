@@ -21,26 +21,10 @@ def many(program: Program) -> Program:
 
     What its `If` and `While` decide by is 1 where they apply and else 0, and what they write is put back where they do
     not. So every memory, a lane, ends with the same numbers whether other lanes take another course or not: an `If` is
-    run if any lane is positive, and a `While` as long as any is. `Runner.run_many` makes it of its program.
+    run if any lane is positive, and a `While` as long as any is; a `FixedPoint` becomes a `While`, so that derivatives
+    are taken before. Registers for masks, and for what is put back, stand after those of the program. `Runner.run_many`
+    makes it.
 
-    Parameters
-    ----------
-    program : Program
-        Of any statements; a `FixedPoint` becomes a `While`, so that derivatives are taken before.
-
-    Returns
-    -------
-    Program
-        With registers for masks, and for what is put back, after those of the program; `program` itself if nothing in
-        it depends on numbers.
-
-    Raises
-    ------
-    TypeError
-        For what is no program.
-
-    Examples
-    --------
     >>> import cgraph as cg
     >>> from cgraph.extend import Call, Program, While, many
     >>> n = cg.variable("n")
@@ -64,16 +48,8 @@ def many(program: Program) -> Program:
 class Masked:
     """Statements that change the lanes of a mask alone, when what they write is put back in the others.
 
-    Attributes
-    ----------
-    lengths : dict of str to int
-        Of all registers; grows.
-    mask : tuple of str
-        The register of the mask, of length 1: 1 in its lanes, else 0; none: all lanes.
-    statements : list of Statement
-        What has been added.
-    written : dict of str to None
-        Registers to be put back.
+    lengths: of all registers; grows.  mask: the register that is 1 in its lanes, else 0; none: all lanes.
+    statements: what has been added.  written: registers to be put back.
     """
 
     def __init__(self, lengths: dict[str, int], mask: Sequence[str] = (), depth: int = 0, own: str = ":") -> None:

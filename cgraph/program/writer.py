@@ -9,24 +9,11 @@ from .statement import Lengths as Registers, Statement, row_of
 
 
 class Writer:
-    """The statements of a function over registers.
+    """The statements of a function over registers, as LLVM's text.
 
-    Attributes
-    ----------
-    registers : mapping of str to int
-        Their lengths.
-    functions : Functions
-        Those of the module, which statements call.
-    type : str
-        Of a number in a register.
-    size : int
-        Of a number, in bytes.
-    pointers : dict of str to str
-        {register: its address}.
-    written : list of str
-        Lines of the statements so far.
-    scratch : list of str
-        Allocations, which stand once at the start.
+    functions: those of the module, which statements call.  type, size: of a number in a register, in LLVM's language
+    and in bytes.  pointers: {register: its address}.  written: lines of the statements so far.  scratch: allocations,
+    which stand once at the start.
     """
 
     def __init__(self, registers: Registers, functions: Functions) -> None:

@@ -17,14 +17,8 @@ HEAVY = 4  # operations of a graph for each of its outputs, from which on these 
 class Replayed(NamedTuple):
     """How values come back that statements backwards read.
 
-    Attributes
-    ----------
-    again : list of Statement
-        What computes those that are cheap.
-    tape : tuple of str
-        Registers to be recorded: results of heavy statements.
-    wanted : set of str
-        Registers that both need from before the assignments.
+    again: what computes those that are cheap.  tape: registers to be recorded, results of heavy statements.
+    wanted: registers that both need from before the assignments.
     """
 
     again: list[Statement]
@@ -35,20 +29,9 @@ class Replayed(NamedTuple):
 class Adjoint(Registers):
     """The statements that pull cotangents back through assignments.
 
-    Attributes
-    ----------
-    bars : dict of str to str
-        {register: the one that has its cotangent}, of what comes after; the rules extend it.
-    active : set of str
-        Registers that depend on what moves.
-    lengths : dict of str to int
-        Of all registers; grows.
-    products : Products
-        Graphs of J^T y_bar.
-    turns : int
-        For how many turns a loop inside has a stack.
-    statements : list of Statement
-        What has been added.
+    bars: {register: the one that has its cotangent}, of what comes after; the rules extend it.  active: registers that
+    depend on what moves.  products: graphs of J^T y_bar.  turns: for how many turns a loop inside has a stack.
+    recording: {assignment: the one that records for its way back}.
     """
 
     def __init__(

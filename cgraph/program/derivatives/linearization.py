@@ -19,22 +19,13 @@ TURNS = 64  # of a loop that its stack has room for, unless more are asked for
 
 
 class Linearized(NamedTuple):
-    """A program that goes along recorded passes, and the registers of its vectors.
+    """A program that goes along recorded passes, which are its feed, and the registers of its vectors.
 
-    Attributes
-    ----------
-    program : Program
-        Its feed is what was recorded of a pass.
-    vectors : dict of str to str
-        {register of a value: that of its cotangent or tangent, before and after a pass}.
-    unsolved : str
-        A register that is not 0 after passes in which equations of a `FixedPoint` were not solved.
+    vectors: {register of a value: that of its cotangent or tangent, before and after a pass}.
+    unsolved: a register that is not 0 after passes in which equations of a `FixedPoint` were not solved.
 
-    Examples
-    --------
     >>> from cgraph.extend import Program, program_jvp
-    >>> linear = program_jvp(Program({"x": 1}, [], record=["x"]))
-    >>> dict(linear.vectors)
+    >>> dict(program_jvp(Program({"x": 1}, [], record=["x"])).vectors)
     {'x': 'x:dot'}
     """
 
@@ -46,33 +37,14 @@ class Linearized(NamedTuple):
 class Linearization:
     """A program in single assignment: what it records, and its derivatives.
 
-    Parameters
-    ----------
-    program : Program
-        Whose `feed` is new in every pass; what it records does not matter.
-    of : sequence of str
-        Registers whose values after a pass matter.
-    wrt : sequence of str
-        Registers by which derivatives are taken, besides those that a pass hands on.
-    constant : sequence of str
-        Registers whose values have no derivatives.
-    rules : mapping of int to Pullback
-        {id of a graph: its own rule for J^T y_bar}.
-    turns : int
-        For how many turns of a `While` its way back has room.
+    of: registers whose values after a pass matter.  wrt: those by which derivatives are taken, besides what a pass
+    hands on; as an attribute first those that stay the same, `inputs`, then those of the feed, `varied`.  constant:
+    those whose values have no derivatives.  rules: {id of a graph: its own rule for J^T y_bar}.  turns: for how many
+    turns of a `While` its way back has room.
 
-    Attributes
-    ----------
-    handed : dict of str to str
-        {register that a pass hands on to the next: the one that has its value after the pass}.
-    wrt : tuple of str
-        Registers by which derivatives are taken, besides what is handed on: first those that stay the same, `inputs`,
-        then those of the feed, `varied`.
-    constants : tuple of str
-        Registers that passes read and never write.
+    handed: {register that a pass hands on to the next: the one that has its value after the pass}.
+    constants: registers that passes read and never write.
 
-    Examples
-    --------
     >>> import cgraph as cg
     >>> from cgraph.extend import Call, Linearization, Program
     >>> x, p = cg.variables("x p")

@@ -28,13 +28,7 @@ class Product(NamedTuple):
 
 
 class Pullback(Protocol):
-    """A rule of a graph's own for J^T y_bar, which may read the values of its outputs.
-
-    Attributes
-    ----------
-    residuals : int
-        How many of the last outputs are there for the rule alone, and have no cotangents.
-    """
+    """A rule of a graph's own for J^T y_bar, which may read the values of its outputs."""
 
     @property
     def residuals(self) -> int:

@@ -11,20 +11,11 @@ from ..statements.call import Map, copied
 
 @dataclass(frozen=True, eq=False)
 class Assignment:
-    """A statement whose outputs no other one writes; what it changes in place is copied first.
+    """A statement whose outputs no other one writes; what it changes in place is copied first, by `copies`.
 
-    Attributes
-    ----------
-    statement : Statement
-        The statement, over registers of the program in single assignment.
-    copies : tuple of Map
-        What stands before it.
-    parts : tuple of tuple of Assignment
-        Of a statement with bodies, each body in single assignment.
-    after : tuple of dict
-        For each part, {register that the statement writes: the one that has its value at the end of the part}.
-    carried : tuple of str
-        Of an iteration, the registers that a turn reads before it writes them.
+    parts: of a statement with bodies, each body in single assignment.
+    after: for each part, {register that the statement writes: the one that has its value at the end of the part}.
+    carried: of an iteration, the registers that a turn reads before it writes them.
     """
 
     statement: Statement
@@ -50,15 +41,7 @@ class Assignment:
 
 @dataclass
 class Registers:
-    """Registers by name; new ones are made with `fresh`.
-
-    Attributes
-    ----------
-    lengths : dict of str to int
-        Their lengths.
-    own : str
-        What is in the names of new ones alone.
-    """
+    """Lengths of registers by name, and new ones, in whose names alone `own` is."""
 
     lengths: dict[str, int]
     own: str = "@"
@@ -83,10 +66,7 @@ class Registers:
 class Assigned(Registers):
     """Statements in single assignment, one after another.
 
-    Attributes
-    ----------
-    current : dict of str to str
-        {register of the program: the one that has its value now}, where that is another.
+    current: {register of the program: the one that has its value now}, where that is another.
     """
 
     current: dict[str, str] = field(default_factory=dict)

@@ -13,20 +13,9 @@ from .single_assignment import Assignment, Registers
 class Tangent(Registers):
     """The statements that push tangents on through assignments.
 
-    Attributes
-    ----------
-    dots : dict of str to str
-        {register: the one that has its tangent}; the rules extend it.
-    active : set of str
-        Registers that depend on what moves.
-    lengths : dict of str to int
-        Of all registers; grows.
-    products : Products
-        Graphs of J x_dot.
-    values : bool
-        Whether the statements themselves are among `statements`, each before its tangents.
-    statements : list of Statement
-        What has been added.
+    dots: {register: the one that has its tangent}; the rules extend it.  active: registers that depend on what moves.
+    products: graphs of J x_dot.  values: whether the statements themselves are among `statements`, each before its
+    tangents.
     """
 
     def __init__(

@@ -25,17 +25,10 @@ BLOCK = 512  # states of a batch in Python that are run between looks at the key
 
 
 class Record(NamedTuple):
-    """The result of a run.
+    """The rows of a run, one for each pass that recorded, and how many passes were run.
 
-    Attributes
-    ----------
-    rows : ndarray, shape (rows, width), or (rows, width, N) of N runs at once
-        The recorded registers, a row for each pass that recorded.
-    passes : int
-        How many were run: fewer than asked for where the program stopped.
+    rows: (rows, width), or (rows, width, N) of N runs at once.
 
-    Examples
-    --------
     >>> import cgraph as cg
     >>> from cgraph.extend import Call, Program, runner
     >>> x = cg.variable("x")
@@ -62,21 +55,11 @@ def _fitting(rows: int, width: int) -> Iterator[None]:
 class Runner(ABC):
     """A program ready to run; made by `runner`.
 
-    Attributes
-    ----------
-    program : Program
-        What it runs.
-    width : int
-        Numbers in a vector of `Map`: registers are padded to a multiple of it.
-    size : int
-        Numbers in a memory.
+    width: numbers in a vector of `Map`, to a multiple of which registers are padded.  size: numbers in a memory.
 
-    Examples
-    --------
     >>> from cgraph.extend import Program, runner
     >>> run = runner(Program({"x": 1}, [], record=["x"]), "python")
-    >>> memory = run.memory({"x": 8.0})
-    >>> run.read(memory, "x").tolist()
+    >>> run.read(run.memory({"x": 8.0}), "x").tolist()
     [8.0]
     """
 
@@ -97,40 +80,14 @@ class Runner(ABC):
         return self._masked
 
     def prepared(self) -> Runner:
-        """This runner, with all made that `run` needs, so that its first run takes no longer than the next.
-
-        Returns
-        -------
-        Runner
-            Itself.
-
-        Examples
-        --------
-        >>> from cgraph.extend import Program, runner
-        >>> runner(Program({"x": 1}, [], record=["x"]), "python").prepared().size
-        1
-        """
+        """This runner, with all made that `run` needs, so that its first run takes no longer than the next."""
         return self
 
     def memory(self, values: Mapping[str, ArrayLike], count: int | None = None) -> Array:
-        """A memory with these values of registers, 0 elsewhere.
+        """A memory, (size,) or (size, count), with these values of registers, 0 elsewhere.
 
-        Parameters
-        ----------
-        values : mapping of str to array_like
-            {register: a number or an array of its length, or (length, count)}.
-        count : int, optional
-            How many memories, for `run_many`.
-
-        Returns
-        -------
-        ndarray, shape (size,) or (size, count)
-            The memory.
-
-        Raises
-        ------
-        GraphError
-            If a register is unknown or a value has another length.
+        values: {register: a number or an array of its length, or (length, count)}.
+        Raises GraphError for an unknown register or a value of another length.
         """
         memory = np.zeros(self.size if count is None else (self.size, require_whole("count", count)))
         for name, value in require_mapping("values", values, "register: numbers").items():
@@ -157,24 +114,9 @@ class Runner(ABC):
     def run(self, memory: Array, passes: int, every: int = 1, feed: ArrayLike | None = None) -> Record:
         """Run passes, fewer if the program stops, and record a row after each `every`th.
 
-        Parameters
-        ----------
-        memory : ndarray of float64, shape (size,)
-            Changed in place: the next run continues from it.
-        passes, every : int
-            At least 0 and at least 1.
-        feed : array_like, shape (passes, feed_width), optional
-            Of a program with a feed, what its registers are before each pass.
-
-        Returns
-        -------
-        Record
-            The rows, and the number of passes that were run.
-
-        Raises
-        ------
-        GraphError
-            If the memory or the feed has another shape or type, or `passes` or `every` is out of range.
+        memory: float64 (size,), changed in place: the next run continues from it.  feed: (passes, feed_width), of a
+        program with a feed, what its registers are before each pass.
+        Raises GraphError for a memory or a feed of another shape or type, or a number out of range.
         """
         self._check(memory, (self.size,), passes, every)
         fed = self._fed(feed, (passes, self.program.feed_width))
@@ -184,23 +126,10 @@ class Runner(ABC):
     def bind(self, memory: Array, rows: Array) -> Callable[[], None]:
         """A function of nothing: `run` on this memory, len(rows) passes, which writes the rows.
 
-        The arrays are checked here and never again; the function keeps them alive. One thread at a time may call it.
-
-        Parameters
-        ----------
-        memory : ndarray of float64, shape (size,)
-            Changed in place: write registers, such as through `read`, between calls.
-        rows : ndarray of float64, shape (passes, width)
-            A pass that records nothing leaves the last ones as they were.
-
-        Returns
-        -------
-        callable
-
-        Raises
-        ------
-        GraphError
-            If an array has another shape or type, or the program has a feed.
+        The arrays, float64 (size,) and (passes, width), are checked here and never again; the function keeps them
+        alive. Registers may be written between calls, such as through `read`. A pass that records nothing leaves the
+        last rows as they were. One thread at a time may call it.
+        Raises GraphError for an array of another shape or type, or a program with a feed.
         """
         if self.program.feed:
             raise GraphError("a bound run takes no feed: give its registers a place in the memory")
@@ -225,27 +154,11 @@ class Runner(ABC):
         """
 
     def run_many(self, memories: Array, passes: int, every: int = 1, feed: ArrayLike | None = None) -> Record:
-        """As `run`, for N memories at once, in vectors: what `run` does of each, whichever course it takes.
+        """As `run`, for N memories (size, N) at once, in vectors: what `run` does of each, whichever course it takes.
 
-        Parameters
-        ----------
-        memories : ndarray of float64, shape (size, N)
-            Changed in place.
-        passes, every : int
-            At least 0 and at least 1.
-        feed : array_like, shape (passes, feed_width, N) or (passes, feed_width, 1), optional
-            As for `run`, for each memory or one for all.
-
-        Returns
-        -------
-        Record
-            With rows (rows, width, N).
-
-        Raises
-        ------
-        GraphError
-            If the program has `record_if` or `stop`, by which memories would have other numbers of rows or passes, or
-            statements that run one memory alone; and as for `run`.
+        feed: (passes, feed_width, N), or (passes, feed_width, 1) for all.  The record has rows (rows, width, N).
+        Raises GraphError, besides as `run`, for a program with `record_if` or `stop`, by which memories would have
+        other numbers of rows or passes, or with statements that run one memory alone.
         """
         if not isinstance(memories, np.ndarray) or memories.ndim != 2:
             raise GraphError(f"memories must have shape ({self.size}, N), got {describe(memories)}")
@@ -257,29 +170,12 @@ class Runner(ABC):
             return self._run_many(memories, passes, every, fed)
 
     def batch(self, name: str, values: ArrayLike, threads: int | None = 1, *, out: Array | None = None) -> Array:
-        """What one pass records at each of N values of a register, side by side in vectors.
+        """What one pass records, (N, width), at each of N values of a register, (N, length), side by side in vectors.
 
-        Parameters
-        ----------
-        name : str
-            The register.
-        values : array_like, shape (N, length)
-            A value a row.
-        threads : int, optional
-            How many may share the work; None: one for each core.
-        out : ndarray of float64, shape (N, width), optional
-            Where they go, sharing no memory with `values`; a new one by default.
-
-        Returns
-        -------
-        ndarray, shape (N, width)
-            A row of the record for each value.
-
-        Raises
-        ------
-        GraphError
-            For another shape; if the program cannot `run_many`, or has a feed; if a pass reads or records a register,
-            other than this one, that it may not have set before.
+        threads: how many may share the work; None: one for each core.  out: where the rows go, sharing no memory with
+        `values`; a new array by default.
+        Raises GraphError for another shape; if the program cannot `run_many`, or has a feed; if a pass reads or records
+        a register, other than this one, that it may not have set before.
         """
         count, rows = thread_count(threads), np.ascontiguousarray(real_array(name, values))
         length = len(self.read(np.empty(self.size), name))

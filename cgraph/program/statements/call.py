@@ -32,17 +32,8 @@ State = dict[str, list[float]]
 
 @dataclass(frozen=True)
 class Call(Statement):
-    """outputs = graph(inputs).
+    """outputs = graph(inputs), where registers end to end are the graph's inputs and outputs in order.
 
-    Attributes
-    ----------
-    graph : Graph
-        The function.
-    inputs, outputs : tuple of str
-        Registers which, end to end, are the graph's inputs and outputs in order.
-
-    Examples
-    --------
     >>> import cgraph as cg
     >>> from cgraph.extend import Call
     >>> a, b = cg.variables("a b")
@@ -58,18 +49,10 @@ class Call(Statement):
 class Map(Statement):
     """outputs[i] = graph(shared, inputs[i]) for every element i.
 
-    Attributes
-    ----------
-    graph : Graph
-        The function of one element.
-    inputs, outputs : tuple of str
-        A register for each input and each output of the graph, of one common length; an input of length 1 has the same
-        value for every element.
-    shared : tuple of str
-        Registers which, end to end, are the graph's first inputs, before those of `inputs`: the same for every element.
+    inputs, outputs: a register for each input and each output of the graph, of one common length; an input of length 1
+    has the same value for every element.  shared: registers which, end to end, are the graph's first inputs, the same
+    for every element.
 
-    Examples
-    --------
     >>> import cgraph as cg
     >>> from cgraph.extend import Map
     >>> x, h = cg.variables("x h")
@@ -86,19 +69,8 @@ class Map(Statement):
 class Sum(Statement):
     """outputs = sum over i of graph(shared, inputs[i]), from the first element to the last.
 
-    Attributes
-    ----------
-    graph : Graph
-        The function of one element.
-    inputs : tuple of str
-        A register for each input of the graph, of one common length or of length 1.
-    outputs : str or tuple of str
-        Registers which, end to end, are the sums of the graph's outputs.
-    shared : tuple of str
-        As of `Map`.
+    inputs, shared: as of `Map`.  outputs: registers which, end to end, are the sums of the graph's outputs.
 
-    Examples
-    --------
     >>> import cgraph as cg
     >>> from cgraph.extend import Sum
     >>> x = cg.variable("x")

@@ -18,17 +18,8 @@ State = dict[str, list[float]]
 
 @dataclass(frozen=True)
 class While(Statement):
-    """while (register > 0) body.
+    """while (register > 0) body; the register has length 1, and NaN is not positive.
 
-    Attributes
-    ----------
-    register : str
-        A register of length 1; NaN is not positive.
-    body : tuple of Statement
-        What is repeated.
-
-    Examples
-    --------
     >>> import cgraph as cg
     >>> from cgraph.extend import Call, While
     >>> n = cg.variable("n")
@@ -41,17 +32,8 @@ class While(Statement):
 
 @dataclass(frozen=True)
 class If(Statement):
-    """if (register > 0) body else otherwise.
+    """if (register > 0) body else otherwise; the register has length 1, and NaN is not positive.
 
-    Attributes
-    ----------
-    register : str
-        A register of length 1; NaN is not positive.
-    body, otherwise : tuple of Statement
-        What is run in either case.
-
-    Examples
-    --------
     >>> import cgraph as cg
     >>> from cgraph.extend import Call, If
     >>> n = cg.variable("n")
@@ -68,17 +50,9 @@ class FixedPoint(Statement):
     """while (register > 0) body, which ends at v = body(v, e), v the registers that a turn hands on to the next.
 
     It runs as `While` does. Its derivative is that of v in terms of e, v' = (dT/dv) v' + (dT/de) e', which is solved by
-    the same iteration, and knows nothing of how many turns v took, nor from where.
+    the same iteration, and knows nothing of how many turns v took, nor from where. A turn has no `If`, `While`,
+    `Factor`.
 
-    Attributes
-    ----------
-    register : str
-        A register of length 1; NaN is not positive.
-    body : tuple of Statement
-        A turn, without `If`, `While` and `Factor`.
-
-    Examples
-    --------
     >>> import cgraph as cg
     >>> from cgraph.extend import Call, FixedPoint
     >>> v, turns = cg.variables("v turns")

@@ -25,19 +25,10 @@ State = dict[str, list[float]]
 
 @dataclass(frozen=True)
 class Factor(Statement):
-    """LU = PA in place of a matrix A, with partial pivoting.
+    """LU = PA in place of a matrix A (n * n), row by row, with partial pivoting; pivots (n) receives the row exchanges.
 
     Of a singular matrix a pivot is 0, and `Solve` then gives infinities or NaN.
 
-    Attributes
-    ----------
-    matrix : str
-        A register of length n * n: A, row by row.
-    pivots : str
-        A register of length n, which receives the row exchanges.
-
-    Examples
-    --------
     >>> from cgraph.extend import Factor, Program, Solve
     >>> program = Program({"A": 4, "p": 2, "b": 2}, [Factor("A", "p"), Solve("A", "p", "b")], record=["b"])
     """
@@ -48,19 +39,8 @@ class Factor(Statement):
 
 @dataclass(frozen=True)
 class Solve(Statement):
-    """The solution of A x = b in place of b, or of A^T x = b.
+    """The solution of A x = b, or transposed of A^T x = b, in place of b, the vector; A and its pivots after `Factor`.
 
-    Attributes
-    ----------
-    matrix, pivots : str
-        The registers of A and its row exchanges, after `Factor`.
-    vector : str
-        A register of length n: b, then x.
-    transposed : bool
-        Whether the equations are those of A^T.
-
-    Examples
-    --------
     >>> from cgraph.extend import Program, Solve, runner
     >>> solve = runner(Program({"LU": 1, "p": 1, "b": 1}, [Solve("LU", "p", "b")], record=["b"]))
     >>> solve.run(solve.memory({"LU": 2.0, "p": 0.0, "b": 6.0}), passes=1).rows.tolist()

@@ -33,15 +33,6 @@ State = dict[str, list[float]]
 class Take(Statement):
     """target[i] = source[table[i]].
 
-    Attributes
-    ----------
-    source, target : str
-        Registers.
-    table : tuple of int
-        For each number of the target its place in the source.
-
-    Examples
-    --------
     >>> from cgraph.extend import Program, Take, runner
     >>> run = runner(Program({"a": 3, "b": 2}, [Take("a", "b", (2, 0))], record=["b"]))
     >>> run.run(run.memory({"a": [5.0, 6.0, 7.0]}), passes=1).rows.tolist()
@@ -55,19 +46,10 @@ class Take(Statement):
 
 @dataclass(frozen=True)
 class Push(Statement):
-    """Numbers of registers, end to end, as one more row of a stack; a full one gets none, and its count is NaN.
+    """Numbers of registers `rows`, end to end, as one more row of a stack; a full one gets none, and its count is NaN.
 
-    Attributes
-    ----------
-    stack : str
-        A register whose length is a multiple of that of a row.
-    count : str
-        A register of length 1: how many rows there are.
-    rows : tuple of str
-        The registers.
+    stack: a register whose length is a multiple of that of a row.  count: one of length 1, how many rows there are.
 
-    Examples
-    --------
     >>> from cgraph.extend import Program, Push, runner
     >>> run = runner(Program({"x": 1, "stack": 2, "count": 1}, [Push("stack", "count", ("x",))], record=["count"]))
     >>> run.run(run.memory({"x": 8.0}), passes=3).rows.ravel().tolist()
@@ -81,17 +63,9 @@ class Push(Statement):
 
 @dataclass(frozen=True)
 class Pop(Statement):
-    """The last row of a stack, taken off it into registers; NaN, and the count NaN, of one that has none.
+    """The last row of a stack, taken off it into registers; NaN, and the count NaN, of one that has none. Fields: see
+    `Push`.
 
-    Attributes
-    ----------
-    stack, count : str
-        As of `Push`.
-    rows : tuple of str
-        The registers.
-
-    Examples
-    --------
     >>> from cgraph.extend import Pop, Program, runner
     >>> run = runner(Program({"x": 1, "stack": 2, "count": 1}, [Pop("stack", "count", ("x",))], record=["x"]))
     >>> run.run(run.memory({"stack": [4.0, 5.0], "count": 2.0}), passes=3).rows.ravel().tolist()
