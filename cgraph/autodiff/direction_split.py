@@ -25,15 +25,6 @@ class DirectionSplit(NamedTuple):
         """The number of entries of a direction."""
         return len(self.linear.inputs) - len(self.primal.outputs)
 
-    def whole(self) -> Graph:
-        """x, s -> y as one graph, operation by operation as in both."""
-        known = dict(zip(self.linear.inputs, self.primal.outputs.values(), strict=False))
-        outputs = self.linear.outputs
-        new = rebuild(outputs.values(), known, lambda node, args: Node(node.op, args, node.label))
-        return Graph(
-            [*self.primal.inputs, *self.linear.inputs[len(known) :]], {name: new[y] for name, y in outputs.items()}
-        )
-
 
 def direction_split(derivative: Graph, directions: int, *, divide: bool = True) -> DirectionSplit:
     """The two parts of a derivative whose last `directions` inputs are the direction, as of `jvp` and `vjp`.

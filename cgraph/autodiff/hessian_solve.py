@@ -183,7 +183,7 @@ def _solved(
         passed = equations.arguments(_rows(output, multipliers, wrt))
         plan = elimination_steps(passed, equations.rotations)
     if order == "balanced":
-        from .balanced_elimination import BalancedElimination, written_rows
+        from .balanced.elimination import BalancedElimination, written_rows
 
         if multipliers:
             raise ValueError('order "balanced" needs a function without multipliers')

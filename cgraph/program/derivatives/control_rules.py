@@ -174,7 +174,8 @@ def pull_while(assignment: Assignment, adjoint: Adjoint) -> None:
     back += [copied(source, other) for source, other in beside.items()]
     back += [_copy_or_zero(source and beside.get(source, source), bar) for bar, source in handed.items()]
     adjoint.add(While(left, (Pop(stack, left, record), *replayed.again, *inner.statements, *back)))
-    adjoint.add(*[Map(_UNLESS_FULL, (bar, turns), (bar,)) for bar in (*bars.values(), *sums.values())])
+    ends = (*bars.values(), *sums.values(), adjoint.unsolved)  # NaN after turns that the stack had no room for
+    adjoint.add(*[Map(_UNLESS_FULL, (end, turns), (end,)) for end in ends])
     for source, name in zip(assignment.sources, after, strict=True):
         if name in bars and source in adjoint.active:
             adjoint.collect(source, bars[name])

@@ -22,7 +22,8 @@ class Linearized(NamedTuple):
     """A program that goes along recorded passes, which are its feed, and the registers of its vectors.
 
     vectors: {register of a value: that of its cotangent or tangent, before and after a pass}.
-    unsolved: a register that is not 0 after passes in which equations of a `FixedPoint` were not solved.
+    unsolved: a register that is not 0 after passes in which equations of a `FixedPoint` were not solved, and NaN after
+    a loop of more turns than there is room for.
 
     >>> from cgraph.extend import Program, program_jvp
     >>> dict(program_jvp(Program({"x": 1}, [], record=["x"])).vectors)
@@ -81,7 +82,7 @@ class Linearization:
         self._at, self._with = _unused("@", program), _unused(":", program)
         self._products = Products({} if rules is None else require_mapping("rules", rules, "id of a graph: rule"))
         self._lengths, self.fed = dict(program.registers), tuple(program.feed)
-        self._turns = require_whole("turns", turns, 1)
+        self.turns = require_whole("turns", turns, 1)
         self.inputs = tuple([name for name in wrt if name not in self.fed])
         self.varied = tuple([name for name in wrt if name in self.fed])
         written = effects(program.body)[1]
@@ -126,7 +127,7 @@ class Linearization:
             lengths |= {bar: lengths[name] for name, bar in ends.items()}
             lengths[self.unsolved] = 1
             bars = {self.handed[name]: ends[name] for name in wanted}
-            pulled = Adjoint(bars, self._active, lengths, self._products, ends.values(), self._turns, own=self._at)
+            pulled = Adjoint(bars, self._active, lengths, self._products, ends.values(), self.turns, own=self._at)
             pulled.pull(self._plain)
             more = [name for name in self.handed if name in pulled.bars and name not in wanted and name in self._active]
             if not more:

@@ -94,7 +94,8 @@ class ProgramVjp:
 
         values: {register: value before the first pass}, 0 for others.  seeds: {register of `of`: cotangent after the
         last pass}, 0 for others.  feed: (passes, feed_width), as for `Runner.run`.
-        Raises GraphError for unknown registers or other shapes, and where equations of a `FixedPoint` were not solved.
+        Raises GraphError for unknown registers or other shapes, where equations of a `FixedPoint` were not solved, and
+        for a loop that takes more turns than there is room for.
         """
         require_whole("passes", passes, 1)
         if unknown := [name for name in require_mapping("seeds", seeds, "register: cotangent") if name not in self._of]:
@@ -120,7 +121,9 @@ class ProgramVjp:
         for first, last, record in tape.recorded(backwards=True):
             fed = record[::-1, :width] if width else np.empty((last - first, 0))
             parts.append(self.backward.run(back, last - first, 1, fed).rows)
-        if self.backward.read(back, self._unsolved)[0]:
+        if np.isnan(unsolved := self.backward.read(back, self._unsolved)[0]):
+            raise GraphError(f"a loop took more turns than the {self._passes.turns} there is room for: give turns=")
+        if unsolved:
             raise GraphError("the derivative of a FixedPoint was not solved: its turns do not settle")
         bars = {name: self.backward.read(back, register).copy() for name, register in self.vectors.items()}
         slopes, at = (np.concatenate(parts) if self._passes.varied else np.empty((passes, 0)))[::-1], 0
@@ -148,9 +151,8 @@ def program_vjp(
     again. A loop inside a pass records its turns on a stack.
 
     program, wrt, constant: as for `program_jvp`; what it records does not matter.  of: registers whose values after the
-    last pass are the result.  turns: for how many turns of a `While` there is room; of one with more all cotangents are
-    NaN.  checkpoints: keep the memory after every so many passes, and record again from there; 0: keep the record of
-    all.
+    last pass are the result.  turns: for how many turns of a `While` there is room.  checkpoints: keep the memory after
+    every so many passes, and record again from there; 0: keep the record of all.
     backend: as for `runner`.
 
     >>> import cgraph as cg

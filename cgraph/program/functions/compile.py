@@ -7,7 +7,6 @@ import os
 import sys
 import warnings
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +19,7 @@ from ...codegen.python_function import OnArrays, OnFloats
 from ...core.evaluation import Array
 from ...core.graph import Graph
 from ...util.require import require_choice, require_flag, require_graph
+from ...util.version import __version__
 from ..program import Program
 from ..runners.native_runner import NativeRunner, flags_of
 from ..runners.python_runner import BLOCK, PythonRunner
@@ -200,9 +200,27 @@ class Native(BoundFunction, Compiled):
         return NativeRunner(program, self._flags, self._cache)
 
 
+class _Version:
+    """The version that writes a pickle; in it, the first that is read."""
+
+    def __reduce__(self) -> tuple[Callable[[str], None], tuple[str]]:
+        return require_version, (__version__,)
+
+
+def require_version(version: str) -> None:
+    """Raise ValueError unless a pickle was written by this version."""
+    if version != __version__:
+        problem = f"was pickled by cgraph {version}, and this is cgraph {__version__}"
+        raise ValueError(f"a compiled graph {problem}: pickle the graph alone, or compile it again")
+
+
+def _remade(_: object, graph: Graph, backend: str, options: Options) -> Compiled:
+    return compile(graph, backend, **options)
+
+
 def _recipe(function: Compiled) -> Any:
     """What pickling keeps: the graph and the choices. Machine code is made again where the pickle is read."""
-    return partial(compile, **function.options), (function.graph, function.backend)
+    return _remade, (_Version(), function.graph, function.backend, function.options)
 
 
 copyreg.pickle(Generated, _recipe)

@@ -10,8 +10,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...core.evaluation import Array
+from ...core.graph import Graph
 from ...util.memory import aligned
 from ...util.threads import write_batch
+from ..fuse import applied
 from ..program import Program
 from ..runners.runner import Runner
 from ..statements.call import Call
@@ -61,7 +63,10 @@ class DirectionProducts:
     @cached_property
     def _beside(self) -> Runner:
         """What runs a point and one direction, as one register, for many of these side by side."""
-        whole = self._derivative.split.whole()
+        (primal, linear), known = self._derivative.split, len(self._derivative.split.primal.outputs)
+        inputs = [*primal.inputs, *linear.inputs[known:]]
+        outputs = applied(linear, [*applied(primal, primal.inputs), *linear.inputs[known:]])
+        whole = Graph(inputs, {f"{k}": node for k, node in enumerate(outputs)})
         registers = {"x": len(whole.inputs), "y": len(whole.outputs)}
         return self._how[0](Program(registers, [Call(whole, ("x",), ("y",))], ["y"]))
 
