@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
+import numpy as np
+
 from ..core.checks import GraphError
 from ..core.evaluation import Array
 from ..core.graph import Graph
@@ -108,6 +110,14 @@ class Execution:
             rule = row.run if self.many < 0 else row.beside
             assert rule is not None, "Runner.run_many has asked"
             rule(statement, state, self)
+
+    def positive(self, values: Sequence[float] | Array) -> bool:
+        """Whether the number of a register is, in any of the memories; NaN is not."""
+        return bool(values[0] > 0.0 if self.many < 0 else np.any(np.asarray(values) > 0.0))
+
+    def write(self, state: dict[str, Any], register: str, numbers: Array) -> None:
+        """The numbers of a register, of one memory or of many, from an array of its own."""
+        state[register] = numbers if self.many >= 0 else numbers.tolist()
 
 
 def names_in(statement: Statement, fields: Iterable[str]) -> Names:

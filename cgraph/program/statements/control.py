@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from ...core.evaluation import Array
 from ..statement import Execution, Lengths, Statement, require_length
 
 if TYPE_CHECKING:
     from ..writer import Writer
-
-State = dict[str, list[float]]
 
 
 @dataclass(frozen=True)
@@ -69,27 +64,15 @@ def check_control(statement: While | If | FixedPoint, lengths: Lengths) -> None:
     require_length(lengths, type(statement).__name__, statement.register, 1)
 
 
-def run_while(statement: While | FixedPoint, state: State, execution: Execution) -> None:
-    """In Python."""
-    while state[statement.register][0] > 0.0:
+def run_while(statement: While | FixedPoint, state: dict[str, Any], execution: Execution) -> None:
+    """In Python; of many memories, as long as the register is positive in any."""
+    while execution.positive(state[statement.register]):
         execution.run(statement.body, state)
 
 
-def run_if(statement: If, state: State, execution: Execution) -> None:
-    """In Python."""
-    positive = state[statement.register][0] > 0.0
-    execution.run(statement.body if positive else statement.otherwise, state)
-
-
-def while_beside(statement: While | FixedPoint, state: dict[str, Array], execution: Execution) -> None:
-    """Of many memories: as long as it is positive in any."""
-    while np.any(state[statement.register] > 0.0):
-        execution.run(statement.body, state)
-
-
-def if_beside(statement: If, state: dict[str, Array], execution: Execution) -> None:
-    """Of many memories: the body if it is positive in any."""
-    positive = np.any(state[statement.register] > 0.0)
+def run_if(statement: If, state: dict[str, Any], execution: Execution) -> None:
+    """In Python; of many memories, the body if the register is positive in any."""
+    positive = execution.positive(state[statement.register])
     execution.run(statement.body if positive else statement.otherwise, state)
 
 

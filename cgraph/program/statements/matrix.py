@@ -20,8 +20,6 @@ from .function_writer import FunctionWriter
 if TYPE_CHECKING:
     from ..writer import Writer
 
-State = dict[str, list[float]]
-
 
 @dataclass(frozen=True)
 class Factor(Statement):
@@ -62,37 +60,20 @@ def check_matrix(statement: Factor | Solve, lengths: Lengths) -> None:
         require_length(lengths, where, statement.vector, n)
 
 
-def run_factor(statement: Factor, state: State, _: Execution) -> None:
-    """In Python."""
-    n = len(state[statement.pivots])
-    a, p = np.array(state[statement.matrix]).reshape(n, n), np.empty(n)
-    _factor(a, p)
-    state[statement.matrix], state[statement.pivots] = a.ravel().tolist(), p.tolist()
+def run_factor(statement: Factor, state: dict[str, Any], execution: Execution) -> None:
+    """In Python, of one memory or of many."""
+    a, n = np.array(state[statement.matrix]), len(state[statement.pivots])
+    pivots = np.empty((n, *a.shape[1:]))
+    _factor(a.reshape(n, n, *a.shape[1:]), pivots)
+    execution.write(state, statement.matrix, a)
+    execution.write(state, statement.pivots, pivots)
 
 
-def run_solve(statement: Solve, state: State, _: Execution) -> None:
-    """In Python."""
-    n = len(state[statement.pivots])
-    a, p, b = np.array(state[statement.matrix]), np.array(state[statement.pivots]), np.array(state[statement.vector])
-    _solver(statement)(a.reshape(n, n), p, b)
-    state[statement.vector] = b.tolist()
-
-
-def factor_beside(statement: Factor, state: dict[str, Array], _: Execution) -> None:
-    """Of many memories, each with pivots of its own."""
-    pivots = np.empty_like(state[statement.pivots])
-    n, count = pivots.shape
-    a = np.array(state[statement.matrix])
-    _factor(a.reshape(n, n, count), pivots)
-    state[statement.matrix], state[statement.pivots] = a, pivots
-
-
-def solve_beside(statement: Solve, state: dict[str, Array], _: Execution) -> None:
-    """Of many memories."""
-    pivots, b = state[statement.pivots], np.array(state[statement.vector])
-    n, count = b.shape
-    _solver(statement)(state[statement.matrix].reshape(n, n, count), pivots, b)
-    state[statement.vector] = b
+def run_solve(statement: Solve, state: dict[str, Any], execution: Execution) -> None:
+    """In Python, of one memory or of many."""
+    a, pivots, b = [np.array(state[name]) for name in (statement.matrix, statement.pivots, statement.vector)]
+    _solver(statement)(a.reshape(len(b), *b.shape), pivots, b)
+    execution.write(state, statement.vector, b)
 
 
 def _solver(statement: Solve) -> Callable[[Array, Array, Array], None]:
