@@ -63,10 +63,6 @@ class Writer:
         """register[k] = value, a number."""
         self.line(f"store {self.type} {value}, ptr {self.place(register, k)}, align 8")
 
-    def copy(self, target: str, source: str, count: int) -> None:
-        """So many numbers from one address to another."""
-        self.written.append(copy_text(target, source, count * self.size))
-
     def fill_with_nan(self, register: str) -> None:
         """register = NaN, every number of it: all bits are 1."""
         size = self.registers[register] * self.size
@@ -84,14 +80,10 @@ class Writer:
         """Go on there."""
         self.line(f"br label %{label}")
 
-    def branch_on(self, condition: str, yes: str, no: str) -> None:
-        """Go on at one of two blocks."""
-        self.line(f"br i1 {condition}, label %{yes}, label %{no}")
-
     def branch(self, register: str, yes: str, no: str) -> None:
         """Go on where register > 0, where NaN is not, and where it is not; of lanes, where any is."""
         self.written += self.positive(f"%{yes}.on", register)
-        self.branch_on(f"%{yes}.on", yes, no)
+        self.line(f"br i1 %{yes}.on, label %{yes}, label %{no}")
 
     def arguments(self, *names: str) -> str:
         """Pointers to registers, as arguments of a call."""

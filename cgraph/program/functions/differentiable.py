@@ -38,6 +38,21 @@ Chosen = tuple[int, ...] | None  # the numbers of inputs; None for all
 LANES = 8  # directions that count as one where colorings are compared, whatever the processor's vectors
 
 
+def _once(make: Callable[[Any, Chosen], Made]) -> Callable[[Any, Chosen], Made]:
+    """What a method makes of the chosen inputs, made once, by whichever thread asks first."""
+
+    def made(self: Differentiable, chosen: Chosen) -> Made:
+        key = make, chosen
+        if key not in self._made:
+            with self._making:
+                if key not in self._made:
+                    self._made[key] = make(self, chosen)
+        found: Made = self._made[key]
+        return found
+
+    return made
+
+
 class Differentiable(ABC):
     """A compiled graph y = f(x) that has derivatives at run time. All that they need is made at the first use.
 
@@ -80,7 +95,7 @@ class Differentiable(ABC):
         Raises GraphError for another shape, or an input that is not there.
         """
         chosen = self._chosen(wrt)
-        return self._products(self._forward, chosen, x, "X_dot", X_dot, (self._count(chosen), self.n_out), threads)
+        return self._products(self._pushed, chosen, x, "X_dot", X_dot, (self._count(chosen), self.n_out), threads)
 
     def vjp(self, x: ArrayLike, Y_bar: ArrayLike, *, wrt: Inputs = None, threads: int | None = 1) -> Array:
         """Products x_bar = J^T y_bar of the transposed Jacobian at x with cotangents, side by side: reverse mode.
@@ -93,7 +108,7 @@ class Differentiable(ABC):
         Raises GraphError for another shape, or an input that is not there.
         """
         chosen = self._chosen(wrt)
-        return self._products(self._reverse, chosen, x, "Y_bar", Y_bar, (self.n_out, self._count(chosen)), threads)
+        return self._products(self._pulled, chosen, x, "Y_bar", Y_bar, (self.n_out, self._count(chosen)), threads)
 
     def jacobian(self, x: ArrayLike, *, wrt: Inputs = None, sparse: bool = False, threads: int | None = 1) -> Any:
         """The Jacobian dy_i/dx_j at x, (n_out, n_in).
@@ -181,7 +196,7 @@ class Differentiable(ABC):
 
     def _products(
         self,
-        derivative: Callable[[Chosen], Derivative],
+        along: Callable[[Chosen], DirectionProducts],
         chosen: Chosen,
         x: ArrayLike,
         name: str,
@@ -193,7 +208,7 @@ class Differentiable(ABC):
         points, rows = self._points(x), real_array(name, directions)
         count = 1 if threads == 1 else thread_count(threads)
         if points.ndim == 2:
-            return self._many_products(derivative, chosen, points, name, rows, shape, count)
+            return self._many_products(along, chosen, points, name, rows, shape, count)
         if rows.ndim not in (1, 2) or rows.shape[-1] != shape[0]:
             raise GraphError(f"{name} must have shape (k, {shape[0]}) or ({shape[0]},), got {rows.shape}")
         matrix = rows if rows.ndim == 2 else rows[None]
@@ -201,12 +216,12 @@ class Differentiable(ABC):
         if not self.n_in:
             result[...] = 0.0
         elif result.size:
-            self._once(name, chosen, lambda _: self._along(derivative(chosen)))(points, matrix, result)
+            along(chosen)(points, matrix, result)
         return result if rows.ndim == 2 else result[0]
 
     def _many_products(
         self,
-        derivative: Callable[[Chosen], Derivative],
+        along: Callable[[Chosen], DirectionProducts],
         chosen: Chosen,
         points: Array,
         name: str,
@@ -223,13 +238,17 @@ class Differentiable(ABC):
             raise GraphError(f"{name} must have shape {wanted} for {count} points, got {given.shape}")
         result = np.zeros((*given.shape[:-1], shape[1]))
         if self.n_in and result.size:
-            products = self._once(name, chosen, lambda _: self._along(derivative(chosen)))
             rows = np.repeat(points, given.shape[1], axis=0) if given.ndim == 3 else points
-            products.many(rows, given.reshape(-1, shape[0]), result.reshape(-1, shape[1]), threads)
+            along(chosen).many(rows, given.reshape(-1, shape[0]), result.reshape(-1, shape[1]), threads)
         return result
 
-    def _along(self, derivative: Derivative) -> DirectionProducts:
-        return DirectionProducts(derivative, self._ready, self.lanes, self.tiles)
+    @_once
+    def _pushed(self, chosen: Chosen) -> DirectionProducts:
+        return DirectionProducts(self._forward(chosen), self._ready, self.lanes, self.tiles)
+
+    @_once
+    def _pulled(self, chosen: Chosen) -> DirectionProducts:
+        return DirectionProducts(self._reverse(chosen), self._ready, self.lanes, self.tiles)
 
     def _matrix(self, matrix: ColoredMatrix, points: Array, sparse: bool, threads: int | None) -> Any:
         count = 1 if threads == 1 else thread_count(threads)
@@ -240,10 +259,8 @@ class Differentiable(ABC):
         found = [module.csr_array((row, columns.copy(), starts.copy()), shape=matrix.entries.shape) for row in rows]
         return found if points.ndim == 2 else found[0]
 
+    @_once
     def _jacobian(self, chosen: Chosen) -> ColoredMatrix:
-        return self._once("jacobian", chosen, self._make_jacobian)
-
-    def _make_jacobian(self, chosen: Chosen) -> ColoredMatrix:
         graph, wrt = self._numbered(chosen)
         entries = pattern(graph, wrt)
         if not len(entries.rows):
@@ -258,10 +275,8 @@ class Differentiable(ABC):
     def _colored(self, entries: Pattern, source: Graph | Sequence[Part], points: int) -> ColoredMatrix:
         return ColoredMatrix(entries, source, points, self.lanes, self._ready)
 
+    @_once
     def _hessian(self, chosen: Chosen) -> ColoredMatrix:
-        return self._once("hessian", chosen, self._make_hessian)
-
-    def _make_hessian(self, chosen: Chosen) -> ColoredMatrix:
         if not self.n_in:  # and no cotangents, which would be the outputs of the reverse mode
             nothing = np.zeros(0, dtype=np.int64)
             return self._colored(Pattern(nothing, nothing, (0, 0)), [], self.n_out)
@@ -270,38 +285,25 @@ class Differentiable(ABC):
         derivative = _guarded(partial(_second_products, graph, wrt), len(wrt))
         return self._colored(entries, hessian_parts(entries, derivative), self.n_in + self.n_out)
 
+    @_once
     def _forward(self, chosen: Chosen) -> Derivative:
-        return self._once("forward", chosen, self._make_forward)
-
-    def _make_forward(self, chosen: Chosen) -> Derivative:
         graph, wrt = self._numbered(chosen)
         return _guarded(partial(forward_products, graph, wrt), len(wrt))
 
+    @_once
     def _reverse(self, chosen: Chosen) -> Derivative:
-        return self._once("reverse", chosen, self._make_reverse)
-
-    def _make_reverse(self, chosen: Chosen) -> Derivative:
         graph, wrt = self._numbered(chosen)
         return _guarded(partial(reverse_products, graph, wrt), self.n_out)
 
     def _numbered(self, chosen: Chosen) -> tuple[Graph, tuple[Node, ...]]:
         """The graph with numbers for names, and the chosen inputs: the longest name has no room for a suffix."""
-        graph = self._once("graph", None, self._make_numbered)
+        graph = self._graph(None)
         return graph, graph.inputs if chosen is None else tuple([graph.inputs[k] for k in chosen])
 
-    def _make_numbered(self, _: Chosen) -> Graph:
+    @_once
+    def _graph(self, _: Chosen) -> Graph:
         inputs = [variable(f"x{k}") for k in range(self.n_in)]
         return Graph(inputs, {f"y{k}": node for k, node in enumerate(self.graph(*inputs).values())})
-
-    def _once(self, name: str, chosen: Chosen, make: Callable[[Chosen], Made]) -> Made:
-        """What `make` gives of the chosen inputs, made once, by whichever thread asks first."""
-        key = name, chosen
-        if key not in self._made:
-            with self._making:
-                if key not in self._made:
-                    self._made[key] = make(chosen)
-        made: Made = self._made[key]
-        return made
 
 
 def _guarded(derive: Callable[..., Graph], directions: int) -> Derivative:
