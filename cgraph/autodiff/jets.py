@@ -172,7 +172,7 @@ class _Jets:
         return self._sum(a, b, "")
 
     def safe_sum(self, a: Node, b: Node) -> Node:
-        """The same, in which zeros win over what is not finite."""
+        """The sum over 0 < j < k of a_j b_k-j, in which zeros win over what is not finite."""
         return self._sum(a, b, "safe")
 
     def weighted_sum(self, a: Node, b: Node) -> Node:
@@ -215,7 +215,7 @@ class _Jets:
         return by_partials(self, node, *node.args)
 
     def _piece(self, node: Node) -> Node:
-        """Of the piece that the side chooses."""
+        """Coefficient k of the piece that the side chooses."""
         piece, args = columns(node.op).piece, node.args
         assert piece is not None
         side = self.sides[node] = variable(f"side{len(self.sides)}")

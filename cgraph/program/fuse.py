@@ -59,7 +59,7 @@ def _one_call(program: Program, run: list[Call | Map]) -> list[Call | Map]:
 
 
 class _Registers:
-    """What registers hold while statements are followed."""
+    """Values of registers while statements are followed."""
 
     def __init__(self, program: Program) -> None:
         self.overwritten: set[Node] = set()

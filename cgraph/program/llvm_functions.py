@@ -62,7 +62,7 @@ class Functions:
         return self._define(key, "map", lines, len(inputs), len(graph.outputs))
 
     def _elements(self, t: str, inputs: Lengths, shared: int, count: int, same: Sequence[int] = ()) -> list[str]:
-        """Where the inputs of element %i are: what all share, end to end, then one number of each other register."""
+        """Places of the inputs of element %i: what all share, end to end, then one number of each other register."""
         places = _end_to_end(self.arithmetic.type, "in", inputs[:shared])
         for k, length in list(enumerate(inputs))[shared:]:
             own = f"ptr %in{k}, i64 {'%i' if length == count else 0}"
@@ -242,7 +242,7 @@ def _among_text(arithmetic: Arithmetic, results: Sequence[str], targets: Sequenc
 
 
 def _end_to_end(t: str, name: str, lengths: Lengths, step: int = 1) -> list[str]:
-    """Where the numbers of registers are, end to end, each so many numbers behind the one before."""
+    """Places of the numbers of registers, end to end, each so many numbers behind the one before."""
     return [f"{t}, ptr %{name}{k}, i64 {at * step}" for k, length in enumerate(lengths) for at in range(length)]
 
 

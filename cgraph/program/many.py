@@ -88,7 +88,7 @@ class Masked:
 
 
 def masked_if(statement: If, masked: Masked) -> None:
-    """Either way in its lanes."""
+    """Run both bodies, each in its lanes."""
     on, off = masked.register("on"), masked.register("off")
     graph = _WAYS_IN_MASK if masked.mask else _WAYS
     masked.add(Call(graph, (statement.register, *masked.mask), (on, off)))
@@ -107,7 +107,7 @@ def masked_while(statement: While | FixedPoint, masked: Masked) -> None:
 
 
 def masked_push(push: Push, masked: Masked) -> None:
-    """In other lanes the count is infinite meanwhile, so that nothing is put on the stack."""
+    """Push in the lanes of the mask: in others the count is infinite meanwhile, so that nothing is put on the stack."""
     if not masked.mask:
         masked.add(push)
         return

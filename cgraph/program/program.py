@@ -80,7 +80,7 @@ class Program:
 
     @property
     def alone(self) -> tuple[str, ...]:
-        """What keeps several memories from running side by side: kinds of statements, `record_if`, `stop`."""
+        """Reasons why memories cannot run side by side: kinds of statements, `record_if`, `stop`."""
         kinds = {type(statement).__name__ for statement in self.statements() if row_of(statement).beside is None}
         return (*sorted(kinds), *[name for name in ("record_if", "stop") if getattr(self, name) is not None])
 

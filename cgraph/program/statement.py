@@ -18,7 +18,7 @@ Rule = Callable[..., None]  # of the statement, or its assignment, and of what i
 
 
 class Statement:
-    """What a program does at a time: the base of the kinds, each of which is a frozen dataclass and a `StatementRow`.
+    """Base of the kinds of statements, each of which is a frozen dataclass and a `StatementRow`.
 
     >>> from cgraph.extend import Factor, Statement
     >>> isinstance(Factor("A", "pivots"), Statement)
@@ -83,7 +83,7 @@ def register_statement(row: StatementRow) -> None:
 
 
 def row_of(statement: Statement) -> StatementRow:
-    """Its row. Raises TypeError for what is no statement of the table."""
+    """Row of a statement. Raises TypeError for what is no statement of the table."""
     try:
         return STATEMENTS[type(statement)]
     except KeyError:
@@ -92,7 +92,7 @@ def row_of(statement: Statement) -> StatementRow:
 
 @dataclass(frozen=True)
 class Execution:
-    """What the rules of statements in Python call: graphs at points, and other statements.
+    """Means of the rules in Python: graphs at points, and other statements.
 
     values: (graph, x) -> the outputs at a point.  batch: (graph, points (inputs, N)) -> the outputs (outputs, N).
     many: how many memories run side by side; -1: one alone.
@@ -182,7 +182,7 @@ def needed(statements: Sequence[Statement], results: Iterable[str]) -> list[Stat
 
 
 def length_of(lengths: Lengths, where: str, name: str) -> int:
-    """Of a register. Raises GraphError for an unknown one, which `where` names."""
+    """Length of a register. Raises GraphError for an unknown one, in the words of `where`."""
     if not isinstance(name, str) or name not in lengths:
         raise GraphError(f"{where} names register {name!r}, not among {', '.join(lengths) or 'none'}")
     return lengths[name]

@@ -73,7 +73,7 @@ class Writer:
         return f"{kind}{self._count}"
 
     def block(self, label: str) -> None:
-        """What follows is a block of that name."""
+        """Begin a block of that name."""
         self.written.append(f"{label}:")
 
     def jump(self, label: str) -> None:
@@ -107,7 +107,7 @@ class Writer:
         self.written += [f"  call void @{name}({', '.join(f'ptr {pointer}' for pointer in pointers)})", *copies]
 
     def lengths(self, names: Sequence[str]) -> Lengths:
-        """Of registers."""
+        """Lengths of registers."""
         return tuple([self.registers[name] for name in names])
 
     def positive(self, result: str, register: str) -> list[str]:
@@ -125,5 +125,5 @@ class Writer:
 
 
 def copy_text(target: str, source: str, size: int) -> str:
-    """So many bytes from one address to another."""
+    """Copy so many bytes from one address to another."""
     return f"  call void @llvm.memcpy.p0.p0.i64(ptr {target}, ptr {source}, i64 {size}, i1 false)"

@@ -52,7 +52,7 @@ class Adjoint(Registers):
         self.recording = {} if recording is None else recording  # {assignment: the one that records}
 
     def inner(self, bars: Mapping[str, str]) -> Adjoint:
-        """Of a body, from cotangents of its end, which stay as they are."""
+        """Adjoint of a body, from cotangents of its end, which stay as they are."""
         more = bars.values(), self.turns, self.recording, self.own
         return Adjoint(bars, self.active, self.lengths, self.products, *more)
 
@@ -91,11 +91,11 @@ class Adjoint(Registers):
         return zero
 
     def seeded(self, outputs: Sequence[str]) -> tuple[int, ...]:
-        """Which of some registers have cotangents."""
+        """Numbers of the registers that have cotangents."""
         return tuple([k for k, name in enumerate(outputs) if name in self.bars])
 
     def wanted(self, inputs: Sequence[str]) -> tuple[int, ...]:
-        """Of which of some registers cotangents matter."""
+        """Numbers of the registers whose cotangents matter."""
         return tuple([k for k, name in enumerate(inputs) if name in self.active and self.lengths[name]])
 
     def recorded(self, assignment: Assignment, statement: Statement, copies: Sequence[Map]) -> None:

@@ -23,7 +23,7 @@ Body = tuple[Statement, ...]
 
 
 def assign_if(statement: If, assigned: Assigned) -> Assignment:
-    """Either body from the same registers on; what one of them writes is copied at the end of both."""
+    """Assignment of both bodies from the same registers on; what one of them writes is copied at the end of both."""
     decides = assigned.now(statement.register)
     writes = list(dict.fromkeys([*effects(statement.body)[1], *effects(statement.otherwise)[1]]))
     before, parts, ends = dict(assigned.current), [], []
@@ -173,6 +173,7 @@ def pull_while(assignment: Assignment, adjoint: Adjoint) -> None:
     back = [added(total, inner.bars[name], total) for name, total in sums.items()]
     back += [copied(source, other) for source, other in beside.items()]
     back += [_copy_or_zero(source and beside.get(source, source), bar) for bar, source in handed.items()]
+    # x_bar_k = f_x^T x_bar_k+1 and e_bar += f_e^T x_bar_k+1, from the last turn back
     adjoint.add(While(left, (Pop(stack, left, record), *replayed.again, *inner.statements, *back)))
     ends = (*bars.values(), *sums.values(), adjoint.unsolved)  # NaN after turns that the stack had no room for
     adjoint.add(*[Map(_UNLESS_FULL, (end, turns), (end,)) for end in ends])

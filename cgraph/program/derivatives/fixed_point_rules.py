@@ -102,9 +102,9 @@ def until_settled(
         if result is None:
             continue
         new, change, size = fresh("new", lengths[u]), fresh("d", 1), fresh("s", 1)
-        body.append(copied(result, new) if v is None else added(v, result, new))
+        body.append(copied(result, new) if v is None else added(v, result, new))  # u_new = v + A u
         body += [Sum(_SQUARED_CHANGE, (new, u), (change,)), Sum(_SQUARE, (new,), (size,)), copied(new, u)]
-        body.append(Call(_SHARE, (total, change, size), (total,)))
+        body.append(Call(_SHARE, (total, change, size), (total,)))  # sum of |u_new - u|^2 / |u_new|^2
     judged = Call(_JUDGED, (total, old, turns, stalled, unsolved), (going, old, turns, stalled, unsolved))
     start = Call(begin, (), tuple(begun[:4]))
     return [*first, start, While(going, (*body, judged)), *turn]

@@ -45,7 +45,7 @@ def push_solve(assignment: Assignment, tangent: Tangent) -> None:
         tangent.add(copied(side, dot))
     else:
         tangent.add(Call(_less_product(n, solve.transposed), (side, matrix, solve.vector), (dot,)))
-    tangent.add(Solve(solve.matrix, solve.pivots, dot, solve.transposed))
+    tangent.add(Solve(solve.matrix, solve.pivots, dot, solve.transposed))  # x_dot = A^-1 (b_dot - A_dot x)
 
 
 def pull_solve(assignment: Assignment, adjoint: Adjoint) -> None:
@@ -56,7 +56,7 @@ def pull_solve(assignment: Assignment, adjoint: Adjoint) -> None:
         return
     bar, n = adjoint.bar(right), adjoint.lengths[solve.vector]
     adjoint.add(copied(adjoint.bars[solve.vector], bar))
-    adjoint.add(Solve(solve.matrix, solve.pivots, bar, not solve.transposed))
+    adjoint.add(Solve(solve.matrix, solve.pivots, bar, not solve.transposed))  # b_bar = A^-T x_bar
     if solve.matrix in adjoint.active:
         matrix = adjoint.bar(solve.matrix)
         sides = (solve.vector, bar) if solve.transposed else (bar, solve.vector)

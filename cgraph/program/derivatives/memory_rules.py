@@ -70,7 +70,7 @@ def push_pop(assignment: Assignment, tangent: Tangent) -> None:
 
 
 def pull_push(assignment: Assignment, adjoint: Adjoint) -> None:
-    """What the row put on the stack has as its cotangent comes off the stack of cotangents, whose row then is 0."""
+    """Cotangents of the row come off the stack of cotangents, whose row then is 0."""
     push = assignment.statement
     assert isinstance(push, Push)
     if push.stack not in adjoint.bars:

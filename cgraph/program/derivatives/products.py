@@ -41,7 +41,7 @@ class Pullback(Protocol):
 
 
 class Products:
-    """Of any graph; a zero that is one whatever the numbers are is left out.
+    """Products of any graph; a zero that is one whatever the numbers are is left out.
 
     pullbacks: {id of a graph: its own rule}.
     """

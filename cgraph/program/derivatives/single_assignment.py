@@ -95,7 +95,7 @@ class Assigned(Registers):
         return Assignment(new, tuple([copied(before[name], self.now(name)) for name in changed]))
 
     def in_place(self, statement: Statement) -> Statement:
-        """With the registers of now, which it also writes. Raises TypeError for one with bodies."""
+        """Statement over the registers of now, which it also writes. Raises TypeError for one with bodies."""
         if bodies_of(statement):
             raise TypeError(f"a FixedPoint with a {type(statement).__name__} in its turns has no derivatives")
         row = row_of(statement)

@@ -33,7 +33,7 @@ class Tangent(Registers):
         self.statements: list[Statement] = []
 
     def inner(self, more: Mapping[str, str] | None = None, *, values: bool = False) -> Tangent:
-        """Of a body: what has tangents here has them there, and more registers."""
+        """Tangent of a body: what has tangents here has them there, and more registers."""
         dots = {**self.dots, **(more or {})}
         return Tangent(dots, self.active, self.lengths, self.products, values=self.values or values, own=self.own)
 
@@ -72,5 +72,5 @@ class Tangent(Registers):
         self.add(copied(self.dots[register], dot) if register in self.dots else zeroed(dot))
 
     def moving(self, inputs: Sequence[str]) -> tuple[int, ...]:
-        """Which of some registers have tangents."""
+        """Numbers of the registers that have tangents."""
         return tuple([k for k, name in enumerate(inputs) if name in self.dots and self.lengths[name]])

@@ -22,7 +22,7 @@ class Block(NamedTuple):
 
 
 class Tape:
-    """What was recorded of passes, block by block.
+    """Record of passes, block by block.
 
     forward: runs the program that records, see `Linearization.forward`.  feed: (first, last) -> what the passes first
     .. last - 1 are fed.  checkpoints: passes between two memories from which the record is made again; 0: the record is

@@ -5,12 +5,11 @@ from __future__ import annotations
 from ...core.graph import Graph
 from ...core.node import Node, constant
 from ...writing.naming import variables
-from ..statement import Names
 from ..statements.call import Sum, copied, zeroed
 from ..statements.memory import Take
 from ..statements.tiles import Scatter, TiledMap, element_sizes, tile_count
 from .adjoint import Adjoint
-from .call_rules import shared_first
+from .call_rules import pushed_elements
 from .memory_rules import collect_taken
 from .products import Product, split
 from .single_assignment import Assignment
@@ -22,28 +21,20 @@ from .tangent import Tangent
 def push_tiled_map(assignment: Assignment, tangent: Tangent) -> None:
     """y_dot = f'(x) x_dot in the tiles that are computed."""
     tiled: TiledMap = assignment.statement  # type: ignore[assignment]
-    inputs, first = (*tiled.shared, *tiled.inputs), len(tiled.shared)
-    lengths = (*tangent.of(tiled.shared), *element_sizes(tiled, tangent.lengths, tiled.inputs))
-    sizes, moving = element_sizes(tiled, tangent.lengths, tiled.outputs), tangent.moving(inputs)
-    product = tangent.products.pushed(tiled.graph, lengths, moving, sizes) if moving else Product(None, ())
-    moved = [
-        k for k in range(len(sizes)) if k in product.kept or (tiled.tiles and _before(assignment, k) in tangent.dots)
-    ]
+    inputs, sizes = [element_sizes(tiled, tangent.lengths, names) for names in (tiled.inputs, tiled.outputs)]
+    pushed = pushed_elements(tiled, inputs, sizes, tangent)
+    before = [tangent.dots.get(name) for name in assignment.sources]
+    moved = [k for k, old in enumerate(before) if k in pushed.kept or (tiled.tiles and old)]
     moved = [k for k in moved if tiled.outputs[k] in tangent.active]
     if not moved:
         return
-    graph, dots = Graph([], {"none": 0.0}), [tangent.dots[inputs[k]] for k in moving]
-    shared: Names = ()
-    others: Names = ()
-    if product.graph is not None:
-        graph, common = shared_first(product, lengths, first, moving), sum([k < first for k in moving])
-        shared, others = (*tiled.shared, *dots[:common]), (*tiled.inputs, *dots[common:])
-    found = dict(zip(product.kept, split(list(graph.outputs.values()), [sizes[k] for k in product.kept]), strict=True))
+    graph = pushed.graph or Graph([], {"none": 0.0})
+    found = dict(zip(pushed.kept, split(list(graph.outputs.values()), [sizes[k] for k in pushed.kept]), strict=True))
     nodes = [node for k in moved for node in found.get(k, [constant(0.0)] * sizes[k])]
-    before = [tangent.dots.get(_before(assignment, k)) for k in moved]
     results = tuple([tangent.dot(tiled.outputs[k]) for k in moved])
-    tangent.add(*[copied(old, dot) if old else zeroed(dot) for old, dot in zip(before, results, strict=True)])
-    tangent.add(TiledMap(_graph(graph.inputs, nodes), others, results, shared, tiled.lanes, tiled.tiles))
+    for k, dot in zip(moved, results, strict=True):
+        tangent.add(zeroed(dot) if (old := before[k]) is None else copied(old, dot))
+    tangent.add(TiledMap(_graph(graph.inputs, nodes), pushed.inputs, results, pushed.shared, tiled.lanes, tiled.tiles))
 
 
 def pull_tiled_map(assignment: Assignment, adjoint: Adjoint) -> None:
@@ -69,16 +60,11 @@ def pull_tiled_map(assignment: Assignment, adjoint: Adjoint) -> None:
         for k, term in zip(product.kept, terms, strict=True):
             adjoint.collect(inputs[k], term if k >= first else _summed(adjoint, inputs[k], term, count, tiled.lanes))
     for k, seed in zip(seeded, seeds, strict=True):
-        if tiled.tiles and (old := _before(assignment, k)) in adjoint.active:
+        if tiled.tiles and (old := assignment.sources[k]) in adjoint.active:
             bar = adjoint.bar(old)
             none = _graph([], [constant(0.0)] * sizes[k])
             adjoint.add(copied(seed, bar), TiledMap(none, (), (bar,), (), tiled.lanes, tiled.tiles))
             adjoint.collect(old, bar)
-
-
-def _before(assignment: Assignment, k: int) -> str:
-    """The register that has output k before the statement."""
-    return assignment.sources[k]
 
 
 def _graph(inputs: tuple[Node, ...] | list[Node], outputs: list[Node]) -> Graph:

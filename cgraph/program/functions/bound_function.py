@@ -54,7 +54,7 @@ class BoundFunction:
         return result
 
     def _take(self) -> _Buffers:
-        """Where one call at a time puts its point and finds its result."""
+        """Buffers of one call at a time: its point, its result."""
         try:
             return self._free.pop()
         except IndexError:

@@ -58,11 +58,11 @@ class Part(NamedTuple):
     entries: Indices
 
     def tiles(self, lanes: int) -> int:
-        """Of directions."""
+        """Number of tiles of directions."""
         return -(-(max(self.colors) + 1) // lanes)
 
     def seeds(self, lanes: int) -> Array:
-        """Of each color the sum of its unit vectors, in tiles."""
+        """Sum of the unit vectors of each color, in tiles."""
         seeds = np.zeros((self.tiles(lanes), len(self.colors), lanes))
         for k, color in enumerate(self.colors):
             if color != NONE:
@@ -158,11 +158,11 @@ class ColoredMatrix:
                 values[again] = found
 
     def _seeds(self, lanes: int) -> dict[str, Array]:
-        """What the registers of directions hold."""
+        """Numbers in the registers of directions."""
         return {f"s{k}": part.seeds(lanes) for k, part in enumerate(self._parts)}
 
     def _runner(self, dense: bool, careful: bool, lanes: int) -> Runner:
-        """What runs the program, made at the first use; the whole matrix is the entries, where none is left out."""
+        """Runner of the program, made at the first use; the whole matrix is the entries, where none is left out."""
         key = dense and not full(self.entries), careful, lanes
         with self._making:
             if key not in self._made:

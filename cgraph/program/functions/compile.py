@@ -219,7 +219,7 @@ def _remade(_: object, graph: Graph, backend: str, options: Options) -> Compiled
 
 
 def _recipe(function: Compiled) -> Any:
-    """What pickling keeps: the graph and the choices. Machine code is made again where the pickle is read."""
+    """Graph and choices, which a pickle keeps. Machine code is made again where it is read."""
     return _remade, (_Version(), function.graph, function.backend, function.options)
 
 

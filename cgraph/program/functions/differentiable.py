@@ -39,7 +39,7 @@ LANES = 8  # directions that count as one where colorings are compared, whatever
 
 
 def _once(make: Callable[[Any, Chosen], Made]) -> Callable[[Any, Chosen], Made]:
-    """What a method makes of the chosen inputs, made once, by whichever thread asks first."""
+    """Method whose result for the chosen inputs is made once, by whichever thread asks first."""
 
     def made(self: Differentiable, chosen: Chosen) -> Made:
         key = make, chosen
@@ -229,7 +229,7 @@ class Differentiable(ABC):
         shape: tuple[int, int],
         threads: int,
     ) -> Array:
-        """Of every point along one direction, or along as many as others."""
+        """Products at many points, of each along one direction or along as many as others."""
         count = len(points)
         if given.ndim == 1:
             given = np.broadcast_to(given, (count, *given.shape))

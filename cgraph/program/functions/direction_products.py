@@ -21,7 +21,7 @@ from .colored_matrix import Derivative, product_statements
 
 
 class _Buffers(NamedTuple):
-    """What one call at a time has for itself: memory of a point, directions and results in tiles, how many, checks."""
+    """Buffers of one call at a time: memory of a point, directions and results in tiles, how many, checks."""
 
     x: Any  # memory
     directions: Array
@@ -32,7 +32,7 @@ class _Buffers(NamedTuple):
 
 
 class DirectionProducts:
-    """What writes products; any number of threads may call it at once.
+    """Writer of products; any number of threads may call it at once.
 
     ready: makes a program ready to run.  lanes, tiles: directions in a tile, and tiles in a block.
     """
@@ -62,7 +62,7 @@ class DirectionProducts:
 
     @cached_property
     def _beside(self) -> Runner:
-        """What runs a point and one direction, as one register, for many of these side by side."""
+        """Runner of a point and one direction, as one register, for many of these side by side."""
         (primal, linear), known = self._derivative.split, len(self._derivative.split.primal.outputs)
         inputs = [*primal.inputs, *linear.inputs[known:]]
         outputs = applied(linear, [*applied(primal, primal.inputs), *linear.inputs[known:]])
@@ -115,5 +115,5 @@ class DirectionProducts:
 
     @cached_property
     def _guarded(self) -> DirectionProducts:
-        """By the split in which zeros win, made at its first use."""
+        """Products by the split in which zeros win, made at its first use."""
         return DirectionProducts(self._derivative.careful, *self._how)

@@ -37,7 +37,7 @@ _FAST = "reassoc nsz arcp contract afn"  # all but the promise that there is no 
 
 
 def flags_of(fast: bool, fma: bool) -> str:
-    """What the arithmetic may do, in LLVM's words."""
+    """Liberties of the arithmetic, in LLVM's words."""
     return _FAST if fast else "contract" if fma else ""
 
 
@@ -77,7 +77,7 @@ class NativeRunner(Runner):
 
     @property
     def _entry(self) -> Any:
-        """What runs one memory, made at its first use."""
+        """Machine code that runs one memory, made at its first use."""
         with self._lock:
             if self._one is None:
                 text = program_ir(self._fused, self._flags, width=self.width, registers=self._host.registers)
@@ -91,7 +91,7 @@ class NativeRunner(Runner):
 
     @property
     def _entry_of_lanes(self) -> Any:
-        """What runs a vector of memories, made at its first use."""
+        """Machine code that runs a vector of memories, made at its first use."""
         with self._lock:
             if self._many is None:
                 text = program_ir(self._fused_many, self._flags, self._host.lanes, self.width, self._host.registers)
@@ -124,7 +124,7 @@ class NativeRunner(Runner):
         return bound_call(code.entry, x[1], y[1], memory), registers
 
     def point(self, x: str, y: str) -> PointCode:
-        """What runs one pass of which two registers lie apart, made at its first use."""
+        """Machine code of one pass of which two registers lie apart, made at its first use."""
         with self._lock:
             if (x, y) not in self._points:
                 how = self._flags, self.width, self._host.registers

@@ -45,7 +45,7 @@ class Record(NamedTuple):
 
 @contextmanager
 def _fitting(rows: int, width: int) -> Iterator[None]:
-    """Within, memory that does not suffice for the rows of a record is told in a sentence."""
+    """Tell in a sentence where memory does not suffice for the rows of a record."""
     try:
         yield
     except MemoryError:
@@ -154,7 +154,7 @@ class Runner(ABC):
         """
 
     def run_many(self, memories: Array, passes: int, every: int = 1, feed: ArrayLike | None = None) -> Record:
-        """As `run`, for N memories (size, N) at once, in vectors: what `run` does of each, whichever course it takes.
+        """Run N memories (size, N) at once, in vectors: as `run` does each, whichever course it takes.
 
         feed: (passes, feed_width, N), or (passes, feed_width, 1) for all.  The record has rows (rows, width, N).
         Raises GraphError, besides as `run`, for a program with `record_if` or `stop`, by which memories would have
@@ -170,7 +170,7 @@ class Runner(ABC):
             return self._run_many(memories, passes, every, fed)
 
     def batch(self, name: str, values: ArrayLike, threads: int | None = 1, *, out: Array | None = None) -> Array:
-        """What one pass records, (N, width), at each of N values of a register, (N, length), side by side in vectors.
+        """Record of one pass, (N, width), at each of N values of a register, (N, length), side by side in vectors.
 
         threads: how many may share the work; None: one for each core.  out: where the rows go, sharing no memory with
         `values`; a new array by default.
@@ -195,7 +195,7 @@ class Runner(ABC):
     def _columns(
         self, name: str, start: Mapping[str, Array] = MappingProxyType({})
     ) -> tuple[int, Callable[[Array, Array], None]]:
-        """What writes records, (width, k), of values of a register, (length, k); and the k worth a thread's start.
+        """The k worth a thread's start, and a writer of records, (width, k), of values of a register, (length, k).
 
         start: what other registers hold before; those that are not there, zeros, unless a pass left others.
         """

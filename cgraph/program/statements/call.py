@@ -170,19 +170,19 @@ def check_elements(statement: Map | Sum, lengths: Lengths) -> None:
 
 
 def run_call(call: Call, state: State, execution: Execution) -> None:
-    """In Python."""
+    """Run in Python."""
     _split(execution.values(call.graph, _joined(state, call.inputs)), call.outputs, state)
 
 
 def run_map(statement: Map, state: State, execution: Execution) -> None:
-    """In Python, element by element."""
+    """Run in Python, element by element."""
     columns = _rows(statement, state, execution)
     for slot, name in enumerate(statement.outputs):
         state[name] = [values[slot] for values in columns]
 
 
 def run_sum(statement: Sum, state: State, execution: Execution) -> None:
-    """In Python, added up in order."""
+    """Run in Python, added up in order."""
     rows = _rows(statement, state, execution)
     columns = zip(*rows, strict=True) if rows else [()] * len(statement.graph.outputs)
     totals = [functools.reduce(operator.add, terms, 0.0) for terms in columns]  # sum() compensates
@@ -215,13 +215,13 @@ def _split(values: Sequence[float], names: Sequence[str], state: State) -> None:
 
 
 def call_beside(call: Call, state: dict[str, Array], execution: Execution) -> None:
-    """Of many memories: a batch."""
+    """Run many memories: a batch."""
     points = np.concatenate([state[name] for name in call.inputs]) if call.inputs else np.empty((0, execution.many))
     _split_rows(execution.batch(call.graph, points), call.outputs, state)
 
 
 def elements_beside(statement: Map | Sum, state: dict[str, Array], execution: Execution) -> None:
-    """Of many memories: all elements as one batch."""
+    """Run many memories: all elements as one batch."""
     # All elements of all N states are points of one batch: (inputs, elements * N) -> (outputs, elements, N).
     shape = (elements(statement, execution.lengths), execution.many)
     rows = [row for name in statement.shared for row in state[name]]
@@ -247,13 +247,13 @@ def _split_rows(rows: Array, names: Sequence[str], state: dict[str, Array]) -> N
 
 
 def call_text(call: Call, writer: Writer) -> None:
-    """As machine code."""
+    """Write as machine code."""
     name = writer.functions.call(call.graph, writer.lengths(call.inputs), writer.lengths(call.outputs))
     writer.calls(name, call.inputs, call.outputs)
 
 
 def map_text(statement: Map, writer: Writer) -> None:
-    """As machine code, in vectors of elements."""
+    """Write as machine code, in vectors of elements."""
     if count := elements(statement, writer.registers):
         shared = writer.lengths(statement.shared)
         name = writer.functions.map(statement.graph, writer.lengths(statement.inputs), count, shared)
@@ -261,7 +261,7 @@ def map_text(statement: Map, writer: Writer) -> None:
 
 
 def sum_text(statement: Sum, writer: Writer) -> None:
-    """As machine code, added up in order."""
+    """Write as machine code, added up in order."""
     count, of = elements(statement, writer.registers), writer.lengths
     name = writer.functions.sum(
         statement.graph, of(statement.inputs), count, of(statement.shared), of(statement.outputs)

@@ -65,19 +65,19 @@ def check_control(statement: While | If | FixedPoint, lengths: Lengths) -> None:
 
 
 def run_while(statement: While | FixedPoint, state: dict[str, Any], execution: Execution) -> None:
-    """In Python; of many memories, as long as the register is positive in any."""
+    """Run in Python; of many memories, as long as the register is positive in any."""
     while execution.positive(state[statement.register]):
         execution.run(statement.body, state)
 
 
 def run_if(statement: If, state: dict[str, Any], execution: Execution) -> None:
-    """In Python; of many memories, the body if the register is positive in any."""
+    """Run in Python; of many memories, the body if the register is positive in any."""
     positive = execution.positive(state[statement.register])
     execution.run(statement.body if positive else statement.otherwise, state)
 
 
 def while_text(statement: While | FixedPoint, writer: Writer) -> None:
-    """As machine code."""
+    """Write as machine code."""
     label = writer.label("while")
     writer.jump(label)
     writer.block(label)
@@ -89,7 +89,7 @@ def while_text(statement: While | FixedPoint, writer: Writer) -> None:
 
 
 def if_text(statement: If, writer: Writer) -> None:
-    """As machine code."""
+    """Write as machine code."""
     label = writer.label("if")
     writer.branch(statement.register, f"{label}.yes", f"{label}.no")
     for way, body in (("yes", statement.body), ("no", statement.otherwise)):

@@ -61,7 +61,7 @@ def check_matrix(statement: Factor | Solve, lengths: Lengths) -> None:
 
 
 def run_factor(statement: Factor, state: dict[str, Any], execution: Execution) -> None:
-    """In Python, of one memory or of many."""
+    """Run in Python, of one memory or of many."""
     a, n = np.array(state[statement.matrix]), len(state[statement.pivots])
     pivots = np.empty((n, *a.shape[1:]))
     _factor(a.reshape(n, n, *a.shape[1:]), pivots)
@@ -70,7 +70,7 @@ def run_factor(statement: Factor, state: dict[str, Any], execution: Execution) -
 
 
 def run_solve(statement: Solve, state: dict[str, Any], execution: Execution) -> None:
-    """In Python, of one memory or of many."""
+    """Run in Python, of one memory or of many."""
     a, pivots, b = [np.array(state[name]) for name in (statement.matrix, statement.pivots, statement.vector)]
     _solver(statement)(a.reshape(len(b), *b.shape), pivots, b)
     execution.write(state, statement.vector, b)
@@ -81,14 +81,14 @@ def _solver(statement: Solve) -> Callable[[Array, Array, Array], None]:
 
 
 def factor_text(statement: Factor, writer: Writer) -> None:
-    """As machine code."""
+    """Write as machine code."""
     n = writer.registers[statement.pivots]
     name = writer.functions.text("lu.factor", _lu_factor_text)
     writer.line(f"call void @{name}({writer.arguments(statement.matrix, statement.pivots)}, i64 {n})")
 
 
 def solve_text(statement: Solve, writer: Writer) -> None:
-    """As machine code."""
+    """Write as machine code."""
     n = writer.registers[statement.pivots]
     name, text = "lu.solve", _lu_solve_text
     if statement.transposed:

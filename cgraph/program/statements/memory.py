@@ -97,28 +97,28 @@ def check_stack(statement: Push | Pop, lengths: Lengths) -> None:
 
 
 def run_take(take: Take, state: dict[str, Any], execution: Execution) -> None:
-    """In Python, of one memory or of many."""
+    """Run in Python, of one memory or of many."""
     execution.write(state, take.target, np.asarray(state[take.source], dtype=np.float64)[list(take.table)])
 
 
 def run_push(push: Push, state: dict[str, Any], execution: Execution) -> None:
-    """In Python, of one memory or of many, each with a count of its own."""
+    """Run in Python, of one memory or of many, each with a count of its own."""
     stack, row = np.array(state[push.stack]), _row(state, push)
     count, number = np.asarray(state[push.count]), np.asarray(state[push.count]).ravel()
     fits = (number >= 0.0) & (number < _most(push, execution.lengths))
     lanes = np.flatnonzero(fits)
-    stack.reshape(len(stack), -1)[_places(number[lanes], len(row)), lanes] = row[:, lanes]
+    stack.reshape(len(stack), number.size)[_places(number[lanes], len(row)), lanes] = row[:, lanes]
     execution.write(state, push.stack, stack)
     execution.write(state, push.count, np.where(fits, number + 1.0, math.nan).reshape(count.shape))
 
 
 def run_pop(pop: Pop, state: dict[str, Any], execution: Execution) -> None:
-    """In Python, of one memory or of many."""
+    """Run in Python, of one memory or of many."""
     stack, row = np.asarray(state[pop.stack]), np.full_like(_row(state, pop), math.nan)
     count, number = np.asarray(state[pop.count]), np.asarray(state[pop.count]).ravel()
     some = (number > 0.0) & (number <= _most(pop, execution.lengths))
     lanes = np.flatnonzero(some)
-    row[:, lanes] = stack.reshape(len(stack), -1)[_places(number[lanes] - 1.0, len(row)), lanes]
+    row[:, lanes] = stack.reshape(len(stack), number.size)[_places(number[lanes] - 1.0, len(row)), lanes]
     execution.write(state, pop.count, np.where(some, number - 1.0, math.nan).reshape(count.shape))
     at = 0
     for name in pop.rows:
@@ -141,12 +141,12 @@ def _most(statement: Push | Pop, lengths: Lengths) -> float:
 
 
 def _places(number: Array, width: int) -> NDArray[np.int_]:
-    """Where the rows of these numbers lie in a stack, (width, N)."""
+    """Places of the rows of these numbers in a stack, (width, N)."""
     return number.astype(int) * width + np.arange(width)[:, None]
 
 
 def take_text(take: Take, writer: Writer) -> None:
-    """As machine code."""
+    """Write as machine code."""
     name = writer.functions.take(take.table)
     writer.calls(name, (take.source,), (take.target,))
 
@@ -179,7 +179,7 @@ class _Lanes:
         self._writer, self._bits = writer, words_of(writer.functions.arithmetic)["b"]
 
     def both(self, *comparisons: tuple[str, str, float]) -> str:
-        """In which lanes two comparisons hold."""
+        """Condition that holds in the lanes where two comparisons do."""
         writer = self._writer
         a, b = [writer.value(f"fcmp {name} {writer.type} {x}, {writer.number(y)}") for name, x, y in comparisons]
         return writer.value(f"and {self._bits} {a}, {b}")

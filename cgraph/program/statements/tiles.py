@@ -73,7 +73,7 @@ def check_tiled_map(statement: TiledMap, lengths: Lengths) -> None:
 
 
 def run_tiled_map(statement: TiledMap, state: dict[str, Any], execution: Execution) -> None:
-    """In Python, all elements as one batch; of one memory or of many."""
+    """Run in Python, all elements as one batch; of one memory or of many."""
     lengths, tail = execution.lengths, () if execution.many < 0 else (execution.many,)
     tiles = np.full(tail, float(tile_count(statement, lengths)))
     for name in statement.tiles:
@@ -83,7 +83,7 @@ def run_tiled_map(statement: TiledMap, state: dict[str, Any], execution: Executi
     shape = (most, statement.lanes, *tail)
 
     def numbers(name: str, size: int) -> Array:
-        """Of the elements, (most, size, lanes, ..)."""
+        """Numbers of the elements, (most, size, lanes, ..)."""
         return np.asarray(state[name])[: most * size * statement.lanes].reshape(most, size, *shape[1:])
 
     rows = [np.broadcast_to(value, shape) for name in statement.shared for value in state[name]]
@@ -102,7 +102,7 @@ def run_tiled_map(statement: TiledMap, state: dict[str, Any], execution: Executi
 
 
 def tiled_map_text(statement: TiledMap, writer: Writer) -> None:
-    """As machine code, a tile after another; where memories lie side by side, an element after another."""
+    """Write as machine code, a tile after another; where memories lie side by side, an element after another."""
     inputs, outputs = (element_sizes(statement, writer.registers, of) for of in (statement.inputs, statement.outputs))
     shared, count = writer.lengths(statement.shared), tile_count(statement, writer.registers)
     if count:
@@ -124,7 +124,7 @@ def check_scatter(statement: Scatter, lengths: Lengths) -> None:
 
 
 def run_scatter(statement: Scatter, state: dict[str, Any], execution: Execution) -> None:
-    """In Python."""
+    """Run in Python."""
     if execution.many >= 0:  # else in place
         state[statement.target] = np.array(state[statement.target])
     source, target = state[statement.source], state[statement.target]
@@ -133,6 +133,6 @@ def run_scatter(statement: Scatter, state: dict[str, Any], execution: Execution)
 
 
 def scatter_text(statement: Scatter, writer: Writer) -> None:
-    """As machine code."""
+    """Write as machine code."""
     name = writer.functions.take(statement.table, statement.places)
     writer.line(f"call void @{name}({writer.arguments(statement.source, statement.target)})")
