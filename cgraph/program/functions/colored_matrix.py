@@ -151,11 +151,7 @@ class ColoredMatrix:
         directions = sum([part.tiles(1) for part in self._parts])
         write_batch(max(width // (1 + directions) // LEAST, 1) * LEAST, columns, points.T, rows.T, threads)
         if not careful and any([part.derivative.guarded for part in self._parts]):
-            again = np.flatnonzero(~np.isfinite(rows).all(axis=1))
-            if len(again):
-                found = values[again]
-                self.write(points[again], found, threads, careful=True)
-                values[again] = found
+            mend(values, lambda at, found: self.write(points[at], found, threads, careful=True))
 
     def _seeds(self, lanes: int) -> dict[str, Array]:
         """Numbers in the registers of directions."""
@@ -196,6 +192,15 @@ class ColoredMatrix:
             registers |= {**checks, "nonfinite": 1}
             statements.append(Call(_nonfinite(sum(checks.values())), (*checks,), ("nonfinite",)))
         return Program(registers, statements, ["y"])
+
+
+def mend(values: Array, write: Callable[[Indices, Array], None]) -> None:
+    """Write the values of points anew, by a split in which zeros win, where some are infinite or NaN."""
+    wrong = np.flatnonzero(~np.isfinite(values.reshape(len(values), -1)).all(axis=1))
+    if len(wrong):
+        found = values[wrong]
+        write(wrong, found)
+        values[wrong] = found
 
 
 def product_statements(

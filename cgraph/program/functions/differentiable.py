@@ -238,8 +238,8 @@ class Differentiable(ABC):
             raise GraphError(f"{name} must have shape {wanted} for {count} points, got {given.shape}")
         result = np.zeros((*given.shape[:-1], shape[1]))
         if self.n_in and result.size:
-            rows = np.repeat(points, given.shape[1], axis=0) if given.ndim == 3 else points
-            along(chosen).many(rows, given.reshape(-1, shape[0]), result.reshape(-1, shape[1]), threads)
+            rows = (count, -1, given.shape[-1]), (count, -1, shape[1])
+            along(chosen).many(points, given.reshape(rows[0]), result.reshape(rows[1]), threads)
         return result
 
     @_once

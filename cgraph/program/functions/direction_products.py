@@ -17,7 +17,9 @@ from ..fuse import applied
 from ..program import Program
 from ..runners.runner import Runner
 from ..statements.call import Call
-from .colored_matrix import Derivative, product_statements
+from .colored_matrix import Derivative, mend, product_statements
+
+MOST = 2**22  # numbers in the rows of points and directions that are written at a time
 
 
 class _Buffers(NamedTuple):
@@ -71,15 +73,19 @@ class DirectionProducts:
         return self._how[0](Program(registers, [Call(whole, ("x",), ("y",))], ["y"]))
 
     def many(self, points: Array, directions: Array, results: Array, threads: int) -> None:
-        """The results, (N, results), of each of N points along a direction of its own, (N, entries)."""
-        rows = np.concatenate([points, directions], axis=1)
-        write_batch(*self._beside._columns("x"), rows.T, results.T, threads)
+        """The results, (N, k, results), of N points, each along k directions of its own, (N, k, entries)."""
+        count = directions.shape[1]
+        size = max(1, MOST // (count * self._beside.program.registers["x"]))
+        for start in range(0, len(points), size):
+            here = slice(start, start + size)
+            along, found = (
+                directions[here].reshape(-1, directions.shape[2]),
+                results[here].reshape(-1, results.shape[2]),
+            )
+            rows = np.concatenate([np.repeat(points[here], count, axis=0), along], axis=1)
+            write_batch(*self._beside._columns("x"), rows.T, found.T, threads)
         if self._derivative.guarded is not None:
-            again = np.flatnonzero(~np.isfinite(results).all(axis=1))
-            if len(again):
-                found = results[again]
-                self._guarded.many(points[again], directions[again], found, threads)
-                results[again] = found
+            mend(results, lambda at, found: self._guarded.many(points[at], directions[at], found, threads))
 
     def _block(self, x: Array, directions: Array, result: Array) -> None:
         try:
