@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Sequence
 from functools import partial
 from typing import Any, TypeVar
@@ -34,6 +33,7 @@ from .direction_products import DirectionProducts
 CHECK = 256  # operations that take as long as to look whether slopes are infinite
 Made = TypeVar("Made")
 Inputs = str | Node | Sequence[str | Node] | None
+Ready = Callable[[Program], Runner]  # makes a program ready to run
 Chosen = tuple[int, ...] | None  # the numbers of inputs; None for all
 LANES = 8  # directions that count as one where colorings are compared, whatever the processor's vectors
 
@@ -53,26 +53,21 @@ def _once(make: Callable[[Any, Chosen], Made]) -> Callable[[Any, Chosen], Made]:
     return made
 
 
-class Differentiable(ABC):
+class Differentiable:
     """A compiled graph y = f(x) that has derivatives at run time. All that they need is made at the first use.
 
+    ready: makes a program ready to run in the same way.
     wrt: the inputs to differentiate by, in this order; by default all. Columns, directions and products with the
     transposed Jacobian are of these alone; x has all inputs.
     """
 
-    graph: Graph
-    n_in: int
-    n_out: int
-    lanes, tiles = LANES, 512  # directions in a tile, and tiles in a block of them
-    vector_cost = 1  # of an operation on a vector of directions, in operations on numbers
+    lanes, tiles, vector_cost = 1, 1, 1  # as of a Runner
 
-    def __init__(self) -> None:
+    def __init__(self, graph: Graph, ready: Ready) -> None:
+        self.graph, self._ready = graph, ready
+        self.n_in, self.n_out = len(graph.inputs), len(graph.outputs)
         self._made: dict[Hashable, Any] = {}  # derivatives and matrices
         self._making = threading.RLock()
-
-    @abstractmethod
-    def _ready(self, program: Program) -> Runner:
-        """A program made ready to run in the same way."""
 
     def _points(self, x: ArrayLike) -> Array:
         """The point, (n_in,), or points, (N, n_in), checked."""

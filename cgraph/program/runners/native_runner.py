@@ -52,9 +52,12 @@ class PointCode(NamedTuple):
 class NativeRunner(Runner):
     """A program as machine code. Any number of threads may run it at once, on a memory each."""
 
+    takes_rows, tiles = True, 16
+
     def __init__(self, program: Program, flags: str, cache: Cache | None = None) -> None:
         host = llvm.host()
         super().__init__(program, host.lanes)
+        self.lanes = host.lanes
         require_texts(program)
         self._flags, self._host, self._cache = flags, host, cache
         self._fused = fused(program)
@@ -147,7 +150,7 @@ class NativeRunner(Runner):
         """The points in a block, and the machine code."""
         from .batch_code import BatchCode
 
-        lanes, text, alone = self._host.lanes, self.batch_text(name), whole_graph(self._fused, name) is not None
+        lanes, text, alone = self._host.lanes, self._batch_module(name), whole_graph(self._fused, name) is not None
         code = self._compiled(text.source, looped=not alone)
         width = max(WORK // max(1, self._nodes) // lanes, 1) * lanes
         begin = np.zeros((text.size // lanes, lanes))
@@ -157,8 +160,15 @@ class NativeRunner(Runner):
                 begin[places[other] : places[other] + len(numbers)] = numbers[:, None]
         return width, BatchCode(code, lanes, begin.ravel(), columns=alone)
 
-    def batch_text(self, name: str) -> Batch:
-        """The text in LLVM's language of the function for batches of a register."""
+    def point_text(self, x: str, y: str) -> str:
+        """The text in LLVM's language."""
+        return self.point(x, y).source
+
+    def batch_text(self, name: str) -> str:
+        """The text in LLVM's language."""
+        return self._batch_module(name).source
+
+    def _batch_module(self, name: str) -> Batch:
         from ...codegen.batch_ir import batch_ir
         from .batch_code import program_rows_ir
 

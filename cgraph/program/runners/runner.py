@@ -63,6 +63,10 @@ class Runner(ABC):
     [8.0]
     """
 
+    lanes, tiles = 8, 512  # directions in a tile, and tiles in a block of them
+    vector_cost = 1  # of an operation on a vector of directions, in operations on numbers
+    takes_rows = False  # whether batches of points that lie one after another are read and written as they lie
+
     def __init__(self, program: Program, width: int = 1) -> None:
         self.program, self.width = program, width
         places = offsets(program.registers, width)
@@ -227,6 +231,18 @@ class Runner(ABC):
             raise GraphError(f"a memory must be contiguous float64 of shape {shape}, got {describe(memory)}")
         require_whole("passes", passes)
         require_whole("every", every, 1)
+
+    def on_lists(self, name: str) -> Callable[[list[float]], tuple[float, ...]] | None:
+        """The record of one pass, at a list of floats for a register, where that needs no memory."""
+        return None
+
+    @abstractmethod
+    def point_text(self, x: str, y: str) -> str:
+        """The text of one pass of which two registers lie apart."""
+
+    @abstractmethod
+    def batch_text(self, name: str) -> str:
+        """The text of the function for batches of a register."""
 
     @abstractmethod
     def _run(self, memory: Array, passes: int, every: int, feed: Array) -> Record: ...
