@@ -201,7 +201,7 @@ class Differentiable:
     ) -> Array:
         """shape: the numbers of entries of a direction and of a result."""
         points, rows = self._points(x), real_array(name, directions)
-        count = 1 if threads == 1 else thread_count(threads)
+        count = threads if type(threads) is int and threads > 0 else thread_count(threads)
         if points.ndim == 2:
             return self._many_products(along, chosen, points, name, rows, shape, count)
         if rows.ndim not in (1, 2) or rows.shape[-1] != shape[0]:
@@ -246,7 +246,7 @@ class Differentiable:
         return DirectionProducts(self._reverse(chosen), self._ready, self.lanes, self.tiles)
 
     def _matrix(self, matrix: ColoredMatrix, points: Array, sparse: bool, threads: int | None) -> Any:
-        count = 1 if threads == 1 else thread_count(threads)
+        count = threads if type(threads) is int and threads > 0 else thread_count(threads)
         if not require_flag("sparse", sparse):
             return matrix.values(points, dense=True) if points.ndim == 1 else matrix.many(points, True, count)
         module, (columns, starts) = scipy_sparse("a sparse derivative"), matrix.compressed

@@ -6,7 +6,7 @@ import functools
 import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -171,7 +171,7 @@ def check_elements(statement: Map | Sum, lengths: Lengths) -> None:
 
 def run_call(call: Call, state: State, execution: Execution) -> None:
     """Run in Python."""
-    _split(execution.values(call.graph, _joined(state, call.inputs)), call.outputs, state)
+    _split(list(execution.values(call.graph, _joined(state, call.inputs))), call.outputs, state)
 
 
 def run_map(statement: Map, state: State, execution: Execution) -> None:
@@ -205,19 +205,19 @@ def _joined(state: Mapping[str, list[float]], names: Sequence[str]) -> list[floa
     return state[names[0]] if len(names) == 1 else [value for name in names for value in state[name]]
 
 
-def _split(values: Sequence[float], names: Sequence[str], state: State) -> None:
-    """Into the registers, end to end."""
+def _split(values: Any, names: Sequence[str], state: dict[str, Any]) -> None:
+    """Put numbers, a list or rows of an array, end to end into registers."""
     at = 0
     for name in names:
         length = len(state[name])
-        state[name] = list(values[at : at + length])
+        state[name] = values[at : at + length]
         at += length
 
 
 def call_beside(call: Call, state: dict[str, Array], execution: Execution) -> None:
     """Run many memories: a batch."""
     points = np.concatenate([state[name] for name in call.inputs]) if call.inputs else np.empty((0, execution.many))
-    _split_rows(execution.batch(call.graph, points), call.outputs, state)
+    _split(execution.batch(call.graph, points), call.outputs, state)
 
 
 def elements_beside(statement: Map | Sum, state: dict[str, Array], execution: Execution) -> None:
@@ -232,15 +232,7 @@ def elements_beside(statement: Map | Sum, state: dict[str, Array], execution: Ex
         state.update(zip(statement.outputs, results, strict=True))
         return
     totals = np.add.accumulate(results, axis=1)[:, -1] if shape[0] else np.zeros((len(results), shape[1]))
-    _split_rows(totals, statement.outputs, state)
-
-
-def _split_rows(rows: Array, names: Sequence[str], state: dict[str, Array]) -> None:
-    at = 0
-    for name in names:
-        length = len(state[name])
-        state[name] = rows[at : at + length]
-        at += length
+    _split(totals, statement.outputs, state)
 
 
 # as machine code
