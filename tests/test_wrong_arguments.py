@@ -154,7 +154,9 @@ CALLS = {
     "cg.Compiled.jvp": call(cg.compile(GRAPH, "python").jvp, [1.0, 2.0], [[1.0, 0.0]], wrt=None, threads=1),
     "cg.Compiled.vjp": call(cg.compile(GRAPH, "python").vjp, [1.0, 2.0], [[1.0]], wrt=None, threads=1),
     "cg.Compiled.jacobian": call(cg.compile(GRAPH, "python").jacobian, [1.0, 2.0], wrt=None, sparse=False, threads=1),
-    "cg.Compiled.hessian": call(cg.compile(GRAPH, "python").hessian, [1.0, 2.0], [1.0], wrt=None, sparse=False, threads=1),
+    "cg.Compiled.hessian": call(
+        cg.compile(GRAPH, "python").hessian, [1.0, 2.0], [1.0], wrt=None, sparse=False, threads=1
+    ),
     "cg.Compiled.bind_jacobian": call(
         cg.compile(GRAPH, "python").bind_jacobian, np.ones(2), np.ones((1, 2)), wrt=None, threads=1
     ),
