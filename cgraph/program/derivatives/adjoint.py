@@ -47,7 +47,6 @@ class Adjoint(Registers):
     ) -> None:
         super().__init__(lengths, own)
         self.bars, self.active, self.products, self.turns = dict(bars), active, products, turns
-        self.statements: list[Statement] = []
         self._kept = set(kept)  # registers of cotangents that must stay as they are
         self.recording = {} if recording is None else recording  # {assignment: the one that records}
 
@@ -63,10 +62,6 @@ class Adjoint(Registers):
             if row.transpose is None:
                 raise TypeError(f"a {row.kind.__name__} has no cotangents: its row has no `transpose`")
             row.transpose(assignment, self)
-
-    def add(self, *statements: Statement) -> None:
-        """Statements after those that are there."""
-        self.statements += statements
 
     def collect(self, register: str, bar: str) -> None:
         """One more term of a register's cotangent."""

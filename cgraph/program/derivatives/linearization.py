@@ -9,7 +9,7 @@ from ...core.checks import GraphError
 from ...util.require import require_mapping, require_sequence, require_whole
 from ..program import Program
 from ..statement import Statement, effects, length_of, needed, reads_and_writes
-from ..statements.call import added, copied, zeroed
+from ..statements.call import added, copied, copied_or_zero
 from .adjoint import Adjoint, replayed
 from .products import Products, Pullback
 from .single_assignment import Assigned, Assignment, flat
@@ -140,8 +140,7 @@ class Linearization:
         rows = {name: self._called(name, "row") for name in self.varied}
         lengths |= {row: lengths[name] for name, row in rows.items()}
         for name, end in [*[(name, ends[name]) for name in wanted], *rows.items()]:
-            bar = pulled.bars.get(name)
-            after.append(zeroed(end) if bar is None else copied(bar, end))
+            after.append(copied_or_zero(pulled.bars.get(name), end))
         results = {*ends.values(), *rows.values(), self.unsolved}
         return self._program(lengths, [*pulled.statements, *after], results, ends, list(rows.values()))
 
@@ -200,11 +199,7 @@ class Linearization:
 
     def _dots_after(self, pushed: Tangent, dots: Mapping[str, str], moving: Sequence[str]) -> list[Statement]:
         """Tangents of what a pass hands on, where the next one reads them."""
-        after: list[Statement] = []
-        for name in moving:
-            dot = pushed.dots.get(self.handed[name])
-            after.append(zeroed(dots[name]) if dot is None else copied(dot, dots[name]))
-        return after
+        return [copied_or_zero(pushed.dots.get(self.handed[name]), dots[name]) for name in moving]
 
     def _program(
         self,

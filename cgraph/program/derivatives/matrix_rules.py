@@ -5,7 +5,7 @@ from __future__ import annotations
 from ...core.graph import Graph
 from ...core.node import constant
 from ...writing.naming import variables
-from ..statements.call import Call, copied, zeroed
+from ..statements.call import Call, copied
 from ..statements.matrix import Factor, Solve
 from .adjoint import Adjoint
 from .single_assignment import Assignment
@@ -38,9 +38,7 @@ def push_solve(assignment: Assignment, tangent: Tangent) -> None:
     if matrix is None and side is None:
         return
     dot = tangent.dot(solve.vector)
-    if side is None:
-        side = tangent.fresh(f"{right}_dot", n)
-        tangent.add(zeroed(side))
+    side = tangent.dot_or_zero(right)
     if matrix is None:
         tangent.add(copied(side, dot))
     else:

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from ...core.graph import Graph
 from ...core.node import Node, constant
 from ...writing.naming import variables
-from ..statements.call import Call, copied, zeroed
+from ..statements.call import Call, copied, copied_or_zero, zeroed
 from ..statements.memory import Pop, Push, Take
 from .adjoint import Adjoint
 from .single_assignment import Assignment
@@ -54,7 +54,7 @@ def push_push(assignment: Assignment, tangent: Tangent) -> None:
         return
     stack, count = assignment.sources[:2]
     dot, work = tangent.dot(push.stack), tangent.fresh("count", 1)
-    tangent.copy_or_zero(stack, dot)
+    tangent.add(copied_or_zero(tangent.dots.get(stack), dot))
     tangent.add(copied(count, work), Push(dot, work, tuple([tangent.dot_or_zero(name) for name in push.rows])))
 
 

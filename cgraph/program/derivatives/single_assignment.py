@@ -45,6 +45,7 @@ class Registers:
 
     lengths: dict[str, int]
     own: str = "@"
+    statements: list[Statement] = field(default_factory=list)  # what has been added
 
     @property
     def unsolved(self) -> str:
@@ -56,6 +57,10 @@ class Registers:
         new = f"{name.partition(self.own)[0]}{self.own}{len(self.lengths)}"
         self.lengths[new] = length
         return new
+
+    def add(self, *statements: Statement) -> None:
+        """Statements after those that are there."""
+        self.statements += statements
 
     def of(self, names: Iterable[str]) -> tuple[int, ...]:
         """Lengths of registers."""
@@ -104,18 +109,6 @@ class Assigned(Registers):
     def flat(self, part: Sequence[Assignment]) -> list[Statement]:
         """The statements of assignments, copies included."""
         return [*flat(part)]
-
-    def made(
-        self,
-        statement: Statement,
-        copies: tuple[Map, ...] = (),
-        *,
-        parts: tuple[tuple[Assignment, ...], ...],
-        after: tuple[Mapping[str, str], ...],
-        carried: Names = (),
-    ) -> Assignment:
-        """The assignment of a statement with bodies, see `Assignment`."""
-        return Assignment(statement, copies, parts, after, carried)
 
 
 def flat(assignments: Sequence[Assignment]) -> Iterator[Statement]:

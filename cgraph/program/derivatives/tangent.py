@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence, Set
 
-from ..statement import Statement, reads_and_writes, row_of
-from ..statements.call import copied, zeroed
+from ..statement import reads_and_writes, row_of
+from ..statements.call import zeroed
 from .products import Products
 from .single_assignment import Assignment, Registers
 
@@ -30,7 +30,6 @@ class Tangent(Registers):
     ) -> None:
         super().__init__(lengths, own)
         self.dots, self.active, self.products, self.values = dict(dots), active, products, values
-        self.statements: list[Statement] = []
 
     def inner(self, more: Mapping[str, str] | None = None, *, values: bool = False) -> Tangent:
         """Tangent of a body: what has tangents here has them there, and more registers."""
@@ -49,10 +48,6 @@ class Tangent(Registers):
             for name in set(reads_and_writes(assignment.statement)[1]) - set(self.active):
                 self.dots.pop(name, None)
 
-    def add(self, *statements: Statement) -> None:
-        """Statements after those that are there."""
-        self.statements += statements
-
     def dot(self, register: str) -> str:
         """A new register for the tangent of one."""
         dot = self.fresh(f"{register}_dot", self.lengths[register])
@@ -66,10 +61,6 @@ class Tangent(Registers):
         zero = self.fresh(f"{register}_dot", self.lengths[register])
         self.add(zeroed(zero))
         return zero
-
-    def copy_or_zero(self, register: str, dot: str) -> None:
-        """dot = the tangent of a register."""
-        self.add(copied(self.dots[register], dot) if register in self.dots else zeroed(dot))
 
     def moving(self, inputs: Sequence[str]) -> tuple[int, ...]:
         """Numbers of the registers that have tangents."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ...core.graph import Graph
 from ...core.node import Node, constant
 from ...writing.naming import variables
-from ..statements.call import Sum, copied, zeroed
+from ..statements.call import Sum, copied, copied_or_zero, zeroed
 from ..statements.memory import Take
 from ..statements.tiles import Scatter, TiledMap, element_sizes, tile_count
 from .adjoint import Adjoint
@@ -33,7 +33,7 @@ def push_tiled_map(assignment: Assignment, tangent: Tangent) -> None:
     nodes = [node for k in moved for node in found.get(k, [constant(0.0)] * sizes[k])]
     results = tuple([tangent.dot(tiled.outputs[k]) for k in moved])
     for k, dot in zip(moved, results, strict=True):
-        tangent.add(zeroed(dot) if (old := before[k]) is None else copied(old, dot))
+        tangent.add(copied_or_zero(before[k], dot))
     tangent.add(TiledMap(_graph(graph.inputs, nodes), pushed.inputs, results, pushed.shared, tiled.lanes, tiled.tiles))
 
 
@@ -89,7 +89,7 @@ def push_scatter(assignment: Assignment, tangent: Tangent) -> None:
     (before,) = assignment.sources
     if scatter.target in tangent.active and {scatter.source, before} & tangent.dots.keys():
         dot = tangent.dot(scatter.target)
-        tangent.copy_or_zero(before, dot)
+        tangent.add(copied_or_zero(tangent.dots.get(before), dot))
         tangent.add(Scatter(tangent.dot_or_zero(scatter.source), dot, scatter.table, scatter.places))
 
 

@@ -109,6 +109,11 @@ def zeroed(register: str) -> Map:
     return Map(_ZERO, (register,), (register,))
 
 
+def copied_or_zero(source: str | None, target: str) -> Map:
+    """target = source, or 0 where there is none."""
+    return zeroed(target) if source is None else copied(source, target)
+
+
 def added(total: str, term: str, result: str) -> Map:
     """Statement result = total + term, of registers of one length.
 
