@@ -14,6 +14,7 @@ from ...core.evaluation import Array
 from ...core.graph import Graph
 from ..program import Program, whole_graph
 from ..statement import Execution
+from ..statements.call import spread
 from .runner import Record, Runner
 
 BLOCK = 4096  # points that NumPy takes at once: temporaries stay in the cache
@@ -41,7 +42,7 @@ class PythonRunner(Runner):
         rows: list[list[float]] = []
         done = 0
         for done in range(1, passes + 1):
-            state.update(_split(feed[done - 1].tolist(), program.feed, program.registers))
+            spread(feed[done - 1].tolist(), program.feed, state)
             execution.run(program.body, state)
             if done % every == 0 and (program.record_if is None or state[program.record_if][0] > 0.0):
                 rows.append([value for name in program.record for value in state[name]])
@@ -59,8 +60,7 @@ class PythonRunner(Runner):
         state |= {name: memories[place].copy() for name, place in self._slices.items()}
         rows = np.empty((passes // every, program.width, count))
         for done in range(1, passes + 1):
-            fed = np.broadcast_to(feed[done - 1], (program.feed_width, count))
-            state.update(_split(fed, program.feed, program.registers))
+            spread(np.broadcast_to(feed[done - 1], (program.feed_width, count)), program.feed, state)
             execution.run(masked.body, state)
             if done % every == 0 and program.record:
                 np.concatenate([state[name] for name in program.record], out=rows[done // every - 1])
@@ -146,12 +146,3 @@ class PythonRunner(Runner):
             here = slice(start, start + BLOCK)
             function(points[:, here], result[:, here])
         return result
-
-
-def _split(values: Any, names: Sequence[str], lengths: Mapping[str, int]) -> dict[str, Any]:
-    """The values, end to end, by the registers that they go to."""
-    at, parts = 0, {}
-    for name in names:
-        parts[name] = values[at : at + lengths[name]]
-        at += lengths[name]
-    return parts

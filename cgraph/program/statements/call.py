@@ -176,7 +176,7 @@ def check_elements(statement: Map | Sum, lengths: Lengths) -> None:
 
 def run_call(call: Call, state: State, execution: Execution) -> None:
     """Run in Python."""
-    _split(list(execution.values(call.graph, _joined(state, call.inputs))), call.outputs, state)
+    spread(list(execution.values(call.graph, _joined(state, call.inputs))), call.outputs, state)
 
 
 def run_map(statement: Map, state: State, execution: Execution) -> None:
@@ -191,7 +191,7 @@ def run_sum(statement: Sum, state: State, execution: Execution) -> None:
     rows = _rows(statement, state, execution)
     columns = zip(*rows, strict=True) if rows else [()] * len(statement.graph.outputs)
     totals = [functools.reduce(operator.add, terms, 0.0) for terms in columns]  # sum() compensates
-    _split(totals, statement.outputs, state)
+    spread(totals, statement.outputs, state)
 
 
 def _rows(statement: Map | Sum, state: State, execution: Execution) -> list[Sequence[float]]:
@@ -210,7 +210,7 @@ def _joined(state: Mapping[str, list[float]], names: Sequence[str]) -> list[floa
     return state[names[0]] if len(names) == 1 else [value for name in names for value in state[name]]
 
 
-def _split(values: Any, names: Sequence[str], state: dict[str, Any]) -> None:
+def spread(values: Any, names: Sequence[str], state: dict[str, Any]) -> None:
     """Put numbers, a list or rows of an array, end to end into registers."""
     at = 0
     for name in names:
@@ -222,7 +222,7 @@ def _split(values: Any, names: Sequence[str], state: dict[str, Any]) -> None:
 def call_beside(call: Call, state: dict[str, Array], execution: Execution) -> None:
     """Run many memories: a batch."""
     points = np.concatenate([state[name] for name in call.inputs]) if call.inputs else np.empty((0, execution.many))
-    _split(execution.batch(call.graph, points), call.outputs, state)
+    spread(execution.batch(call.graph, points), call.outputs, state)
 
 
 def elements_beside(statement: Map | Sum, state: dict[str, Array], execution: Execution) -> None:
@@ -237,7 +237,7 @@ def elements_beside(statement: Map | Sum, state: dict[str, Array], execution: Ex
         state.update(zip(statement.outputs, results, strict=True))
         return
     totals = np.add.accumulate(results, axis=1)[:, -1] if shape[0] else np.zeros((len(results), shape[1]))
-    _split(totals, statement.outputs, state)
+    spread(totals, statement.outputs, state)
 
 
 # as machine code
