@@ -61,6 +61,8 @@ def check_tiled_map(statement: TiledMap, lengths: Lengths) -> None:
         length_of(lengths, where, name)
     count = tile_count(statement, lengths) * statement.lanes
     known = sum([lengths[name] for name in statement.shared])
+    if known > len(graph.inputs):
+        raise GraphError(f"{where} has {len(graph.inputs)} inputs, the shared registers hold {known}")
     for names, wanted in ((statement.inputs, len(graph.inputs) - known), (statement.outputs, len(graph.outputs))):
         sizes = element_sizes(statement, lengths, names)
         for name, size in zip(names, sizes, strict=True):
@@ -69,7 +71,9 @@ def check_tiled_map(statement: TiledMap, lengths: Lengths) -> None:
             raise GraphError(f"{where} needs {wanted} numbers of an element, {', '.join(names)} hold {sum(sizes)}")
     for name in statement.tiles:
         require_length(lengths, where, name, 1)
-    require_once(where, [*statement.outputs, *statement.inputs, *statement.shared, *statement.tiles])
+    require_once(where, statement.outputs)
+    if both := {*statement.outputs} & {*statement.inputs, *statement.shared, *statement.tiles}:
+        raise GraphError(f"{where} both reads and writes register {min(both)!r}")
 
 
 def run_tiled_map(statement: TiledMap, state: dict[str, Any], execution: Execution) -> None:
