@@ -65,8 +65,7 @@ class NativeRunner(Runner):
         self._functions = program_functions(self._fused)
         host.require(self._functions)
         self._lock = threading.Lock()
-        self._one: Any = None  # what runs one memory, and a vector of them
-        self._many: Any = None
+        self._codes: dict[int, Any] = {}  # {lanes: what runs so many memories}
         self._points: dict[tuple[str, str], PointCode] = {}  # by the registers that lie apart
         self._batches: dict[str, tuple[int, BatchCode]] = {}  # by the register that varies
 
@@ -81,25 +80,20 @@ class NativeRunner(Runner):
     @property
     def _entry(self) -> Any:
         """Machine code that runs one memory, made at its first use."""
-        with self._lock:
-            if self._one is None:
-                text = program_ir(self._fused, self._flags, width=self.width, registers=self._host.registers)
-                self._one = self._compiled(text).function("run", _RUN)
-        return self._one
+        return self._code(self._fused, 1)
 
     @cached_property
     def _fused_many(self) -> Program:
         """The program of a vector of memories."""
         return self._fused if self.masked is self.program else fused(self.masked)
 
-    @property
-    def _entry_of_lanes(self) -> Any:
-        """Machine code that runs a vector of memories, made at its first use."""
+    def _code(self, program: Program, lanes: int) -> Any:
+        """Machine code that runs so many memories, made at its first use."""
         with self._lock:
-            if self._many is None:
-                text = program_ir(self._fused_many, self._flags, self._host.lanes, self.width, self._host.registers)
-                self._many = self._compiled(text).function("run", _RUN)
-        return self._many
+            if lanes not in self._codes:
+                text = program_ir(program, self._flags, lanes, self.width, self._host.registers)
+                self._codes[lanes] = self._compiled(text).function("run", _RUN)
+        return self._codes[lanes]
 
     def _run(self, memory: Array, passes: int, every: int, feed: Array) -> Record:
         rows = np.empty((passes // every, self.program.width))
@@ -180,7 +174,7 @@ class NativeRunner(Runner):
 
     def _run_many(self, memories: Array, passes: int, every: int, feed: Array) -> Record:
         lanes, size = self._host.lanes, self.size
-        entry, total = self._entry_of_lanes, memories.shape[1]
+        entry, total = self._code(self._fused_many, lanes), memories.shape[1]
         rows = np.empty((passes // every, self.program.width, total))
         block = np.zeros(
             (offsets(self._fused_many.registers, self.width)[""], lanes)
