@@ -62,9 +62,9 @@ class Compiled(BoundFunction, Differentiable):
         self.backend, self.options = backend, options
         self._runner = own(Program({"x": self.n_in, "y": self.n_out}, [Call(graph, ("x",), ("y",))], ["y"]))
         self.lanes, self.tiles, self.vector_cost = self._runner.lanes, self._runner.tiles, self._runner.vector_cost
-        self.source = self._runner.point_text("x", "y")
+        self.source = self._runner._point_text("x", "y")
         BoundFunction.__init__(self, self._bound, self.n_in, (self.n_out,))
-        if (on_lists := self._runner.on_lists("x")) is not None:
+        if (on_lists := self._runner._on_lists("x")) is not None:
             self.values = on_lists  # type: ignore[assignment, method-assign]  # without arrays on the way
 
     def batch(self, X: ArrayLike, threads: int | None = 1, *, out: Array | None = None) -> Array:
@@ -104,7 +104,7 @@ class Compiled(BoundFunction, Differentiable):
 
     def batch_source(self) -> str:
         """The text of the function for batches: NumPy or LLVM."""
-        return self._runner.batch_text("x")
+        return self._runner._batch_text("x")
 
     def _bound(self, x: Array, y: Array) -> Callable[[], None]:
         return self._runner._bind_pass(("x", x), ("y", y))[0]

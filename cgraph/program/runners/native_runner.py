@@ -154,11 +154,11 @@ class NativeRunner(Runner):
                 begin[places[other] : places[other] + len(numbers)] = numbers[:, None]
         return width, BatchCode(code, lanes, begin.ravel(), columns=alone)
 
-    def point_text(self, x: str, y: str) -> str:
+    def _point_text(self, x: str, y: str) -> str:
         """The text in LLVM's language."""
         return self.point(x, y).source
 
-    def batch_text(self, name: str) -> str:
+    def _batch_text(self, name: str) -> str:
         """The text in LLVM's language."""
         return self._batch_module(name).source
 

@@ -72,7 +72,7 @@ class PythonRunner(Runner):
         arrays = {name: np.zeros(length) for name, length in self.program.registers.items() if name not in (x[0], y[0])}
         flat = arrays[y[0]] = y[1].reshape(-1)
         if (graph := whole_graph(self.program, x[0])) is not None:
-            on_lists, point = self.on_lists(x[0]), x[1]
+            on_lists, point = self._on_lists(x[0]), x[1]
 
             def call() -> None:
                 if on_lists is not None:
@@ -108,17 +108,17 @@ class PythonRunner(Runner):
 
         return sys.maxsize, one_by_one  # the interpreter runs one thread at a time
 
-    def point_text(self, x: str, y: str) -> str:
+    def _point_text(self, x: str, y: str) -> str:
         """The text in Python, of one graph."""
         if self._backend == "numpy":
-            return self.batch_text(x)
+            return self._batch_text(x)
         return self._on_floats(self._graph(x)).source
 
-    def batch_text(self, name: str) -> str:
+    def _batch_text(self, name: str) -> str:
         """The text in NumPy, of one graph."""
         return self._on_arrays(self._graph(name)).source
 
-    def on_lists(self, name: str) -> OnFloats | None:
+    def _on_lists(self, name: str) -> OnFloats | None:
         """The function of lists, of one graph."""
         return None if self._backend == "numpy" else self._on_floats(self._graph(name))
 

@@ -232,16 +232,16 @@ class Runner(ABC):
         require_whole("passes", passes)
         require_whole("every", every, 1)
 
-    def on_lists(self, name: str) -> Callable[[list[float]], tuple[float, ...]] | None:
+    def _on_lists(self, name: str) -> Callable[[list[float]], tuple[float, ...]] | None:
         """The record of one pass, at a list of floats for a register, where that needs no memory."""
         return None
 
     @abstractmethod
-    def point_text(self, x: str, y: str) -> str:
+    def _point_text(self, x: str, y: str) -> str:
         """The text of one pass of which two registers lie apart."""
 
     @abstractmethod
-    def batch_text(self, name: str) -> str:
+    def _batch_text(self, name: str) -> str:
         """The text of the function for batches of a register."""
 
     @abstractmethod
