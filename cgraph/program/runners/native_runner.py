@@ -147,12 +147,9 @@ class NativeRunner(Runner):
         lanes, text, alone = self._host.lanes, self._batch_module(name), whole_graph(self._fused, name) is not None
         code = self._compiled(text.source, looped=not alone)
         width = max(WORK // max(1, self._nodes) // lanes, 1) * lanes
-        begin = np.zeros((text.size // lanes, lanes))
-        if start:
-            places = offsets(self._fused_many.registers, 1)
-            for other, numbers in start.items():
-                begin[places[other] : places[other] + len(numbers)] = numbers[:, None]
-        return width, BatchCode(code, lanes, begin.ravel(), columns=alone)
+        places = offsets(self._fused_many.registers, 1) if start else {}
+        begin = {places[other]: numbers for other, numbers in start.items()}
+        return width, BatchCode(code, lanes, text.size, begin, columns=alone)
 
     def _point_text(self, x: str, y: str) -> str:
         """The text in LLVM's language."""
