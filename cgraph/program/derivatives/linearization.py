@@ -150,18 +150,10 @@ class Linearization:
         It is fed what was recorded, and records the tangents of `record` after a pass.  then: what else it does with
         the tangents, {name}:dot.
         """
-        lengths = {**self._lengths, self.unsolved: 1}
-        moving = [name for name in self.handed if name in self._active]
-        dots = {name: self._called(name, "dot") for name in (*moving, *self._among("directions", directions, lengths))}
+        dots, lengths, statements = self._pushed(self._among("directions", directions, self._lengths), values=False)
         self._among("record", record, dots)
-        lengths |= {dot: lengths[name] for name, dot in dots.items()}
-        pushed = Tangent(dots, self._active, lengths, self._products, own=self._at)
-        pushed.push(self._plain)
-        after = self._dots_after(pushed, dots, moving)
         results = {*dots.values(), self.unsolved}
-        return self._program(
-            lengths, [*pushed.statements, *after, *then], results, dots, [dots[name] for name in record]
-        )
+        return self._program(lengths, [*statements, *then], results, dots, [dots[name] for name in record])
 
     def beside(self, directions: Sequence[str], record: Sequence[str]) -> Linearized:
         """The passes with the tangents beside their values: no tape.
@@ -169,14 +161,8 @@ class Linearization:
         What is handed on begins, and ends, in the registers of the program itself.
         record: what is recorded after a pass, and then its tangents.
         """
-        lengths = {**self._lengths, self.unsolved: 1}
-        moving = [name for name in self.handed if name in self._active]
-        dots = {name: self._called(name, "dot") for name in (*moving, *directions)}
-        lengths |= {dot: lengths[name] for name, dot in dots.items()}
-        pushed = Tangent(dots, self._active, lengths, self._products, values=True, own=self._at)
-        pushed.push(self._plain)
-        copies = [copied(after, before) for before, after in self.handed.items() if lengths[before]]
-        body = [*pushed.statements, *self._dots_after(pushed, dots, moving), *copies]
+        dots, lengths, statements = self._pushed(directions, values=True)
+        body = [*statements, *[copied(after, before) for before, after in self.handed.items() if lengths[before]]]
         rows = [*record, *[dots[name] for name in record if name in dots]]
         used = {*_names(body), *rows, *dots.values(), *self.fed, self.unsolved}
         kept = {name: length for name, length in lengths.items() if self._at not in name or name in used}
@@ -197,9 +183,21 @@ class Linearization:
             raise GraphError(f"{what} must be among {', '.join(known) or 'none'}, got {unknown[0]!r:.60}")
         return list(names)
 
-    def _dots_after(self, pushed: Tangent, dots: Mapping[str, str], moving: Sequence[str]) -> list[Statement]:
-        """Tangents of what a pass hands on, where the next one reads them."""
-        return [copied_or_zero(pushed.dots.get(self.handed[name]), dots[name]) for name in moving]
+    def _pushed(
+        self, directions: Sequence[str], *, values: bool
+    ) -> tuple[dict[str, str], dict[str, int], list[Statement]]:
+        """The tangents of what a pass hands on and of more, the lengths of all registers, and what pushes them on.
+
+        Tangents of what a pass hands on end where the next one reads them.
+        """
+        lengths = {**self._lengths, self.unsolved: 1}
+        moving = [name for name in self.handed if name in self._active]
+        dots = {name: self._called(name, "dot") for name in (*moving, *directions)}
+        lengths |= {dot: lengths[name] for name, dot in dots.items()}
+        pushed = Tangent(dots, self._active, lengths, self._products, values=values, own=self._at)
+        pushed.push(self._plain)
+        pushed.add(*[copied_or_zero(pushed.dots.get(self.handed[name]), dots[name]) for name in moving])
+        return dots, lengths, pushed.statements
 
     def _program(
         self,
