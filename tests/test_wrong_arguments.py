@@ -151,12 +151,14 @@ CALLS = {
     "cg.Graph.select_inputs": call(GRAPH.select_inputs, None),
     "cg.Compiled()": call(cg.compile(GRAPH, "python"), [1.0, 2.0]),
     "cg.Compiled.batch": call(cg.compile(GRAPH, "python").batch, [[1.0], [2.0]], 1, out=None),
-    "cg.Compiled.jvp": call(cg.compile(GRAPH, "python").jvp, [1.0, 2.0], [[1.0, 0.0]], wrt=None),
-    "cg.Compiled.vjp": call(cg.compile(GRAPH, "python").vjp, [1.0, 2.0], [[1.0]], wrt=None),
-    "cg.Compiled.jacobian": call(cg.compile(GRAPH, "python").jacobian, [1.0, 2.0], wrt=None, sparse=False),
-    "cg.Compiled.hessian": call(cg.compile(GRAPH, "python").hessian, [1.0, 2.0], [1.0], wrt=None, sparse=False),
+    "cg.Compiled.jvp": call(cg.compile(GRAPH, "python").jvp, [1.0, 2.0], [[1.0, 0.0]], wrt=None, threads=1),
+    "cg.Compiled.vjp": call(cg.compile(GRAPH, "python").vjp, [1.0, 2.0], [[1.0]], wrt=None, threads=1),
+    "cg.Compiled.jacobian": call(cg.compile(GRAPH, "python").jacobian, [1.0, 2.0], wrt=None, sparse=False, threads=1),
+    "cg.Compiled.hessian": call(
+        cg.compile(GRAPH, "python").hessian, [1.0, 2.0], [1.0], wrt=None, sparse=False, threads=1
+    ),
     "cg.Compiled.bind_jacobian": call(
-        cg.compile(GRAPH, "python").bind_jacobian, np.ones(2), np.ones((1, 2)), wrt=None
+        cg.compile(GRAPH, "python").bind_jacobian, np.ones(2), np.ones((1, 2)), wrt=None, threads=1
     ),
     "cg.Loop()": call(LOOP, [1.0], 2, 1),
     "cg.Loop.batch": call(LOOP.batch, [[1.0]], 2, 1),

@@ -106,50 +106,20 @@ def solve_nodes(
 ) -> list[Node]:
     """Nodes x with (d2f/dw2) x = rhs: `cg.hessian_solve` on nodes.
 
-    The tangents t of all nodes that depend on w make f's second differential stationary: W t = b, with W the symmetric
-    second-order adjoint and b = rhs at w. Walking the nodes from the output down, an operation passes its row of W and
-    its entry of b to its arguments through its partials p (t = sum p t_arg), and adds its adjoint times its second
-    partials; a variable, once all nodes that use it are done, is eliminated as by Gauss. One sweep back up then gives
-    the tangents, and those of w are x. For a tree of bodies this is the articulated-body algorithm.
+    The tangents t of all nodes that depend on the variables w make f's second differential stationary: W t = b, with W
+    the symmetric second-order adjoint and b = rhs at w. Walking the nodes from the output down, an operation passes its
+    row of W and its entry of b to its arguments through its partials p (t = sum p t_arg), and adds its adjoint times
+    its second partials; a variable, once all nodes that use it are done, is eliminated as by Gauss. One sweep back up
+    then gives the tangents, and those of w are x. For a tree of bodies this is the articulated-body algorithm.
 
-    Parameters
-    ----------
-    output : Node
-        f.
-    wrt : sequence of Node, n of them
-        The variables w, leaves.
-    rhs : sequence of Node, n of them
-        The right-hand side.
-    build : Builder, optional
-        What the nodes are built by; by default a new one.
-    at : mapping of Node to Node, optional
-        {z: b_z}, right-hand sides at nodes that depend on w. They stand for (dz/dw)^T b_z more at w, but reach w by the
-        elimination itself: fewer nodes, and no large sums at w that the elimination has to undo.
-    multipliers : collection of Node
-        Those s of w that f is linear in, f = g(u) + s . h(u), as of constraints h. They have no pivots of their own,
-        and each is eliminated after the last of the variables that its df/ds depends on.
-    check : bool
-        Append the node that tells whether the Hessian is positive definite, see `cg.hessian_solve`; with multipliers,
-        whether it is so in u, and whether each of them leaves with a negative pivot: 0, or 1 + the index in w of the
-        first that does not.
-    order : {"recursive", "balanced"}
-        As of `cg.hessian_solve`. With multipliers there is no balanced order.
+    build: what the nodes are built by; by default a new one.  order, check: as of `cg.hessian_solve`.
+    at: {z: b_z}, right-hand sides at nodes that depend on w. They stand for (dz/dw)^T b_z more at w, but reach w by the
+    elimination itself: fewer nodes, and no large sums at w that the elimination has to undo.
+    multipliers: those s of w that f is linear in, f = g(u) + s . h(u), as of constraints h. They have no pivots of
+    their own, and each is eliminated after the last of the variables that its df/ds depends on; `check` then is 0 if
+    the Hessian is positive definite in u and each of them leaves with a negative pivot, else 1 + the index in w of the
+    first that is not so. With them there is no balanced order (ValueError).
 
-    Returns
-    -------
-    list of Node
-        x, n nodes; with `check`, n + 1.
-
-    Raises
-    ------
-    ValueError
-        For multipliers in balanced order.
-    SingularError
-        With the index of the variable, if a row has only zeros left, or with `check` a pivot is a constant that is not
-        positive.
-
-    Examples
-    --------
     >>> import cgraph as cg
     >>> from cgraph.extend import solve_nodes
     >>> v, tau = cg.variables("v tau")
@@ -213,7 +183,7 @@ def _solved(
         passed = equations.arguments(_rows(output, multipliers, wrt))
         plan = elimination_steps(passed, equations.rotations)
     if order == "balanced":
-        from .balanced_elimination import BalancedElimination, written_rows
+        from .balanced.elimination import BalancedElimination, written_rows
 
         if multipliers:
             raise ValueError('order "balanced" needs a function without multipliers')

@@ -29,24 +29,14 @@ from ..writing.naming import variables
 class Jets(NamedTuple):
     """The Taylor coefficients of a solution, as graphs.
 
-    Attributes
-    ----------
-    start : Graph
-        (x, t, p) -> the rates (m), the zeros, and what decides the pieces.
-    order : Graph
-        (the rates before (m), unit, k, zeros, sums, sides) -> coefficients k of x (m), of the rates (m), of the left
-        and the right factors of the sums, and of what decides the pieces; they are of the time over the unit.
-    zeros, sums : int
-        How many numbers the orders hand on. Sum i of order k runs over 0 < j < k: left_i of order j times right_i of
-        order k - j.
-    safe : tuple of bool
-        Of each sum, whether zeros win in it over what is not finite.
-    pieces : tuple of Node
-        The piecewise nodes of `start`, each chosen by the sign of its first argument, or of the difference of two: that
-        sign is its side.
+    start: (x, t, p) -> the rates (m), the zeros, and what decides the pieces.
+    order: (the rates before (m), unit, k, zeros, sums, sides) -> coefficients k of x (m), of the rates (m), of the left
+    and the right factors of the sums, and of what decides the pieces; they are of the time over the unit.
+    zeros, sums: how many numbers the orders hand on. Sum i of order k runs over 0 < j < k: left_i of order j times
+    right_i of order k - j.  safe: of each sum, whether zeros win in it over what is not finite.
+    pieces: the piecewise nodes of `start`, each chosen by its side, the sign of its first argument or of a difference
+    of two.
 
-    Examples
-    --------
     >>> import cgraph as cg
     >>> from cgraph.extend import jets
     >>> x = cg.variable("x")
@@ -73,33 +63,13 @@ class NoSeriesError(ValueError):
 def jets(rate: Graph, time: str = "t", *, exact: bool = False) -> Jets:
     """The Taylor coefficients of a solution of xdot = f(x, t), as graphs.
 
-    Parameters
-    ----------
-    rate : Graph
-        f. Its first inputs are the states, one for each output; the others are constant, but for the time.
-    time : str
-        The name of the input that is t.
-    exact : bool
-        For numbers of any precision: nothing is folded, since a folded constant is rounded to float64, and a piecewise
-        operation has the series of its piece.
+    rate: f. Its first inputs are the states, one for each output; the others are constant, but for the one called
+    `time`.
+    exact: for numbers of any precision: nothing is folded, since a folded constant is rounded to float64, and a
+    piecewise operation has the series of its piece.
+    Raises NoSeriesError for an operation that jumps, or whose partials of partials never come back to what is there;
+    unless `exact`, for a piecewise one, too.
 
-    Returns
-    -------
-    Jets
-        The graphs.
-
-    Raises
-    ------
-    NoSeriesError
-        For an operation that jumps, or whose partials of partials never come back to what is there; unless `exact`, for
-        a piecewise one, too.
-    TypeError
-        For what is no graph.
-    ValueError
-        For a graph with more rates than inputs.
-
-    Examples
-    --------
     Of xdot = x, every coefficient is the one before over k:
 
     >>> import cgraph as cg
@@ -202,7 +172,7 @@ class _Jets:
         return self._sum(a, b, "")
 
     def safe_sum(self, a: Node, b: Node) -> Node:
-        """The same, in which zeros win over what is not finite."""
+        """The sum over 0 < j < k of a_j b_k-j, in which zeros win over what is not finite."""
         return self._sum(a, b, "safe")
 
     def weighted_sum(self, a: Node, b: Node) -> Node:
@@ -245,7 +215,7 @@ class _Jets:
         return by_partials(self, node, *node.args)
 
     def _piece(self, node: Node) -> Node:
-        """Of the piece that the side chooses."""
+        """Coefficient k of the piece that the side chooses."""
         piece, args = columns(node.op).piece, node.args
         assert piece is not None
         side = self.sides[node] = variable(f"side{len(self.sides)}")

@@ -38,10 +38,10 @@ def ldl_solve(
         for i, row in enumerate(lower):
             for j in range(i + 1):
                 equations.matrix.add(unknowns[i], unknowns[j], row[j])
-        for unknown in reversed(unknowns):
+        for unknown in reversed(unknowns):  # A = L D L^T from the last row up, and b with it
             equations.eliminate(unknown)
         equations.eliminate_waiting()
-        solution: dict[Node, Node] = {}
+        solution: dict[Node, Node] = {}  # L^T x = D^-1 L^-1 b, the last to leave first
         for unknown in reversed(equations.pivot_rows):
             solution[unknown] = equations.solution(unknown, solution)
         return [solution[unknown] for unknown in unknowns] + ([equations.info()] if check else [])

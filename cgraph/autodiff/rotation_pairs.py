@@ -29,7 +29,7 @@ class Rotation(NamedTuple):
 
     @property
     def angle(self) -> tuple[Node | float, Node | float]:
-        """What rotations by one angle have in common."""
+        """Cosine and sine, alike for rotations by one angle."""
         cos, sin = (each if each.value is None else each.value for each in (self.cos, self.sin))
         return cos, sin
 

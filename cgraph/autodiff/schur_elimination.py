@@ -82,7 +82,7 @@ class EdgePushing(SymmetricElimination):
         return result
 
     def unknown(self, node: Node) -> Node:
-        """What is called by a node in the step at hand."""
+        """Unknown that a node stands for in the step at hand."""
         return node
 
     def reduce(self, step: Step) -> None:
@@ -130,11 +130,11 @@ class EdgePushing(SymmetricElimination):
         """
         variable, other, p, p_other = self.sums[node]
         bar, at_variable = self.bars.pop(node, ZERO), p * self.rhs[variable]
-        self.rhs[node] = self.rhs.get(node, ZERO) + at_variable
-        self.eliminate(node)
+        self.rhs[node] = self.rhs.get(node, ZERO) + at_variable  # b_z += p b_w
+        self.eliminate(node)  # W_jk -= W_zj W_zk / W_zz
         if other in self.depends:
             self.bars[other] = self.bars.get(other, ZERO) + p_other * bar
-            other = self.unknown(other)
+            other = self.unknown(other)  # b_a -= p' p b_w
             self.rhs[other] = self.rhs.get(other, ZERO) - p_other * at_variable
 
     def push_rotations(self, group: Sequence[Rotation]) -> None:
@@ -183,7 +183,7 @@ class EdgePushing(SymmetricElimination):
         self.matrix.add_both(y, x2, c * u - pq)
 
     def _push_diagonal_block(self, r: Rotation, inner: Mapping[tuple[Node, Node], Node]) -> None:
-        """As `_push_block` for the symmetric block of (p, q) with itself."""
+        """R^T B R as in `_push_block` for the symmetric block of (p, q) with itself."""
         p, q, x, y, c, s = r[:6]
         pp, pq, qq = (inner.get(pair, ZERO) for pair in ((p, p), (p, q), (q, q)))
         u = s * (pp - qq) + 2.0 * c * pq
@@ -202,7 +202,7 @@ class EdgePushing(SymmetricElimination):
                 if partial.value != 0.0:
                     self.reached.pass_on(node.op, node, arg, partial)
         self.partials[node] = partials
-        for arg, p in partials.items():
+        for arg, p in partials.items():  # z = sum_k p_k a_k in W t = b: abar_k, b_k and row k take p_k times z's
             a = self.unknown(arg)
             self.bars[arg] = self.bars.get(arg, ZERO) + self.product(node, bar, p)
             self.rhs[a] = self.rhs.get(a, ZERO) + self.product(node, p, rhs)

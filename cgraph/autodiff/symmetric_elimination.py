@@ -12,16 +12,9 @@ from .symmetric_matrix import ZERO, SymmetricMatrix
 
 
 class SingularError(GraphError):
-    """A pivot is the constant zero beside zeros alone, or known not to be positive where it has to be.
+    """A pivot, of row `index`, is the constant zero beside zeros alone, or known not to be positive where it has to be.
 
-    Attributes
-    ----------
-    index : int
-        The row of the pivot.
-    pivot : float
-        Its value.
-    regular : bool
-        Whether the matrix is not singular for all that is known, but not positive definite.
+    regular: whether the matrix is not singular for all that is known, but not positive definite.
     """
 
     def __init__(self, index: int, pivot: float = 0.0, *, regular: bool = False) -> None:
@@ -65,9 +58,9 @@ class SymmetricElimination:
             return
         pivot, row = self.matrix.pop(i)
         rhs = self.rhs[i]
-        gains = {other: value / pivot for other, value in row.items()}
+        gains = {other: value / pivot for other, value in row.items()}  # g_j = W_ij / W_ii
         others = list(row)
-        for k, a in enumerate(others):
+        for k, a in enumerate(others):  # the Schur complement: W_jk -= g_j W_ik, b_j -= g_j b_i
             for b in others[: k + 1]:
                 self.matrix.add(a, b, -(gains[a] * row[b]))
             self.rhs[a] = self.rhs.get(a, ZERO) - gains[a] * rhs
@@ -102,7 +95,7 @@ class SymmetricElimination:
         rhs_i, rhs_j = self.rhs[i], self.rhs[j]
         gains_i, gains_j = ({k: value / c for k, value in row.items()} for row in (row_j, row_i))
         others = list(dict.fromkeys([*row_i, *row_j]))
-        for n, k in enumerate(others):
+        for n, k in enumerate(others):  # by [[0, c], [c, 0]]^-1: W_km -= (W_jk W_im + W_ik W_jm) / c
             for m in others[: n + 1]:
                 for gains, row in ((gains_i, row_i), (gains_j, row_j)):
                     self.matrix.add(k, m, -(gains.get(k, ZERO) * row.get(m, ZERO)))
@@ -114,7 +107,7 @@ class SymmetricElimination:
 
     def solution(self, i: Node, known: Mapping[Node, Node]) -> Node:
         """t_i from those eliminated after it."""
-        _, total, gains = self.pivot_rows[i]
+        _, total, gains = self.pivot_rows[i]  # t_i = b_i / W_ii - sum_j g_j t_j
         for other, gain in gains.items():
             total = total - gain * known[other]
         return total

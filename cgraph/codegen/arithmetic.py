@@ -9,7 +9,7 @@ REGISTERS = 13  # values that fit in the registers of any processor at once, som
 
 
 class Arithmetic(NamedTuple):
-    """What the instructions of a function may do, and on how many numbers at once."""
+    """Liberties of the instructions of a function, and the numbers that they work on at once."""
 
     flags: str = ""  # fast-math flags: none is strict IEEE
     lanes: int = 1  # doubles in a vector
@@ -50,7 +50,7 @@ class Arithmetic(NamedTuple):
 
 
 def words_of(arithmetic: Arithmetic) -> dict[str, str]:
-    """What the column `llvm` of the operation table names."""
+    """Words that the column `llvm` of the operation table names."""
     return {
         "t": arithmetic.type,
         "b": "i1" if arithmetic.lanes == 1 else f"<{arithmetic.lanes} x i1>",

@@ -34,7 +34,7 @@ class Batch(NamedTuple):
 
 
 class Place(NamedTuple):
-    """Where numbers lie in the memory w: `size` vectors, from the vector `start` on."""
+    """Place of numbers in the memory w: `size` vectors, from the vector `start` on."""
 
     start: int
     size: int
@@ -265,7 +265,7 @@ def _block(arithmetic: Arithmetic, filling: bool) -> list[str]:
 
 
 def _taken(row: int, lane: int, distance: int, lanes: int) -> int:
-    """Which lane of two rows, the one with this bit clear first, goes to a lane of a row."""
+    """Lane of two rows, the one with this bit clear first, that goes to a lane of a row."""
     return (lane & ~distance | (row & distance)) + (lanes if lane & distance else 0)
 
 

@@ -54,7 +54,7 @@ class _Method(ctypes.Structure):
 
 
 class _Addresses(bytes):
-    """What a call needs, `self` of its function: as addresses, and as objects that stay alive with it."""
+    """Needs of a call, `self` of its function: as addresses, and as objects that stay alive with it."""
 
     kept: tuple[object, ...]
 

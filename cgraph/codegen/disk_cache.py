@@ -93,7 +93,7 @@ def clear_cache(folder: str | os.PathLike[str] | None = None) -> int:
 
 
 def default_folder() -> Path:
-    """Where the platform keeps caches: $XDG_CACHE_HOME, or ~/.cache, ~/Library/Caches, %LOCALAPPDATA%; there, `cgraph`.
+    """Folder `cgraph` in the platform's for caches: $XDG_CACHE_HOME, or ~/.cache, ~/Library/Caches, %LOCALAPPDATA%.
 
     Raises RuntimeError for a user without a home.
     """
@@ -106,7 +106,7 @@ def default_folder() -> Path:
 
 
 def _read(path: Path) -> bytes | None:
-    """What an entry keeps; None if there is none to trust: whoever writes an entry decides what this process runs."""
+    """Content of an entry; None if there is none to trust: whoever writes an entry decides what this process runs."""
     try:
         with open(path, "rb", opener=_open_at_once) as file:
             status = os.fstat(file.fileno())
@@ -139,7 +139,7 @@ def _write(path: Path, content: bytes) -> None:
 
 
 def _checksum(path: Path, content: bytes) -> bytes:
-    """With the entry's name: one that was renamed is another's."""
+    """Checksum of an entry's name and content: one that was renamed is another's."""
     return sha256(path.stem.encode() + content).digest()
 
 

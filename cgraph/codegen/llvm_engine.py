@@ -36,7 +36,7 @@ class Code:
         weakref.finalize(self, engine.close).atexit = False
 
     def address(self, name: str) -> int:
-        """Where a function begins."""
+        """Address of a function."""
         return int(self._engine.get_function_address(name))
 
     def function(self, name: str, prototype: Any) -> Any:

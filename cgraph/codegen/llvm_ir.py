@@ -46,7 +46,7 @@ def _element(base: str, name: str, row: int) -> list[str]:
 
 
 def preamble(graphs: Iterable[Graph], arithmetic: Arithmetic) -> list[str]:
-    """What a module needs before the bodies of these graphs: functions of the C library, and those on vectors."""
+    """Declarations before the bodies of these graphs: functions of the C library, and those on vectors."""
     libm: dict[str, int] = {}
     called: dict[str, int] = {}
     for graph in graphs:
@@ -194,7 +194,7 @@ class _Constants:
         ]
 
     def start(self) -> list[str]:
-        """What stands at the start of a function that reads constants."""
+        """Lines at the start of a function that reads constants."""
         return [] if not self._rows else [f"  %constants = load ptr, ptr @{self._name}.constants, align 8"]
 
     def read(self, node: Node, name: str) -> tuple[str, list[str]]:
@@ -260,7 +260,7 @@ def _results_behind_calls(
 
 
 def _vector(arithmetic: Arithmetic) -> Arithmetic:
-    """Of a joined call: the lanes there are, or a vector filled with arguments."""
+    """Arithmetic of a joined call: the lanes there are, or a vector filled with arguments."""
     return arithmetic._replace(lanes=max(arithmetic.lanes, arithmetic.together))
 
 

@@ -85,7 +85,7 @@ class Parts:
         return lines
 
     def _used(self, step: Step) -> None:
-        """Its next use is another one; after the last one it goes."""
+        """Move a step on to its next use; after the last one it goes."""
         if uses := self._uses.get(step):
             self._count += 1
             heappush(self._latest, (-uses[-1], self._count, step))
@@ -121,7 +121,7 @@ class Parts:
 
 
 def _starts(steps: Iterable[Step], calls: Mapping[Node, Joined]) -> set[int]:
-    """Where parts begin, without the first."""
+    """Numbers of the steps where parts begin, without the first."""
     starts: set[int] = set()
     begin = 0
     for number, step in enumerate(steps):

@@ -20,7 +20,7 @@ class Joined(NamedTuple):
 
 
 class Merged(NamedTuple):
-    """What machine code does in one step though the graph has several nodes for it.
+    """Several nodes of a graph that machine code does in one step.
 
     calls: {node: the call that gives it}.  products: {sum or difference: its argument that it multiplies itself}.
     """
@@ -66,7 +66,7 @@ def _leaf(step: Node | Joined) -> bool:
 
 
 def needed(step: Node | Joined, merged: Merged) -> tuple[Node | Joined, ...]:
-    """What a step reads: arguments, or the joined call that gives the node; of a product that it takes in, the factors.
+    """Arguments of a step, or the joined call that gives the node; of a product that it takes in, the factors.
 
     In their place, as in a * b + c and in c - a * b.
     """

@@ -79,7 +79,7 @@ class Lines:
         return terms[0]
 
     def between(self, x: str, low: float, high: float) -> str:
-        """Which lanes lie in [low, high]; a NaN does not."""
+        """Lanes that lie in [low, high]; a NaN does not."""
         above = self.add(f"fcmp oge {self.d} {x}, {number(low)}")
         below = self.add(f"fcmp ole {self.d} {x}, {number(high)}")
         return self.add(f"and {self.b} {above}, {below}")

@@ -59,7 +59,7 @@ def _one_call(program: Program, run: list[Call | Map]) -> list[Call | Map]:
 
 
 class _Registers:
-    """What registers hold while statements are followed."""
+    """Values of registers while statements are followed."""
 
     def __init__(self, program: Program) -> None:
         self.overwritten: set[Node] = set()
@@ -69,7 +69,7 @@ class _Registers:
 
     def call(self, call: Call) -> None:
         """outputs = graph(inputs)."""
-        results = _apply(call.graph, [value for name in call.inputs for value in self._values(name)])
+        results = applied(call.graph, [value for name in call.inputs for value in self._values(name)])
         for name in call.outputs:
             self._write(name, [results.pop(0) for _ in range(self._lengths[name])])
 
@@ -78,7 +78,7 @@ class _Registers:
         shared = [value for name in statement.shared for value in self._values(name)]
         columns = [self._values(name) for name in statement.inputs]
         rows = [
-            _apply(statement.graph, [*shared, *[column[i if len(column) == count else 0] for column in columns]])
+            applied(statement.graph, [*shared, *[column[i if len(column) == count else 0] for column in columns]])
             for i in range(count)
         ]
         for name, values in zip(statement.outputs, zip(*rows, strict=True), strict=True):
@@ -104,7 +104,8 @@ class _Registers:
         self._written[name] = values
 
 
-def _apply(graph: Graph, values: Sequence[Node]) -> list[Node]:
+def applied(graph: Graph, values: Sequence[Node]) -> list[Node]:
+    """The outputs of a graph at nodes, operation by operation as it has them: nothing is folded."""
     inputs = dict(zip(graph.inputs, values, strict=True))
     outputs = list(graph.outputs.values())
     copies = rebuild(outputs, inputs, lambda node, args: Node(node.op, args, node.label))

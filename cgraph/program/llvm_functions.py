@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 
-from ..codegen.arithmetic import Arithmetic
-from ..codegen.llvm_ir import Address, Body, body, libm_functions
+from ..codegen.arithmetic import Arithmetic, words_of
+from ..codegen.llvm_ir import Body, body, libm_functions
 from ..core.graph import Graph
 
-_ARGUMENT = {"x": "in", "y": "out"}  # by the names that `body` gives to the two sides of a graph
 Lengths = tuple[int, ...]  # of the registers that are a function's arguments
 
 
@@ -26,119 +25,103 @@ class Functions:
 
     def call(self, graph: Graph, inputs: Lengths, outputs: Lengths) -> str:
         """y = graph(x), where the input registers end to end are x, and the output registers y."""
-        places = {
-            base: [(group, k) for group, length in enumerate(lengths) for k in range(length)]
-            for base, lengths in (("x", inputs), ("y", outputs))
-        }
-
-        def address(base: str, name: str, row: int) -> list[str]:
-            group, k = places[base][row]
-            return [f"  {name} = getelementptr {self.arithmetic.type}, ptr %{_ARGUMENT[base]}{group}, i64 {k}"]
+        t, scope = self.arithmetic.type, [*_pointers("in", inputs), *_pointers("out", outputs)]
 
         def lines() -> list[str]:
-            written = self._body(graph, self.arithmetic, address, scope)
+            x, y = _end_to_end(t, "in", inputs), _end_to_end(t, "out", outputs)
+            written = self._body(graph, self.arithmetic, x, y, scope)
             return [*written.start, *written.lines]
 
-        scope = [*_pointers("in", inputs), *_pointers("out", outputs)]
         return self._define((id(graph), inputs, outputs), "call", lines, len(inputs), len(outputs))
 
     def map(self, graph: Graph, inputs: Lengths, count: int, shared: Lengths = ()) -> str:
-        """y[i] = graph(shared, x[i]) for i = 0 .. count - 1; an input of another length holds one number for all i."""
-        t, known = self.arithmetic.type, _numbers(shared)
-        inputs = (*shared, *inputs)
+        """y[i] = graph(shared, x[i]) for i = 0 .. count - 1; an input of another length holds one number for all i.
 
-        def address(base: str, name: str, row: int) -> list[str]:
-            if base == "x" and row < len(known):
-                return [f"  {name} = getelementptr {t}, ptr %in{known[row][0]}, i64 {known[row][1]}"]
-            row += len(shared) - len(known) if base == "x" else 0
-            moves = base == "y" or inputs[row] == count
-            return [f"  {name} = getelementptr {t}, ptr %{_ARGUMENT[base]}{row}, i64 {'%i' if moves else 0}"]
-
-        def lines() -> list[str]:
-            return _loop(self._body(graph, self.arithmetic, address, scope), [], count)
-
-        scope = [*_pointers("in", inputs), *_pointers("out", graph.outputs), "i64 %i"]
-        in_vectors = self.arithmetic.lanes == 1 and self.width > 1 and count > 1 and not libm_functions(graph)
-        chosen = self._map_in_vectors(graph, inputs, count, shared) if in_vectors else lines
-        key = ("map", id(graph), inputs, count, len(shared))
-        return self._define(key, "map", chosen, len(inputs), len(graph.outputs))
-
-    def _map_in_vectors(self, graph: Graph, inputs: Lengths, count: int, shared: Lengths) -> Callable[[], list[str]]:
-        """As `map`, a vector of elements at a time; results beyond the last element go to the register's padding.
-
-        inputs: the shared ones first.
+        Where it can, a vector of elements at a time; results beyond the last one go to the register's padding.
         """
-        arithmetic = self.arithmetic._replace(lanes=self.width, together=1)
-        known, first = _numbers(shared), len(shared)
-        t, scalars = arithmetic.type, [k for k, length in enumerate(inputs) if k >= first and length != count]
-
-        def address(base: str, name: str, row: int) -> list[str]:
-            if base == "x" and row < len(known):
-                return [f"  {name} = getelementptr double, ptr %in{known[row][0]}, i64 {known[row][1]}"]
-            row += first - len(known) if base == "x" else 0
-            if base == "x" and row in scalars:
-                return [f"  {name} = getelementptr {t}, ptr %same{row}, i64 0"]
-            return [f"  {name} = getelementptr {t}, ptr %{_ARGUMENT[base]}{row}, i64 %i"]
+        first, inputs = len(shared), (*shared, *inputs)
+        in_vectors = self.arithmetic.lanes == 1 and self.width > 1 and count > 1 and not libm_functions(graph)
+        arithmetic = self.arithmetic._replace(lanes=self.width, together=1) if in_vectors else self.arithmetic
+        t, same = (
+            arithmetic.type,
+            [k for k, length in enumerate(inputs) if in_vectors and k >= first and length != count],
+        )
+        scope = [*_pointers("in", inputs), *_pointers("out", graph.outputs), "i64 %i", *[f"ptr %same{k}" for k in same]]
 
         def lines() -> list[str]:
             spread = []  # a vector of equal numbers for each input that is the same for all elements
-            for k in scalars:
-                spread += [
-                    f"  %same{k} = alloca {t}, align 64",
-                    f"  %one{k} = load double, ptr %in{k}, align 8",
-                    f"  %first{k} = insertelement {t} poison, double %one{k}, i32 0",
-                    f"  %all{k} = shufflevector {t} %first{k}, {t} poison, <{self.width} x i32> zeroinitializer",
-                    f"  store {t} %all{k}, ptr %same{k}, align 64",
-                ]
-            written = self._body(graph, arithmetic, address, scope, len(known))
-            return [*spread, *_loop(written, [], -(-count // self.width))]
+            for k in same:
+                spread += [f"  %same{k} = alloca {t}, align 64", f"  %one{k} = load double, ptr %in{k}, align 8"]
+                spread += [*arithmetic.splat(f"%all{k}", f"%one{k}"), f"  store {t} %all{k}, ptr %same{k}, align 64"]
+            x = self._elements(t, inputs, first, count, same)
+            y = [f"{t}, ptr %out{k}, i64 %i" for k in range(len(graph.outputs))]
+            written = self._body(graph, arithmetic, x, y, scope, sum(shared) if in_vectors else 0)
+            return [*spread, *_loop(written, [], -(-count // arithmetic.lanes) if in_vectors else count)]
 
-        scope = [*_pointers("in", inputs), *_pointers("out", graph.outputs), "i64 %i"]
-        scope += [f"ptr %same{k}" for k in scalars]
-        return lines
+        key = ("map", id(graph), inputs, count, first)
+        return self._define(key, "map", lines, len(inputs), len(graph.outputs))
 
-    def tiled_map(self, graph: Graph, shared: Lengths, lanes: int) -> str:
-        """y = graph(shared, x) of every tile, each number a vector; the last input says how many there are."""
-        arithmetic, known, last = self.arithmetic._replace(lanes=lanes, together=1), _numbers(shared), len(shared)
-        t, sizes = arithmetic.type, {"x": len(graph.inputs) - len(known), "y": len(graph.outputs)}
+    def _elements(self, t: str, inputs: Lengths, shared: int, count: int, same: Sequence[int] = ()) -> list[str]:
+        """Places of the inputs of element %i: what all share, end to end, then one number of each other register."""
+        places = _end_to_end(self.arithmetic.type, "in", inputs[:shared])
+        for k, length in list(enumerate(inputs))[shared:]:
+            own = f"ptr %in{k}, i64 {'%i' if length == count else 0}"
+            places.append(f"{t}, {f'ptr %same{k}, i64 0' if k in same else own}")
+        return places
 
-        def address(base: str, name: str, row: int) -> list[str]:
-            if base == "x" and row < len(known):
-                return [f"  {name} = getelementptr double, ptr %in{known[row][0]}, i64 {known[row][1]}"]
-            return [f"  {name} = getelementptr {t}, ptr %{base}, i64 {row - len(known) if base == 'x' else row}"]
+    def tiled_map(
+        self, graph: Graph, shared: Lengths, inputs: Lengths, outputs: Lengths, lanes: int, count: int, some: bool
+    ) -> str:
+        """y = graph(shared, x) of every tile, each number a vector; of every element, where that would not do.
+
+        So it is with memories side by side, which are vectors themselves, and with functions of the C library.
+        inputs, outputs: the numbers of an element in each register.  some: the last input says how many of `count`.
+        """
+        in_vectors = self.arithmetic.lanes == 1 and not libm_functions(graph)
+        arithmetic = self.arithmetic._replace(lanes=lanes, together=1) if in_vectors else self.arithmetic
+        t, step = arithmetic.type, 1 if in_vectors else lanes
+        among = some and self.arithmetic.lanes > 1  # each memory has a number of tiles of its own
+        scope = [*_pointers("in", shared), *_pointers("from", inputs), *_pointers("to", outputs)]
+        scope += ["ptr %results"] if among else []
 
         def lines() -> list[str]:
-            written = self._body(graph, arithmetic, address, scope, len(known))
-            start = [f"  %number = load double, ptr %in{last + 1}, align 8", "  %tiles = fptosi double %number to i64"]
-            here = []
-            for base, register in (("x", f"%in{last}"), ("y", "%out0")):
-                here.append(f"  %{base}.row = mul i64 %i, {sizes[base]}")
-                here.append(f"  %{base} = getelementptr {t}, ptr {register}, i64 %{base}.row")
+            x = [*_end_to_end(self.arithmetic.type, "in", shared), *_end_to_end(t, "from", inputs, step)]
+            y = _end_to_end(t, "to", outputs, step)
+            results = [f"{t}, ptr %results, i64 {k}" for k in range(len(y))] if among else y
+            written = self._body(graph, arithmetic, x, results, scope, sum(shared) if in_vectors else 0)
+            here = [f"  %tile = udiv i64 %i, {step}", f"  %lane = urem i64 %i, {step}"] if step > 1 else []
+            elements = [("from", k, size, f"%in{len(shared) + k}") for k, size in enumerate(inputs)]
+            for name, k, size, register in (
+                *elements,
+                *[("to", k, size, f"%out{k}") for k, size in enumerate(outputs)],
+            ):
+                at = f"%{name}{k}.at"
+                if step > 1:
+                    here += [f"  {at}.tile = mul i64 %tile, {size * step}", f"  {at} = add i64 {at}.tile, %lane"]
+                else:
+                    here.append(f"  {at} = mul i64 %i, {size}")
+                here.append(f"  %{name}{k} = getelementptr {t}, ptr {register}, i64 {at}")
+            start = _tiles_text(self.arithmetic, count, f"%in{len(shared) + len(inputs)}", step) if some else []
+            start += [f"  %results = alloca {t}, i64 {len(y)}, align 64"] if among else []
+            after = _among_text(self.arithmetic, results, y, step) if among else []
             body = written._replace(start=[*start, *written.start], lines=[*here, *written.lines])
-            return _loop(body, [], "%tiles")
+            return _loop(body, after, "%steps" if some else count * step)
 
-        scope = [*_pointers("in", shared), "ptr %x", "ptr %y"]
-        return self._define(("tiles", id(graph), shared, lanes), "tiles", lines, last + 2, 1)
+        key = ("tiles", id(graph), shared, inputs, outputs, lanes, count, some)
+        return self._define(key, "tiles", lines, len(shared) + len(inputs) + some, len(outputs))
 
     def sum(self, graph: Graph, inputs: Lengths, count: int, shared: Lengths = (), outputs: Lengths = (1,)) -> str:
         """y = sum over i = 0 .. count - 1 of graph(shared, x[i]), added up in this order from 0."""
-        t, known, first = self.arithmetic.type, _numbers(shared), len(shared)
-        inputs, places = (*shared, *inputs), _numbers(outputs)
-        terms = [f"%one{k}" if k else "%one" for k in range(len(places))]
-
-        def address(base: str, name: str, row: int) -> list[str]:
-            if base == "y":
-                return [f"  {name} = getelementptr {t}, ptr {terms[row]}, i64 0"]
-            if row < len(known):
-                return [f"  {name} = getelementptr {t}, ptr %in{known[row][0]}, i64 {known[row][1]}"]
-            row += first - len(known)
-            return [f"  {name} = getelementptr {t}, ptr %in{row}, i64 {'%i' if inputs[row] == count else 0}"]
+        t, first, inputs = self.arithmetic.type, len(shared), (*shared, *inputs)
+        totals = _end_to_end(t, "out", outputs)
+        terms = [f"%one{k}" if k else "%one" for k in range(len(totals))]
+        scope = [*_pointers("in", inputs), *[f"ptr {term}" for term in terms], "i64 %i"]
 
         def lines() -> list[str]:
             start, add = [], []
-            for k, ((register, at), term) in enumerate(zip(places, terms, strict=True)):
+            for k, (total, term) in enumerate(zip(totals, terms, strict=True)):
                 start += [f"  {term} = alloca {t}, align 64"]
-                start += [f"  %sum{k} = getelementptr {t}, ptr %out{register}, i64 {at}"]
+                start += [f"  %sum{k} = getelementptr {total}"]
                 start += [f"  store {t} {self.arithmetic.number(0.0)}, ptr %sum{k}, align 8"]
                 add += [  # y += graph(shared, x[i])
                     f"  %so.far{k} = load {t}, ptr %sum{k}, align 8",
@@ -146,9 +129,11 @@ class Functions:
                     f"  %total{k} = fadd {t} %so.far{k}, %here{k}",
                     f"  store {t} %total{k}, ptr %sum{k}, align 8",
                 ]
-            return [*start, *(_loop(self._body(graph, self.arithmetic, address, scope), add, count) if count else [])]
+            if not count:
+                return start
+            x, y = self._elements(t, inputs, first, count), [f"{t}, ptr {term}, i64 0" for term in terms]
+            return [*start, *_loop(self._body(graph, self.arithmetic, x, y, scope), add, count)]
 
-        scope = [*_pointers("in", inputs), *[f"ptr {term}" for term in terms], "i64 %i"]
         key = ("sum", id(graph), inputs, count, first, outputs)
         return self._define(key, "sum", lines, len(inputs), len(outputs))
 
@@ -179,9 +164,22 @@ class Functions:
         return self._define(("take", tuple(table), tuple(places)), "take", lines, 1, 1)
 
     def _body(
-        self, graph: Graph, arithmetic: Arithmetic, address: Address, scope: Sequence[str], uniform: int = 0
+        self,
+        graph: Graph,
+        arithmetic: Arithmetic,
+        x: Sequence[str],
+        y: Sequence[str],
+        scope: Sequence[str],
+        uniform: int = 0,
     ) -> Body:
-        """The body of the function that is being defined, those that it calls defined before."""
+        """The body of the function that is being defined, those that it calls defined before.
+
+        x, y: where the inputs and outputs are: type, pointer, index.
+        """
+
+        def address(base: str, name: str, row: int) -> list[str]:
+            return [f"  {name} = getelementptr {(x if base == 'x' else y)[row]}"]
+
         written = body(graph, arithmetic, address, next(reversed(self._names.values())), scope, uniform=uniform)
         self.definitions += written.definitions
         return written
@@ -207,9 +205,45 @@ class Functions:
         return name
 
 
-def _numbers(registers: Lengths) -> list[tuple[int, int]]:
-    """Of the numbers of registers end to end, which register and where in it."""
-    return [(register, k) for register, length in enumerate(registers) for k in range(length)]
+def _tiles_text(arithmetic: Arithmetic, count: int, register: str, step: int) -> list[str]:
+    """%steps: `step` times the tiles that a register asks for, from one to `count`; of memories, the most."""
+    t, bits, one, most = arithmetic.type, words_of(arithmetic)["b"], arithmetic.number(1.0), arithmetic.number(count)
+    lines = [
+        f"  %asked = load {t}, ptr {register}, align 8",
+        f"  %several = fcmp ogt {t} %asked, {one}",
+        f"  %least = select {bits} %several, {t} %asked, {t} {one}",
+        f"  %fits = fcmp olt {t} %least, {most}",
+        f"  %tiles = select {bits} %fits, {t} %least, {t} {most}",
+    ]
+    if arithmetic.lanes > 1:
+        lines.append(f"  %most = call double @llvm.vector.reduce.fmax.{arithmetic.suffix}({t} %tiles)")
+    whole = f"  %whole = fptosi double {'%most' if arithmetic.lanes > 1 else '%tiles'} to i64"
+    return [*lines, whole, f"  %steps = mul i64 %whole, {step}"]
+
+
+def _among_text(arithmetic: Arithmetic, results: Sequence[str], targets: Sequence[str], step: int) -> list[str]:
+    """The results of an element among its numbers, in memories that ask for its tile."""
+    t, bits = arithmetic.type, words_of(arithmetic)["b"]
+    lines = [
+        f"  %tile.next = add i64 {'%tile' if step > 1 else '%i'}, 1",
+        "  %number = uitofp i64 %tile.next to double",
+    ]
+    lines += [*arithmetic.splat("%numbers", "%number"), f"  %asks = fcmp ole {t} %numbers, %tiles"]
+    for row, (result, target) in enumerate(zip(results, targets, strict=True)):
+        lines += [
+            f"  %new{row}.at = getelementptr {result}",
+            f"  %old{row}.at = getelementptr {target}",
+            f"  %new{row} = load {t}, ptr %new{row}.at, align 8",
+            f"  %old{row} = load {t}, ptr %old{row}.at, align 8",
+            f"  %put{row} = select {bits} %asks, {t} %new{row}, {t} %old{row}",
+            f"  store {t} %put{row}, ptr %old{row}.at, align 8",
+        ]
+    return lines
+
+
+def _end_to_end(t: str, name: str, lengths: Lengths, step: int = 1) -> list[str]:
+    """Places of the numbers of registers, end to end, each so many numbers behind the one before."""
+    return [f"{t}, ptr %{name}{k}, i64 {at * step}" for k, length in enumerate(lengths) for at in range(length)]
 
 
 def _pointers(name: str, registers: Iterable[object]) -> list[str]:

@@ -21,26 +21,10 @@ def many(program: Program) -> Program:
 
     What its `If` and `While` decide by is 1 where they apply and else 0, and what they write is put back where they do
     not. So every memory, a lane, ends with the same numbers whether other lanes take another course or not: an `If` is
-    run if any lane is positive, and a `While` as long as any is. `Runner.run_many` makes it of its program.
+    run if any lane is positive, and a `While` as long as any is; a `FixedPoint` becomes a `While`, so that derivatives
+    are taken before. Registers for masks, and for what is put back, stand after those of the program. `Runner.run_many`
+    makes it.
 
-    Parameters
-    ----------
-    program : Program
-        Of any statements; a `FixedPoint` becomes a `While`, so that derivatives are taken before.
-
-    Returns
-    -------
-    Program
-        With registers for masks, and for what is put back, after those of the program; `program` itself if nothing in
-        it depends on numbers.
-
-    Raises
-    ------
-    TypeError
-        For what is no program.
-
-    Examples
-    --------
     >>> import cgraph as cg
     >>> from cgraph.extend import Call, Program, While, many
     >>> n = cg.variable("n")
@@ -64,16 +48,8 @@ def many(program: Program) -> Program:
 class Masked:
     """Statements that change the lanes of a mask alone, when what they write is put back in the others.
 
-    Attributes
-    ----------
-    lengths : dict of str to int
-        Of all registers; grows.
-    mask : tuple of str
-        The register of the mask, of length 1: 1 in its lanes, else 0; none: all lanes.
-    statements : list of Statement
-        What has been added.
-    written : dict of str to None
-        Registers to be put back.
+    lengths: of all registers; grows.  mask: the register that is 1 in its lanes, else 0; none: all lanes.
+    statements: what has been added.  written: registers to be put back.
     """
 
     def __init__(self, lengths: dict[str, int], mask: Sequence[str] = (), depth: int = 0, own: str = ":") -> None:
@@ -112,7 +88,7 @@ class Masked:
 
 
 def masked_if(statement: If, masked: Masked) -> None:
-    """Either way in its lanes."""
+    """Run both bodies, each in its lanes."""
     on, off = masked.register("on"), masked.register("off")
     graph = _WAYS_IN_MASK if masked.mask else _WAYS
     masked.add(Call(graph, (statement.register, *masked.mask), (on, off)))
@@ -131,7 +107,7 @@ def masked_while(statement: While | FixedPoint, masked: Masked) -> None:
 
 
 def masked_push(push: Push, masked: Masked) -> None:
-    """In other lanes the count is infinite meanwhile, so that nothing is put on the stack."""
+    """Push in the lanes of the mask: in others the count is infinite meanwhile, so that nothing is put on the stack."""
     if not masked.mask:
         masked.add(push)
         return

@@ -18,29 +18,13 @@ from .statements.call import Call
 class Program:
     """A loop body over named registers of numbers, which `runner` makes ready to run.
 
-    Parameters
-    ----------
-    registers : mapping of str to int
-        {name: length}: all the numbers that a program works on.
-    body : sequence of Statement
-        What one pass does: `Call`, `Map`, `Sum`, `While`, `If`, `FixedPoint`, `Factor`, `Solve`, `Take`, `Push`, `Pop`,
-        and kinds added by `register_statement`.
-    record : sequence of str
-        Registers which, end to end, make a row of the record.
-    record_if : str, optional
-        A register of length 1; a pass at whose end it is not positive records nothing.
-    stop : str, optional
-        A register of length 1; the passes end after one at whose end it is not 0.
-    feed : sequence of str
-        Registers which, end to end, take a row of numbers before each pass, from those handed to the run.
+    registers: {name: length}, all the numbers that a program works on.  body: the statements of a pass, of the kinds in
+    `STATEMENTS`.  record: registers which, end to end, make a row of the record; record_if: one of length 1, where a
+    pass at whose end it is not positive records nothing.  stop: one of length 1; the passes end after one at whose end
+    it is not 0.  feed: registers which, end to end, take a row of numbers before each pass, from those handed to the
+    run.
+    Raises GraphError for a statement with an unknown register, or registers of lengths that do not fit.
 
-    Raises
-    ------
-    GraphError
-        If a statement names an unknown register, or registers of lengths that do not fit.
-
-    Examples
-    --------
     >>> import cgraph as cg
     >>> from cgraph.extend import Call, Program, runner
     >>> x = cg.variable("x")
@@ -96,7 +80,7 @@ class Program:
 
     @property
     def alone(self) -> tuple[str, ...]:
-        """What keeps several memories from running side by side: kinds of statements, `record_if`, `stop`."""
+        """Reasons why memories cannot run side by side: kinds of statements, `record_if`, `stop`."""
         kinds = {type(statement).__name__ for statement in self.statements() if row_of(statement).beside is None}
         return (*sorted(kinds), *[name for name in ("record_if", "stop") if getattr(self, name) is not None])
 

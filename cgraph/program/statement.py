@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
+import numpy as np
+
 from ..core.checks import GraphError
 from ..core.evaluation import Array
 from ..core.graph import Graph
@@ -16,10 +18,8 @@ Rule = Callable[..., None]  # of the statement, or its assignment, and of what i
 
 
 class Statement:
-    """What a program does at a time: the base of the kinds, each of which is a frozen dataclass and a `StatementRow`.
+    """Base of the kinds of statements, each of which is a frozen dataclass and a `StatementRow`.
 
-    Examples
-    --------
     >>> from cgraph.extend import Factor, Statement
     >>> isinstance(Factor("A", "pivots"), Statement)
     True
@@ -28,62 +28,27 @@ class Statement:
 
 @dataclass(frozen=True, eq=False)
 class StatementRow:
-    """One row of the table of statements: all that the library knows of a kind of statement.
+    """One row of the table of statements: all that the library knows of a kind of statement, see docs/extending.md.
 
-    Parameters
-    ----------
-    kind : type
-        A frozen dataclass over `Statement`.
-    reads, writes : tuple of str
-        Its fields that name registers, each a name or a tuple of names. A field in both is changed in place.
-    run : callable
-        (statement, state, execution): its effect on `state`, {register: list of float}. `execution.values(graph, x)`
-        are the outputs of a graph, `execution.run(statements, state)` runs others.
-    check : callable, optional
-        (statement, lengths): raises GraphError where registers do not fit; `require_length` helps. That their names are
-        known is checked without it.
-    bodies : tuple of str
-        Its fields that are statements, run as often as registers say.
-    graph : str
-        Its field that is a graph. Default: it has none.
-    text : callable, optional
-        (statement, writer): LLVM's text, see `writer`'s methods. Default: programs with it run in Python.
-    beside : callable, optional
-        As `run`, of N memories: `state` is {register: array (length, N)}; with it, `text` has to write for vectors of
-        numbers, too. Default: programs with it run one memory at a time.
-    masked : callable, optional
-        (statement, masked): adds what does the same in the lanes of a mask and leaves the others as they are, see
-        `Masked`. Default: the statement, what it writes being put back in the other lanes.
-    assign : callable, optional
-        (statement, assigned): the assignment of registers that no other statement writes. Default: by `reads` and
-        `writes`; a kind with bodies needs it to have derivatives.
-    jvp, transpose : callable, optional
-        (assignment, tangent) and (assignment, adjoint): add the statements that push tangents on, or pull cotangents
-        back, see docs/extending.md. Default: no derivative.
-    reruns : bool
-        Whether what `jvp` adds computes the values too.
-
-    Examples
-    --------
     >>> from cgraph.extend import STATEMENTS, Solve
     >>> STATEMENTS[Solve].reads, STATEMENTS[Solve].writes
     (('matrix', 'pivots', 'vector'), ('vector',))
     """
 
     kind: type[Statement]
-    reads: Names
-    writes: Names
-    run: Rule
-    check: Rule | None = None
-    bodies: Names = ()
-    graph: str = ""
-    text: Rule | None = None
-    beside: Rule | None = None
-    masked: Rule | None = None
-    assign: Callable[..., Any] | None = None
-    jvp: Rule | None = None
-    transpose: Rule | None = None
-    reruns: bool = False
+    reads: Names  # its fields that name registers, each a name or a tuple of names
+    writes: Names  # the same; a field in both is changed in place
+    run: Rule  # (statement, state, execution): its effect on {register: list of float}
+    check: Rule | None = None  # (statement, lengths): raises GraphError where registers do not fit
+    bodies: Names = ()  # its fields that are statements, run as often as registers say
+    graph: str = ""  # its field that is a graph
+    text: Rule | None = None  # (statement, writer): LLVM's text; without it, it runs in Python
+    beside: Rule | None = None  # as `run`, on arrays (length, N); with it `text` has to write for vectors, too
+    masked: Rule | None = None  # (statement, masked): adds what does the same in the lanes of a mask, see `Masked`
+    assign: Callable[..., Any] | None = None  # (statement, assigned): its assignment, which bodies need
+    jvp: Rule | None = None  # (assignment, tangent): adds the statements that push tangents on
+    transpose: Rule | None = None  # (assignment, adjoint): adds those that pull cotangents back
+    reruns: bool = False  # whether what `jvp` adds computes the values too
 
 
 STATEMENTS: dict[type[Statement], StatementRow] = {}  # filled by table.py
@@ -92,20 +57,9 @@ STATEMENTS: dict[type[Statement], StatementRow] = {}  # filled by table.py
 def register_statement(row: StatementRow) -> None:
     """Add a row to the table of statements: from then on programs may have statements of its kind.
 
-    Parameters
-    ----------
-    row : StatementRow
-        The row.
+    Raises TypeError for what is no row, or a kind that is no class over `Statement`; ValueError for a kind that is in
+    the table already, or has no field of a name in `reads`, `writes`, `bodies`, `graph`.
 
-    Raises
-    ------
-    TypeError
-        For what is no row, or where its kind is no class over `Statement`.
-    ValueError
-        When the kind is in the table already, or has no field of a name in `reads`, `writes`, `bodies`, `graph`.
-
-    Examples
-    --------
     >>> from cgraph.extend import STATEMENTS, Call, register_statement
     >>> register_statement(STATEMENTS[Call])
     Traceback (most recent call last):
@@ -129,7 +83,7 @@ def register_statement(row: StatementRow) -> None:
 
 
 def row_of(statement: Statement) -> StatementRow:
-    """Its row. Raises TypeError for what is no statement of the table."""
+    """Row of a statement. Raises TypeError for what is no statement of the table."""
     try:
         return STATEMENTS[type(statement)]
     except KeyError:
@@ -138,18 +92,10 @@ def row_of(statement: Statement) -> StatementRow:
 
 @dataclass(frozen=True)
 class Execution:
-    """What the rules of statements in Python call: graphs at points, and other statements.
+    """Means of the rules in Python: graphs at points, and other statements.
 
-    Attributes
-    ----------
-    lengths : mapping of str to int
-        Of the registers.
-    values : callable
-        (graph, x): the outputs of a graph of the program at a point.
-    batch : callable
-        (graph, points): the outputs at points (inputs, N), (outputs, N).
-    many : int
-        How many memories run side by side; -1: one alone.
+    values: (graph, x) -> the outputs at a point.  batch: (graph, points (inputs, N)) -> the outputs (outputs, N).
+    many: how many memories run side by side; -1: one alone.
     """
 
     lengths: Lengths
@@ -164,6 +110,14 @@ class Execution:
             rule = row.run if self.many < 0 else row.beside
             assert rule is not None, "Runner.run_many has asked"
             rule(statement, state, self)
+
+    def positive(self, values: Sequence[float] | Array) -> bool:
+        """Whether the number of a register is, in any of the memories; NaN is not."""
+        return bool(values[0] > 0.0 if self.many < 0 else np.any(np.asarray(values) > 0.0))
+
+    def write(self, state: dict[str, Any], register: str, numbers: Array) -> None:
+        """The numbers of a register, of one memory or of many, from an array of its own."""
+        state[register] = numbers if self.many >= 0 else numbers.tolist()
 
 
 def names_in(statement: Statement, fields: Iterable[str]) -> Names:
@@ -228,7 +182,7 @@ def needed(statements: Sequence[Statement], results: Iterable[str]) -> list[Stat
 
 
 def length_of(lengths: Lengths, where: str, name: str) -> int:
-    """Of a register. Raises GraphError for an unknown one, which `where` names."""
+    """Length of a register. Raises GraphError for an unknown one, in the words of `where`."""
     if not isinstance(name, str) or name not in lengths:
         raise GraphError(f"{where} names register {name!r}, not among {', '.join(lengths) or 'none'}")
     return lengths[name]
@@ -237,8 +191,6 @@ def length_of(lengths: Lengths, where: str, name: str) -> int:
 def require_length(lengths: Lengths, where: str, name: str, length: int) -> None:
     """Raises GraphError if a register of that name is unknown or has another length; for the `check` of a row.
 
-    Examples
-    --------
     >>> from cgraph.extend import require_length
     >>> require_length({"a": 2}, "Sort", "a", 3)
     Traceback (most recent call last):

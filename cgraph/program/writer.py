@@ -9,24 +9,11 @@ from .statement import Lengths as Registers, Statement, row_of
 
 
 class Writer:
-    """The statements of a function over registers.
+    """The statements of a function over registers, as LLVM's text.
 
-    Attributes
-    ----------
-    registers : mapping of str to int
-        Their lengths.
-    functions : Functions
-        Those of the module, which statements call.
-    type : str
-        Of a number in a register.
-    size : int
-        Of a number, in bytes.
-    pointers : dict of str to str
-        {register: its address}.
-    written : list of str
-        Lines of the statements so far.
-    scratch : list of str
-        Allocations, which stand once at the start.
+    functions: those of the module, which statements call.  type, size: of a number in a register, in LLVM's language
+    and in bytes.  pointers: {register: its address}.  written: lines of the statements so far.  scratch: allocations,
+    which stand once at the start.
     """
 
     def __init__(self, registers: Registers, functions: Functions) -> None:
@@ -76,10 +63,6 @@ class Writer:
         """register[k] = value, a number."""
         self.line(f"store {self.type} {value}, ptr {self.place(register, k)}, align 8")
 
-    def copy(self, target: str, source: str, count: int) -> None:
-        """So many numbers from one address to another."""
-        self.written.append(copy_text(target, source, count * self.size))
-
     def fill_with_nan(self, register: str) -> None:
         """register = NaN, every number of it: all bits are 1."""
         size = self.registers[register] * self.size
@@ -90,21 +73,17 @@ class Writer:
         return f"{kind}{self._count}"
 
     def block(self, label: str) -> None:
-        """What follows is a block of that name."""
+        """Begin a block of that name."""
         self.written.append(f"{label}:")
 
     def jump(self, label: str) -> None:
         """Go on there."""
         self.line(f"br label %{label}")
 
-    def branch_on(self, condition: str, yes: str, no: str) -> None:
-        """Go on at one of two blocks."""
-        self.line(f"br i1 {condition}, label %{yes}, label %{no}")
-
     def branch(self, register: str, yes: str, no: str) -> None:
         """Go on where register > 0, where NaN is not, and where it is not; of lanes, where any is."""
         self.written += self.positive(f"%{yes}.on", register)
-        self.branch_on(f"%{yes}.on", yes, no)
+        self.line(f"br i1 %{yes}.on, label %{yes}, label %{no}")
 
     def arguments(self, *names: str) -> str:
         """Pointers to registers, as arguments of a call."""
@@ -128,7 +107,7 @@ class Writer:
         self.written += [f"  call void @{name}({', '.join(f'ptr {pointer}' for pointer in pointers)})", *copies]
 
     def lengths(self, names: Sequence[str]) -> Lengths:
-        """Of registers."""
+        """Lengths of registers."""
         return tuple([self.registers[name] for name in names])
 
     def positive(self, result: str, register: str) -> list[str]:
@@ -146,5 +125,5 @@ class Writer:
 
 
 def copy_text(target: str, source: str, size: int) -> str:
-    """So many bytes from one address to another."""
+    """Copy so many bytes from one address to another."""
     return f"  call void @llvm.memcpy.p0.p0.i64(ptr {target}, ptr {source}, i64 {size}, i1 false)"

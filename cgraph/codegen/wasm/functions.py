@@ -21,7 +21,7 @@ HOST = "math."  # before the name of a function that the host supplies
 
 
 def _table() -> bytes:
-    """What `wave` reads at TABLE: the digits of 2/pi, the last ones first."""
+    """Digits of 2/pi, the last ones first, which `wave` reads at TABLE."""
     one = 1 << 1300
     pi = 4 * (4 * _arctan_of_inverse(5, one) - _arctan_of_inverse(239, one))
     return ((2 * one << DIGITS) // pi).to_bytes(DIGITS // 8, "little")

@@ -36,7 +36,7 @@ class Embedded(Tableau, Protocol):
 
 
 class Layout(NamedTuple):
-    """Where things are: inputs and states, t among the inputs, and at which byte the work space begins."""
+    """Layout of memory: inputs and states, t among the inputs, and at which byte the work space begins."""
 
     inputs: int
     states: int

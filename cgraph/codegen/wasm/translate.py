@@ -16,7 +16,7 @@ from .instructions import F64, I32, I64
 
 
 class Signature(NamedTuple):
-    """What a call needs to know of a function."""
+    """Number and types of a function, for its calls."""
 
     number: int
     parameters: tuple[int, ...]
@@ -57,12 +57,12 @@ class Body:
         )
 
     def statements(self, nodes: Sequence[ast.stmt]) -> None:
-        """Theirs, one after another."""
+        """Instructions of statements, one after another."""
         for node in nodes:
             self.statement(node)
 
     def statement(self, node: ast.stmt) -> None:
-        """Its instructions."""
+        """Instructions of a statement."""
         match node:
             case ast.Assign([target], value):
                 kinds = self._kinds(value)

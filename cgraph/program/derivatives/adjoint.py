@@ -17,14 +17,8 @@ HEAVY = 4  # operations of a graph for each of its outputs, from which on these 
 class Replayed(NamedTuple):
     """How values come back that statements backwards read.
 
-    Attributes
-    ----------
-    again : list of Statement
-        What computes those that are cheap.
-    tape : tuple of str
-        Registers to be recorded: results of heavy statements.
-    wanted : set of str
-        Registers that both need from before the assignments.
+    again: what computes those that are cheap.  tape: registers to be recorded, results of heavy statements.
+    wanted: registers that both need from before the assignments.
     """
 
     again: list[Statement]
@@ -35,20 +29,9 @@ class Replayed(NamedTuple):
 class Adjoint(Registers):
     """The statements that pull cotangents back through assignments.
 
-    Attributes
-    ----------
-    bars : dict of str to str
-        {register: the one that has its cotangent}, of what comes after; the rules extend it.
-    active : set of str
-        Registers that depend on what moves.
-    lengths : dict of str to int
-        Of all registers; grows.
-    products : Products
-        Graphs of J^T y_bar.
-    turns : int
-        For how many turns a loop inside has a stack.
-    statements : list of Statement
-        What has been added.
+    bars: {register: the one that has its cotangent}, of what comes after; the rules extend it.  active: registers that
+    depend on what moves.  products: graphs of J^T y_bar.  turns: for how many turns a loop inside has a stack.
+    recording: {assignment: the one that records for its way back}.
     """
 
     def __init__(
@@ -64,12 +47,11 @@ class Adjoint(Registers):
     ) -> None:
         super().__init__(lengths, own)
         self.bars, self.active, self.products, self.turns = dict(bars), active, products, turns
-        self.statements: list[Statement] = []
         self._kept = set(kept)  # registers of cotangents that must stay as they are
         self.recording = {} if recording is None else recording  # {assignment: the one that records}
 
     def inner(self, bars: Mapping[str, str]) -> Adjoint:
-        """Of a body, from cotangents of its end, which stay as they are."""
+        """Adjoint of a body, from cotangents of its end, which stay as they are."""
         more = bars.values(), self.turns, self.recording, self.own
         return Adjoint(bars, self.active, self.lengths, self.products, *more)
 
@@ -80,10 +62,6 @@ class Adjoint(Registers):
             if row.transpose is None:
                 raise TypeError(f"a {row.kind.__name__} has no cotangents: its row has no `transpose`")
             row.transpose(assignment, self)
-
-    def add(self, *statements: Statement) -> None:
-        """Statements after those that are there."""
-        self.statements += statements
 
     def collect(self, register: str, bar: str) -> None:
         """One more term of a register's cotangent."""
@@ -108,11 +86,11 @@ class Adjoint(Registers):
         return zero
 
     def seeded(self, outputs: Sequence[str]) -> tuple[int, ...]:
-        """Which of some registers have cotangents."""
+        """Numbers of the registers that have cotangents."""
         return tuple([k for k, name in enumerate(outputs) if name in self.bars])
 
     def wanted(self, inputs: Sequence[str]) -> tuple[int, ...]:
-        """Of which of some registers cotangents matter."""
+        """Numbers of the registers whose cotangents matter."""
         return tuple([k for k, name in enumerate(inputs) if name in self.active and self.lengths[name]])
 
     def recorded(self, assignment: Assignment, statement: Statement, copies: Sequence[Map]) -> None:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from ...core.graph import Graph
+from ..statement import Names
 from ..statements.call import Call, Map, Sum, elements
+from ..statements.tiles import TiledMap
 from .adjoint import Adjoint
-from .products import Product
+from .products import Product, split
 from .single_assignment import Assignment
 from .tangent import Tangent
 
@@ -31,33 +33,43 @@ def push_call(assignment: Assignment, tangent: Tangent) -> None:
 def push_elements(assignment: Assignment, tangent: Tangent) -> None:
     """y_dot[i] = f'(x[i]) x_dot[i], or their sum."""
     statement: Map | Sum = assignment.statement  # type: ignore[assignment]
-    inputs, first = (*statement.shared, *statement.inputs), len(statement.shared)
-    moving = tangent.moving(inputs)
-    if not moving or tangent.active.isdisjoint(statement.outputs):
+    if tangent.active.isdisjoint(statement.outputs):
         return
-    lengths = (*tangent.of(statement.shared), *[1] * len(statement.inputs))
     one_each = isinstance(statement, Map)
     outputs = (1,) * len(statement.outputs) if one_each else tangent.of(statement.outputs)
-    product = tangent.products.pushed(statement.graph, lengths, moving, outputs)
+    pushed = pushed_elements(statement, (1,) * len(statement.inputs), outputs, tangent)
+    if pushed.graph is not None:
+        results = tuple([tangent.dot(statement.outputs[k]) for k in pushed.kept])
+        tangent.add(type(statement)(pushed.graph, pushed.inputs, results, pushed.shared))
+
+
+class Pushed(NamedTuple):
+    """The graph of tangents of elements, the outputs that it has, and its registers; no graph where nothing moves."""
+
+    graph: Graph | None = None
+    kept: tuple[int, ...] = ()
+    shared: Names = ()
+    inputs: Names = ()
+
+
+def pushed_elements(
+    statement: Map | Sum | TiledMap, inputs: tuple[int, ...], outputs: tuple[int, ...], tangent: Tangent
+) -> Pushed:
+    """The tangents of a graph of elements, which have so many numbers in each register."""
+    names, first = (*statement.shared, *statement.inputs), len(statement.shared)
+    moving, lengths = tangent.moving(names), (*tangent.of(statement.shared), *inputs)
+    product = tangent.products.pushed(statement.graph, lengths, moving, outputs) if moving else Product(None, ())
     if product.graph is None:
-        return
-    shared = (*statement.shared, *[tangent.dots[inputs[k]] for k in moving if k < first])
-    others = (*statement.inputs, *[tangent.dots[inputs[k]] for k in moving if k >= first])
-    graph = _shared_first(product, lengths, first, moving)
-    results = tuple([tangent.dot(statement.outputs[k]) for k in product.kept])
-    tangent.add(type(statement)(graph, others, results, shared))
+        return Pushed()
+    dots, common = [tangent.dots[names[k]] for k in moving], sum([k < first for k in moving])
+    shared, others = (*statement.shared, *dots[:common]), (*statement.inputs, *dots[common:])
+    return Pushed(_shared_first(product.graph, lengths, first, moving), product.kept, shared, others)
 
 
-def _shared_first(product: Product, lengths: tuple[int, ...], first: int, moving: Sequence[int]) -> Graph:
+def _shared_first(graph: Graph, lengths: tuple[int, ...], first: int, moving: Sequence[int]) -> Graph:
     """The graph with the inputs that are shared first: numbers, their tangents, then those of elements."""
-    graph = product.graph
-    assert graph is not None
-    if not first:
-        return graph
-    sizes = [*lengths, *[lengths[k] for k in moving]]
+    groups = split(graph.inputs, [*lengths, *[lengths[k] for k in moving]])
     common = [k < first for k in (*range(len(lengths)), *moving)]
-    ends = list(itertools.accumulate(sizes, initial=0))
-    groups = [graph.inputs[start:end] for start, end in itertools.pairwise(ends)]
     order = [
         node
         for wanted in (True, False)
@@ -65,7 +77,7 @@ def _shared_first(product: Product, lengths: tuple[int, ...], first: int, moving
         for node in group
         if is_common is wanted
     ]
-    return Graph(order, graph.outputs)
+    return Graph(order, graph.outputs) if first else graph
 
 
 # cotangents: x_bar += f'(x)^T y_bar
@@ -89,7 +101,7 @@ def pull_call(assignment: Assignment, adjoint: Adjoint) -> None:
 
 
 def pull_elements(assignment: Assignment, adjoint: Adjoint) -> None:
-    """Of a number that all elements share, or of length 1, the sum over the elements."""
+    """Cotangents of elements; their sum for a number that all elements share, or of length 1."""
     statement: Map | Sum = assignment.statement  # type: ignore[assignment]
     inputs, first = (*statement.shared, *statement.inputs), len(statement.shared)
     count, one_each = elements(statement, adjoint.lengths), isinstance(statement, Map)

@@ -9,7 +9,7 @@ from ...core.graph import Graph
 from ...operations.table import where
 from ...writing.naming import variables
 from ..statement import Statement, effects, reads_and_writes
-from ..statements.call import Map, added, copied, zeroed
+from ..statements.call import Map, added, copied, copied_or_zero, zeroed
 from ..statements.control import If, While
 from ..statements.memory import Pop, Push
 from .adjoint import Adjoint
@@ -23,7 +23,7 @@ Body = tuple[Statement, ...]
 
 
 def assign_if(statement: If, assigned: Assigned) -> Assignment:
-    """Either body from the same registers on; what one of them writes is copied at the end of both."""
+    """Assignment of both bodies from the same registers on; what one of them writes is copied at the end of both."""
     decides = assigned.now(statement.register)
     writes = list(dict.fromkeys([*effects(statement.body)[1], *effects(statement.otherwise)[1]]))
     before, parts, ends = dict(assigned.current), [], []
@@ -34,7 +34,7 @@ def assign_if(statement: If, assigned: Assigned) -> Assignment:
     assigned.current = before
     at = [assigned.write(name) for name in writes]
     after = tuple([dict(zip(at, end, strict=True)) for end in ends])
-    return assigned.made(If(decides, *_ways(assigned, parts, after)), parts=tuple(parts), after=after)
+    return Assignment(If(decides, *_ways(assigned, parts, after)), parts=tuple(parts), after=after)
 
 
 def _ways(registers: Assigned | Adjoint, parts: Sequence[Part], after: Sequence[Mapping[str, str]]) -> list[Body]:
@@ -54,7 +54,7 @@ def push_if(assignment: Assignment, tangent: Tangent) -> None:
         and any([where[name] in each.dots for each, where in zip(inner, assignment.after, strict=True)])
     }
     ways = [
-        (*each.statements, *[_copy_or_zero(each.dots.get(where[name]), dot) for name, dot in moved.items()])
+        (*each.statements, *[copied_or_zero(each.dots.get(where[name]), dot) for name, dot in moved.items()])
         for each, where in zip(inner, assignment.after, strict=True)
     ]
     if moved:
@@ -77,7 +77,7 @@ def pull_if(assignment: Assignment, adjoint: Adjoint) -> None:
     outer = dict.fromkeys([name for each in inner for name in each.bars if name not in written])
     terms = {name: adjoint.bar(name) for name in outer if name in adjoint.active}
     ways = [
-        (*each.statements, *[_copy_or_zero(each.bars.get(name), bar) for name, bar in terms.items()]) for each in inner
+        (*each.statements, *[copied_or_zero(each.bars.get(name), bar) for name, bar in terms.items()]) for each in inner
     ]
     if terms:
         adjoint.add(If(_decides(assignment), *ways))
@@ -89,10 +89,6 @@ def _decides(assignment: Assignment) -> str:
     statement = assignment.statement
     assert isinstance(statement, While | If)
     return statement.register
-
-
-def _copy_or_zero(source: str | None, target: str) -> Map:
-    return zeroed(target) if source is None else copied(source, target)
 
 
 def _written(part: Sequence[Assignment]) -> set[str]:
@@ -113,7 +109,7 @@ def assign_while(statement: While, assigned: Assigned) -> Assignment:
     assigned.current = outside
     copies = tuple([copied(source, name) for source, name in zip(before, at, strict=True)])
     loop = While(assigned.now(statement.register), (*assigned.flat(turn), *_turned(after)))
-    return assigned.made(loop, copies, parts=(turn,), after=(after,))
+    return Assignment(loop, copies, parts=(turn,), after=(after,))
 
 
 def _turned(after: Mapping[str, str]) -> list[Map]:
@@ -129,10 +125,10 @@ def push_while(assignment: Assignment, tangent: Tangent) -> None:
     tangent.add(*assignment.copies)
     for source, at in zip(assignment.sources, after, strict=True):
         if at in dots:
-            tangent.add(_copy_or_zero(before.get(source), dots[at]))
+            tangent.add(copied_or_zero(before.get(source), dots[at]))
     inner = tangent.inner(values=True)
     inner.push(turn)
-    ends = [_copy_or_zero(inner.dots.get(after[at]), dot) for at, dot in dots.items()]
+    ends = [copied_or_zero(inner.dots.get(after[at]), dot) for at, dot in dots.items()]
     tangent.add(replace(loop, body=(*inner.statements, *_turned(after), *ends)))
 
 
@@ -165,16 +161,18 @@ def pull_while(assignment: Assignment, adjoint: Adjoint) -> None:
     body = (*adjoint.flat(turn), Push(stack, turns, record), *_turned(after))
     adjoint.recorded(assignment, replace(loop, body=body), (*assignment.copies, zeroed(turns)))
     adjoint.add(copied(turns, left))
-    adjoint.add(*[_copy_or_zero(outer.get(name), bar) for name, bar in bars.items()])
+    adjoint.add(*[copied_or_zero(outer.get(name), bar) for name, bar in bars.items()])
     adjoint.add(*[zeroed(total) for total in sums.values()])
     handed = {bar: inner.bars.get(name) for name, bar in bars.items()}
     both = [source for source in handed.values() if source is not None and source in handed]  # read after written
     beside = {source: adjoint.fresh("beside", adjoint.lengths[source]) for source in both}
     back = [added(total, inner.bars[name], total) for name, total in sums.items()]
     back += [copied(source, other) for source, other in beside.items()]
-    back += [_copy_or_zero(source and beside.get(source, source), bar) for bar, source in handed.items()]
+    back += [copied_or_zero(source and beside.get(source, source), bar) for bar, source in handed.items()]
+    # x_bar_k = f_x^T x_bar_k+1 and e_bar += f_e^T x_bar_k+1, from the last turn back
     adjoint.add(While(left, (Pop(stack, left, record), *replayed.again, *inner.statements, *back)))
-    adjoint.add(*[Map(_UNLESS_FULL, (bar, turns), (bar,)) for bar in (*bars.values(), *sums.values())])
+    ends = (*bars.values(), *sums.values(), adjoint.unsolved)  # NaN after turns that the stack had no room for
+    adjoint.add(*[Map(_UNLESS_FULL, (end, turns), (end,)) for end in ends])
     for source, name in zip(assignment.sources, after, strict=True):
         if name in bars and source in adjoint.active:
             adjoint.collect(source, bars[name])

@@ -9,7 +9,7 @@ from ...core.graph import Graph
 from ...operations.table import maximum, where
 from ...writing.naming import variables
 from ..statement import Statement, effects
-from ..statements.call import Call, Sum, added, copied, zeroed
+from ..statements.call import Call, Sum, added, copied, copied_or_zero
 from ..statements.control import FixedPoint, While
 from .adjoint import Adjoint
 from .single_assignment import Assigned, Assignment, Registers
@@ -33,7 +33,7 @@ def assign_fixed_point(statement: FixedPoint, assigned: Assigned) -> Assignment:
     assigned.current = outside
     loop = FixedPoint(assigned.now(statement.register), body)
     carried_on = tuple([at[name] for name in carried])
-    return assigned.made(loop, copies, parts=(turn,), after=(after,), carried=carried_on)
+    return Assignment(loop, copies, parts=(turn,), after=(after,), carried=carried_on)
 
 
 def push_fixed_point(assignment: Assignment, tangent: Tangent) -> None:
@@ -98,13 +98,13 @@ def until_settled(
     body: list[Statement] = [*turn, Call(Graph([], {"zero": 0.0}), (), (total,))]
     first: list[Statement] = []
     for u, v, result in rows:
-        first.append(zeroed(u) if v is None else copied(v, u))
+        first.append(copied_or_zero(v, u))
         if result is None:
             continue
         new, change, size = fresh("new", lengths[u]), fresh("d", 1), fresh("s", 1)
-        body.append(copied(result, new) if v is None else added(v, result, new))
+        body.append(copied(result, new) if v is None else added(v, result, new))  # u_new = v + A u
         body += [Sum(_SQUARED_CHANGE, (new, u), (change,)), Sum(_SQUARE, (new,), (size,)), copied(new, u)]
-        body.append(Call(_SHARE, (total, change, size), (total,)))
+        body.append(Call(_SHARE, (total, change, size), (total,)))  # sum of |u_new - u|^2 / |u_new|^2
     judged = Call(_JUDGED, (total, old, turns, stalled, unsolved), (going, old, turns, stalled, unsolved))
     start = Call(begin, (), tuple(begun[:4]))
     return [*first, start, While(going, (*body, judged)), *turn]

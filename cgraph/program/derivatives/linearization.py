@@ -9,7 +9,7 @@ from ...core.checks import GraphError
 from ...util.require import require_mapping, require_sequence, require_whole
 from ..program import Program
 from ..statement import Statement, effects, length_of, needed, reads_and_writes
-from ..statements.call import added, copied, zeroed
+from ..statements.call import added, copied, copied_or_zero
 from .adjoint import Adjoint, replayed
 from .products import Products, Pullback
 from .single_assignment import Assigned, Assignment, flat
@@ -19,22 +19,14 @@ TURNS = 64  # of a loop that its stack has room for, unless more are asked for
 
 
 class Linearized(NamedTuple):
-    """A program that goes along recorded passes, and the registers of its vectors.
+    """A program that goes along recorded passes, which are its feed, and the registers of its vectors.
 
-    Attributes
-    ----------
-    program : Program
-        Its feed is what was recorded of a pass.
-    vectors : dict of str to str
-        {register of a value: that of its cotangent or tangent, before and after a pass}.
-    unsolved : str
-        A register that is not 0 after passes in which equations of a `FixedPoint` were not solved.
+    vectors: {register of a value: that of its cotangent or tangent, before and after a pass}.
+    unsolved: a register that is not 0 after passes in which equations of a `FixedPoint` were not solved, and NaN after
+    a loop of more turns than there is room for.
 
-    Examples
-    --------
     >>> from cgraph.extend import Program, program_jvp
-    >>> linear = program_jvp(Program({"x": 1}, [], record=["x"]))
-    >>> dict(linear.vectors)
+    >>> dict(program_jvp(Program({"x": 1}, [], record=["x"])).vectors)
     {'x': 'x:dot'}
     """
 
@@ -46,33 +38,14 @@ class Linearized(NamedTuple):
 class Linearization:
     """A program in single assignment: what it records, and its derivatives.
 
-    Parameters
-    ----------
-    program : Program
-        Whose `feed` is new in every pass; what it records does not matter.
-    of : sequence of str
-        Registers whose values after a pass matter.
-    wrt : sequence of str
-        Registers by which derivatives are taken, besides those that a pass hands on.
-    constant : sequence of str
-        Registers whose values have no derivatives.
-    rules : mapping of int to Pullback
-        {id of a graph: its own rule for J^T y_bar}.
-    turns : int
-        For how many turns of a `While` its way back has room.
+    of: registers whose values after a pass matter.  wrt: those by which derivatives are taken, besides what a pass
+    hands on; as an attribute first those that stay the same, `inputs`, then those of the feed, `varied`.  constant:
+    those whose values have no derivatives.  rules: {id of a graph: its own rule for J^T y_bar}.  turns: for how many
+    turns of a `While` its way back has room.
 
-    Attributes
-    ----------
-    handed : dict of str to str
-        {register that a pass hands on to the next: the one that has its value after the pass}.
-    wrt : tuple of str
-        Registers by which derivatives are taken, besides what is handed on: first those that stay the same, `inputs`,
-        then those of the feed, `varied`.
-    constants : tuple of str
-        Registers that passes read and never write.
+    handed: {register that a pass hands on to the next: the one that has its value after the pass}.
+    constants: registers that passes read and never write.
 
-    Examples
-    --------
     >>> import cgraph as cg
     >>> from cgraph.extend import Call, Linearization, Program
     >>> x, p = cg.variables("x p")
@@ -109,7 +82,7 @@ class Linearization:
         self._at, self._with = _unused("@", program), _unused(":", program)
         self._products = Products({} if rules is None else require_mapping("rules", rules, "id of a graph: rule"))
         self._lengths, self.fed = dict(program.registers), tuple(program.feed)
-        self._turns = require_whole("turns", turns, 1)
+        self.turns = require_whole("turns", turns, 1)
         self.inputs = tuple([name for name in wrt if name not in self.fed])
         self.varied = tuple([name for name in wrt if name in self.fed])
         written = effects(program.body)[1]
@@ -154,7 +127,7 @@ class Linearization:
             lengths |= {bar: lengths[name] for name, bar in ends.items()}
             lengths[self.unsolved] = 1
             bars = {self.handed[name]: ends[name] for name in wanted}
-            pulled = Adjoint(bars, self._active, lengths, self._products, ends.values(), self._turns, own=self._at)
+            pulled = Adjoint(bars, self._active, lengths, self._products, ends.values(), self.turns, own=self._at)
             pulled.pull(self._plain)
             more = [name for name in self.handed if name in pulled.bars and name not in wanted and name in self._active]
             if not more:
@@ -167,8 +140,7 @@ class Linearization:
         rows = {name: self._called(name, "row") for name in self.varied}
         lengths |= {row: lengths[name] for name, row in rows.items()}
         for name, end in [*[(name, ends[name]) for name in wanted], *rows.items()]:
-            bar = pulled.bars.get(name)
-            after.append(zeroed(end) if bar is None else copied(bar, end))
+            after.append(copied_or_zero(pulled.bars.get(name), end))
         results = {*ends.values(), *rows.values(), self.unsolved}
         return self._program(lengths, [*pulled.statements, *after], results, ends, list(rows.values()))
 
@@ -178,18 +150,10 @@ class Linearization:
         It is fed what was recorded, and records the tangents of `record` after a pass.  then: what else it does with
         the tangents, {name}:dot.
         """
-        lengths = {**self._lengths, self.unsolved: 1}
-        moving = [name for name in self.handed if name in self._active]
-        dots = {name: self._called(name, "dot") for name in (*moving, *self._among("directions", directions, lengths))}
+        dots, lengths, statements = self._pushed(self._among("directions", directions, self._lengths), values=False)
         self._among("record", record, dots)
-        lengths |= {dot: lengths[name] for name, dot in dots.items()}
-        pushed = Tangent(dots, self._active, lengths, self._products, own=self._at)
-        pushed.push(self._plain)
-        after = self._dots_after(pushed, dots, moving)
         results = {*dots.values(), self.unsolved}
-        return self._program(
-            lengths, [*pushed.statements, *after, *then], results, dots, [dots[name] for name in record]
-        )
+        return self._program(lengths, [*statements, *then], results, dots, [dots[name] for name in record])
 
     def beside(self, directions: Sequence[str], record: Sequence[str]) -> Linearized:
         """The passes with the tangents beside their values: no tape.
@@ -197,14 +161,8 @@ class Linearization:
         What is handed on begins, and ends, in the registers of the program itself.
         record: what is recorded after a pass, and then its tangents.
         """
-        lengths = {**self._lengths, self.unsolved: 1}
-        moving = [name for name in self.handed if name in self._active]
-        dots = {name: self._called(name, "dot") for name in (*moving, *directions)}
-        lengths |= {dot: lengths[name] for name, dot in dots.items()}
-        pushed = Tangent(dots, self._active, lengths, self._products, values=True, own=self._at)
-        pushed.push(self._plain)
-        copies = [copied(after, before) for before, after in self.handed.items() if lengths[before]]
-        body = [*pushed.statements, *self._dots_after(pushed, dots, moving), *copies]
+        dots, lengths, statements = self._pushed(directions, values=True)
+        body = [*statements, *[copied(after, before) for before, after in self.handed.items() if lengths[before]]]
         rows = [*record, *[dots[name] for name in record if name in dots]]
         used = {*_names(body), *rows, *dots.values(), *self.fed, self.unsolved}
         kept = {name: length for name, length in lengths.items() if self._at not in name or name in used}
@@ -225,13 +183,21 @@ class Linearization:
             raise GraphError(f"{what} must be among {', '.join(known) or 'none'}, got {unknown[0]!r:.60}")
         return list(names)
 
-    def _dots_after(self, pushed: Tangent, dots: Mapping[str, str], moving: Sequence[str]) -> list[Statement]:
-        """Tangents of what a pass hands on, where the next one reads them."""
-        after: list[Statement] = []
-        for name in moving:
-            dot = pushed.dots.get(self.handed[name])
-            after.append(zeroed(dots[name]) if dot is None else copied(dot, dots[name]))
-        return after
+    def _pushed(
+        self, directions: Sequence[str], *, values: bool
+    ) -> tuple[dict[str, str], dict[str, int], list[Statement]]:
+        """The tangents of what a pass hands on and of more, the lengths of all registers, and what pushes them on.
+
+        Tangents of what a pass hands on end where the next one reads them.
+        """
+        lengths = {**self._lengths, self.unsolved: 1}
+        moving = [name for name in self.handed if name in self._active]
+        dots = {name: self._called(name, "dot") for name in (*moving, *directions)}
+        lengths |= {dot: lengths[name] for name, dot in dots.items()}
+        pushed = Tangent(dots, self._active, lengths, self._products, values=values, own=self._at)
+        pushed.push(self._plain)
+        pushed.add(*[copied_or_zero(pushed.dots.get(self.handed[name]), dots[name]) for name in moving])
+        return dots, lengths, pushed.statements
 
     def _program(
         self,

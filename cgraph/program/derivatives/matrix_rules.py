@@ -5,7 +5,7 @@ from __future__ import annotations
 from ...core.graph import Graph
 from ...core.node import constant
 from ...writing.naming import variables
-from ..statements.call import Call, copied, zeroed
+from ..statements.call import Call, copied
 from ..statements.matrix import Factor, Solve
 from .adjoint import Adjoint
 from .single_assignment import Assignment
@@ -38,14 +38,12 @@ def push_solve(assignment: Assignment, tangent: Tangent) -> None:
     if matrix is None and side is None:
         return
     dot = tangent.dot(solve.vector)
-    if side is None:
-        side = tangent.fresh(f"{right}_dot", n)
-        tangent.add(zeroed(side))
+    side = tangent.dot_or_zero(right)
     if matrix is None:
         tangent.add(copied(side, dot))
     else:
         tangent.add(Call(_less_product(n, solve.transposed), (side, matrix, solve.vector), (dot,)))
-    tangent.add(Solve(solve.matrix, solve.pivots, dot, solve.transposed))
+    tangent.add(Solve(solve.matrix, solve.pivots, dot, solve.transposed))  # x_dot = A^-1 (b_dot - A_dot x)
 
 
 def pull_solve(assignment: Assignment, adjoint: Adjoint) -> None:
@@ -56,7 +54,7 @@ def pull_solve(assignment: Assignment, adjoint: Adjoint) -> None:
         return
     bar, n = adjoint.bar(right), adjoint.lengths[solve.vector]
     adjoint.add(copied(adjoint.bars[solve.vector], bar))
-    adjoint.add(Solve(solve.matrix, solve.pivots, bar, not solve.transposed))
+    adjoint.add(Solve(solve.matrix, solve.pivots, bar, not solve.transposed))  # b_bar = A^-T x_bar
     if solve.matrix in adjoint.active:
         matrix = adjoint.bar(solve.matrix)
         sides = (solve.vector, bar) if solve.transposed else (bar, solve.vector)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from ...core.graph import Graph
 from ...core.node import Node, constant
 from ...writing.naming import variables
-from ..statements.call import Call, copied, zeroed
+from ..statements.call import Call, copied, copied_or_zero, zeroed
 from ..statements.memory import Pop, Push, Take
 from .adjoint import Adjoint
 from .single_assignment import Assignment
@@ -25,16 +27,20 @@ def pull_take(assignment: Assignment, adjoint: Adjoint) -> None:
     """source_bar[j] = the sum of target_bar[i] over all i with table[i] = j."""
     take = assignment.statement
     assert isinstance(take, Take)
-    if take.target not in adjoint.bars or take.source not in adjoint.active:
-        return
-    bars = variables([f"b{k}" for k in range(len(take.table))])
+    if take.target in adjoint.bars and take.source in adjoint.active:
+        collect_taken(adjoint, take.source, take.target, enumerate(take.table))
+
+
+def collect_taken(adjoint: Adjoint, source: str, target: str, moves: Iterable[tuple[int, int]]) -> None:
+    """source_bar[j] += target_bar[i] for all (i, j) of the moves."""
+    bars = variables([f"b{k}" for k in range(adjoint.lengths[target])])
     totals: dict[int, Node] = {}
-    for place, bar in zip(take.table, bars, strict=True):
-        totals[place] = totals[place] + bar if place in totals else bar
-    size, source = adjoint.lengths[take.source], adjoint.bar(take.source)
-    graph = Graph(bars, {f"{k}": totals.get(k, constant(0.0)) for k in range(size)})
-    adjoint.add(Call(graph, (adjoint.bars[take.target],), (source,)))
-    adjoint.collect(take.source, source)
+    for i, j in moves:
+        totals[j] = totals[j] + bars[i] if j in totals else bars[i]
+    bar = adjoint.bar(source)
+    graph = Graph(bars, {f"{j}": totals.get(j, constant(0.0)) for j in range(adjoint.lengths[source])})
+    adjoint.add(Call(graph, (adjoint.bars[target],), (bar,)))
+    adjoint.collect(source, bar)
 
 
 # The tangent of a stack is a stack of tangents with a count of its own, and what is put on one comes off the other.
@@ -48,7 +54,7 @@ def push_push(assignment: Assignment, tangent: Tangent) -> None:
         return
     stack, count = assignment.sources[:2]
     dot, work = tangent.dot(push.stack), tangent.fresh("count", 1)
-    tangent.copy_or_zero(stack, dot)
+    tangent.add(copied_or_zero(tangent.dots.get(stack), dot))
     tangent.add(copied(count, work), Push(dot, work, tuple([tangent.dot_or_zero(name) for name in push.rows])))
 
 
@@ -64,7 +70,7 @@ def push_pop(assignment: Assignment, tangent: Tangent) -> None:
 
 
 def pull_push(assignment: Assignment, adjoint: Adjoint) -> None:
-    """What the row put on the stack has as its cotangent comes off the stack of cotangents, whose row then is 0."""
+    """Cotangents of the row come off the stack of cotangents, whose row then is 0."""
     push = assignment.statement
     assert isinstance(push, Push)
     if push.stack not in adjoint.bars:

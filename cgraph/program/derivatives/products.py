@@ -28,13 +28,7 @@ class Product(NamedTuple):
 
 
 class Pullback(Protocol):
-    """A rule of a graph's own for J^T y_bar, which may read the values of its outputs.
-
-    Attributes
-    ----------
-    residuals : int
-        How many of the last outputs are there for the rule alone, and have no cotangents.
-    """
+    """A rule of a graph's own for J^T y_bar, which may read the values of its outputs."""
 
     @property
     def residuals(self) -> int:
@@ -47,7 +41,7 @@ class Pullback(Protocol):
 
 
 class Products:
-    """Of any graph; a zero that is one whatever the numbers are is left out.
+    """Products of any graph; a zero that is one whatever the numbers are is left out.
 
     pullbacks: {id of a graph: its own rule}.
     """
@@ -77,9 +71,9 @@ class Products:
         key = ("push", id(graph), inputs, moving, outputs)
         if key not in self._made:
             self._graphs.append(graph)
-            groups = _split(graph.inputs, inputs)
+            groups = split(graph.inputs, inputs)
             pushed = simplify(jvp(graph, [node for k in moving for node in groups[k]]))
-            results = _split(list(pushed.outputs.values()), outputs)
+            results = split(list(pushed.outputs.values()), outputs)
             self._made[key] = _product(pushed.inputs, dict(enumerate(results)), with_outputs=False)
         return self._made[key]
 
@@ -87,15 +81,15 @@ class Products:
 def _pulled(
     graph: Graph, pullback: Pullback | None, inputs: Lengths, wanted: Chosen, outputs: Lengths, seeded: Chosen
 ) -> Product:
-    groups = [group for k, group in enumerate(_split(graph.inputs, inputs)) if k in wanted]
+    groups = [group for k, group in enumerate(split(graph.inputs, inputs)) if k in wanted]
     by = [node for group in groups for node in group]
     known = pullback is not None and len(seeded) == len(outputs) - bool(pullback.residuals)
     if pullback is not None and known:
         pulled = pullback(by)
     else:
-        names = [name for k, part in enumerate(_split(list(graph.outputs), outputs)) if k in seeded for name in part]
+        names = [name for k, part in enumerate(split(list(graph.outputs), outputs)) if k in seeded for name in part]
         pulled = simplify(vjp(Graph(graph.inputs, {name: graph.outputs[name] for name in names}), by))
-    results = _split(list(pulled.outputs.values()), tuple([len(group) for group in groups]))
+    results = split(list(pulled.outputs.values()), tuple([len(group) for group in groups]))
     return _product(pulled.inputs, dict(zip(wanted, results, strict=True)), known)
 
 
@@ -106,7 +100,7 @@ def _product(inputs: Sequence[Node], results: Mapping[int, Sequence[Node]], with
     return Product(graph, tuple(kept), with_outputs)
 
 
-def _split(items: Sequence[T], lengths: Lengths) -> list[Sequence[T]]:
+def split(items: Sequence[T], lengths: Sequence[int]) -> list[Sequence[T]]:
     """The items, end to end, by the registers that hold them."""
     ends = list(itertools.accumulate(lengths, initial=0))
     return [items[start:end] for start, end in itertools.pairwise(ends)]

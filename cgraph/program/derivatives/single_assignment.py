@@ -11,20 +11,11 @@ from ..statements.call import Map, copied
 
 @dataclass(frozen=True, eq=False)
 class Assignment:
-    """A statement whose outputs no other one writes; what it changes in place is copied first.
+    """A statement whose outputs no other one writes; what it changes in place is copied first, by `copies`.
 
-    Attributes
-    ----------
-    statement : Statement
-        The statement, over registers of the program in single assignment.
-    copies : tuple of Map
-        What stands before it.
-    parts : tuple of tuple of Assignment
-        Of a statement with bodies, each body in single assignment.
-    after : tuple of dict
-        For each part, {register that the statement writes: the one that has its value at the end of the part}.
-    carried : tuple of str
-        Of an iteration, the registers that a turn reads before it writes them.
+    parts: of a statement with bodies, each body in single assignment.
+    after: for each part, {register that the statement writes: the one that has its value at the end of the part}.
+    carried: of an iteration, the registers that a turn reads before it writes them.
     """
 
     statement: Statement
@@ -50,18 +41,11 @@ class Assignment:
 
 @dataclass
 class Registers:
-    """Registers by name; new ones are made with `fresh`.
-
-    Attributes
-    ----------
-    lengths : dict of str to int
-        Their lengths.
-    own : str
-        What is in the names of new ones alone.
-    """
+    """Lengths of registers by name, and new ones, in whose names alone `own` is."""
 
     lengths: dict[str, int]
     own: str = "@"
+    statements: list[Statement] = field(default_factory=list)  # what has been added
 
     @property
     def unsolved(self) -> str:
@@ -74,6 +58,10 @@ class Registers:
         self.lengths[new] = length
         return new
 
+    def add(self, *statements: Statement) -> None:
+        """Statements after those that are there."""
+        self.statements += statements
+
     def of(self, names: Iterable[str]) -> tuple[int, ...]:
         """Lengths of registers."""
         return tuple([self.lengths[name] for name in names])
@@ -83,10 +71,7 @@ class Registers:
 class Assigned(Registers):
     """Statements in single assignment, one after another.
 
-    Attributes
-    ----------
-    current : dict of str to str
-        {register of the program: the one that has its value now}, where that is another.
+    current: {register of the program: the one that has its value now}, where that is another.
     """
 
     current: dict[str, str] = field(default_factory=dict)
@@ -115,7 +100,7 @@ class Assigned(Registers):
         return Assignment(new, tuple([copied(before[name], self.now(name)) for name in changed]))
 
     def in_place(self, statement: Statement) -> Statement:
-        """With the registers of now, which it also writes. Raises TypeError for one with bodies."""
+        """Statement over the registers of now, which it also writes. Raises TypeError for one with bodies."""
         if bodies_of(statement):
             raise TypeError(f"a FixedPoint with a {type(statement).__name__} in its turns has no derivatives")
         row = row_of(statement)
@@ -124,18 +109,6 @@ class Assigned(Registers):
     def flat(self, part: Sequence[Assignment]) -> list[Statement]:
         """The statements of assignments, copies included."""
         return [*flat(part)]
-
-    def made(
-        self,
-        statement: Statement,
-        copies: tuple[Map, ...] = (),
-        *,
-        parts: tuple[tuple[Assignment, ...], ...],
-        after: tuple[Mapping[str, str], ...],
-        carried: Names = (),
-    ) -> Assignment:
-        """The assignment of a statement with bodies, see `Assignment`."""
-        return Assignment(statement, copies, parts, after, carried)
 
 
 def flat(assignments: Sequence[Assignment]) -> Iterator[Statement]:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence, Set
 
-from ..statement import Statement, reads_and_writes, row_of
-from ..statements.call import copied, zeroed
+from ..statement import reads_and_writes, row_of
+from ..statements.call import zeroed
 from .products import Products
 from .single_assignment import Assignment, Registers
 
@@ -13,20 +13,9 @@ from .single_assignment import Assignment, Registers
 class Tangent(Registers):
     """The statements that push tangents on through assignments.
 
-    Attributes
-    ----------
-    dots : dict of str to str
-        {register: the one that has its tangent}; the rules extend it.
-    active : set of str
-        Registers that depend on what moves.
-    lengths : dict of str to int
-        Of all registers; grows.
-    products : Products
-        Graphs of J x_dot.
-    values : bool
-        Whether the statements themselves are among `statements`, each before its tangents.
-    statements : list of Statement
-        What has been added.
+    dots: {register: the one that has its tangent}; the rules extend it.  active: registers that depend on what moves.
+    products: graphs of J x_dot.  values: whether the statements themselves are among `statements`, each before its
+    tangents.
     """
 
     def __init__(
@@ -41,10 +30,9 @@ class Tangent(Registers):
     ) -> None:
         super().__init__(lengths, own)
         self.dots, self.active, self.products, self.values = dict(dots), active, products, values
-        self.statements: list[Statement] = []
 
     def inner(self, more: Mapping[str, str] | None = None, *, values: bool = False) -> Tangent:
-        """Of a body: what has tangents here has them there, and more registers."""
+        """Tangent of a body: what has tangents here has them there, and more registers."""
         dots = {**self.dots, **(more or {})}
         return Tangent(dots, self.active, self.lengths, self.products, values=self.values or values, own=self.own)
 
@@ -60,10 +48,6 @@ class Tangent(Registers):
             for name in set(reads_and_writes(assignment.statement)[1]) - set(self.active):
                 self.dots.pop(name, None)
 
-    def add(self, *statements: Statement) -> None:
-        """Statements after those that are there."""
-        self.statements += statements
-
     def dot(self, register: str) -> str:
         """A new register for the tangent of one."""
         dot = self.fresh(f"{register}_dot", self.lengths[register])
@@ -78,10 +62,6 @@ class Tangent(Registers):
         self.add(zeroed(zero))
         return zero
 
-    def copy_or_zero(self, register: str, dot: str) -> None:
-        """dot = the tangent of a register."""
-        self.add(copied(self.dots[register], dot) if register in self.dots else zeroed(dot))
-
     def moving(self, inputs: Sequence[str]) -> tuple[int, ...]:
-        """Which of some registers have tangents."""
+        """Numbers of the registers that have tangents."""
         return tuple([k for k, name in enumerate(inputs) if name in self.dots and self.lengths[name]])

@@ -22,19 +22,12 @@ class Block(NamedTuple):
 
 
 class Tape:
-    """What was recorded of passes, block by block.
+    """Record of passes, block by block.
 
-    Attributes
-    ----------
-    forward : Runner
-        Of the program that records, see `Linearization.forward`.
-    feed : callable
-        (first, last): what the passes first .. last - 1 are fed.
-    checkpoints : int
-        Passes between two checkpoints, from which the record is made again; 0: the record is kept.
+    forward: runs the program that records, see `Linearization.forward`.  feed: (first, last) -> what the passes first
+    .. last - 1 are fed.  checkpoints: passes between two memories from which the record is made again; 0: the record is
+    kept.
 
-    Examples
-    --------
     >>> import numpy as np
     >>> from cgraph.extend import Program, Tape, runner
     >>> forward = runner(Program({"x": 1}, [], record=["x"], feed=["x"]), "python")

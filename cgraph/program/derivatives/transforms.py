@@ -25,33 +25,14 @@ def program_jvp(program: Program, wrt: Sequence[str] = (), *, constant: Sequence
     """A program with the tangents of its registers: J x_dot of any number of passes.
 
     Every register that is recorded or handed on, and every one of `wrt`, has a register "{name}:dot" for its tangent,
-    which is set before the first pass and read after the last one. Values and tangents are computed side by side; a
-    loop turns as often as its values say, and a `FixedPoint` has the tangent of its equations.
+    which is set before the first pass and read after the last one: `vectors` of the result. Its record has the rows of
+    the program's, then the tangents of what has tangents in them. Values and tangents are computed side by side; a loop
+    turns as often as its values say, and a `FixedPoint` has the tangent of its equations.
 
-    Parameters
-    ----------
-    program : Program
-        Without `record_if` and `stop`.
-    wrt : sequence of str
-        Registers that passes read and do not write, or are fed; those that passes hand on come with them.
-    constant : sequence of str
-        Registers whose values have no derivatives, such as guesses.
+    program: without `record_if` and `stop`.  wrt: registers that passes read and do not write, or are fed; those that
+    passes hand on come with them.  constant: registers whose values have no derivatives, such as guesses.
+    Raises GraphError for an unknown register, TypeError for a statement without derivative.
 
-    Returns
-    -------
-    Linearized
-        `program`, whose record has the rows of the program's and then the tangents of what has tangents in them;
-        `vectors`, {register: that of its tangent}.
-
-    Raises
-    ------
-    GraphError
-        If a register is unknown, or the program has `record_if` or `stop`.
-    TypeError
-        If a statement has no derivative.
-
-    Examples
-    --------
     >>> import cgraph as cg
     >>> from cgraph.extend import Call, Program, program_jvp, runner
     >>> x = cg.variable("x")
@@ -69,17 +50,9 @@ def program_jvp(program: Program, wrt: Sequence[str] = (), *, constant: Sequence
 class Pulled(NamedTuple):
     """Values at the end of passes, and cotangents at their start.
 
-    Attributes
-    ----------
-    values : dict of str to ndarray
-        {register of `of`: its value after the last pass}.
-    bars : dict of str to ndarray
-        {register: its cotangent} of what is handed on and of `wrt`.
-    rows : dict of str to ndarray, (passes, length)
-        {register of the feed in `wrt`: its cotangents, pass by pass}.
+    values: {register of `of`: its value after the last pass}.  bars: {register: its cotangent} of what is handed on and
+    of `wrt`.  rows: {register of the feed in `wrt`: its cotangents, (passes, length)}.
 
-    Examples
-    --------
     >>> from cgraph.extend import Program, program_vjp
     >>> program_vjp(Program({"x": 1}, [], record=()), ["x"])({"x": 2.0}, 1, {"x": 3.0}).bars
     {'x': array([3.])}
@@ -93,19 +66,10 @@ class Pulled(NamedTuple):
 class ProgramVjp:
     """J^T y_bar of any number of passes of a program; made by `program_vjp`.
 
-    Attributes
-    ----------
-    forward : Runner
-        The passes, which record what their way back reads. What is handed on begins and ends in the registers `handed`.
-    backward : Runner
-        A pass backwards, fed a row of that record.
-    handed : dict of str to str
-        {register that a pass hands on: the one of `forward` that has its value after a pass}.
-    vectors : dict of str to str
-        {register: the one of `backward` that has its cotangent}.
+    forward: runs the passes, which record what their way back reads; what is handed on begins and ends in the registers
+    `handed`, {register: the one that has its value after a pass}.  backward: runs a pass backwards, fed a row of that
+    record, and has cotangents in the registers `vectors`, {register: that of its cotangent}.
 
-    Examples
-    --------
     >>> from cgraph.extend import Program, program_vjp
     >>> pull = program_vjp(Program({"x": 1}, [], record=()), ["x"])
     >>> pull({"x": 2.0}, passes=5, seeds={"x": 3.0}).bars["x"].tolist()
@@ -126,27 +90,12 @@ class ProgramVjp:
         seeds: Mapping[str, ArrayLike],
         feed: ArrayLike | None = None,
     ) -> Pulled:
-        """Run the passes from values of registers, and pull cotangents of `of` back through them.
+        """Run at least one pass from values of registers, and pull cotangents of `of` back through them.
 
-        Parameters
-        ----------
-        values : mapping of str to array_like
-            {register: value before the first pass}; 0 for others.
-        passes : int
-            At least 1.
-        seeds : mapping of str to array_like
-            {register of `of`: cotangent after the last pass}; 0 for others.
-        feed : array_like, shape (passes, feed_width), optional
-            As for `Runner.run`.
-
-        Returns
-        -------
-        Pulled
-
-        Raises
-        ------
-        GraphError
-            For unknown registers or other shapes, and where equations of a `FixedPoint` were not solved.
+        values: {register: value before the first pass}, 0 for others.  seeds: {register of `of`: cotangent after the
+        last pass}, 0 for others.  feed: (passes, feed_width), as for `Runner.run`.
+        Raises GraphError for unknown registers or other shapes, where equations of a `FixedPoint` were not solved, and
+        for a loop that takes more turns than there is room for.
         """
         require_whole("passes", passes, 1)
         if unknown := [name for name in require_mapping("seeds", seeds, "register: cotangent") if name not in self._of]:
@@ -172,7 +121,9 @@ class ProgramVjp:
         for first, last, record in tape.recorded(backwards=True):
             fed = record[::-1, :width] if width else np.empty((last - first, 0))
             parts.append(self.backward.run(back, last - first, 1, fed).rows)
-        if self.backward.read(back, self._unsolved)[0]:
+        if np.isnan(unsolved := self.backward.read(back, self._unsolved)[0]):
+            raise GraphError(f"a loop took more turns than the {self._passes.turns} there is room for: give turns=")
+        if unsolved:
             raise GraphError("the derivative of a FixedPoint was not solved: its turns do not settle")
         bars = {name: self.backward.read(back, register).copy() for name, register in self.vectors.items()}
         slopes, at = (np.concatenate(parts) if self._passes.varied else np.empty((passes, 0)))[::-1], 0
@@ -199,38 +150,11 @@ def program_vjp(
     The passes record the results of their heavy graphs and what they begin with; on the way back the rest is computed
     again. A loop inside a pass records its turns on a stack.
 
-    Parameters
-    ----------
-    program : Program
-        Without `record_if` and `stop`; what it records does not matter.
-    of : sequence of str
-        Registers whose values after the last pass are the result.
-    wrt : sequence of str
-        Registers that passes read and do not write, or are fed, by which derivatives are wanted; those by what passes
-        hand on come with them.
-    constant : sequence of str
-        Registers whose values have no derivatives, such as guesses.
-    turns : int
-        For how many turns of a `While` there is room. Of one with more all cotangents are NaN.
-    checkpoints : int
-        Keep the memory after every so many passes, and record again from there; 0: keep the record of all.
-    backend : {"auto", "llvm", "python"}
-        As for `runner`.
+    program, wrt, constant: as for `program_jvp`; what it records does not matter.  of: registers whose values after the
+    last pass are the result.  turns: for how many turns of a `While` there is room.  checkpoints: keep the memory after
+    every so many passes, and record again from there; 0: keep the record of all.
+    backend: as for `runner`.
 
-    Returns
-    -------
-    ProgramVjp
-        A function of values, the number of passes, seeds and a feed.
-
-    Raises
-    ------
-    GraphError
-        If a register is unknown, or the program has `record_if` or `stop`.
-    TypeError
-        If a statement has no derivative.
-
-    Examples
-    --------
     >>> import cgraph as cg
     >>> from cgraph.extend import Call, Program, program_vjp
     >>> x, p = cg.variables("x p")

@@ -54,7 +54,7 @@ class BoundFunction:
         return result
 
     def _take(self) -> _Buffers:
-        """Where one call at a time puts its point and finds its result."""
+        """Buffers of one call at a time: its point, its result."""
         try:
             return self._free.pop()
         except IndexError:
@@ -62,12 +62,7 @@ class BoundFunction:
             return x.data, y, y.data, self._bind(x, y)
 
     def _point(self, x: ArrayLike) -> Array:
-        return point_of(x, self._sizes[0])
-
-
-def point_of(x: ArrayLike, n_in: int) -> Array:
-    """The point, checked."""
-    point = real_array("x", x)
-    if point.shape != (n_in,):
-        raise GraphError(f"x must have shape ({n_in},), one value for each input, got {point.shape}")
-    return point
+        point, n_in = real_array("x", x), self._sizes[0]
+        if point.shape != (n_in,):
+            raise GraphError(f"x must have shape ({n_in},), one value for each input, got {point.shape}")
+        return point

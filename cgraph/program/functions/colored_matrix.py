@@ -11,17 +11,19 @@ import numpy as np
 
 from ...autodiff.coloring import NONE, Coloring, star_coloring
 from ...autodiff.direction_split import DirectionSplit
-from ...autodiff.sparsity import Indices, Indices32, Pattern
+from ...autodiff.sparsity import Indices, Indices32, Pattern, full
 from ...core.evaluation import Array
 from ...core.graph import Graph
 from ...core.node import as_node, variable
+from ...util.threads import write_batch
 from ..program import Program
 from ..runners.runner import Runner
-from ..statement import Statement
+from ..statement import Names, Statement
 from ..statements.call import Call
 from ..statements.tiles import Scatter, TiledMap
 from .bound_function import BoundFunction
 
+LEAST = 64  # points in a block, a multiple of every processor's vectors
 LARGE = 2**16  # numbers in a matrix, of which no copy is kept for another call
 
 
@@ -56,15 +58,16 @@ class Part(NamedTuple):
     entries: Indices
 
     def tiles(self, lanes: int) -> int:
-        """Of directions."""
+        """Number of tiles of directions."""
         return -(-(max(self.colors) + 1) // lanes)
 
-    def write_seeds(self, directions: Array, lanes: int) -> None:
-        """Of each color the sum of its unit vectors."""
-        seeds = directions.reshape(-1, len(self.colors), lanes)
+    def seeds(self, lanes: int) -> Array:
+        """Sum of the unit vectors of each color, in tiles."""
+        seeds = np.zeros((self.tiles(lanes), len(self.colors), lanes))
         for k, color in enumerate(self.colors):
             if color != NONE:
                 seeds[color // lanes, k, color % lanes] = 1.0
+        return seeds.ravel()
 
 
 class ColoredMatrix:
@@ -84,8 +87,9 @@ class ColoredMatrix:
         ready: Callable[[Program], Runner],
     ) -> None:
         self.entries, self._source, self._points = entries, source, points
+        self._parts = () if isinstance(source, Graph) else source
         self._lanes, self._ready = lanes, ready
-        self._made: dict[tuple[bool, bool], Runner] = {}
+        self._made: dict[tuple[bool, bool, int], Runner] = {}
         self._making = threading.Lock()
         self._entries = BoundFunction(self.bind, points, (len(entries.rows),))
         self._dense = BoundFunction(self.bind, points, entries.shape)
@@ -100,21 +104,30 @@ class ColoredMatrix:
         if not dense:
             return self._entries(x)
         m, n = self.entries.shape
-        if m * n <= LARGE:
-            return self._dense(x)
-        matrix = np.zeros((m, n))
-        matrix[self.entries.rows, self.entries.columns] = self._entries(x)
+        return self._dense(x) if m * n <= LARGE else self._filled(self._entries(x))
+
+    def many(self, points: Array, dense: bool, threads: int) -> Array:
+        """`values` of each of the points (N, n)."""
+        m, n = self.entries.shape
+        whole = dense and m * n <= LARGE
+        values = np.empty((len(points), m, n) if whole else (len(points), len(self.entries.rows)))
+        self.write(points, values, threads)
+        return self._filled(values) if dense and not whole else values
+
+    def _filled(self, entries: Array) -> Array:
+        """The whole matrix, or several of them."""
+        matrix = np.zeros((*entries.shape[:-1], *self.entries.shape))
+        matrix[..., self.entries.rows, self.entries.columns] = entries
         return matrix
 
     def bind(self, x: Array, values: Array) -> Callable[[], None]:
         """A function of nothing that reads x and writes the values: entries, (count,), or into a matrix of zeros."""
 
         def bound(careful: bool) -> Callable[[], None]:
-            runner = self._runner(values.ndim == 2 and values.size > len(self.entries.rows), careful)
+            runner = self._runner(values.ndim == 2, careful, self._lanes)
             run, registers = runner._bind_pass(("x", x), ("y", values))
-            for k, part in enumerate(() if isinstance(self._source, Graph) else self._source):
-                part.write_seeds(registers[f"s{k}"], self._lanes)
-                registers[f"tiles{k}"][0] = part.tiles(self._lanes)
+            for name, seeds in self._seeds(self._lanes).items():
+                registers[name][:] = seeds
             if "nonfinite" not in registers:
                 return run
             nonfinite = registers["nonfinite"].data
@@ -128,16 +141,33 @@ class ColoredMatrix:
 
         return bound(careful=False)
 
-    def _runner(self, dense: bool, careful: bool) -> Runner:
-        """What runs the program, made at the first use."""
-        with self._making:
-            if (dense, careful) not in self._made:
-                self._made[dense, careful] = self._ready(self._program(dense, careful))
-            return self._made[dense, careful]
+    def write(self, points: Array, values: Array, threads: int, *, careful: bool = False) -> None:
+        """The values at points (N, n), which lie side by side in vectors: entries (N, count), or matrices (N, m, n)."""
+        if not len(self.entries.rows) or not len(points):
+            values[...] = 0.0
+            return
+        rows = values.reshape(len(points), -1)
+        width, columns = self._runner(values.ndim == 3, careful, 1)._columns("x", self._seeds(1))
+        directions = sum([part.tiles(1) for part in self._parts])
+        write_batch(max(width // (1 + directions) // LEAST, 1) * LEAST, columns, points.T, rows.T, threads)
+        if not careful and any([part.derivative.guarded for part in self._parts]):
+            mend(values, lambda at, found: self.write(points[at], found, threads, careful=True))
 
-    def _program(self, dense: bool, careful: bool) -> Program:
-        """x -> y, the entries, or with `dense` the whole matrix."""
-        (m, n), lanes = self.entries.shape, self._lanes
+    def _seeds(self, lanes: int) -> dict[str, Array]:
+        """Numbers in the registers of directions."""
+        return {f"s{k}": part.seeds(lanes) for k, part in enumerate(self._parts)}
+
+    def _runner(self, dense: bool, careful: bool, lanes: int) -> Runner:
+        """Runner of the program, made at the first use; the whole matrix is the entries, where none is left out."""
+        key = dense and not full(self.entries), careful, lanes
+        with self._making:
+            if key not in self._made:
+                self._made[key] = self._ready(self._program(*key))
+            return self._made[key]
+
+    def _program(self, dense: bool, careful: bool, lanes: int) -> Program:
+        """x -> y, the entries, or with `dense` the whole matrix; the directions in tiles of so many lanes."""
+        m, n = self.entries.shape
         places = self.entries.rows * n + self.entries.columns if dense else np.arange(len(self.entries.rows))
         registers = {"x": self._points, "y": m * n if dense else len(places)}
         if isinstance(self._source, Graph):
@@ -147,15 +177,16 @@ class ColoredMatrix:
             return Program(registers | {"e": len(places)}, body, ["y"])
         statements: list[Statement] = []
         checks: dict[str, int] = {}
-        for k, part in enumerate(self._source):
+        for k, part in enumerate(self._parts):
             derivative = part.derivative.careful if careful else part.derivative
             (primal, linear), tiles = derivative.split, part.tiles(lanes)
-            sizes = len(primal.outputs), tiles * len(part.colors) * lanes, tiles * len(linear.outputs) * lanes, 1
-            registers |= {f"{letter}{k}": size for letter, size in zip(("p", "s", "t", "tiles"), sizes, strict=True)}
+            sizes = len(primal.outputs), tiles * len(part.colors) * lanes, tiles * len(linear.outputs) * lanes
+            registers |= {f"{letter}{k}": size for letter, size in zip("pst", sizes, strict=True)}
             taken = ((part.color // lanes) * len(linear.outputs) + part.result) * lanes + part.color % lanes
-            statements += product_statements(derivative, k, f"t{k}", lanes)
+            checked = derivative.guarded is not None and lanes > 1  # of points side by side the entries are looked at
+            statements += product_statements(derivative, k, f"t{k}", lanes, checked=checked)
             statements.append(Scatter(f"t{k}", "y", _tuple(taken), _tuple(places[part.entries])))
-            if derivative.guarded is not None:
+            if checked:
                 checks[f"check{k}"] = tiles * lanes
         if checks:
             registers |= {**checks, "nonfinite": 1}
@@ -163,15 +194,28 @@ class ColoredMatrix:
         return Program(registers, statements, ["y"])
 
 
-def product_statements(derivative: Derivative, k: int, results: str, lanes: int) -> list[Statement]:
-    """A register of results: of the point x along `tiles` of directions s; the number k stands behind names.
+def mend(values: Array, write: Callable[[Indices, Array], None]) -> None:
+    """Write the values of points anew, by a split in which zeros win, where some are infinite or NaN."""
+    wrong = np.flatnonzero(~np.isfinite(values.reshape(len(values), -1)).all(axis=1))
+    if len(wrong):
+        found = values[wrong]
+        write(wrong, found)
+        values[wrong] = found
 
-    With a guard a register `check` has NaN for a direction of which a result is infinite or NaN, else 0.
+
+def product_statements(
+    derivative: Derivative, k: int, results: str, lanes: int, tiles: Names = (), *, checked: bool
+) -> list[Statement]:
+    """A register of results: of the point x along tiles of directions s; the number k stands behind names.
+
+    checked: a register `check` has NaN for a direction of which a result is infinite or NaN, else 0.
     """
-    (primal, linear), p, tiles = derivative.split, f"p{k}", f"tiles{k}"
-    statements: list[Statement] = [Call(primal, ("x",), (p,)), TiledMap(linear, f"s{k}", results, (p,), lanes, tiles)]
-    if derivative.guarded is not None:
-        statements.append(TiledMap(_nonfinite(len(linear.outputs)), results, f"check{k}", (), lanes, tiles))
+    (primal, linear), p = derivative.split, f"p{k}"
+    statements: list[Statement] = [Call(primal, ("x",), (p,))]
+    statements.append(TiledMap(linear, (f"s{k}",), (results,), (p,), lanes, tiles))
+    if checked:
+        count = _nonfinite(len(linear.outputs))
+        statements.append(TiledMap(count, (results,), (f"check{k}",), (), lanes, tiles))
     return statements
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import copyreg
 import os
-import sys
 import warnings
 from collections.abc import Callable
 from functools import partial
@@ -12,19 +11,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ...codegen.disk_cache import open_cache
 from ...codegen.llvm_engine import MissingFunctionError
-from ...codegen.python_function import OnArrays, OnFloats
-from ...core.evaluation import Array
 from ...core.graph import Graph
 from ...util.require import require_choice, require_flag, require_graph
-from ..program import Program
+from ...util.version import __version__
 from ..runners.native_runner import NativeRunner, flags_of
-from ..runners.python_runner import BLOCK, PythonRunner
-from ..statements.call import Call
-from .bound_function import BoundFunction
+from ..runners.python_runner import PythonRunner
 from .compiled import Compiled, Options
 
 BACKENDS = ("auto", "python", "numpy", "llvm")
@@ -106,11 +100,14 @@ def compile(
         )
     if backend == "llvm" or (backend == "auto" and not large):
         try:
-            return Native(graph, backend, options)
+            flags, kept = flags_of(options["fast"], options["fma"]), open_cache(options["cache"])
+            ready = partial(NativeRunner, flags=flags, cache=kept)
+            return Compiled(graph, backend, options, ready, ready)
         except (ImportError, MissingFunctionError):
             if backend == "llvm":
                 raise
-    return Generated(graph, backend, options)
+    in_python = partial(PythonRunner, fma=options["fma"])
+    return Compiled(graph, backend, options, in_python, partial(in_python, backend=backend))
 
 
 def _place(cache: bool | str | os.PathLike[str]) -> bool | str:
@@ -122,88 +119,27 @@ def _place(cache: bool | str | os.PathLike[str]) -> bool | str:
     return str(Path(cache).expanduser().absolute())
 
 
-class Generated(Compiled):
-    """Generated Python for one point, generated NumPy for many; with backend "python" or "numpy", that one for both.
+class _Version:
+    """The version that writes a pickle; in it, the first that is read."""
 
-    options: fma; without it NumPy has its functions from the C library, too, one element after another.
-    """
-
-    vector_cost = 20  # NumPy's call, against one of Python's operators
-
-    def __init__(self, graph: Graph, backend: str, options: Options) -> None:
-        super().__init__(graph, backend, options)
-        self._floats = None if backend == "numpy" else OnFloats(graph)
-        self._arrays = self._on_arrays(graph) if backend == "numpy" else None
-        self.source = (self._floats or self._on_arrays(graph)).source
-
-    def _on_arrays(self, graph: Graph) -> OnArrays:
-        return OnArrays(graph, exact=not self.options["fma"])
-
-    def __call__(self, x: ArrayLike) -> Array:
-        """The outputs at one point; by NumPy, as a batch of one."""
-        point = self._point(x)
-        return self.batch(point[:, None])[:, 0] if self._floats is None else np.array(self._floats(point.tolist()))
-
-    def values(self, x: list[float]) -> tuple[float, ...]:
-        """The outputs as floats at a list of floats; IEEE values where a function of `math` raises."""
-        return tuple(self(x).tolist()) if self._floats is None else self._floats(x)
-
-    def _ready(self, program: Program) -> PythonRunner:
-        return PythonRunner(program, fma=self.options["fma"])
-
-    def _columns(self) -> tuple[int, Callable[[Array, Array], None]]:
-        if self.backend == "python":
-            return sys.maxsize, self._one_by_one  # the interpreter runs one thread at a time
-        if self._arrays is None:
-            self._arrays = self._on_arrays(self.graph)
-        return BLOCK, self._arrays
-
-    def _one_by_one(self, points: Array, result: Array) -> None:
-        for column, x in enumerate(points.T.tolist()):
-            result[:, column] = self.values(x)
-
-    def _bound(self, x: Array, y: Array) -> Callable[[], None]:
-        def run() -> None:
-            y[:] = self(x)
-
-        return run
+    def __reduce__(self) -> tuple[Callable[[str], None], tuple[str]]:
+        return require_version, (__version__,)
 
 
-class Native(BoundFunction, Compiled):
-    """Machine code through LLVM. The function of one point is made at once, that of batches at its first use.
+def require_version(version: str) -> None:
+    """Raise ValueError unless a pickle was written by this version."""
+    if version != __version__:
+        problem = f"was pickled by cgraph {version}, and this is cgraph {__version__}"
+        raise ValueError(f"a compiled graph {problem}: pickle the graph alone, or compile it again")
 
-    options: fast, fma and cache, see `compile`. Any number of threads may call it at once.
-    """
 
-    takes_rows, tiles = True, 16
-
-    def __init__(self, graph: Graph, backend: str, options: Options) -> None:
-        Compiled.__init__(self, graph, backend, options)
-        BoundFunction.__init__(self, self._bound, self.n_in, (self.n_out,))
-        self._flags = flags_of(options["fast"], options["fma"])
-        self._cache = open_cache(options["cache"])
-        self._runner = self._ready(Program({"x": self.n_in, "y": self.n_out}, [Call(graph, ("x",), ("y",))], ["y"]))
-        self.lanes = self._runner.width
-        self.source = self._runner.point("x", "y").source
-
-    def batch_source(self) -> str:
-        """The text in LLVM's language of the function for batches."""
-        return self._runner.batch_text("x").source
-
-    def _bound(self, x: Array, y: Array) -> Callable[[], None]:
-        return self._runner._bind_pass(("x", x), ("y", y))[0]
-
-    def _columns(self) -> tuple[int, Callable[[Array, Array], None]]:
-        return self._runner._columns("x")
-
-    def _ready(self, program: Program) -> NativeRunner:
-        return NativeRunner(program, self._flags, self._cache)
+def _remade(_: object, graph: Graph, backend: str, options: Options) -> Compiled:
+    return compile(graph, backend, **options)
 
 
 def _recipe(function: Compiled) -> Any:
-    """What pickling keeps: the graph and the choices. Machine code is made again where the pickle is read."""
-    return partial(compile, **function.options), (function.graph, function.backend)
+    """Graph and choices, which a pickle keeps. Machine code is made again where it is read."""
+    return _remade, (_Version(), function.graph, function.backend, function.options)
 
 
-copyreg.pickle(Generated, _recipe)
-copyreg.pickle(Native, _recipe)
+copyreg.pickle(Compiled, _recipe)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Callable
 from typing import TypedDict
 
@@ -17,8 +16,10 @@ from ...util.html_text import html_table, html_text
 from ...util.memory import lies_in_rows, require_memory, require_out, require_target
 from ...util.real_arrays import real_array
 from ...util.threads import thread_count, write_batch
-from .bound_function import point_of
-from .differentiable import Differentiable
+from ..program import Program
+from ..statements.call import Call
+from .bound_function import BoundFunction
+from .differentiable import Differentiable, Ready
 
 
 class Options(TypedDict):
@@ -29,7 +30,7 @@ class Options(TypedDict):
     cache: bool | str
 
 
-class Compiled(Differentiable):
+class Compiled(BoundFunction, Differentiable):
     """A graph compiled by `cg.compile`. Inputs and outputs are in the order of the graph's.
 
     Attributes
@@ -56,22 +57,15 @@ class Compiled(Differentiable):
     ([[1.0]], [[5.0], [7.0]])
     """
 
-    source: str
-    takes_rows = False  # whether batches of points that lie one after another are read and written as they lie
-
-    def __init__(self, graph: Graph, backend: str, options: Options) -> None:
-        super().__init__()
-        self.graph = graph
+    def __init__(self, graph: Graph, backend: str, options: Options, ready: Ready, own: Ready) -> None:
+        Differentiable.__init__(self, graph, ready)
         self.backend, self.options = backend, options
-        self.n_in, self.n_out = len(graph.inputs), len(graph.outputs)
-
-    @abstractmethod
-    def __call__(self, x: ArrayLike) -> Array:
-        """Values of the outputs, (n_out,), at one point x, (n_in,). Raises GraphError for another shape."""
-
-    @abstractmethod
-    def values(self, x: list[float]) -> tuple[float, ...]:
-        """The outputs as floats at a list of n_in floats: the fastest way in from lists; nothing is checked."""
+        self._runner = own(Program({"x": self.n_in, "y": self.n_out}, [Call(graph, ("x",), ("y",))], ["y"]))
+        self.lanes, self.tiles, self.vector_cost = self._runner.lanes, self._runner.tiles, self._runner.vector_cost
+        self.source = self._runner._point_text("x", "y")
+        BoundFunction.__init__(self, self._bound, self.n_in, (self.n_out,))
+        if (on_lists := self._runner._on_lists("x")) is not None:
+            self.values = on_lists  # type: ignore[assignment, method-assign]  # without arrays on the way
 
     def batch(self, X: ArrayLike, threads: int | None = 1, *, out: Array | None = None) -> Array:
         """Values of the outputs, (n_out, N), at N points X, (n_in, N).
@@ -88,11 +82,11 @@ class Compiled(Differentiable):
         if points.ndim != 2 or points.shape[0] != self.n_in:
             raise GraphError(f"X must have shape ({self.n_in}, N), one row for each input, got {points.shape}")
         total = points.shape[1]
-        order = "F" if self.takes_rows and lies_in_rows(points) else "C"
+        order = "F" if self._runner.takes_rows and lies_in_rows(points) else "C"
         result = np.empty((self.n_out, total), order=order) if out is None else out  # type: ignore[call-overload]
         if out is not None:
             require_out(out, (self.n_out, total), points)
-        write_batch(*self._columns(), points, result, count)
+        write_batch(*self._runner._columns("x"), points, result, count)
         return result
 
     def bind(self, x: Array, y: Array) -> Callable[[], None]:
@@ -108,16 +102,12 @@ class Compiled(Differentiable):
         require_target("y", y, "x", x)
         return bound(self._bound(x, y))
 
-    @abstractmethod
-    def _columns(self) -> tuple[int, Callable[[Array, Array], None]]:
-        """What writes the results, (n_out, k), of points, (n_in, k), and the k that is worth handing to a thread."""
+    def batch_source(self) -> str:
+        """The text of the function for batches: NumPy or LLVM."""
+        return self._runner._batch_text("x")
 
-    @abstractmethod
     def _bound(self, x: Array, y: Array) -> Callable[[], None]:
-        """`bind`, after its checks."""
-
-    def _point(self, x: ArrayLike) -> Array:
-        return point_of(x, self.n_in)
+        return self._runner._bind_pass(("x", x), ("y", y))[0]
 
     def _repr_html_(self) -> str:
         rows = [("back end", self.backend), ("inputs", str(self.n_in)), ("outputs", str(self.n_out))]

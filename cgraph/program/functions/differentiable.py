@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Sequence
 from functools import partial
 from typing import Any, TypeVar
@@ -25,6 +24,7 @@ from ...util.memory import require_memory, require_target
 from ...util.real_arrays import real_array
 from ...util.require import require_flag
 from ...util.scipy_modules import scipy_sparse
+from ...util.threads import thread_count
 from ..program import Program
 from ..runners.runner import Runner
 from .colored_matrix import ColoredMatrix, Derivative, Part, hessian_parts, jacobian_parts
@@ -33,103 +33,150 @@ from .direction_products import DirectionProducts
 CHECK = 256  # operations that take as long as to look whether slopes are infinite
 Made = TypeVar("Made")
 Inputs = str | Node | Sequence[str | Node] | None
+Ready = Callable[[Program], Runner]  # makes a program ready to run
 Chosen = tuple[int, ...] | None  # the numbers of inputs; None for all
 LANES = 8  # directions that count as one where colorings are compared, whatever the processor's vectors
 
 
-class Differentiable(ABC):
+def _once(make: Callable[[Any, Chosen], Made]) -> Callable[[Any, Chosen], Made]:
+    """Method whose result for the chosen inputs is made once, by whichever thread asks first."""
+
+    def made(self: Differentiable, chosen: Chosen) -> Made:
+        key = make, chosen
+        if key not in self._made:
+            with self._making:
+                if key not in self._made:
+                    self._made[key] = make(self, chosen)
+        found: Made = self._made[key]
+        return found
+
+    return made
+
+
+class Differentiable:
     """A compiled graph y = f(x) that has derivatives at run time. All that they need is made at the first use.
 
+    ready: makes a program ready to run in the same way.
     wrt: the inputs to differentiate by, in this order; by default all. Columns, directions and products with the
     transposed Jacobian are of these alone; x has all inputs.
     """
 
-    graph: Graph
-    n_in: int
-    n_out: int
-    lanes, tiles = LANES, 512  # directions in a tile, and tiles in a block of them
-    vector_cost = 1  # of an operation on a vector of directions, in operations on numbers
+    lanes, tiles, vector_cost = 1, 1, 1  # as of a Runner
 
-    def __init__(self) -> None:
+    def __init__(self, graph: Graph, ready: Ready) -> None:
+        self.graph, self._ready = graph, ready
+        self.n_in, self.n_out = len(graph.inputs), len(graph.outputs)
         self._made: dict[Hashable, Any] = {}  # derivatives and matrices
         self._making = threading.RLock()
 
-    @abstractmethod
-    def _ready(self, program: Program) -> Runner:
-        """A program made ready to run in the same way."""
+    def _points(self, x: ArrayLike) -> Array:
+        """The point, (n_in,), or points, (N, n_in), checked."""
+        points = real_array("x", x)
+        if points.shape != (self.n_in,) and (points.ndim != 2 or points.shape[1] != self.n_in):
+            wanted = f"({self.n_in},), one value for each input, or (N, {self.n_in}), a point a row"
+            raise GraphError(f"x must have shape {wanted}, got {points.shape}")
+        return points
 
-    @abstractmethod
-    def _point(self, x: ArrayLike) -> Array:
-        """The point, checked."""
-
-    def jvp(self, x: ArrayLike, X_dot: ArrayLike, *, wrt: Inputs = None) -> Array:
+    def jvp(self, x: ArrayLike, X_dot: ArrayLike, *, wrt: Inputs = None, threads: int | None = 1) -> Array:
         """Products y_dot = J x_dot of the Jacobian at x with directions, side by side in vectors: forward mode.
 
         X_dot: (k, n_in), a direction a row; the result is (k, n_out). Of one direction, (n_in,), it is (n_out,). An
         entry of x_dot that is zero counts for nothing, also where an operation has no slope in it; times a factor that
         is infinite or NaN it is NaN.
+        x: (n_in,), or N points, (N, n_in). X_dot then is (N, n_in), a direction for each, or (N, k, n_in), and the
+        result (N, n_out) or (N, k, n_out); one direction (n_in,) is that of all points.
         wrt: the inputs to differentiate by, n_in of them; by default all.
+        threads: how many may share the points, as of `batch`.
         Raises GraphError for another shape, or an input that is not there.
         """
         chosen = self._chosen(wrt)
-        return self._products(self._forward, chosen, x, "X_dot", X_dot, (self._count(chosen), self.n_out))
+        return self._products(self._pushed, chosen, x, "X_dot", X_dot, (self._count(chosen), self.n_out), threads)
 
-    def vjp(self, x: ArrayLike, Y_bar: ArrayLike, *, wrt: Inputs = None) -> Array:
+    def vjp(self, x: ArrayLike, Y_bar: ArrayLike, *, wrt: Inputs = None, threads: int | None = 1) -> Array:
         """Products x_bar = J^T y_bar of the transposed Jacobian at x with cotangents, side by side: reverse mode.
 
         Y_bar: (k, n_out), a cotangent a row; the result is (k, n_in). Of one cotangent, (n_out,), it is (n_in,).
+        x: (n_in,), or N points, (N, n_in). Y_bar then is (N, n_out), a cotangent for each, or (N, k, n_out), and the
+        result (N, n_in) or (N, k, n_in); one cotangent (n_out,) is that of all points.
         wrt: the inputs to differentiate by, n_in of them; by default all.
+        threads: how many may share the points, as of `batch`.
         Raises GraphError for another shape, or an input that is not there.
         """
         chosen = self._chosen(wrt)
-        return self._products(self._reverse, chosen, x, "Y_bar", Y_bar, (self.n_out, self._count(chosen)))
+        return self._products(self._pulled, chosen, x, "Y_bar", Y_bar, (self.n_out, self._count(chosen)), threads)
 
-    def jacobian(self, x: ArrayLike, *, wrt: Inputs = None, sparse: bool = False) -> Any:
+    def jacobian(self, x: ArrayLike, *, wrt: Inputs = None, sparse: bool = False, threads: int | None = 1) -> Any:
         """The Jacobian dy_i/dx_j at x, (n_out, n_in).
 
         Columns that share no row are one direction of a forward sweep, rows that share no column one of a reverse
         sweep, whichever costs less, or both: `cg.sparsity` tells the entries, greedy coloring the directions.
+        x: (n_in,), or N points, (N, n_in), side by side in vectors; the result then is (N, n_out, n_in). Of points in
+        columns, as `batch` takes them, it is `jacobian(X.T)`.
         wrt: the inputs to differentiate by, n_in of them; by default all. With displacements as inputs, a quaternion
         q + G(q) xi, the columns of these at xi = 0 are those of displacements.
-        sparse: give a scipy.sparse.csr_array with the entries of `cg.sparsity`.
+        sparse: give a scipy.sparse.csr_array with the entries of `cg.sparsity`; of N points a list of them.
+        threads: how many may share the points, as of `batch`.
         Raises GraphError for another shape, or an input that is not there; ImportError with `sparse` without SciPy.
-        """
-        return self._matrix(self._jacobian(self._chosen(wrt)), self._point(x), sparse)
 
-    def hessian(self, x: ArrayLike, y_bar: ArrayLike | None = None, *, wrt: Inputs = None, sparse: bool = False) -> Any:
+        >>> x = cg.variable("x")
+        >>> cg.compile(cg.Graph([x], {"y": x * x})).jacobian([[1.0], [2.0], [3.0]]).ravel().tolist()
+        [2.0, 4.0, 6.0]
+        """
+        return self._matrix(self._jacobian(self._chosen(wrt)), self._points(x), sparse, threads)
+
+    def hessian(
+        self,
+        x: ArrayLike,
+        y_bar: ArrayLike | None = None,
+        *,
+        wrt: Inputs = None,
+        sparse: bool = False,
+        threads: int | None = 1,
+    ) -> Any:
         """The Hessian of y_bar . y at x, (n_in, n_in): forward sweeps over the reverse one, never a tensor.
 
         Columns are compressed by a star coloring, which reads an entry or its mirror image.
-        y_bar: (n_out,), the weights of the outputs; not needed for one output.
+        x: (n_in,), or N points, (N, n_in); the result then is (N, n_in, n_in).
+        y_bar: (n_out,), the weights of the outputs, or (N, n_out), of each point; not needed for one output.
         wrt: the inputs to differentiate by, n_in of them; by default all.
-        sparse: give a scipy.sparse.csr_array.
+        sparse: give a scipy.sparse.csr_array; of N points a list of them.
+        threads: how many may share the points, as of `batch`.
         Raises GraphError for another shape, or an input that is not there; ImportError with `sparse` without SciPy.
         """
         if y_bar is None and self.n_out != 1:
             raise GraphError(f"hessian needs y_bar, the weights of the {self.n_out} outputs")
-        weights = real_array("y_bar", [1.0] if y_bar is None else y_bar)
-        if weights.shape != (self.n_out,):
-            raise GraphError(f"y_bar must have shape ({self.n_out},), one weight for each output, got {weights.shape}")
+        points, weights = self._points(x), real_array("y_bar", [1.0] if y_bar is None else y_bar)
+        if weights.shape != (self.n_out,) and weights.shape != (*points.shape[:-1], self.n_out):
+            each = f" or {(len(points), self.n_out)}" if points.ndim == 2 else ""
+            raise GraphError(
+                f"y_bar must have shape ({self.n_out},){each}, one weight for each output, got {weights.shape}"
+            )
+        if points.ndim > weights.ndim:
+            weights = np.broadcast_to(weights, (len(points), self.n_out))
         matrix = self._hessian(self._chosen(wrt))
-        return self._matrix(matrix, np.concatenate([self._point(x), weights]), sparse)
+        return self._matrix(matrix, np.concatenate([points, weights], axis=-1), sparse, threads)
 
-    def bind_jacobian(self, x: Array, values: Array, *, wrt: Inputs = None) -> Callable[[], None]:
+    def bind_jacobian(
+        self, x: Array, values: Array, *, wrt: Inputs = None, threads: int | None = 1
+    ) -> Callable[[], None]:
         """A function of nothing that reads x, (n_in,), and writes the Jacobian: the fastest way to it.
 
         values: (n_out, n_in), or one number for each entry of `cg.sparsity`, row by row. What is zero whatever x is set
         to zero here, and not touched by the function. As for `bind`, the arrays are checked here and kept alive, and
         one thread at a time may call it.
+        Of N points x is (N, n_in), and values (N, n_out, n_in) or (N, entries).
         wrt: the inputs to differentiate by, as many as `values` has columns; by default all.
+        threads: how many may share the points, as of `batch`.
         Raises GraphError for arrays that are not contiguous float64 of these shapes, or share memory, and for an input
         that is not there.
         """
-        matrix = self._jacobian(self._chosen(wrt))
-        count = len(matrix.entries.rows)
-        require_memory("x", x, (self.n_in,))
-        require_memory("values", values, matrix.entries.shape, (count,))
+        matrix, count = self._jacobian(self._chosen(wrt)), thread_count(threads)
+        rows = x.shape[:1] if isinstance(x, np.ndarray) and x.ndim == 2 else ()
+        require_memory("x", x, (*rows, self.n_in))
+        require_memory("values", values, (*rows, *matrix.entries.shape), (*rows, len(matrix.entries.rows)))
         require_target("values", values, "x", x)
         values[...] = 0.0
-        return bound(matrix.bind(x, values))
+        return bound(partial(matrix.write, x, values, count) if rows else matrix.bind(x, values))
 
     def _chosen(self, wrt: Inputs) -> Chosen:
         """The numbers of the inputs that `wrt` names."""
@@ -144,15 +191,19 @@ class Differentiable(ABC):
 
     def _products(
         self,
-        derivative: Callable[[Chosen], Derivative],
+        along: Callable[[Chosen], DirectionProducts],
         chosen: Chosen,
         x: ArrayLike,
         name: str,
         directions: ArrayLike,
         shape: tuple[int, int],
+        threads: int | None,
     ) -> Array:
         """shape: the numbers of entries of a direction and of a result."""
-        point, rows = self._point(x), real_array(name, directions)
+        points, rows = self._points(x), real_array(name, directions)
+        count = threads if type(threads) is int and threads > 0 else thread_count(threads)
+        if points.ndim == 2:
+            return self._many_products(along, chosen, points, name, rows, shape, count)
         if rows.ndim not in (1, 2) or rows.shape[-1] != shape[0]:
             raise GraphError(f"{name} must have shape (k, {shape[0]}) or ({shape[0]},), got {rows.shape}")
         matrix = rows if rows.ndim == 2 else rows[None]
@@ -160,23 +211,51 @@ class Differentiable(ABC):
         if not self.n_in:
             result[...] = 0.0
         elif result.size:
-            self._once(name, chosen, lambda _: self._along(derivative(chosen)))(point, matrix, result)
+            along(chosen)(points, matrix, result)
         return result if rows.ndim == 2 else result[0]
 
-    def _along(self, derivative: Derivative) -> DirectionProducts:
-        return DirectionProducts(derivative, self._ready, self.lanes, self.tiles)
+    def _many_products(
+        self,
+        along: Callable[[Chosen], DirectionProducts],
+        chosen: Chosen,
+        points: Array,
+        name: str,
+        given: Array,
+        shape: tuple[int, int],
+        threads: int,
+    ) -> Array:
+        """Products at many points, of each along one direction or along as many as others."""
+        count = len(points)
+        if given.ndim == 1:
+            given = np.broadcast_to(given, (count, *given.shape))
+        if given.ndim not in (2, 3) or len(given) != count or given.shape[-1] != shape[0]:
+            wanted = f"({count}, {shape[0]}), ({count}, k, {shape[0]}) or ({shape[0]},)"
+            raise GraphError(f"{name} must have shape {wanted} for {count} points, got {given.shape}")
+        result = np.zeros((*given.shape[:-1], shape[1]))
+        if self.n_in and result.size:
+            rows = (count, -1, given.shape[-1]), (count, -1, shape[1])
+            along(chosen).many(points, given.reshape(rows[0]), result.reshape(rows[1]), threads)
+        return result
 
-    def _matrix(self, matrix: ColoredMatrix, point: Array, sparse: bool) -> Any:
+    @_once
+    def _pushed(self, chosen: Chosen) -> DirectionProducts:
+        return DirectionProducts(self._forward(chosen), self._ready, self.lanes, self.tiles)
+
+    @_once
+    def _pulled(self, chosen: Chosen) -> DirectionProducts:
+        return DirectionProducts(self._reverse(chosen), self._ready, self.lanes, self.tiles)
+
+    def _matrix(self, matrix: ColoredMatrix, points: Array, sparse: bool, threads: int | None) -> Any:
+        count = threads if type(threads) is int and threads > 0 else thread_count(threads)
         if not require_flag("sparse", sparse):
-            return matrix.values(point, dense=True)
+            return matrix.values(points, dense=True) if points.ndim == 1 else matrix.many(points, True, count)
         module, (columns, starts) = scipy_sparse("a sparse derivative"), matrix.compressed
-        values = matrix.values(point, dense=False)
-        return module.csr_array((values, columns.copy(), starts.copy()), shape=matrix.entries.shape)
+        rows = matrix.many(points, False, count) if points.ndim == 2 else [matrix.values(points, dense=False)]
+        found = [module.csr_array((row, columns.copy(), starts.copy()), shape=matrix.entries.shape) for row in rows]
+        return found if points.ndim == 2 else found[0]
 
+    @_once
     def _jacobian(self, chosen: Chosen) -> ColoredMatrix:
-        return self._once("jacobian", chosen, self._make_jacobian)
-
-    def _make_jacobian(self, chosen: Chosen) -> ColoredMatrix:
         graph, wrt = self._numbered(chosen)
         entries = pattern(graph, wrt)
         if not len(entries.rows):
@@ -191,10 +270,8 @@ class Differentiable(ABC):
     def _colored(self, entries: Pattern, source: Graph | Sequence[Part], points: int) -> ColoredMatrix:
         return ColoredMatrix(entries, source, points, self.lanes, self._ready)
 
+    @_once
     def _hessian(self, chosen: Chosen) -> ColoredMatrix:
-        return self._once("hessian", chosen, self._make_hessian)
-
-    def _make_hessian(self, chosen: Chosen) -> ColoredMatrix:
         if not self.n_in:  # and no cotangents, which would be the outputs of the reverse mode
             nothing = np.zeros(0, dtype=np.int64)
             return self._colored(Pattern(nothing, nothing, (0, 0)), [], self.n_out)
@@ -203,38 +280,25 @@ class Differentiable(ABC):
         derivative = _guarded(partial(_second_products, graph, wrt), len(wrt))
         return self._colored(entries, hessian_parts(entries, derivative), self.n_in + self.n_out)
 
+    @_once
     def _forward(self, chosen: Chosen) -> Derivative:
-        return self._once("forward", chosen, self._make_forward)
-
-    def _make_forward(self, chosen: Chosen) -> Derivative:
         graph, wrt = self._numbered(chosen)
         return _guarded(partial(forward_products, graph, wrt), len(wrt))
 
+    @_once
     def _reverse(self, chosen: Chosen) -> Derivative:
-        return self._once("reverse", chosen, self._make_reverse)
-
-    def _make_reverse(self, chosen: Chosen) -> Derivative:
         graph, wrt = self._numbered(chosen)
         return _guarded(partial(reverse_products, graph, wrt), self.n_out)
 
     def _numbered(self, chosen: Chosen) -> tuple[Graph, tuple[Node, ...]]:
         """The graph with numbers for names, and the chosen inputs: the longest name has no room for a suffix."""
-        graph = self._once("graph", None, self._make_numbered)
+        graph = self._graph(None)
         return graph, graph.inputs if chosen is None else tuple([graph.inputs[k] for k in chosen])
 
-    def _make_numbered(self, _: Chosen) -> Graph:
+    @_once
+    def _graph(self, _: Chosen) -> Graph:
         inputs = [variable(f"x{k}") for k in range(self.n_in)]
         return Graph(inputs, {f"y{k}": node for k, node in enumerate(self.graph(*inputs).values())})
-
-    def _once(self, name: str, chosen: Chosen, make: Callable[[Chosen], Made]) -> Made:
-        """What `make` gives of the chosen inputs, made once, by whichever thread asks first."""
-        key = name, chosen
-        if key not in self._made:
-            with self._making:
-                if key not in self._made:
-                    self._made[key] = make(chosen)
-        made: Made = self._made[key]
-        return made
 
 
 def _guarded(derive: Callable[..., Graph], directions: int) -> Derivative:

@@ -4,19 +4,26 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...core.evaluation import Array
+from ...core.graph import Graph
 from ...util.memory import aligned
+from ...util.threads import write_batch
+from ..fuse import applied
 from ..program import Program
 from ..runners.runner import Runner
-from .colored_matrix import Derivative, product_statements
+from ..statements.call import Call
+from .colored_matrix import Derivative, mend, product_statements
+
+MOST = 2**22  # numbers in the rows of points and directions that are written at a time
 
 
 class _Buffers(NamedTuple):
-    """What one call at a time has for itself: memory of a point, directions and results in tiles, how many, checks."""
+    """Buffers of one call at a time: memory of a point, directions and results in tiles, how many, checks."""
 
     x: Any  # memory
     directions: Array
@@ -27,7 +34,7 @@ class _Buffers(NamedTuple):
 
 
 class DirectionProducts:
-    """What writes products; any number of threads may call it at once.
+    """Writer of products; any number of threads may call it at once.
 
     ready: makes a program ready to run.  lanes, tiles: directions in a tile, and tiles in a block.
     """
@@ -38,11 +45,12 @@ class DirectionProducts:
         sizes = {"x": len(split.primal.inputs), "p0": len(split.primal.outputs), "tiles0": 1}
         self._tiles = tiles, split.directions, lanes
         self._results = tiles, len(split.linear.outputs), lanes
-        if derivative.guarded is not None:
+        checked = derivative.guarded is not None
+        if checked:
             sizes["check0"] = tiles * lanes
         sizes |= {"s0": math.prod(self._tiles), "y": math.prod(self._results)}
-        self._runner = ready(Program(sizes, product_statements(derivative, 0, "y", lanes), ["y"]))
-        self._careful: DirectionProducts | None = None
+        body = product_statements(derivative, 0, "y", lanes, ("tiles0",), checked=checked)
+        self._runner = ready(Program(sizes, body, ["y"]))
         self._free: list[_Buffers] = []  # pop and append are atomic
 
     def __call__(self, x: Array, directions: Array, result: Array) -> None:
@@ -53,6 +61,31 @@ class DirectionProducts:
             return
         for start in range(0, len(directions), size):  # between blocks, Ctrl-C is heard
             self._block(x, directions[start : start + size], result[start : start + size])
+
+    @cached_property
+    def _beside(self) -> Runner:
+        """Runner of a point and one direction, as one register, for many of these side by side."""
+        (primal, linear), known = self._derivative.split, len(self._derivative.split.primal.outputs)
+        inputs = [*primal.inputs, *linear.inputs[known:]]
+        outputs = applied(linear, [*applied(primal, primal.inputs), *linear.inputs[known:]])
+        whole = Graph(inputs, {f"{k}": node for k, node in enumerate(outputs)})
+        registers = {"x": len(whole.inputs), "y": len(whole.outputs)}
+        return self._how[0](Program(registers, [Call(whole, ("x",), ("y",))], ["y"]))
+
+    def many(self, points: Array, directions: Array, results: Array, threads: int) -> None:
+        """The results, (N, k, results), of N points, each along k directions of its own, (N, k, entries)."""
+        count = directions.shape[1]
+        size = max(1, MOST // (count * self._beside.program.registers["x"]))
+        for start in range(0, len(points), size):
+            here = slice(start, start + size)
+            along, found = (
+                directions[here].reshape(-1, directions.shape[2]),
+                results[here].reshape(-1, results.shape[2]),
+            )
+            rows = np.concatenate([np.repeat(points[here], count, axis=0), along], axis=1)
+            write_batch(*self._beside._columns("x"), rows.T, found.T, threads)
+        if self._derivative.guarded is not None:
+            mend(results, lambda at, found: self._guarded.many(points[at], directions[at], found, threads))
 
     def _block(self, x: Array, directions: Array, result: Array) -> None:
         try:
@@ -77,7 +110,7 @@ class DirectionProducts:
         found = b"" if buffers.check is None else buffers.check[: 8 * count].tobytes()
         self._free.append(buffers)
         if found.count(0) < len(found):  # zeros, but NaN where a result is infinite or NaN
-            self._in_guard(x, directions, result)
+            self._guarded(x, directions, result)
 
     def _buffers(self) -> _Buffers:
         x, y = np.empty(self._runner.program.registers["x"]), aligned(math.prod(self._results))
@@ -86,8 +119,7 @@ class DirectionProducts:
         found = None if check is None else check.data.cast("B")
         return _Buffers(x.data, s, y.reshape(self._results), registers["tiles0"].data, found, run)
 
-    def _in_guard(self, x: Array, directions: Array, result: Array) -> None:
-        """By the split in which zeros win, made at its first use."""
-        if self._careful is None:
-            self._careful = DirectionProducts(self._derivative.careful, *self._how)
-        self._careful(x, directions, result)
+    @cached_property
+    def _guarded(self) -> DirectionProducts:
+        """Products by the split in which zeros win, made at its first use."""
+        return DirectionProducts(self._derivative.careful, *self._how)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -21,13 +22,14 @@ _BATCH = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p, *[ctypes.c_int
 class BatchCode:
     """The function of batches of a module; any number of threads may call it at once.
 
-    size: of the memory that a call needs.  columns: whether it takes points in columns, too, and not rows alone.
+    size: of the memory that a call needs, which holds zeros at first and, from numbers of vectors on, those of `start`.
+    columns: whether it takes points in columns, too, and not rows alone.
     """
 
-    def __init__(self, code: Code, lanes: int, size: int, *, columns: bool = True) -> None:
+    def __init__(self, code: Code, lanes: int, size: int, start: Mapping[int, Array], *, columns: bool = True) -> None:
         self._rows = code.function("rows", _BATCH)
         self._columns = code.function("batch", _BATCH) if columns else None
-        self._lanes, self._size = lanes, size
+        self._lanes, self._size, self._start = lanes, size, start
         self._free: list[Array] = []  # memories
 
     def __call__(self, points: Array, result: Array) -> None:
@@ -60,6 +62,9 @@ class BatchCode:
             memory = self._free.pop()
         except IndexError:
             memory = aligned(self._size)
+            memory[:] = 0.0
+            for at, numbers in self._start.items():
+                memory[at * self._lanes : (at + len(numbers)) * self._lanes] = np.repeat(numbers, self._lanes)
         entry = self._rows if axis else self._columns
         strides = points.strides[axis] // points.itemsize, result.strides[axis] // result.itemsize
         entry(points.ctypes.data, result.ctypes.data, count, *strides, memory.ctypes.data)  # type: ignore[misc]

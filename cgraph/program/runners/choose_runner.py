@@ -16,30 +16,10 @@ BACKENDS = ("auto", "python", "llvm")
 def runner(program: Program, backend: str = "auto", *, fast: bool = False, fma: bool = True) -> Runner:
     """A program made ready to run.
 
-    Parameters
-    ----------
-    program : Program
-        What to run.
-    backend : {"auto", "llvm", "python"}
-        "llvm" is machine code (extra `native`), "python" Python over lists; "auto" takes machine code where llvmlite is
-        installed.
-    fast, fma : bool
-        Liberties with rounding, as in `cg.compile`.
+    backend: "llvm" is machine code (extra `native`), "python" Python over lists; "auto" takes machine code where
+    llvmlite is installed.  fast, fma: liberties with rounding, as in `cg.compile`.
+    Raises ValueError for an unknown backend, ImportError for "llvm" without llvmlite.
 
-    Returns
-    -------
-    Runner
-        Its `memory` holds the registers, its `run` the passes.
-
-    Raises
-    ------
-    ValueError
-        If the backend is unknown.
-    ImportError
-        If the backend is "llvm" and llvmlite is not installed.
-
-    Examples
-    --------
     >>> import cgraph as cg
     >>> from cgraph.extend import Call, Program, runner
     >>> x = cg.variable("x")

@@ -29,7 +29,7 @@ def require_texts(program: Program) -> None:
 
 
 def offsets(registers: Mapping[str, int], width: int) -> dict[str, int]:
-    """Where each register begins in the memory, and, under "", the size of it all.
+    """Place of each register in the memory, and, under "", the size of it all.
 
     A register of more than one number is padded to a multiple of `width`, so that whole vectors can be read and
     written.

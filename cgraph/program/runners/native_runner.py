@@ -6,6 +6,7 @@ import ctypes
 import threading
 from collections.abc import Callable, Mapping
 from functools import cached_property, partial
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -36,7 +37,7 @@ _FAST = "reassoc nsz arcp contract afn"  # all but the promise that there is no 
 
 
 def flags_of(fast: bool, fma: bool) -> str:
-    """What the arithmetic may do, in LLVM's words."""
+    """Liberties of the arithmetic, in LLVM's words."""
     return _FAST if fast else "contract" if fma else ""
 
 
@@ -51,9 +52,12 @@ class PointCode(NamedTuple):
 class NativeRunner(Runner):
     """A program as machine code. Any number of threads may run it at once, on a memory each."""
 
+    takes_rows, tiles = True, 16
+
     def __init__(self, program: Program, flags: str, cache: Cache | None = None) -> None:
         host = llvm.host()
         super().__init__(program, host.lanes)
+        self.lanes = host.lanes
         require_texts(program)
         self._flags, self._host, self._cache = flags, host, cache
         self._fused = fused(program)
@@ -61,8 +65,7 @@ class NativeRunner(Runner):
         self._functions = program_functions(self._fused)
         host.require(self._functions)
         self._lock = threading.Lock()
-        self._one: Any = None  # what runs one memory, and a vector of them
-        self._many: Any = None
+        self._codes: dict[int, Any] = {}  # {lanes: what runs so many memories}
         self._points: dict[tuple[str, str], PointCode] = {}  # by the registers that lie apart
         self._batches: dict[str, tuple[int, BatchCode]] = {}  # by the register that varies
 
@@ -76,26 +79,21 @@ class NativeRunner(Runner):
 
     @property
     def _entry(self) -> Any:
-        """What runs one memory, made at its first use."""
-        with self._lock:
-            if self._one is None:
-                text = program_ir(self._fused, self._flags, width=self.width, registers=self._host.registers)
-                self._one = self._compiled(text).function("run", _RUN)
-        return self._one
+        """Machine code that runs one memory, made at its first use."""
+        return self._code(self._fused, 1)
 
     @cached_property
     def _fused_many(self) -> Program:
         """The program of a vector of memories."""
         return self._fused if self.masked is self.program else fused(self.masked)
 
-    @property
-    def _entry_of_lanes(self) -> Any:
-        """What runs a vector of memories, made at its first use."""
+    def _code(self, program: Program, lanes: int) -> Any:
+        """Machine code that runs so many memories, made at its first use."""
         with self._lock:
-            if self._many is None:
-                text = program_ir(self._fused_many, self._flags, self._host.lanes, self.width, self._host.registers)
-                self._many = self._compiled(text).function("run", _RUN)
-        return self._many
+            if lanes not in self._codes:
+                text = program_ir(program, self._flags, lanes, self.width, self._host.registers)
+                self._codes[lanes] = self._compiled(text).function("run", _RUN)
+        return self._codes[lanes]
 
     def _run(self, memory: Array, passes: int, every: int, feed: Array) -> Record:
         rows = np.empty((passes // every, self.program.width))
@@ -123,7 +121,7 @@ class NativeRunner(Runner):
         return bound_call(code.entry, x[1], y[1], memory), registers
 
     def point(self, x: str, y: str) -> PointCode:
-        """What runs one pass of which two registers lie apart, made at its first use."""
+        """Machine code of one pass of which two registers lie apart, made at its first use."""
         with self._lock:
             if (x, y) not in self._points:
                 how = self._flags, self.width, self._host.registers
@@ -133,24 +131,35 @@ class NativeRunner(Runner):
                 self._points[x, y] = PointCode(text, entry, places)
             return self._points[x, y]
 
-    def _columns(self, name: str) -> tuple[int, Callable[[Array, Array], None]]:
+    def _columns(
+        self, name: str, start: Mapping[str, Array] = MappingProxyType({})
+    ) -> tuple[int, Callable[[Array, Array], None]]:
         if name not in self._batches:
             with self._lock:
                 if name not in self._batches:
-                    self._batches[name] = self._batch(name)
+                    self._batches[name] = self._batch(name, start)
         return self._batches[name]
 
-    def _batch(self, name: str) -> tuple[int, BatchCode]:
+    def _batch(self, name: str, start: Mapping[str, Array]) -> tuple[int, BatchCode]:
         """The points in a block, and the machine code."""
         from .batch_code import BatchCode
 
-        lanes, text, alone = self._host.lanes, self.batch_text(name), whole_graph(self._fused, name) is not None
+        lanes, text, alone = self._host.lanes, self._batch_module(name), whole_graph(self._fused, name) is not None
         code = self._compiled(text.source, looped=not alone)
         width = max(WORK // max(1, self._nodes) // lanes, 1) * lanes
-        return width, BatchCode(code, lanes, text.size, columns=alone)
+        places = offsets(self._fused_many.registers, 1) if start else {}
+        begin = {places[other]: numbers for other, numbers in start.items()}
+        return width, BatchCode(code, lanes, text.size, begin, columns=alone)
 
-    def batch_text(self, name: str) -> Batch:
-        """The text in LLVM's language of the function for batches of a register."""
+    def _point_text(self, x: str, y: str) -> str:
+        """The text in LLVM's language."""
+        return self.point(x, y).source
+
+    def _batch_text(self, name: str) -> str:
+        """The text in LLVM's language."""
+        return self._batch_module(name).source
+
+    def _batch_module(self, name: str) -> Batch:
         from ...codegen.batch_ir import batch_ir
         from .batch_code import program_rows_ir
 
@@ -162,7 +171,7 @@ class NativeRunner(Runner):
 
     def _run_many(self, memories: Array, passes: int, every: int, feed: Array) -> Record:
         lanes, size = self._host.lanes, self.size
-        entry, total = self._entry_of_lanes, memories.shape[1]
+        entry, total = self._code(self._fused_many, lanes), memories.shape[1]
         rows = np.empty((passes // every, self.program.width, total))
         block = np.zeros(
             (offsets(self._fused_many.registers, self.width)[""], lanes)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -20,21 +21,14 @@ from ..program import Program
 from ..statement import reads_and_writes, row_of
 from .llvm_ir import offsets
 
-BLOCK = 64  # states of a batch in Python that are run between looks at the keyboard
+BLOCK = 512  # states of a batch in Python that are run between looks at the keyboard
 
 
 class Record(NamedTuple):
-    """The result of a run.
+    """The rows of a run, one for each pass that recorded, and how many passes were run.
 
-    Attributes
-    ----------
-    rows : ndarray, shape (rows, width), or (rows, width, N) of N runs at once
-        The recorded registers, a row for each pass that recorded.
-    passes : int
-        How many were run: fewer than asked for where the program stopped.
+    rows: (rows, width), or (rows, width, N) of N runs at once.
 
-    Examples
-    --------
     >>> import cgraph as cg
     >>> from cgraph.extend import Call, Program, runner
     >>> x = cg.variable("x")
@@ -51,7 +45,7 @@ class Record(NamedTuple):
 
 @contextmanager
 def _fitting(rows: int, width: int) -> Iterator[None]:
-    """Within, memory that does not suffice for the rows of a record is told in a sentence."""
+    """Tell in a sentence where memory does not suffice for the rows of a record."""
     try:
         yield
     except MemoryError:
@@ -61,23 +55,17 @@ def _fitting(rows: int, width: int) -> Iterator[None]:
 class Runner(ABC):
     """A program ready to run; made by `runner`.
 
-    Attributes
-    ----------
-    program : Program
-        What it runs.
-    width : int
-        Numbers in a vector of `Map`: registers are padded to a multiple of it.
-    size : int
-        Numbers in a memory.
+    width: numbers in a vector of `Map`, to a multiple of which registers are padded.  size: numbers in a memory.
 
-    Examples
-    --------
     >>> from cgraph.extend import Program, runner
     >>> run = runner(Program({"x": 1}, [], record=["x"]), "python")
-    >>> memory = run.memory({"x": 8.0})
-    >>> run.read(memory, "x").tolist()
+    >>> run.read(run.memory({"x": 8.0}), "x").tolist()
     [8.0]
     """
+
+    lanes, tiles = 8, 512  # directions in a tile, and tiles in a block of them
+    vector_cost = 1  # of an operation on a vector of directions, in operations on numbers
+    takes_rows = False  # whether batches of points that lie one after another are read and written as they lie
 
     def __init__(self, program: Program, width: int = 1) -> None:
         self.program, self.width = program, width
@@ -96,40 +84,14 @@ class Runner(ABC):
         return self._masked
 
     def prepared(self) -> Runner:
-        """This runner, with all made that `run` needs, so that its first run takes no longer than the next.
-
-        Returns
-        -------
-        Runner
-            Itself.
-
-        Examples
-        --------
-        >>> from cgraph.extend import Program, runner
-        >>> runner(Program({"x": 1}, [], record=["x"]), "python").prepared().size
-        1
-        """
+        """This runner, with all made that `run` needs, so that its first run takes no longer than the next."""
         return self
 
     def memory(self, values: Mapping[str, ArrayLike], count: int | None = None) -> Array:
-        """A memory with these values of registers, 0 elsewhere.
+        """A memory, (size,) or (size, count), with these values of registers, 0 elsewhere.
 
-        Parameters
-        ----------
-        values : mapping of str to array_like
-            {register: a number or an array of its length, or (length, count)}.
-        count : int, optional
-            How many memories, for `run_many`.
-
-        Returns
-        -------
-        ndarray, shape (size,) or (size, count)
-            The memory.
-
-        Raises
-        ------
-        GraphError
-            If a register is unknown or a value has another length.
+        values: {register: a number or an array of its length, or (length, count)}.
+        Raises GraphError for an unknown register or a value of another length.
         """
         memory = np.zeros(self.size if count is None else (self.size, require_whole("count", count)))
         for name, value in require_mapping("values", values, "register: numbers").items():
@@ -156,24 +118,9 @@ class Runner(ABC):
     def run(self, memory: Array, passes: int, every: int = 1, feed: ArrayLike | None = None) -> Record:
         """Run passes, fewer if the program stops, and record a row after each `every`th.
 
-        Parameters
-        ----------
-        memory : ndarray of float64, shape (size,)
-            Changed in place: the next run continues from it.
-        passes, every : int
-            At least 0 and at least 1.
-        feed : array_like, shape (passes, feed_width), optional
-            Of a program with a feed, what its registers are before each pass.
-
-        Returns
-        -------
-        Record
-            The rows, and the number of passes that were run.
-
-        Raises
-        ------
-        GraphError
-            If the memory or the feed has another shape or type, or `passes` or `every` is out of range.
+        memory: float64 (size,), changed in place: the next run continues from it.  feed: (passes, feed_width), of a
+        program with a feed, what its registers are before each pass.
+        Raises GraphError for a memory or a feed of another shape or type, or a number out of range.
         """
         self._check(memory, (self.size,), passes, every)
         fed = self._fed(feed, (passes, self.program.feed_width))
@@ -183,23 +130,10 @@ class Runner(ABC):
     def bind(self, memory: Array, rows: Array) -> Callable[[], None]:
         """A function of nothing: `run` on this memory, len(rows) passes, which writes the rows.
 
-        The arrays are checked here and never again; the function keeps them alive. One thread at a time may call it.
-
-        Parameters
-        ----------
-        memory : ndarray of float64, shape (size,)
-            Changed in place: write registers, such as through `read`, between calls.
-        rows : ndarray of float64, shape (passes, width)
-            A pass that records nothing leaves the last ones as they were.
-
-        Returns
-        -------
-        callable
-
-        Raises
-        ------
-        GraphError
-            If an array has another shape or type, or the program has a feed.
+        The arrays, float64 (size,) and (passes, width), are checked here and never again; the function keeps them
+        alive. Registers may be written between calls, such as through `read`. A pass that records nothing leaves the
+        last rows as they were. One thread at a time may call it.
+        Raises GraphError for an array of another shape or type, or a program with a feed.
         """
         if self.program.feed:
             raise GraphError("a bound run takes no feed: give its registers a place in the memory")
@@ -224,27 +158,11 @@ class Runner(ABC):
         """
 
     def run_many(self, memories: Array, passes: int, every: int = 1, feed: ArrayLike | None = None) -> Record:
-        """As `run`, for N memories at once, in vectors: what `run` does of each, whichever course it takes.
+        """Run N memories (size, N) at once, in vectors: as `run` does each, whichever course it takes.
 
-        Parameters
-        ----------
-        memories : ndarray of float64, shape (size, N)
-            Changed in place.
-        passes, every : int
-            At least 0 and at least 1.
-        feed : array_like, shape (passes, feed_width, N) or (passes, feed_width, 1), optional
-            As for `run`, for each memory or one for all.
-
-        Returns
-        -------
-        Record
-            With rows (rows, width, N).
-
-        Raises
-        ------
-        GraphError
-            If the program has `record_if` or `stop`, by which memories would have other numbers of rows or passes, or
-            statements that run one memory alone; and as for `run`.
+        feed: (passes, feed_width, N), or (passes, feed_width, 1) for all.  The record has rows (rows, width, N).
+        Raises GraphError, besides as `run`, for a program with `record_if` or `stop`, by which memories would have
+        other numbers of rows or passes, or with statements that run one memory alone.
         """
         if not isinstance(memories, np.ndarray) or memories.ndim != 2:
             raise GraphError(f"memories must have shape ({self.size}, N), got {describe(memories)}")
@@ -256,29 +174,12 @@ class Runner(ABC):
             return self._run_many(memories, passes, every, fed)
 
     def batch(self, name: str, values: ArrayLike, threads: int | None = 1, *, out: Array | None = None) -> Array:
-        """What one pass records at each of N values of a register, side by side in vectors.
+        """Record of one pass, (N, width), at each of N values of a register, (N, length), side by side in vectors.
 
-        Parameters
-        ----------
-        name : str
-            The register.
-        values : array_like, shape (N, length)
-            A value a row.
-        threads : int, optional
-            How many may share the work; None: one for each core.
-        out : ndarray of float64, shape (N, width), optional
-            Where they go, sharing no memory with `values`; a new one by default.
-
-        Returns
-        -------
-        ndarray, shape (N, width)
-            A row of the record for each value.
-
-        Raises
-        ------
-        GraphError
-            For another shape; if the program cannot `run_many`, or has a feed; if a pass reads or records a register,
-            other than this one, that it may not have set before.
+        threads: how many may share the work; None: one for each core.  out: where the rows go, sharing no memory with
+        `values`; a new array by default.
+        Raises GraphError for another shape; if the program cannot `run_many`, or has a feed; if a pass reads or records
+        a register, other than this one, that it may not have set before.
         """
         count, rows = thread_count(threads), np.ascontiguousarray(real_array(name, values))
         length = len(self.read(np.empty(self.size), name))
@@ -295,11 +196,18 @@ class Runner(ABC):
         write_batch(*self._columns(name), rows.T, result.T, count)
         return result
 
-    def _columns(self, name: str) -> tuple[int, Callable[[Array, Array], None]]:
-        """What writes records, (width, k), of values of a register, (length, k); and the k worth a thread's start."""
+    def _columns(
+        self, name: str, start: Mapping[str, Array] = MappingProxyType({})
+    ) -> tuple[int, Callable[[Array, Array], None]]:
+        """The k worth a thread's start, and a writer of records, (width, k), of values of a register, (length, k).
+
+        start: what other registers hold before; those that are not there, zeros, unless a pass left others.
+        """
 
         def write(values: Array, records: Array) -> None:
             memories = self.memory({name: values}, values.shape[1])
+            for other, numbers in start.items():
+                self.write(memories, other, np.broadcast_to(numbers[:, None], (len(numbers), values.shape[1])))
             records[...] = self._run_many(memories, 1, 1, np.empty((1, 0, values.shape[1]))).rows[0]
 
         return BLOCK, write
@@ -323,6 +231,18 @@ class Runner(ABC):
             raise GraphError(f"a memory must be contiguous float64 of shape {shape}, got {describe(memory)}")
         require_whole("passes", passes)
         require_whole("every", every, 1)
+
+    def _on_lists(self, name: str) -> Callable[[list[float]], tuple[float, ...]] | None:
+        """The record of one pass, at a list of floats for a register, where that needs no memory."""
+        return None
+
+    @abstractmethod
+    def _point_text(self, x: str, y: str) -> str:
+        """The text of one pass of which two registers lie apart."""
+
+    @abstractmethod
+    def _batch_text(self, name: str) -> str:
+        """The text of the function for batches of a register."""
 
     @abstractmethod
     def _run(self, memory: Array, passes: int, every: int, feed: Array) -> Record: ...

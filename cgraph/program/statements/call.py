@@ -6,7 +6,7 @@ import functools
 import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -32,17 +32,8 @@ State = dict[str, list[float]]
 
 @dataclass(frozen=True)
 class Call(Statement):
-    """outputs = graph(inputs).
+    """outputs = graph(inputs), where registers end to end are the graph's inputs and outputs in order.
 
-    Attributes
-    ----------
-    graph : Graph
-        The function.
-    inputs, outputs : tuple of str
-        Registers which, end to end, are the graph's inputs and outputs in order.
-
-    Examples
-    --------
     >>> import cgraph as cg
     >>> from cgraph.extend import Call
     >>> a, b = cg.variables("a b")
@@ -58,18 +49,10 @@ class Call(Statement):
 class Map(Statement):
     """outputs[i] = graph(shared, inputs[i]) for every element i.
 
-    Attributes
-    ----------
-    graph : Graph
-        The function of one element.
-    inputs, outputs : tuple of str
-        A register for each input and each output of the graph, of one common length; an input of length 1 has the same
-        value for every element.
-    shared : tuple of str
-        Registers which, end to end, are the graph's first inputs, before those of `inputs`: the same for every element.
+    inputs, outputs: a register for each input and each output of the graph, of one common length; an input of length 1
+    has the same value for every element.  shared: registers which, end to end, are the graph's first inputs, the same
+    for every element.
 
-    Examples
-    --------
     >>> import cgraph as cg
     >>> from cgraph.extend import Map
     >>> x, h = cg.variables("x h")
@@ -86,19 +69,8 @@ class Map(Statement):
 class Sum(Statement):
     """outputs = sum over i of graph(shared, inputs[i]), from the first element to the last.
 
-    Attributes
-    ----------
-    graph : Graph
-        The function of one element.
-    inputs : tuple of str
-        A register for each input of the graph, of one common length or of length 1.
-    outputs : str or tuple of str
-        Registers which, end to end, are the sums of the graph's outputs.
-    shared : tuple of str
-        As of `Map`.
+    inputs, shared: as of `Map`.  outputs: registers which, end to end, are the sums of the graph's outputs.
 
-    Examples
-    --------
     >>> import cgraph as cg
     >>> from cgraph.extend import Sum
     >>> x = cg.variable("x")
@@ -135,6 +107,11 @@ def copied(source: str, target: str) -> Map:
 def zeroed(register: str) -> Map:
     """register = 0."""
     return Map(_ZERO, (register,), (register,))
+
+
+def copied_or_zero(source: str | None, target: str) -> Map:
+    """target = source, or 0 where there is none."""
+    return zeroed(target) if source is None else copied(source, target)
 
 
 def added(total: str, term: str, result: str) -> Map:
@@ -198,23 +175,23 @@ def check_elements(statement: Map | Sum, lengths: Lengths) -> None:
 
 
 def run_call(call: Call, state: State, execution: Execution) -> None:
-    """In Python."""
-    _split(execution.values(call.graph, _joined(state, call.inputs)), call.outputs, state)
+    """Run in Python."""
+    spread(list(execution.values(call.graph, _joined(state, call.inputs))), call.outputs, state)
 
 
 def run_map(statement: Map, state: State, execution: Execution) -> None:
-    """In Python, element by element."""
+    """Run in Python, element by element."""
     columns = _rows(statement, state, execution)
     for slot, name in enumerate(statement.outputs):
         state[name] = [values[slot] for values in columns]
 
 
 def run_sum(statement: Sum, state: State, execution: Execution) -> None:
-    """In Python, added up in order."""
+    """Run in Python, added up in order."""
     rows = _rows(statement, state, execution)
     columns = zip(*rows, strict=True) if rows else [()] * len(statement.graph.outputs)
     totals = [functools.reduce(operator.add, terms, 0.0) for terms in columns]  # sum() compensates
-    _split(totals, statement.outputs, state)
+    spread(totals, statement.outputs, state)
 
 
 def _rows(statement: Map | Sum, state: State, execution: Execution) -> list[Sequence[float]]:
@@ -233,23 +210,23 @@ def _joined(state: Mapping[str, list[float]], names: Sequence[str]) -> list[floa
     return state[names[0]] if len(names) == 1 else [value for name in names for value in state[name]]
 
 
-def _split(values: Sequence[float], names: Sequence[str], state: State) -> None:
-    """Into the registers, end to end."""
+def spread(values: Any, names: Sequence[str], state: dict[str, Any]) -> None:
+    """Put numbers, a list or rows of an array, end to end into registers."""
     at = 0
     for name in names:
         length = len(state[name])
-        state[name] = list(values[at : at + length])
+        state[name] = values[at : at + length]
         at += length
 
 
 def call_beside(call: Call, state: dict[str, Array], execution: Execution) -> None:
-    """Of many memories: a batch."""
+    """Run many memories: a batch."""
     points = np.concatenate([state[name] for name in call.inputs]) if call.inputs else np.empty((0, execution.many))
-    _split_rows(execution.batch(call.graph, points), call.outputs, state)
+    spread(execution.batch(call.graph, points), call.outputs, state)
 
 
 def elements_beside(statement: Map | Sum, state: dict[str, Array], execution: Execution) -> None:
-    """Of many memories: all elements as one batch."""
+    """Run many memories: all elements as one batch."""
     # All elements of all N states are points of one batch: (inputs, elements * N) -> (outputs, elements, N).
     shape = (elements(statement, execution.lengths), execution.many)
     rows = [row for name in statement.shared for row in state[name]]
@@ -260,28 +237,20 @@ def elements_beside(statement: Map | Sum, state: dict[str, Array], execution: Ex
         state.update(zip(statement.outputs, results, strict=True))
         return
     totals = np.add.accumulate(results, axis=1)[:, -1] if shape[0] else np.zeros((len(results), shape[1]))
-    _split_rows(totals, statement.outputs, state)
-
-
-def _split_rows(rows: Array, names: Sequence[str], state: dict[str, Array]) -> None:
-    at = 0
-    for name in names:
-        length = len(state[name])
-        state[name] = rows[at : at + length]
-        at += length
+    spread(totals, statement.outputs, state)
 
 
 # as machine code
 
 
 def call_text(call: Call, writer: Writer) -> None:
-    """As machine code."""
+    """Write as machine code."""
     name = writer.functions.call(call.graph, writer.lengths(call.inputs), writer.lengths(call.outputs))
     writer.calls(name, call.inputs, call.outputs)
 
 
 def map_text(statement: Map, writer: Writer) -> None:
-    """As machine code, in vectors of elements."""
+    """Write as machine code, in vectors of elements."""
     if count := elements(statement, writer.registers):
         shared = writer.lengths(statement.shared)
         name = writer.functions.map(statement.graph, writer.lengths(statement.inputs), count, shared)
@@ -289,7 +258,7 @@ def map_text(statement: Map, writer: Writer) -> None:
 
 
 def sum_text(statement: Sum, writer: Writer) -> None:
-    """As machine code, added up in order."""
+    """Write as machine code, added up in order."""
     count, of = elements(statement, writer.registers), writer.lengths
     name = writer.functions.sum(
         statement.graph, of(statement.inputs), count, of(statement.shared), of(statement.outputs)

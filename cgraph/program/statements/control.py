@@ -3,32 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from ...core.evaluation import Array
 from ..statement import Execution, Lengths, Statement, require_length
 
 if TYPE_CHECKING:
     from ..writer import Writer
 
-State = dict[str, list[float]]
-
 
 @dataclass(frozen=True)
 class While(Statement):
-    """while (register > 0) body.
+    """while (register > 0) body; the register has length 1, and NaN is not positive.
 
-    Attributes
-    ----------
-    register : str
-        A register of length 1; NaN is not positive.
-    body : tuple of Statement
-        What is repeated.
-
-    Examples
-    --------
     >>> import cgraph as cg
     >>> from cgraph.extend import Call, While
     >>> n = cg.variable("n")
@@ -41,17 +27,8 @@ class While(Statement):
 
 @dataclass(frozen=True)
 class If(Statement):
-    """if (register > 0) body else otherwise.
+    """if (register > 0) body else otherwise; the register has length 1, and NaN is not positive.
 
-    Attributes
-    ----------
-    register : str
-        A register of length 1; NaN is not positive.
-    body, otherwise : tuple of Statement
-        What is run in either case.
-
-    Examples
-    --------
     >>> import cgraph as cg
     >>> from cgraph.extend import Call, If
     >>> n = cg.variable("n")
@@ -68,17 +45,9 @@ class FixedPoint(Statement):
     """while (register > 0) body, which ends at v = body(v, e), v the registers that a turn hands on to the next.
 
     It runs as `While` does. Its derivative is that of v in terms of e, v' = (dT/dv) v' + (dT/de) e', which is solved by
-    the same iteration, and knows nothing of how many turns v took, nor from where.
+    the same iteration, and knows nothing of how many turns v took, nor from where. A turn has no `If`, `While`,
+    `Factor`.
 
-    Attributes
-    ----------
-    register : str
-        A register of length 1; NaN is not positive.
-    body : tuple of Statement
-        A turn, without `If`, `While` and `Factor`.
-
-    Examples
-    --------
     >>> import cgraph as cg
     >>> from cgraph.extend import Call, FixedPoint
     >>> v, turns = cg.variables("v turns")
@@ -95,32 +64,20 @@ def check_control(statement: While | If | FixedPoint, lengths: Lengths) -> None:
     require_length(lengths, type(statement).__name__, statement.register, 1)
 
 
-def run_while(statement: While | FixedPoint, state: State, execution: Execution) -> None:
-    """In Python."""
-    while state[statement.register][0] > 0.0:
+def run_while(statement: While | FixedPoint, state: dict[str, Any], execution: Execution) -> None:
+    """Run in Python; of many memories, as long as the register is positive in any."""
+    while execution.positive(state[statement.register]):
         execution.run(statement.body, state)
 
 
-def run_if(statement: If, state: State, execution: Execution) -> None:
-    """In Python."""
-    positive = state[statement.register][0] > 0.0
-    execution.run(statement.body if positive else statement.otherwise, state)
-
-
-def while_beside(statement: While | FixedPoint, state: dict[str, Array], execution: Execution) -> None:
-    """Of many memories: as long as it is positive in any."""
-    while np.any(state[statement.register] > 0.0):
-        execution.run(statement.body, state)
-
-
-def if_beside(statement: If, state: dict[str, Array], execution: Execution) -> None:
-    """Of many memories: the body if it is positive in any."""
-    positive = np.any(state[statement.register] > 0.0)
+def run_if(statement: If, state: dict[str, Any], execution: Execution) -> None:
+    """Run in Python; of many memories, the body if the register is positive in any."""
+    positive = execution.positive(state[statement.register])
     execution.run(statement.body if positive else statement.otherwise, state)
 
 
 def while_text(statement: While | FixedPoint, writer: Writer) -> None:
-    """As machine code."""
+    """Write as machine code."""
     label = writer.label("while")
     writer.jump(label)
     writer.block(label)
@@ -132,7 +89,7 @@ def while_text(statement: While | FixedPoint, writer: Writer) -> None:
 
 
 def if_text(statement: If, writer: Writer) -> None:
-    """As machine code."""
+    """Write as machine code."""
     label = writer.label("if")
     writer.branch(statement.register, f"{label}.yes", f"{label}.no")
     for way, body in (("yes", statement.body), ("no", statement.otherwise)):

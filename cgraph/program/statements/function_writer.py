@@ -51,7 +51,7 @@ class FunctionWriter:
         return self.at("%a", self.index(row, column))
 
     def absolute(self, number: str) -> str:
-        """Its absolute value."""
+        """Absolute value of a number."""
         return self.value(f"call {self.type} @llvm.fabs.{self._suffix}({self.type} {number})")
 
     def everywhere(self, integer: str) -> str:

@@ -20,24 +20,13 @@ from .function_writer import FunctionWriter
 if TYPE_CHECKING:
     from ..writer import Writer
 
-State = dict[str, list[float]]
-
 
 @dataclass(frozen=True)
 class Factor(Statement):
-    """LU = PA in place of a matrix A, with partial pivoting.
+    """LU = PA in place of a matrix A (n * n), row by row, with partial pivoting; pivots (n) receives the row exchanges.
 
     Of a singular matrix a pivot is 0, and `Solve` then gives infinities or NaN.
 
-    Attributes
-    ----------
-    matrix : str
-        A register of length n * n: A, row by row.
-    pivots : str
-        A register of length n, which receives the row exchanges.
-
-    Examples
-    --------
     >>> from cgraph.extend import Factor, Program, Solve
     >>> program = Program({"A": 4, "p": 2, "b": 2}, [Factor("A", "p"), Solve("A", "p", "b")], record=["b"])
     """
@@ -48,19 +37,8 @@ class Factor(Statement):
 
 @dataclass(frozen=True)
 class Solve(Statement):
-    """The solution of A x = b in place of b, or of A^T x = b.
+    """The solution of A x = b, or transposed of A^T x = b, in place of b, the vector; A and its pivots after `Factor`.
 
-    Attributes
-    ----------
-    matrix, pivots : str
-        The registers of A and its row exchanges, after `Factor`.
-    vector : str
-        A register of length n: b, then x.
-    transposed : bool
-        Whether the equations are those of A^T.
-
-    Examples
-    --------
     >>> from cgraph.extend import Program, Solve, runner
     >>> solve = runner(Program({"LU": 1, "p": 1, "b": 1}, [Solve("LU", "p", "b")], record=["b"]))
     >>> solve.run(solve.memory({"LU": 2.0, "p": 0.0, "b": 6.0}), passes=1).rows.tolist()
@@ -82,37 +60,20 @@ def check_matrix(statement: Factor | Solve, lengths: Lengths) -> None:
         require_length(lengths, where, statement.vector, n)
 
 
-def run_factor(statement: Factor, state: State, _: Execution) -> None:
-    """In Python."""
-    n = len(state[statement.pivots])
-    a, p = np.array(state[statement.matrix]).reshape(n, n), np.empty(n)
-    _factor(a, p)
-    state[statement.matrix], state[statement.pivots] = a.ravel().tolist(), p.tolist()
+def run_factor(statement: Factor, state: dict[str, Any], execution: Execution) -> None:
+    """Run in Python, of one memory or of many."""
+    a, n = np.array(state[statement.matrix]), len(state[statement.pivots])
+    pivots = np.empty((n, *a.shape[1:]))
+    _factor(a.reshape(n, n, *a.shape[1:]), pivots)
+    execution.write(state, statement.matrix, a)
+    execution.write(state, statement.pivots, pivots)
 
 
-def run_solve(statement: Solve, state: State, _: Execution) -> None:
-    """In Python."""
-    n = len(state[statement.pivots])
-    a, p, b = np.array(state[statement.matrix]), np.array(state[statement.pivots]), np.array(state[statement.vector])
-    _solver(statement)(a.reshape(n, n), p, b)
-    state[statement.vector] = b.tolist()
-
-
-def factor_beside(statement: Factor, state: dict[str, Array], _: Execution) -> None:
-    """Of many memories, each with pivots of its own."""
-    pivots = np.empty_like(state[statement.pivots])
-    n, count = pivots.shape
-    a = np.array(state[statement.matrix])
-    _factor(a.reshape(n, n, count), pivots)
-    state[statement.matrix], state[statement.pivots] = a, pivots
-
-
-def solve_beside(statement: Solve, state: dict[str, Array], _: Execution) -> None:
-    """Of many memories."""
-    pivots, b = state[statement.pivots], np.array(state[statement.vector])
-    n, count = b.shape
-    _solver(statement)(state[statement.matrix].reshape(n, n, count), pivots, b)
-    state[statement.vector] = b
+def run_solve(statement: Solve, state: dict[str, Any], execution: Execution) -> None:
+    """Run in Python, of one memory or of many."""
+    a, pivots, b = [np.array(state[name]) for name in (statement.matrix, statement.pivots, statement.vector)]
+    _solver(statement)(a.reshape(len(b), *b.shape), pivots, b)
+    execution.write(state, statement.vector, b)
 
 
 def _solver(statement: Solve) -> Callable[[Array, Array, Array], None]:
@@ -120,14 +81,14 @@ def _solver(statement: Solve) -> Callable[[Array, Array, Array], None]:
 
 
 def factor_text(statement: Factor, writer: Writer) -> None:
-    """As machine code."""
+    """Write as machine code."""
     n = writer.registers[statement.pivots]
     name = writer.functions.text("lu.factor", _lu_factor_text)
     writer.line(f"call void @{name}({writer.arguments(statement.matrix, statement.pivots)}, i64 {n})")
 
 
 def solve_text(statement: Solve, writer: Writer) -> None:
-    """As machine code."""
+    """Write as machine code."""
     n = writer.registers[statement.pivots]
     name, text = "lu.solve", _lu_solve_text
     if statement.transposed:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...codegen.arithmetic import Arithmetic
+from ...codegen.arithmetic import Arithmetic, words_of
 from ...core.checks import GraphError
 from ...core.evaluation import Array
 from ..statement import (
@@ -26,22 +27,11 @@ from .function_writer import FunctionWriter
 if TYPE_CHECKING:
     from ..writer import Writer
 
-State = dict[str, list[float]]
-
 
 @dataclass(frozen=True)
 class Take(Statement):
     """target[i] = source[table[i]].
 
-    Attributes
-    ----------
-    source, target : str
-        Registers.
-    table : tuple of int
-        For each number of the target its place in the source.
-
-    Examples
-    --------
     >>> from cgraph.extend import Program, Take, runner
     >>> run = runner(Program({"a": 3, "b": 2}, [Take("a", "b", (2, 0))], record=["b"]))
     >>> run.run(run.memory({"a": [5.0, 6.0, 7.0]}), passes=1).rows.tolist()
@@ -55,19 +45,10 @@ class Take(Statement):
 
 @dataclass(frozen=True)
 class Push(Statement):
-    """Numbers of registers, end to end, as one more row of a stack; a full one gets none, and its count is NaN.
+    """Numbers of registers `rows`, end to end, as one more row of a stack; a full one gets none, and its count is NaN.
 
-    Attributes
-    ----------
-    stack : str
-        A register whose length is a multiple of that of a row.
-    count : str
-        A register of length 1: how many rows there are.
-    rows : tuple of str
-        The registers.
+    stack: a register whose length is a multiple of that of a row.  count: one of length 1, how many rows there are.
 
-    Examples
-    --------
     >>> from cgraph.extend import Program, Push, runner
     >>> run = runner(Program({"x": 1, "stack": 2, "count": 1}, [Push("stack", "count", ("x",))], record=["count"]))
     >>> run.run(run.memory({"x": 8.0}), passes=3).rows.ravel().tolist()
@@ -81,17 +62,9 @@ class Push(Statement):
 
 @dataclass(frozen=True)
 class Pop(Statement):
-    """The last row of a stack, taken off it into registers; NaN, and the count NaN, of one that has none.
+    """The last row of a stack, taken off it into registers; NaN, and the count NaN, of one that has none. Fields: see
+    `Push`.
 
-    Attributes
-    ----------
-    stack, count : str
-        As of `Push`.
-    rows : tuple of str
-        The registers.
-
-    Examples
-    --------
     >>> from cgraph.extend import Pop, Program, runner
     >>> run = runner(Program({"x": 1, "stack": 2, "count": 1}, [Pop("stack", "count", ("x",))], record=["x"]))
     >>> run.run(run.memory({"stack": [4.0, 5.0], "count": 2.0}), passes=3).rows.ravel().tolist()
@@ -123,166 +96,79 @@ def check_stack(statement: Push | Pop, lengths: Lengths) -> None:
         require_once(where, statement.rows)
 
 
-def run_take(take: Take, state: State, _: Execution) -> None:
-    """In Python."""
-    source = state[take.source]
-    state[take.target] = [source[place] for place in take.table]
+def run_take(take: Take, state: dict[str, Any], execution: Execution) -> None:
+    """Run in Python, of one memory or of many."""
+    execution.write(state, take.target, np.asarray(state[take.source], dtype=np.float64)[list(take.table)])
 
 
-def take_beside(take: Take, state: dict[str, Array], _: Execution) -> None:
-    """Of many memories."""
-    state[take.target] = state[take.source][list(take.table)]
-
-
-def run_push(push: Push, state: State, _: Execution) -> None:
-    """In Python."""
-    row = [value for name in push.rows for value in state[name]]
-    stack, count = state[push.stack], state[push.count][0]
-    if count * len(row) < len(stack) or (not row and count >= 0.0):
-        at = int(count) * len(row)
-        state[push.stack] = [*stack[:at], *row, *stack[at + len(row) :]]
-        state[push.count] = [count + 1.0]
-    else:
-        state[push.count] = [math.nan]
-
-
-def run_pop(pop: Pop, state: State, _: Execution) -> None:
-    """In Python."""
-    width, count = sum([len(state[name]) for name in pop.rows]), state[pop.count][0]
-    row, after = [math.nan] * width, math.nan
-    if count > 0.0:
-        at, after = (int(count) - 1) * width, count - 1.0
-        row = state[pop.stack][at : at + width]
-    state[pop.count] = [after]
-    for name in pop.rows:
-        length = len(state[name])
-        state[name], row = row[:length], row[length:]
-
-
-def push_beside(push: Push, state: dict[str, Array], _: Execution) -> None:
-    """Of many memories, each with a count of its own."""
-    row = _row(state, push.rows)
-    stack, count = state[push.stack].copy(), state[push.count][0]
-    width, most = len(row), len(stack) // len(row) if len(row) else math.inf
-    fits = (count >= 0.0) & (count < most)
+def run_push(push: Push, state: dict[str, Any], execution: Execution) -> None:
+    """Run in Python, of one memory or of many, each with a count of its own."""
+    stack, row = np.array(state[push.stack]), _row(state, push)
+    count, number = np.asarray(state[push.count]), np.asarray(state[push.count]).ravel()
+    fits = (number >= 0.0) & (number < _most(push, execution.lengths))
     lanes = np.flatnonzero(fits)
-    stack[_places(count[lanes], width), lanes] = row[:, lanes]
-    state[push.stack], state[push.count] = stack, np.where(fits, count + 1.0, math.nan)[None]
+    stack.reshape(len(stack), number.size)[_places(number[lanes], len(row)), lanes] = row[:, lanes]
+    execution.write(state, push.stack, stack)
+    execution.write(state, push.count, np.where(fits, number + 1.0, math.nan).reshape(count.shape))
 
 
-def pop_beside(pop: Pop, state: dict[str, Array], _: Execution) -> None:
-    """Of many memories."""
-    row = np.full_like(_row(state, pop.rows), math.nan)
-    stack, count = state[pop.stack], state[pop.count][0]
-    width, most = len(row), len(stack) // len(row) if len(row) else math.inf
-    some = (count > 0.0) & (count <= most)
+def run_pop(pop: Pop, state: dict[str, Any], execution: Execution) -> None:
+    """Run in Python, of one memory or of many."""
+    stack, row = np.asarray(state[pop.stack]), np.full_like(_row(state, pop), math.nan)
+    count, number = np.asarray(state[pop.count]), np.asarray(state[pop.count]).ravel()
+    some = (number > 0.0) & (number <= _most(pop, execution.lengths))
     lanes = np.flatnonzero(some)
-    row[:, lanes] = stack[_places(count[lanes] - 1.0, width), lanes]
-    state[pop.count] = np.where(some, count - 1.0, math.nan)[None]
+    row[:, lanes] = stack.reshape(len(stack), number.size)[_places(number[lanes] - 1.0, len(row)), lanes]
+    execution.write(state, pop.count, np.where(some, number - 1.0, math.nan).reshape(count.shape))
     at = 0
     for name in pop.rows:
-        length = len(state[name])
-        state[name] = row[at : at + length]
+        length = execution.lengths[name]
+        execution.write(state, name, row[at : at + length].reshape(length, *count.shape[1:]))
         at += length
 
 
-def _row(state: dict[str, Array], names: Names) -> Array:
-    none = next(iter(state.values()))[:0]
-    return np.concatenate([none, *[state[name] for name in names]])
+def _row(state: dict[str, Any], statement: Push | Pop) -> Array:
+    """The numbers of the registers, end to end, (width, memories)."""
+    count = np.asarray(state[statement.count])
+    parts = [np.asarray(state[name], dtype=np.float64).reshape(-1, count.size) for name in statement.rows]
+    return np.concatenate([np.empty((0, count.size)), *parts])
+
+
+def _most(statement: Push | Pop, lengths: Lengths) -> float:
+    """The rows that the stack has room for."""
+    width = sum([lengths[name] for name in statement.rows])
+    return float(lengths[statement.stack] // width) if width else math.inf
 
 
 def _places(number: Array, width: int) -> NDArray[np.int_]:
-    """Where the rows of these numbers lie in a stack, (width, N)."""
+    """Places of the rows of these numbers in a stack, (width, N)."""
     return number.astype(int) * width + np.arange(width)[:, None]
 
 
 def take_text(take: Take, writer: Writer) -> None:
-    """As machine code."""
+    """Write as machine code."""
     name = writer.functions.take(take.table)
     writer.calls(name, (take.source,), (take.target,))
 
 
 def push_text(push: Push, writer: Writer) -> None:
-    """if (count < most) { stack[count] = row; count += 1 } else count = NaN."""
-    label, at = writer.label("push"), _Places(writer, push.rows)
-    most = writer.registers[push.stack] // at.width if at.width else math.inf
-    if writer.functions.arithmetic.lanes > 1:
-        _push_lanes(push, writer, float(most))
-        return
-    count = writer.load(push.count)
-    fits = writer.value(f"fcmp olt double {count}, {writer.number(float(most))}")
-    writer.branch_on(fits, f"{label}.fits", f"{label}.full")
-    writer.block(f"{label}.fits")
-    for pointer, name in at.row(push.stack, count):
-        writer.copy(pointer, writer.pointer(name), writer.registers[name])
-    writer.store(writer.value(f"fadd double {count}, 1.0"), push.count)
-    writer.jump(f"{label}.end")
-    writer.block(f"{label}.full")
-    writer.store(writer.number(math.nan), push.count)
-    writer.jump(f"{label}.end")
-    writer.block(f"{label}.end")
-
-
-def pop_text(pop: Pop, writer: Writer) -> None:
-    """if (count > 0) { count -= 1; row = stack[count] } else row = count = NaN."""
-    label, at = writer.label("pop"), _Places(writer, pop.rows)
-    if writer.functions.arithmetic.lanes > 1:
-        _pop_lanes(pop, writer, at.width)
-        return
-    count = writer.load(pop.count)
-    writer.branch(pop.count, f"{label}.some", f"{label}.none")
-    writer.block(f"{label}.some")
-    left = writer.value(f"fsub double {count}, 1.0")
-    for pointer, name in at.row(pop.stack, left):
-        writer.copy(writer.pointer(name), pointer, writer.registers[name])
-    writer.store(left, pop.count)
-    writer.jump(f"{label}.end")
-    writer.block(f"{label}.none")
-    for name in (pop.count, *pop.rows):
-        writer.fill_with_nan(name)
-    writer.jump(f"{label}.end")
-    writer.block(f"{label}.end")
-
-
-class _Places:
-    """Where the registers of a row lie in a stack."""
-
-    def __init__(self, writer: Writer, names: Names) -> None:
-        self._writer, self._names = writer, names
-        self.width = sum(writer.lengths(names))
-
-    def row(self, stack: str, number: str) -> list[tuple[str, str]]:
-        """(address, register) of the parts of the row of that number, a double."""
-        writer, places = self._writer, []
-        start = writer.value(f"mul i64 {writer.value(f'fptosi double {number} to i64')}, {self.width}")
-        for name in self._names:
-            places.append((writer.value(f"getelementptr double, ptr {writer.pointer(stack)}, i64 {start}"), name))
-            start = writer.value(f"add i64 {start}, {writer.registers[name]}")
-        return places
-
-
-# of lanes: every one has a row of its own
-
-
-def _push_lanes(push: Push, writer: Writer, most: float) -> None:
-    """As `push_text`, in every lane."""
+    """if (0 <= count < most) { stack[count] = row; count += 1 } else count = NaN, in every lane."""
     lanes, count = _Lanes(writer), writer.load(push.count)
-    fits = lanes.both(("oge", count, 0.0), ("olt", count, most))
+    fits = lanes.both(("oge", count, 0.0), ("olt", count, _most(push, writer.registers)))
     begin = lanes.begin(fits, count, sum(writer.lengths(push.rows)))
-    lanes.move(writer.functions.text("stack.put", _put_text), push.stack, begin, push.rows)
+    lanes.move("stack.put", push.stack, begin, push.rows)
     lanes.count(push.count, fits, writer.value(f"fadd {writer.type} {count}, {writer.number(1.0)}"))
 
 
-def _pop_lanes(pop: Pop, writer: Writer, width: int) -> None:
-    """As `pop_text`, in every lane."""
+def pop_text(pop: Pop, writer: Writer) -> None:
+    """if (0 < count <= most) { count -= 1; row = stack[count] } else row = count = NaN, in every lane."""
     lanes, count = _Lanes(writer), writer.load(pop.count)
-    most = writer.registers[pop.stack] // width if width else math.inf
-    some = lanes.both(("ogt", count, 0.0), ("ole", count, float(most)))
+    some = lanes.both(("ogt", count, 0.0), ("ole", count, _most(pop, writer.registers)))
     left = writer.value(f"fsub {writer.type} {count}, {writer.number(1.0)}")
-    begin = lanes.begin(some, left, width)
+    begin = lanes.begin(some, left, sum(writer.lengths(pop.rows)))
     for name in pop.rows:
         writer.fill_with_nan(name)
-    lanes.move(writer.functions.text("stack.get", _get_text), pop.stack, begin, pop.rows)
+    lanes.move("stack.get", pop.stack, begin, pop.rows)
     lanes.count(pop.count, some, left)
 
 
@@ -290,10 +176,10 @@ class _Lanes:
     """Text over lanes, in some of which a condition holds."""
 
     def __init__(self, writer: Writer) -> None:
-        self._writer, self._bits = writer, f"<{writer.functions.arithmetic.lanes} x i1>"
+        self._writer, self._bits = writer, words_of(writer.functions.arithmetic)["b"]
 
     def both(self, *comparisons: tuple[str, str, float]) -> str:
-        """In which lanes two comparisons hold."""
+        """Condition that holds in the lanes where two comparisons do."""
         writer = self._writer
         a, b = [writer.value(f"fcmp {name} {writer.type} {x}, {writer.number(y)}") for name, x, y in comparisons]
         return writer.value(f"and {self._bits} {a}, {b}")
@@ -307,9 +193,10 @@ class _Lanes:
         writer.line(f"store {t} {begin}, ptr {begin}.at, align 8")
         return f"{begin}.at"
 
-    def move(self, function: str, stack: str, begin: str, names: Names) -> None:
-        """Between rows of the stack and registers, end to end."""
+    def move(self, name: str, stack: str, begin: str, names: Names) -> None:
+        """Between rows of the stack and registers, end to end: to the stack, "stack.put", or from it, "stack.get"."""
         writer, at = self._writer, 0
+        function = writer.functions.text(name, partial(_move_text, name=name))
         for register in names:
             length = writer.registers[register]
             pointers = f"ptr {writer.pointer(stack)}, ptr {begin}, ptr {writer.pointer(register)}"
@@ -323,17 +210,8 @@ class _Lanes:
         writer.store(writer.value(f"select {self._bits} {condition}, {t} {after}, {t} {nan}"), register)
 
 
-def _put_text(arithmetic: Arithmetic) -> list[str]:
-    """`void stack.put(stack, begin, row, at, n)`: stack[begin + at + j] = row[j] in lanes where begin >= 0."""
-    return _move_text(arithmetic, "stack.put")
-
-
-def _get_text(arithmetic: Arithmetic) -> list[str]:
-    """`void stack.get(stack, begin, row, at, n)`: row[j] = stack[begin + at + j] in lanes where begin >= 0."""
-    return _move_text(arithmetic, "stack.get")
-
-
 def _move_text(arithmetic: Arithmetic, name: str) -> list[str]:
+    """`void name(stack, begin, row, at, n)`: stack[begin + at + j] = row[j], or back, in lanes where begin >= 0."""
     ir = FunctionWriter(arithmetic)
     with ir.each_lane() as lane:
         begin = ir.load_double(ir.double_at("%begin", "0", lane))

@@ -1,5 +1,6 @@
 """Machine code: every operation to the last bit, batches of any kind, threads, pickles."""
 
+import copy
 import itertools
 import math
 import pickle
@@ -17,6 +18,7 @@ from cgraph.codegen import batch_ir, llvm_engine, parts
 from cgraph.codegen.llvm_ir import scalar_ir
 from cgraph.core.node import apply
 from cgraph.operations.operation import OPS
+from cgraph.program.functions import compile as functions
 from tests.strategies import cases, examples
 from tests.ulps import same, ulps_apart
 
@@ -302,6 +304,19 @@ def test_a_pickle_is_rebuilt_with_its_options(options):
     assert restored.source == function.source
     assert restored.backend == "llvm"
     assert same(restored([0.1, 0.2, 0.3]), function([0.1, 0.2, 0.3]))
+
+
+@pytest.mark.parametrize("backend", ["python", "auto"])
+def test_a_pickle_of_another_version_is_refused_in_a_sentence(backend, monkeypatch):
+    function = cg.compile(chain(), backend)
+    with monkeypatch.context() as patch:
+        patch.setattr(functions, "__version__", "0.0.9")
+        written = pickle.dumps(function)
+    with pytest.raises(
+        ValueError, match=r"a compiled graph was pickled by cgraph 0\.0\.9, and this is cgraph .*: pickle"
+    ):
+        pickle.loads(written)
+    assert same(copy.deepcopy(function)([0.1, 0.2, 0.3]), function([0.1, 0.2, 0.3]))
 
 
 def test_the_source_is_the_text_of_llvm():

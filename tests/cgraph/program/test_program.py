@@ -10,6 +10,7 @@ from hypothesis import given, settings, strategies as st
 
 import cgraph as cg
 from cgraph.extend import Call, Factor, If, Map, Program, Solve, Sum, While, runner
+from cgraph.program.statements.tiles import Scatter, TiledMap
 from tests.strategies import examples
 from tests.tolerances import LONG_SUM
 
@@ -233,6 +234,27 @@ def test_machine_code_agrees_with_python_to_the_last_bit() -> None:
     assert rows[0].tolist() == rows[1].tolist()
 
 
+@pytest.mark.parametrize("asked", [0.0, 1.0, 2.0, 2.5, 99.0, math.nan])
+@pytest.mark.parametrize("wave", [False, True])  # functions of the C library go element by element
+def test_tiles_that_are_not_asked_for_stay_as_they_are(backend: str, asked: float, wave: bool) -> None:
+    k, a, b = cg.variables("k a b")
+    graph = cg.Graph([k, a, b], {"sum": k * (cg.sin(a) if wave else a) + b, "difference": a - b})
+    registers = {"k": 1, "pairs": 12, "sums": 6, "differences": 6, "tiles": 1}
+    tiled = TiledMap(graph, ("pairs",), ("sums", "differences"), ("k",), 2, ("tiles",))
+    ready = runner(Program(registers, [tiled], record=["sums", "differences"]), backend, fma=False)
+    pairs, old = np.arange(12.0), np.full(6, -1.0)
+    memory = ready.memory({"k": 3.0, "pairs": pairs, "sums": old, "differences": old, "tiles": asked})
+    together = np.repeat(memory[:, None], 11, axis=1)
+    ready.write(together, "tiles", np.array([[asked, 1.0, 3.0, 2.0, *[asked] * 7]]))
+    first, second = pairs.reshape(3, 2, 2)[:, 0].ravel(), pairs.reshape(3, 2, 2)[:, 1].ravel()
+    wanted = np.stack([3.0 * (np.array([*map(math.sin, first)]) if wave else first) + second, first - second])
+    many = ready.run_many(together, 1).rows[0]
+    for number, found in ((asked, ready.run(memory, 1).rows[0]), *zip((asked, 1.0, 3.0, 2.0), many.T, strict=False)):
+        computed = 2 * int(min(3.0, max(1.0, number)))
+        expected = np.where(np.arange(6) < computed, wanted, -1.0)
+        assert found.tolist() == expected.ravel().tolist()
+
+
 ONE = cg.Graph([cg.variable("a")], {"o": -cg.variable("a")})
 
 
@@ -251,6 +273,11 @@ ONE = cg.Graph([cg.variable("a")], {"o": -cg.variable("a")})
         ({"a": 2}, [If("a", ())], "If needs register 'a' to have length 1, got 2"),
         ({"a": 3, "p": 2}, [Factor("a", "p")], "Factor needs register 'a' to have length 4, got 3"),
         ({"a": 4, "p": 2, "b": 1}, [Solve("a", "p", "b")], "Solve needs register 'b' to have length 2, got 1"),
+        ({"a": 5, "b": 4}, [TiledMap(ONE, ("a",), ("b",), (), 2)], "needs register 'a' to have length 4, got 5"),
+        ({"a": 4, "b": 4}, [TiledMap(ONE, (), ("b",), ("a",), 2)], "has 1 inputs, the shared registers hold 4"),
+        ({"a": 4}, [TiledMap(ONE, ("a",), ("a",), (), 2)], "both reads and writes register 'a'"),
+        ({"a": 2, "b": 1}, [Scatter("a", "b", (0,), (1,))], "Scatter needs places from 0 to 0 of register 'b'"),
+        ({"a": 2, "b": 1}, [Scatter("a", "b", (0, 1), (0,))], "Scatter needs a place for each of 2 numbers, got 1"),
         ({"a": -1}, [], "register 'a' needs a length, an integer not negative, got -1"),
         ({"a": 1}, [While("a", (Call(ONE, ("z",), ("a",)),))], "names register 'z'"),
     ],

@@ -9,7 +9,7 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
-from cgraph.autodiff import dissection
+from cgraph.autodiff.balanced import dissection
 from cgraph.extend import solve_nodes
 from dynamics.experiments.speed.bench_scenes import chain
 from dynamics.systems.model import as_ode, as_system

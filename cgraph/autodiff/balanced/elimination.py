@@ -17,24 +17,24 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from heapq import heapify, heappop, heappush
 from typing import NamedTuple
 
-from ..core.builder import Builder
-from ..core.node import Node, as_node, variable
+from ...core.builder import Builder
+from ...core.node import Node, as_node, variable
+from ..elimination_order import Step, nodes_of
+from ..schur_elimination import ONE, EdgePushing
+from ..symmetric_elimination import PivotRow
+from ..symmetric_matrix import ZERO, SymmetricMatrix
 from .dissection import Piece, dissect
-from .elimination_order import Step, nodes_of
-from .schur_elimination import ONE, EdgePushing
-from .symmetric_elimination import PivotRow
-from .symmetric_matrix import ZERO, SymmetricMatrix
 
 
 class Copy(NamedTuple):
-    """What stands for a node in other pieces, and the multiplier that holds it there."""
+    """Stand-in for a node in other pieces, and the multiplier that holds it there."""
 
     copy: Node
     multiplier: Node
 
 
 class BalancedElimination(EdgePushing):
-    """As EdgePushing, in pieces.
+    """EdgePushing in pieces.
 
     plan: the steps.  rows: the unknowns that each step leaves entries with, see `written_rows`.
     """
@@ -107,7 +107,7 @@ class BalancedElimination(EdgePushing):
         for node in nodes:
             if node in self._copies:
                 copy, multiplier = self._copies[node]
-                self.matrix.add(node, multiplier, as_node(-1.0))
+                self.matrix.add(node, multiplier, as_node(-1.0))  # t_copy - t_node = 0, the multiplier's row
                 self.matrix.add(copy, multiplier, ONE)
         super().reduce(step)
         before = len(self.pivot_rows)
@@ -130,9 +130,10 @@ class BalancedElimination(EdgePushing):
         u = row_i.pop(j)
         e, row_j = self.matrix.pop(j)
         rhs_i, rhs_j = self.rhs.pop(i, ZERO), self.rhs.pop(j, ZERO)
-        det = a * e - u * u
+        det = a * e - u * u  # K = [[W_ii, u], [u, W_jj]], of inertia J and mobility C: -(J C + u^2) < 0
         jj, ij, ii = a / det, -(u / det), e / det  # of the inverse
         others = list(dict.fromkeys([*row_i, *row_j]))
+        # g = K^-1 W_(ij)k;  W_km -= g_k^T W_(ij)m,  b_k -= g_k^T b_(ij)
         gains_i = {k: ii * row_i.get(k, ZERO) + ij * row_j.get(k, ZERO) for k in others}
         gains_j = {k: ij * row_i.get(k, ZERO) + jj * row_j.get(k, ZERO) for k in others}
         for n, k in enumerate(others):
@@ -145,7 +146,7 @@ class BalancedElimination(EdgePushing):
         self.pivot_rows[j] = PivotRow(as_node(-1.0), ij * rhs_i + jj * rhs_j, gains_j)
 
     def solution(self, i: Node, known: Mapping[Node, Node]) -> Node:
-        """As of the base class, the shallowest terms first."""
+        """Solution as of the base class, the shallowest terms first."""
         _, constant, gains = self.pivot_rows[i]
         terms = [(constant, False), *[(gain * known[other], True) for other, gain in gains.items()]]
         heap = [(self._depth(node), n, node, negative) for n, (node, negative) in enumerate(terms)]
@@ -161,7 +162,7 @@ class BalancedElimination(EdgePushing):
         return -total if negative else total
 
     def info(self, negative: Collection[Node] = ()) -> Node:
-        """As of the base class; a pair that has not one positive eigenvalue counts as the variable before it."""
+        """Info as of the base class; a pair that has not one positive eigenvalue counts as the variable before it."""
         return super().info({*negative, *[unknown for pair in self._copies.values() for unknown in pair]})
 
     def depth_of(self, solved: EdgePushing, wrt: Sequence[Node]) -> int:
@@ -188,7 +189,7 @@ class WrittenMatrix(SymmetricMatrix):
         self.written: set[Node] = set()
 
     def add(self, a: Node, b: Node, value: Node) -> None:
-        """As of the base class."""
+        """Add as the base class does, and notice."""
         if value.value != 0.0:
             self.written |= {a, b}
         super().add(a, b, value)

@@ -19,12 +19,7 @@ NEAR = 0.2  # of the variables of a piece: how far from its middle a cut may be
 class Piece:
     """Steps that are eliminated on their own: those of two halves, or a last piece; and the branches that join it.
 
-    Attributes
-    ----------
-    above : Piece or None
-        What it is a half of, or joins.
-    last : int
-        The place of its last step.
+    above: what it is a half of, or joins.  last: the place of its last step.
     """
 
     def __init__(self, above: Piece | None, last: int) -> None:
