@@ -32,7 +32,7 @@ side by side run, and `register_statement` adds a kind of statement. `copied` an
 `thread_count` reads `threads=`, `share` gives work to threads, `atomic_write` writes a file whole or not at all,
 `write_files` several, and `check_writable` looks beforehand; `counted` is a number with its noun; `html_table`,
 `html_lines` and `picture` are what a notebook shows of a result; `install` ends an error about a missing
-package, `scipy_integrate` gives SciPy's module or raises it. `memo` and `kept_by_first` make a
+package, `scipy_module` gives a module of SciPy or raises it. `memo` and `kept_by_first` make a
 function keep its results. `Array` is the type of an array of float64, `Json` of what JSON can hold.
 
     >>> import cgraph as cg
@@ -126,7 +126,7 @@ if TYPE_CHECKING:
         require_texts as require_texts,
         require_whole as require_whole,
     )
-    from .util.scipy_modules import scipy_integrate as scipy_integrate
+    from .util.scipy_modules import scipy_module as scipy_module
     from .util.threads import share as share, thread_count as thread_count
     from .util.words import counted as counted, nearest as nearest, or_nearest as or_nearest
     from .writing.formulas import Formulas as Formulas, Notation as Notation

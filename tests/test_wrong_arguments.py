@@ -401,7 +401,7 @@ CALLS |= {
     "extend.require_whole": call(lambda value, least: extend.require_whole("value", value, least), 3, 0),
     "extend.rounding_spread": call(extend.rounding_spread, GRAPH, {}),
     "extend.runner": call(extend.runner, PROGRAM, "python", fast=False, fma=True),
-    "extend.scipy_integrate": call(extend.scipy_integrate, "what"),
+    "extend.scipy_module": call(extend.scipy_module, "integrate", "what"),
     "extend.share": call(extend.share, abs, range(3), 2),
     "extend.shortened": call(extend.shortened, [X * Y]),
     "extend.solve_nodes": call(

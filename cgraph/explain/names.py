@@ -24,23 +24,10 @@ _NEGATION, _WHOLE = SUM, 9  # how strongly a leading minus binds, and a name or 
 class Names:
     """The names of a graph's nodes, in both directions: `one`, `all`, `group`, `output`; and `text`, `line`, `short`.
 
-    Parameters
-    ----------
-    graph : Graph
-        Whose nodes.
-    called : mapping of str to str, optional
-        {name in the graph: what a person calls it}, such as `dynamics.display_names(model)`. These are shown, and taken
-        beside the graph's; where the graph has the same name, or two have one, the graph's stands.
+    called: {name in the graph: what a person calls it}, such as `dynamics.display_names(model)`. These are shown, and
+    taken beside the graph's; where the graph has the same name, or two have one, the graph's stands.
+    number, as an attribute: the %numbers of the operations, as in `graph.listing()`.
 
-    Attributes
-    ----------
-    graph : Graph
-        Whose nodes.
-    number : dict of Node to int
-        The %numbers of the operations, as in `graph.listing()`.
-
-    Examples
-    --------
     >>> import cgraph as cg
     >>> from cgraph.extend import Names
     >>> x, h = cg.variables("x h")
@@ -81,6 +68,10 @@ class Names:
     def meant(self, name: str) -> str:
         """The graph's name of what a person calls so."""
         return self._meant.get(name, name)
+
+    def called(self, who: Name) -> str:
+        """What a person calls a node that is given by a name or itself."""
+        return self.shown(self.meant(who)) if isinstance(who, str) else self.text(who)
 
     def inputs_of(self, what: str, values: Mapping[str, Value]) -> dict[str, Value]:
         """Values by the graph's names of inputs. Raises GraphError, naming `what`, for what is no input, or twice."""

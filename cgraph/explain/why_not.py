@@ -137,7 +137,7 @@ def why_not(
     known = Names(graph, names)
     source, sink = known.one(input, "input"), known.output(output, "output")
     reached, made_from = descendants(graph.nodes, [source]), ancestors([sink])
-    to, origin = (known.shown(known.meant(who)) if isinstance(who, str) else known.text(who) for who in (output, input))
+    to, origin = known.called(output), known.called(input)
     if sink in reached:
         raise GraphError(f"{to} depends on {origin}; cg.why lists the paths")
     return WhyNot(

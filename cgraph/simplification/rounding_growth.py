@@ -65,28 +65,10 @@ _POINTS, _SIGNS = 256, 1021  # samples, whose mean is certain to a tenth; operat
 def rounding_spread(graph: Graph, values: Mapping[str, float]) -> float:
     """How far outputs move where the results of all operations are off by one part in 2^30, either way at random.
 
-    A running bound adds sizes where errors cancel, as they do by the thousand in an elimination.
+    Of the worst output, in parts of the largest and of 2^-30: the mean of the sample points where that is finite,
+    infinite without any. A running bound adds sizes where errors cancel, as they do by the thousand in an elimination.
+    values: {input: number}, such as parameters; the other inputs are normally distributed, the same every time.
 
-    Parameters
-    ----------
-    graph : Graph
-        Any graph.
-    values : mapping of str to float
-        Inputs that have these values, such as parameters. The others are normally distributed, the same every time.
-
-    Returns
-    -------
-    float
-        How far the worst output moves, in parts of the largest and of 2^-30; the mean of the sample points where that
-        is finite, infinite without any.
-
-    Raises
-    ------
-    TypeError
-        For what is no graph, or no mapping.
-
-    Examples
-    --------
     >>> import cgraph as cg
     >>> from cgraph.extend import rounding_spread
     >>> x, y = cg.variables("x y")

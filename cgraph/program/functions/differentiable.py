@@ -24,7 +24,7 @@ from ...core.node import Node, variable
 from ...util.memory import require_memory, require_target
 from ...util.real_arrays import real_array
 from ...util.require import require_flag
-from ...util.scipy_modules import scipy_sparse
+from ...util.scipy_modules import scipy_module
 from ..program import Program
 from ..runners.runner import Runner
 from .colored_matrix import ColoredMatrix, Derivative, Part, hessian_parts, jacobian_parts
@@ -169,7 +169,7 @@ class Differentiable(ABC):
     def _matrix(self, matrix: ColoredMatrix, point: Array, sparse: bool) -> Any:
         if not require_flag("sparse", sparse):
             return matrix.values(point, dense=True)
-        module, (columns, starts) = scipy_sparse("a sparse derivative"), matrix.compressed
+        module, (columns, starts) = scipy_module("sparse", "a sparse derivative"), matrix.compressed
         values = matrix.values(point, dense=False)
         return module.csr_array((values, columns.copy(), starts.copy()), shape=matrix.entries.shape)
 
