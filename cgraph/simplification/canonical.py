@@ -110,7 +110,7 @@ class Canonical:
                 return self._hyperbolic(node)
         return None
 
-    def product(self, a: Sum, b: Sum, squares: Mapping[int, Sum] | None = None) -> Sum:
+    def product(self, a: Sum, b: Sum, *, squares: Mapping[int, Sum] | None = None) -> Sum:
         """a b, with these squares replaced, by default all. Raises TooLongError."""
         if len(a) * len(b) > MOST_PRODUCTS:
             raise TooLongError
@@ -131,7 +131,7 @@ class Canonical:
         if square is not None:
             powers = {**powers, square: powers[square] - 2}
         one = {tuple(sorted([(atom, power) for atom, power in powers.items() if power])): term}
-        return one if square is None else self.product(one, squares[square], squares)
+        return one if square is None else self.product(one, squares[square], squares=squares)
 
     def _factors(self, node: Node) -> list[Sum]:
         """The arguments of a product, a sum as one atom where writing it out would gain nothing."""

@@ -86,7 +86,7 @@ class _Writer:
         """With cos^2 = 1 - sin^2 at the angles where that is shorter."""
         for cosine, sine in self.canonical.pairs.values():
             square = added(number(1.0), {((sine, 2),): Term(1.0, 1.0, UNLABELLED)}, -1.0)
-            other = self.canonical.product(a, number(1.0), {cosine: square})
+            other = self.canonical.product(a, number(1.0), squares={cosine: square})
             if _length(other) < _length(a):
                 a = other
         return a
