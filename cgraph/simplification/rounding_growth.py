@@ -50,9 +50,8 @@ def error_bounds(
     """
     partials = {node: tuple(map(as_node, node.op.partials(node, *node.args))) for node in nodes if node.args}
     needed = topological([*nodes, *[slope for slopes in partials.values() for slope in slopes]])
-    found = dict(
-        zip(needed, evaluate(needed, {str(i): each for i, each in enumerate(needed)}, values).values(), strict=True)
-    )
+    numbered = {str(i): node for i, node in enumerate(needed)}
+    found = dict(zip(needed, evaluate(needed, numbered, values).values(), strict=True))
     errors: dict[Node, Value] = {}
     with np.errstate(all="ignore"):
         for node in nodes:

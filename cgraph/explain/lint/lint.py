@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from ...core.graph import Edge, Graph
 from ...core.node import Node
 from ...util.html_text import html_table, html_text
+from ...util.json_type import Json
 from ...util.require import require_graph, require_mapping, require_sequence
 from ...util.words import counted
 from ..edge_partials import Point
@@ -19,9 +19,6 @@ from .cancellation import cancellations, rounded
 from .finding import Finding
 from .independence import Group, check_independence
 from .singular import Box, singular_nodes
-
-if TYPE_CHECKING:
-    from ...util.json_type import Json
 
 Pair = tuple[Group, Group]
 
