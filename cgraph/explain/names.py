@@ -10,7 +10,7 @@ from ..core.graph import Graph
 from ..core.node import CONSTANT, Node
 from ..operations.operation import SUM, columns
 from ..util.require import require_graph, require_texts
-from ..util.words import nearest
+from ..util.words import listed, nearest
 from ..writing.source_lines import lines_text
 
 Name = str | Node
@@ -79,9 +79,9 @@ class Names:
         for name, value in values.items():
             meant = self.meant(name) if isinstance(name, str) else name
             if meant not in self.graph.input_names:
-                listed = _listed([self.shown(each) for each in self.graph.input_names]) or "none"
+                has = listed([self.shown(each) for each in self.graph.input_names]) or "none"
                 near = self._near(name, self.graph.input_names)
-                raise GraphError(f"{what}: the graph has no input {name!s:.80}{near} (it has {listed})")
+                raise GraphError(f"{what}: the graph has no input {name!s:.80}{near} (it has {has})")
             if meant in result:
                 raise GraphError(f"{what} gives the input {self.shown(meant)} twice, once as {meant}")
             result[meant] = value
@@ -135,7 +135,7 @@ class Names:
     def _known(self) -> str:
         named = [name for name, nodes in self.by_name.items() if any(node.args for node in nodes)]
         parts = (("inputs", self.graph.input_names), ("named nodes", named), ("outputs", tuple(self.graph.outputs)))
-        return "; ".join(f"{what} {_listed([self.shown(name) for name in names])}" for what, names in parts if names)
+        return "; ".join(f"{what} {listed([self.shown(name) for name in names])}" for what, names in parts if names)
 
     # From a node to text.
 
@@ -188,10 +188,6 @@ class Names:
             text, strength = parts[0]
             return (f"-({text})" if strength <= _NEGATION or text.startswith("-") else f"-{text}"), _NEGATION
         return f"{node.op.name}({', '.join([text for text, _ in parts])})", _WHOLE
-
-
-def _listed(names: Sequence[str]) -> str:
-    return ", ".join(names if len(names) <= 12 else [*names[:10], "...", names[-1]])
 
 
 def joined(words: Sequence[str], most: int = 6) -> str:
