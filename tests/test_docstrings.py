@@ -4,8 +4,9 @@ import doctest
 import importlib
 import inspect
 import re
+from functools import cache
 from pathlib import Path
-from types import FunctionType, ModuleType
+from types import FunctionType
 
 import numpy as np
 import pytest
@@ -16,23 +17,23 @@ import dynamics as dyn
 import viz
 from cgraph.extend import install
 from cgraph.operations.table import OPS
+from tests.sources import sources
 
-ROOT = Path(__file__).parents[1]
 PUBLIC = (cg, cgraph.extend, dyn, viz)
 # What an example may use without importing it, beside the names of its module; in its output `...` is any text.
 NAMES = {"cg": cg, "dyn": dyn, "viz": viz, "np": np}
 FLAGS = doctest.ELLIPSIS
 
 
-def modules_with_examples() -> list[ModuleType]:
-    files = [path for package in ("cgraph", "dynamics", "viz") for path in sorted((ROOT / package).rglob("*.py"))]
-    written = [path.relative_to(ROOT) for path in files if ">>> " in path.read_text(encoding="utf-8")]
-    return [importlib.import_module(".".join(path.with_suffix("").parts).removesuffix(".__init__")) for path in written]
-
-
-def examples() -> list[doctest.DocTest]:
-    finder = doctest.DocTestFinder(exclude_empty=True)
-    return [test for module in modules_with_examples() for test in finder.find(module) if test.examples]
+@cache
+def examples() -> dict[str, list[doctest.DocTest]]:
+    """{package.folder: examples in the docstrings of its modules}."""
+    finder, found = doctest.DocTestFinder(exclude_empty=True), {}
+    for source in sources().values():
+        if ">>> " in source.text:
+            tests = [test for test in finder.find(importlib.import_module(source.module)) if test.examples]
+            found.setdefault(".".join(source.module.split(".")[:2]), []).extend(tests)
+    return found
 
 
 def run(example: doctest.DocTest) -> str:
@@ -51,15 +52,11 @@ def run(example: doctest.DocTest) -> str:
     return ""
 
 
-ROOMS = sorted({".".join(example.name.split(".")[:2]) for example in examples()})
-
-
-@pytest.mark.parametrize("room", ROOMS)
+@pytest.mark.parametrize("room", examples())
 def test_an_example_prints_what_is_shown(room: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    absent = [run(example) for example in examples() if f"{example.name}.".startswith(f"{room}.")]
-    if any(absent):
-        pytest.skip(f"not run: {', '.join(filter(None, absent))}")
+    if absent := list(filter(None, map(run, examples()[room]))):
+        pytest.skip(f"not run: {', '.join(absent)}")
 
 
 def public() -> dict[str, type | FunctionType]:
