@@ -215,7 +215,7 @@ def why(
         edges = [edge for edge in edges if edge.target is not source]
     count = path_count(nodes, edges, source, sink) if nodes else 0
     if at is None:
-        shortest = best_paths(nodes, edges, source, sink, k, lambda edge: 1.0) if count else []
+        shortest = best_paths(nodes, edges, [source], [sink], k) if count else []
         return Why(
             graph, to, origin, count, tuple(_told_apart(known, [_path(known, to, path, None) for path in shortest]))
         )
@@ -223,7 +223,7 @@ def why(
     edges = _contributing(known, nodes, edges, slopes, sink)
     derivative, weight = _path_sums(nodes, edges, slopes, source, sink)
     # The largest |product| of partials has the least sum of -log |partial|.
-    heaviest = best_paths(nodes, edges, source, sink, k, lambda edge: -math.log(abs(slopes[edge]))) if count else []
+    heaviest = best_paths(nodes, edges, [source], [sink], k, lambda edge: -math.log(abs(slopes[edge]))) if count else []
     paths = [_path(known, to, path, math.prod([slopes[edge] for edge in path])) for path in heaviest]
     return Why(graph, to, origin, count, tuple(_told_apart(known, paths)), derivative, weight)
 
