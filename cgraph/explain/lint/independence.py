@@ -16,7 +16,7 @@ from ...writing.networkx_queries import minimum_cut
 from ...writing.source_lines import lines_text
 from ..names import Name, Names, joined
 from ..paths import best_paths
-from ..reachability import ancestors, between, descendants, has_more_ancestors
+from ..reachability import ancestors, between, descendants
 from .finding import Finding
 
 Group = Name | Sequence[Name]
@@ -150,7 +150,7 @@ def _leak(names: Names, source: Node, sink: Node, members: set[Node], function: 
     a, b = names.text(source), names.text(sink)
     gained = f"d{function}/d{b}"
     slope = None
-    if not has_more_ancestors(sink, SLOPE_NODES):
+    if len(ancestors([sink])) <= SLOPE_NODES:
         seeds = {node: constant(0.0) for node in members if node not in (source, sink)} | {source: constant(1.0)}
         slope = tangents(seeds, [sink], Builder()).get(sink)
     text = names.text(slope) if slope is not None else "?"
