@@ -5,4 +5,4 @@ Whoever imports this package has the table filled.
 
 from . import table
 
-abs, round = table.abs_, table.round_  # which the table calls otherwise: its rows have Python's
+abs, round = table.abs_, table.round_  # the rows of the table use Python's
