@@ -167,21 +167,8 @@ NUMPY: dict[str, Callable[..., float]] = {op.name: getattr(np, op.name, op.array
     "round": np.rint,
     "zero_safe_mul": lambda a, b: 0.0 if 0.0 in (a, b) else a * b,
 }
-POSITIVE_SPECIALS = (
-    0.0,
-    5e-324,
-    1e-310,
-    2.2250738585072014e-308,
-    1e-20,
-    0.5,
-    1.0,
-    2.0,
-    3.0,
-    711.0,
-    1e20,
-    1e308,
-    math.inf,
-)
+POSITIVE_SPECIALS = (0.0, 5e-324, 1e-310, 2.2250738585072014e-308, 1e-20, 0.5, 1.0, 2.0, 3.0, 711.0, 1e20, 1e308)
+POSITIVE_SPECIALS += (math.inf,)
 SPECIALS = (math.nan, *POSITIVE_SPECIALS, *(-value for value in POSITIVE_SPECIALS))
 ZERO_SIGN_IS_OPEN = {"minimum", "maximum", "zero_safe_mul"}  # IEEE 754 lets min(0, -0) be either
 
