@@ -6,153 +6,72 @@ from .util.version import __version__ as __version__
 TYPE_CHECKING = False  # as a checker knows it; typing takes a while to load
 
 if TYPE_CHECKING:
-    from .autodiff.hessian_solve import hessian_solve
-    from .autodiff.jacobian import hessian, jacobian
-    from .autodiff.products import gradient, jvp, vjp
-    from .autodiff.sparsity import sparsity
-    from .codegen.c.c_source import CSource, to_c
-    from .codegen.disk_cache import clear_cache
-    from .codegen.wasm.to_wasm import to_wasm
-    from .core.checks import GraphError
-    from .core.graph import Edge, Graph
-    from .core.node import Node, constant, variable
-    from .core.scope import tag
-    from .explain.compare import Comparison, compare
-    from .explain.lint.lint import Lint, lint
-    from .explain.why import Why, why
-    from .explain.why_not import WhyNot, why_not
+    from .autodiff.hessian_solve import hessian_solve as hessian_solve
+    from .autodiff.jacobian import hessian as hessian, jacobian as jacobian
+    from .autodiff.products import gradient as gradient, jvp as jvp, vjp as vjp
+    from .autodiff.sparsity import sparsity as sparsity
+    from .codegen.c.c_source import CSource as CSource, to_c as to_c
+    from .codegen.disk_cache import clear_cache as clear_cache
+    from .codegen.wasm.to_wasm import to_wasm as to_wasm
+    from .core.checks import GraphError as GraphError
+    from .core.graph import Edge as Edge, Graph as Graph
+    from .core.node import Node as Node, constant as constant, variable as variable
+    from .core.scope import tag as tag
+    from .explain.compare import Comparison as Comparison, compare as compare
+    from .explain.lint.lint import Lint as Lint, lint as lint
+    from .explain.why import Why as Why, why as why
+    from .explain.why_not import WhyNot as WhyNot, why_not as why_not
+    from .operations import abs as abs, round as round
     from .operations.table import (
-        abs_ as abs,
-        acos,
-        asin,
-        atan,
-        atan2,
-        cbrt,
-        ceil,
-        cos,
-        cosh,
-        equal,
-        erf,
-        erfc,
-        exp,
-        exp2,
-        expm1,
-        floor,
-        fmod,
-        hypot,
-        less,
-        less_equal,
-        log,
-        log1p,
-        log2,
-        log10,
-        logistic,
-        maximum,
-        minimum,
-        not_equal,
-        pow,
-        round_ as round,
-        sign,
-        sin,
-        sinh,
-        sqrt,
-        tan,
-        tanh,
-        where,
+        acos as acos,
+        asin as asin,
+        atan as atan,
+        atan2 as atan2,
+        cbrt as cbrt,
+        ceil as ceil,
+        cos as cos,
+        cosh as cosh,
+        equal as equal,
+        erf as erf,
+        erfc as erfc,
+        exp as exp,
+        exp2 as exp2,
+        expm1 as expm1,
+        floor as floor,
+        fmod as fmod,
+        hypot as hypot,
+        less as less,
+        less_equal as less_equal,
+        log as log,
+        log1p as log1p,
+        log2 as log2,
+        log10 as log10,
+        logistic as logistic,
+        maximum as maximum,
+        minimum as minimum,
+        not_equal as not_equal,
+        pow as pow,
+        sign as sign,
+        sin as sin,
+        sinh as sinh,
+        sqrt as sqrt,
+        tan as tan,
+        tanh as tanh,
+        where as where,
     )
-    from .program.functions.compile import compile
-    from .program.functions.compiled import Compiled
-    from .program.loop import Loop, loop
-    from .simplification.balanced_sums import balanced_sums
-    from .simplification.double_double import double_double
-    from .simplification.simplify import simplify, specialize
-    from .util.caches import clear_caches
-    from .writing.counts import Counts
-    from .writing.latex import latex
-    from .writing.naming import variables, with_name
-    from .writing.source_lines import recording_lines
-    from .writing.structure_hash import structure_hash
+    from .program.functions.compile import compile as compile
+    from .program.functions.compiled import Compiled as Compiled
+    from .program.loop import Loop as Loop, loop as loop
+    from .simplification.balanced_sums import balanced_sums as balanced_sums
+    from .simplification.double_double import double_double as double_double
+    from .simplification.simplify import simplify as simplify, specialize as specialize
+    from .util.caches import clear_caches as clear_caches
+    from .writing.counts import Counts as Counts
+    from .writing.latex import latex as latex
+    from .writing.naming import variables as variables, with_name as with_name
+    from .writing.source_lines import recording_lines as recording_lines
+    from .writing.structure_hash import structure_hash as structure_hash
 
-__all__ = [
-    "CSource",
-    "Comparison",
-    "Compiled",
-    "Counts",
-    "Edge",
-    "Graph",
-    "GraphError",
-    "Lint",
-    "Loop",
-    "Node",
-    "Why",
-    "WhyNot",
-    "abs",
-    "acos",
-    "asin",
-    "atan",
-    "atan2",
-    "balanced_sums",
-    "cbrt",
-    "ceil",
-    "clear_cache",
-    "clear_caches",
-    "compare",
-    "compile",
-    "constant",
-    "cos",
-    "cosh",
-    "double_double",
-    "equal",
-    "erf",
-    "erfc",
-    "exp",
-    "exp2",
-    "expm1",
-    "floor",
-    "fmod",
-    "gradient",
-    "hessian",
-    "hessian_solve",
-    "hypot",
-    "jacobian",
-    "jvp",
-    "latex",
-    "less",
-    "less_equal",
-    "lint",
-    "log",
-    "log1p",
-    "log2",
-    "log10",
-    "logistic",
-    "loop",
-    "maximum",
-    "minimum",
-    "not_equal",
-    "pow",
-    "recording_lines",
-    "round",
-    "sign",
-    "simplify",
-    "sin",
-    "sinh",
-    "sparsity",
-    "specialize",
-    "sqrt",
-    "structure_hash",
-    "tag",
-    "tan",
-    "tanh",
-    "to_c",
-    "to_wasm",
-    "variable",
-    "variables",
-    "vjp",
-    "where",
-    "why",
-    "why_not",
-    "with_name",
-]
 
 if not TYPE_CHECKING:  # a checker shall see a misspelt name
 

@@ -32,7 +32,7 @@ side by side run, and `register_statement` adds a kind of statement. `copied` an
 `thread_count` reads `threads=`, `share` gives work to threads, `atomic_write` writes a file whole or not at all,
 `write_files` several, and `check_writable` looks beforehand; `counted` is a number with its noun; `html_table`,
 `html_lines` and `picture` are what a notebook shows of a result; `install` ends an error about a missing
-package, `scipy_integrate` gives SciPy's module or raises it. `memo` and `kept_by_first` make a
+package, `scipy_module` gives a module of SciPy or raises it. `memo` and `kept_by_first` make a
 function keep its results. `Array` is the type of an array of float64, `Json` of what JSON can hold.
 
     >>> import cgraph as cg
@@ -46,170 +46,91 @@ function keep its results. `Array` is the type of an array of float64, `Json` of
     (True, True)
 """
 
-from .util.doors import doors
+from .util.doors import doors as doors
 
 TYPE_CHECKING = False  # as a checker knows it; typing takes a while to load
 
 if TYPE_CHECKING:
-    from .autodiff.compressed_jacobian import CompressedJacobian, compressed_jacobian
-    from .autodiff.hessian_solve import Order, solve_nodes, solve_tangents
-    from .autodiff.jacobian import hessian_nodes
-    from .autodiff.jets import Jets, NoSeriesError, jets
-    from .autodiff.ldl_solve import ldl_elimination, ldl_solve
-    from .autodiff.symmetric_elimination import SingularError
-    from .core.builder import Builder, folded
-    from .core.checks import check_name
-    from .core.evaluation import Array
-    from .core.forward import tangents
-    from .core.label import ADJOINT, PRIMAL, TANGENT, UNLABELLED
-    from .core.node import as_node
-    from .core.reverse import cotangents
-    from .core.scope import building
-    from .core.traversal import topological
-    from .explain.lint.cancellation import certain_digits
-    from .explain.names import Names
-    from .operations.operation import MathML, Op, columns
-    from .operations.register import register
-    from .operations.table import OPS
-    from .program.derivatives.linearization import Linearization, Linearized
-    from .program.derivatives.tape import Tape, run_passes
-    from .program.derivatives.transforms import ProgramVjp, Pulled, program_jvp, program_vjp
-    from .program.many import many
-    from .program.program import Program
-    from .program.runners.choose_runner import runner
-    from .program.runners.runner import Record, Runner
-    from .program.statement import STATEMENTS, Statement, StatementRow, register_statement, require_length
-    from .program.statements.call import Call, Map, Sum, added, copied
-    from .program.statements.control import FixedPoint, If, While
-    from .program.statements.matrix import Factor, Solve
-    from .program.statements.memory import Pop, Push, Take
-    from .simplification.identities import shortened
-    from .simplification.polynomial import Polynomial, expand, format_polynomial
-    from .simplification.reciprocals import with_reciprocals
-    from .simplification.rounding_growth import rounding_spread
-    from .util.atomic_write import atomic_write, check_writable, write_files
-    from .util.caches import kept_by_first, memo
-    from .util.doors import doors
-    from .util.extras import install
-    from .util.html_text import html_lines, html_table, picture
-    from .util.json_type import Json
-    from .util.real_arrays import is_finite, real_array, real_number
-    from .util.require import (
-        require_choice,
-        require_flag,
-        require_graph,
-        require_mapping,
-        require_path,
-        require_sequence,
-        require_texts,
-        require_whole,
+    from .autodiff.compressed_jacobian import (
+        CompressedJacobian as CompressedJacobian,
+        compressed_jacobian as compressed_jacobian,
     )
-    from .util.scipy_modules import scipy_integrate
-    from .util.threads import share, thread_count
-    from .util.words import counted, nearest, or_nearest
-    from .writing.formulas import Formulas, Notation
+    from .autodiff.hessian_solve import Order as Order, solve_nodes as solve_nodes, solve_tangents as solve_tangents
+    from .autodiff.jacobian import hessian_nodes as hessian_nodes
+    from .autodiff.jets import Jets as Jets, NoSeriesError as NoSeriesError, jets as jets
+    from .autodiff.ldl_solve import ldl_elimination as ldl_elimination, ldl_solve as ldl_solve
+    from .autodiff.symmetric_elimination import SingularError as SingularError
+    from .core.builder import Builder as Builder, folded as folded
+    from .core.checks import check_name as check_name
+    from .core.evaluation import Array as Array
+    from .core.forward import tangents as tangents
+    from .core.label import ADJOINT as ADJOINT, PRIMAL as PRIMAL, TANGENT as TANGENT, UNLABELLED as UNLABELLED
+    from .core.node import as_node as as_node
+    from .core.reverse import cotangents as cotangents
+    from .core.scope import building as building
+    from .core.traversal import topological as topological
+    from .explain.lint.cancellation import certain_digits as certain_digits
+    from .explain.names import Names as Names
+    from .operations.operation import MathML as MathML, Op as Op, columns as columns
+    from .operations.register import register as register
+    from .operations.table import OPS as OPS
+    from .program.derivatives.linearization import Linearization as Linearization, Linearized as Linearized
+    from .program.derivatives.tape import Tape as Tape, run_passes as run_passes
+    from .program.derivatives.transforms import (
+        ProgramVjp as ProgramVjp,
+        Pulled as Pulled,
+        program_jvp as program_jvp,
+        program_vjp as program_vjp,
+    )
+    from .program.many import many as many
+    from .program.program import Program as Program
+    from .program.runners.choose_runner import runner as runner
+    from .program.runners.runner import Record as Record, Runner as Runner
+    from .program.statement import (
+        STATEMENTS as STATEMENTS,
+        Statement as Statement,
+        StatementRow as StatementRow,
+        register_statement as register_statement,
+        require_length as require_length,
+    )
+    from .program.statements.call import Call as Call, Map as Map, Sum as Sum, added as added, copied as copied
+    from .program.statements.control import FixedPoint as FixedPoint, If as If, While as While
+    from .program.statements.matrix import Factor as Factor, Solve as Solve
+    from .program.statements.memory import Pop as Pop, Push as Push, Take as Take
+    from .simplification.identities import shortened as shortened
+    from .simplification.polynomial import (
+        Polynomial as Polynomial,
+        expand as expand,
+        format_polynomial as format_polynomial,
+    )
+    from .simplification.reciprocals import with_reciprocals as with_reciprocals
+    from .simplification.rounding_growth import rounding_spread as rounding_spread
+    from .util.atomic_write import (
+        atomic_write as atomic_write,
+        check_writable as check_writable,
+        write_files as write_files,
+    )
+    from .util.caches import kept_by_first as kept_by_first, memo as memo
+    from .util.doors import doors as doors
+    from .util.extras import install as install
+    from .util.html_text import html_lines as html_lines, html_table as html_table, picture as picture
+    from .util.json_type import Json as Json
+    from .util.real_arrays import is_finite as is_finite, real_array as real_array, real_number as real_number
+    from .util.require import (
+        require_choice as require_choice,
+        require_flag as require_flag,
+        require_graph as require_graph,
+        require_mapping as require_mapping,
+        require_path as require_path,
+        require_sequence as require_sequence,
+        require_texts as require_texts,
+        require_whole as require_whole,
+    )
+    from .util.scipy_modules import scipy_module as scipy_module
+    from .util.threads import share as share, thread_count as thread_count
+    from .util.words import counted as counted, nearest as nearest, or_nearest as or_nearest
+    from .writing.formulas import Formulas as Formulas, Notation as Notation
 
-__all__ = [
-    "ADJOINT",
-    "OPS",
-    "PRIMAL",
-    "STATEMENTS",
-    "TANGENT",
-    "UNLABELLED",
-    "Array",
-    "Builder",
-    "Call",
-    "CompressedJacobian",
-    "Factor",
-    "FixedPoint",
-    "Formulas",
-    "If",
-    "Jets",
-    "Json",
-    "Linearization",
-    "Linearized",
-    "Map",
-    "MathML",
-    "Names",
-    "NoSeriesError",
-    "Notation",
-    "Op",
-    "Order",
-    "Polynomial",
-    "Pop",
-    "Program",
-    "ProgramVjp",
-    "Pulled",
-    "Push",
-    "Record",
-    "Runner",
-    "SingularError",
-    "Solve",
-    "Statement",
-    "StatementRow",
-    "Sum",
-    "Take",
-    "Tape",
-    "While",
-    "added",
-    "as_node",
-    "atomic_write",
-    "building",
-    "certain_digits",
-    "check_name",
-    "check_writable",
-    "columns",
-    "compressed_jacobian",
-    "copied",
-    "cotangents",
-    "counted",
-    "doors",
-    "expand",
-    "folded",
-    "format_polynomial",
-    "hessian_nodes",
-    "html_lines",
-    "html_table",
-    "install",
-    "is_finite",
-    "jets",
-    "kept_by_first",
-    "ldl_elimination",
-    "ldl_solve",
-    "many",
-    "memo",
-    "nearest",
-    "or_nearest",
-    "picture",
-    "program_jvp",
-    "program_vjp",
-    "real_array",
-    "real_number",
-    "register",
-    "register_statement",
-    "require_choice",
-    "require_flag",
-    "require_graph",
-    "require_length",
-    "require_mapping",
-    "require_path",
-    "require_sequence",
-    "require_texts",
-    "require_whole",
-    "rounding_spread",
-    "run_passes",
-    "runner",
-    "scipy_integrate",
-    "share",
-    "shortened",
-    "solve_nodes",
-    "solve_tangents",
-    "tangents",
-    "thread_count",
-    "topological",
-    "with_reciprocals",
-    "write_files",
-]
 
 if not TYPE_CHECKING:  # a checker shall see a misspelt name
     __getattr__, __dir__ = doors(

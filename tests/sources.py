@@ -3,7 +3,7 @@
 import ast
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -28,6 +28,11 @@ class Source:
     def nodes(self) -> list[ast.AST]:
         return list(ast.walk(self.tree))
 
+    @property
+    def module(self) -> str:
+        """Its dotted name."""
+        return self.file.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
+
     def imports(self, for_types: bool = True) -> Iterator[str]:
         """Absolute names of the modules that it imports, in functions, too; under `if TYPE_CHECKING:`, if asked."""
         typing = {
@@ -48,6 +53,7 @@ class Source:
                 yield ".".join([*above, *([node.module] if node.module else [])])
 
 
+@cache
 def sources() -> dict[str, Source]:
     """{file: its source} of all three packages."""
     files = [path.relative_to(ROOT).as_posix() for name in PACKAGES for path in sorted((ROOT / name).rglob("*.py"))]

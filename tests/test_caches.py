@@ -6,7 +6,6 @@ import pickle
 import re
 import weakref
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,8 +14,8 @@ import cgraph as cg
 import dynamics as dyn
 from cgraph.extend import kept_by_first, memo
 from cgraph.util.caches import kept_results
+from tests.sources import ROOT, sources
 
-ROOT = Path(__file__).parents[1]
 HOME = "cgraph.util.caches"
 MOST = 25
 WEAK = {"cgraph.core.label", "dynamics.multibody.structure"}  # have weak tables, which docs/design.md explains
@@ -31,15 +30,6 @@ TABLES = {
     f"{HOME}._memos",
 }
 CONTAINERS = {"dict", "list", "set", "OrderedDict", "defaultdict", "deque", "Counter"}
-
-
-def sources() -> Iterator[tuple[str, ast.Module]]:
-    """Dotted name and tree of every module."""
-    for package in ("cgraph", "dynamics", "viz"):
-        for path in sorted((ROOT / package).rglob("*.py")):
-            parts = path.relative_to(ROOT).with_suffix("").parts
-            name = ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
-            yield name, ast.parse(path.read_text(encoding="utf-8"))
 
 
 def called(node: ast.expr) -> str:
@@ -72,8 +62,8 @@ def listed() -> list[list[str]]:
 
 def test_every_cache_is_listed_and_there_are_few() -> None:
     found: list[list[str]] = [[], []]
-    for module, tree in sources():
-        for name, kind in [] if module == HOME else caches(tree.body, module):
+    for source in sources().values():
+        for name, kind in [] if source.module == HOME else caches(source.tree.body, source.module):
             found[KINDS[kind]].append(name)
     assert [sorted(names) for names in listed()] == [sorted(names) for names in found]
     assert 0 < len(found[0]) <= MOST
@@ -82,8 +72,9 @@ def test_every_cache_is_listed_and_there_are_few() -> None:
 def test_nothing_else_keeps_results() -> None:
     """No other cache of functools, no weak table, no module's or class's own table, no global variable."""
     others = []
-    for module, tree in sources():
-        for node in ast.walk(tree):
+    for source in sources().values():
+        module, tree = source.module, source.tree
+        for node in source.nodes:
             if isinstance(node, ast.ImportFrom) and node.module == "functools" and module != HOME:
                 others += [f"{module}: {each.name}" for each in node.names if each.name in ("cache", "lru_cache")]
             if isinstance(node, ast.Attribute) and ast.unparse(node) in ("functools.cache", "functools.lru_cache"):
@@ -92,7 +83,7 @@ def test_nothing_else_keeps_results() -> None:
                 others.append(f"{module}: {node.id}")
             if isinstance(node, ast.Global):
                 others += [f"{module}: global {name}" for name in node.names]
-        for scope in [tree, *[node for node in ast.walk(tree) if isinstance(node, ast.ClassDef)]]:
+        for scope in [tree, *[node for node in source.nodes if isinstance(node, ast.ClassDef)]]:
             others += [f"{module}.{name}" for name in empty_containers(scope.body)]
     assert set(others) == TABLES
 

@@ -118,32 +118,27 @@ def test_examples_print_what_is_shown(name: str, tmp_path: Path) -> None:
     assert [file.name for file, image in drawings.items() if texts(file) != texts(image)] == []  # else: make pictures
 
 
-@pytest.mark.parametrize("name", PAGES)
-def test_linked_files_exist(name: str) -> None:
-    targets = re.findall(r"""(?:\]\(|src=")([^)#"\s]+)""", FENCE.sub("", PAGES[name]))
-    files = [target for target in targets if "://" not in target]
-    assert [file for file in files if not (ROOT / name).parent.joinpath(file).exists()] == []
+def test_linked_files_exist() -> None:
+    targets = [
+        (name, target)
+        for name, page in PAGES.items()
+        for target in re.findall(r"""(?:\]\(|src=")([^)#"\s]+)""", FENCE.sub("", page))
+        if "://" not in target
+    ]
+    assert [(name, file) for name, file in targets if not (ROOT / name).parent.joinpath(file).exists()] == []
 
 
-@pytest.mark.parametrize("name", PAGES)
-def test_named_functions_exist(name: str) -> None:
+def test_named_functions_and_tests_exist_and_shown_commands_are_commands() -> None:
     """`cgraph.jvp`: what is written with its package can be found there."""
-    for dotted in re.findall(r"`((?:cgraph|dynamics|viz)(?:\.\w+)+)", PAGES[name]):
-        if not dotted.endswith((".py", ".svg")):
-            resolve_name(dotted)
-
-
-@pytest.mark.parametrize("name", PAGES)
-def test_named_tests_exist(name: str) -> None:
-    for file, test in re.findall(r"`(tests/[\w/]+\.py)(?:::(\w+))?`", PAGES[name]):
-        text = (ROOT / file).read_text(encoding="utf-8")
-        assert not test or f"def {test}(" in text, f"{file}::{test}"
-
-
-@pytest.mark.parametrize("name", [name for name in PAGES if commands(PAGES[name])])
-def test_shown_commands_are_commands(name: str) -> None:
-    for command in commands(PAGES[name]):
-        parse(shlex.split(command))
+    for page in PAGES.values():
+        for dotted in re.findall(r"`((?:cgraph|dynamics|viz)(?:\.\w+)+)", page):
+            if not dotted.endswith((".py", ".svg")):
+                resolve_name(dotted)
+        for file, test in re.findall(r"`(tests/[\w/]+\.py)(?:::(\w+))?`", page):
+            text = (ROOT / file).read_text(encoding="utf-8")
+            assert not test or f"def {test}(" in text, f"{file}::{test}"
+        for command in commands(page):
+            parse(shlex.split(command))
 
 
 def test_the_reading_edition_of_the_core_is_short_and_names_files_that_exist() -> None:

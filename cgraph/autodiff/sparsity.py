@@ -17,7 +17,7 @@ from ..core.row import Row
 from ..core.scope import building
 from ..util.caches import OPERATIONS, memo
 from ..util.require import require_graph
-from ..util.scipy_modules import scipy_sparse
+from ..util.scipy_modules import scipy_module
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -94,7 +94,7 @@ def sparsity(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None)
            [0, 0, 0]])
     """
     require_graph("sparsity", graph)
-    sparse = scipy_sparse("sparsity")
+    sparse = scipy_module("sparse", "sparsity")
     entries = pattern(graph, graph.select_inputs(wrt))
     found: csr_array = sparse.csr_array(
         (np.ones(len(entries.rows), dtype=bool), *entries.compressed()), shape=entries.shape

@@ -56,8 +56,9 @@ class ReachedNodes:
     """The flags of nodes that one sweep, forward or reverse, reaches through operations that select.
 
     A selecting operation such as `where` has the partial 0 in an argument that it leaves out. Beyond it, whichever way
-    the sweep goes, the tangent or cotangent is 0 and must stay 0, though partials there may be infinite or NaN. Any
-    other 0 times infinity is NaN, as in IEEE arithmetic.
+    the sweep goes, the tangent or cotangent is 0 and must stay 0, though partials there may be infinite or NaN: of
+    where(x > 0, log(x), x), the cotangent of log(x) is 0 at x = 0, and its slope 1 / x is not asked. Any other 0 times
+    infinity is NaN, as in IEEE arithmetic.
 
     seeds: {seed: its value}, if a zero of it means the same, which matters where an operation has a singular slope;
     else {seed: None}.

@@ -5,19 +5,17 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 from ..core.checks import GraphError
 from ..core.graph import Graph
 from ..core.node import VARIABLE, Node, variable
 from ..util.html_text import html_lines
+from ..util.json_type import Json
 from ..util.require import require_choice, require_graph, require_sequence, require_texts
 from ..util.words import counted
 from ..writing.structure_hash import node_hashes
 from .names import Names, joined
-
-if TYPE_CHECKING:
-    from ..util.json_type import Json
 
 Classify = Callable[[Graph], Callable[[Node], str]]
 Side = Literal["left", "right"]

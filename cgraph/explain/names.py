@@ -10,7 +10,7 @@ from ..core.graph import Graph
 from ..core.node import CONSTANT, Node
 from ..operations.operation import SUM, columns
 from ..util.require import require_graph, require_texts
-from ..util.words import nearest
+from ..util.words import listed, nearest
 from ..writing.source_lines import lines_text
 
 Name = str | Node
@@ -24,23 +24,10 @@ _NEGATION, _WHOLE = SUM, 9  # how strongly a leading minus binds, and a name or 
 class Names:
     """The names of a graph's nodes, in both directions: `one`, `all`, `group`, `output`; and `text`, `line`, `short`.
 
-    Parameters
-    ----------
-    graph : Graph
-        Whose nodes.
-    called : mapping of str to str, optional
-        {name in the graph: what a person calls it}, such as `dynamics.display_names(model)`. These are shown, and taken
-        beside the graph's; where the graph has the same name, or two have one, the graph's stands.
+    called: {name in the graph: what a person calls it}, such as `dynamics.display_names(model)`. These are shown, and
+    taken beside the graph's; where the graph has the same name, or two have one, the graph's stands.
+    number, as an attribute: the %numbers of the operations, as in `graph.listing()`.
 
-    Attributes
-    ----------
-    graph : Graph
-        Whose nodes.
-    number : dict of Node to int
-        The %numbers of the operations, as in `graph.listing()`.
-
-    Examples
-    --------
     >>> import cgraph as cg
     >>> from cgraph.extend import Names
     >>> x, h = cg.variables("x h")
@@ -82,15 +69,19 @@ class Names:
         """The graph's name of what a person calls so."""
         return self._meant.get(name, name)
 
+    def called(self, who: Name) -> str:
+        """What a person calls a node that is given by a name or itself."""
+        return self.shown(self.meant(who)) if isinstance(who, str) else self.text(who)
+
     def inputs_of(self, what: str, values: Mapping[str, Value]) -> dict[str, Value]:
         """Values by the graph's names of inputs. Raises GraphError, naming `what`, for what is no input, or twice."""
         result: dict[str, Value] = {}
         for name, value in values.items():
             meant = self.meant(name) if isinstance(name, str) else name
             if meant not in self.graph.input_names:
-                listed = _listed([self.shown(each) for each in self.graph.input_names]) or "none"
+                has = listed([self.shown(each) for each in self.graph.input_names]) or "none"
                 near = self._near(name, self.graph.input_names)
-                raise GraphError(f"{what}: the graph has no input {name!s:.80}{near} (it has {listed})")
+                raise GraphError(f"{what}: the graph has no input {name!s:.80}{near} (it has {has})")
             if meant in result:
                 raise GraphError(f"{what} gives the input {self.shown(meant)} twice, once as {meant}")
             result[meant] = value
@@ -144,7 +135,7 @@ class Names:
     def _known(self) -> str:
         named = [name for name, nodes in self.by_name.items() if any(node.args for node in nodes)]
         parts = (("inputs", self.graph.input_names), ("named nodes", named), ("outputs", tuple(self.graph.outputs)))
-        return "; ".join(f"{what} {_listed([self.shown(name) for name in names])}" for what, names in parts if names)
+        return "; ".join(f"{what} {listed([self.shown(name) for name in names])}" for what, names in parts if names)
 
     # From a node to text.
 
@@ -197,10 +188,6 @@ class Names:
             text, strength = parts[0]
             return (f"-({text})" if strength <= _NEGATION or text.startswith("-") else f"-{text}"), _NEGATION
         return f"{node.op.name}({', '.join([text for text, _ in parts])})", _WHOLE
-
-
-def _listed(names: Sequence[str]) -> str:
-    return ", ".join(names if len(names) <= 12 else [*names[:10], "...", names[-1]])
 
 
 def joined(words: Sequence[str], most: int = 6) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from operator import itemgetter
 
 from ..core.graph import Edge
@@ -41,7 +41,12 @@ _Step = tuple[float, Edge | None, int]  # one of the best ways to a node: cost, 
 
 
 def best_paths(
-    nodes: Sequence[Node], edges: Sequence[Edge], source: Node, sink: Node, k: int, cost: Callable[[Edge], float]
+    nodes: Sequence[Node],
+    edges: Sequence[Edge],
+    sources: Collection[Node],
+    sinks: Collection[Node],
+    k: int,
+    cost: Callable[[Edge], float] = lambda edge: 1.0,
 ) -> list[tuple[Edge, ...]]:
     """The k paths of least cost, the sum over their edges, best first: each node keeps the k best ways to it.
 
@@ -49,16 +54,17 @@ def best_paths(
     """
     incoming = by_target(edges)
     start: list[_Step] = [(0.0, None, 0)]
-    best = {source: start[:k]}
+    best = dict.fromkeys(sources, start[:k])
     for node in nodes:
-        if node is not source:
+        if node not in sources:
             ways: list[_Step] = []
             for edge in incoming.get(node, ()):
                 if math.isfinite(more := cost(edge)):
-                    ways += [(step[0] + more, edge, rank) for rank, step in enumerate(best[edge.source])]
+                    ways += [(step[0] + more, edge, rank) for rank, step in enumerate(best.get(edge.source, ()))]
             ways.sort(key=_cost)  # sorted runs, so this is a merge; stable, so that ties fall the same way in every run
             best[node] = ways[:k]
-    return [_traced(best, step) for step in best.get(sink, ())]
+    ends = sorted([step for sink in sinks for step in best.get(sink, ())], key=_cost)
+    return [_traced(best, step) for step in ends[:k]]
 
 
 _cost = itemgetter(0)

@@ -28,17 +28,6 @@ def ancestors(sinks: Iterable[Node], without: Collection[Node] = ()) -> set[Node
     return reached
 
 
-def has_more_ancestors(sink: Node, limit: int) -> bool:
-    """Whether a node has more than `limit` ancestors, itself counted; visits no more than needed to tell."""
-    reached = {sink}
-    stack = [sink]
-    while stack and len(reached) <= limit:
-        new = [arg for arg in stack.pop().args if arg not in reached]
-        reached.update(new)
-        stack.extend(new)
-    return len(reached) > limit
-
-
 def between(nodes: Sequence[Node], sources: Iterable[Node], sinks: Iterable[Node]) -> list[Node]:
     """The nodes on any path from `sources` to `sinks`, in the order of `nodes`; empty when there is none."""
     on_path = descendants(nodes, sources) & ancestors(sinks)

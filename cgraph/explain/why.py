@@ -6,13 +6,13 @@ import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
 
 from ..core.checks import GraphError
 from ..core.graph import Edge, Graph
 from ..core.node import Node
 from ..operations.operation import columns
 from ..util.html_text import html_table, html_text
+from ..util.json_type import Json, json_number
 from ..util.require import require_graph
 from ..util.words import counted
 from ..writing.source_lines import lines_text
@@ -20,9 +20,6 @@ from .edge_partials import Point, edge_slopes
 from .names import Name, Names
 from .paths import best_paths, by_target, path_count
 from .reachability import between
-
-if TYPE_CHECKING:
-    from ..util.json_type import Json
 
 EXACT = 10**15  # up to here a number of paths is printed digit by digit
 LENGTH = 90  # characters up to which a path is written out; a longer one is written by its tags
@@ -141,12 +138,12 @@ class Why:
             "output": self.output,
             "input": self.input,
             "paths": self.count if self.count <= EXACT else digits_of(self.count),
-            "derivative": _json(self.derivative),
-            "weight": _json(self.weight),
+            "derivative": json_number(self.derivative),
+            "weight": json_number(self.weight),
             "share": self.share,
             "listed": [
                 {
-                    "value": _json(path.value),
+                    "value": json_number(path.value),
                     "text": path.text,
                     "edges": [[number[edge.source], number[edge.target], edge.slot] for edge in path.edges],
                 }
@@ -210,7 +207,7 @@ def why(
     if not isinstance(k, int) or isinstance(k, bool) or k < 0:
         raise ValueError(f"k must be a whole number of paths, at least 0, got {k!r}")
     source, sink = known.one(input, "input"), known.output(output, "output")
-    to, origin = _name_of(known, output), _name_of(known, input)
+    to, origin = known.called(output), known.called(input)
     nodes = between(graph.nodes, [source], [sink])
     inside = set(nodes)
     edges = [Edge(arg, node, slot) for node in nodes for slot, arg in enumerate(node.args) if arg in inside]
@@ -218,7 +215,7 @@ def why(
         edges = [edge for edge in edges if edge.target is not source]
     count = path_count(nodes, edges, source, sink) if nodes else 0
     if at is None:
-        shortest = best_paths(nodes, edges, source, sink, k, lambda edge: 1.0) if count else []
+        shortest = best_paths(nodes, edges, [source], [sink], k) if count else []
         return Why(
             graph, to, origin, count, tuple(_told_apart(known, [_path(known, to, path, None) for path in shortest]))
         )
@@ -226,7 +223,7 @@ def why(
     edges = _contributing(known, nodes, edges, slopes, sink)
     derivative, weight = _path_sums(nodes, edges, slopes, source, sink)
     # The largest |product| of partials has the least sum of -log |partial|.
-    heaviest = best_paths(nodes, edges, source, sink, k, lambda edge: -math.log(abs(slopes[edge]))) if count else []
+    heaviest = best_paths(nodes, edges, [source], [sink], k, lambda edge: -math.log(abs(slopes[edge]))) if count else []
     paths = [_path(known, to, path, math.prod([slopes[edge] for edge in path])) for path in heaviest]
     return Why(graph, to, origin, count, tuple(_told_apart(known, paths)), derivative, weight)
 
@@ -268,10 +265,6 @@ def _path_sums(
         sums[edge.target] += slopes[edge] * sums[edge.source]
         weights[edge.target] += abs(slopes[edge]) * weights[edge.source]
     return sums.get(sink, 0.0), weights.get(sink, 0.0)
-
-
-def _name_of(names: Names, who: Name) -> str:
-    return names.shown(names.meant(who)) if isinstance(who, str) else names.text(who)
 
 
 def _path(names: Names, output: str, edges: tuple[Edge, ...], value: float | None) -> Path:
@@ -334,7 +327,3 @@ def count_text(count: int) -> str:
 
 def _weight(path: Path) -> str:
     return "" if path.value is None else f"{path.value:+.4g}"
-
-
-def _json(value: float | None) -> float | None:
-    return value if value is not None and math.isfinite(value) else None

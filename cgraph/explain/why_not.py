@@ -4,19 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from ..core.checks import GraphError
 from ..core.graph import Graph
 from ..core.node import Node
 from ..util.html_text import html_lines
+from ..util.json_type import Json
 from ..util.require import require_graph
 from ..util.words import counted
 from .names import Name, Names, joined
 from .reachability import ancestors, descendants
-
-if TYPE_CHECKING:
-    from ..util.json_type import Json
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,7 +134,7 @@ def why_not(
     known = Names(graph, names)
     source, sink = known.one(input, "input"), known.output(output, "output")
     reached, made_from = descendants(graph.nodes, [source]), ancestors([sink])
-    to, origin = (known.shown(known.meant(who)) if isinstance(who, str) else known.text(who) for who in (output, input))
+    to, origin = known.called(output), known.called(input)
     if sink in reached:
         raise GraphError(f"{to} depends on {origin}; cg.why lists the paths")
     return WhyNot(

@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from ..core.node import Node, Scalar, apply, constant
 from .operation import OPS
+from .values import whole_power
 
 ZERO = constant(0.0)
 SPLIT = 2.0**27  # halves of at most 26 bits, whose products are exact
@@ -121,15 +122,7 @@ def pow(a: Pair, b: Pair) -> Pair | None:
         return sqrt(a)
     if not (0.0 < abs(exponent) <= WHOLE and exponent == int(exponent)):
         return None
-    result: Pair | None = None
-    square, left = a, int(abs(exponent))
-    while left:
-        if left % 2:
-            result = square if result is None else mul(result, square)
-        left //= 2
-        if left:
-            square = mul(square, square)
-    assert result is not None
+    result = whole_power(a, int(abs(exponent)), mul)
     return result if exponent > 0.0 else div(Pair(constant(1.0), ZERO), result)
 
 

@@ -22,20 +22,11 @@ LIBRARY = 2.0  # units of rounding: libraries promise an ulp or so
 
 
 class MathML(NamedTuple):
-    """An operation in presentation MathML.
+    """An operation in presentation MathML, with {0}, {1}, .. where the arguments go.
 
-    Parameters
-    ----------
-    text : str
-        MathML with {0}, {1}, .. where the arguments go.
-    least : tuple of int
-        Of each argument, how strongly it must bind to go without parentheses: 0 a relation, 1 a sum, 2 a product, 3 a
-        function, 4 a name or a number.
-    binding : int
-        How strongly the whole binds.
+    least: of each argument, how strongly it must bind to go without parentheses: 0 a relation, 1 a sum, 2 a product, 3
+    a function, 4 a name or a number.  binding: how strongly the whole binds.
 
-    Examples
-    --------
     >>> from cgraph.extend import MathML
     >>> MathML("<msqrt>{0}</msqrt>", (0,), 3).text.format("<mi>x</mi>")
     '<msqrt><mi>x</mi></msqrt>'

@@ -15,21 +15,9 @@ _LIBRARY = sys.modules[__name__.partition(".")[0]]  # `cg.name` of one of its na
 def register(op: Op) -> None:
     """Add a row to the operation table: from then on every part of the library knows the operation.
 
-    Parameters
-    ----------
-    op : Op
-        The row. `cg.name` is then the function that makes its nodes, and its `ufunc` makes them too.
+    `cg.name` is then the function that makes its nodes, and its `ufunc` makes them too. Raises TypeError for what is no
+    Op, or has no function in its first columns, ValueError for a name, samples or partials that do not fit.
 
-    Raises
-    ------
-    TypeError
-        For what is no Op, and when `scalar`, `array` or `partials` is no function.
-    ValueError
-        When the name is no identifier, is in the table already or means something else in cgraph, when parameter
-        names, a sample or the partials do not fit the number of arguments, or when there is no sample.
-
-    Examples
-    --------
     >>> from cgraph.extend import OPS, register
     >>> register(OPS["sin"])
     Traceback (most recent call last):

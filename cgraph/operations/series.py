@@ -9,10 +9,12 @@ rule, piecewise operations their `piece`; every other operation without a rule o
 
 from __future__ import annotations
 
+import operator
 from typing import Protocol
 
 from ..core.node import Node, apply, as_node
 from .operation import OPS
+from .values import whole_power
 
 POWERS = 2.0**53  # whole exponents up to this size become products
 
@@ -111,14 +113,7 @@ def power(a: Node, b: Node) -> Node:
     exponent = b.value
     if exponent is None or not abs(exponent) <= POWERS or exponent != int(exponent):
         return apply(OPS["exp"], b * apply(OPS["log"], a))
-    result: Node | None = None
-    square, rest = a, abs(int(exponent))
-    while rest:
-        if rest & 1:
-            result = square if result is None else result * square
-        rest >>= 1
-        if rest:
-            square = square * square
-    if result is None:
+    if exponent == 0.0:
         return as_node(1.0)
+    result: Node = whole_power(a, abs(int(exponent)), operator.mul)
     return 1.0 / result if exponent < 0 else result

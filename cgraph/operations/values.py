@@ -5,10 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import wraps
+from typing import TypeVar
 
 import numpy as np
 
 from ..core.evaluation import Array, Value
+
+Factor = TypeVar("Factor")
 
 
 def ieee(function: Callable[..., float], ufunc: Callable[..., Value]) -> Callable[..., float]:
@@ -67,6 +70,19 @@ def sign(a: float) -> float:
 def by_element(function: Callable[..., float]) -> Callable[..., Value]:
     """A function of floats, on arrays that broadcast, one element after another."""
     return lambda *args: np.asarray(np.frompyfunc(function, len(args), 1)(*args), dtype=np.float64)
+
+
+def whole_power(base: Factor, exponent: int, times: Callable[[Factor, Factor], Factor]) -> Factor:
+    """base ** exponent of anything that can be multiplied, by squares, for an exponent from 1."""
+    result: Factor | None = None
+    while True:
+        if exponent % 2:
+            result = base if result is None else times(result, base)
+        exponent //= 2
+        if not exponent:
+            assert result is not None
+            return result
+        base = times(base, base)
 
 
 # From here on a double has no digits behind the point; infinities and NaN are beyond, too.

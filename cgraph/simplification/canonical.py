@@ -45,14 +45,15 @@ class Canonical:
     """Canonical sums of nodes, and the atoms that they are made of.
 
     made: the operation and arguments of an atom, where it is no sine or cosine of a base angle: None and one node for
-    that node.  angles: {atom: (angle, whether it is the sine)}.  written: angles whose sine or cosine stands in the
-    graph.
+    that node.  angles: {atom: (angle, whether it is the sine)}.  pairs: the atoms (cosine, sine) of each base angle.
+    squares: {atom: the square of it}.  written: angles whose sine or cosine stands in the graph.
     """
 
     def __init__(self, outputs: Sequence[Node]) -> None:
         self.order = topological(outputs)
         self.made: dict[int, tuple[Row | None, tuple[Node, ...]]] = {}
         self.angles: dict[int, tuple[Angle, bool]] = {}
+        self.pairs: dict[Angle, tuple[int, int]] = {}
         self.squares: dict[int, Sum] = {}
         self.written: set[frozenset[Angle]] = set()
         self._atoms: dict[object, int] = {}
@@ -109,10 +110,11 @@ class Canonical:
                 return self._hyperbolic(node)
         return None
 
-    def product(self, a: Sum, b: Sum) -> Sum:
-        """a b, with squares replaced. Raises TooLongError."""
+    def product(self, a: Sum, b: Sum, *, squares: Mapping[int, Sum] | None = None) -> Sum:
+        """a b, with these squares replaced, by default all. Raises TooLongError."""
         if len(a) * len(b) > MOST_PRODUCTS:
             raise TooLongError
+        squares = self.squares if squares is None else squares
         result: Sum = {}
         for left, x in a.items():
             for right, y in b.items():
@@ -120,16 +122,16 @@ class Canonical:
                 for atom, power in right:
                     powers[atom] = powers.get(atom, 0) + power
                 term = Term(x.value * y.value, x.size * y.size, x.label.with_tags_of(y.label))
-                accumulate(result, self._reduced(powers, term))
+                accumulate(result, self._reduced(powers, term, squares))
         return without_zeros(result)
 
-    def _reduced(self, powers: dict[int, int], term: Term) -> Sum:
+    def _reduced(self, powers: dict[int, int], term: Term, squares: Mapping[int, Sum]) -> Sum:
         """One product with its squares replaced."""
-        for atom, power in powers.items():
-            if power >= 2 and atom in self.squares:
-                rest = {**powers, atom: power - 2}
-                return self.product({_sorted(rest): term}, self.squares[atom])
-        return {_sorted(powers): term}
+        square = next((atom for atom, power in powers.items() if power >= 2 and atom in squares), None)
+        if square is not None:
+            powers = {**powers, square: powers[square] - 2}
+        one = {tuple(sorted([(atom, power) for atom, power in powers.items() if power])): term}
+        return one if square is None else self.product(one, squares[square], squares=squares)
 
     def _factors(self, node: Node) -> list[Sum]:
         """The arguments of a product, a sum as one atom where writing it out would gain nothing."""
@@ -207,8 +209,7 @@ class Canonical:
             c, s = self._multiple((powers, unit), round(size / unit), term.label)
             if term.value < 0.0:
                 s = scaled(s, -1.0)
-            turned = added(self.product(cosine, c), self.product(sine, s), -1.0)
-            cosine, sine = turned, added(self.product(sine, c), self.product(cosine, s), 1.0)
+            cosine, sine = self._turned((cosine, sine), (c, s))
             if max(len(cosine), len(sine)) > MOST_TERMS:
                 raise TooLongError
         return cosine, sine
@@ -223,19 +224,20 @@ class Canonical:
 
     def _multiple(self, angle: Angle, count: int, label: Label) -> tuple[Sum, Sum]:
         """(cos k a, sin k a) of a base angle a."""
-        pair: list[Sum] = []
-        for sine in (False, True):
-            atom = self._atom(("sine" if sine else "cosine", angle))
-            self.angles[atom] = (angle, sine)
-            pair.append({((atom, 1),): Term(1.0, 1.0, label)})
-        c, s = pair
-        (((atom, _),),) = s
-        self.squares.setdefault(atom, added(number(1.0), self.product(c, c), -1.0))
-        cosine, opposite = c, s
+        cosine, sine = self.pairs.setdefault(angle, (self._atom(("cosine", angle)), self._atom(("sine", angle))))
+        self.angles |= {cosine: (angle, False), sine: (angle, True)}
+        one: tuple[Sum, Sum] = {((cosine, 1),): Term(1.0, 1.0, label)}, {((sine, 1),): Term(1.0, 1.0, label)}
+        self.squares.setdefault(sine, added(number(1.0), self.product(one[0], one[0]), -1.0))
+        turned = one
         for _ in range(count - 1):
-            turned = added(self.product(cosine, c), self.product(opposite, s), -1.0)
-            cosine, opposite = turned, added(self.product(opposite, c), self.product(cosine, s), 1.0)
-        return cosine, opposite
+            turned = self._turned(turned, one)
+        return turned
+
+    def _turned(self, a: tuple[Sum, Sum], b: tuple[Sum, Sum]) -> tuple[Sum, Sum]:
+        """(cos, sin) of the sum of two angles, of theirs."""
+        (cos_a, sin_a), (cos_b, sin_b) = a, b
+        cosine = added(self.product(cos_a, cos_b), self.product(sin_a, sin_b), -1.0)
+        return cosine, added(self.product(sin_a, cos_b), self.product(cos_a, sin_b), 1.0)
 
     def _atom(self, what: object) -> int:
         return self._atoms.setdefault(what, len(self._atoms))
@@ -279,7 +281,3 @@ def key(a: Sum) -> Key:
 
 def _small_whole(value: float | None) -> bool:
     return value is not None and abs(value) <= MOST_POWER and value == int(value)
-
-
-def _sorted(powers: Mapping[int, int]) -> Powers:
-    return tuple(sorted([(atom, power) for atom, power in powers.items() if power]))

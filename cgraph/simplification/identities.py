@@ -14,7 +14,7 @@ from ..core.scope import building
 from ..core.traversal import topological
 from ..operations.operation import OPS
 from ..util.explain_failure import explain_failure
-from .canonical import ROUNDING, Angle, Canonical, Powers, Sum, Term, accumulate, without_zeros
+from .canonical import ROUNDING, Angle, Canonical, Powers, Sum, Term, added, number
 from .rounding_growth import as_accurate
 
 LONGEST = 250  # nodes; beyond, sums of products would be too long to be of use
@@ -84,15 +84,9 @@ class _Writer:
 
     def _flipped(self, a: Sum) -> Sum:
         """With cos^2 = 1 - sin^2 at the angles where that is shorter."""
-        for atom, (angle, sine) in self.canonical.angles.items():
-            if sine:
-                continue
-            if not any([name == atom and power > 1 for powers in a for name, power in powers]):
-                continue
-            (sine_atom,) = [
-                other for other, (its, is_sine) in self.canonical.angles.items() if is_sine and its == angle
-            ]
-            other = _without_squares(a, atom, sine_atom)
+        for cosine, sine in self.canonical.pairs.values():
+            square = added(number(1.0), {((sine, 2),): Term(1.0, 1.0, UNLABELLED)}, -1.0)
+            other = self.canonical.product(a, number(1.0), squares={cosine: square})
             if _length(other) < _length(a):
                 a = other
         return a
@@ -279,18 +273,3 @@ def _divided(factors: dict[Factor, int], factor: Factor, sign: int) -> dict[Fact
 
 def _length(a: Sum) -> int:
     return sum([1 + sum([abs(power) for _, power in powers]) for powers in a])
-
-
-def _without_squares(a: Sum, cosine: int, sine: int) -> Sum:
-    """With cos^2 = 1 - sin^2 put in for every square of one cosine."""
-    result: Sum = {}
-    for powers, term in a.items():
-        exponents = dict(powers)
-        squares = max(0, exponents.get(cosine, 0)) // 2
-        exponents[cosine] = exponents.get(cosine, 0) - 2 * squares
-        for k in range(squares + 1):
-            weight = math.comb(squares, k) * (-1.0) ** k
-            turned = {**exponents, sine: exponents.get(sine, 0) + 2 * k}
-            name = tuple(sorted([(atom, power) for atom, power in turned.items() if power]))
-            accumulate(result, {name: Term(weight * term.value, abs(weight) * term.size, term.label)})
-    return without_zeros(result)

@@ -1,16 +1,16 @@
-"""Rounding growth: how far the errors of all operations carry to some nodes, at sample points."""
+"""Rounding growth: how far the errors of all operations carry to some nodes, at a point or at samples."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ..core.evaluation import Array, Value
+from ..core.evaluation import Array, Value, evaluate
 from ..core.graph import Graph
-from ..core.node import CONSTANT, Node
+from ..core.node import CONSTANT, Node, as_node
 from ..core.traversal import topological
-from ..operations.operation import columns
+from ..operations.operation import OPS, columns
 from ..util.require import require_graph, require_mapping
 
 UNIT = 2.0**-30  # in place of 2^-53: errors that double precision can show
@@ -24,8 +24,9 @@ def as_accurate(old: Node, new: Node) -> bool:
     """
     names = sorted({node.name or "" for node in topological([old, new]) if not node.args and node.op is not CONSTANT})
     points = dict(zip(names, _points(len(names)), strict=True))
+    (values, errors), (_, others) = (error_bounds(topological([node]), points) for node in (old, new))
+    value, before, after = values[old], errors[old], others[new]
     with np.errstate(all="ignore"):
-        (value, before), (_, after) = _errors(old, points), _errors(new, points)
         usable = np.isfinite(value) & np.isfinite(before)
         worse = ~(after <= MORE * np.maximum(before, UNIT * np.abs(value)))  # what is not finite is worse
     return not np.any(usable & worse)
@@ -39,24 +40,26 @@ def _points(count: int) -> Array:
     return np.concatenate(regimes, axis=1)
 
 
-def _errors(node: Node, points: dict[str, Array]) -> tuple[Array, Array]:
-    """The value, and a bound of its error with operations that round to a part of `UNIT`, to first order."""
-    known: dict[Node, tuple[Value, Value]] = {}
-    for inner in topological([node]):
-        if not inner.args:
-            value = points[inner.name or ""] if inner.value is None else inner.value
-            known[inner] = (value, 0.0)
-            continue
-        values = [known[arg][0] for arg in inner.args]
-        value = inner.op.array(*values)
-        error = columns(inner.op).rounding * UNIT * np.abs(value)
-        for k, arg in enumerate(inner.args):
-            moved = [*values[:k], values[k] + known[arg][1], *values[k + 1 :]]
-            error = error + np.abs(inner.op.array(*moved) - value)
-        known[inner] = (value, error)
-    value, error = known[node]
-    count = len(next(iter(points.values()), ()))
-    return np.broadcast_to(value, count), np.broadcast_to(error, count)
+def error_bounds(
+    nodes: Sequence[Node], values: Mapping[str, Value], unit: float = UNIT, of_inputs: float = 0.0
+) -> tuple[dict[Node, Value], dict[Node, Value]]:
+    """Values of nodes, arguments first, and bounds of their errors to first order, with roundings to a part of `unit`.
+
+    An error passes on through the local partials, in absolute value, and each operation adds its own.
+    values: {input: number or array}.  of_inputs: error of an input, relative to its value.
+    """
+    partials = {node: tuple(map(as_node, node.op.partials(node, *node.args))) for node in nodes if node.args}
+    needed = topological([*nodes, *[slope for slopes in partials.values() for slope in slopes]])
+    numbered = {str(i): node for i, node in enumerate(needed)}
+    found = dict(zip(needed, evaluate(needed, numbered, values).values(), strict=True))
+    errors: dict[Node, Value] = {}
+    with np.errstate(all="ignore"):
+        for node in nodes:
+            pairs = zip(partials.get(node, ()), node.args, strict=True)
+            inherited = [OPS["zero_safe_mul"].array(np.abs(found[slope]), errors[arg]) for slope, arg in pairs]
+            own = unit * columns(node.op).rounding if node.args else of_inputs if node.value is None else 0.0
+            errors[node] = sum(inherited) + own * np.abs(found[node])
+    return found, errors
 
 
 _POINTS, _SIGNS = 256, 1021  # samples, whose mean is certain to a tenth; operations with signs of their own
@@ -65,30 +68,11 @@ _POINTS, _SIGNS = 256, 1021  # samples, whose mean is certain to a tenth; operat
 def rounding_spread(graph: Graph, values: Mapping[str, float], sizes: Mapping[str, float] | None = None) -> float:
     """How far outputs move where the results of all operations are off by one part in 2^30, either way at random.
 
-    A running bound adds sizes where errors cancel, as they do by the thousand in an elimination.
+    Of the worst output, in parts of the largest and of 2^-30: the mean of the sample points where that is finite,
+    infinite without any. A running bound adds sizes where errors cancel, as they do by the thousand in an elimination.
+    values: {input: number}, such as parameters; the other inputs are normally distributed, the same every time.
+    sizes: what inputs are drawn of, and outputs compared by, where they have units; 1 of those that are not named.
 
-    Parameters
-    ----------
-    graph : Graph
-        Any graph.
-    values : mapping of str to float
-        Inputs that have these values, such as parameters. The others are normally distributed, the same every time.
-    sizes : mapping of str to float, optional
-        What inputs are drawn of, and outputs compared by, where they have units; 1 of those that are not named.
-
-    Returns
-    -------
-    float
-        How far the worst output moves, in parts of the largest and of 2^-30; the mean of the sample points where that
-        is finite, infinite without any.
-
-    Raises
-    ------
-    TypeError
-        For what is no graph, or no mapping.
-
-    Examples
-    --------
     >>> import cgraph as cg
     >>> from cgraph.extend import rounding_spread
     >>> x, y = cg.variables("x y")

@@ -19,6 +19,8 @@ def doors(
 ) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
     """The `__getattr__` and `__dir__` of a module whose names are written elsewhere, by its `__name__` and `__file__`.
 
+    `__all__` is the list of these names, unless the module has one.
+
     The imports of the file under `if TYPE_CHECKING:`, which type checkers read, say where each name is written. A
     module is imported when one of its names is first asked for, and the name then stays in the package.
     otherwise: what gives a name that no import brings, or raises AttributeError.  first: a module that is imported
@@ -37,6 +39,8 @@ def doors(
         return found
 
     def load(name: str) -> object:
+        if name == "__all__":
+            return sorted(homes())
         if name not in homes():
             if otherwise is not None and not name.startswith("_"):
                 return otherwise(name)

@@ -2,31 +2,22 @@
 
 from __future__ import annotations
 
+from importlib import import_module
 from types import ModuleType
 
 from .extras import install
+from .require import require_choice
 
 
-def scipy_sparse(what: str) -> ModuleType:
-    """The module `scipy.sparse`. Raises ImportError, saying that `what` needs SciPy, where there is none."""
-    try:
-        from scipy import sparse
-    except ImportError:
-        raise ImportError(f"{what} needs SciPy: {install('scipy')}") from None
-    found: ModuleType = sparse  # it has no types for everybody
-    return found
+def scipy_module(name: str, what: str) -> ModuleType:
+    """SciPy's module `integrate` or `sparse`. Raises ImportError, saying that `what` needs SciPy, where there is none.
 
-
-def scipy_integrate(what: str) -> ModuleType:
-    """The module `scipy.integrate`. Raises ImportError, saying that `what` needs SciPy, where there is none.
-
-    >>> from cgraph.extend import scipy_integrate
-    >>> scipy_integrate("method 'scipy:BDF'").__name__
+    >>> from cgraph.extend import scipy_module
+    >>> scipy_module("integrate", "method 'scipy:BDF'").__name__
     'scipy.integrate'
     """
+    require_choice("name", name, ("integrate", "sparse"))
     try:
-        from scipy import integrate
+        return import_module(f"scipy.{name}")
     except ImportError:
         raise ImportError(f"{what} needs SciPy: {install('scipy')}") from None
-    found: ModuleType = integrate  # it has no types for everybody
-    return found

@@ -51,5 +51,9 @@ def or_nearest(name: str, known: Sequence[str]) -> str:
     """
     if near := nearest(name, known):
         return f"did you mean {' or '.join(map(repr, near))}?"
-    listed = known if len(known) <= _LISTED else [*known[: _LISTED - 2], "...", known[-1]]
-    return f"it has {', '.join(listed) or 'none'}"
+    return f"it has {listed(known) or 'none'}"
+
+
+def listed(names: Sequence[str]) -> str:
+    """The names; of many the first, and the last."""
+    return ", ".join(names if len(names) <= _LISTED else [*names[: _LISTED - 2], "...", names[-1]])

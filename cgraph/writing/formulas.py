@@ -18,19 +18,10 @@ LINES = 40
 class Notation(NamedTuple):
     """How formulas are written; a text is (formula, how strongly it binds, as in `MathML`).
 
-    Attributes
-    ----------
-    names : callable
-        Of names: {name: formula}; two names never have one formula.
-    number : callable
-        Of a constant: its text.
-    operation : callable
-        Of an operation's row and the texts of its arguments: its text.
-    unnamed : callable
-        Of the %number of an operation without a name: what it is called.
+    names: of names, {name: formula}; two names never have one formula.  number: of a constant, its text.
+    operation: of an operation's row and the texts of its arguments, its text.
+    unnamed: of the %number of an operation without a name, what it is called.
 
-    Examples
-    --------
     >>> from cgraph.extend import Notation
     >>> plain = Notation(
     ...     lambda names: {name: name for name in names},
@@ -58,19 +49,9 @@ class Lines(NamedTuple):
 class Formulas:
     """The equations of some nodes: which of them have a line, what they are called, and their formulas.
 
-    Parameters
-    ----------
-    nodes : sequence of Node
-        All that is reached, arguments first, as `Graph.nodes`.
-    outputs : mapping of str to Node
-        {name: node}.
-    notation : Notation
-        How formulas are written.
-    called : mapping of str to str, optional
-        {name of an input, node or output: what a person calls it}.
+    nodes: all that is reached, arguments first, as `Graph.nodes`.  outputs: {name: node}.
+    called: {name of an input, node or output: what a person calls it}.
 
-    Examples
-    --------
     >>> import cgraph as cg
     >>> from cgraph.extend import Formulas, Notation
     >>> plain = Notation(

@@ -12,7 +12,7 @@ from cgraph.extend import Array, install
 
 from ..multibody.body import WORLD, Body
 from ..multibody.joint_coordinates import places
-from ..multibody.joints import quaternion
+from ..multibody.joints import AxialJoint, quaternion
 from ..multibody.mechanism import Mechanism
 from .contender import UnavailableError
 
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 _JOINTS = {
     "revolute": "JointModelRevoluteUnaligned",
     "prismatic": "JointModelPrismaticUnaligned",
+    "screw": "JointModelHelicalUnaligned",
     "ball": "JointModelSpherical",
     "free": "JointModelFreeFlyer",
     "free (body axes)": "JointModelFreeFlyer",
@@ -169,9 +170,11 @@ def _joint(module: ModuleType, body: Body) -> JointModel:
     kind = body.joint.kind
     if kind not in _JOINTS:
         raise UnavailableError(f"has no joint of the kind {kind!r}")
-    if kind not in _ALIGNED:
+    if not isinstance(body.joint.type, AxialJoint):
         return getattr(module, _JOINTS[kind])()
     axis = np.asarray(body.joint.axis)
+    if kind not in _ALIGNED:
+        return getattr(module, _JOINTS[kind])(axis, body.joint.pitch)
     for name, unit in zip("XYZ", np.eye(3), strict=True):
         if np.array_equal(axis, unit):
             return getattr(module, _ALIGNED[kind] + name)()

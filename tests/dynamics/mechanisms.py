@@ -41,8 +41,11 @@ def random_joint(kind: str, rng: np.random.Generator, **others: Any) -> Joint:
         "spring_reference": rng.normal(),
         "armature": rng.uniform(),
         "pitch": PITCH if kind == "screw" else 0.0,
+        "axis": rng.normal(size=3),
+        "position": 0.3 * rng.normal(size=3),
+        "orientation": random_rotation(rng),
     }
-    return Joint(kind, rng.normal(size=3), 0.3 * rng.normal(size=3), random_rotation(rng), **(numbers | others))
+    return Joint(kind, **(numbers | others))
 
 
 def random_body(name: str, kind: str, parent: str, rng: np.random.Generator, **others: Any) -> Body:
@@ -92,15 +95,16 @@ def turned_tree(n: int) -> Mechanism:
 
 
 TREE_KINDS = ["revolute", "prismatic", "ball", "fixed"]
+EVERY_KIND = [*TREE_KINDS, "screw", "cylindrical", "universal", "planar"]
 
 
-def random_tree(seed: int, n: int) -> Mechanism:
+def random_tree(seed: int, n: int, among: Sequence[str] = TREE_KINDS) -> Mechanism:
     """n bodies of some kinds on chains, branches or all on one, two in five on a base that is free.
 
     Joints have damping, armature where they can, and springs where they can have any.
     """
     rng = np.random.default_rng((seed, n))
-    kinds = ["revolute", *rng.permutation(TREE_KINDS)[: rng.integers(1, 4)].tolist()]
+    kinds = ["revolute", *rng.permutation(among)[: rng.integers(1, 4)].tolist()]
     base = rng.choice(["free", "free (body axes)", "", "", ""])
     reach, bodies = int(rng.choice([1, 2, 4, n])), []
     for i in range(n):
@@ -108,6 +112,8 @@ def random_tree(seed: int, n: int) -> Mechanism:
         parent = f"b{rng.integers(max(0, i - reach), i)}" if i else WORLD
         sprung = {"stiffness": 0.0, "spring_reference": 0.0} if kind in ("ball", "free", "free (body axes)") else {}
         others = sprung | ({"armature": 0.0} if kind in ("free (body axes)", "fixed") else {})
+        if kind in ("universal", "planar"):
+            others["axis"], others["second_axis"] = random_rotation(rng)[:2]
         bodies.append(random_body(f"b{i}", kind, parent, rng, joint=random_joint(kind, rng, **others)))
     return Mechanism(bodies, 5.0 * rng.normal(size=3))
 

@@ -88,16 +88,16 @@ def _joint(joint: Any, before: list[Vector], q: Vector) -> tuple[list[Vector], V
     return axes, _times(before, q[:3]), [still] * 3 + _transposed(axes), along + [still] * 3
 
 
-def tree_in_digits(tree: Mechanism, q: Array, qd: Array, tau: Array) -> tuple[Array, Array, Array]:
-    """M (n, n), bias (n,) and accelerations (n,), with springs of axial joints and dampers, rounded at last."""
+def tree_in_digits(tree: Mechanism, q: Array, qd: Array, qdd: Array, tau: Array) -> dict[str, Array]:
+    """M (n, n), bias, torques and accelerations (n,), with springs of axial joints and dampers, rounded at last."""
     before, ctx.prec = ctx.prec, DIGITS
     try:
-        return _tree(tree, _numbers(q), _numbers(qd), _numbers(tau))
+        return _tree(tree, _numbers(q), _numbers(qd), _numbers(qdd), _numbers(tau))
     finally:
         ctx.prec = before
 
 
-def _tree(tree: Mechanism, q: Vector, qd: Vector, tau: Vector) -> tuple[Array, Array, Array]:
+def _tree(tree: Mechanism, q: Vector, qd: Vector, qdd: Vector, tau: Vector) -> dict[str, Array]:
     n, still = len(qd), [arb(0)] * 3
     states: dict[str, Any] = {
         "world": (_matrix(np.eye(3)), still, still, still, _scaled(arb(-1), _numbers(tree.gravity)), [])
@@ -132,5 +132,6 @@ def _tree(tree: Mechanism, q: Vector, qd: Vector, tau: Vector) -> tuple[Array, A
             bias[first] += arb(float(joint.stiffness)) * (x[0] - arb(float(joint.spring_reference)))
     rhs = [[t - b - d] for t, b, d in zip(tau, bias, braking, strict=True)]
     solved = arb_mat(mass).solve(arb_mat(rhs))
-    rows = np.array([[float(entry.mid()) for entry in row] for row in mass])
-    return rows, np.array([float(x.mid()) for x in bias]), np.array([float(solved[i, 0].mid()) for i in range(n)])
+    torques = _sum(_times(mass, qdd), bias, braking)
+    rows = {"mass": mass, "bias": bias, "torques": torques, "accelerations": [solved[i, 0] for i in range(n)]}
+    return {name: np.vectorize(lambda x: float(x.mid()), otypes=[float])(row) for name, row in rows.items()}

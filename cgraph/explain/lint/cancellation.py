@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from ...core.graph import Graph
-from ...core.node import Node, as_node
+from ...core.node import Node
 from ...operations.operation import columns
+from ...simplification.rounding_growth import error_bounds
 from ...util.explain_failure import explain_failure
-from ..edge_partials import Point, node_values
+from ...util.json_type import Json
+from ..edge_partials import Point, checked
 from ..names import Names
 from .finding import Finding
-
-if TYPE_CHECKING:
-    from ...util.json_type import Json
 
 UNIT = 2.0**-53  # relative error of one rounding
 DIGITS = -math.log10(UNIT)  # 15.95 decimal digits of a float64
@@ -37,20 +35,9 @@ class Rounded:
 
 
 def rounded(names: Names, at: Point) -> Rounded:
-    """Values and error bounds: each input is off by half a unit in the last place, as a decimal number would be.
-
-    An error passes on through the local partials, in absolute value, and each operation adds its own.
-    """
-    graph = names.graph
-    partials = [as_node(each) for node in graph.nodes if node.args for each in node.op.partials(node, *node.args)]
-    numbers = iter(node_values(names, [*graph.nodes, *partials], at))
-    values = {node: next(numbers) for node in graph.nodes}
-    errors: dict[Node, float] = {}
-    for node in graph.nodes:
-        inherited = [_times(next(numbers), errors[arg]) for arg in node.args]
-        own = UNIT * columns(node.op).rounding if node.args else UNIT if node.value is None else 0.0
-        errors[node] = sum(inherited) + own * abs(values[node])
-    return Rounded(values, errors)
+    """Values and error bounds: each input is off by half a unit in the last place, as a decimal number would be."""
+    values, errors = error_bounds(names.graph.nodes, checked(names, at), UNIT, of_inputs=UNIT)
+    return Rounded(*[{node: float(each[node]) for node in names.graph.nodes} for each in (values, errors)])
 
 
 @explain_failure
@@ -105,7 +92,3 @@ def _finding(names: Names, node: Node, found: Rounded, lost: float, left: float)
         "digits_left": left,
     }
     return Finding("cancellation", text, (node,), data=data)
-
-
-def _times(slope: float, error: float) -> float:
-    return abs(slope) * error if error and slope else 0.0

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 from ...core.graph import Edge
 from ...core.node import Node
-
-if TYPE_CHECKING:
-    from ...util.json_type import Json
+from ...util.json_type import Json
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,8 @@ from ...util.words import counted
 from ...writing.networkx_queries import minimum_cut
 from ...writing.source_lines import lines_text
 from ..names import Name, Names, joined
-from ..reachability import ancestors, between, descendants, has_more_ancestors
+from ..paths import best_paths
+from ..reachability import ancestors, between, descendants
 from .finding import Finding
 
 Group = Name | Sequence[Name]
@@ -70,7 +71,7 @@ def _blame(names: Names, inside: list[Node], dependent: list[Node], on: list[Nod
     ]
     starts, ends = [node for node in on if node in allowed], [node for node in dependent if node in allowed]
     cut = minimum_cut(edges, starts, ends)
-    paths = _paths_through(cut, edges, starts, ends)
+    paths = _paths_through(cut, inside, edges, starts, ends)
     pairs = dict.fromkeys([(path[0].source, path[-1].target) for path in paths])
     leaks = [_leak(names, *pair, sources | sinks, function) for pair in pairs]
     through = _derivatives_through(names.graph, paths)
@@ -133,40 +134,15 @@ def _report(
 
 
 def _paths_through(
-    cut: Sequence[Edge], edges: Sequence[Edge], sources: Iterable[Node], sinks: Iterable[Node]
+    cut: Sequence[Edge], nodes: Sequence[Node], edges: Sequence[Edge], sources: Sequence[Node], sinks: Sequence[Node]
 ) -> list[list[Edge]]:
     """For each edge of the cut a shortest path from a source to a sink through it."""
-    before = _breadth_first(edges, sources, 0, 1)
-    after = _breadth_first(edges, sinks, 1, 0)
     paths = []
     for edge in cut:
-        start, end = [], []
-        node = edge.source
-        while (step := before[node]) is not None:
-            start.append(step)
-            node = step.source
-        node = edge.target
-        while (step := after[node]) is not None:
-            end.append(step)
-            node = step.target
-        paths.append([*reversed(start), edge, *end])
+        (before,) = best_paths(nodes, edges, sources, [edge.source], 1)
+        (after,) = best_paths(nodes, edges, [edge.target], sinks, 1)
+        paths.append([*before, edge, *after])
     return paths
-
-
-def _breadth_first(edges: Sequence[Edge], starts: Iterable[Node], near: int, far: int) -> dict[Node, Edge | None]:
-    """The edge by which each node is first met from `starts`, walking from end `near` of an edge to end `far`."""
-    leaving: dict[Node, list[Edge]] = {}
-    for edge in edges:
-        leaving.setdefault(edge[near], []).append(edge)  # type: ignore[arg-type]  # 0 and 1 are the nodes
-    met: dict[Node, Edge | None] = dict.fromkeys(starts)
-    queue = list(met)
-    for node in queue:
-        for edge in leaving.get(node, ()):
-            other: Node = edge[far]  # type: ignore[assignment]
-            if other not in met:
-                met[other] = edge
-                queue.append(other)
-    return met
 
 
 def _leak(names: Names, source: Node, sink: Node, members: set[Node], function: str) -> Leak:
@@ -174,7 +150,7 @@ def _leak(names: Names, source: Node, sink: Node, members: set[Node], function: 
     a, b = names.text(source), names.text(sink)
     gained = f"d{function}/d{b}"
     slope = None
-    if not has_more_ancestors(sink, SLOPE_NODES):
+    if len(ancestors([sink])) <= SLOPE_NODES:
         seeds = {node: constant(0.0) for node in members if node not in (source, sink)} | {source: constant(1.0)}
         slope = tangents(seeds, [sink], Builder()).get(sink)
     text = names.text(slope) if slope is not None else "?"

@@ -5,23 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from ...core.graph import Edge, Graph
 from ...core.node import Node
 from ...util.html_text import html_table, html_text
+from ...util.json_type import Json
 from ...util.require import require_graph, require_mapping, require_sequence
 from ...util.words import counted
 from ..edge_partials import Point
-from ..names import Name, Names
+from ..names import Name, Names, joined
+from ..reachability import ancestors
 from .cancellation import cancellations, rounded
-from .dependence import missing_dependences, unused_inputs
 from .finding import Finding
 from .independence import Group, check_independence
 from .singular import Box, singular_nodes
-
-if TYPE_CHECKING:
-    from ...util.json_type import Json
 
 Pair = tuple[Group, Group]
 
@@ -161,7 +158,7 @@ def lint(
         findings += violations
         proofs += held
     if depends is not None and require_mapping("depends", depends, "output: names"):
-        missing = missing_dependences(known, depends)
+        missing = _missing_dependences(known, depends)
         findings += missing
         if not missing:
             proofs.append("every output depends on what was declared for it.")
@@ -175,7 +172,7 @@ def lint(
         findings += losses
         if not losses:
             proofs.append(_accuracy(known, at, digits))
-    return Lint(graph, tuple(findings), tuple(unused_inputs(known)), tuple(proofs))
+    return Lint(graph, tuple(findings), tuple(_unused_inputs(known)), tuple(proofs))
 
 
 def _pairs(independent: Pair | Sequence[Pair]) -> list[Pair]:
@@ -199,6 +196,33 @@ def _pairs(independent: Pair | Sequence[Pair]) -> list[Pair]:
         if not isinstance(pair, Sequence) or isinstance(pair, str) or len(pair) != 2:
             raise ValueError(f"independent: each entry must be a pair of groups, got {pair!r:.60}")
     return [(first, second) for first, second in pairs]
+
+
+def _unused_inputs(names: Names) -> list[Finding]:
+    """The inputs that no output depends on."""
+    used = set(names.graph.nodes)
+    unused = [node for node in names.graph.inputs if node not in used]
+    called = {node: names.text(node) for node in unused}
+    return [
+        Finding("unused input", f"Nothing uses the input {name}.", (node,), data={"input": name})
+        for node, name in called.items()
+    ]
+
+
+def _missing_dependences(names: Names, depends: Mapping[Name, Name | Sequence[Name]]) -> list[Finding]:
+    """The outputs that do not depend on each of the nodes declared for them."""
+    findings = []
+    for output, declared in depends.items():
+        sink = names.output(output)
+        reached = ancestors([sink])
+        inputs = [names.text(node) for node in names.graph.inputs if node in reached]
+        for node in names.group(declared):
+            if node not in reached:
+                to, origin = names.called(output), names.text(node)
+                text = f"{to} does not depend on {origin}; it is made from {joined(inputs, 12) or 'numbers'}."
+                data = {"output": to, "input": origin, "made_from_inputs": inputs}
+                findings.append(Finding("missing dependence", text, (sink, node), data=data))
+    return findings
 
 
 def _accuracy(names: Names, at: Point, digits: float) -> str:

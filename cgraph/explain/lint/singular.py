@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-import math
 import numbers
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 from ...core.graph import Graph
 from ...core.node import CONSTANT, VARIABLE, Node
 from ...operations.bounds import LINE
 from ...operations.operation import Interval, Op, columns
+from ...util.json_type import Json, json_number
 from ...util.real_arrays import real_number
 from ...util.require import require_mapping
 from ..names import Names
 from .finding import Finding
-
-if TYPE_CHECKING:
-    from ...util.json_type import Json
 
 Box = Mapping[str, float | tuple[float, float]]
 
@@ -72,7 +68,7 @@ def singular_nodes(names: Names, box: Box) -> list[Finding]:
                 "operation": node.op.name,
                 "tags": sorted(node.tags),
                 "reason": reason,
-                "arguments": {name: [_json(end) for end in bound] for name, bound in arguments.items()},
+                "arguments": {name: [json_number(end) for end in bound] for name, bound in arguments.items()},
             }
             text = f"{names.line(node)}: {reason}" + (f"; {within}." if within else ".")
             findings.append(Finding("singular", text, (node,), data=data))
@@ -101,8 +97,3 @@ def _float(name: str, end: float) -> float:
 
 def _shown(bound: Interval) -> str:
     return f"[{bound[0]:.4g}, {bound[1]:.4g}]"
-
-
-def _json(end: float) -> float | None:
-    """JSON has no infinity: None says that there is no bound."""
-    return end if math.isfinite(end) else None

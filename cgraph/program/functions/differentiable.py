@@ -23,7 +23,7 @@ from ...core.node import Node, variable
 from ...util.memory import require_memory, require_target
 from ...util.real_arrays import real_array
 from ...util.require import require_flag
-from ...util.scipy_modules import scipy_sparse
+from ...util.scipy_modules import scipy_module
 from ...util.threads import thread_count
 from ..program import Program
 from ..runners.runner import Runner
@@ -249,7 +249,7 @@ class Differentiable:
         count = threads if type(threads) is int and threads > 0 else thread_count(threads)
         if not require_flag("sparse", sparse):
             return matrix.values(points, dense=True) if points.ndim == 1 else matrix.many(points, True, count)
-        module, (columns, starts) = scipy_sparse("a sparse derivative"), matrix.compressed
+        module, (columns, starts) = scipy_module("sparse", "a sparse derivative"), matrix.compressed
         rows = matrix.many(points, False, count) if points.ndim == 2 else [matrix.values(points, dense=False)]
         found = [module.csr_array((row, columns.copy(), starts.copy()), shape=matrix.entries.shape) for row in rows]
         return found if points.ndim == 2 else found[0]

@@ -16,7 +16,7 @@ from cgraph.extend import Builder, SingularError, building, cotangents, folded, 
 
 from ...equations.accelerations import DENSE_UP_TO
 from ...equations.bias_terms import bias_terms
-from ...equations.constraints.constraints import DenseSolver, constraint_rows
+from ...equations.constraints.constraints import constraint_rows
 from ...equations.substitute import substitute
 from ...integrators import Problem
 from ...systems.arguments import new_variables
@@ -100,8 +100,8 @@ def _eliminated(system: System, rhs: Sequence[Node]) -> list[Node]:
 def _factored(system: System, rhs: Sequence[Node]) -> list[Node]:
     """M^-1 rhs by the factors of the whole M, as short chains are solved."""
     build = Builder()
-    solver = DenseSolver(system, bias_terms(system).lagrangian, constraint_rows(system, []), build, composites=True)
-    return solver.solve(rhs)
+    rows, lagrangian = constraint_rows(system, []), bias_terms(system).lagrangian
+    return rows.solve_densely(system, lagrangian, rhs, build, composites=True)
 
 
 def _more_than(rate: Graph, nodes: Sequence[Node]) -> int:

@@ -12,7 +12,7 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import Array, scipy_integrate
+from cgraph.extend import Array, scipy_module
 
 from ...integrators import Problem
 from ...integrators.step_control import RESOLUTION
@@ -45,7 +45,7 @@ class ScipySolver:
 
 def scipy_solver(problem: Problem, name: str, backend: str) -> ScipySolver:
     """The solver, with the problem's rate and Jacobian compiled. Raises ImportError without SciPy."""
-    integrate = scipy_integrate(f"method {SCIPY + name!r}")
+    integrate = scipy_module("integrate", f"method {SCIPY + name!r}")
     rate = cg.compile(problem.rate, backend)
     jacobian: dict[str, Any] = {}
     if name in IMPLICIT:
@@ -190,4 +190,4 @@ def _inside(times: Array, t_old: float, t: float) -> bool:
 
 def solve_ivp() -> Any:
     """SciPy's `solve_ivp` itself, to compare with. Raises ImportError without SciPy."""
-    return scipy_integrate("solve_ivp").solve_ivp
+    return scipy_module("integrate", "solve_ivp").solve_ivp

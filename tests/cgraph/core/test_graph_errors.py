@@ -1,7 +1,6 @@
 """A graph, its nodes and its values say what is wrong with them."""
 
 import math
-import re
 import time
 from dataclasses import FrozenInstanceError, replace
 
@@ -27,48 +26,79 @@ def test_graph_error_is_a_value_error():
     assert issubclass(GraphError, ValueError)
 
 
-def test_a_free_variable_is_named():
-    with pytest.raises(GraphError, match=r"'y', 'z'.*\(x\)"):
-        cg.Graph([x], {"f": x * z + y})
+GRAPH = cg.Graph([x, y], {"f": x + y})
 
 
-def test_a_repeated_input_is_named():
-    with pytest.raises(GraphError, match="'x' is listed more than once"):
-        cg.Graph([x, y, x], {"f": x})
+def evaluated(value: object) -> object:
+    return GRAPH.evaluate({"x": value, "y": 1.0})
 
 
-@pytest.mark.parametrize("wrong", [2.0, "x", x + y, cg.constant(1.0), None])
-def test_an_input_that_is_not_a_variable_is_an_error(wrong):
-    with pytest.raises(TypeError, match="must be a variable"):
-        cg.Graph([x, wrong], {"f": x})
+# {what is refused: (call of one wrong thing, the wrong things, the error, what it says)}
+REFUSED = {
+    "a free variable": (lambda node: cg.Graph([x], {"f": node}), [x * z + y], GraphError, r"'y', 'z'.*\(x\)"),
+    "a repeated input": (
+        lambda inputs: cg.Graph(inputs, {"f": x}), [[x, y, x]], GraphError, "'x' is listed more than once"
+    ),
+    "an input that is no variable": (
+        lambda wrong: cg.Graph([x, wrong], {"f": x}), [2.0, "x", x + y, cg.constant(1.0), None], TypeError,
+        "must be a variable",
+    ),
+    "a single node for inputs": (lambda node: cg.Graph(node, {"f": node}), [x], TypeError, r"write \[x\]"),
+    "outputs that map nothing": (
+        lambda wrong: cg.Graph([x], wrong), [x, [x], [("f", x)], None, "f"], TypeError,
+        "outputs must map names to nodes",
+    ),
+    "an output that is no node": (
+        lambda wrong: cg.Graph([x], {"f": wrong}), ["x", None, 1j, [x], np.array([1.0, 2.0])], TypeError, "output 'f'"
+    ),
+    "an output without a name": (
+        lambda wrong: cg.Graph([x], {wrong: x}), ["", 1, None, x], (TypeError, ValueError), "the name of an output must"
+    ),
+    "a graph without outputs": (lambda outputs: cg.Graph([x], outputs), [{}], GraphError, "at least one output"),
+    "a missing value": (GRAPH.evaluate, [{"x": 1.0}], GraphError, r"no value for input '?y"),
+    "an unknown value": (
+        GRAPH.evaluate, [{"x": 1.0, "y": 1.0, "w": 1.0}], GraphError, r"no input '?w'? \(it has x, y\)"
+    ),
+    "shapes that do not broadcast": (
+        GRAPH.evaluate, [{"x": np.ones(2), "y": np.ones(3)}], GraphError, r"x \(2,\), y \(3,\)"
+    ),
+    "a value that is not real": (
+        evaluated, [1j, np.ones(2) * 1j, "1.0", None, np.array(["a"]), [None], x, object()], TypeError,
+        "input 'x' must be real numbers, got",
+    ),
+    "a constant that is NaN": (
+        cg.constant, [math.nan, np.nan, np.float32("nan"), np.array(math.nan)], ValueError, "NaN"
+    ),
+    "a factor that is NaN": (
+        lambda nan: x * nan, [math.nan, np.nan, np.float32("nan"), np.array(math.nan)], ValueError, "NaN"
+    ),
+    "a constant that is not real": (cg.constant, [1j, "1", None, [1.0], np.complex128(1)], TypeError, "real number"),
+    "a variable with white space": (cg.variable, ["", "a b", " a"], ValueError, "name"),
+    "a variable without a name": (cg.variable, [1], TypeError, "name"),
+    "the truth of a node": (bool, [x < y], TypeError, r"cg\.where"),
+    "the number of a node": (float, [x], TypeError, "evaluate"),
+    "a change of a row": (lambda n: setattr(OPS["add"], "arity", n), [3], FrozenInstanceError, "arity"),
+    "too few arguments": (cg.atan2, [x], TypeError, r"atan2 takes 2 argument\(s\), got 1"),
+    "two outputs for one": (
+        lambda transform: transform(cg.Graph([x], {"f": x, "g": x})), [cg.gradient, cg.hessian], GraphError,
+        "got 2: f, g",
+    ),
+    **{
+        f"{transform.__name__} by what is no input": (
+            lambda wrong, transform=transform: transform(GRAPH, wrong), ["w", ["x", "w"], z, [x, z]], GraphError,
+            r"no input '?[wz]'? \(it has x, y\)",
+        )
+        for transform in (cg.jvp, cg.vjp, cg.gradient, cg.jacobian, cg.hessian)
+    },
+}  # fmt: skip
 
 
-def test_a_single_node_for_inputs_is_an_error():
-    with pytest.raises(TypeError, match=r"write \[x\]"):
-        cg.Graph(x, {"f": x})
-
-
-@pytest.mark.parametrize("wrong", [x, [x], [("f", x)], None, "f"])
-def test_outputs_that_do_not_map_names_to_nodes_are_an_error(wrong):
-    with pytest.raises(TypeError, match="outputs must map names to nodes"):
-        cg.Graph([x], wrong)
-
-
-@pytest.mark.parametrize("wrong", ["x", None, 1j, [x], np.array([1.0, 2.0])])
-def test_an_output_that_is_not_a_node_is_named(wrong):
-    with pytest.raises(TypeError, match="output 'f'"):
-        cg.Graph([x], {"f": wrong})
-
-
-@pytest.mark.parametrize("wrong", ["", 1, None, x])
-def test_an_output_needs_a_name(wrong):
-    with pytest.raises((TypeError, ValueError), match="the name of an output must"):
-        cg.Graph([x], {wrong: x})
-
-
-def test_a_graph_needs_an_output():
-    with pytest.raises(GraphError, match="at least one output"):
-        cg.Graph([x], {})
+@pytest.mark.parametrize("what", REFUSED)
+def test_what_is_wrong_is_told(what):
+    call, wrongs, error, words = REFUSED[what]
+    for wrong in wrongs:
+        with pytest.raises(error, match=words):
+            call(wrong)
 
 
 def test_an_output_may_be_a_number_or_an_input_or_shared():
@@ -76,35 +106,11 @@ def test_an_output_may_be_a_number_or_an_input_or_shared():
     assert graph.evaluate({"x": 3.0}) == {"one": 1.0, "same": 3.0, "again": 3.0}
 
 
-GRAPH = cg.Graph([x, y], {"f": x + y})
-
-
-def test_a_missing_value_is_named():
-    with pytest.raises(GraphError, match=r"no value for input '?y"):
-        GRAPH.evaluate({"x": 1.0})
-
-
-def test_an_unknown_value_is_named():
-    with pytest.raises(GraphError, match=r"no input '?w'? \(it has x, y\)"):
-        GRAPH.evaluate({"x": 1.0, "y": 1.0, "w": 1.0})
-
-
-def test_shapes_that_do_not_broadcast_are_listed():
-    with pytest.raises(GraphError, match=r"x \(2,\), y \(3,\)"):
-        GRAPH.evaluate({"x": np.ones(2), "y": np.ones(3)})
-
-
-@pytest.mark.parametrize("wrong", [1j, np.ones(2) * 1j, "1.0", None, np.array(["a"]), [None], x, object()])
-def test_a_value_that_is_not_real_is_an_error(wrong):
-    with pytest.raises(TypeError, match="input 'x' must be real numbers, got"):
-        GRAPH.evaluate({"x": wrong, "y": 1.0})
-
-
-@pytest.mark.parametrize("value", [2, np.int8(2), np.float32(2), np.array(2.0), np.uint64(2)])
-def test_any_real_number_is_a_value_and_gives_a_float(value):
-    result = GRAPH.evaluate({"x": value, "y": 1})["f"]
-    assert result == 3.0
-    assert type(result) is float
+def test_any_real_number_is_a_value_and_gives_a_float():
+    for value in (2, np.int8(2), np.float32(2), np.array(2.0), np.uint64(2)):
+        result = GRAPH.evaluate({"x": value, "y": 1})["f"]
+        assert result == 3.0
+        assert type(result) is float
 
 
 def test_arrays_broadcast_to_one_shape_and_to_float64():
@@ -132,28 +138,6 @@ def test_out_of_domain_gives_nan_and_raises_nothing():
     assert results[1]["g"].tolist() == [-1.0, math.inf]
 
 
-@pytest.mark.parametrize("nan", [math.nan, np.nan, np.float32("nan"), np.array(math.nan)])
-def test_nan_is_not_a_constant(nan):
-    with pytest.raises(ValueError, match="NaN"):
-        cg.constant(nan)
-    with pytest.raises(ValueError, match="NaN"):
-        x * nan
-
-
-@pytest.mark.parametrize("wrong", [1j, "1", None, [1.0], np.complex128(1)])
-def test_a_constant_must_be_real(wrong):
-    with pytest.raises(TypeError, match="real number"):
-        cg.constant(wrong)
-
-
-@pytest.mark.parametrize(
-    ("wrong", "error"), [("", ValueError), ("a b", ValueError), (" a", ValueError), (1, TypeError)]
-)
-def test_a_variable_needs_a_name_without_white_space(wrong, error):
-    with pytest.raises(error, match="name"):
-        cg.variable(wrong)
-
-
 def test_equal_leaves_are_one_node():
     assert cg.variable("x") is x
     assert cg.variables("x, y") == [x, y]
@@ -161,11 +145,7 @@ def test_equal_leaves_are_one_node():
     assert cg.constant(0.0) is not cg.constant(-0.0)
 
 
-def test_a_node_has_no_truth_value_and_no_number():
-    with pytest.raises(TypeError, match=r"cg\.where"):
-        bool(x < y)
-    with pytest.raises(TypeError, match="evaluate"):
-        float(x)
+def test_a_constant_is_a_number():
     assert float(cg.constant(2.5)) == 2.5
 
 
@@ -176,36 +156,13 @@ def test_nodes_compare_by_identity():
 
 
 @pytest.mark.parametrize("name", ["op", "args", "value", "name", "label", "new"])
-@pytest.mark.parametrize("change", [lambda node, name: setattr(node, name, None), delattr], ids=["set", "delete"])
-def test_a_node_cannot_be_changed(name, change):
+def test_a_node_cannot_be_changed(name):
     node = x + y
     with pytest.raises(AttributeError, match="immutable"):
-        change(node, name)
+        setattr(node, name, None)
+    with pytest.raises(AttributeError, match="immutable"):
+        delattr(node, name)
     assert (node.op, node.args) == (OPS["add"], (x, y))
-
-
-def test_a_row_of_the_table_cannot_be_changed():
-    with pytest.raises(FrozenInstanceError):
-        OPS["add"].arity = 3
-
-
-def test_a_wrong_number_of_arguments_is_an_error():
-    with pytest.raises(TypeError, match=r"atan2 takes 2 argument\(s\), got 1"):
-        cg.atan2(x)
-
-
-def test_transforms_of_one_output_refuse_several():
-    graph = cg.Graph([x], {"f": x, "g": x})
-    for transform in (cg.gradient, cg.hessian):
-        with pytest.raises(GraphError, match=re.escape("got 2: f, g")):
-            transform(graph)
-
-
-@pytest.mark.parametrize("transform", [cg.jvp, cg.vjp, cg.gradient, cg.jacobian, cg.hessian])
-@pytest.mark.parametrize("wrong", ["w", ["x", "w"], z, [x, z]])
-def test_wrt_must_be_inputs(transform, wrong):
-    with pytest.raises(GraphError, match=r"no input '?[wz]'? \(it has x, y\)"):
-        transform(GRAPH, wrong)
 
 
 def test_a_forged_cycle_is_found_by_the_constructor_and_by_check():

@@ -134,13 +134,12 @@ BRANCHES = (
 )
 
 
-@pytest.mark.parametrize("order", [1, 2, 3])
 @pytest.mark.parametrize("branch", [pytest.param(branch, id=branch.name) for branch in BRANCHES])
-def test_what_is_not_taken_does_not_reach_a_derivative(branch, order):
-    found = derivatives(branch.function, branch.x)[("first", "second", "third")[order - 1]]
-    with mp.workdps(50):
-        expected = float(mpmath.diff(branch.taken, mpf(branch.x), order))
-    assert found == pytest.approx([expected] * len(found), rel=TOLERANCE, abs=TOLERANCE)
+def test_what_is_not_taken_does_not_reach_a_derivative(branch):
+    for order, found in enumerate(derivatives(branch.function, branch.x).values(), 1):
+        with mp.workdps(50):
+            expected = float(mpmath.diff(branch.taken, mpf(branch.x), order))
+        assert found == pytest.approx([expected] * len(found), rel=TOLERANCE, abs=TOLERANCE)
 
 
 def test_nan_in_an_operand_of_minimum_is_the_value_as_in_numpy():
@@ -190,24 +189,27 @@ def test_the_mixed_second_derivative_of_a_power_at_zero_is_finite():
     assert hessian == {"d2f/dxdx": 0.0, "d2f/dxdy": 0.0, "d2f/dydx": 0.0, "d2f/dydy": 0.0}
 
 
-@pytest.mark.parametrize("base", [-2.0, -0.5])
 @pytest.mark.parametrize("exponent", [2.0, 3.0, -1.0, 5.0])
-def test_integer_powers_of_negative_numbers_have_derivatives(base, exponent):
-    found = derivatives(lambda x: x**exponent, base)
-    for order, name in enumerate(("first", "second"), 1):
-        expected = float(high_precision.partial(lambda x: x ** int(exponent), [base], [order]))
-        assert found[name] == pytest.approx([expected] * len(found[name]), rel=TOLERANCE)
+def test_integer_powers_of_negative_numbers_have_derivatives(exponent):
+    for base in (-2.0, -0.5):
+        found = derivatives(lambda x: x**exponent, base)
+        for order, name in enumerate(("first", "second"), 1):
+            expected = float(high_precision.partial(lambda x: x ** int(exponent), [base], [order]))
+            assert found[name] == pytest.approx([expected] * len(found[name]), rel=TOLERANCE)
 
 
 EXTREMES = (1e-200, -1e-200, 1e200, -1e200, 1e-310, 1.0)
 
 
-@pytest.mark.parametrize("b", EXTREMES)
 @pytest.mark.parametrize("a", EXTREMES)
-def test_partials_of_atan2_and_hypot_neither_overflow_nor_underflow_early(a, b):
+def test_partials_of_atan2_and_hypot_neither_overflow_nor_underflow_early(a):
     x, y = cg.variables("x y")
-    graph = cg.Graph([x, y], {"angle": cg.atan2(x, y), "length": cg.hypot(x, y)})
-    found = cg.jacobian(graph).evaluate({"x": a, "y": b})
+    jacobian = cg.jacobian(cg.Graph([x, y], {"angle": cg.atan2(x, y), "length": cg.hypot(x, y)}))
+    for b in EXTREMES:
+        assert_partials_of_angle_and_length(jacobian.evaluate({"x": a, "y": b}), a, b)
+
+
+def assert_partials_of_angle_and_length(found: dict[str, float], a: float, b: float) -> None:
     with mp.workdps(50):
         s = mpf(a) ** 2 + mpf(b) ** 2
         expected = {
@@ -292,10 +294,10 @@ def test_a_zero_factor_as_written_follows_ieee():
     assert cg.gradient(graph).evaluate({"x": 3.0}) == {"df/dx": 0.0}
 
 
-@pytest.mark.parametrize("x", [-30.0, -1e-300, 1e-300, 1e-9, 8.0, 30.0])
 @pytest.mark.parametrize("name", ["tanh", "atan", "expm1", "exp", "sinh", "cosh", "tan", "sin", "cos"])
-def test_partials_are_accurate_far_out_and_near_zero(name, x):
+def test_partials_are_accurate_far_out_and_near_zero(name):
     """To a rounding of the larger of the derivative and 1: the slope of tanh is lost where tanh is 1."""
-    (found,) = set(derivatives(lambda node: getattr(cg, name)(node), x)["first"])
-    expected = high_precision.partial(high_precision.OPERATIONS[name], [x], [1])
-    assert abs(mpf(found) - expected) <= TOLERANCE * max(1, abs(expected))
+    for x in (-30.0, -1e-300, 1e-300, 1e-9, 8.0, 30.0):
+        (found,) = set(derivatives(getattr(cg, name), x)["first"])
+        expected = high_precision.partial(high_precision.OPERATIONS[name], [x], [1])
+        assert abs(mpf(found) - expected) <= TOLERANCE * max(1, abs(expected)), x

@@ -27,10 +27,10 @@ def rows(block: str) -> list[str]:
     return [line.removesuffix(r" \\") for line in lines]
 
 
-@pytest.mark.parametrize("op", [op for op in OPS.values() if op.arity])
-def test_every_operation_has_a_formula_that_can_be_read(op) -> None:
-    parses(cg.latex(cg.Node(op, (A, B, C)[: op.arity])))
-    parses(cg.latex(cg.Node(op, (-(A + B), A * -2.0, A / B)[: op.arity])))
+def test_every_operation_has_a_formula_that_can_be_read() -> None:
+    for op in OPS.values():
+        parses(cg.latex(cg.Node(op, (A, B, C)[: op.arity])))
+        parses(cg.latex(cg.Node(op, (-(A + B), A * -2.0, A / B)[: op.arity])))
 
 
 def value(block: str, **at: float) -> dict[str, float]:

@@ -105,35 +105,30 @@ def apart(found: float, expected: float, ulps: float = ULPS) -> bool:
     return abs(found - expected) > ulps * np.spacing(abs(expected))
 
 
-@pytest.mark.parametrize("op", ROWS)
-def test_samples_have_as_many_numbers_as_the_operation_has_arguments(op):
+def samples_have_as_many_numbers_as_the_operation_has_arguments(op: Op) -> None:
     assert op.samples
     assert {len(sample) for sample in op.samples} == {op.arity} == {len(op.domain)}
 
 
-@pytest.mark.parametrize("op", ROWS)
-def test_there_is_one_partial_for_each_argument(op):
+def there_is_one_partial_for_each_argument(op: Op) -> None:
     graph = graph_of(op)
     (node,) = graph.outputs.values()
     assert len(op.partials(node, *node.args)) == op.arity == len(graph.edges)
 
 
-@pytest.mark.parametrize("op", ROWS)
-def test_value_is_that_of_mpmath(op):
+def value_is_that_of_mpmath(op: Op) -> None:
     for point in points(op):
         (found,) = at(graph_of(op), *point)
         expected = float(high_precision.OPERATIONS[op.name](*map(mpf, point)))
         assert not apart(found, expected, ulps=2), point
 
 
-@pytest.mark.parametrize("op", ROWS)
-def test_derivatives_are_those_of_mpmath_in_every_mode(op):
+def derivatives_are_those_of_mpmath_in_every_mode(op: Op) -> None:
     for point in points(op):
         assert wrong_derivatives(op, point) == []
 
 
-@pytest.mark.parametrize("op", ROWS)
-def test_vjp_is_linear_in_its_cotangent_and_jvp_in_its_tangents(op):
+def vjp_is_linear_in_its_cotangent_and_jvp_in_its_tangents(op: Op) -> None:
     graph, point = graph_of(op), op.samples[0]
     one, many = at(cg.vjp(graph), *point, 1.0), at(cg.vjp(graph), *point, -2.5)
     assert all(map(close, many, [-2.5 * bar for bar in one]))
@@ -142,8 +137,7 @@ def test_vjp_is_linear_in_its_cotangent_and_jvp_in_its_tangents(op):
     assert close(together, sum(w * at(cg.jvp(graph), *point, *unit(op.arity, i))[0] for i, w in enumerate(weights)))
 
 
-@pytest.mark.parametrize("op", ROWS)
-def test_arrays_have_the_values_of_floats(op):
+def arrays_have_the_values_of_floats(op: Op) -> None:
     graph = graph_of(op)
     rows = points(op)
     columns = [np.array(column) for column in zip(*rows, strict=True)]
@@ -173,21 +167,8 @@ NUMPY: dict[str, Callable[..., float]] = {op.name: getattr(np, op.name, op.array
     "round": np.rint,
     "zero_safe_mul": lambda a, b: 0.0 if 0.0 in (a, b) else a * b,
 }
-POSITIVE_SPECIALS = (
-    0.0,
-    5e-324,
-    1e-310,
-    2.2250738585072014e-308,
-    1e-20,
-    0.5,
-    1.0,
-    2.0,
-    3.0,
-    711.0,
-    1e20,
-    1e308,
-    math.inf,
-)
+POSITIVE_SPECIALS = (0.0, 5e-324, 1e-310, 2.2250738585072014e-308, 1e-20, 0.5, 1.0, 2.0, 3.0, 711.0, 1e20, 1e308)
+POSITIVE_SPECIALS += (math.inf,)
 SPECIALS = (math.nan, *POSITIVE_SPECIALS, *(-value for value in POSITIVE_SPECIALS))
 ZERO_SIGN_IS_OPEN = {"minimum", "maximum", "zero_safe_mul"}  # IEEE 754 lets min(0, -0) be either
 
@@ -204,8 +185,7 @@ def same_special(op: Op, found: float, expected: float) -> bool:
     return not signed or math.copysign(1.0, found) == math.copysign(1.0, expected)
 
 
-@pytest.mark.parametrize("op", ROWS)
-def test_specials_are_those_of_numpy(op):
+def specials_are_those_of_numpy(op: Op) -> None:
     graph = graph_of(op)
     with np.errstate(all="ignore"):
         different = [
@@ -217,8 +197,7 @@ def test_specials_are_those_of_numpy(op):
     assert different == []
 
 
-@pytest.mark.parametrize("op", ROWS)
-def test_specials_in_arrays_are_those_of_floats(op):
+def specials_in_arrays_are_those_of_floats(op: Op) -> None:
     graph = graph_of(op)
     rows = specials(op)
     (together,) = at(graph, *(np.array(column) for column in zip(*rows, strict=True)))
@@ -243,6 +222,24 @@ def test_a_constant_exponent_gives_arrays_the_values_of_floats(exponent):
         if not same_special(OPS["pow"], each, alone)
     ]
     assert different == []
+
+
+PROPERTIES = (
+    samples_have_as_many_numbers_as_the_operation_has_arguments,
+    there_is_one_partial_for_each_argument,
+    value_is_that_of_mpmath,
+    derivatives_are_those_of_mpmath_in_every_mode,
+    vjp_is_linear_in_its_cotangent_and_jvp_in_its_tangents,
+    arrays_have_the_values_of_floats,
+    specials_are_those_of_numpy,
+    specials_in_arrays_are_those_of_floats,
+)
+
+
+@pytest.mark.parametrize("op", ROWS)
+def test_a_row_of_the_table_has_every_property(op):
+    for holds in PROPERTIES:
+        holds(op)
 
 
 # Test the tests: a wrong rule is seen, whichever part of it is wrong.

@@ -181,6 +181,10 @@ def test_a_name_is_kept_by_listings_and_inlining():
 def test_a_name_is_kept_by_simplify():
     twice = cg.Graph([x, y], {"f": cg.sin(x * y) + cg.exp(cg.with_name(x * y, "K"))})
     assert "K" in {node.name for node in cg.simplify(twice).nodes}
+    first, other = cg.with_name(x * y, "K"), cg.with_name(x * y, "J")
+    for after in (other, x * y):  # of equal nodes the first name stays
+        merged = cg.simplify(cg.Graph([x, y], {"f": cg.sin(first) + cg.exp(after)}))
+        assert [node.name for node in merged.nodes if node.op.name == "mul"] == ["K"]
 
 
 def tagged_chain(n: int) -> cg.Graph:

@@ -19,9 +19,13 @@ def partial_sums(terms, signs):
     return result
 
 
-@pytest.mark.parametrize("signs", ["+", "-", "~", "+-", "+~-"])
 @pytest.mark.parametrize("n", [2, 15, 16, 17, 64, 100])
-def test_all_partial_sums_are_those_of_the_terms(n, signs):
+def test_all_partial_sums_are_those_of_the_terms(n):
+    for signs in ("+", "-", "~", "+-", "+~-"):
+        assert_partial_sums(n, signs)
+
+
+def assert_partial_sums(n: int, signs: str) -> None:
     x = cg.variables([f"x{i}" for i in range(n)])
     order = [signs[i % len(signs)] for i in range(n - 1)]
     graph = cg.Graph(x, {f"s{i}": s for i, s in enumerate(partial_sums(x, order))})

@@ -42,14 +42,14 @@ def function(request, monkeypatch):
     return cg.compile(graph(), request.param.partition(" ")[0])
 
 
-@pytest.mark.parametrize("count", [0, 1, 7, 8, 9, 23, 24, 25, 47, 48, 49, 55, 1000])
-def test_the_values_do_not_depend_on_the_number_of_threads(function, count):
-    X = points(count)
-    alone = function.batch(X)
-    for number in (1, 2, 3, 8, None, np.int64(2)):
-        assert function.batch(X, threads=number).tobytes() == alone.tobytes()
-    for column in range(0, count, 7):
-        np.testing.assert_array_almost_equal_nulp(alone[:, column], function(X[:, column]), BATCH_ULPS)
+def test_the_values_do_not_depend_on_the_number_of_threads(function):
+    for count in (0, 1, 7, 8, 9, 23, 24, 25, 47, 48, 49, 55, 1000):
+        X = points(count)
+        alone = function.batch(X)
+        for number in (1, 2, 3, 8, None, np.int64(2)):
+            assert function.batch(X, threads=number).tobytes() == alone.tobytes(), (count, number)
+        for column in range(0, count, 7):
+            np.testing.assert_array_almost_equal_nulp(alone[:, column], function(X[:, column]), BATCH_ULPS)
 
 
 def test_the_block_is_no_matter_to_the_values(function, monkeypatch):
@@ -82,16 +82,16 @@ LAYOUTS = {
 }
 
 
-@pytest.mark.parametrize("layout", LAYOUTS)
-@pytest.mark.parametrize("number", [1, 3])
-def test_the_layout_of_the_points_is_no_matter(function, layout, number):
+def test_the_layout_of_the_points_is_no_matter(function):
     X = points(100)
-    laid_out = LAYOUTS[layout](X)
-    assert np.array_equal(laid_out, X)
-    found, expected = function.batch(laid_out, threads=number), function.batch(X)
-    assert found.tobytes() == function.batch(laid_out).tobytes()
-    # Of columns from right to left, NumPy computes some functions in another way.
-    np.testing.assert_array_almost_equal_nulp(found, expected, 0 if function.backend == "llvm" else BATCH_ULPS)
+    expected = function.batch(X)
+    for layout in LAYOUTS.values():
+        laid_out = layout(X)
+        assert np.array_equal(laid_out, X)
+        found = function.batch(laid_out, threads=3)
+        assert found.tobytes() == function.batch(laid_out).tobytes()
+        # Of columns from right to left, NumPy computes some functions in another way.
+        np.testing.assert_array_almost_equal_nulp(found, expected, 0 if function.backend == "llvm" else BATCH_ULPS)
 
 
 def test_one_row_for_all_columns_and_one_column_for_all(function):

@@ -13,16 +13,12 @@ import dynamics as dyn
 from cgraph import Graph
 from dynamics.multibody.algebra.spatial import from_quaternion
 from dynamics.multibody.joint_coordinates import per_velocity
-from dynamics.peers import PEERS
-from dynamics.peers.case import Case
 from dynamics.peers.pinocchio_model import PinocchioModel
 from dynamics.systems.system import System
 from dynamics.verification.certificate import certify
 from tests.dynamics.models import Array
 
 ROUNDING = 1e-12  # of the largest of its kind, in some hundred sums
-PEER = 1e-14  # of the sums of sizes that an answer comes from
-INSTALLED = [name for name in ("mujoco", "pinocchio") if PEERS[name].installed]
 
 
 def random_tree(seed: int, base: str = "free", most: int = 5) -> dyn.Mechanism:
@@ -69,48 +65,6 @@ def near(a: Array, b: Array) -> bool:
 def test_its_certificate_holds(base: str, seed: int) -> None:
     certificate = certify(random_tree(seed, base, most=2), states=2, seed=seed)
     assert certificate.passed, str(certificate)
-
-
-def errors(mechanism: dyn.Mechanism, seed: int) -> dict[str, float]:
-    """How far the peers are from our graphs at a random state, over the sums of sizes that the answers come from."""
-    n, at = mechanism.system.n, state(mechanism.system, seed, qdd=1, tau=1)
-    rows = {
-        name: np.array([x for key, x in at.items() if key.rstrip("0123456789") == name])
-        for name in ("q", "qd", "qdd", "tau")
-    }
-    ours = {
-        "tau": values(dyn.inverse_dynamics(mechanism), at),
-        "qdd": values(dyn.forward_dynamics(mechanism), at),
-        "M": values(dyn.mass_matrix(mechanism), at).reshape(n, n),
-        "bias": values(dyn.bias(mechanism), at),
-        "recursive": dyn.RecursiveInverseDynamics(mechanism)(rows["q"], rows["qd"], rows["qdd"]),
-    }
-    weight, M = values(dyn.gravity_force(mechanism), at), np.abs(ours["M"])
-    braking = np.abs(np.array(mechanism.system.damping) * rows["qd"])
-    bias = np.abs(weight) + np.abs(ours["bias"] - weight)
-    tau = M @ np.abs(rows["qdd"]) + bias + braking
-    qdd = np.abs(np.linalg.inv(ours["M"])) @ (np.abs(rows["tau"]) + bias + braking)
-    scales = {"tau": tau, "qdd": qdd, "M": M, "bias": tau, "recursive": tau}
-    result = {}
-    for peer in INSTALLED:
-        if peer == "mujoco" and any("axes" in body.joint.kind for body in mechanism.bodies):
-            continue  # which it has not
-        theirs = PEERS[peer].make(Case("tree", mechanism)).quantities(**rows)  # type: ignore[attr-defined]
-        theirs["recursive"] = theirs["tau"]
-        for name, scale in scales.items():
-            result[f"{peer} {name}"] = float(np.abs(ours[name] - theirs[name]).max() / scale.max())
-    return result
-
-
-@mark.skipif(not INSTALLED, reason="neither MuJoCo nor Pinocchio is installed")
-@mark.parametrize("count", [4, param(1000, marks=[mark.slow, mark.timeout(3600)])])
-def test_peers_find_the_same(count: int, record_property: Callable[[str, object], None]) -> None:
-    bases, worst = ["free", "ball", "revolute", "free (body axes)"], dict[str, float]()
-    for seed in range(100, 100 + count):
-        for name, error in errors(random_tree(seed, bases[seed % len(bases)], most=7), seed).items():
-            worst[name] = max(error, worst.get(name, 0.0))
-    record_property("worst", worst)
-    assert max(worst.values()) <= PEER, worst
 
 
 @mark.parametrize("count", [3, param(60, marks=[mark.slow, mark.timeout(600)])])

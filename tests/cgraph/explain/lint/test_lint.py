@@ -36,7 +36,7 @@ def state(n: int) -> tuple[str, str]:
 
 
 @pytest.mark.parametrize("simplify", [True, False])
-@pytest.mark.parametrize("n", range(1, 11))
+@pytest.mark.parametrize("n", [1, 2, 4, 9])
 def test_by_definition_the_blame_is_one_edge_for_each_joint(n, simplify):
     graph = dyn.inverse_dynamics(arm(n), "euler_embedded", simplify=simplify)
     found = lint(graph, independent=state(n), function="L")
@@ -268,45 +268,44 @@ def test_every_value_of_a_graph_in_a_box_lies_within_its_bounds_and_no_slope_is_
         assert all(math.isfinite(slope) for slope in slopes.evaluate(at).values())
 
 
-@pytest.mark.parametrize(
-    ("node", "box", "reason"),
-    [
-        (cg.sqrt(x), (0.0, 1.0), "the slope is infinite at 0"),
-        (cg.sqrt(x), (-1.0, 1.0), "there is no value below 0"),
-        (cg.sqrt(x), (1e-300, 1.0), None),
-        (cg.sqrt(x * x + y * y), (-1.0, 1.0), "the slope is infinite at 0"),
-        (cg.sqrt(x * x + 1.0), (-1.0, 1.0), None),
-        (1.0 / x, (-1.0, 2.0), "the divisor can be 0"),
-        (1.0 / x, (0.5, 2.0), None),
-        (1.0 / (2.0 + cg.cos(x)), (-100.0, 100.0), None),
-        (cg.log(x), (0.0, 1.0), "value and slope are infinite at 0"),
-        (cg.log(cg.exp(x)), (-5.0, 5.0), None),
-        (cg.log1p(x), (-1.0, 1.0), "value and slope are infinite at -1"),
-        (cg.tan(x), (1.5, 1.6), "infinite at odd multiples of pi/2"),
-        (cg.tan(x), (-1.5, 1.5), None),
-        (cg.asin(x), (0.0, 1.0), "the slope is infinite at -1 and 1"),
-        (cg.acos(x), (0.0, 2.0), "there is no value beyond -1 and 1"),
-        (cg.asin(x), (-0.9, 0.9), None),
-        (cg.atan2(y, x), (-1.0, 1.0), "the slope is unbounded where both arguments are 0"),
-        (cg.atan2(y + 2.0, x), (-1.0, 1.0), None),
-        (cg.hypot(x, y), (-1.0, 1.0), "there is no slope where both arguments are 0"),
-        (cg.hypot(x, y + 2.0), (-1.0, 1.0), None),
-        (x**2, (-1.0, 1.0), None),
-        (x**-2, (-1.0, 1.0), "the base can be 0 under a negative power"),
-        (x**-2, (0.1, 1.0), None),
-        (x**0.5, (0.0, 1.0), "the slope is infinite where the base is 0"),
-        (x**1.5, (0.0, 1.0), None),
-        (x**1.5, (-1.0, 1.0), "there is no value at a negative base"),
-    ],
+POINTS = (
+    (cg.sqrt(x), (0.0, 1.0), "the slope is infinite at 0"),
+    (cg.sqrt(x), (-1.0, 1.0), "there is no value below 0"),
+    (cg.sqrt(x), (1e-300, 1.0), None),
+    (cg.sqrt(x * x + y * y), (-1.0, 1.0), "the slope is infinite at 0"),
+    (cg.sqrt(x * x + 1.0), (-1.0, 1.0), None),
+    (1.0 / x, (-1.0, 2.0), "the divisor can be 0"),
+    (1.0 / x, (0.5, 2.0), None),
+    (1.0 / (2.0 + cg.cos(x)), (-100.0, 100.0), None),
+    (cg.log(x), (0.0, 1.0), "value and slope are infinite at 0"),
+    (cg.log(cg.exp(x)), (-5.0, 5.0), None),
+    (cg.log1p(x), (-1.0, 1.0), "value and slope are infinite at -1"),
+    (cg.tan(x), (1.5, 1.6), "infinite at odd multiples of pi/2"),
+    (cg.tan(x), (-1.5, 1.5), None),
+    (cg.asin(x), (0.0, 1.0), "the slope is infinite at -1 and 1"),
+    (cg.acos(x), (0.0, 2.0), "there is no value beyond -1 and 1"),
+    (cg.asin(x), (-0.9, 0.9), None),
+    (cg.atan2(y, x), (-1.0, 1.0), "the slope is unbounded where both arguments are 0"),
+    (cg.atan2(y + 2.0, x), (-1.0, 1.0), None),
+    (cg.hypot(x, y), (-1.0, 1.0), "there is no slope where both arguments are 0"),
+    (cg.hypot(x, y + 2.0), (-1.0, 1.0), None),
+    (x**2, (-1.0, 1.0), None),
+    (x**-2, (-1.0, 1.0), "the base can be 0 under a negative power"),
+    (x**-2, (0.1, 1.0), None),
+    (x**0.5, (0.0, 1.0), "the slope is infinite where the base is 0"),
+    (x**1.5, (0.0, 1.0), None),
+    (x**1.5, (-1.0, 1.0), "there is no value at a negative base"),
 )
-def test_singular_points_in_a_box_are_found_and_others_are_not(node, box, reason):
-    graph = cg.Graph([x, y], {"f": node})
-    found = lint(graph, box={"x": box, "y": box})
-    assert found.ok is (reason is None)
-    if reason is not None:
-        (finding,) = found.findings
-        assert reason in str(finding)
-        assert finding.nodes == (node,)
+
+
+def test_singular_points_in_a_box_are_found_and_others_are_not():
+    for node, box, reason in POINTS:
+        found = lint(cg.Graph([x, y], {"f": node}), box={"x": box, "y": box})
+        assert found.ok is (reason is None)
+        if reason is not None:
+            (finding,) = found.findings
+            assert reason in str(finding)
+            assert finding.nodes == (node,)
 
 
 def test_a_finding_in_a_box_tells_the_arguments_and_the_tags():
