@@ -53,7 +53,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _command(arguments: Sequence[str] | None) -> int:
     from .commands.arguments import show_warnings  # here, where a signal is awaited: with all else it takes a second
-    from .commands.parser import parse
+    from .commands.command import parse
 
     options = parse(arguments)
     with show_warnings():

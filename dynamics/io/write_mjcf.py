@@ -16,8 +16,7 @@ from ..multibody.joints import AxialJoint
 from ..multibody.mechanism import WORLD, Body, Mechanism, MechanismError, require_mechanism
 from ..systems.model import Model
 from .stand_ins import ROUNDING, with_stand_ins
-from .write_loops import equality_lines, site_lines
-from .xml_numbers import numbers
+from .write_loops import equality_lines, numbers, site_lines
 
 
 def to_mjcf(model: Model, timestep: float = 1e-3) -> str:

@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cgraph.extend import Array, html_lines, html_table
-
-if TYPE_CHECKING:
-    from cgraph.extend import Json
+from cgraph.extend import Array, Json, html_lines, html_table
 
 
 @dataclass(frozen=True)

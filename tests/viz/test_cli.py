@@ -23,7 +23,7 @@ from dynamics.scenes import scenes as registry
 from tests.slow import slow
 from viz import cli
 from viz.commands.arguments import FORMULATIONS, IN_PYTHON
-from viz.commands.parser import COMMANDS, complete, parse
+from viz.commands.command import COMMANDS, complete, parse
 
 
 def run(*arguments: str, cwd=None) -> subprocess.CompletedProcess[str]:

@@ -11,8 +11,7 @@ import numpy as np
 
 from cgraph.extend import Array
 
-from .canvas import RATE, Canvas, Point
-from .colors import DARK, LIGHT, Colors
+from .canvas import DARK, LIGHT, RATE, Canvas, Colors, Point
 
 SIDE, TITLE, CLOCK, MARGIN = 340, 30, 26, 14  # pixels: of a panel, its title, the time below, and around
 SIZE, SMALL = 14, 12  # of letters

@@ -5,11 +5,11 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import cgraph as cg
 import dynamics as dyn
 from cgraph import extend
+from cgraph.extend import Json
 
 from . import library
 from .arguments import (
@@ -17,6 +17,7 @@ from .arguments import (
     MOMENTUM_FORM,
     answer_and_draw,
     check_picture,
+    filled,
     may_draw_and_print,
     scene_of,
     state_names,
@@ -24,11 +25,7 @@ from .arguments import (
     unless_json,
 )
 from .command import Command
-from .point_arguments import filled
 from .sizes import size_data, size_table
-
-if TYPE_CHECKING:
-    from cgraph.extend import Json
 
 
 def add(parser: Command) -> None:

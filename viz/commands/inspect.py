@@ -8,9 +8,8 @@ from pathlib import Path
 from cgraph import extend
 
 from . import library
-from .arguments import MOMENTUM_FORM, answer, positive, say, takes_a_scene, unless_json
+from .arguments import MOMENTUM_FORM, answer, positive, say, started, takes_a_scene, takes_a_start, unless_json
 from .command import Command
-from .point_arguments import started, takes_a_start
 
 LONGEST = 1000.0  # s: seconds of work for an arm of ten links
 

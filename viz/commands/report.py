@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import shutil
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,11 +12,11 @@ from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 import dynamics as dyn
+from cgraph import extend
 
-from . import library, pruning_report, stability_report
-from .arguments import IN_PYTHON, READING, answer, number, positive, reading, reads_files, say, unless_json
+from . import library
+from .arguments import IN_PYTHON, READING, answer, number, positive, reading, reads_files, say, start, unless_json
 from .command import Command
-from .point_arguments import start
 
 CURVES, STABILITY, PRUNING, COMPARE = "a report of run times", "--stability", "--pruning", "--compare"
 
@@ -95,8 +96,8 @@ def run(options: argparse.Namespace) -> int | None:
             raise ValueError(f"--{name.replace('_', '-')} goes with {' or '.join(with_these)}, not with {kind}")
     runs: dict[str, Callable[[argparse.Namespace], int | None]] = {
         CURVES: _curves,
-        STABILITY: stability_report.run,
-        PRUNING: pruning_report.run,
+        STABILITY: _stability,
+        PRUNING: _pruning,
         COMPARE: _comparisons,
     }
     if options.out is not None:
@@ -192,3 +193,63 @@ def _measured(
             points = sum(len(each.points) for each in report.curves)
             lines.append(f"{[*written][-1]}: {len(report.curves)} integrators, {points} points")
     return found, lines, files
+
+
+NAME = "stability"  # of the files
+
+
+def _stability(options: argparse.Namespace) -> int:
+    """Write the page and print the table; 1 for a row beyond its bound without a known reason."""
+    if options.out is not None:
+        library.check_can_plot()
+    begin = time.perf_counter()
+    found = library.stability.run(options.quick, say)
+    content = library.stability.to_dict(found, time.perf_counter() - begin, options.quick)
+    files: dict[Path, str | bytes] = {}
+    text = library.stability.text(found)
+    if options.out is not None:
+        files |= library.document_files(
+            options.out, NAME, library.stability_page.document(content), content, library.stability.to_csv(found)
+        )
+        text = f"{text}\n{[*files][-1]}"
+    answer(unless_json(options, content, text), files, folder=options.out)
+    unexplained = [f"{each.case} by {each.method}" for each in found if not each.explained]
+    if unexplained:
+        say(f"beyond its bound without a known reason: {', '.join(unexplained)}")
+    return 1 if unexplained else 0
+
+
+def _pruning(options: argparse.Namespace) -> None:
+    """Write a page for each scene."""
+    without = [each for each in (options.without or "").split(",") if each]
+    if unknown := [each for each in without if each not in dyn.EFFECTS]:
+        raise ValueError(f"effects are {', '.join(dyn.EFFECTS)}, got {unknown[0]!r}")
+    locked = options.lock or []
+    lock = dict(locked)
+    if len(lock) < len(locked):
+        raise ValueError(f"--lock takes each body once, got {', '.join(body for body, _ in locked)}")
+    found, lines, files = [], [], dict[Path, str | bytes]()
+    for name in options.scenes:
+        scene = dyn.scenes.load(name, **reading(options))
+        effects = [each for each in dyn.EFFECTS if each not in without]
+        content = library.pruning.report(scene, effects=effects, lock=_bodies(scene, lock))
+        found.append(content)
+        if options.out is not None:
+            document = library.pruning_page.document(content)
+            written = library.document_files(options.out, content["name"], document, content, kind="pruning")
+            files |= written
+            sizes = [f"{each['equations']} {each['full']['nodes']} to {each['pruned']['nodes']} nodes"
+                     for each in content["graphs"]]  # fmt: skip
+            lines.append(f"{[*written][-1]}: {', '.join(sizes)}")
+    answer(unless_json(options, found, "\n".join(lines)), files, folder=options.out)
+
+
+def _bodies(scene: dyn.scenes.Scene, lock: dict[str, float]) -> dict[str, float]:
+    """What is to be locked by its body's name, where it may be given by its coordinate's."""
+    moving = scene.mechanism.moving if scene.mechanism else ()
+    bodies = [body.name for body in moving]
+    of = {body.coordinate: body.name for body in moving} | {name: name for name in bodies}
+    if unknown := [name for name in lock if name not in of]:
+        known = extend.or_nearest(unknown[0], list(of)) if of else "it has no bodies"
+        raise ValueError(f"{scene.name} has no joint {unknown[0]!r:.80} to lock; {known}")
+    return {of[name]: at for name, at in lock.items()}

@@ -10,10 +10,14 @@ from cgraph import extend
 
 from . import library
 from .arguments import (
+    REST,
     answer_and_draw,
     check_picture,
     equations_of,
+    filled,
     may_draw_and_print,
+    point,
+    point_text,
     scene_of,
     takes_a_scene,
     takes_equations,
@@ -21,7 +25,6 @@ from .arguments import (
     whole,
 )
 from .command import Command
-from .point_arguments import REST, filled, point, point_text
 
 
 def add(parser: Command) -> None:

@@ -6,10 +6,10 @@ from collections.abc import Collection, Mapping, Sequence
 from html import escape
 from string import Template
 from types import MappingProxyType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from cgraph import Graph, Node, __version__
-from cgraph.extend import Array, require_graph, require_mapping, require_sequence, require_texts
+from cgraph.extend import Array, Json, require_graph, require_mapping, require_sequence, require_texts
 
 from .. import theme
 from ..pages import html
@@ -18,9 +18,6 @@ from ..pages.html import Page, asset
 from ..pages.operations import operations
 from .content import Motion, State, StateTable, Version
 from .record import record
-
-if TYPE_CHECKING:
-    from cgraph.extend import Json
 
 SCRIPTS = (
     "texts.js", "values.js", "state.js", "paths.js", "formula.js", "layers.js", "places.js",

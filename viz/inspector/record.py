@@ -20,19 +20,14 @@ is wrong, steps [{words, nodes, value, joint}]. Where nodes stand is the page's 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 from cgraph import Graph, Node
-from cgraph.extend import ADJOINT, PRIMAL, TANGENT, columns
+from cgraph.extend import ADJOINT, PRIMAL, TANGENT, Json, columns
 
 from .. import theme
-from ..graph_drawing.positions import Positions, positions
-from ..graph_drawing.render import RenderError
-from ..pages.graph import graph_data
+from ..graph_drawing.render import Positions, RenderError, positions
+from ..pages.operations import graph_data
 from .content import Motion, State, StateTable, Version
-
-if TYPE_CHECKING:
-    from cgraph.extend import Json
 
 STAGES = {PRIMAL: "as written", ADJOINT: "reverse sweep", TANGENT: "forward sweep"}
 SMALL = 60  # nodes of a graph that is laid out by Graphviz

@@ -11,9 +11,8 @@ from dynamics import SimulationWarning, energy, simulate, state_equation
 
 from .. import theme
 from ..pages import html
-from ..pages.graph import graph_data
-from .screen import Screen, number
-from .subject import LARGEST, Subject
+from ..pages.operations import graph_data
+from .subject import LARGEST, Screen, Subject, number
 
 FACTORS = (2, 4, 16)
 STEPS, FINE = 100, 16  # of the coarse motion, and how many of the reference's there are in one

@@ -19,8 +19,7 @@ from .closed_loop import closed_loop
 from .elimination import elimination
 from .energy_and_step import energy_and_step
 from .euler_edge import euler_edge
-from .screen import Screen
-from .subject import Subject, formula, lagrangian_graph, subject_of
+from .subject import Screen, Subject, formula, lagrangian_graph, subject_of
 from .sweeps import sweeps
 from .torque_parts import torque_parts
 

@@ -13,8 +13,7 @@ from dynamics import inverse_dynamics
 from ..graph_drawing.dot import to_dot
 from ..graph_drawing.render import render_svg
 from ..graph_drawing.short_formulas import short_formulas
-from .screen import Screen, inline
-from .subject import Subject, lagrangian_graph
+from .subject import Screen, Subject, inline, lagrangian_graph
 
 ROWS = 120  # nodes that the page walks through
 DRAWN = 40  # nodes, at most, of a graph that is drawn

@@ -18,7 +18,7 @@ from ...equations.equations_of_motion import forward_dynamics
 from ...multibody.builders.planar_arm import planar_links
 from ...multibody.mechanism import Mechanism
 from ...systems.system import System
-from ..paper_numbers.fit import exponent
+from ..paper_numbers import exponent
 from ..text_table import table
 from .bench_scenes import binary_tree, chain, turned_arm
 

@@ -19,7 +19,7 @@ from ...multibody.builders.planar_arm import planar_arm
 from ...multibody.mechanism import Mechanism
 from ...multiprecision.chain_equations import accelerations
 from ...systems.model import as_system
-from ..fresh_process import run_fresh
+from ..machine import run_fresh
 from ..text_table import digits, table
 from .bench_scenes import turned_arm
 

@@ -7,26 +7,22 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 import cgraph as cg
-from cgraph.extend import Array
+from cgraph.extend import Array, Json
 
 from ...multiprecision import Reference, ReferenceFailedError
 from ...multiprecision.solution import from_text
 from ...simulation.steps.scipy_solvers import solve_ivp
 from ..setting import Setting
 from ..work_precision.trajectory_runs import problem_of
-from .random_lagrangians import LAGRANGIANS
-from .random_starts import EACH, FAMILIES, random_motion
-
-if TYPE_CHECKING:
-    from cgraph.extend import Json
+from .random_motions import EACH, LAGRANGIANS, STARTS, random_motion
 
 FILE = Path(__file__).with_name("answers.json")
-COUNT = LAGRANGIANS + EACH * len(FAMILIES)
+COUNT = LAGRANGIANS + EACH * len(STARTS)
 DIGITS = 30
 PARTS = 8  # of the motion: an error may be made at the start of any
 RTOL, NUDGE = 1e-7, 2.0**-12  # of motions beside the motion: their errors, and how far they start aside, in sizes

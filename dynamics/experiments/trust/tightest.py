@@ -15,7 +15,7 @@ from ..work_precision.measurement import Tried, in_turns
 from ..work_precision.trajectory_peers import EPSILON, Heyoka
 from ..work_precision.trajectory_runs import Ours, Solver, problem_of
 from .answers import Answer, answer
-from .random_lagrangians import LAGRANGIANS, random_setting
+from .random_motions import LAGRANGIANS, random_setting
 
 METHOD, TURNS = "taylor", 5
 FLOOR = EPSILON / 4.0  # of an error in a ratio: less is luck

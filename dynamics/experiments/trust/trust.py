@@ -19,7 +19,7 @@ from ...simulation.trajectory import Trajectory
 from ..setting import Setting
 from ..text_table import table
 from .answers import COUNT, Answer, answer
-from .random_starts import jump, random_motion
+from .random_motions import jump, random_motion
 
 RIGHT, SAID, SILENT = "right", "said", "silent"
 SLACK = 100.0  # times rtol times the growth: an error that is right

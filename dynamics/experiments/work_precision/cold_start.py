@@ -21,7 +21,7 @@ from ...peers.casadi import CasadiPeer, casadi
 from ...peers.heyoka import heyoka, leave_cache
 from ...simulation.run_options import SCIPY
 from ...simulation.simulate import simulate
-from ..fresh_process import run_fresh
+from ..machine import run_fresh
 from ..setting import Setting
 from .named_settings import load
 from .trajectory_peers import MOST, casadi_equations, heyoka_derivatives, heyoka_equations

@@ -13,9 +13,8 @@ from ...peers import UnavailableError
 from ..machine import load as load_of_machine, machine
 from ..setting import Setting
 from .cold_start import STARTS, cold_starts
-from .measurement import Entry, ErrorMetrics, in_turns, sweep
+from .measurement import PEERS, Entry, ErrorMetrics, WorkPrecision, in_turns, sweep
 from .named_settings import load
-from .report import PEERS, WorkPrecision
 from .trajectory_peers import offers
 from .trajectory_runs import EQUAL, Ours, Solver, problem_of
 

@@ -12,7 +12,7 @@ import cgraph as cg
 import dynamics as dyn
 from cgraph import structure_hash
 from dynamics.equations.formulations.formulations import SMALL
-from dynamics.experiments.trust.random_lagrangians import LAGRANGIANS, random_setting
+from dynamics.experiments.trust.random_motions import LAGRANGIANS, random_setting
 from dynamics.multibody.joints import COMPOSITIONS, TYPES
 from dynamics.multibody.mechanism import WORLD, Body, Joint, Mechanism
 from tests.dynamics.mechanisms import (

@@ -15,9 +15,8 @@ from cgraph.extend import ldl_elimination
 from dynamics.equations.linearization import linearize_many
 from dynamics.experiments.machine import machine
 from dynamics.experiments.speed import bench as module
-from dynamics.experiments.speed.bench import MODES, PEERS, TASKS, Cell, Row, WorkerPool, bench
+from dynamics.experiments.speed.bench import MODES, PEERS, TASKS, Cell, Row, WorkerPool, bench, tables
 from dynamics.experiments.speed.bench_scenes import SCENES, free_tree, load
-from dynamics.experiments.speed.bench_table import tables
 from dynamics.experiments.speed.worker import Prepared, Refused, Worker
 from dynamics.experiments.text_table import digits
 from dynamics.io.mujoco_twin import MujocoTwin

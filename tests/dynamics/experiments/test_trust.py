@@ -4,8 +4,7 @@ import pytest
 from pytest import mark
 
 from dynamics.experiments.trust.answers import COUNT, answer, compute
-from dynamics.experiments.trust.random_lagrangians import FAMILIES, LAGRANGIANS, random_setting
-from dynamics.experiments.trust.random_starts import EACH, FAMILIES as STARTS, random_motion
+from dynamics.experiments.trust.random_motions import EACH, FAMILIES, LAGRANGIANS, STARTS, random_motion, random_setting
 from dynamics.experiments.trust.trust import ADAPTIVE, RIGHT, SAID, SILENT, judge
 
 QUICK = 8  # of the random Lagrangians: one of each family; of the random starts, too

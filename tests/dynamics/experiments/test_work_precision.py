@@ -18,9 +18,18 @@ import dynamics as dyn
 from dynamics.experiments.setting import INTERVALS, Setting
 from dynamics.experiments.work_precision import measurement
 from dynamics.experiments.work_precision.cold_start import cold_starts
-from dynamics.experiments.work_precision.measurement import FLOOR, Entry, ErrorMetrics, fitted_order
+from dynamics.experiments.work_precision.measurement import (
+    FLOOR,
+    Curve,
+    Entry,
+    ErrorMetrics,
+    Point,
+    WorkPrecision,
+    fitted_order,
+    targets,
+    to_csv,
+)
 from dynamics.experiments.work_precision.named_settings import load, names
-from dynamics.experiments.work_precision.report import Curve, Point, WorkPrecision, targets, to_csv
 from dynamics.experiments.work_precision.trajectory_peers import EPSILON, Cvodes, Heyoka, Mujoco, heyoka_derivatives
 from dynamics.experiments.work_precision.trajectory_runs import (
     CHOSEN,

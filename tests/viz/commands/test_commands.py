@@ -16,7 +16,7 @@ import pytest
 import cgraph as cg
 import dynamics as dyn
 from viz import cli, theme
-from viz.commands.point_arguments import filled
+from viz.commands.arguments import filled
 
 RIGHT, FLAWED = ("chain_rule", "chain_rule_literal"), ("euler_embedded", "kinetic_only", "kinetic_only_exact")
 MODEL = """<mujoco><compiler angle="radian"/><worldbody>

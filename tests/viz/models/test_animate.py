@@ -13,7 +13,7 @@ import pytest
 import dynamics as dyn
 import viz
 from dynamics import scenes
-from viz.animation.colors import DARK, LIGHT
+from viz.animation.canvas import DARK, LIGHT
 from viz.models.animate import _at, frames
 
 Image = pytest.importorskip("PIL.Image")
