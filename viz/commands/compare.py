@@ -9,7 +9,6 @@ from collections.abc import Mapping
 import cgraph as cg
 import dynamics as dyn
 from cgraph import extend
-from cgraph.extend import Json
 
 from . import library
 from .arguments import (
@@ -84,7 +83,7 @@ def run(options: argparse.Namespace) -> int:
     return 1 if any(only) else 0
 
 
-def _forms(scene: dyn.scenes.Scene, graphs: Mapping[str, cg.Graph]) -> tuple[dict[str, Json], str]:
+def _forms(scene: dyn.scenes.Scene, graphs: Mapping[str, cg.Graph]) -> tuple[dict[str, extend.Json], str]:
     """Sizes of both forms, and how far they agree at a state, as data and as text."""
     sizes, apart = size_data(graphs), library.form_agreement(scene, graphs, filled(graphs[library.LAGRANGE], scene, {}))
     agreement = (
