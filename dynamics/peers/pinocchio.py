@@ -9,9 +9,8 @@ import numpy as np
 from cgraph.extend import Array
 
 from ..multibody.joint_coordinates import per_velocity, places
-from .case import BATCH, DERIVATIVES, Case, rk4_step
-from .contender import Contender, Peer, UnavailableError
 from .mujoco import bodies
+from .peer import BATCH, DERIVATIVES, Peer, PeerModel, TimedTask, UnavailableError, rk4_step
 from .pinocchio_model import PinocchioModel, pinocchio
 
 
@@ -22,7 +21,7 @@ class PinocchioPeer(Peer):
     except within a step of RK4, and so are states translated from our coordinates to its own.
     """
 
-    def __init__(self, case: Case) -> None:
+    def __init__(self, case: PeerModel) -> None:
         super().__init__(case)
         self.pinocchio = pinocchio()
         mechanism = bodies(case)
@@ -84,7 +83,7 @@ class PinocchioPeer(Peer):
             "bias": still - self.damping * qd,
         }
 
-    def prepare(self, task: str, mode: str) -> Contender:
+    def prepare(self, task: str, mode: str) -> TimedTask:
         """Pinocchio's rnea or aba, at one state or over states."""
         if self.loops and DERIVATIVES.get(task, task) != "inverse":
             raise UnavailableError("has no loops in aba; `cgraph bench closed-chains` has its constraintDynamics")
@@ -92,7 +91,7 @@ class PinocchioPeer(Peer):
             return self._step()
         if task in DERIVATIVES:
             return self._slopes(task) if mode == "call" else self._slopes_of_batch(task)
-        x = self.case.point(task) if mode == "call" else self.case.points(task)
+        x = self.case.inputs(task, mode)
         arguments = self.arguments(x, task)
 
         def result(y: Array) -> Array:
@@ -101,10 +100,10 @@ class PinocchioPeer(Peer):
         if mode == "call":
             algorithm = self.pinocchio.aba if task == "forward" else self.pinocchio.rnea
             twin, data = self.twin, self.data
-            return Contender(lambda: algorithm(twin, data, *arguments), result)
+            return TimedTask(lambda: algorithm(twin, data, *arguments), result)
         return self._many("abaInParallel" if task == "forward" else "rneaInParallel", arguments, result)
 
-    def _many(self, name: str, arguments: tuple[Array, ...], result: Callable[[Array], Array]) -> Contender:
+    def _many(self, name: str, arguments: tuple[Array, ...], result: Callable[[Array], Array]) -> TimedTask:
         """Its loop over the columns of a batch, on one thread. Builds without OpenMP lack it."""
         algorithm = getattr(self.pinocchio, name, None)
         if algorithm is None:
@@ -112,9 +111,7 @@ class PinocchioPeer(Peer):
         pool = self.pinocchio.ModelPool(self.twin, 1)
         columns = [np.asfortranarray(each) for each in arguments]
         y = np.zeros((self.case.n, BATCH), order="F")
-        return Contender(
-            lambda: algorithm(1, pool, *columns, y), lambda found: result(y if found is None else found), BATCH
-        )
+        return TimedTask(lambda: algorithm(1, pool, *columns, y), lambda found: result(y if found is None else found))
 
     def slopes(self, x: Array, task: str) -> Array:
         """The derivatives at one state, (n, 3n), with those of dampers and springs."""
@@ -122,14 +119,14 @@ class PinocchioPeer(Peer):
         self._derivatives(task)(self.twin, self.data, *arguments)
         return self._their_slopes(task, arguments).reshape(self.case.n, 3 * self.case.n)
 
-    def _slopes(self, task: str) -> Contender:
+    def _slopes(self, task: str) -> TimedTask:
         """The derivatives of rnea or aba; those of dampers and springs are added outside what is timed."""
         arguments = self.arguments(self.case.point(task), DERIVATIVES[task])
         algorithm = self._derivatives(task)
         model, data = self.twin, self.data
-        return Contender(lambda: algorithm(model, data, *arguments), lambda _: self._their_slopes(task, arguments))
+        return TimedTask(lambda: algorithm(model, data, *arguments), lambda _: self._their_slopes(task, arguments))
 
-    def _slopes_of_batch(self, task: str) -> Contender:
+    def _slopes_of_batch(self, task: str) -> TimedTask:
         """A call for every state; what it leaves in Pinocchio's memory is read outside what is timed."""
         states = [self.arguments(x, DERIVATIVES[task]) for x in self.case.points(task).T]
         algorithm = self._derivatives(task)
@@ -146,7 +143,7 @@ class PinocchioPeer(Peer):
                 rows.append(self._their_slopes(task, arguments))
             return np.array(rows).T
 
-        return Contender(run, result, len(states))
+        return TimedTask(run, result)
 
     def _derivatives(self, task: str) -> Callable[..., object]:
         """Pinocchio's function. Raises UnavailableError for a model that has more than it knows."""
@@ -170,7 +167,7 @@ class PinocchioPeer(Peer):
         passive = -by_last if forward else np.eye(n)
         return np.hstack([by_q + passive * self.stiffness, by_u + passive * self.damping, by_last]).ravel()
 
-    def _step(self) -> Contender:
+    def _step(self) -> TimedTask:
         """RK4 in Python over aba."""
         if self.case.nq != self.case.n:
             raise UnavailableError("has no rates of quaternions")
@@ -186,7 +183,7 @@ class PinocchioPeer(Peer):
 
         x = self.case.point("rk4")
         x = np.concatenate([x[at], x[n + at]])
-        return Contender(lambda: rk4_step(rate, x), lambda y: y[back])
+        return TimedTask(lambda: rk4_step(rate, x), lambda y: y[back])
 
 
 def _symmetric(upper: Array) -> Array:

@@ -13,8 +13,7 @@ from cgraph.extend import Array
 from ..multibody.body import WORLD
 from ..multibody.loops import Loop
 from ..multibody.mechanism import Mechanism
-from .case import Case
-from .contender import UnavailableError
+from .peer import PeerModel, UnavailableError
 from .pinocchio import PinocchioPeer
 
 if TYPE_CHECKING:
@@ -47,7 +46,7 @@ def constraint_dynamics(
     for loop in mechanism.loops:
         if loop.kind not in _KINDS:
             raise UnavailableError(f"has no loop of the kind {loop.kind!r}")
-    peer = PinocchioPeer(Case("held", mechanism))
+    peer = PinocchioPeer(PeerModel("held", mechanism))
     pin, twin, data = peer.pinocchio, peer.twin, peer.data
     models, datas = pin.StdVec_RigidConstraintModel(), pin.StdVec_RigidConstraintData()
     for loop in mechanism.loops:

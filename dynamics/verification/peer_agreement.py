@@ -20,9 +20,8 @@ from ..io.load import compiled
 from ..io.mujoco_twin import joint_order, mujoco
 from ..multibody.body import Body, MechanismError
 from ..multibody.mechanism import Mechanism, as_mechanism
-from ..peers.case import Case
-from ..peers.contender import Peer, UnavailableError
 from ..peers.mujoco import MujocoPeer
+from ..peers.peer import Peer, PeerModel, UnavailableError
 from ..peers.pinocchio import PinocchioPeer
 from ..peers.pinocchio_loops import constrained_accelerations
 from ..systems.model import Model, as_system
@@ -157,7 +156,7 @@ class Asked(Protocol):
         ...
 
 
-class _At(Case):
+class _At(PeerModel):
     """A case that is asked at a state of ours."""
 
     state: Array
@@ -169,7 +168,7 @@ class _At(Case):
 class Translation:
     """A peer on the model as `to_mjcf` writes it."""
 
-    def __init__(self, make: Callable[[Case], Peer], mechanism: Mechanism) -> None:
+    def __init__(self, make: Callable[[PeerModel], Peer], mechanism: Mechanism) -> None:
         self.make, self.mechanism = make, mechanism
         self.case = _At("the model", mechanism)
         self.peer = make(self.case)
@@ -287,7 +286,7 @@ def _without_forces(model: Model) -> Mechanism:
     return replace(bodies, forces=(), parameters={}) if bodies.forces else bodies
 
 
-def _translated(make: Callable[[Case], Peer], model: Model) -> Translation:
+def _translated(make: Callable[[PeerModel], Peer], model: Model) -> Translation:
     try:
         return Translation(make, bare(model))
     except ImportError:

@@ -39,7 +39,7 @@ FOLDER = Path("report")
 def add(parser: Command) -> None:
     """The command's arguments."""
     parser.names |= {
-        "scenes": lambda: [*dyn.scenes.names(), *library.named_settings.names()],
+        "scenes": lambda: [*dyn.scenes.names(), *library.named_tasks.names()],
         "methods": lambda: dyn.METHODS,
         "peers": lambda: library.PEERS,
         "comparisons": lambda: library.COMPARISONS,
@@ -155,7 +155,7 @@ def _comparisons(options: argparse.Namespace) -> None:
 
 def _curves(options: argparse.Namespace) -> None:
     """A page of run time beside error for each scene."""
-    named = {library.named_settings.load(name, reading=reading(options)).name for name in options.scenes}
+    named = {library.named_tasks.load(name, reading=reading(options)).name for name in options.scenes}
     if len(named) < len(options.scenes):
         raise ValueError(f"each scene needs a name of its own for its files, got {', '.join(options.scenes)}")
     chosen = {"t_end": options.t_end, "start": options.start, "reading": reading(options)}

@@ -15,9 +15,8 @@ import numpy as np
 from cgraph.extend import Array, install
 
 from ...multibody.mechanism import as_mechanism
-from ...peers import PEERS, Case
-from ...peers.case import MOTIONS, TASKS
-from ...peers.contender import MODES
+from ...peers import PEERS, PeerModel
+from ...peers.peer import MODES, MOTIONS, TASKS
 from ..text_table import WIDTH, digits, table
 from .bench_scenes import QUICK, SCENES, load
 from .worker import Load, Prepared, Worker
@@ -84,7 +83,7 @@ def bench(
     loads: dict[str, Load] = {name: partial(load, name, **(reading or {})) for name in scenes}
     cases = {}
     for name, scene in loads.items():  # a wrong name is told before anything is measured
-        cases[name] = Case(name, scene())
+        cases[name] = PeerModel(name, scene())
     wanted = [name for name, kind in PEERS.items() if name == OURS or (name in peers and kind.installed)]
     ours = PEERS[OURS].offers
     asked = {
@@ -98,13 +97,13 @@ def bench(
     return _rows(cases, loads, asked, wanted, repeats, budget, say)
 
 
-def _has(case: Case, task: str) -> bool:
+def _has(case: PeerModel, task: str) -> bool:
     """Whether there is such a task of the model."""
     return task not in MOTIONS or case.nq == case.n
 
 
 def _rows(
-    cases: dict[str, Case],
+    cases: dict[str, PeerModel],
     loads: dict[str, Load],
     asked: dict[str, list[str]],
     peers: list[str],
@@ -131,7 +130,7 @@ def _rows(
                 pool.end()
 
 
-def _row(case: Case, task: str, mode: str, pool: WorkerPool, repeats: int) -> Row:
+def _row(case: PeerModel, task: str, mode: str, pool: WorkerPool, repeats: int) -> Row:
     row = Row(case.name, task, mode, case.n)
     ready = pool.prepared(task, mode, row.skipped)
     samples: dict[str, list[float]] = {peer: [] for peer in ready}
@@ -156,7 +155,7 @@ def _row(case: Case, task: str, mode: str, pool: WorkerPool, repeats: int) -> Ro
     return row
 
 
-def _start(case: Case, task: str, mode: str) -> Array:
+def _start(case: PeerModel, task: str, mode: str) -> Array:
     """What the values of a step or a loop are measured from: they move little, and it is the motion that counts."""
     if mode == "loop":
         return case.point(task)
@@ -301,7 +300,7 @@ def _table(rows: Sequence[Row], read: Callable[[Row], dict[str, tuple[str, str]]
 
 
 def _spread(rows: Sequence[Row]) -> list[str]:
-    """How much the turns of a contender differed."""
+    """How much the turns of a peer differed."""
     spreads = {
         (peer, row.scene): 100.0 * (cell.high - cell.low) / cell.micros
         for row in rows

@@ -17,7 +17,7 @@ from cgraph.extend import Array, Json
 from ...multiprecision import Reference, ReferenceFailedError
 from ...multiprecision.solution import from_text
 from ...simulation.steps.scipy_solvers import solve_ivp
-from ..setting import Setting
+from ..accuracy_task import AccuracyTask
 from ..work_precision.trajectory_runs import problem_of
 from .random_motions import EACH, LAGRANGIANS, STARTS, random_motion
 
@@ -47,40 +47,40 @@ class Answer:
 
 def answer(number: int) -> Answer:
     """The answer to the random motion of this number, from the file beside this one or computed."""
-    setting = random_motion(number)
+    task = random_motion(number)
     kept = _kept().get(str(number))
-    if kept is None or kept["start"] != _hex(setting.start) or kept["t"] != setting.t_end.hex():
-        return compute(setting)
-    end = from_text([setting.t_end], [kept["x"]], kept["error"], kept["how"]) if "x" in kept else None
+    if kept is None or kept["start"] != _hex(task.start) or kept["t"] != task.t_end.hex():
+        return compute(task)
+    end = from_text([task.t_end], [kept["x"]], kept["error"], kept["how"]) if "x" in kept else None
     return Answer(end, tuple(kept["size"]), kept["growth"], kept["how"])
 
 
-def compute(setting: Setting) -> Answer:
-    """The answer to a setting, by `reference`; the growth by SciPy."""
-    times = [setting.t_end * k / PARTS for k in range(PARTS + 1)]
+def compute(task: AccuracyTask) -> Answer:
+    """The answer to a task, by `reference`; the growth by SciPy."""
+    times = [task.t_end * k / PARTS for k in range(PARTS + 1)]
     try:
-        motion = setting.solution(times, digits=DIGITS)
+        motion = task.solution(times, digits=DIGITS)
     except ReferenceFailedError as error:
         return Answer(None, (), 1.0, str(error))
     assert motion is not None
     end = Reference(motion.t[-1:], motion.decimal[-1:], motion.error, motion.how)
-    size, growth = size_and_growth(setting, times, np.max(np.abs(motion.x), axis=0))
+    size, growth = size_and_growth(task, times, np.max(np.abs(motion.x), axis=0))
     return Answer(end, tuple(size.tolist()), growth, motion.how)
 
 
-def size_and_growth(setting: Setting, times: Sequence[float], size: Array) -> tuple[Array, float]:
+def size_and_growth(task: AccuracyTask, times: Sequence[float], size: Array) -> tuple[Array, float]:
     """The largest value of each state, (m,), and the largest row sum of the flow from any of these times to the last.
 
     The flow is measured in units of the sizes, by differences of motions of SciPy's solvers; `size` is a first guess.
     """
-    rate = cg.compile(problem_of(setting).rate)
+    rate = cg.compile(problem_of(task).rate)
     unit = np.where(size > 0.0, size, 1.0)
 
     def motion(x: Array, at: Sequence[float] | None = times) -> Array:
-        options = {"rtol": RTOL, "atol": RTOL * unit, "method": "Radau" if setting.stiff else "DOP853", "t_eval": at}
-        return np.asarray(solve_ivp()(lambda t, x: rate([*x, t]), (0.0, setting.t_end), x, **options).y.T)
+        options = {"rtol": RTOL, "atol": RTOL * unit, "method": "Radau" if task.stiff else "DOP853", "t_eval": at}
+        return np.asarray(solve_ivp()(lambda t, x: rate([*x, t]), (0.0, task.t_end), x, **options).y.T)
 
-    start = np.array(setting.start)
+    start = np.array(task.start)
     size = np.maximum(size, np.abs(motion(start, None)).max(axis=0))  # of all its steps, layers included
     unit = np.where(size > 0.0, size, 1.0)
     columns = []
@@ -95,15 +95,15 @@ def size_and_growth(setting: Setting, times: Sequence[float], size: Array) -> tu
 def renew(numbers: Iterable[int], say: Callable[[str], None] = lambda line: None) -> None:
     """Compute the answers of these numbers and keep them in the file; some take half a minute."""
     for number in numbers:
-        setting = random_motion(number)
-        result = compute(setting)
-        entry: dict[str, Json] = {"start": _hex(setting.start), "t": setting.t_end.hex()}
+        task = random_motion(number)
+        result = compute(task)
+        entry: dict[str, Json] = {"start": _hex(task.start), "t": task.t_end.hex()}
         entry |= {"size": list(result.size), "growth": result.growth, "how": result.how}
         if result.end is not None:
             entry |= {"x": list(result.end.decimal[0]), "error": result.end.error}
         with _changed() as entries:
             entries[str(number)] = entry
-        say(f"{number} {setting.name}: growth {result.growth:.3g}; {result.how}")
+        say(f"{number} {task.name}: growth {result.growth:.3g}; {result.how}")
 
 
 @contextmanager

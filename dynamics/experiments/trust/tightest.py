@@ -15,7 +15,7 @@ from ..work_precision.measurement import Tried, in_turns
 from ..work_precision.trajectory_peers import EPSILON, Heyoka
 from ..work_precision.trajectory_runs import Ours, Solver, problem_of
 from .answers import Answer, answer
-from .random_motions import LAGRANGIANS, random_setting
+from .random_motions import LAGRANGIANS, random_task
 
 METHOD, TURNS = "taylor", 5
 FLOOR = EPSILON / 4.0  # of an error in a ratio: less is luck
@@ -36,21 +36,21 @@ class Duel:
 
 def duel(number: int, method: str = METHOD, tolerance: float = EPSILON) -> Duel | None:
     """One of our methods at this tolerance, and heyoka at its default; None of a motion that has no end or is stiff."""
-    setting, truth = random_setting(number), answer(number)
-    if truth.end is None or setting.stiff:
+    task, truth = random_task(number), answer(number)
+    if truth.end is None or task.stiff:
         return None
-    problem, smallest = problem_of(setting), min([size for size in truth.size if size] or [1.0])
-    both: tuple[Solver, Solver] = Ours(method, setting, smallest, problem), Heyoka(setting, smallest, problem)
+    problem, smallest = problem_of(task), min([size for size in truth.size if size] or [1.0])
+    both: tuple[Solver, Solver] = Ours(method, task, smallest, problem), Heyoka(task, smallest, problem)
     tried = []
     for solver in both:
         run = solver.ready(tolerance if solver.ours else EPSILON)
         outcome = run()
         if outcome.status:
-            return Duel(setting.name, (math.nan, math.nan), (math.nan, math.nan), f"{solver.name}: {outcome.status}")
+            return Duel(task.name, (math.nan, math.nan), (math.nan, math.nan), f"{solver.name}: {outcome.status}")
         tried.append(Tried(0.0, run, outcome, _error(truth, outcome.x)))
     in_turns(tried, TURNS)
     first, second = tried
-    return Duel(setting.name, (first.error, second.error), (min(first.seconds), min(second.seconds)))
+    return Duel(task.name, (first.error, second.error), (min(first.seconds), min(second.seconds)))
 
 
 def _error(truth: Answer, x: Array) -> float:

@@ -16,7 +16,7 @@ from ...integrators import METHODS
 from ...simulation.run_options import METHOD, RunOptions
 from ...simulation.simulate import simulate
 from ...simulation.trajectory import Trajectory
-from ..setting import Setting
+from ..accuracy_task import AccuracyTask
 from ..text_table import table
 from .answers import COUNT, Answer, answer
 from .random_motions import jump, random_motion
@@ -48,29 +48,29 @@ class Verdict:
 
 def judge(number: int, method: str | None = None) -> Verdict:
     """The verdict on one random motion by a method with default arguments."""
-    setting, truth = random_motion(number), answer(number)
+    task, truth = random_motion(number), answer(number)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        start = setting.q, setting.qd or None
+        start = task.q, task.qd or None
         try:
-            run = simulate(setting.model, *start, setting.t_end, method or METHOD, progress=False)
+            run = simulate(task.model, *start, task.t_end, method or METHOD, progress=False)
         except NoSeriesError as error:
-            return Verdict(setting.name, method or DEFAULT, SAID, math.nan, str(error), 0, 0.0)
+            return Verdict(task.name, method or DEFAULT, SAID, math.nan, str(error), 0, 0.0)
     words = "; ".join([str(each.message) for each in caught])
-    excess = _excess(setting, truth, run)
-    slack = JUMPS if setting.name.startswith(jump.__name__) else SLACK
+    excess = _excess(task, truth, run)
+    slack = JUMPS if task.name.startswith(jump.__name__) else SLACK
     right = excess <= slack or (truth.end is None and not run.stats.success)
     verdict = RIGHT if right else SAID if words else SILENT
-    return Verdict(setting.name, method or DEFAULT, verdict, excess, words, run.stats.steps, run.stats.seconds)
+    return Verdict(task.name, method or DEFAULT, verdict, excess, words, run.stats.steps, run.stats.seconds)
 
 
-def _excess(setting: Setting, truth: Answer, run: Trajectory) -> float:
+def _excess(task: AccuracyTask, truth: Answer, run: Trajectory) -> float:
     if truth.end is None or not run.stats.success:
         return math.nan
     size = np.array(truth.size)
     error = np.abs(truth.end.deviation(np.hstack([run.q[-1:], run.qd[-1:]]))[0])
     relative = np.divide(error, size, out=np.where(error > 0.0, np.inf, 0.0), where=size > 0.0)
-    tolerance = RunOptions(setting.t_end, run.stats.method).relative
+    tolerance = RunOptions(task.t_end, run.stats.method).relative
     return float(np.max(relative) / (tolerance * truth.growth))
 
 

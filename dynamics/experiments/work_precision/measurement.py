@@ -20,8 +20,8 @@ from ...integrators import Problem
 from ...multiprecision import Reference
 from ...simulation.run_options import SCIPY
 from ...systems.model import as_system
+from ..accuracy_task import INTERVALS, AccuracyTask
 from ..paper_numbers import exponent
-from ..setting import INTERVALS, Setting
 from ..text_table import csv_text
 from .cold_start import ColdStart
 from .trajectory_runs import CHOSEN, EQUAL, Outcome, Solver
@@ -37,7 +37,7 @@ class Point:
 
     knob: the number of equal steps, or the relative tolerance.  step: t_end over the accepted steps [s].
     seconds, median: the shortest and the median of the timed runs.
-    error: of the state at t_end; largest: over all times; see `Setting.scales`.
+    error: of the state at t_end; largest: over all times; see `AccuracyTask.scales`.
     drift: largest change of energy, over the largest kinetic energy of the motion; of a conservative system.
     """
 
@@ -75,7 +75,7 @@ class Curve:
 
 @dataclass(frozen=True)
 class WorkPrecision:
-    """The report of one setting.  absent: {solver: why it is not there}.  load: of the machine, at start and end."""
+    """The report of one task.  absent: {solver: why it is not there}.  load: of the machine, at start and end."""
 
     name: str
     about: str
@@ -176,12 +176,12 @@ STALLED = 2  # knobs in a row without a smaller error, after which no finer one 
 class ErrorMetrics:
     """Errors of states against the exact motion, and the change of energy of conservative systems."""
 
-    def __init__(self, setting: Setting, exact: Reference) -> None:
-        self.setting, self.exact, self.scales = setting, exact, setting.scales(exact)
+    def __init__(self, task: AccuracyTask, exact: Reference) -> None:
+        self.task, self.exact, self.scales = task, exact, task.scales(exact)
         self.smallest = float(self.scales.min())  # size of a state
         self.energies: Graph | None = None
-        if setting.conservative:
-            system, of_energy = as_system(setting.model), energy(setting.model)
+        if task.conservative:
+            system, of_energy = as_system(task.model), energy(task.model)
             self.energies = Graph(of_energy.inputs, of_energy.outputs | {"K": system.kinetic})
 
     def errors(self, rows: Array) -> Array:
@@ -201,7 +201,7 @@ class ErrorMetrics:
         """The largest change of energy over the rows, over the largest kinetic energy."""
         if self.energies is None:
             return None
-        inputs = dict(zip(self.energies.input_names, rows.T, strict=False)) | dict(self.setting.parameters)
+        inputs = dict(zip(self.energies.input_names, rows.T, strict=False)) | dict(self.task.parameters)
         values = {name: np.asarray(value) for name, value in self.energies.evaluate(inputs).items()}
         turned = float(np.max(values["K"])) or float(np.max(np.abs(values["E"]))) or 1.0
         return float(np.max(np.abs(values["E"] - values["E"][0]))) / turned
@@ -254,7 +254,7 @@ def _point(solver: Solver, tried: Tried, metrics: ErrorMetrics) -> Point:
         drift = metrics.drift(rows) if math.isfinite(largest) else None
     return Point(
         tried.knob,
-        metrics.setting.t_end / outcome.steps if outcome.steps else None,
+        metrics.task.t_end / outcome.steps if outcome.steps else None,
         min(tried.seconds),
         statistics.median(tried.seconds),
         outcome.steps,

@@ -14,7 +14,7 @@ from cgraph import Graph
 from dynamics.multibody.algebra.spatial import from_quaternion
 from dynamics.multibody.joint_coordinates import per_velocity
 from dynamics.peers import PEERS
-from dynamics.peers.case import Case
+from dynamics.peers.peer import PeerModel
 from dynamics.peers.pinocchio_model import PinocchioModel
 from dynamics.systems.system import System
 from dynamics.verification.certificate import certify
@@ -95,7 +95,7 @@ def errors(mechanism: dyn.Mechanism, seed: int) -> dict[str, float]:
     for peer in INSTALLED:
         if peer == "mujoco" and any("axes" in body.joint.kind for body in mechanism.bodies):
             continue  # which it has not
-        theirs = PEERS[peer].make(Case("tree", mechanism)).quantities(**rows)  # type: ignore[attr-defined]
+        theirs = PEERS[peer].make(PeerModel("tree", mechanism)).quantities(**rows)  # type: ignore[attr-defined]
         theirs["recursive"] = theirs["tau"]
         for name, scale in scales.items():
             result[f"{peer} {name}"] = float(np.abs(ours[name] - theirs[name]).max() / scale.max())

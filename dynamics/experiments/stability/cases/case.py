@@ -1,4 +1,4 @@
-"""A case: a setting that is hard for arithmetic or for an integrator, what to measure on the way, and bounds."""
+"""A case: a task that is hard for arithmetic or for an integrator, what to measure on the way, and bounds."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from cgraph import Graph, Node
 
 from ....equations.energies import energy
 from ....systems.model import Model, as_ode, as_system
-from ...setting import Setting
+from ...accuracy_task import AccuracyTask
 
 RTOL = 1e-9  # the relative tolerance that the bounds are for
 ATOL = 1e-3 * RTOL  # the absolute one, in the SI unit of each state
@@ -35,7 +35,7 @@ class Criterion:
 
 
 @dataclass(frozen=True)
-class StabilityCase(Setting):
+class StabilityCase(AccuracyTask):
     """One row of the stability table; `about` says what is hard here. `exact` may be of a limit of the motion.
 
     atol: absolute tolerance, where that of one in a thousand of RTOL in SI units is too much or too little; for all

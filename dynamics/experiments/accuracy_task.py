@@ -1,4 +1,4 @@
-"""Setting: a scene with the exact motion that runs of it are measured against."""
+"""AccuracyTask: a scene with the exact motion that runs of it are measured against."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ DECADES = 12  # of the times, where they are spread by powers of ten
 
 
 @dataclass(frozen=True)
-class Setting(Scene):
+class AccuracyTask(Scene):
     """A scene and its exact motion.  q, qd: of an OdeSystem the states, and nothing.
 
     size: a natural size of each state, which errors are relative to; empty for the largest values of the motion.
