@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -43,6 +45,16 @@ class AccuracyTask(Scene):
         return (*self.q, *self.qd)
 
     @property
+    def identity(self) -> dict[str, Any]:
+        """Start and end to the last bit, by which a motion that is kept is known."""
+        return {"start": [float(each).hex() for each in self.start], "t": self.t_end.hex()}
+
+    def kept(self, file: Path, key: str) -> dict[str, Any] | None:
+        """The entry of this motion in a JSON file of entries; None where there is none, or one of another motion."""
+        entry: dict[str, Any] | None = json.loads(file.read_text(encoding="utf-8")).get(key) if file.exists() else None
+        return entry if entry is not None and entry.items() >= self.identity.items() else None
+
+    @property
     def times(self) -> list[float]:
         """When errors are taken [s]; the last is t_end."""
         if self.decades:
@@ -74,7 +86,7 @@ class AccuracyTask(Scene):
 
     @property
     def mechanical(self) -> bool:
-        """It has coordinates and velocities."""
+        """Whether the model has coordinates and velocities."""
         return as_ode(self.model) is None
 
     @property
@@ -93,7 +105,7 @@ class AccuracyTask(Scene):
         return tuple([max(abs(a), abs(b)) or 1.0 for a, b in zip(self.start, end, strict=True)])
 
     def scales(self, exact: Reference) -> Array:
-        """What errors at all times are relative to, (T, m)."""
+        """Scale of the errors at all times, (T, m)."""
         if self.decades:
             return np.where(exact.x == 0.0, 1.0, np.abs(exact.x))
         return np.broadcast_to(self.size or scale(exact.x), exact.x.shape)

@@ -39,7 +39,7 @@ def load() -> float | None:
 
 
 def run_fresh(module: str, call: str, text: str = "", timeout: float | None = None) -> subprocess.CompletedProcess[str]:
-    """What the call, of a name of that module, wrote to its standard output and error. `text` is its standard input.
+    """Output and errors of a call, of a name of that module, in a process of its own. `text` is its standard input.
 
     Raises subprocess.TimeoutExpired after `timeout` s.
     """

@@ -23,7 +23,7 @@ def report(
     values: Mapping[str, float] | None = None,
     regroup: bool = False,
 ) -> dict[str, Any]:
-    """What `prune` makes of a scene's inverse and forward dynamics, for JSON.
+    """Report of `prune` on a scene's inverse and forward dynamics, for JSON.
 
     effects, lock, regroup: as of `prune`.  values: the same, where the equations have that input.
     """

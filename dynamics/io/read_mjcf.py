@@ -161,7 +161,7 @@ def _kind(mj: MjModel, j: int) -> str:
 
 
 def _not_modelled(mj: MjModel) -> list[str]:
-    """What belongs to the mechanism of the model and a mechanism cannot have."""
+    """Sentences on parts of the model's mechanism that a mechanism cannot have."""
     sprung = [] if disabled(mj, "SPRING") else sorted(j for j in _where(mj, "jnt_stiffness") if _elsewhere(mj, j))
     pulling = sorted(set().union(*(_where(mj, f"tendon_{what}") for what in _OF_A_TENDON)))
     tendons = [mj.tendon(i).name or f"number {i}" for i in pulling]
@@ -182,7 +182,7 @@ def _not_modelled(mj: MjModel) -> list[str]:
 
 
 def _acting_from_outside(mj: MjModel, smooth: Smooth) -> list[str]:
-    """What acts on the mechanism of the model, inputs and forces that are not smooth, and is not taken."""
+    """Sentences on inputs and forces on the mechanism that are not smooth, and not taken."""
     limited = not disabled(mj, "CONSTRAINT", "LIMIT")
     limits = [j for j in sorted(_where(mj, "jnt_limited")) if smooth.limits is None or not single(mj, j)]
     touching = (np.any(mj.geom_contype) and np.any(mj.geom_conaffinity)) or mj.npair
@@ -279,7 +279,7 @@ def require_modest(source: object, called: str) -> None:
 
 
 class _Asked:
-    """Which files a model names, and how many copies its elements and those of the files that it includes ask for.
+    """Files that a model names, and the copies that its elements and those of the files that it includes ask for.
 
     folder: where included files are; None: they are not read.
     """

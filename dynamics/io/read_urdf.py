@@ -159,7 +159,7 @@ def _joint(joint: Element, name: str, child: str) -> Joint:
 
 
 def _inertial(link: Element, name: str) -> _Inertial:
-    """What a link has; nothing for one without."""
+    """Inertial of a link; empty for a link without."""
     where = f"link {name!r}"
     inertial = _one(link, where, "inertial")
     if inertial is None:
@@ -245,7 +245,7 @@ def _couplings(joints: Mapping[str, Element], leaders: Mapping[str, str]) -> lis
 
 
 def _outside(robot: Element, joints: Mapping[str, Element], smooth: Smooth) -> list[str]:
-    """What acts on a mechanism and does not belong to it, and is not taken."""
+    """Sentences on forces and inputs on a mechanism that are not taken."""
     limited = [name for name, joint in joints.items() if _limited(joint, name)]
     rubbing = [f"{name}: {force:g}" for name, joint in joints.items() if (force := _friction(joint, name))]
     return present(

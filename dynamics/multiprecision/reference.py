@@ -144,7 +144,7 @@ def _converged(
 
 
 def _differences(a: list[list[Number]], b: list[list[Number]]) -> list[float]:
-    """Of each state the largest difference, relative to the largest value of it in b."""
+    """Largest difference of each state, relative to its largest value in b."""
     result = []
     for first, second in zip(zip(*a, strict=True), zip(*b, strict=True), strict=True):
         largest = max([abs(value) for value in second])

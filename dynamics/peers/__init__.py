@@ -36,7 +36,7 @@ class Kind:
         return find_spec(self.package) is not None
 
     def load(self) -> type[Peer]:
-        """Its class, whose module is imported now."""
+        """Class of the peer, whose module is imported now."""
         module, name = self.home.split(".")
         peer: type[Peer] = getattr(import_module(f".{module}", __name__), name)
         return peer

@@ -91,7 +91,7 @@ class JaxPeer(Peer):
         return {"inverse": self._inverse, "forward": self._forward, "rk4": self._step}[task]
 
     def _slopes(self, function: Callable[[JaxArray], JaxArray]) -> Callable[[JaxArray], JaxArray]:
-        """Its derivatives, row by row; those by q along the velocities."""
+        """Derivatives of a function, row by row; those by q along the velocities."""
 
         def slopes(x: JaxArray) -> JaxArray:
             q, qd, _ = self._split(x)

@@ -85,7 +85,7 @@ class Ours(Peer):
 
     @cached_property
     def parts(self) -> LinearizationParts:
-        """Of the derivatives of forward dynamics."""
+        """Parts of the derivatives of forward dynamics."""
         return linearization_parts(self.case.system)
 
     @kept_by_first

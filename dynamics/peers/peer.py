@@ -80,18 +80,18 @@ class PeerModel:
         return self.points(task) if mode == "batch" else self.point(task)
 
     def _normalized(self, x: Array) -> Array:
-        """The same with quaternions of length 1."""
+        """Inputs with quaternions of length 1."""
         graph = normalization(self.model)
         if graph is not None:
             x[: self.nq + self.n] = cg.compile(graph, backend="numpy").batch(x[: self.nq + self.n])
         return x
 
     def width(self, task: str) -> int:
-        """How many numbers go into a task."""
+        """Number of inputs of a task."""
         return self.nq + {"rk4": 1, **dict.fromkeys(MOTIONS, PASSES + 1)}.get(task, 2) * self.n
 
     def nudges(self, task: str) -> NDArray[np.intp]:
-        """Which result moves each input from one pass of a loop to the next."""
+        """Index of the result that moves each input from one pass of a loop to the next."""
         return np.arange(self.width(task)) % self.n
 
 

@@ -104,7 +104,7 @@ class PinocchioPeer(Peer):
         return self._many("abaInParallel" if task == "forward" else "rneaInParallel", arguments, result)
 
     def _many(self, name: str, arguments: tuple[Array, ...], result: Callable[[Array], Array]) -> TimedTask:
-        """Its loop over the columns of a batch, on one thread. Builds without OpenMP lack it."""
+        """Pinocchio's loop over the columns of a batch, on one thread. Builds without OpenMP lack it."""
         algorithm = getattr(self.pinocchio, name, None)
         if algorithm is None:
             raise UnavailableError(f"this build has no {name}")
@@ -156,7 +156,7 @@ class PinocchioPeer(Peer):
         return derivatives
 
     def _their_slopes(self, task: str, arguments: tuple[Array, Array, Array]) -> Array:
-        """What the last call has left, in our order."""
+        """Derivatives that the last call has left, in our order."""
         forward, n, data = task == "derivatives", self.case.n, self.data
         if forward:
             found = data.ddq_dq, data.ddq_dv, _symmetric(data.Minv)

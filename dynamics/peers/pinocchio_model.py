@@ -100,7 +100,7 @@ class PinocchioModel:
         return result
 
     def rotor(self, v: Array) -> Array:
-        """What Pinocchio's force lacks of the armature of free bodies, which moves along the axes of the joint."""
+        """Force that Pinocchio lacks of the armature of free bodies, which moves along the axes of the joint."""
         result = self.curved(v)
         for linear, _, _, armature in self._turned:
             result[linear] *= armature

@@ -181,7 +181,7 @@ class _Checks:
         return self.held.matrix * self._solved[:, None, self.system.n :]
 
     def always(self) -> Iterator[Residual]:
-        """What holds for every Lagrangian."""
+        """Residuals of every Lagrangian."""
         yield from self._mass_matrix()
         yield self._bias()
         yield self._forward()
@@ -198,7 +198,7 @@ class _Checks:
             yield self._differences(f"AD: slope of {name} along a line = differences", graph)
 
     def of_coriolis(self) -> Iterator[Residual]:
-        """What holds for one that is quadratic in the velocities."""
+        """Residuals of a Lagrangian that is quadratic in the velocities."""
         matrix = self.matrix(coriolis(self.system))
         qd = self.at["qd"]
         terms = np.abs(matrix) @ np.abs(qd)[..., None]
@@ -323,7 +323,7 @@ class _Checks:
 def derivative_residuals(
     system: System, value: Callable[[Graph], Array], inverse: Graph, inertia: Array, rng: np.random.Generator
 ) -> Iterator[Residual]:
-    """Of the torques, and of the accelerations, times M, which is how far their equation is from holding.
+    """Residuals of the derivatives of torques, and of accelerations, these times M: how far their equation is missed.
 
     value: numbers of a graph at the states, (N, n_out).  inverse: of inverse dynamics.  inertia: M, (N, n, n).
     """

@@ -38,11 +38,11 @@ TINY = 2.0**-40  # of the heaviest body: a mass that weighs nothing beside what 
 
 
 class NotComparableError(Exception):
-    """Why a peer has nothing to say of a model."""
+    """Raised when a peer has nothing to say of a model."""
 
 
 class Sizes(NamedTuple):
-    """What is put in place of masses and inertias that differ: little mass, and the inertia of a body of the model."""
+    """Stand-ins for masses and inertias that differ: little mass, and the inertia of a body of the model."""
 
     mass: float  # kg; bodies that have no more are without mass
     inertia: float  # kg m^2
@@ -152,7 +152,7 @@ class Asked(Protocol):
         ...
 
     def without(self, terms: Sequence[str], sizes: Sizes) -> Asked:
-        """The same, with these of the `TERMS` taken out."""
+        """The peer with these of the `TERMS` taken out."""
         ...
 
 
@@ -183,7 +183,7 @@ class Translation:
         return np.array(rows)
 
     def without(self, terms: Sequence[str], sizes: Sizes) -> Translation:
-        """The same model with these of the `TERMS` taken out."""
+        """The model with these of the `TERMS` taken out."""
         return Translation(self.make, without(self.mechanism, terms, sizes))
 
 
@@ -204,7 +204,7 @@ class Original:
         return np.array(rows)
 
     def without(self, terms: Sequence[str], sizes: Sizes) -> Original:
-        """The same model with these of the `TERMS` taken out."""
+        """The model with these of the `TERMS` taken out."""
         mj = copy.copy(self.mj)
         for name in terms:
             TERMS[name].theirs(mj, sizes)
@@ -222,7 +222,7 @@ def peers(model: Model, twin: Original | None = None) -> Iterator[tuple[str, Cal
 
 
 def residual(name: str, peer: Asked, model: Model, at: Mapping[str, Array]) -> Residual:
-    """How far the inverse dynamics of a peer is from ours, with what explains it where that is too far."""
+    """Difference of the inverse dynamics of a peer from ours, with the terms that explain it where it is too large."""
     bodies = bare(model)
     value = disagreement(bodies, peer, at)
     note = "" if value <= PEERS.value else explanation(bodies, peer, at)
@@ -248,7 +248,7 @@ def disagreement(model: Mechanism, peer: Asked, at: Mapping[str, Array]) -> floa
 
 
 def with_loops(model: Model, at: Mapping[str, Array]) -> tuple[list[Residual], list[str]]:
-    """How far accelerations with constraints are from those of peers, and what is not compared, a sentence each.
+    """Differences of accelerations with constraints from those of peers, and sentences on what is not compared.
 
     at: states that meet the constraints.
     """

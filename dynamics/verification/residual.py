@@ -11,7 +11,7 @@ from cgraph.extend import Array, Json, html_lines, html_table
 
 @dataclass(frozen=True)
 class Bound:
-    """How large a residual may be, and why."""
+    """Largest value of a residual, and its reason."""
 
     name: str
     value: float
@@ -42,7 +42,7 @@ class Residual:
 
 @dataclass(frozen=True)
 class Certificate:
-    """What holds of a model's graphs at random states, as `certify` makes it.
+    """Equations of a model's graphs held at random states, as `certify` makes it.
 
     Parameters
     ----------

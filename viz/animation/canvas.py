@@ -102,11 +102,11 @@ class Canvas:
         self._draw.text((_FINE * at[0], _FINE * at[1]), text, color, _font(_FINE * size), anchor)
 
     def width_of(self, text: str, size: int) -> float:
-        """How wide a text is."""
+        """Width of a text."""
         return float(self._draw.textlength(text, _font(_FINE * size))) / _FINE
 
     def picture(self) -> Image:
-        """What is drawn, smoothed."""
+        """Picture, smoothed."""
         picture: Image = self.image.reduce(_FINE)
         return picture
 

@@ -53,7 +53,7 @@ def reads_files(command: argparse.ArgumentParser) -> None:
 
 
 def reading(options: argparse.Namespace) -> dict[str, bool]:
-    """Those of the arguments that say how a model file is read that are there."""
+    """Options that say how a model file is read, where they are given."""
     return {name: True for name in READING if getattr(options, name)}
 
 
@@ -69,7 +69,7 @@ def say(line: str) -> None:
 
 
 def unless_json(options: argparse.Namespace, data: object, text: object) -> str:
-    """What a command prints: its data where `--json` asks for it, else the text."""
+    """Output of a command: its data where `--json` asks for it, else the text."""
     return json.dumps(data, indent=1) if options.json else str(text)
 
 
@@ -96,7 +96,7 @@ def answer(text: str, files: Mapping[Path, str | bytes] | None = None, *, folder
 
 @contextmanager
 def show_warnings() -> Iterator[None]:
-    """Within, a warning is a line of standard error, once, without the line of our code that gave it."""
+    """Show a warning as a line of standard error, once, without the line of our code that gave it."""
     with warnings.catch_warnings():
         shown: set[str] = set()
 

@@ -38,12 +38,12 @@ class Command(argparse.ArgumentParser):
             action.help = action.help and action.help.format(**told)
 
     def parse_known_args(self, args: Sequence[str] | None = None, namespace: Any = None) -> Any:  # type: ignore[override]
-        """As argparse has it, which asks this of the command that is named."""
+        """Options of a command, loaded first; argparse asks this of the command that is named."""
         self.load()
         return super().parse_known_args(args, namespace)
 
     def format_help(self) -> str:
-        """As argparse has it."""
+        """Help of a command, completed first."""
         self.complete()
         return super().format_help()
 

@@ -1,4 +1,4 @@
-"""What commands use of the library beyond its public names, loaded when a command runs."""
+"""Names of the library that commands use beyond the public ones, loaded when a command runs."""
 # ruff: noqa: F401
 # mypy: implicit-reexport
 
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
     from ..models.inspect import inspection_page
     from ..models.inspection import FRAMES, inspection
     from ..models.live import live_page
-    from ..models.open_loops import constant_momentum, tree_alone
+    from ..models.remarks import constant_momentum, tree_alone
     from ..pages import pruning as pruning_page, stability as stability_page, work_precision as work_precision_page
     from ..pages.document import check_folder, document_files
     from ..pages.html import html_target

@@ -119,7 +119,7 @@ class _Exact(NamedTuple):
     folder: Path
 
     def files(self) -> dict[Path, str | bytes]:
-        """Those that came."""
+        """Files of the motions that came."""
         if self.kept is None:
             return {}
         files: dict[Path, str | bytes] = {}
@@ -170,7 +170,7 @@ def _curves(options: argparse.Namespace) -> None:
 def _measured(
     options: argparse.Namespace, chosen: dict[str, Any], peers: tuple[str, ...], exact: Path
 ) -> tuple[list[dict[str, Any]], list[str], dict[Path, str | bytes]]:
-    """What a report has: its data, what is printed of it, and its files."""
+    """Data, lines to print and files of a report."""
     found, lines, files = [], [], dict[Path, str | bytes]()
     for name in options.scenes:
         report = library.work_precision.work_precision(
@@ -245,7 +245,7 @@ def _pruning(options: argparse.Namespace) -> None:
 
 
 def _bodies(scene: dyn.scenes.Scene, lock: dict[str, float]) -> dict[str, float]:
-    """What is to be locked by its body's name, where it may be given by its coordinate's."""
+    """Joints to lock by their bodies' names, where they may be given by their coordinates'."""
     moving = scene.mechanism.moving if scene.mechanism else ()
     bodies = [body.name for body in moving]
     of = {body.coordinate: body.name for body in moving} | {name: name for name in bodies}

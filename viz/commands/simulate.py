@@ -64,7 +64,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _summary(run: dyn.Trajectory) -> dict[str, Any]:
-    """How a run went, as data."""
+    """Facts of a run, as data."""
     import numpy as np
 
     stats = run.stats

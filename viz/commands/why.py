@@ -97,7 +97,7 @@ def _not_connected(options: argparse.Namespace, scene: dyn.scenes.Scene, names: 
 
 
 def _constant(scene: dyn.scenes.Scene, names: extend.Names, options: argparse.Namespace) -> str:
-    """That the momentum is constant whose rate was asked for, or the coordinate that its rate was asked by; or ""."""
+    """Sentence on a constant momentum whose rate was asked for, or whose coordinate the rate was asked by; or ""."""
     output, source = names.meant(options.output), names.meant(options.input)
     told = [
         library.constant_momentum(name)

@@ -134,7 +134,7 @@ def _edges(marked: Collection[Edge]) -> frozenset[Edge]:
 
 
 def _marks(marked: Collection[Node] | Mapping[str, Collection[Node]], words: str) -> dict[Node, Paint]:
-    """How each marked node is painted."""
+    """Paint of each marked node."""
     groups = marked if isinstance(marked, Mapping) else {words: marked}
     if len(groups) > len(theme.MARKS):
         raise ValueError(f"marked nodes come in at most {len(theme.MARKS)} groups, got {len(groups)}")

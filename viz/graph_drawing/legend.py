@@ -55,6 +55,6 @@ polygon[fill="white"][stroke="none"] {{ fill: {theme.DARK_PAGE}; }}
 
 
 def to_adaptive(svg: str) -> str:
-    """What `render_svg` returns, with ink and ground for dark pages where the reader's system asks for them."""
+    """SVG of `render_svg`, with ink and ground for dark pages where the reader's system asks for them."""
     head, rest = svg.split(">", 1)
     return f"{head}>\n{_DARK}{rest.lstrip()}"

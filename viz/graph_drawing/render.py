@@ -48,7 +48,7 @@ class RenderError(RuntimeError):
 
 
 class Drawing(Protocol):
-    """What `to_dot` returns: something that holds its DOT text."""
+    """Result of `to_dot`: something that holds its DOT text."""
 
     @property
     def source(self) -> str:

@@ -1,4 +1,4 @@
-"""What an inspector shows: graphs that are versions of one another, their one state, a motion, tables."""
+"""Contents of an inspector: graphs that are versions of one another, their one state, a motion, tables."""
 
 from __future__ import annotations
 

@@ -101,7 +101,7 @@ def _motion(motion: Motion, letters: Letters) -> dict[str, Json]:
 
 
 def _letters(names: Mapping[str, str]) -> Letters:
-    """What the picture shows of a name: what a person calls it, or letters where that is long."""
+    """Label of a name in the picture: its display name, or letters where that is long."""
     shown = {name: text for name, text in theme.called(names).items() if len(text) <= LONGEST}
     return lambda name: shown.get(name) or theme.pretty(name)
 
@@ -165,7 +165,7 @@ _Plan = tuple[list[Node | str], list[tuple[float, float]], list[tuple[int, int]]
 
 
 def _planned(graph: Graph, letters: Letters) -> _Plan:
-    """What is drawn of a graph, its nodes but constants and its outputs, their sizes, and the lines between them."""
+    """Parts of a drawing: nodes but constants, and outputs, their sizes, and the lines between them."""
     shown: list[Node | str] = [node for node in graph.nodes if node.value is None]
     at = {node: i for i, node in enumerate(shown)}
     lines = [(at[edge.source], at[edge.target]) for edge in graph.edges if edge.source.value is None]

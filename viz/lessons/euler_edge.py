@@ -49,7 +49,7 @@ def euler_edge(subject: Subject) -> Screen:
 
 
 def _expected(stays: bool, verdict: Verdict) -> str:
-    """What a teacher expects of the class."""
+    """Expectation of the teacher."""
     if stays:
         return "Expect hands for A: a smaller step cures almost every other error of a simulation."
     if not verdict.differs:

@@ -89,7 +89,7 @@ def page(subject: Subject, screens: Sequence[Screen]) -> Page:
 
 
 def scripts() -> str:
-    """What there is to play with, and what it needs."""
+    """Scripts of the plays, and of what they need."""
     return "\n".join([values(), asset(html.__package__, "elements.js", "graph.js"), asset(__package__, "plays.js")])
 
 

@@ -1,4 +1,4 @@
-"""What a lesson is about: a model in a moving state, its names, and its graphs as the page's script takes them."""
+"""Subject of a lesson: a model in a moving state, its names, and its graphs as the page's script takes them."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class Subject:
 
     @property
     def scene_names(self) -> dict[str, str]:
-        """What a person calls the inputs and outputs, in plain letters."""
+        """Display names of the inputs and outputs, in plain letters."""
         return display_names(self.scene)
 
     @cached_property
@@ -78,7 +78,7 @@ class Subject:
         ]
 
     def shown(self, name: str) -> str:
-        """What a person reads for an input, output or node of that name."""
+        """Display name of an input, output or node."""
         return self.names.get(name, theme.pretty(name))
 
 

@@ -89,7 +89,7 @@ def _text(node: Node, called: Mapping[Node, str]) -> str:
 
 
 def _what(node: Node) -> str:
-    """What the slope at an input is."""
+    """Meaning of the slope at an input."""
     name = node.name or ""
     if node.args or not name[-1:].isdigit():
         return ""

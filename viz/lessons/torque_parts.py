@@ -1,4 +1,4 @@
-"""Why this torque: what of it moves mass, what goes around the bend, what holds weight and springs."""
+"""Parts of a torque: what of it moves mass, what goes around the bend, what holds weight and springs."""
 
 from __future__ import annotations
 

@@ -119,7 +119,7 @@ class Live:
             require_texts(what, getattr(self, what))
 
     def to_dict(self) -> dict[str, Json]:
-        """What the script of the page reads."""
+        """Data for the script of the page."""
         called = theme.called(self.names)
         return {
             "rate": base64.b64encode(cg.to_wasm(self.rate, self.methods, time=TIME)).decode(),
@@ -155,7 +155,7 @@ EVALUATION = "'wasm-unsafe-eval'"  # in the policy: WebAssembly may be compiled,
 
 
 class Panel(NamedTuple):
-    """What a page takes to have the panel: elements, its data, a script and a style; all colors are variables.
+    """Panel for a page: elements, its data, a script and a style; all colors are variables.
 
     The page's style has --text, --back, --soft and --edge, its scripts elements.js and
     address.js, its policy `EVALUATION`.

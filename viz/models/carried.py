@@ -1,4 +1,4 @@
-"""What AD of the energy carries: nodes of the chain rule's graph that equations by velocities do not have, and why."""
+"""Nodes that AD of the energy carries: those of the chain rule that equations by velocities do not have, and why."""
 
 from __future__ import annotations
 

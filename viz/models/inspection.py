@@ -235,7 +235,7 @@ def _named(**tables: Array) -> dict[str, float | Array]:
 
 
 def _shares(scene: Scene) -> StateTable | None:
-    """What each partial Lagrangian takes of the torques, and damping and forces where there are any; the sum of all."""
+    """Shares of the torques of each partial Lagrangian, of damping and forces where there are any, and their sum."""
     system, mechanism = scene.system, scene.mechanism
     if len(system.partial_lagrangians) < 2 or (mechanism is not None and mechanism.base_parameters):
         return None

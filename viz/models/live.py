@@ -189,7 +189,7 @@ def _momenta(scene: Scene, values: Mapping[str, float]) -> dict[str, float]:
 
 
 def _places(scene: Scene, rate: Graph, start: dict[str, float]) -> tuple[dict[str, Node], tuple[int, ...]]:
-    """Where joints and tips are in the picture: x0, y0, x1, .. over the inputs of the state equation."""
+    """Places of joints and tips in the picture: x0, y0, x1, .. over the inputs of the state equation."""
     if scene.mechanism is None:
         return {}, ()
     inputs = dict(zip(rate.input_names, rate.inputs, strict=True))
@@ -212,7 +212,7 @@ def _places(scene: Scene, rate: Graph, start: dict[str, float]) -> tuple[dict[st
 
 
 def _scale(name: str, value: float, unit: str, weight: float) -> float:
-    """How far a slider reaches to both sides of 0."""
+    """Reach of a slider to both sides of 0."""
     if name.startswith("tau"):
         return _round(2.0 * weight) if weight else 10.0
     usual = USUAL.get(unit, 1.0)

@@ -70,7 +70,7 @@ class Document:
 
 
 def left_out(what: Sequence[str]) -> list[Block]:
-    """What the model of a page has not of the file that it was read from; it stands at the top."""
+    """Blocks at the top of a page on what its model has not of the file that it was read from."""
     return [Paragraph(f"Left out of the model: {'; '.join(what)}.", warning=True)] if what else []
 
 

@@ -156,7 +156,7 @@ def _row(case: PeerModel, task: str, mode: str, pool: WorkerPool, repeats: int) 
 
 
 def _start(case: PeerModel, task: str, mode: str) -> Array:
-    """What the values of a step or a loop are measured from: they move little, and it is the motion that counts."""
+    """Origin of the values of a step or a loop: they move little, and it is the motion that counts."""
     if mode == "loop":
         return case.point(task)
     if task == "rk4":
@@ -300,7 +300,7 @@ def _table(rows: Sequence[Row], read: Callable[[Row], dict[str, tuple[str, str]]
 
 
 def _spread(rows: Sequence[Row]) -> list[str]:
-    """How much the turns of a peer differed."""
+    """Spread of the turns of the peers."""
     spreads = {
         (peer, row.scene): 100.0 * (cell.high - cell.low) / cell.micros
         for row in rows

@@ -49,7 +49,7 @@ class Prepared:
 
 @dataclass(frozen=True)
 class Refused:
-    """Why a task is not ready."""
+    """Reason why a task is not ready."""
 
     reason: str
 
@@ -104,7 +104,7 @@ class Worker:
 
     @property
     def alive(self) -> bool:
-        """It can still be asked."""
+        """Whether the process can still be asked."""
         return self._process.is_alive()
 
     def end(self) -> None:
@@ -149,7 +149,7 @@ def _serve(pipe: Connection, load: Load, name: str) -> None:
 
 
 def repetitions(task: TimedTask) -> int:
-    """How many runs make a measurable time."""
+    """Number of runs that make a measurable time."""
     start = time.perf_counter()
     task.run()
     once = time.perf_counter() - start

@@ -66,7 +66,7 @@ class CaseResult:
 
 
 class Limit(NamedTuple):
-    """Why a bound is not met.  within: the largest measurement that the reason accounts for, in bounds."""
+    """Reason why a bound is not met.  within: the largest measurement that the reason accounts for, in bounds."""
 
     reason: str
     within: float

@@ -31,7 +31,7 @@ MOTIONS: dict[str, tuple[Scene, float]] = {  # without chaos, and the step to ru
 
 
 class Drift(NamedTuple):
-    """Of an energy over a run: relative to `size`."""
+    """Drift of an energy over a run, relative to `size`."""
 
     band: float  # largest less smallest
     drift: float  # the change over the run by the straight line of least squares

@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -43,7 +43,7 @@ SEED = 2025
 
 
 class Task(NamedTuple):
-    """What is evaluated.  doubled: in double-double, see above."""
+    """Quantity to evaluate.  doubled: in double-double, see above."""
 
     derive: Callable[..., Graph]
     exact: Callable[..., Pair]
@@ -152,7 +152,7 @@ class Arms:
         self._graph = task.derive(arm_with_parameters(n))
 
     def functions(self, arm: Mechanism) -> list[Compiled]:
-        """What evaluates the task, one for each backend; in double-double one for all arms."""
+        """Functions of the task, one for each backend; in double-double one for all arms."""
         return self._doubled if self.task.doubled else self._compiled(self.task.derive(arm))
 
     @cached_property
@@ -208,7 +208,7 @@ def arm_with_parameters(n: int) -> System:
     )
 
 
-def by_centers(q: Sequence[Node], qd: Sequence[Node], links: Sequence[LinkParameters], gravity: Node) -> list[Node]:
+def by_centers(q: Sequence[Node], qd: Sequence[Node], links: Sequence[Any], gravity: Node | float) -> list[Node]:
     """The partial Lagrangians by positions and velocities of the centers of mass, K = m v.v / 2 + I w^2 / 2."""
     partials: list[Node] = []
     angle, omega = q[0], qd[0]

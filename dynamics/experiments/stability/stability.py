@@ -109,7 +109,7 @@ def text(results: Sequence[CaseResult]) -> str:
 
 
 def summary(results: Sequence[CaseResult]) -> str:
-    """How many of each verdict."""
+    """Count of each verdict."""
     counts = Counter(row.verdict for row in results)
     return f"{len(results)} rows: {', '.join(f'{counts[word]} {word}' for word in ('meets', 'limit', 'unexplained'))}"
 

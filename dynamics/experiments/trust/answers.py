@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 import cgraph as cg
-from cgraph.extend import Array, Json
+from cgraph.extend import Array
 
 from ...multiprecision import Reference, ReferenceFailedError
 from ...multiprecision.solution import from_text
@@ -48,8 +45,8 @@ class Answer:
 def answer(number: int) -> Answer:
     """The answer to the random motion of this number, from the file beside this one or computed."""
     task = random_motion(number)
-    kept = _kept().get(str(number))
-    if kept is None or kept["start"] != _hex(task.start) or kept["t"] != task.t_end.hex():
+    kept = task.kept(FILE, str(number))
+    if kept is None:
         return compute(task)
     end = from_text([task.t_end], [kept["x"]], kept["error"], kept["how"]) if "x" in kept else None
     return Answer(end, tuple(kept["size"]), kept["growth"], kept["how"])
@@ -90,35 +87,3 @@ def size_and_growth(task: AccuracyTask, times: Sequence[float], size: Array) -> 
     flows = np.stack(columns, axis=2)  # (T, m, m), from the start
     usable = [flow for flow in flows[:-1] if np.linalg.cond(flow) < REGULAR]
     return size, max([1.0, *[float(np.abs(flows[-1] @ np.linalg.inv(flow)).sum(axis=1).max()) for flow in usable]])
-
-
-def renew(numbers: Iterable[int], say: Callable[[str], None] = lambda line: None) -> None:
-    """Compute the answers of these numbers and keep them in the file; some take half a minute."""
-    for number in numbers:
-        task = random_motion(number)
-        result = compute(task)
-        entry: dict[str, Json] = {"start": _hex(task.start), "t": task.t_end.hex()}
-        entry |= {"size": list(result.size), "growth": result.growth, "how": result.how}
-        if result.end is not None:
-            entry |= {"x": list(result.end.decimal[0]), "error": result.end.error}
-        with _changed() as entries:
-            entries[str(number)] = entry
-        say(f"{number} {task.name}: growth {result.growth:.3g}; {result.how}")
-
-
-@contextmanager
-def _changed() -> Iterator[dict[str, Json]]:
-    entries = json.loads(FILE.read_text(encoding="utf-8")) if FILE.exists() else {}
-    yield entries
-    ordered = {str(number): entries[str(number)] for number in sorted(map(int, entries))}
-    FILE.write_text(json.dumps(ordered, indent=0) + "\n", encoding="utf-8")
-
-
-def _hex(values: Iterable[float]) -> list[str]:
-    return [float(value).hex() for value in values]
-
-
-def _kept() -> dict[str, Any]:
-    if not FILE.exists():
-        return {}
-    return dict(json.loads(FILE.read_text(encoding="utf-8")))

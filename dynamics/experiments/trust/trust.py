@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -84,27 +84,33 @@ def verdicts(
 
 
 def trust(count: int = COUNT) -> Iterator[str]:
-    """The verdicts counted by method, and in words those that are silent."""
-    judged = list(verdicts(range(count)))
-    methods = list(dict.fromkeys([each.method for each in judged]))
+    """The verdicts counted by method, and in words those that are not right."""
+    right = f"right to {SLACK:g}, where forces jump to {JUMPS:g}"
+    title = f"{count} random motions, default arguments; excess: error over rtol times growth, {right}"
+    figures: dict[str, Callable[[Sequence[Verdict], list[float]], str]] = {
+        "median excess": lambda chosen, ends: f"{np.median(ends):.2g}",
+        "largest": lambda chosen, ends: f"{max(ends):.2g}",
+        "seconds": lambda chosen, ends: f"{sum(each.seconds for each in chosen):.2f}",
+    }
+    yield from counted(title, list(verdicts(range(count))), figures)
+
+
+def counted(
+    title: str, judged: Sequence[Verdict], figures: Mapping[str, Callable[[Sequence[Verdict], list[float]], str]]
+) -> Iterator[str]:
+    """A title, the verdicts and figures by method, and in words the verdicts that are not right.
+
+    figures: {head of a column: text of the verdicts of a method, and of the excesses of their ends}.
+    """
     rows = []
-    for method in methods:
+    for method in dict.fromkeys([each.method for each in judged]):
         chosen = [each for each in judged if each.method == method]
         counts = Counter([each.verdict for each in chosen])
         ends = [each.excess for each in chosen if each.excess == each.excess]
-        rows.append(
-            [
-                method,
-                *[str(counts[verdict]) for verdict in (RIGHT, SAID, SILENT)],
-                f"{np.median(ends):.2g}",
-                f"{max(ends):.2g}",
-                f"{sum(each.seconds for each in chosen):.2f}",
-            ]
-        )
-    head = ["method", RIGHT, SAID, SILENT, "median excess", "largest", "seconds"]
-    right = f"right to {SLACK:g}, where forces jump to {JUMPS:g}"
-    yield f"{count} random motions, default arguments; excess: error over rtol times growth, {right}"
-    yield "\n".join(table(head, rows))
+        texts = [figure(chosen, ends) for figure in figures.values()]
+        rows.append([method, *[str(counts[verdict]) for verdict in (RIGHT, SAID, SILENT)], *texts])
+    yield title
+    yield "\n".join(table(["method", RIGHT, SAID, SILENT, *figures], rows))
     for each in judged:
         if each.verdict != RIGHT:
             yield f"{each.verdict}: {each.name}, {each.method}: excess {each.excess:.3g}; {each.words}"

@@ -161,7 +161,7 @@ def cold_starts(
 
 
 def _in_a_process(request: dict[str, Any], budget: float) -> dict[str, float] | str:
-    """What `child` printed, or why it did not."""
+    """Answer of `child`, or the reason why there is none."""
     try:
         done = run_fresh(__name__, "child()", json.dumps(request), budget)
     except subprocess.TimeoutExpired:

@@ -49,7 +49,7 @@ class Subject(NamedTuple):
 
     @property
     def title(self) -> str:
-        """What is integrated, and what its exact motion is worth."""
+        """Title: the motion, and the error of its reference."""
         exact, until = self.metrics.exact, f"{self.task.name}, to t = {self.task.t_end:g} s"
         return f"{until}. Exact motion: {exact.how}; its error {exact.error:.0e}"
 

@@ -227,7 +227,7 @@ class Entry:
     stopped: str = ""
 
     def curve(self, metrics: ErrorMetrics, problem: Problem) -> Curve:
-        """What the report keeps."""
+        """Curve of the report."""
         solver = self.solver
         points = tuple([_point(solver, each, metrics) for each in self.tried])
         theirs = solver.rates(metrics.exact.x)
@@ -332,7 +332,7 @@ def fitted_order(steps: Sequence[float], errors: Sequence[float], finest: int | 
 
 
 def _fitted(kind: str, points: Sequence[Point]) -> float | None:
-    """Of equal steps by the largest error; of chosen ones, whose dense output has another order, by that at the end."""
+    """Fitted order by the largest error; of chosen steps, whose dense output has another order, by that at the end."""
     told = [each for each in points if each.step]
     steps = [each.step or 0.0 for each in told]
     if kind == EQUAL:

@@ -73,7 +73,7 @@ class Mujoco(Solver):
         return ours
 
     def _states(self, steps: int) -> tuple[Array, Callable[[], object]]:
-        """Where the states of a run go, (1, steps, ..), and the run."""
+        """Memory of the states of a run, (1, steps, ..), and the run."""
         states = np.empty((1, steps, self.begin.shape[1]))
         native = rollout(self.model, self.begin, states)
 
@@ -84,7 +84,7 @@ class Mujoco(Solver):
         return states, run
 
     def rates(self, x: Array) -> Array:
-        """Its rates, (T, m), at states (T, m): velocities as they are, accelerations by MuJoCo."""
+        """Rates, (T, m), at states (T, m): velocities as they are, accelerations by MuJoCo."""
         n, order, at = self.peer.case.n, self.peer.order, self.peer.at
         twin, none = self.peer.twin, np.zeros(self.peer.case.n)
         accelerations = [twin.accelerations(row[:n][at], row[n:][at], none)[order] for row in x]
@@ -144,7 +144,7 @@ class Heyoka(Solver):
         return result
 
     def rates(self, x: Array) -> Array:
-        """Its rates of the states, (T, m), at states (T, m)."""
+        """Rates of the states, (T, m), at states (T, m)."""
         variables, expressions = zip(*self.system, strict=True)
         function = self.heyoka.cfunc(list(expressions), list(variables), compact_mode=True)
         times = {"time": np.zeros(len(x))} if function.is_time_dependent else {}
@@ -185,7 +185,7 @@ class Cvodes(Solver):
         return states
 
     def rates(self, x: Array) -> Array:
-        """Its rates of the states, (T, m), at states (T, m)."""
+        """Rates of the states, (T, m), at states (T, m)."""
         ca, parts = self.casadi, self.equations
         rate = ca.Function("rate", [parts["x"], parts["t"]], [parts["ode"]])
         return np.array([np.array(rate(row, 0.0)).ravel() for row in x])

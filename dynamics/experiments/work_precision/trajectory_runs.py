@@ -56,14 +56,14 @@ class Solver(ABC):
 
     @abstractmethod
     def ready(self, knob: float) -> Callable[[], Outcome]:
-        """What is timed: the run with that knob, everything before it done. Raises for what cannot be done."""
+        """Run with that knob, everything before it done: what is timed. Raises for a knob that cannot be had."""
 
     @abstractmethod
     def rows(self, knob: float) -> Array:
         """The states at the task's times, (T, m); NaN from where it stopped."""
 
     def rates(self, x: Array) -> Array | None:
-        """Its own rates of the states, (T, m), at states (T, m); None where they are computed by our graph."""
+        """Rates of the states, (T, m), at states (T, m); None where they are computed by our graph."""
         return None
 
     def absolute(self, knob: float) -> float:

@@ -77,7 +77,7 @@ def work_precision(
 
 
 def _described(task: AccuracyTask, problem: Problem, exact: Reference) -> dict[str, Any]:
-    """What the report says of the task and of its exact motion."""
+    """Facts of the report on the task and its exact motion."""
     fields = ("name", "about", "t_end", "conservative", "stiff", "left_out")
     return {name: getattr(task, name) for name in fields} | {
         "states": problem.size,
@@ -113,7 +113,7 @@ def _solvers(
     backend: str,
     absent: dict[str, str],
 ) -> Iterable[Solver]:
-    """Those that can be made; why others cannot goes to `absent`."""
+    """Solvers that can be made; reasons why others cannot go to `absent`."""
     makers: dict[str, Callable[[], Solver]] = {
         method: lambda method=method: Ours(method, task, smallest, problem, backend)  # type: ignore[misc]
         for method in METHODS

@@ -1,4 +1,4 @@
-"""What is said where a model has loops or other constraints, and inverse dynamics is that of its tree."""
+"""Sentences on a model: that inverse dynamics is that of its tree, and that a momentum is constant."""
 
 from __future__ import annotations
 
