@@ -20,6 +20,7 @@ import dynamics as dyn
 import viz
 from dynamics import scenes
 from dynamics.scenes import scenes as registry
+from tests.each_row import each_row
 from tests.slow import slow
 from viz import cli
 from viz.commands.arguments import FORMULATIONS, IN_PYTHON
@@ -82,7 +83,7 @@ def test_a_model_file_stands_where_a_scene_s_name_does(tmp_path, capsys):
     assert capsys.readouterr().err == said
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("arguments", "said"),
     [
         (["draw", "quadruple_pendulum", "--out", "x.dot"], "there is no scene 'quadruple_pendulum'"),
@@ -129,7 +130,7 @@ def test_what_the_system_says_has_no_number(monkeypatch, capsys):
 WRONG = ([], ["paint"], ["draw"], ["draw", "chain", "--out", "x.dot", "--formulation", "f"])
 
 
-@pytest.mark.parametrize("arguments", WRONG)
+@each_row("arguments", WRONG)
 def test_wrong_usage_gets_the_usage_and_exit_status_2(capsys, arguments):
     with pytest.raises(SystemExit) as stop:
         cli.main(arguments)
@@ -247,7 +248,7 @@ def test_words_of_a_list_may_stand_between_options():
     assert parse(["report", "--quick", "chain", "--json", "spring_mass"]).scenes == ["chain", "spring_mass"]
 
 
-@pytest.mark.parametrize("arguments", [["draw", "chain", "chain", "--out", "a.dot"], ["bench", "--quickly"]])
+@each_row("arguments", [["draw", "chain", "chain", "--out", "a.dot"], ["bench", "--quickly"]])
 def test_what_no_list_takes_is_refused(capsys, arguments):
     with pytest.raises(SystemExit) as stop:
         parse(arguments)
@@ -310,10 +311,10 @@ def test_json_of_a_report_writes_no_file_unless_a_folder_is_named(tmp_path, monk
         "draw spring_mass --out {}",
     ],
 )
-@pytest.mark.parametrize("target", ["missing/a.svg", "folder.svg"])
+@each_row("target", ["missing/a.svg", "folder.svg"])
 def test_a_place_that_cannot_be_written_is_told_before_the_work(tmp_path, monkeypatch, capsys, arguments, target):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "folder.svg").mkdir()
+    (tmp_path / "folder.svg").mkdir(exist_ok=True)
     assert cli.main(arguments.format(target).split()) == 2
     printed = capsys.readouterr()
     assert printed.out == ""

@@ -24,6 +24,7 @@ from dynamics.peers import PeerModel, UnavailableError, ours
 from dynamics.peers.ours import with_inertial_parameters
 from dynamics.peers.peer import BATCH, DERIVATIVES, DT, MOTIONS, NUDGE, PASSES
 from dynamics.peers.translate import translated
+from tests.each_row import each_row
 from viz import cli
 
 ROUNDING = 1e-10  # of a loop: the motion is that much larger than the last bit of the state it is taken from
@@ -140,7 +141,7 @@ OFFERED = [
 ]
 
 
-@pytest.mark.parametrize(("name", "task", "mode"), [each for each in OFFERED if "gradient" not in each.values[1]])
+@each_row(("name", "task", "mode"), [each for each in OFFERED if "gradient" not in each.values[1]], by="name")
 def test_a_peer_finds_what_mujoco_finds(name, task, mode):
     case = PeerModel("planar 3", load("planar 3").model)
     reference, x = Reference(case), case.point(task)
@@ -204,7 +205,7 @@ def test_a_gradient_by_inertial_numbers_is_that_of_motions_with_other_numbers():
     assert found[len(case.point("gradient")) :] @ along == pytest.approx(expected, rel=DIFFERENCES)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("name", "task"),
     [
         (name, task)
@@ -212,6 +213,7 @@ def test_a_gradient_by_inertial_numbers_is_that_of_motions_with_other_numbers():
         for task in TASKS
         if (task, "call") in PEERS[name].offers and task not in MOTIONS
     ],
+    by="name",
 )
 def test_a_peer_knows_springs_armature_slides_and_the_order_of_joints(name, task):
     case = PeerModel("tree", tree())
@@ -261,7 +263,7 @@ def floating():
     return case, {task: prepared("ours-numpy", case, task, "batch")[1] for task in TASKS if task not in MOTIONS}
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("name", "task", "mode"),
     [
         pytest.param(
@@ -272,6 +274,7 @@ def floating():
         if not {"loop", "jax", *MOTIONS} & set(each.values)
     ]
     + [pytest.param("jax", task, "batch", marks=pytest.mark.slow) for task in CALLED],
+    by="name",
 )
 def test_a_peer_moves_a_free_base_as_we_do(name, task, mode, floating):
     case, ours = floating
@@ -360,7 +363,7 @@ def test_what_a_peer_s_own_code_raises_is_a_reason():
     assert not worker.alive
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("choice", "said"),
     [
         ({"scenes": ["planar 4"]}, "there is no scene 'planar 4'"),

@@ -23,6 +23,7 @@ from dynamics.experiments.stability import (
 from dynamics.experiments.stability.case_result import CaseResult, Measurement
 from dynamics.integrators import METHODS, Method, runge_kutta
 from dynamics.integrators.tableau import DOPRI5
+from tests.each_row import each_row
 from tests.early_end import stops
 
 STIFF, SMOOTH = "Robertson, to 1e11", "heavy top"
@@ -97,7 +98,7 @@ def kept_is_computed(name: str) -> None:
     assert np.max(np.abs(kept.deviation(computed.x)[0]) / size) <= STORED * grown
 
 
-@mark.parametrize("name", [*[name for name, case in cases.table().items() if case.exact], "mass ratio 1e-12"])
+@each_row("name", [*[name for name, case in cases.table().items() if case.exact], "mass ratio 1e-12"])
 def test_a_solution_in_the_file_is_the_one_computed(name: str) -> None:
     importorskip("mpmath")
     importorskip("flint")

@@ -43,6 +43,7 @@ from dynamics.experiments.work_precision.trajectory_runs import (
 from dynamics.experiments.work_precision.work_precision import work_precision
 from dynamics.integrators import METHODS
 from dynamics.multiprecision import Reference
+from tests.each_row import each_row
 
 T_END = 10.0  # s, of the scene spring_mass: q = cos t
 ROUNDING = 1e-9  # a thousand times that of a power of R(i h) in float64
@@ -369,7 +370,7 @@ def test_another_start_has_another_exact_motion() -> None:
     assert exact.x[-1] == approx(np.array([2.0 * math.sin(1.0), 2.0 * math.cos(1.0)]), rel=1e-14)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("arguments", "said"),
     [
         ({"name": "nothing"}, "there is no scene 'nothing'"),

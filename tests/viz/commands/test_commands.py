@@ -15,6 +15,7 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
+from tests.each_row import each_row
 from viz import cli, theme
 from viz.commands.arguments import filled
 
@@ -48,7 +49,7 @@ def by_complex_step(graph: cg.Graph, output: str, name: str, at: dict[str, float
     return values[graph.outputs[output]].imag / 1e-200
 
 
-@pytest.mark.parametrize("formulation", RIGHT)
+@each_row("formulation", RIGHT)
 def test_lint_proves_that_the_chain_rule_keeps_q_and_qd_apart(capsys, formulation):
     text = said(capsys, "lint", "triple_pendulum", "--formulation", formulation)
     assert text.count("Holds: ") == 3
@@ -56,7 +57,7 @@ def test_lint_proves_that_the_chain_rule_keeps_q_and_qd_apart(capsys, formulatio
     assert "q.joint 1, q.joint 2 and q.joint 3 are inputs" in text
 
 
-@pytest.mark.parametrize("formulation", FLAWED)
+@each_row("formulation", FLAWED)
 def test_lint_blames_the_edges_of_the_embedding(capsys, formulation):
     exact = formulation == "kinetic_only_exact"  # embedded, but no derivative is taken through it
     found = figures(capsys, "lint", "triple_pendulum", "--formulation", formulation, status=int(not exact))
@@ -68,7 +69,7 @@ def test_lint_blames_the_edges_of_the_embedding(capsys, formulation):
     assert (finding["derivatives_through"] == 0) == exact
 
 
-@pytest.mark.parametrize("n", [1, 2, 3, 5, 8])
+@each_row("n", [1, 2, 3, 5, 8])
 def test_the_fewest_edges_to_cut_are_one_for_each_joint(n):
     arm = dyn.scenes.load("chain", n=n)
     groups = [f"q{i}" for i in range(n)], [f"qd{i}" for i in range(n)]
@@ -392,7 +393,7 @@ def test_the_answer_is_drawn(tmp_path, capsys):
     assert "only chain_rule" in svg
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("arguments", "message"),
     [
         (["why", "triple_pendulum", "tau0", "q9"], "nothing in the graph is called 'q9'"),
@@ -417,7 +418,7 @@ def test_a_mistake_gets_one_line_and_exit_status_2(capsys, arguments, message):
     assert message in error
 
 
-@pytest.mark.parametrize(
+@each_row(
     "arguments",
     [
         ["lint"],

@@ -12,6 +12,7 @@ from xml.etree import ElementTree
 
 import pytest
 
+from tests.each_row import each_row
 from viz import cli
 from viz.pages.document import Table, to_html
 
@@ -197,7 +198,7 @@ def test_an_interrupted_report_leaves_no_file(tmp_path: Path, monkeypatch: pytes
     assert left == []
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("arguments", "said"),
     [
         (["report", "nothing"], "there is no scene 'nothing'"),
@@ -228,7 +229,7 @@ def test_mistakes_get_one_line(
     assert not (tmp_path / "r").exists()
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("arguments", "said"),
     [
         (["--start", "a,b"], "argument --start: expected a finite number, got 'a'"),
