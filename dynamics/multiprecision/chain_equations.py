@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 Maker = Callable[[object], Number]
 DIGITS = 60  # of the first attempt; twice as many until `LOST` is met
-MOST = 2000
+MOST_DIGITS = 2000
 LOST = 1e-50  # the largest bound on the error, relative to the largest component
 
 
@@ -49,7 +49,7 @@ def _bounded(
 ) -> Pair:
     """The numbers, computed with so many digits that the bound on their error is at most LOST."""
     digits = DIGITS
-    while digits <= MOST:
+    while digits <= MOST_DIGITS:
         with working(digits) as number:
             try:
                 x = solved(*_equations(number, chain, q, qd), _column(number, third)).entries()
@@ -61,7 +61,7 @@ def _bounded(
                 low = [float((value - h).mid()) for value, h in zip(x, high, strict=True)]
                 return Pair(np.array(high), np.array(low))
         digits *= 2
-    raise ArithmeticError(f"{MOST} digits are not enough for a chain of {len(chain.moving)} links")
+    raise ArithmeticError(f"{MOST_DIGITS} digits are not enough for a chain of {len(chain.moving)} links")
 
 
 def _equations(number: Maker, chain: Mechanism, q: Array, qd: Array) -> tuple[arb_mat, arb_mat]:

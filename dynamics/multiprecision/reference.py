@@ -24,7 +24,11 @@ from .taylor_integrator import ReferenceFailedError, taylor
 
 Solver = Callable[..., tuple[list[list[Number]], str]]
 REFERENCE_METHODS: dict[str, Solver] = {"taylor": taylor, "radau": collocation}
-FEWEST, STEP, MOST = 8, 6, 400  # digits of the tolerance: the least at first, more in each run, and where it ends
+FEWEST, STEP, MOST_DIGITS = (
+    8,
+    6,
+    400,
+)  # digits of the tolerance: the least at first, more in each run, and where it ends
 # Digits of the first run. Collocation has at the ends of steps about twice the digits that it has within.
 FIRST: dict[str, Callable[[int], int]] = {"taylor": lambda digits: digits + 2, "radau": lambda digits: digits // 2 + 4}
 SPARE = 6  # digits written beyond those asked for
@@ -96,8 +100,8 @@ def reference(
     require_choice("method", method, REFERENCE_METHODS)
     if folder is not None:
         folder = require_path("folder", folder)
-    if isinstance(digits, bool) or not (isinstance(digits, int) and 1 <= digits <= MOST // 2):
-        raise ValueError(f"digits must be a whole number from 1 to {MOST // 2}, got {digits!r}")
+    if isinstance(digits, bool) or not (isinstance(digits, int) and 1 <= digits <= MOST_DIGITS // 2):
+        raise ValueError(f"digits must be a whole number from 1 to {MOST_DIGITS // 2}, got {digits!r}")
     model, constant, _ = with_closed_form(as_equations(model), tau, parameters)
     start, inputs = initial_value(model, q, qd, constant, parameters), state_inputs(model)
     x, times = start.x.tolist(), times_to_record(t_eval).tolist()
@@ -126,7 +130,7 @@ def _converged(
     wanted = max(first, FEWEST)
     before, _ = run(wanted)
     step = STEP
-    while (wanted := wanted + step) <= MOST:
+    while (wanted := wanted + step) <= MOST_DIGITS:
         rows, how = run(wanted)
         error, state = max(zip(_differences(before, rows), states, strict=True))
         if error <= 10.0**-digits:
@@ -137,7 +141,7 @@ def _converged(
         missing = digits + math.log10(error) if error < math.inf else digits
         before, step = rows, max(STEP, math.ceil(missing))
     raise ReferenceFailedError(
-        f"{MOST} digits are not enough for {digits} digits at t = {times[-1]:.6g}: the last two runs differ by "
+        f"{MOST_DIGITS} digits are not enough for {digits} digits at t = {times[-1]:.6g}: the last two runs differ by "
         f"{error:.0e} of the largest value of {state}, so that it is zero but for rounding, or the start does "
         "not decide it, as beyond a configuration where a linkage can go on in two ways"
     )

@@ -76,11 +76,16 @@ def levels_svg(panels: Sequence[LevelPanel], scale: Scale) -> str:
         marks = {words: scale.y(level, depth) for words, level in panel.marks.items()}
         drawn += [*_words(panel, x, width, marks), *_lines(panel.graph, at), *_nodes(panel.graph, at, scale)]
         x += width + SIDE
+    heights = {level: scale.y(level, depth) for level in range(0, depth + 1, scale.ticks)}
+    return _with_rows(x - SIDE, heights, scale.y(0, depth) + scale.row / 2, drawn)
+
+
+def _with_rows(right: float, heights: Mapping[int, float], bottom: float, drawn: Sequence[str]) -> str:
+    """The picture, with lines and numbers of its rows.  heights: {level: pixels from the top}."""
     rows = []
-    for level in range(0, depth + 1, scale.ticks):
-        y = scale.y(level, depth)
-        rows += [rule(SIDE - 10, x - SIDE, y, 'stroke-opacity="0.2"'), label(SIDE - 14, y + 4, str(level), "end")]
-    return picture(x - SIDE + 8, scale.y(0, depth) + scale.row / 2 + FOOT, [*rows, *drawn])
+    for level, y in heights.items():
+        rows += [rule(SIDE - 10, right, y, 'stroke-opacity="0.2"'), label(SIDE - 14, y + 4, str(level), "end")]
+    return picture(right + 8, bottom + FOOT, [*rows, *drawn])
 
 
 def _across(graph: Graph, scale: Scale) -> tuple[dict[Node, tuple[float, int]], float]:
@@ -221,11 +226,7 @@ def silhouettes_svg(panels: Sequence[LevelPanel], row: float = 1.0, node: float 
             )
             drawn.append(f'<path d="{rows}" fill="{paint.line}"/>')
         x += width + SIDE
-    ticks = []
-    for level in range(0, depth + 1, TICKS):
-        ticks += [rule(SIDE - 10, x - SIDE, y(level), 'stroke-opacity="0.2"')]
-        ticks += [label(SIDE - 14, y(level) + 4, str(level), "end")]
-    return picture(x - SIDE + 8, y(0) + FOOT, [*ticks, *drawn])
+    return _with_rows(x - SIDE, {level: y(level) for level in range(0, depth + 1, TICKS)}, y(0), drawn)
 
 
 def _rows(graph: Graph, x: float, node: float) -> dict[theme.Paint, list[tuple[int, float, float]]]:

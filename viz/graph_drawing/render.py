@@ -19,7 +19,7 @@ from .. import theme
 from .dot import to_dot
 
 ENGINES = ("dot", "neato", "fdp", "sfdp", "circo", "twopi", "osage", "patchwork")
-LONGEST = 1e6  # s, that a drawing may be waited for
+LONGEST_WAIT = 1e6  # s, that a drawing may be waited for
 LARGE = 500  # nodes; beyond, a layered drawing takes long and shows little
 
 # The WebAssembly Graphviz runs in a process of its own: it has no time limit, it aborts the process when threads use
@@ -86,8 +86,8 @@ def render_svg(dot_source: str | Drawing, *, engine: str = "dot", timeout: float
     (True, 2)
     """
     require_choice("engine", engine, ENGINES)
-    if not 0.0 < real_number("timeout", timeout) <= LONGEST:
-        raise ValueError(f"timeout must be positive, up to {LONGEST:g} s, got {timeout!r} s")
+    if not 0.0 < real_number("timeout", timeout) <= LONGEST_WAIT:
+        raise ValueError(f"timeout must be positive, up to {LONGEST_WAIT:g} s, got {timeout!r} s")
     source = dot_source if isinstance(dot_source, str) else getattr(dot_source, "source", None)
     if not isinstance(source, str):
         raise TypeError(f"render_svg needs DOT text or what to_dot returns, got {type(dot_source).__name__}")

@@ -32,7 +32,7 @@ from .content import Motion, State, StateTable, Version
 STAGES = {PRIMAL: "as written", ADJOINT: "reverse sweep", TANGENT: "forward sweep"}
 SMALL = 60  # nodes of a graph that is laid out by Graphviz
 NODE_HEIGHT, LEAF_HEIGHT = 34.0, 30.0  # pixels, as in arrange.js
-LONGEST = 24  # letters of a name for which a box has room
+LONGEST_NAME = 24  # letters of a name for which a box has room
 Letters = Callable[[str], str]
 
 
@@ -102,7 +102,7 @@ def _motion(motion: Motion, letters: Letters) -> dict[str, Json]:
 
 def _letters(names: Mapping[str, str]) -> Letters:
     """Label of a name in the picture: its display name, or letters where that is long."""
-    shown = {name: text for name, text in theme.called(names).items() if len(text) <= LONGEST}
+    shown = {name: text for name, text in theme.called(names).items() if len(text) <= LONGEST_NAME}
     return lambda name: shown.get(name) or theme.pretty(name)
 
 

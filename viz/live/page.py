@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from html import escape
-from typing import Any, NamedTuple
+from typing import Any
 
 import cgraph as cg
 from cgraph import Graph, GraphError
@@ -15,7 +15,7 @@ from cgraph.extend import Json, is_finite, real_number, require_graph, require_m
 
 from .. import theme
 from ..pages import html
-from ..pages.html import Page, asset
+from ..pages.html import Page, Panel, asset
 
 TIME = "t"  # the input that is the time, if there is one
 GROUPS = (
@@ -154,31 +154,19 @@ SCRIPTS = ("machine.js", "run.js", "course.js", "live.js")
 EVALUATION = "'wasm-unsafe-eval'"  # in the policy: WebAssembly may be compiled, text may not
 
 
-class Panel(NamedTuple):
-    """Panel for a page: elements, its data, a script and a style; all colors are variables.
-
-    The page's style has --text, --back, --soft and --edge, its scripts elements.js and
-    address.js, its policy `EVALUATION`.
-    """
-
-    html: str
-    data: Mapping[str, Json]
-    script: str
-    style: str
-
-    def folded(self) -> str:
-        """Elements for the end of a page: the panel, closed at first."""
-        return f'<details id="live"><summary>Live: computed as you watch</summary>\n{self.html}</details>'
-
-
 def panel(live: Live) -> Panel:
-    """The panel."""
+    """The panel of a live motion, for a page whose style has --text, --back, --soft and --edge.
+
+    The page's scripts need elements.js and address.js.
+    """
     colors = {"kinetic": theme.BLUE, "potential": theme.ORANGE, "right": theme.GREEN, "wrong": theme.SPURIOUS}
     variables = ":root{" + "".join(f"--live-{name}:{color};" for name, color in colors.items()) + "}\n"
     dark = f"@media (prefers-color-scheme: dark){{:root{{--live-kinetic:{theme.SKY_BLUE};}}}}\n"
     script = f"{{\n{asset(__package__, *SCRIPTS)}\nstartLive();\n}}"  # in a block it shares no name with a page's
     style = f"{variables}{dark}{asset(__package__, 'live.css')}"
-    return Panel(asset(__package__, "live.html"), {"live-data": live.to_dict()}, script, style)
+    return Panel(
+        asset(__package__, "live.html"), style, run=script, allowed=EVALUATION, data={"live-data": live.to_dict()}
+    )
 
 
 def page_text(live: Live, *, title: str = "A motion, live", about: str = "") -> Page:
@@ -213,6 +201,8 @@ def page_text(live: Live, *, title: str = "A motion, live", about: str = "") -> 
             raise TypeError(f"{what} of a page must be text, got {type(text).__name__}: {text!r:.60}")
     shown = panel(live)
     words = f"<p>{escape(about)}</p>\n" if about else ""
-    body = f"<main>\n<h1>{escape(title)}</h1>\n{words}{shown.html}</main>"
-    script = f'"use strict";\n{asset(html.__package__, "elements.js", "address.js")}\n{shown.script}'
-    return html.compose(title, body, f"{asset(__package__, 'alone.css')}{shown.style}", script, shown.data, EVALUATION)
+    body = f"<main>\n<h1>{escape(title)}</h1>\n{words}{shown.body}</main>"
+    script = f'"use strict";\n{asset(html.__package__, "elements.js", "address.js")}\n{shown.run}'
+    return html.compose(
+        title, body, f"{asset(__package__, 'alone.css')}{shown.style}", script, shown.data, shown.allowed
+    )

@@ -30,9 +30,8 @@ from dynamics.simulation.trajectory import SimulationWarning
 from dynamics.systems.display_names import display_names
 from dynamics.systems.model import Model
 
-from ..inspector import Panel
-from ..live import EVALUATION, Live, page_text, panel
-from ..pages.html import Page, html_target
+from ..live import Live, page_text, panel
+from ..pages.html import Page, Panel, html_target
 
 MOST_BODIES = 4  # of a mechanism whose masses become parameters by themselves
 SAMPLES = 16  # states at which the extent of a mechanism is looked at
@@ -91,8 +90,9 @@ def live_page(model: Model, path: str | os.PathLike[str] | None = None, *, start
 
 def live_panel(scene: Scene, *, momentum: bool = False) -> Panel:
     """The motion of a scene as a panel at the end of another page, closed at first."""
-    live = panel(live_of(scene, momentum=momentum))
-    return Panel(style=live.style, run=live.script, end=live.folded(), allowed=EVALUATION, data=live.data)
+    shown = panel(live_of(scene, momentum=momentum))
+    closed = f'<details id="live"><summary>Live: computed as you watch</summary>\n{shown.body}</details>'
+    return shown._replace(body="", end=closed)
 
 
 def live_of(scene: Scene, *, momentum: bool = False) -> Live:

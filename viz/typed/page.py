@@ -6,9 +6,9 @@ import json
 from string import Template
 
 from .. import theme
-from ..inspector.page import Panel, compose
+from ..inspector.page import compose
 from ..pages import html
-from ..pages.html import Page, asset
+from ..pages.html import Page, Panel, asset
 from ..pages.operations import operations
 
 FILES = (

@@ -24,7 +24,7 @@ from ...simulation.simulate import simulate
 from ..accuracy_task import AccuracyTask
 from ..machine import run_fresh
 from .named_tasks import load
-from .trajectory_peers import MOST, casadi_equations, heyoka_derivatives, heyoka_equations
+from .trajectory_peers import MOST_STEPS, casadi_equations, heyoka_derivatives, heyoka_equations
 from .trajectory_runs import problem_of
 
 RTOL = 1e-9  # of all but heyoka, whose default is the resolution of float64
@@ -73,7 +73,7 @@ def _heyoka(task: AccuracyTask, compact: bool = False, cached: bool = False) -> 
     except UnavailableError:
         system = heyoka_equations(hy, problem_of(task))
     run = hy.taylor_adaptive(system, list(task.start), compact_mode=compact)
-    outcome, _, _, steps, *_ = run.propagate_until(task.t_end, max_steps=MOST)
+    outcome, _, _, steps, *_ = run.propagate_until(task.t_end, max_steps=MOST_STEPS)
     if outcome != hy.taylor_outcome.time_limit:
         raise RuntimeError(f"stopped after {steps} steps")
 

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 EPSILON = 2.0**-52
 COMPACT = 300  # nodes of the rate; beyond, heyoka's code written out takes minutes to compile
-MOST = 100_000  # steps of heyoka and of CVODES
+MOST_STEPS = 100_000  # steps of heyoka and of CVODES
 MUJOCO = {"Euler": 1, "RK4": 4, "implicit": 1, "implicitfast": 1}  # with the orders of their errors
 CVODES: dict[str, dict[str, Any]] = {
     "BDF": {},
@@ -126,7 +126,7 @@ class Heyoka(Solver):
         def run() -> Outcome:
             integrator.time = 0.0
             integrator.state[:] = self.start
-            outcome, _, _, steps, *_ = integrator.propagate_until(t_end, max_steps=MOST)
+            outcome, _, _, steps, *_ = integrator.propagate_until(t_end, max_steps=MOST_STEPS)
             status = "" if outcome == limit else f"stopped after {steps} steps"
             return Outcome(integrator.state.copy(), steps, None, None, status)
 
@@ -137,8 +137,8 @@ class Heyoka(Solver):
         integrator = self.integrator(knob)
         times = self.task.times
         if times[0] > 0.0:
-            integrator.propagate_until(times[0], max_steps=MOST)
-        states: Array = integrator.propagate_grid(times, max_steps=MOST)[-1]
+            integrator.propagate_until(times[0], max_steps=MOST_STEPS)
+        states: Array = integrator.propagate_grid(times, max_steps=MOST_STEPS)[-1]
         result = np.full((len(times), len(self.start)), math.nan)
         result[: len(states)] = states
         return result
@@ -164,7 +164,12 @@ class Cvodes(Solver):
         self.equations = casadi_equations(self.casadi, problem)
 
     def _function(self, knob: float, times: Sequence[float]) -> Function:
-        options = {"reltol": knob, "abstol": self.absolute(knob), "max_num_steps": MOST, "show_eval_warnings": False}
+        options = {
+            "reltol": knob,
+            "abstol": self.absolute(knob),
+            "max_num_steps": MOST_STEPS,
+            "show_eval_warnings": False,
+        }
         return self.casadi.integrator("run", "cvodes", self.equations, 0.0, list(times), options | self.options)
 
     def ready(self, knob: float) -> Callable[[], Outcome]:

@@ -25,7 +25,7 @@ from ..accuracy_task import AccuracyTask
 
 EQUAL, CHOSEN = "equal steps", "chosen steps"
 TRIAL = 4096  # steps that tell how long many more take
-LONGEST = 3.0  # s; a run that takes longer is given up
+LONGEST_RUN = 3.0  # s; a run that takes longer is given up
 
 
 class Outcome(NamedTuple):
@@ -84,8 +84,8 @@ def finished(run: Integration, start: Array) -> Outcome:
         for block in run.blocks(start):
             if len(block.x):
                 last = block.x[-1]
-            if time.perf_counter() - begin > LONGEST:
-                status = f"took longer than {LONGEST:g} s"
+            if time.perf_counter() - begin > LONGEST_RUN:
+                status = f"took longer than {LONGEST_RUN:g} s"
                 break
     return Outcome(np.array(last), run.steps, run.rejected, run.evaluations, run.status or status)
 
@@ -97,7 +97,7 @@ def recorded(run: Integration, start: Array, times: Sequence[float]) -> Array:
     with np.errstate(all="ignore"):
         for block in run.blocks(start):
             recorder.add(block)
-            if time.perf_counter() - begin > 2 * LONGEST:
+            if time.perf_counter() - begin > 2 * LONGEST_RUN:
                 break
     states = recorder.table()[1]
     result = np.full((len(times), len(start)), math.nan)
@@ -133,8 +133,10 @@ class Ours(Solver):
 
     def ready(self, knob: float) -> Callable[[], Outcome]:
         """The run to t_end, without dense output."""
-        if self.kind == EQUAL and self._at_least(knob) > LONGEST:  # such a run does not look at the clock on its way
-            return lambda: Outcome(self.start, status=f"would take longer than {LONGEST:g} s")
+        if (
+            self.kind == EQUAL and self._at_least(knob) > LONGEST_RUN
+        ):  # such a run does not look at the clock on its way
+            return lambda: Outcome(self.start, status=f"would take longer than {LONGEST_RUN:g} s")
         compiled, options = self._plain, self._options(knob, [self.task.t_end])
         return lambda: finished(integration(compiled, options), self.start)
 
