@@ -14,7 +14,6 @@ from cgraph.extend import Array, install
 from .. import theme
 
 if TYPE_CHECKING:
-    from matplotlib.collections import LineCollection
     from matplotlib.figure import Figure
 
 STYLE: dict[Any, Any] = {
@@ -74,21 +73,6 @@ def to_adaptive_svg(figure: Figure, *, background: bool = False) -> str:
     light, night = (f" background: {color};" if background else "" for color in (theme.WHITE, theme.DARK_PAGE))
     dark = f"@media (prefers-color-scheme: dark) {{ svg {{ color: {theme.DARK_TEXT};{night} }} }}"
     return f"{head}<style>svg {{ color: {theme.TEXT}; fill: currentColor;{light} }} {dark}</style>\n <defs>{rest}"
-
-
-def painted_line(points: Array, values: Array, limits: tuple[float, float], colors: Sequence[str]) -> LineCollection:
-    """A line whose pieces are painted by their values, on a logarithmic scale from the first color to the last.
-
-    points: (T, 2).  values: (T - 1,), positive.
-    """
-    from matplotlib.collections import LineCollection
-    from matplotlib.colors import LinearSegmentedColormap, LogNorm
-
-    pieces = np.stack([points[:-1], points[1:]], axis=1)
-    ramp = LinearSegmentedColormap.from_list("ramp", list(colors))
-    return LineCollection(
-        pieces.tolist(), array=values, cmap=ramp, norm=LogNorm(*limits), linewidths=1.6, capstyle="round"
-    )
 
 
 def snapshots(
