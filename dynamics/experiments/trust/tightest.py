@@ -34,16 +34,16 @@ class Duel:
     status: str = ""
 
 
-def duel(number: int, method: str = METHOD, tolerance: float = EPSILON) -> Duel | None:
-    """One of our methods at this tolerance, and heyoka at its default; None of a motion that has no end or is stiff."""
+def duel(number: int) -> Duel | None:
+    """Our Taylor method and heyoka, both at the resolution of float64; None of a motion that has no end or is stiff."""
     task, truth = random_task(number), answer(number)
     if truth.end is None or task.stiff:
         return None
     problem, smallest = problem_of(task), min([size for size in truth.size if size] or [1.0])
-    both: tuple[Solver, Solver] = Ours(method, task, smallest, problem), Heyoka(task, smallest, problem)
+    both: tuple[Solver, Solver] = Ours(METHOD, task, smallest, problem), Heyoka(task, smallest, problem)
     tried = []
     for solver in both:
-        run = solver.ready(tolerance if solver.ours else EPSILON)
+        run = solver.ready(EPSILON)
         outcome = run()
         if outcome.status:
             return Duel(task.name, (math.nan, math.nan), (math.nan, math.nan), f"{solver.name}: {outcome.status}")
