@@ -88,7 +88,6 @@ class Equation:
 
     formulation: str
     terms: Polynomial
-    unnecessary: Polynomial  # all but I qdd
 
     def __str__(self) -> str:
         return format_polynomial(self.terms)
@@ -96,9 +95,7 @@ class Equation:
 
 def equation3(formulation: str) -> Equation:
     """The terms of the graph of that formulation; qd0 stands for the embedded velocity qdd0 dt + qd0_old."""
-    terms = _terms(momentum_rate(spring_mass(), formulation))
-    inertial = (("I", 1), ("qdd0", 1))
-    return Equation(formulation, terms, {key: c for key, c in terms.items() if key != inertial})
+    return Equation(formulation, _terms(momentum_rate(spring_mass(), formulation)))
 
 
 def torque_terms(formulation: str) -> Polynomial:

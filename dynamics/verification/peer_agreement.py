@@ -22,8 +22,7 @@ from ..multibody.body import Body, MechanismError
 from ..multibody.mechanism import Mechanism, as_mechanism
 from ..peers.mujoco import MujocoPeer
 from ..peers.peer import Peer, PeerModel, UnavailableError
-from ..peers.pinocchio import PinocchioPeer
-from ..peers.pinocchio_loops import constrained_accelerations
+from ..peers.pinocchio import PinocchioPeer, constrained_accelerations
 from ..systems.model import Model, as_system
 from .residual import PEERS, PROXIMAL, Residual
 

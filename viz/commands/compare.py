@@ -19,12 +19,13 @@ from .arguments import (
     filled,
     may_draw_and_print,
     scene_of,
+    size_data,
+    size_table,
     state_names,
     takes_a_scene,
     unless_json,
 )
 from .command import Command
-from .sizes import size_data, size_table
 
 
 def add(parser: Command) -> None:

@@ -9,10 +9,9 @@ from dynamics import Verdict, formulation_sizes, formulation_verdict, inverse_dy
 from dynamics.equations.formulations.formulation_sizes import INERTIAL_TERM, blamed
 
 from .. import theme
-from ..graph_drawing.dot import to_dot
+from ..graph_drawing.dot import short_formulas, to_dot
 from ..graph_drawing.legend import kinds_in, legend_svg, to_adaptive
 from ..graph_drawing.render import render_svg
-from ..graph_drawing.short_formulas import short_formulas
 from ..pages import html
 from ..pages.formulations import TITLES, WHY_FEWER, size_table
 from ..pages.mathml import equations

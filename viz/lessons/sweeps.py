@@ -10,9 +10,8 @@ from cgraph import Graph, Node
 from cgraph.extend import Names, columns, cotangents
 from dynamics import inverse_dynamics
 
-from ..graph_drawing.dot import to_dot
+from ..graph_drawing.dot import short_formulas, to_dot
 from ..graph_drawing.render import render_svg
-from ..graph_drawing.short_formulas import short_formulas
 from .subject import Screen, Subject, inline, lagrangian_graph
 
 ROWS = 120  # nodes that the page walks through

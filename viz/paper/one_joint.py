@@ -11,10 +11,9 @@ from dynamics.experiments.paper_numbers import PAPER, equation3, torque_terms
 from dynamics.experiments.text_table import csv_text
 
 from .. import theme
-from ..graph_drawing.dot import to_dot
+from ..graph_drawing.dot import short_formulas, to_dot
 from ..graph_drawing.legend import kinds_in, legend_svg, to_adaptive
 from ..graph_drawing.render import render_png, render_svg
-from ..graph_drawing.short_formulas import short_formulas
 from ..pages import html
 from ..pages.formulations import TITLES, WHY_FEWER, size_table
 from .part import Part

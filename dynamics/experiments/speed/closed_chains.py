@@ -18,7 +18,7 @@ from ...multibody.builders.planar_arm import planar_arm
 from ...multibody.loops import Loop
 from ...multibody.mechanism import Mechanism
 from ...peers.peer import TimedTask
-from ...peers.pinocchio_loops import constraint_dynamics
+from ...peers.pinocchio import constraint_dynamics
 from ..text_table import table
 from .worker import repetitions, timed
 

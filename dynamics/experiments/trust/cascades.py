@@ -24,8 +24,7 @@ from ...simulation.ensembles.simulate_many import simulate_many
 from ...simulation.events.event import Event
 from ...simulation.simulate import simulate
 from ...systems.system import System
-from .answers import COUNT
-from .trust import RIGHT, SAID, SILENT, SLACK, Verdict, counted, trust
+from .trust import COUNT, RIGHT, SAID, SILENT, SLACK, Verdict, counted, trust
 
 CASCADES = 100
 UNITS = 6.0  # decades of the units of length and time, each way

@@ -14,8 +14,8 @@ from ..text_table import table
 from ..work_precision.measurement import Tried, in_turns
 from ..work_precision.trajectory_peers import EPSILON, Heyoka
 from ..work_precision.trajectory_runs import Ours, Solver, problem_of
-from .answers import Answer, answer
 from .random_motions import LAGRANGIANS, random_task
+from .trust import Answer, answer
 
 METHOD, TURNS = "taylor", 5
 FLOOR = EPSILON / 4.0  # of an error in a ratio: less is luck

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from dynamics.experiments.stability import case_runs, cases
-from dynamics.experiments.trust import answers
+from dynamics.experiments.trust import trust as answers
 from dynamics.experiments.trust.random_motions import random_motion
 from dynamics.multiprecision import Reference
 

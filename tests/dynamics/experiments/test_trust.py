@@ -3,9 +3,8 @@
 import pytest
 from pytest import mark
 
-from dynamics.experiments.trust.answers import COUNT, answer, compute
 from dynamics.experiments.trust.random_motions import EACH, FAMILIES, LAGRANGIANS, STARTS, random_motion, random_task
-from dynamics.experiments.trust.trust import ADAPTIVE, RIGHT, SAID, SILENT, judge
+from dynamics.experiments.trust.trust import ADAPTIVE, COUNT, RIGHT, SAID, SILENT, answer, compute, judge
 
 QUICK = 8  # of the random Lagrangians: one of each family; of the random starts, too
 SPREAD = 1e-2  # relative: growth is measured by differences

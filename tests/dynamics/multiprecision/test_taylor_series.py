@@ -16,7 +16,7 @@ from tests.high_precision import OPERATIONS
 
 pytest.importorskip("flint", reason="reference solutions need python-flint")
 from dynamics.multiprecision.flint_numbers import value, working
-from dynamics.multiprecision.taylor_series import Series
+from dynamics.multiprecision.taylor_integrator import Series
 
 ORDER = 12
 TWELVE_ORDERS = 1e-25  # relative, of numbers with 60 digits that mpmath differentiates numerically
