@@ -7,7 +7,6 @@ trajectory. Peers run the first of the trajectories.
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable, Iterator
 
@@ -23,6 +22,7 @@ from ...peers.peer import AnyState, PeerModel, rk4_step
 from ...simulation.ensembles.simulate_many import simulate_many
 from ..machine import load
 from ..text_table import table
+from .worker import single_core
 
 SCENE = "triple_pendulum"
 STEPS, DT = 1000, 1e-3  # s
@@ -80,14 +80,8 @@ def jax(q: Array, qd: Array) -> Run:
 
 def ensembles(count: int = COUNT, repeats: int = REPEATS) -> Iterator[str]:
     """First runs as they are ready, and then the table."""
-    cores = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else set()
-    if cores:
-        os.sched_setaffinity(0, {min(cores)})  # before JAX counts them
-    try:
+    with single_core():  # before JAX counts them
         yield from _measured(count, repeats)
-    finally:
-        if cores:
-            os.sched_setaffinity(0, cores)
 
 
 def _measured(count: int, repeats: int) -> Iterator[str]:

@@ -61,7 +61,7 @@ class Worker:
         context = multiprocessing.get_context("spawn")
         self._pipe, theirs = context.Pipe()
         self._process = context.Process(target=_serve, args=(theirs, load, peer), daemon=True)
-        with _single_core(), _interrupts_held():
+        with single_core(), _interrupts_held():
             self._process.start()
         theirs.close()
 
@@ -185,8 +185,8 @@ def _interrupts_held() -> Iterator[None]:
 
 
 @contextmanager
-def _single_core() -> Iterator[None]:
-    """Processes started within run on one core, the same for all, and start no threads to share it."""
+def single_core() -> Iterator[None]:
+    """This process and those started within run on one core, the same for all, and start no threads to share it."""
     before = {name: os.environ.get(name) for name in _ONE_CORE}
     os.environ.update(_ONE_CORE)
     cores = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else set()
