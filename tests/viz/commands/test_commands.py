@@ -393,65 +393,6 @@ def test_the_answer_is_drawn(tmp_path, capsys):
     assert "only chain_rule" in svg
 
 
-@each_row(
-    ("arguments", "message"),
-    [
-        (["why", "triple_pendulum", "tau0", "q9"], "nothing in the graph is called 'q9'"),
-        (["why", "triple_pendulum", "tau9", "q0"], "nothing in the graph is called 'tau9'"),
-        (["why", "spring_mass", "tau0", "q0", "--at", "zz=1"], "the graph has no input zz"),
-        (["lint", "spring_mass", "--box", "zz=0:1"], "the graph has no input zz"),
-        (["inspect", "spring_mass", "--out", "x.html", "--t-end", "1e9"], "--t-end must be at most 1000 s"),
-        (["compare", "nowhere"], "there is no scene 'nowhere'"),
-        (["lint", "nowhere.py:system"], "there is no file 'nowhere.py'"),
-        (["simulate", "chain", "--start", "joint 11=1"], "there is no joint 11; did you mean"),
-        (["simulate", "chain", "--every", "1e-300"], "--every 1e-300 makes "),
-        (["simulate", "chain", "--csv", "nowhere/a.csv"], "cannot write"),
-        (["simulate", "chain", "--method", "rk5"], "method must be one of "),
-        (["lesson", "--out", "lesson.txt"], "--out must end in .html"),
-    ],
-)
-def test_a_mistake_gets_one_line_and_exit_status_2(capsys, arguments, message):
-    assert cli.main(arguments) == 2
-    error = capsys.readouterr().err
-    assert error.startswith("cgraph: error: ")
-    assert error.count("\n") == 1
-    assert message in error
-
-
-@each_row(
-    "arguments",
-    [
-        ["lint"],
-        ["why", "spring_mass", "tau0"],
-        ["why", "spring_mass", "tau0", "q0", "--k", "-1"],
-        ["why", "spring_mass", "tau0", "q0", "--at", "q0"],
-        ["why", "spring_mass", "tau0", "q0", "--at", "q0=nan"],
-        ["why", "spring_mass", "tau0", "q0", "--at", "q0=1,q0=2"],
-        ["lint", "spring_mass", "--box", "q0=0:1,q0=0:2"],
-        ["certify", "spring_mass", "--seed", "-1"],
-        ["bench", "--budget", "-1"],
-        ["inspect", "spring_mass", "--out", "x.html", "--t-end", "0"],
-        ["why", "spring_mass", "tau0", "q0", "--svg", "answer.png"],
-        ["why", "spring_mass", "tau0", "q0", "--forward", "--formulation", "kinetic_only"],
-        ["lint", "spring_mass", "--box", "q0=1"],
-        ["lint", "spring_mass", "--box", "q0=2:1"],
-        ["compare", "spring_mass", "--formulations", "chain_rule"],
-        ["compare", "spring_mass", "--formulations", "chain_rule", "none"],
-        ["lesson"],
-        ["simulate", "chain", "--start", "a,b"],
-        ["simulate", "chain", "--start", "q0=1,q0=2"],
-        ["simulate", "chain", "--t-end", "-1"],
-        ["simulate", "chain", "--rtol", "0"],
-        ["draw", "chain", "--out", "a.dot", "--forward", "--formulation", "kinetic_only"],
-    ],
-)
-def test_wrong_usage_has_exit_status_2(capsys, arguments):
-    with pytest.raises(SystemExit) as stop:
-        cli.main(arguments)
-    assert stop.value.code == 2
-    assert "usage: cgraph" in capsys.readouterr().err
-
-
 def test_a_point_keeps_parameters_and_is_always_the_same():
     scene = dyn.scenes.load("spring_mass")
     graph = dyn.inverse_dynamics(scene, "euler_embedded")
