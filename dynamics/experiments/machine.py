@@ -1,4 +1,4 @@
-"""The machine that measured times belong to: its processor, its packages and its load, in words."""
+"""The machine that measured times belong to, in words, and a fresh process on it."""
 
 from __future__ import annotations
 

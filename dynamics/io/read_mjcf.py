@@ -1,4 +1,4 @@
-"""MJCF read: the mechanism of MuJoCo's own model, which its compiler makes of a file."""
+"""MJCF read: the mechanism of MuJoCo's own model, which its compiler makes of a file of modest size."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""URDF read: the mechanism of a <robot>, with the numbers of the file."""
+"""URDF read: the mechanism of a <robot>, with the numbers of the file and the joints that mimic others."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Reference solutions of any model: two runs of different order and precision, whose difference is the stated error."""
+"""Reference solutions of any model: two unlike runs, whose difference is the error; kept in a folder."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pinocchio: rnea and aba, C++ called from Python, and its parallel loops over them on one thread."""
+"""Pinocchio: rnea and aba, C++ called from Python, its parallel loops over them, and constraintDynamics of loops."""
 
 from __future__ import annotations
 

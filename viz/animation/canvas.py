@@ -1,4 +1,4 @@
-"""Canvases: pictures drawn by Pillow, and animations of them as GIF, APNG or MP4."""
+"""Canvases: pictures drawn by Pillow, their colors, and animations as GIF, APNG or MP4."""
 
 from __future__ import annotations
 

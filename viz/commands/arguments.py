@@ -1,4 +1,4 @@
-"""The arguments that several commands share: a scene, a formulation, a picture; and what they stand for."""
+"""The arguments that several commands share: a scene, a start, a formulation, a point, a picture."""
 
 from __future__ import annotations
 

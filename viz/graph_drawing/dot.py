@@ -1,4 +1,4 @@
-"""The drawing of a graph as DOT, the language of Graphviz."""
+"""The drawing of a graph as DOT, the language of Graphviz, and short formulas for its nodes."""
 
 from __future__ import annotations
 

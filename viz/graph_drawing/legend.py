@@ -1,4 +1,4 @@
-"""A legend as a picture, small, for several drawings that share their colors."""
+"""A legend as a picture, small, for drawings that share their colors, and ink for dark pages."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Graphs by depth: a row for each length of the longest way from the leaves, the same rows for all panels."""
+"""Graphs by depth: a row for each length of the longest way from the leaves, as nodes and lines, or as silhouettes."""
 
 from __future__ import annotations
 

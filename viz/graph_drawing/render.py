@@ -1,4 +1,4 @@
-"""Pictures from DOT: SVG by Graphviz, from the system or from WebAssembly, and PNG from that SVG."""
+"""Pictures from DOT: SVG by Graphviz, from the system or from WebAssembly, PNG from that SVG, and places of boxes."""
 
 from __future__ import annotations
 

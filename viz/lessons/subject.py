@@ -1,4 +1,4 @@
-"""Subject of a lesson: a model in a moving state, its names, and its graphs as the page's script takes them."""
+"""Subject of a lesson: a model in a moving state, its names, its graphs for scripts; and screens on it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Documents: headings, words, tables and pictures, as one HTML page or as Markdown beside picture files."""
+"""Documents: headings, words, tables and pictures, as one HTML page or as Markdown, and the files of one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The operations of the table for scripts of pages: values as JavaScript, partials as programs, formulas as trees."""
+"""Graphs and operations for scripts of pages: values as JavaScript, partials as programs, formulas as trees."""
 
 from __future__ import annotations
 

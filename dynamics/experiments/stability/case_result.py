@@ -1,4 +1,4 @@
-"""Case results: measurements of one case by one method beside their bounds, and whether they meet them."""
+"""Case results: measurements of one case by one method beside their bounds, and known reasons where they are beyond."""
 
 from __future__ import annotations
 

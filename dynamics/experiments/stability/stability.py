@@ -1,4 +1,4 @@
-"""Stability: the table of stiff and extreme cases, a result a row, and its forms as plain data and as CSV."""
+"""Stability: the table of stiff and extreme cases, a result a row, and its forms as text, plain data and CSV."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Random Lagrangians: smooth systems of eight families, drawn from a seed, with starts and lengths of run."""
+"""Random motions, drawn from a seed: Lagrangians of eight families; starts at 0, chains, and forces that jump."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Measurement of solvers: their errors against the exact motion, and run times taken in turns."""
+"""Measurement of solvers: their errors against the exact motion, and run times in turns; and the report of them."""
 
 from __future__ import annotations
 
