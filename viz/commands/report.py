@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, NamedTuple
+from typing import Any
 
 import dynamics as dyn
 from cgraph import extend
@@ -112,32 +112,20 @@ def _locked(text: str) -> tuple[str, float]:
     return body, number(at)
 
 
-class _Exact(NamedTuple):
-    """Exact motions that are there, and those that come: files in a folder of their own until the report is whole."""
-
-    kept: Path | None
-    folder: Path
-
-    def files(self) -> dict[Path, str | bytes]:
-        """Files of the motions that came."""
-        if self.kept is None:
-            return {}
-        files: dict[Path, str | bytes] = {}
-        for path in self.folder.iterdir():
-            there, content = self.kept / path.name, path.read_bytes()
-            if not there.is_file() or there.read_bytes() != content:
-                files[there] = content
-        return files
-
-
 @contextmanager
-def _exact_motions(out: Path | None) -> Iterator[_Exact]:
+def _exact_motions(out: Path | None) -> Iterator[tuple[Path, Callable[[], dict[Path, str | bytes]]]]:
+    """A folder with the exact motions that are kept, and the files of those that come, for when the report is whole."""
     kept = None if out is None else out / "exact"
-    with TemporaryDirectory() as folder:
-        if kept is not None and kept.is_dir():
-            for path in kept.glob("*.json"):
-                shutil.copy(path, folder)
-        yield _Exact(kept, Path(folder))
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        for path in kept.glob("*.json") if kept else ():
+            shutil.copy(path, folder)
+
+        def new() -> dict[Path, str | bytes]:
+            files = {kept / path.name: path.read_bytes() for path in folder.iterdir()} if kept else {}
+            return {path: text for path, text in files.items() if not path.is_file() or path.read_bytes() != text}
+
+        yield folder, new
 
 
 def _comparisons(options: argparse.Namespace) -> None:
@@ -146,11 +134,11 @@ def _comparisons(options: argparse.Namespace) -> None:
     if unknown := [name for name in names if name not in library.COMPARISONS]:
         raise ValueError(f"comparisons are {', '.join(library.COMPARISONS)}, got {unknown[0]!r}")
     print(library.machine())
-    with _exact_motions(options.out) as exact:
+    with _exact_motions(options.out) as (folder, new):
         for name in names or library.COMPARISONS:
-            for text in library.COMPARISONS[name](str(exact.folder)):
+            for text in library.COMPARISONS[name](str(folder)):
                 print(f"\n{text}", flush=True)
-        answer("", exact.files(), folder=options.out)
+        answer("", new(), folder=options.out)
 
 
 def _curves(options: argparse.Namespace) -> None:
@@ -162,9 +150,9 @@ def _curves(options: argparse.Namespace) -> None:
     peers = tuple(library.PEERS) if options.peers is None else tuple(filter(None, options.peers.split(",")))
     if options.out is not None:
         library.check_can_plot()
-    with _exact_motions(options.out) as exact:
-        found, lines, files = _measured(options, chosen, peers, exact.folder)
-        answer(unless_json(options, found, "\n".join(lines)), files | exact.files(), folder=options.out)
+    with _exact_motions(options.out) as (folder, new):
+        found, lines, files = _measured(options, chosen, peers, folder)
+        answer(unless_json(options, found, "\n".join(lines)), files | new(), folder=options.out)
 
 
 def _measured(

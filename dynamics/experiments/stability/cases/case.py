@@ -41,7 +41,8 @@ class StabilityCase(AccuracyTask):
     atol: absolute tolerance, where that of one in a thousand of RTOL in SI units is too much or too little; for all
     states, or for each.
     growth: what the flow makes of a small relative error of the start by t_end (the largest of all states, each
-    relative to its size); the tests measure it. None where there is no solution to compare with.
+    relative to its size); the tests measure it. None where there is no solution to compare with. Where no criterion is
+    of the error, `error_criterion(growth)` is the last.
     invariants(model): a graph over the state (and t, parameters) whose outputs do not change along the motion.
     """
 
@@ -50,6 +51,11 @@ class StabilityCase(AccuracyTask):
     atol: float | tuple[float, ...] = ATOL
     growth: float | None = None
     invariants: Callable[[Model], Graph] | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.growth is not None and not any([each.quantity.startswith("error") for each in self.criteria]):
+            object.__setattr__(self, "criteria", (*self.criteria, error_criterion(self.growth)))
 
 
 def error_criterion(growth: float, why: str = GROWN, quantity: str = "error") -> Criterion:
