@@ -16,7 +16,7 @@ import dynamics as dyn
 import viz
 from docs.sphinx_extensions.command_reference import markdown
 from tests.slow import slow
-from viz.commands.parser import complete, parse
+from viz.commands.command import complete, parse
 
 ROOT = Path(__file__).parents[1]
 PAGES = {

@@ -53,7 +53,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _command(arguments: Sequence[str] | None) -> int:
     from .commands.arguments import show_warnings  # here, where a signal is awaited: with all else it takes a second
-    from .commands.parser import parse
+    from .commands.command import parse
 
     options = parse(arguments)
     with show_warnings():
@@ -88,7 +88,7 @@ def _discard_output() -> None:
 
 
 def _sentence(error: BaseException) -> str:
-    """What an error says, without the number that the system has for it."""
+    """Text of an error, without the number that the system has for it."""
     if isinstance(error, OSError) and error.strerror:
         return error.strerror if error.filename is None else f"{error.filename}: {error.strerror}"
     return str(error) or type(error).__name__

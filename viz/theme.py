@@ -1,4 +1,4 @@
-"""How everything looks: colors that color-blind people can tell apart, fonts, and names in mathematical letters."""
+"""Looks of everything: colors that color-blind people can tell apart, fonts, and names in mathematical letters."""
 
 from __future__ import annotations
 

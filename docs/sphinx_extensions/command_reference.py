@@ -9,7 +9,7 @@ WIDTH = 88  # columns of the usage
 
 def markdown(commands):
     """Sections in Markdown, one for each command, {name: parser}."""
-    from viz.commands.parser import COMMANDS
+    from viz.commands.command import COMMANDS
 
     return "\n".join(_section(name, COMMANDS[name], command) for name, command in commands.items())
 
@@ -35,7 +35,7 @@ def _sentence(text):
 
 
 def _append(app, name, source):
-    from viz.commands.parser import complete
+    from viz.commands.command import complete
 
     if name == "command-reference":
         source[0] += "\n" + markdown(complete())

@@ -1,10 +1,12 @@
-"""The machine that measured times belong to: its processor, its packages and its load, in words."""
+"""The machine that measured times belong to, in words, and a fresh process on it."""
 
 from __future__ import annotations
 
 import os
 import platform
 import re
+import subprocess
+import sys
 from contextlib import suppress
 from importlib import metadata
 from pathlib import Path
@@ -34,3 +36,16 @@ def load() -> float | None:
     with suppress(OSError, AttributeError):
         return os.getloadavg()[0]
     return None
+
+
+def run_fresh(module: str, call: str, text: str = "", timeout: float | None = None) -> subprocess.CompletedProcess[str]:
+    """Output and errors of a call, of a name of that module, in a process of its own. `text` is its standard input.
+
+    Raises subprocess.TimeoutExpired after `timeout` s.
+    """
+    command = [sys.executable, "-c", f"from {module} import {call.partition('(')[0]}; {call}"]
+    path = os.pathsep.join(filter(None, sys.path))
+    environment = os.environ | {"PYTHONPATH": path}
+    return subprocess.run(
+        command, input=text, capture_output=True, text=True, timeout=timeout, check=False, env=environment
+    )

@@ -21,18 +21,17 @@ def report(
     effects: Iterable[str] = EFFECTS,
     lock: Mapping[str, float] | None = None,
     values: Mapping[str, float] | None = None,
-    regroup: bool = False,
 ) -> dict[str, Any]:
-    """What `prune` makes of a scene's inverse and forward dynamics, for JSON.
+    """Report of `prune` on a scene's inverse and forward dynamics, for JSON.
 
-    effects, lock, regroup: as of `prune`.  values: the same, where the equations have that input.
+    effects, lock: as of `prune`.  values: the same, where the equations have that input.
     """
     kept = tuple(effects)
     graphs = []
     for title, equations in EQUATIONS.items():
         known = _inputs(equations(scene))
         bound = {name: value for name, value in (values or {}).items() if name in known}
-        pruned = prune(scene, equations, effects=kept, lock=lock, values=bound, regroup=regroup)
+        pruned = prune(scene, equations, effects=kept, lock=lock, values=bound)
         graphs.append({"equations": title, **_account(pruned)})
     described = {"name": scene.name, "about": scene.about, "left_out": list(scene.left_out)}
     return {**described, "effects": list(kept), "graphs": graphs}

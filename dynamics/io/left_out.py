@@ -1,4 +1,4 @@
-"""What a file has and a mechanism has not: refused, or left out and said; and what of its loops says nothing new."""
+"""Elements of a file that a mechanism has not: refused, or left out and said; and loops that follow from others."""
 
 from __future__ import annotations
 
@@ -23,8 +23,17 @@ def listed(names: Sequence[str]) -> str:
     return ", ".join([*shown, *([f"{len(names) - 5} more"] if len(names) > 5 else [])])
 
 
+def follows_itself(name: str, leaders: Mapping[str, str]) -> bool:
+    """Whether a joint mimics itself, by way of others."""
+    at, seen = leaders[name], {name}
+    while at in leaders and at not in seen:
+        seen.add(at)
+        at = leaders[at]
+    return at == name
+
+
 def refused_or_left_out(essential: Sequence[str], outside: Sequence[str], ignore: bool) -> tuple[str, ...]:
-    """What is left out. Raises MechanismError for what belongs to the mechanism itself, unless `ignore`."""
+    """Sentences on what goes. Raises MechanismError for what belongs to the mechanism itself, unless `ignore`."""
     if not require_flag("ignore", ignore) and essential:
         raise MechanismError(f"a mechanism cannot have {'; '.join(essential)} (the option ignore leaves this out)")
     return (*essential, *outside)

@@ -40,7 +40,7 @@ def _warn(text: str) -> None:
 
 
 def joint_order(mj: MjModel, mechanism: Mechanism) -> tuple[list[int], list[int]]:
-    """Where our coordinates stand in qpos, (nq,), and our velocities in qvel, (n,), by the names of the joints."""
+    """Places of our coordinates in qpos, (nq,), and of our velocities in qvel, (n,), by the names of the joints."""
     joints = [(mj.joint(body.coordinate), body.joint.type) for body in mechanism.moving]
     q = [int(joint.qposadr[0]) + k for joint, kind in joints for k in range(len(kind.coordinates))]
     u = [int(joint.dofadr[0]) + k for joint, kind in joints for k in range(len(kind.velocities))]

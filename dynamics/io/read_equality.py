@@ -25,7 +25,7 @@ _MODELLED = ("joint", "connect", "weld")
 
 
 class End(NamedTuple):
-    """Where a frame of MuJoCo's is in that of one of our bodies."""
+    """Placement of a frame of MuJoCo's in that of one of our bodies."""
 
     body: str
     position: Array  # (3,) [m]
@@ -50,7 +50,7 @@ def read_loops(mj: MjModel, moving: Sequence[Body], ends: Sequence[tuple[str, Ar
 
 
 def other_equalities(mj: MjModel) -> list[str]:
-    """Those that no loop is, and that act."""
+    """Sentences on active constraints that no loop stands for."""
     others: dict[str, list[int]] = {}
     for i in _active(mj):
         if _kind(mj, i) not in _MODELLED:
@@ -59,7 +59,7 @@ def other_equalities(mj: MjModel) -> list[str]:
 
 
 def left_of_equalities(mj: MjModel) -> list[str]:
-    """What is left out of those that are loops, and those that do not act."""
+    """Sentences on the softness of constraints that are loops, and on those that do not act."""
     inactive = [i for i in range(mj.neq) if not (mj.eq_active0[i] or disabled(mj, "CONSTRAINT", "EQUALITY"))]
     return present(
         {
@@ -78,7 +78,7 @@ def _active(mj: MjModel) -> list[int]:
 
 
 def _modelled(mj: MjModel) -> list[int]:
-    """Those that act and are loops."""
+    """Active constraints that are loops."""
     return [i for i in _active(mj) if _kind(mj, i) in _MODELLED]
 
 

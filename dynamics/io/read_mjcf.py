@@ -1,11 +1,15 @@
-"""MJCF read: the mechanism of MuJoCo's own model, which its compiler makes of a file."""
+"""MJCF read: the mechanism of MuJoCo's own model, which its compiler makes of a file of modest size."""
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
+from xml.parsers import expat
 
 import numpy as np
 
@@ -15,7 +19,6 @@ from ..multibody.algebra import spatial
 from ..multibody.joints import TYPES
 from ..multibody.mechanism import WORLD, Body, Joint, Mechanism, MechanismError, MechanismWarning
 from .left_out import listed, present, refused_or_left_out
-from .mjcf_limits import require_modest
 from .mujoco_twin import mujoco
 from .read_equality import left_of_equalities, other_equalities, read_loops
 from .smooth_forces import NONE, Smooth, actuators, disabled, first_output, inputs, mjcf_forces, modelled, single
@@ -24,6 +27,7 @@ from .stand_ins import zeros_again
 
 if TYPE_CHECKING:
     from mujoco import MjModel
+
 
 # Fields of MuJoCo's model that say so when they are not zero.
 _OF_A_TENDON = ("stiffness", "stiffnesspoly", "damping", "dampingpoly", "armature")
@@ -157,7 +161,7 @@ def _kind(mj: MjModel, j: int) -> str:
 
 
 def _not_modelled(mj: MjModel) -> list[str]:
-    """What belongs to the mechanism of the model and a mechanism cannot have."""
+    """Sentences on parts of the model's mechanism that a mechanism cannot have."""
     sprung = [] if disabled(mj, "SPRING") else sorted(j for j in _where(mj, "jnt_stiffness") if _elsewhere(mj, j))
     pulling = sorted(set().union(*(_where(mj, f"tendon_{what}") for what in _OF_A_TENDON)))
     tendons = [mj.tendon(i).name or f"number {i}" for i in pulling]
@@ -178,7 +182,7 @@ def _not_modelled(mj: MjModel) -> list[str]:
 
 
 def _acting_from_outside(mj: MjModel, smooth: Smooth) -> list[str]:
-    """What acts on the mechanism of the model, inputs and forces that are not smooth, and is not taken."""
+    """Sentences on inputs and forces on the mechanism that are not smooth, and not taken."""
     limited = not disabled(mj, "CONSTRAINT", "LIMIT")
     limits = [j for j in sorted(_where(mj, "jnt_limited")) if smooth.limits is None or not single(mj, j)]
     touching = (np.any(mj.geom_contype) and np.any(mj.geom_conaffinity)) or mj.npair
@@ -248,3 +252,68 @@ def _joint_names(mj: MjModel, joints: Sequence[int]) -> list[str]:
 def _coordinate(mj: MjModel, dof: int) -> str:
     """The name of the joint of a degree of freedom."""
     return _joint_names(mj, [int(mj.dof_jntid[dof])])[0]
+
+
+COPIES = 10_000  # of replicated elements: MuJoCo's time grows with their square
+_FILES = {f"file{side}" for side in ("", "right", "left", "up", "down", "front", "back")}
+
+
+def require_modest(source: object, called: str) -> None:
+    """Raises MechanismError for a text that names another file or is not XML, too many copies, and a blank anchor.
+
+    called: what errors call the source.
+    """
+    asked = _Asked(None if is_text(source) else path_of(source).parent)
+    try:
+        asked.read(text_of(source))
+    except (expat.ExpatError, LookupError, ValueError) as error:
+        if is_text(source):
+            raise MechanismError(f"{called} is not XML: {error}") from None
+    if is_text(source) and asked.files:
+        named = f"{called} names the file {asked.files[0]!r:.200}"
+        raise MechanismError(f"{named}, and a text reads no other files: give the path of a model instead")
+    if asked.blank:
+        raise MechanismError(f"MuJoCo cannot read {called}: the anchor of a <connect> needs three numbers, got none")
+    if asked.copies > COPIES:
+        raise MechanismError(f"{called} asks for {asked.copies:.6g} copies by `count`, at most {COPIES} are made")
+
+
+class _Asked:
+    """Files that a model names, and the copies that its elements and those of the files that it includes ask for.
+
+    folder: where included files are; None: they are not read.
+    """
+
+    def __init__(self, folder: Path | None) -> None:
+        self.folder = folder
+        self.files: list[str] = []
+        self.included: set[Path] = set()
+        self.copies = 0.0
+        self.blank = False  # an anchor without numbers, after which MuJoCo 4 reads no other model in this process
+        self.within = [1.0]  # of each open element, how often it is made
+
+    def read(self, text: bytes) -> None:
+        """Add what a text asks for. Raises what expat does, also where MuJoCo takes it, as "--" in a comment."""
+        parser = expat.ParserCreate("utf-8" if self.folder is None else None)
+        parser.StartElementHandler, parser.EndElementHandler = self._opened, self._closed
+        parser.Parse(text, True)
+
+    def _opened(self, tag: str, attributes: dict[str, str]) -> None:
+        self.files += [attributes[name] for name in sorted(_FILES & attributes.keys())]
+        self.blank |= not attributes.get("anchor", "0").strip()
+        times = 1.0
+        with suppress(ValueError):  # MuJoCo says what is no number
+            times = math.prod([float(each) for each in attributes.get("count", "1").split()])
+        self.within.append(self.within[-1] * max(times, 1.0))
+        if times > 1.0:
+            self.copies += self.within[-1]
+        if tag == "include" and self.folder is not None:
+            path, depth = self.folder / attributes.get("file", ""), len(self.within)
+            if path not in self.included and path.is_file():  # MuJoCo refuses a file that is included twice
+                self.included.add(path)
+                with suppress(expat.ExpatError, LookupError):
+                    self.read(path.read_bytes())
+                del self.within[depth:]
+
+    def _closed(self, tag: str) -> None:
+        self.within.pop()

@@ -1,9 +1,9 @@
-"""URDF read: the mechanism of a <robot>, with the numbers of the file."""
+"""URDF read: the mechanism of a <robot>, with the numbers of the file and the joints that mimic others."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from decimal import Decimal
 from typing import Any, NamedTuple
 from xml.etree.ElementTree import Element, SubElement
@@ -18,8 +18,7 @@ from ..multibody.forces.joint_force import JointForce, JointFriction
 from ..multibody.joints import COMPOSITIONS, TYPES
 from ..multibody.loops import Loop
 from ..multibody.mechanism import WORLD, Body, Joint, Mechanism, MechanismError
-from .left_out import listed, present, refused_or_left_out
-from .read_mimic import read_mimics
+from .left_out import follows_itself, listed, present, refused_or_left_out
 from .smooth_forces import NONE, Smooth
 
 GRAVITY = (0.0, 0.0, -9.81)  # m/s^2, where the file says nothing
@@ -160,7 +159,7 @@ def _joint(joint: Element, name: str, child: str) -> Joint:
 
 
 def _inertial(link: Element, name: str) -> _Inertial:
-    """What a link has; nothing for one without."""
+    """Inertial of a link; empty for a link without."""
     where = f"link {name!r}"
     inertial = _one(link, where, "inertial")
     if inertial is None:
@@ -246,7 +245,7 @@ def _couplings(joints: Mapping[str, Element], leaders: Mapping[str, str]) -> lis
 
 
 def _outside(robot: Element, joints: Mapping[str, Element], smooth: Smooth) -> list[str]:
-    """What acts on a mechanism and does not belong to it, and is not taken."""
+    """Sentences on forces and inputs on a mechanism that are not taken."""
     limited = [name for name, joint in joints.items() if _limited(joint, name)]
     rubbing = [f"{name}: {force:g}" for name, joint in joints.items() if (force := _friction(joint, name))]
     return present(
@@ -291,3 +290,45 @@ def _extensions(robot: Element) -> Iterator[str]:
             alone = [[(inner.tag, *inner.keys()) for inner in each]] == [[("option", "gravity")]]
             if each.tag not in _KNOWN[parent.tag] and not (each.tag == "mujoco" and alone):
                 yield f"<{each.tag}>"
+
+
+_SINGLE = ("continuous", "revolute", "prismatic")  # joints with one coordinate
+
+
+class Mimics(NamedTuple):
+    """Joints that mimic others, and sentences on those that do not go in."""
+
+    leaders: dict[str, str]  # of each that follows, the joint that it mimics
+    refused: list[str]
+    of_no_effect: list[str]
+
+
+def read_mimics(joints: Mapping[str, Element]) -> Mimics:
+    """The joints that mimic others. Raises MechanismError for a joint that mimics several."""
+    leaders: dict[str, str] = {}
+    for name, joint in joints.items():
+        if len(mimics := joint.findall("mimic")) > 1:
+            raise MechanismError(f"joint {name!r} has {len(mimics)} elements <mimic>, and one is needed")
+        if mimics:
+            leaders[name] = mimics[0].get("joint", "")
+    kinds = {name: joint.get("type") for name, joint in joints.items()}
+    fixed = [name for name in leaders if kinds[name] == "fixed"]
+    follow = [name for name in leaders if name not in fixed]
+    astray = [name for name in follow if leaders[name] not in joints]
+    circle = [name for name in follow if follows_itself(name, leaders)]
+    others = [name for name in follow if name not in (*astray, *circle)]
+    several = [name for name in others if not {kinds[name], kinds[leaders[name]]} <= {*_SINGLE}]
+    refused = {
+        "joints that mimic one that is not there": astray,
+        "joints that mimic one another in a circle": circle,
+        "joints that mimic others where one of both has not one coordinate": several,
+    }
+    return Mimics(
+        {name: leaders[name] for name in others if name not in several},
+        present({f"{what} ({_after(names, leaders)})": names for what, names in refused.items()}),
+        present({f"fixed joints that mimic others ({_after(fixed, leaders)})": fixed}),
+    )
+
+
+def _after(names: Sequence[str], leaders: Mapping[str, str]) -> str:
+    return listed([f"{name} after {leaders[name]}" for name in names])

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Smooth:
-    """Which of the forces that a file asks for are taken.
+    """Choice of the forces of a file that are taken.
 
     limits: stiffness and damping of springs in place of joint limits, see `JointLimit`; None leaves limits out.
     friction: the velocity of `JointFriction`; None leaves friction loss out.  actuators: whether they are taken.
@@ -41,7 +41,7 @@ NONE = Smooth()
 
 
 def smooth(limits: Sequence[float] | None, friction: float | None, actuators: bool) -> Smooth:
-    """The same, checked. Raises MechanismError and TypeError."""
+    """Choice of forces, checked. Raises MechanismError and TypeError."""
     springs = None
     if limits is not None:
         pair = real_array("limits", limits)
@@ -101,13 +101,13 @@ def _on_joint(mj: MjModel, i: int) -> bool:
 
 
 def inputs(mj: MjModel, i: int) -> range:
-    """Where the inputs of an actuator stand among all; newer versions of MuJoCo have several of one."""
+    """Indices of an actuator's inputs among all; newer versions of MuJoCo have several of one."""
     first = int(getattr(mj, "actuator_ctrladr", range(i + 1))[i])
     return range(first, first + int(getattr(mj, "actuator_ctrlnum", [1] * (i + 1))[i]))
 
 
 def first_output(mj: MjModel, i: int) -> int:
-    """Where the first output of an actuator stands among all."""
+    """Index of an actuator's first output among all."""
     return int(getattr(mj, "actuator_outadr", range(i + 1))[i])
 
 

@@ -19,7 +19,7 @@ def is_text(source: object) -> bool:
 
 
 def called(source: object) -> str:
-    """What errors call a source."""
+    """Name of a source in errors."""
     return "the given text" if is_text(source) else f"{str(source)!r}"
 
 

@@ -10,8 +10,14 @@ import numpy as np
 from ..multibody.algebra import spatial
 from ..multibody.loops import Loop
 from ..multibody.mechanism import WORLD, Mechanism, MechanismError
-from .read_mimic import follows_itself
-from .xml_numbers import numbers
+from ..multibody.parameters import Quantities
+from .left_out import follows_itself
+
+
+def numbers(values: Quantities) -> str:
+    """The numbers, with blanks between."""
+    return " ".join([repr(float(value)) for value in np.asarray(values)])
+
 
 _DEGREE = 4  # of MJCF's polycoef
 _OF_SITES = {"point": "connect", "weld": "weld"}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from xml.sax.saxutils import quoteattr
 
@@ -15,8 +14,7 @@ from ..multibody.algebra import spatial
 from ..multibody.mechanism import WORLD, Body, Mechanism, MechanismError, require_mechanism
 from ..systems.model import Model
 from .stand_ins import ROUNDING, with_stand_ins
-from .write_loops import equality_lines, site_lines
-from .xml_numbers import numbers
+from .write_loops import equality_lines, numbers, site_lines
 
 
 def to_mjcf(model: Model, timestep: float = 1e-3) -> str:
@@ -59,18 +57,6 @@ def to_mjcf(model: Model, timestep: float = 1e-3) -> str:
     mechanism = require_mechanism(model, "MJCF").bind()
     if not 0.0 < real_number("timestep", timestep) < math.inf:
         raise ValueError(f"timestep must be positive and finite, got {timestep!r} s")
-    return mjcf_text(mechanism, timestep)
-
-
-def moving_alone(mechanism: Mechanism) -> Mechanism:
-    """The tree of the bodies that move, those welded to them merged in, without loops."""
-    return replace(mechanism, bodies=mechanism.moving, locked={}, loops=())
-
-
-def mjcf_text(
-    mechanism: Mechanism, timestep: float, head: Sequence[str] = (), shapes: Mapping[str, Sequence[str]] | None = None
-) -> str:
-    """The text of a mechanism with more elements: `head` before the bodies, `shapes` in the bodies of those names."""
     if mechanism.forces:
         raise MechanismError(f"MJCF has no forces, there is one on body {mechanism.forces[0].body!r}")
     bodies = mechanism.parts
@@ -88,11 +74,10 @@ def mjcf_text(
         f'  <option timestep="{timestep!r}" integrator="RK4" gravity="{numbers(mechanism.gravity)}">',
         '    <flag contact="disable"/>',
         "  </option>",
-        *[f"  {line}" for line in head],
         "  <worldbody>",
     ]
-    more = [site_lines(mechanism.loops), shapes or {}]
-    lines += [f"    {line}" for line in more[0].get(WORLD, ())]
+    sites = site_lines(mechanism.loops)
+    lines += [f"    {line}" for line in sites.get(WORLD, ())]
     indent = 2
     stack: list[Body | None] = [*reversed(children.get(WORLD, []))]  # None closes a body
     while stack:
@@ -101,11 +86,16 @@ def mjcf_text(
             indent -= 1
             lines.append("  " * indent + "</body>")
             continue
-        inside = [f"  {line}" for each in more for line in each.get(opened.name, ())]
+        inside = [f"  {line}" for line in sites.get(opened.name, ())]
         lines += ["  " * indent + line for line in [*_body_lines(opened, *inertial[opened.name]), *inside]]
         indent += 1
         stack += [None, *reversed(children.get(opened.name, []))]
     return "\n".join([*lines, "  </worldbody>", *equality_lines(mechanism), "</mujoco>"]) + "\n"
+
+
+def moving_alone(mechanism: Mechanism) -> Mechanism:
+    """The tree of the bodies that move, those welded to them merged in, without loops."""
+    return replace(mechanism, bodies=mechanism.moving, locked={}, loops=())
 
 
 def _body_lines(body: Body, mass: float, moments: str) -> list[str]:

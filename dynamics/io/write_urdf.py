@@ -14,8 +14,7 @@ from ..multibody.mechanism import WORLD, Body, MechanismError, require_mechanism
 from ..multibody.parameters import vanishes
 from ..systems.model import Model
 from .read_urdf import FAR, GRAVITY
-from .write_loops import mimic_lines
-from .xml_numbers import numbers
+from .write_loops import mimic_lines, numbers
 
 
 def to_urdf(model: Model) -> str:

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from cgraph.extend import Array
 
+from ..multibody.body import Body
 from ..multibody.mechanism import Mechanism
 from .flint_numbers import Number, flint, working
 
-Vector = list[Number]
+if TYPE_CHECKING:
+    from flint import arb_mat
+
 Maker = Callable[[object], Number]
 DIGITS = 60  # of the first attempt; twice as many until `LOST` is met
-MOST = 2000
+MOST_DIGITS = 2000
 LOST = 1e-50  # the largest bound on the error, relative to the largest component
 
 
@@ -33,39 +36,23 @@ class Pair(NamedTuple):
 
 def torques(chain: Mechanism, q: Array, qd: Array, qdd: Array) -> Pair:
     """tau [N m] of a chain for accelerations qdd, (n,). Raises ImportError without python-flint."""
-
-    def solved(terms: _Equations, number: Maker) -> Vector:
-        alpha = _numbers(number, qdd)
-        return [_dot(row, alpha) - right for row, right in zip(terms.matrix, terms.right, strict=True)]
-
-    return _bounded(chain, q, qd, solved)
+    return _bounded(chain, q, qd, qdd, lambda matrix, right, alpha: matrix * alpha - right)
 
 
 def accelerations(chain: Mechanism, q: Array, qd: Array, tau: Array) -> Pair:
     """qdd [rad/s^2] of a chain under torques tau, (n,). Raises ImportError without python-flint."""
-
-    def solved(terms: _Equations, number: Maker) -> Vector:
-        right = [[a + b] for a, b in zip(_numbers(number, tau), terms.right, strict=True)]
-        column = flint().arb_mat(terms.matrix).solve(flint().arb_mat(right))
-        return [column[i, 0] for i in range(len(right))]
-
-    return _bounded(chain, q, qd, solved)
+    return _bounded(chain, q, qd, tau, lambda matrix, right, torque: matrix.solve(torque + right))
 
 
-class _Equations(NamedTuple):
-    """The equations matrix qdd = tau + right."""
-
-    matrix: list[Vector]
-    right: Vector
-
-
-def _bounded(chain: Mechanism, q: Array, qd: Array, solved: Callable[[_Equations, Maker], Vector]) -> Pair:
+def _bounded(
+    chain: Mechanism, q: Array, qd: Array, third: Array, solved: Callable[[arb_mat, arb_mat, arb_mat], arb_mat]
+) -> Pair:
     """The numbers, computed with so many digits that the bound on their error is at most LOST."""
     digits = DIGITS
-    while digits <= MOST:
+    while digits <= MOST_DIGITS:
         with working(digits) as number:
             try:
-                x = solved(_equations(number, chain, q, qd), number)
+                x = solved(*_equations(number, chain, q, qd), _column(number, third)).entries()
             except ZeroDivisionError:  # flint: the matrix cannot be told from a singular one
                 x = []
             largest = max([abs(float(value.mid())) for value in x], default=math.nan)
@@ -74,110 +61,86 @@ def _bounded(chain: Mechanism, q: Array, qd: Array, solved: Callable[[_Equations
                 low = [float((value - h).mid()) for value, h in zip(x, high, strict=True)]
                 return Pair(np.array(high), np.array(low))
         digits *= 2
-    raise ArithmeticError(f"{MOST} digits are not enough for a chain of {len(chain.moving)} links")
+    raise ArithmeticError(f"{MOST_DIGITS} digits are not enough for a chain of {len(chain.moving)} links")
 
 
-def _equations(number: Maker, chain: Mechanism, q: Array, qd: Array) -> _Equations:
-    """Of revolute joints about axes of their frames: all in the world's axes, about the world's origin.
+def _equations(number: Maker, chain: Mechanism, q: Array, qd: Array) -> tuple[arb_mat, arb_mat]:
+    """The matrix and the right side of matrix qdd = tau + right, of revolute joints about axes of their frames.
 
-    With S_i the joint's twist (angular, then linear) and I_i a body's 6 x 6 inertia,
+    All in the world's axes, about the world's origin. With S_i the joint's twist (angular, then linear) and I_i a
+    body's 6 x 6 inertia,
         M_ij = S_i . (sum over k >= i of I_k) S_j for j <= i,
     and the bias is what the Newton-Euler equations give for qdd = 0.
     """
-    zero = number(0)
-    place, turn = [zero] * 3, [[number(int(i == j)) for j in range(3)] for i in range(3)]
-    velocity, acceleration = [zero] * 6, [zero] * 3 + [-each for each in _numbers(number, chain.gravity)]
+    place, turn = _column(number, np.zeros(3)), _matrix(number, np.eye(3))
+    velocity = _column(number, np.zeros(6))
+    acceleration = _column(number, [0.0, 0.0, 0.0, *-np.asarray(chain.gravity, dtype=np.float64)])
     twists, inertias, forces = [], [], []
-    for body, angle, rate in zip(chain.moving, _numbers(number, q), _numbers(number, qd), strict=True):
+    for body, angle, rate in zip(chain.moving, q.tolist(), qd.tolist(), strict=True):
         assert body.joint.kind == "revolute"
-        place = _plus(place, _times(turn, _numbers(number, body.joint.position)))
-        turn = _product(turn, [_numbers(number, row) for row in np.asarray(body.joint.orientation)])
-        axis = _times(turn, _numbers(number, body.joint.axis))
-        turn = _product(turn, _rotation(number, np.asarray(body.joint.axis, dtype=np.float64), angle))
-        twist = axis + _cross(place, axis)
-        rated = [rate * x for x in twist]
-        acceleration = _plus(acceleration, _twist_cross(velocity, rated))
-        velocity = _plus(velocity, rated)
+        place = place + turn * _column(number, body.joint.position)
+        turn = turn * _matrix(number, body.joint.orientation)
+        axis = turn * _column(number, body.joint.axis)
+        turn = turn * _rotation(number, np.asarray(body.joint.axis, dtype=np.float64), number(angle))
+        twist = _blocks([[axis], [_skew(place) * axis]])
+        rated = twist * number(rate)
+        acceleration = acceleration + _carried(velocity) * rated
+        velocity = velocity + rated
         inertia = _inertia_about_origin(number, body, place, turn)
-        forces.append(_plus(_times(inertia, acceleration), _wrench_cross(velocity, _times(inertia, velocity))))
+        # the rate of a wrench that a twist V carries along is -(V x)^T of it
+        forces.append(inertia * acceleration - _carried(velocity).transpose() * (inertia * velocity))
         twists.append(twist)
         inertias.append(inertia)
-    n = len(twists)
-    matrix, right = [[zero] * n for _ in range(n)], [zero] * n
-    carried, force = [[zero] * 6 for _ in range(6)], [zero] * 6
+    n, rows = len(twists), [twist.entries() for twist in twists]
+    matrix, right = [[number(0)] * n for _ in range(n)], [number(0)] * n
+    inertia, force = _matrix(number, np.zeros((6, 6))), _column(number, np.zeros(6))
     for i in reversed(range(n)):
-        carried = [_plus(a, b) for a, b in zip(carried, inertias[i], strict=True)]
-        force = _plus(force, forces[i])
-        right[i] = -number(chain.moving[i].joint.damping) * number(float(qd[i])) - _dot(twists[i], force)
-        column = _times(carried, twists[i])
-        for j in range(i + 1):
-            matrix[i][j] = matrix[j][i] = _dot(column, twists[j])
-    return _Equations(matrix, right)
+        inertia, force = inertia + inertias[i], force + forces[i]
+        damping = number(chain.moving[i].joint.damping) * number(float(qd[i]))
+        right[i] = -damping - (twists[i].transpose() * force)[0, 0]
+        for j, entry in enumerate((flint().arb_mat(rows[: i + 1]) * (inertia * twists[i])).entries()):
+            matrix[i][j] = matrix[j][i] = entry
+    return flint().arb_mat(matrix), flint().arb_mat([[each] for each in right])
 
 
-def _numbers(number: Maker, values: object) -> Vector:
-    return [number(x) for x in np.asarray(values, dtype=np.float64).tolist()]
+def _matrix(number: Maker, rows: object) -> arb_mat:
+    return flint().arb_mat([[number(x) for x in row] for row in np.asarray(rows, dtype=np.float64).tolist()])
 
 
-def _rotation(number: Maker, axis: Array, angle: Number) -> list[Vector]:
+def _column(number: Maker, values: object) -> arb_mat:
+    return _matrix(number, np.reshape(np.asarray(values, dtype=np.float64), (-1, 1)))
+
+
+def _blocks(rows: Sequence[Sequence[arb_mat]]) -> arb_mat:
+    """The matrix of blocks."""
+    lines: list[list[Number]] = []
+    for row in rows:
+        lines += [[x for part in parts for x in part] for parts in zip(*[each.tolist() for each in row], strict=True)]
+    return flint().arb_mat(lines)
+
+
+def _skew(a: arb_mat) -> arb_mat:
+    """[a], the matrix of a x."""
+    x, y, z = a.entries()
+    return flint().arb_mat([[0 * x, -z, y], [z, 0 * x, -x], [-y, x, 0 * x]])
+
+
+def _carried(twist: arb_mat) -> arb_mat:
+    """[[w], 0; [v], [w]]: the rate of a twist that the twist (w, v) carries along."""
+    angular, linear = (_skew(flint().arb_mat([[each] for each in twist.entries()[k : k + 3]])) for k in (0, 3))
+    return _blocks([[angular, 0 * angular], [linear, angular]])
+
+
+def _rotation(number: Maker, axis: Array, angle: Number) -> arb_mat:
     """By an angle about an axis of the frame, 3 x 3: c 1 + (1 - c) a a^T + s [a]."""
     assert sorted(np.abs(axis)) == [0.0, 0.0, 1.0]
-    s, c, a = angle.sin(), angle.cos(), _numbers(number, axis)
-    zero = number(0)
-    skew = [[zero, -a[2], a[1]], [a[2], zero, -a[0]], [-a[1], a[0], zero]]
-    return [[c * int(i == j) + (1 - c) * a[i] * a[j] + s * skew[i][j] for j in range(3)] for i in range(3)]
+    a, c = _column(number, axis), angle.cos()
+    return _matrix(number, np.eye(3)) * c + a * a.transpose() * (1 - c) + _skew(a) * angle.sin()
 
 
-def _inertia_about_origin(arb: Maker, body: Any, place: Vector, turn: list[Vector]) -> list[Vector]:
-    """6 x 6, of (angular, linear) velocity: [[J - m [c][c], m [c]], [-m [c], m 1]], [c] the matrix of c x."""
-    mass = arb(body.mass)
-    c = _plus(place, _times(turn, _numbers(arb, body.center)))
-    inertia = np.asarray(body.inertia, dtype=np.float64)
-    rows = np.diag(inertia) if inertia.ndim == 1 else inertia
-    own = _product(_product(turn, [_numbers(arb, row) for row in rows]), _transpose(turn))
-    zero = arb(0)
-    skew = [[zero, -c[2], c[1]], [c[2], zero, -c[0]], [-c[1], c[0], zero]]
-    square = _product(skew, skew)
-    top = [
-        [own[i][j] - mass * square[i][j] for j in range(3)] + [mass * skew[i][j] for j in range(3)] for i in range(3)
-    ]
-    return top + [[-mass * x for x in skew[i]] + [mass * int(i == j) for j in range(3)] for i in range(3)]
-
-
-def _sum(values: Iterable[Number]) -> Number:
-    return sum(values, 0)
-
-
-def _dot(a: Vector, b: Vector) -> Number:
-    return _sum([x * y for x, y in zip(a, b, strict=True)])
-
-
-def _plus(a: Vector, b: Vector) -> Vector:
-    return [x + y for x, y in zip(a, b, strict=True)]
-
-
-def _cross(a: Vector, b: Vector) -> Vector:
-    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-
-
-def _twist_cross(a: Vector, b: Vector) -> Vector:
-    """The rate of a twist b that is carried along by a."""
-    return _cross(a[:3], b[:3]) + _plus(_cross(a[:3], b[3:]), _cross(a[3:], b[:3]))
-
-
-def _wrench_cross(a: Vector, f: Vector) -> Vector:
-    """The rate of a wrench f (moment, force) that is carried along by a."""
-    return _plus(_cross(a[:3], f[:3]), _cross(a[3:], f[3:])) + _cross(a[:3], f[3:])
-
-
-def _times(matrix: Sequence[Vector], vector: Vector) -> Vector:
-    return [_dot(row, vector) for row in matrix]
-
-
-def _transpose(matrix: list[Vector]) -> list[Vector]:
-    return [list(column) for column in zip(*matrix, strict=True)]
-
-
-def _product(a: list[Vector], b: list[Vector]) -> list[Vector]:
-    columns = _transpose(b)
-    return [[_dot(row, column) for column in columns] for row in a]
+def _inertia_about_origin(number: Maker, body: Body, place: arb_mat, turn: arb_mat) -> arb_mat:
+    """6 x 6, of (angular, linear) velocity: [[J - m [c][c], m [c]], [-m [c], m 1]]."""
+    mass, rows = number(body.mass), np.asarray(body.inertia, dtype=np.float64)
+    skew = _skew(place + turn * _column(number, body.center))
+    own = turn * _matrix(number, np.diag(rows) if rows.ndim == 1 else rows) * turn.transpose()
+    return _blocks([[own - skew * skew * mass, skew * mass], [-skew * mass, _matrix(number, np.eye(3)) * mass]])

@@ -17,7 +17,7 @@ DIGITS = 30  # of the texts; the stated error is 10^-DIGITS
 GUARD = 40  # more digits in the arithmetic: a phase of 10^15 rad, or a modulus next to 1, costs some of them
 
 
-def _solution(times: Sequence[float], state: Callable[[MPContext, mpf], Sequence[mpf]], how: str) -> Reference:
+def solution(times: Sequence[float], state: Callable[[MPContext, mpf], Sequence[mpf]], how: str) -> Reference:
     """state(mp, t): the state at time t, in mpmath numbers."""
     try:
         import mpmath
@@ -31,7 +31,7 @@ def _solution(times: Sequence[float], state: Callable[[MPContext, mpf], Sequence
 
 def exponential(times: Sequence[float], x: float, rate: float) -> Reference:
     """xdot = rate x from x. States (x)."""
-    return _solution(times, lambda mp, t: [x * mp.exp(rate * t)], "exponential")
+    return solution(times, lambda mp, t: [x * mp.exp(rate * t)], "exponential")
 
 
 def oscillator(
@@ -50,7 +50,7 @@ def oscillator(
             (a * fast * mp.exp(fast * t) + b * slow * mp.exp(slow * t)).real,
         ]
 
-    return _solution(times, state, "damped oscillator by its two eigenvalues")
+    return solution(times, state, "damped oscillator by its two eigenvalues")
 
 
 def free_fall(times: Sequence[float], q: Sequence[float], qd: Sequence[float], qdd: Sequence[float]) -> Reference:
@@ -61,7 +61,7 @@ def free_fall(times: Sequence[float], q: Sequence[float], qd: Sequence[float], q
         places = [p + s * t + b * t * t / 2 for p, s, b in zip(x, v, a, strict=True)]
         return [*places, *[s + b * t for s, b in zip(v, a, strict=True)]]
 
-    return _solution(times, state, "constant acceleration")
+    return solution(times, state, "constant acceleration")
 
 
 def kepler(times: Sequence[float], eccentricity: float, mu: float = 1.0) -> Reference:
@@ -89,7 +89,7 @@ def kepler(times: Sequence[float], eccentricity: float, mu: float = 1.0) -> Refe
         rate = motion / (1 - e * c)
         return [a * (c - e), a * b * s, -a * s * rate, a * b * c * rate]
 
-    return _solution(times, state, "Kepler's equation by Newton's method")
+    return solution(times, state, "Kepler's equation by Newton's method")
 
 
 def kepler_start(eccentricity: float, mu: float = 1.0) -> tuple[float, float, float, float]:
@@ -112,7 +112,7 @@ def pendulum(times: Sequence[float], angle: float, stiffness: float) -> Referenc
         sn, cn = mp.ellipfun("sn", u=u, m=k * k), mp.ellipfun("cn", u=u, m=k * k)
         return [hanging + 2 * mp.asin(k * sn), 2 * k * w * cn]
 
-    return _solution(times, state, "Jacobi elliptic functions")
+    return solution(times, state, "Jacobi elliptic functions")
 
 
 def free_rigid_body(times: Sequence[float], inertia: Sequence[float], omega: Sequence[float]) -> Reference:
@@ -120,28 +120,10 @@ def free_rigid_body(times: Sequence[float], inertia: Sequence[float], omega: Seq
 
     Landau and Lifshitz, "Mechanics", section 37, from any start that is no permanent rotation and not on a separatrix.
     """
-    return _solution(times, lambda mp, t: _Rotor(mp, inertia, omega).velocity(t), "Jacobi elliptic functions")
+    return solution(times, lambda mp, t: Rotor(mp, inertia, omega).velocity(t), "Jacobi elliptic functions")
 
 
-def free_rotor(times: Sequence[float], inertia: Sequence[float], omega: Sequence[float]) -> Reference:
-    """The same motion with the orientation. States: the body's axes, seen in those at t = 0, row by row; omega.
-
-    The body turns about the axis of its angular momentum by an elliptic integral of the third kind, and stands against
-    that axis as its angular velocity says (E. T. Whittaker, "Analytical Dynamics", section 69).
-    """
-
-    def state(mp: MPContext, t: mpf) -> list[mpf]:
-        rotor = _Rotor(mp, inertia, omega)
-        first, here, angle = rotor.frame(mp.mpf(0)), rotor.frame(t), rotor.precession(t)
-        s, c = mp.sin(angle), mp.cos(angle)
-        turned = [first[0] * c + first[1] * s, first[1] * c - first[0] * s, first[2]]
-        rotation = sum([a * b.T for a, b in zip(turned, here, strict=True)], mp.zeros(3, 3))
-        return [*rotation, *rotor.velocity(t)]
-
-    return _solution(times, state, "Jacobi elliptic functions, and an integral of the third kind")
-
-
-class _Rotor:
+class Rotor:
     """A rigid body without torque from a start: w_a = first cn(u), w_1 = middle sn(u), w_c = last dn(u)."""
 
     def __init__(self, mp: MPContext, inertia: Sequence[float], omega: Sequence[float]) -> None:
@@ -167,31 +149,6 @@ class _Rotor:
         result[self.a], result[1], result[self.c] = self.first * cn, self.middle * sn, self.last * dn
         return result
 
-    def frame(self, t: mpf) -> list[mpf]:
-        """In the body's axes: those whose z is the angular momentum, and whose x leans towards axis c."""
-        momentum = [i * w for i, w in zip(self.inertia, self.velocity(t), strict=True)]
-        z = self.mp.matrix(momentum) / self.mp.sqrt(self.square)
-        x = self.mp.matrix([int(k == self.c) - z[self.c] * z[k] for k in range(3)])
-        x /= self.mp.norm(x)
-        y = [z[1] * x[2] - z[2] * x[1], z[2] * x[0] - z[0] * x[2], z[0] * x[1] - z[1] * x[0]]
-        return [x, self.mp.matrix(y), z]
-
-    def precession(self, t: mpf) -> mpf:
-        """How far axis c has turned about L: the integral of L (2T - I_c w_c^2) / (L^2 - I_c^2 w_c^2) [rad]."""
-        mp, moment = self.mp, self.inertia[self.c]
-        across = self.square - (moment * self.last) ** 2  # L^2 - I_c^2 w_c^2 = across (1 - n sn^2)
-        n = -((moment * self.last) ** 2) * self.m / across
-        share = self._third(n, self.start + self.rate * t) - self._third(n, self.start)
-        return mp.sqrt(self.square) / moment * (t + (self.energy * moment - self.square) / across * share / self.rate)
-
-    def _third(self, n: mpf, u: mpf) -> mpf:
-        """The integral of 1 / (1 - n sn^2) from 0 to u."""
-        mp, m = self.mp, self.m
-        turns = mp.nint(u / (2 * mp.ellipk(m)))
-        v = u - 2 * turns * mp.ellipk(m)
-        amplitude = mp.atan2(mp.ellipfun("sn", u=v, m=m), mp.ellipfun("cn", u=v, m=m))
-        return 2 * turns * mp.ellippi(n, m) + mp.ellippi(n, amplitude, m)
-
 
 def cyclotron(times: Sequence[float], start: Sequence[float], frequency: float) -> Reference:
     """A charge in a uniform field along z: (vx, vy)' = frequency (vy, -vx). States (x, y, vx, vy)."""
@@ -202,12 +159,12 @@ def cyclotron(times: Sequence[float], start: Sequence[float], frequency: float) 
         s, c = mp.sin(w * t), mp.cos(w * t)
         return [x + (u * s + v * (1 - c)) / w, y + (v * s - u * (1 - c)) / w, u * c + v * s, v * c - u * s]
 
-    return _solution(times, state, "circles at the cyclotron frequency")
+    return solution(times, state, "circles at the cyclotron frequency")
 
 
 def cosine(times: Sequence[float]) -> Reference:
     """x = cos(t). States (x)."""
-    return _solution(times, lambda mp, t: [mp.cos(t)], "cosine")
+    return solution(times, lambda mp, t: [mp.cos(t)], "cosine")
 
 
 def two_modes(times: Sequence[float], q: Sequence[float], stiffness: Sequence[float]) -> Reference:
@@ -219,4 +176,4 @@ def two_modes(times: Sequence[float], q: Sequence[float], stiffness: Sequence[fl
         place, speed = second * mp.cos(v * t), -second * v * mp.sin(v * t)
         return [both * mp.cos(w * t) - place, place, -both * w * mp.sin(w * t) - speed, speed]
 
-    return _solution(times, state, "two modes of vibration")
+    return solution(times, state, "two modes of vibration")

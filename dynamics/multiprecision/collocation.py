@@ -20,8 +20,7 @@ from cgraph.extend import Array
 
 from ..systems.arguments import TIME
 from .flint_numbers import Number, flint, log2_size, working
-from .taylor_integrator import ReferenceFailedError, step_size
-from .taylor_series import Series
+from .taylor_integrator import ReferenceFailedError, Series, step_size
 
 if TYPE_CHECKING:
     from flint import arb_mat

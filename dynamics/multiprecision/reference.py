@@ -1,29 +1,34 @@
-"""Reference solutions of any model: two runs of different order and precision, whose difference is the stated error."""
+"""Reference solutions of any model: two unlike runs, whose difference is the error; kept in a folder."""
 
 from __future__ import annotations
 
+import hashlib
+import json
 import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from numpy.typing import ArrayLike
 
-from cgraph import Node
-from cgraph.extend import require_choice, require_path
+from cgraph import Graph, Node
+from cgraph.extend import atomic_write, require_choice, require_path
 
 from ..equations.state_equation import state_equation, state_inputs
 from ..equations.states.initial_value import initial_value, times_to_record
 from ..systems.controller import with_closed_form
 from ..systems.model import Model, as_equations
 from .collocation import collocation
-from .disk_store import Store, key
 from .flint_numbers import Number, text
 from .solution import Reference, from_text
 from .taylor_integrator import ReferenceFailedError, taylor
 
 Solver = Callable[..., tuple[list[list[Number]], str]]
 REFERENCE_METHODS: dict[str, Solver] = {"taylor": taylor, "radau": collocation}
-FEWEST, STEP, MOST = 8, 6, 400  # digits of the tolerance: the least at first, more in each run, and where it ends
+FEWEST, STEP, MOST_DIGITS = (
+    8,
+    6,
+    400,
+)  # digits of the tolerance: the least at first, more in each run, and where it ends
 # Digits of the first run. Collocation has at the ends of steps about twice the digits that it has within.
 FIRST: dict[str, Callable[[int], int]] = {"taylor": lambda digits: digits + 2, "radau": lambda digits: digits // 2 + 4}
 SPARE = 6  # digits written beyond those asked for
@@ -95,8 +100,8 @@ def reference(
     require_choice("method", method, REFERENCE_METHODS)
     if folder is not None:
         folder = require_path("folder", folder)
-    if isinstance(digits, bool) or not (isinstance(digits, int) and 1 <= digits <= MOST // 2):
-        raise ValueError(f"digits must be a whole number from 1 to {MOST // 2}, got {digits!r}")
+    if isinstance(digits, bool) or not (isinstance(digits, int) and 1 <= digits <= MOST_DIGITS // 2):
+        raise ValueError(f"digits must be a whole number from 1 to {MOST_DIGITS // 2}, got {digits!r}")
     model, constant, _ = with_closed_form(as_equations(model), tau, parameters)
     start, inputs = initial_value(model, q, qd, constant, parameters), state_inputs(model)
     x, times = start.x.tolist(), times_to_record(t_eval).tolist()
@@ -125,7 +130,7 @@ def _converged(
     wanted = max(first, FEWEST)
     before, _ = run(wanted)
     step = STEP
-    while (wanted := wanted + step) <= MOST:
+    while (wanted := wanted + step) <= MOST_DIGITS:
         rows, how = run(wanted)
         error, state = max(zip(_differences(before, rows), states, strict=True))
         if error <= 10.0**-digits:
@@ -136,14 +141,14 @@ def _converged(
         missing = digits + math.log10(error) if error < math.inf else digits
         before, step = rows, max(STEP, math.ceil(missing))
     raise ReferenceFailedError(
-        f"{MOST} digits are not enough for {digits} digits at t = {times[-1]:.6g}: the last two runs differ by "
+        f"{MOST_DIGITS} digits are not enough for {digits} digits at t = {times[-1]:.6g}: the last two runs differ by "
         f"{error:.0e} of the largest value of {state}, so that it is zero but for rounding, or the start does "
         "not decide it, as beyond a configuration where a linkage can go on in two ways"
     )
 
 
 def _differences(a: list[list[Number]], b: list[list[Number]]) -> list[float]:
-    """Of each state the largest difference, relative to the largest value of it in b."""
+    """Largest difference of each state, relative to its largest value in b."""
     result = []
     for first, second in zip(zip(*a, strict=True), zip(*b, strict=True), strict=True):
         largest = max([abs(value) for value in second])
@@ -151,3 +156,78 @@ def _differences(a: list[list[Number]], b: list[list[Number]]) -> list[float]:
         relative = float(difference / largest) if largest != 0 else float(difference)
         result.append(relative if relative == relative else math.inf)
     return result
+
+
+FORMAT = 1  # part of the name: count it up when the method changes so that old solutions are not what would be computed
+
+
+def key(
+    graph: Graph,
+    states: Sequence[str],
+    start: Sequence[float],
+    times: Sequence[float],
+    values: Mapping[str, float],
+    method: str,
+    digits: int,
+) -> str:
+    """The name of a solution: a hash of the equations by structure, numbers by their bits."""
+    number = {node: i for i, node in enumerate(graph.nodes)}
+    nodes = [
+        (
+            node.op.name,
+            [number[arg] for arg in node.args],
+            None if node.value is None else node.value.hex(),
+            node.name if node.op.name == "variable" else None,
+        )
+        for node in graph.nodes
+    ]
+    rates = [number[node] for node in graph.outputs.values()]
+    numbers = [[float(value).hex() for value in row] for row in (start, times, values.values())]
+    content = [FORMAT, nodes, rates, list(states), list(values), numbers, method, digits]
+    return hashlib.sha256(json.dumps(content).encode()).hexdigest()
+
+
+class Store:
+    """Solutions in a folder, which is created on demand. Several programs may use it at once."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def get(self, name: str, times: Sequence[float], width: int, solve: Callable[[], Reference]) -> Reference:
+        """The solution of that name, at these times with so many states; computed and kept when it is not there."""
+        path = self.folder / f"{name}.json"
+        kept = _read(path, times, width)
+        if kept is not None:
+            return kept
+        solution = solve()
+        self.folder.mkdir(parents=True, exist_ok=True)
+        atomic_write(path, json.dumps(_signed(solution)))  # a reader sees all of it or nothing
+        return solution
+
+
+def _signed(solution: Reference) -> dict[str, object]:
+    content = {
+        "t": [t.hex() for t in solution.t],
+        "x": [list(row) for row in solution.decimal],
+        "error": solution.error.hex(),
+        "how": solution.how,
+    }
+    return content | {"sum": _sum(content)}
+
+
+def _sum(content: Mapping[str, object]) -> str:
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def _read(path: Path, times: Sequence[float], width: int) -> Reference | None:
+    """The solution in a file, or None when there is none or it is not what was written."""
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+        if content.pop("sum") != _sum(content):
+            return None
+        t = [float.fromhex(text) for text in content["t"]]
+        if t != list(times) or {len(row) for row in content["x"]} != {width}:
+            return None
+        return from_text(t, content["x"], float.fromhex(content["error"]), content["how"])
+    except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        return None

@@ -48,7 +48,7 @@ class Reference:
 
     @cached_property
     def _rest(self) -> Array:
-        """What the rounding of `x` left out."""
+        """Remainder that the rounding of `x` left out."""
         rest = [[float(Fraction(text) - Fraction(float(text))) for text in row] for row in self.decimal]
         return np.array(rest).reshape(self.x.shape)
 

@@ -7,8 +7,7 @@ from dataclasses import dataclass, field
 from importlib import import_module
 from importlib.util import find_spec
 
-from .case import DERIVATIVES, MOTIONS, TASKS, Case
-from .contender import MODES, Contender, Peer, UnavailableError
+from .peer import DERIVATIVES, MODES, MOTIONS, TASKS, Peer, PeerModel, TimedTask, UnavailableError
 
 CALLS = {(task, mode) for task in ("inverse", "forward") for mode in ("call", "batch")}
 RK4 = {("rk4", mode) for mode in MODES}
@@ -37,12 +36,12 @@ class Kind:
         return find_spec(self.package) is not None
 
     def load(self) -> type[Peer]:
-        """Its class, whose module is imported now."""
+        """Class of the peer, whose module is imported now."""
         module, name = self.home.split(".")
         peer: type[Peer] = getattr(import_module(f".{module}", __name__), name)
         return peer
 
-    def make(self, case: Case) -> Peer:
+    def make(self, case: PeerModel) -> Peer:
         """The peer on a case. Raises ImportError where the package is not installed."""
         return self.load()(case, **self.options)
 
@@ -91,4 +90,4 @@ PEERS = {
     "torch": Kind("PyTorch eager, torch.autograd", "torch", {("inverse", "call")}, "torch.TorchPeer"),
 }
 
-__all__ = ["PEERS", "Case", "Contender", "Kind", "Peer", "UnavailableError"]
+__all__ = ["PEERS", "Kind", "Peer", "PeerModel", "TimedTask", "UnavailableError"]

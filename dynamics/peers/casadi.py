@@ -12,11 +12,22 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cgraph.extend import Array, install, kept_by_first
+from cgraph.extend import Array, kept_by_first
 
-from .case import BATCH, DERIVATIVES, MOTIONS, NUDGE, PASSES, Case, rk4_step
-from .contender import Contender, Peer, UnavailableError
 from .ours import rate_graph, task_graph
+from .peer import (
+    BATCH,
+    DERIVATIVES,
+    MOTIONS,
+    NUDGE,
+    PASSES,
+    Peer,
+    PeerModel,
+    TimedTask,
+    UnavailableError,
+    required,
+    rk4_step,
+)
 from .translate import lagrangian, quasi_velocities, translated
 
 if TYPE_CHECKING:
@@ -33,7 +44,7 @@ class CasadiPeer(Peer):
     Its forward dynamics is an LDL^T of the mass matrix followed by its `cse`: fewer instructions than `casadi.solve`.
     """
 
-    def __init__(self, case: Case, native: bool = False, own_graph: bool = True) -> None:
+    def __init__(self, case: PeerModel, native: bool = False, own_graph: bool = True) -> None:
         super().__init__(case)
         self.casadi, self.native = casadi(), native
         self.compiler = os.environ.get("CC") or shutil.which("gcc") or shutil.which("cc")
@@ -123,30 +134,25 @@ class CasadiPeer(Peer):
         moved = x + NUDGE * function(x)[self.case.nudges(task).tolist()]
         return self.casadi.Function("moved", [x], [moved])
 
-    def prepare(self, task: str, mode: str) -> Contender:
+    def prepare(self, task: str, mode: str) -> TimedTask:
         """CasADi's function of the task, in its virtual machine or through gcc."""
         if self.native and self.compiler is None:
             raise UnavailableError("there is no C compiler")
-        function = self.function(task)
+        function, x = self.function(task), self.case.inputs(task, mode)
         size = function.n_instructions() if function.is_a("SXFunction") else None
-        if mode == "call":
-            return self._contender(function, self.case.point(task), 1, size)
         if mode == "loop":
-            return self._contender(self._pass(task).fold(PASSES), self.case.point(task), PASSES, size)
-        many = function.map(BATCH, "serial")
-        return self._contender(many, np.ascontiguousarray(self.case.points(task).T), BATCH, size)
-
-    def _contender(self, function: Function, x: Array, evaluations: int, size: int | None) -> Contender:
-        """Through CasADi's buffers, which call on fixed memory."""
+            function = self._pass(task).fold(PASSES)
+        elif mode == "batch":
+            function, x = function.map(BATCH, "serial"), np.ascontiguousarray(x.T)
         if self.native:
             function = self._through_c(function)
-        buffer, evaluate = function.buffer()
+        buffer, evaluate = function.buffer()  # calls on fixed memory
         y = np.empty(function.numel_out(0))
         buffer.set_arg(0, x.data)
         buffer.set_res(0, y.data)
 
         def result(_: object) -> Array:
-            return y.reshape(-1, function.size1_out(0)).T.copy() if evaluations == BATCH else y.copy()
+            return y.reshape(-1, function.size1_out(0)).T.copy() if mode == "batch" else y.copy()
 
         held = (x, buffer)  # the buffer holds bare pointers
 
@@ -154,7 +160,7 @@ class CasadiPeer(Peer):
             evaluate()
             _ = held
 
-        return Contender(run, result, evaluations, size)
+        return TimedTask(run, result, size)
 
     def _through_c(self, function: Function) -> Function:
         """The function compiled by the C compiler and loaded again. Raises UnavailableError when that fails."""
@@ -173,9 +179,4 @@ class CasadiPeer(Peer):
 
 def casadi() -> ModuleType:
     """The module. Raises ImportError naming the extra when it is not installed."""
-    try:
-        import casadi as module
-    except ImportError as error:
-        raise ImportError(f"CasADi is not installed: {install('bench')}") from error
-    found: ModuleType = module  # it has no types
-    return found
+    return required("casadi", "CasADi")

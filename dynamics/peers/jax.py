@@ -7,10 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cgraph.extend import Array, install, ldl_elimination
+from cgraph.extend import ldl_elimination
 
-from .case import BATCH, DERIVATIVES, MOTIONS, NUDGE, PASSES, Case, rk4_step
-from .contender import Contender, Peer
+from .peer import DERIVATIVES, MOTIONS, NUDGE, PASSES, Peer, PeerModel, TimedTask, required, rk4_step
 from .translate import lagrangian, quasi_velocities
 
 if TYPE_CHECKING:
@@ -23,12 +22,9 @@ NAMES = {f"a{name}": f"arc{name}" for name in ("sin", "cos", "tan")} | {"atan2":
 class JaxPeer(Peer):
     """JAX: `jit`, `vmap` for batches, `lax.scan` for loops."""
 
-    def __init__(self, case: Case) -> None:
+    def __init__(self, case: PeerModel) -> None:
         super().__init__(case)
-        try:
-            import jax
-        except ImportError as error:
-            raise ImportError(f"JAX is not installed: {install('bench')}") from error
+        jax = required("jax", "JAX")
         jax.config.update("jax_platforms", "cpu")
         jax.config.update("jax_enable_x64", True)
         jax.config.update("jax_cpu_enable_async_dispatch", False)  # a queue and a thread more than one core needs
@@ -90,15 +86,12 @@ class JaxPeer(Peer):
         if task in DERIVATIVES:
             return self._slopes(self._function(DERIVATIVES[task]))
         if task in MOTIONS:
-            return (
-                self._motion
-                if task == "motion"
-                else self.jax.grad(lambda x: (self._motion(x)[: self.case.n] ** 2).sum())
-            )
+            square = self.jax.grad(lambda x: (self._motion(x)[: self.case.n] ** 2).sum())
+            return self._motion if task == "motion" else square
         return {"inverse": self._inverse, "forward": self._forward, "rk4": self._step}[task]
 
     def _slopes(self, function: Callable[[JaxArray], JaxArray]) -> Callable[[JaxArray], JaxArray]:
-        """Its derivatives, row by row; those by q along the velocities."""
+        """Derivatives of a function, row by row; those by q along the velocities."""
 
         def slopes(x: JaxArray) -> JaxArray:
             q, qd, _ = self._split(x)
@@ -107,27 +100,20 @@ class JaxPeer(Peer):
 
         return slopes
 
-    def prepare(self, task: str, mode: str) -> Contender:
+    def prepare(self, task: str, mode: str) -> TimedTask:
         """JAX's jitted function of the task."""
-        function = self._function(task)
-        x = self.np.asarray(self.case.point(task))
-        if mode == "call":
-            return _contender(self.jax.jit(function), x, 1)
+        jit, lax = self.jax.jit, self.jax.lax
+        function, x = self._function(task), self.case.inputs(task, mode)
         if mode == "batch":
-            points = self.np.asarray(np.ascontiguousarray(self.case.points(task).T))
-            return _contender(self.jax.jit(self.jax.vmap(function)), points, BATCH)
+            run, x = jit(self.jax.vmap(function)), np.ascontiguousarray(x.T)
+        elif mode == "loop":
+            nudges = self.case.nudges(task)
 
-        nudges = self.case.nudges(task)
+            def one_pass(carry: JaxArray, _: None) -> tuple[JaxArray, None]:
+                return (function(carry) if task == "rk4" else carry + NUDGE * function(carry)[nudges]), None
 
-        def one_pass(carry: JaxArray, _: None) -> tuple[JaxArray, None]:
-            return (function(carry) if task == "rk4" else carry + NUDGE * function(carry)[nudges]), None
-
-        return _contender(self.jax.jit(lambda x: self.jax.lax.scan(one_pass, x, None, PASSES)[0]), x, PASSES)
-
-
-def _contender(function: Callable[[JaxArray], JaxArray], x: JaxArray, evaluations: int) -> Contender:
-    def result(y: JaxArray) -> Array:
-        values: Array = np.asarray(y)
-        return values.T if evaluations == BATCH else values
-
-    return Contender(lambda: function(x).block_until_ready(), result, evaluations)
+            run = jit(lambda x: lax.scan(one_pass, x, None, PASSES)[0])
+        else:
+            run = jit(function)
+        there = self.np.asarray(x)
+        return TimedTask(lambda: run(there).block_until_ready(), lambda y: np.asarray(y).T)

@@ -8,11 +8,10 @@ from cgraph.extend import Array
 
 from ..io.mujoco_twin import MujocoTwin, joint_order, rollout
 from ..multibody.mechanism import Mechanism, as_mechanism
-from .case import BATCH, DT, PASSES, Case
-from .contender import Contender, Peer, UnavailableError
+from .peer import DT, PASSES, Peer, PeerModel, TimedTask, UnavailableError
 
 
-def bodies(case: Case) -> Mechanism:
+def bodies(case: PeerModel) -> Mechanism:
     """The bodies of the case's model. Raises UnavailableError for a bare Lagrangian."""
     mechanism = as_mechanism(case.model)
     if mechanism is None:
@@ -23,7 +22,7 @@ def bodies(case: Case) -> Mechanism:
 class MujocoPeer(Peer):
     """MuJoCo on the model's MJCF, contacts off; sensors, actuation and constraints too, as there are none."""
 
-    def __init__(self, case: Case) -> None:
+    def __init__(self, case: PeerModel) -> None:
         super().__init__(case)
         mechanism = bodies(case)
         self.twin = MujocoTwin(mechanism, timestep=DT)
@@ -32,6 +31,7 @@ class MujocoPeer(Peer):
             model.opt.disableflags |= getattr(self.mujoco.mjtDisableBit, f"mjDSBL_{unused}")
         self.q_order, self.order = (np.array(each) for each in joint_order(model, mechanism))
         self.q_at, self.at = np.argsort(self.q_order), np.argsort(self.order)
+        self.taken = np.concatenate([1 + self.q_order, 1 + case.nq + self.order])  # ours among time, qpos, qvel
 
     def quantities(self, q: Array, qd: Array, qdd: Array, tau: Array) -> dict[str, Array]:
         """tau of a motion, qdd under torques tau, M(q) and the bias at one state, in our order."""
@@ -43,7 +43,11 @@ class MujocoPeer(Peer):
             "bias": twin.bias(place, qd[at])[order],
         }
 
-    def prepare(self, task: str, mode: str) -> Contender:
+    def starts(self, x: Array) -> Array:
+        """Time, qpos and qvel, (N, 1 + nq + n), of our states, (N, nq + n), as `rollout` takes them."""
+        return np.hstack([np.zeros((len(x), 1)), x[:, self.q_at], x[:, self.case.nq + self.at]])
+
+    def prepare(self, task: str, mode: str) -> TimedTask:
         """MuJoCo's call for the task, at one state, in a loop or over states."""
         if task != "inverse" and self.twin.mechanism.loops:
             raise UnavailableError("has soft loops, which move otherwise")
@@ -54,10 +58,10 @@ class MujocoPeer(Peer):
         data.qpos[:], data.qvel[:] = x[self.q_at], x[nq + self.at]
         if task == "forward":
             data.qfrc_applied[:] = x[nq + n + self.at]
-            return Contender(lambda: m.mj_forward(model, data), lambda _: np.array(data.qacc[self.order]))
+            return TimedTask(lambda: m.mj_forward(model, data), lambda _: np.array(data.qacc[self.order]))
         if task == "inverse":
             data.qacc[:] = x[nq + n + self.at]
-            return Contender(lambda: m.mj_inverse(model, data), lambda _: np.array(data.qfrc_inverse[self.order]))
+            return TimedTask(lambda: m.mj_inverse(model, data), lambda _: np.array(data.qfrc_inverse[self.order]))
         q, qd = data.qpos.copy(), data.qvel.copy()
         data.qfrc_applied[:] = 0.0
 
@@ -66,19 +70,15 @@ class MujocoPeer(Peer):
             m.mj_step(model, data)
             return np.concatenate([data.qpos[self.q_order], data.qvel[self.order]])
 
-        return Contender(lambda: m.mj_step(model, data), step)
+        return TimedTask(lambda: m.mj_step(model, data), step)
 
-    def _rollout(self, mode: str) -> Contender:
+    def _rollout(self, mode: str) -> TimedTask:
         """A thousand steps of one state, or one step of each of many, by MuJoCo's own loop in one thread."""
-        nq = self.case.nq
-        steps = PASSES if mode == "loop" else 1
-        x = self.case.points("rk4") if mode == "batch" else self.case.point("rk4")[:, None]
-        starts = np.hstack([np.zeros((x.shape[1], 1)), x[self.q_at].T, x[nq + self.at].T])  # time, qpos, qvel
-        states = np.empty((len(starts), steps, starts.shape[1]))
-        taken = np.concatenate([1 + self.q_order, 1 + nq + self.order])
+        starts = self.starts(np.atleast_2d(self.case.inputs("rk4", mode).T))
+        states = np.empty((len(starts), PASSES if mode == "loop" else 1, starts.shape[1]))
 
         def result(_: object) -> Array:
-            last: Array = states[:, -1, taken].T
+            last: Array = states[:, -1, self.taken].T
             return last.copy() if mode == "batch" else last[:, 0].copy()
 
-        return Contender(rollout(self.twin.model, starts, states), result, BATCH if mode == "batch" else PASSES)
+        return TimedTask(rollout(self.twin.model, starts, states), result)

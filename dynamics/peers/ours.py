@@ -23,11 +23,10 @@ from ..multibody.body import Body
 from ..multibody.mechanism import Mechanism, as_mechanism
 from ..simulation.gradients.gradient import gradient
 from ..systems.model import Model
-from .case import DT, MOTIONS, NUDGE, PASSES, Case, rk4_step
-from .contender import Contender, Peer, UnavailableError
+from .peer import DT, MOTIONS, NUDGE, PASSES, Peer, PeerModel, TimedTask, UnavailableError, rk4_step
 
 
-def task_graph(case: Case, task: str) -> Graph:
+def task_graph(case: PeerModel, task: str) -> Graph:
     """Our graph of a task."""
     if task == "rk4":
         return step_graph(rate_graph(case))
@@ -37,7 +36,7 @@ def task_graph(case: Case, task: str) -> Graph:
     return case.bound(make[task](case.model))
 
 
-def slope_graph(case: Case) -> Graph:
+def slope_graph(case: PeerModel) -> Graph:
     """(q0.., qd0.., tau0..) -> dqdd/d(q, qd, tau), row by row."""
     matrices, n = case.bound(state_space(case.model)), case.n
     names = [f"A_{i}_{j}" if j < 2 * n else f"B_{i}_{j - 2 * n}" for i in range(n, 2 * n) for j in range(3 * n)]
@@ -52,7 +51,7 @@ def _inverse_derivatives(model: Model) -> Graph:
     return cg.simplify(Graph(graph.inputs, {name: graph.outputs[name] for name in names}))
 
 
-def rate_graph(case: Case) -> Graph:
+def rate_graph(case: PeerModel) -> Graph:
     """(q0.., qd0..) -> their rates without applied torque."""
     return cg.specialize(case.bound(state_equation(case.model)), {f"tau{i}": 0.0 for i in range(case.n)})
 
@@ -65,7 +64,7 @@ def step_graph(rate: Graph) -> Graph:
     return cg.simplify(Graph(x, {f"{node.name}_next": y for node, y in zip(x, after, strict=False)}))
 
 
-def carried(case: Case, task: str, graph: Graph) -> tuple[Graph, dict[str, str]]:
+def carried(case: PeerModel, task: str, graph: Graph) -> tuple[Graph, dict[str, str]]:
     """One pass of a loop over a task, and what its inputs become: the state after the step, or a nudged input."""
     if task == "rk4":
         return graph, dict(zip(graph.input_names, graph.outputs, strict=True))
@@ -86,7 +85,7 @@ class Ours(Peer):
 
     @cached_property
     def parts(self) -> LinearizationParts:
-        """Of the derivatives of forward dynamics."""
+        """Parts of the derivatives of forward dynamics."""
         return linearization_parts(self.case.system)
 
     @kept_by_first
@@ -94,7 +93,7 @@ class Ours(Peer):
         """The graph of a task, compiled."""
         return cg.compile(self.graph(task))
 
-    def prepare(self, task: str, mode: str) -> Contender:
+    def prepare(self, task: str, mode: str) -> TimedTask:
         """The compiled graph of the task."""
         if task in MOTIONS:
             return self._motion() if task == "motion" else self._gradient(task)
@@ -106,37 +105,37 @@ class Ours(Peer):
         size = len(graph.nodes)
         if mode == "loop":
             loop, x = cg.loop(*carried(self.case, task, graph)), self.case.point(task)
-            return Contender(lambda: loop(x, PASSES, PASSES), lambda rows: rows[-1], PASSES, size)
+            return TimedTask(lambda: loop(x, PASSES, PASSES), lambda rows: rows[-1], size)
         function = self.function(task)
         if mode == "batch":
-            return Contender(lambda: function.batch(points), _same, points.shape[1], size)
+            return TimedTask(lambda: function.batch(points), np.asarray, size)
         y = np.empty(function.n_out)
-        return Contender(function.bind(self.case.point(task), y), lambda _: y.copy(), 1, size)
+        return TimedTask(function.bind(self.case.point(task), y), lambda _: y.copy(), size)
 
-    def _jacobian(self) -> Contender:
+    def _jacobian(self) -> TimedTask:
         """Derivatives of a large model by `bind_jacobian` of forward dynamics, where velocities are rates."""
         function, x = self.function("forward"), self.case.point("derivatives")
         rows = np.empty((self.case.n, len(x)))
-        return Contender(function.bind_jacobian(x, rows), lambda _: rows.ravel(), 1, len(function.graph.nodes))
+        return TimedTask(function.bind_jacobian(x, rows), lambda _: rows.ravel(), len(function.graph.nodes))
 
-    def _many(self) -> Contender:
+    def _many(self) -> TimedTask:
         """Derivatives at the states of a batch, rows of it, as anybody calls them."""
         case = self.case
         x = np.ascontiguousarray(case.points("derivatives").T)
         states = np.split(x, [case.nq, case.nq + case.n], axis=1)
         size = self.parts.size
-        return Contender(lambda: linearize_many(case.model, *states), lambda found: _slopes(*found), len(x), size)
+        return TimedTask(lambda: linearize_many(case.model, *states), lambda found: _slopes(*found), size)
 
-    def _columns(self) -> Contender:
+    def _columns(self) -> TimedTask:
         """Derivatives of a large model: one piece of code for all columns, as `linearize_many` has it."""
         case, n = self.case, self.case.n
         graphs = self.parts.in_columns()
         size = len(graphs.shared.nodes) + len(graphs.column.nodes)
         run = runner(linearization_program(graphs._replace(shared=case.bound(graphs.shared)), n))
         memory, row = run.memory({"state": case.point("derivatives")}), np.empty((1, run.program.width))
-        return Contender(run.bind(memory, row), lambda _: row[0, -3 * n * n :].copy(), 1, size)
+        return TimedTask(run.bind(memory, row), lambda _: row[0, -3 * n * n :].copy(), size)
 
-    def _motion(self) -> Contender:
+    def _motion(self) -> TimedTask:
         """The steps as one program, which is fed a row of torques a step."""
         step, x, n = (
             step_graph(self.case.bound(state_equation(self.case.model))),
@@ -146,11 +145,11 @@ class Ours(Peer):
         registers = {"x": 2 * n, "tau": n}
         run = runner(Program(registers, [Call(step, ("x", "tau"), ("x",))], record=["x"], feed=["tau"]))
         start, rows = x[: 2 * n], x[2 * n :].reshape(PASSES, n)
-        return Contender(
-            lambda: run.run(run.memory({"x": start}), PASSES, PASSES, rows), lambda y: y.rows[0], 1, len(step.nodes)
+        return TimedTask(
+            lambda: run.run(run.memory({"x": start}), PASSES, PASSES, rows), lambda y: y.rows[0], len(step.nodes)
         )
 
-    def _gradient(self, task: str) -> Contender:
+    def _gradient(self, task: str) -> TimedTask:
         """`dyn.gradient`."""
         case, n = self.case, self.case.n
         model: Model = case.model
@@ -161,7 +160,7 @@ class Ours(Peer):
             model, numbers = with_inertial_parameters(mechanism)
         q, qd, tau = np.split(case.point(task), [n, 2 * n])
         rows, end, wrt = tau.reshape(PASSES, n), PASSES * DT, ["q", "qd", "tau", *numbers]
-        return Contender(
+        return TimedTask(
             lambda: gradient(model, _square, q, qd, end, "rk4", tau=rows, wrt=wrt, estimate_error=False),
             lambda found: np.concatenate([np.ravel(found[name]) for name in wrt]),
         )
@@ -180,15 +179,10 @@ def _slopes(a: Array, b: Array) -> Array:
 class OurNumpy(Peer):
     """Our graph as generated NumPy over arrays: what there is without llvmlite. For batches."""
 
-    def prepare(self, task: str, mode: str) -> Contender:
+    def prepare(self, task: str, mode: str) -> TimedTask:
         """The compiled graph of the task."""
         function, points = cg.compile(task_graph(self.case, task), backend="numpy"), self.case.points(task)
-        return Contender(lambda: function.batch(points), _same, points.shape[1], len(function.graph.nodes))
-
-
-def _same(values: Array) -> Array:
-    array: Array = values
-    return array
+        return TimedTask(lambda: function.batch(points), np.asarray, len(function.graph.nodes))
 
 
 def with_inertial_parameters(mechanism: Mechanism) -> tuple[Mechanism, dict[str, float]]:

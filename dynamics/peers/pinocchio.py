@@ -1,18 +1,25 @@
-"""Pinocchio: rnea and aba, C++ called from Python, and its parallel loops over them on one thread."""
+"""Pinocchio: rnea and aba, C++ called from Python, its parallel loops over them, and constraintDynamics of loops."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from cgraph.extend import Array
 
+from ..multibody.body import WORLD
 from ..multibody.joint_coordinates import per_velocity, places
-from .case import BATCH, DERIVATIVES, Case, rk4_step
-from .contender import Contender, Peer, UnavailableError
+from ..multibody.loops import Loop
+from ..multibody.mechanism import Mechanism
 from .mujoco import bodies
+from .peer import BATCH, DERIVATIVES, Peer, PeerModel, TimedTask, UnavailableError, rk4_step
 from .pinocchio_model import PinocchioModel, pinocchio
+
+if TYPE_CHECKING:
+    from pinocchio import SE3
 
 
 class PinocchioPeer(Peer):
@@ -22,7 +29,7 @@ class PinocchioPeer(Peer):
     except within a step of RK4, and so are states translated from our coordinates to its own.
     """
 
-    def __init__(self, case: Case) -> None:
+    def __init__(self, case: PeerModel) -> None:
         super().__init__(case)
         self.pinocchio = pinocchio()
         mechanism = bodies(case)
@@ -84,7 +91,7 @@ class PinocchioPeer(Peer):
             "bias": still - self.damping * qd,
         }
 
-    def prepare(self, task: str, mode: str) -> Contender:
+    def prepare(self, task: str, mode: str) -> TimedTask:
         """Pinocchio's rnea or aba, at one state or over states."""
         if self.loops and DERIVATIVES.get(task, task) != "inverse":
             raise UnavailableError("has no loops in aba; `cgraph bench closed-chains` has its constraintDynamics")
@@ -92,7 +99,7 @@ class PinocchioPeer(Peer):
             return self._step()
         if task in DERIVATIVES:
             return self._slopes(task) if mode == "call" else self._slopes_of_batch(task)
-        x = self.case.point(task) if mode == "call" else self.case.points(task)
+        x = self.case.inputs(task, mode)
         arguments = self.arguments(x, task)
 
         def result(y: Array) -> Array:
@@ -101,20 +108,18 @@ class PinocchioPeer(Peer):
         if mode == "call":
             algorithm = self.pinocchio.aba if task == "forward" else self.pinocchio.rnea
             twin, data = self.twin, self.data
-            return Contender(lambda: algorithm(twin, data, *arguments), result)
+            return TimedTask(lambda: algorithm(twin, data, *arguments), result)
         return self._many("abaInParallel" if task == "forward" else "rneaInParallel", arguments, result)
 
-    def _many(self, name: str, arguments: tuple[Array, ...], result: Callable[[Array], Array]) -> Contender:
-        """Its loop over the columns of a batch, on one thread. Builds without OpenMP lack it."""
+    def _many(self, name: str, arguments: tuple[Array, ...], result: Callable[[Array], Array]) -> TimedTask:
+        """Pinocchio's loop over the columns of a batch, on one thread. Builds without OpenMP lack it."""
         algorithm = getattr(self.pinocchio, name, None)
         if algorithm is None:
             raise UnavailableError(f"this build has no {name}")
         pool = self.pinocchio.ModelPool(self.twin, 1)
         columns = [np.asfortranarray(each) for each in arguments]
         y = np.zeros((self.case.n, BATCH), order="F")
-        return Contender(
-            lambda: algorithm(1, pool, *columns, y), lambda found: result(y if found is None else found), BATCH
-        )
+        return TimedTask(lambda: algorithm(1, pool, *columns, y), lambda found: result(y if found is None else found))
 
     def slopes(self, x: Array, task: str) -> Array:
         """The derivatives at one state, (n, 3n), with those of dampers and springs."""
@@ -122,14 +127,14 @@ class PinocchioPeer(Peer):
         self._derivatives(task)(self.twin, self.data, *arguments)
         return self._their_slopes(task, arguments).reshape(self.case.n, 3 * self.case.n)
 
-    def _slopes(self, task: str) -> Contender:
+    def _slopes(self, task: str) -> TimedTask:
         """The derivatives of rnea or aba; those of dampers and springs are added outside what is timed."""
         arguments = self.arguments(self.case.point(task), DERIVATIVES[task])
         algorithm = self._derivatives(task)
         model, data = self.twin, self.data
-        return Contender(lambda: algorithm(model, data, *arguments), lambda _: self._their_slopes(task, arguments))
+        return TimedTask(lambda: algorithm(model, data, *arguments), lambda _: self._their_slopes(task, arguments))
 
-    def _slopes_of_batch(self, task: str) -> Contender:
+    def _slopes_of_batch(self, task: str) -> TimedTask:
         """A call for every state; what it leaves in Pinocchio's memory is read outside what is timed."""
         states = [self.arguments(x, DERIVATIVES[task]) for x in self.case.points(task).T]
         algorithm = self._derivatives(task)
@@ -146,7 +151,7 @@ class PinocchioPeer(Peer):
                 rows.append(self._their_slopes(task, arguments))
             return np.array(rows).T
 
-        return Contender(run, result, len(states))
+        return TimedTask(run, result)
 
     def _derivatives(self, task: str) -> Callable[..., object]:
         """Pinocchio's function. Raises UnavailableError for a model that has more than it knows."""
@@ -159,7 +164,7 @@ class PinocchioPeer(Peer):
         return derivatives
 
     def _their_slopes(self, task: str, arguments: tuple[Array, Array, Array]) -> Array:
-        """What the last call has left, in our order."""
+        """Derivatives that the last call has left, in our order."""
         forward, n, data = task == "derivatives", self.case.n, self.data
         if forward:
             found = data.ddq_dq, data.ddq_dv, _symmetric(data.Minv)
@@ -170,7 +175,7 @@ class PinocchioPeer(Peer):
         passive = -by_last if forward else np.eye(n)
         return np.hstack([by_q + passive * self.stiffness, by_u + passive * self.damping, by_last]).ravel()
 
-    def _step(self) -> Contender:
+    def _step(self) -> TimedTask:
         """RK4 in Python over aba."""
         if self.case.nq != self.case.n:
             raise UnavailableError("has no rates of quaternions")
@@ -186,7 +191,7 @@ class PinocchioPeer(Peer):
 
         x = self.case.point("rk4")
         x = np.concatenate([x[at], x[n + at]])
-        return Contender(lambda: rk4_step(rate, x), lambda y: y[back])
+        return TimedTask(lambda: rk4_step(rate, x), lambda y: y[back])
 
 
 def _symmetric(upper: Array) -> Array:
@@ -201,3 +206,62 @@ def _rotation_vector(e: Array) -> Array:
     angle = 2.0 * np.arctan2(length, np.abs(e[0]))
     result: Array = e[1:] * (np.copysign(angle, e[0]) / np.where(length, length, 1.0))
     return result
+
+
+_KINDS = {"point": "CONTACT_3D", "weld": "CONTACT_6D"}
+_PROXIMAL = 1e-14, 1e-8, 200  # what is left of the constraints, its regularization, and iterations
+
+
+def constrained_accelerations(mechanism: Mechanism, q: Array, qd: Array, tau: Array) -> Array:
+    """qdd, (N, n), at states that meet the loops, without Baumgarte's stabilization.
+
+    Raises ImportError without Pinocchio, and UnavailableError for what it has not.
+    """
+    ready, rows = constraint_dynamics(mechanism, _PROXIMAL), []
+    for x in np.concatenate([q, qd, tau], axis=1):
+        run, result = ready(x)
+        run()
+        rows.append(result())
+    return np.array(rows)
+
+
+def constraint_dynamics(
+    mechanism: Mechanism, proximal: tuple[float, float, int]
+) -> Callable[[Array], tuple[Callable[[], object], Callable[[], Array]]]:
+    """At x = (q, qd, tau): a call, and what reads the accelerations, (n,), that it left.
+
+    proximal: what is left of the constraints, its regularization, and iterations. Raises as above.
+    """
+    for loop in mechanism.loops:
+        if loop.kind not in _KINDS:
+            raise UnavailableError(f"has no loop of the kind {loop.kind!r}")
+    peer = PinocchioPeer(PeerModel("held", mechanism))
+    pin, twin, data = peer.pinocchio, peer.twin, peer.data
+    models, datas = pin.StdVec_RigidConstraintModel(), pin.StdVec_RigidConstraintData()
+    for loop in mechanism.loops:
+        ends = [*_frame(peer, mechanism, loop.body, loop.at), *_frame(peer, mechanism, loop.to, loop.to_at, loop)]
+        models.append(pin.RigidConstraintModel(getattr(pin.ContactType, _KINDS[loop.kind]), twin, *ends, pin.LOCAL))
+        datas.append(models[-1].createData())
+    pin.initConstraintDynamics(twin, data, models, datas)
+    settings, solve = pin.ProximalSettings(*proximal), pin.constraintDynamics
+
+    def ready(x: Array) -> tuple[Callable[[], object], Callable[[], Array]]:
+        theirs = peer.arguments(x, "forward")
+        return (
+            lambda: solve(twin, data, *theirs, models, datas, settings),
+            lambda: peer.of.our_a(*theirs[:2], np.array(data.ddq)),
+        )
+
+    return ready
+
+
+def _frame(
+    peer: PinocchioPeer, mechanism: Mechanism, body: str, at: ArrayLike, loop: Loop | None = None
+) -> tuple[int, SE3]:
+    """Pinocchio's joint of a body, and the frame of a loop there.  loop: whose orientation the frame has."""
+    carrier = mechanism.carriers[body]
+    names = {each.name: each.coordinate for each in mechanism.moving}
+    joint = 0 if carrier.name == WORLD else peer.twin.getJointId(names[carrier.name])
+    turn = np.eye(3) if loop is None else np.asarray(loop.orientation, dtype=np.float64)
+    place = carrier.position + carrier.orientation @ np.asarray(at, dtype=np.float64)
+    return joint, peer.pinocchio.SE3(carrier.orientation @ turn, place)

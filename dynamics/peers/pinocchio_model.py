@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from cgraph.extend import Array, install
+from cgraph.extend import Array
 
 from ..multibody.body import WORLD, Body
 from ..multibody.joint_coordinates import places
 from ..multibody.joints import AxialJoint, quaternion
 from ..multibody.mechanism import Mechanism
-from .contender import UnavailableError
+from .peer import UnavailableError, required
 
 if TYPE_CHECKING:
     from pinocchio import Inertia, JointModel
@@ -34,12 +34,7 @@ _WORLD_AXES = "free"  # whose linear velocity is in the axes of the joint, and P
 
 def pinocchio() -> ModuleType:
     """The pinocchio module. Raises ImportError naming the extra when it is not installed."""
-    try:
-        import pinocchio as module
-    except ImportError as error:
-        raise ImportError(f"Pinocchio is not installed: {install('bench')}") from error
-    found: ModuleType = module  # it has no types
-    return found
+    return required("pinocchio", "Pinocchio")
 
 
 class PinocchioModel:
@@ -106,7 +101,7 @@ class PinocchioModel:
         return result
 
     def rotor(self, v: Array) -> Array:
-        """What Pinocchio's force lacks of the armature of free bodies, which moves along the axes of the joint."""
+        """Force that Pinocchio lacks of the armature of free bodies, which moves along the axes of the joint."""
         result = self.curved(v)
         for linear, _, _, armature in self._turned:
             result[linear] *= armature

@@ -8,9 +8,8 @@ import numpy as np
 
 from cgraph.extend import Array
 
-from .case import BATCH, Case
-from .contender import Contender, Peer
-from .translate import lagrangian, require_rates
+from .peer import BATCH, Peer, PeerModel, TimedTask, required
+from .translate import lagrange, lagrangian, require_rates
 
 Values = Sequence[float | Array]
 Lambdified = Callable[..., Values]
@@ -20,37 +19,34 @@ NAMES = {"abs": "Abs", "minimum": "Min", "maximum": "Max"}
 class SympyPeer(Peer):
     """SymPy, as PyDy uses it: M and the right-hand side by lambdify, `numpy.linalg.solve`."""
 
-    def __init__(self, case: Case) -> None:
+    def __init__(self, case: PeerModel) -> None:
         super().__init__(case)
         require_rates(case)
-        import sympy
-
-        self.sympy = sympy
+        self.sympy = required("sympy", "SymPy")
         self.functions: dict[str, Lambdified] = {}
 
-    def prepare(self, task: str, mode: str) -> Contender:
+    def prepare(self, task: str, mode: str) -> TimedTask:
         """SymPy's lambdified function of the task."""
         if task not in self.functions:
             self.functions[task] = self._lambdified(task)
         function, many = self.functions[task], mode == "batch"
-        x = self.case.points(task) if many else self.case.point(task)
-        return Contender(lambda: self._solved(task, function(*x), many), _array, BATCH if many else 1)
+        x = self.case.inputs(task, mode)
+        return TimedTask(lambda: self._solved(task, function(*x), many), np.array)
 
     def _lambdified(self, task: str) -> Lambdified:
         sp, n = self.sympy, self.case.n
         inputs = sp.symbols([f"{block}_{i}" for block in ("q", "qd", "last") for i in range(n)])
         q, qd, last = inputs[:n], inputs[n : 2 * n], inputs[2 * n :]
         energy, forces = lagrangian(self.case, q, qd, sp, NAMES, sp.Float)
-        p = [sp.diff(energy, each) for each in qd]
-        damping = self.case.system.damping
-        known = [sp.diff(energy, q[i]) + forces[i] - damping[i] * qd[i] for i in range(n)]
-        moved = [sum(sp.diff(p[i], q[k]) * qd[k] for k in range(n)) for i in range(n)]
+        slopes = [sp.diff(energy, each) for each in (*q, *qd)]
+        hessian = {(i, k): sp.diff(p, x) for i, p in enumerate(slopes[n:]) for k, x in enumerate((*q, *qd))}
+        mass, rest = lagrange(self.case, qd, slopes, hessian, forces, sum)
         if task == "inverse":
-            inertia = [sum(sp.diff(p[i], qd[k]) * last[k] for k in range(n)) for i in range(n)]
-            outputs = [inertia[i] + moved[i] - known[i] for i in range(n)]
+            outputs = [
+                sum([m * a for m, a in zip(row, last, strict=True)]) + b for row, b in zip(mass, rest, strict=True)
+            ]
         else:
-            outputs = [last[i] + known[i] - moved[i] for i in range(n)]
-            outputs += [sp.diff(p[i], qd[k]) for i in range(n) for k in range(n)]
+            outputs = [a - b for a, b in zip(last, rest, strict=True)] + [entry for row in mass for entry in row]
         function: Lambdified = sp.lambdify(inputs, outputs, modules="numpy", cse=True)
         return function
 
@@ -63,8 +59,3 @@ class SympyPeer(Peer):
         columns = np.array([np.broadcast_to(value, BATCH) for value in values])  # a constant entry is one number
         mass = np.moveaxis(columns[n:].reshape(n, n, BATCH), 2, 0)
         return np.linalg.solve(mass, columns[:n].T[:, :, None])[:, :, 0].T
-
-
-def _array(values: Values | Array) -> Array:
-    array: Array = np.array(values)
-    return array

@@ -12,8 +12,7 @@ from cgraph import Node
 from cgraph.extend import topological
 
 from ..systems.system import System
-from .case import Case
-from .contender import Contender, Peer, UnavailableError
+from .peer import Peer, PeerModel, TimedTask, UnavailableError
 from .translate import require_rates
 
 if TYPE_CHECKING:
@@ -23,17 +22,17 @@ if TYPE_CHECKING:
 class TorchPeer(Peer):
     """PyTorch, an operation at a time, as Table 1 has it."""
 
-    def __init__(self, case: Case) -> None:
+    def __init__(self, case: PeerModel) -> None:
         super().__init__(case)
         require_rates(case)
         self.evaluate = eager_evaluations(case.system, ["chain_rule"])["chain_rule"]
 
-    def prepare(self, task: str, mode: str) -> Contender:
+    def prepare(self, task: str, mode: str) -> TimedTask:
         """PyTorch's eager evaluation of the task."""
         if self.case.system.parameters or any(force.value != 0.0 for force in self.case.system.forces):
             raise UnavailableError("is measured on systems without parameters and applied forces")
         x = self.case.point(task)
-        return Contender(lambda: self.evaluate(x), lambda taus: np.array([float(tau.detach()) for tau in taus]))
+        return TimedTask(lambda: self.evaluate(x), lambda taus: np.array([float(tau.detach()) for tau in taus]))
 
 
 def eager_evaluations(system: System, formulations: Iterable[str]) -> dict[str, Callable[[np.ndarray], list[Tensor]]]:

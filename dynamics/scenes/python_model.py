@@ -34,7 +34,7 @@ def is_python(name: str) -> bool:
 
 
 def short_name(name: str) -> str:
-    """What the model of a name is called in titles and files: `arm.system` for `models/arm.py:system`."""
+    """Name of a model in titles and files: `arm.system` for `models/arm.py:system`."""
     source, _, what = name.rpartition(":")
     return f"{Path(source).stem if source.endswith(SUFFIX) else source.rpartition('.')[2]}.{what}"
 
@@ -114,7 +114,7 @@ def _executed(path: Path) -> ModuleType:
 
 
 def _told(source: str, function: Callable[[], Made]) -> Made:
-    """What a function of the user's gives. Raises ValueError, with the line in the source, for what it raises."""
+    """Result of a function of the user's. Raises ValueError, with the line in the source, for an error of its own."""
     try:
         return function()
     except Exception as error:
@@ -144,7 +144,7 @@ def _where(source: str, error: BaseException) -> str:
 
 @contextmanager
 def _first_on_path(folder: Path) -> Iterator[None]:
-    """Within, modules are looked for in that folder first, as Python does for a file that it runs."""
+    """Look for modules in that folder first, as Python does for a file that it runs."""
     sys.path.insert(0, str(folder))
     importlib.invalidate_caches()
     try:

@@ -104,7 +104,7 @@ class Scene:
 
     @property
     def left_out(self) -> tuple[str, ...]:
-        """Of a model that was read from a file: what the file has and the model has not, a sentence each."""
+        """Sentences on what a model has not of the file that it was read from."""
         return self.mechanism.left_out if self.mechanism else ()
 
     @property

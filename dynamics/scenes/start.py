@@ -72,7 +72,7 @@ def moving_start(scene: Scene) -> Scene:
 
 
 def rest_text(scene: Scene, moving: Scene) -> str:
-    """Why a motion starts elsewhere than the scene does, and where: a sentence without its capital and its stop."""
+    """Reason and place of a start that is not the scene's: a sentence without its capital and its stop."""
     finite = np.isfinite(_rates(state_equation(scene), scene))
     reason = "at rest nothing moves" if finite else "at its start the rates are not finite"
     return f"{reason}, so it starts at {start_text(moving)}"
@@ -85,7 +85,7 @@ def start_text(scene: Scene) -> str:
 
 
 def _names(scene: Scene) -> list[str]:
-    """What a person calls the states, in the order of q and qd."""
+    """Display names of the states, in the order of q and qd."""
     if scene.ode:
         return list(scene.coordinates)
     return [f"q.{name}" for name in scene.coordinates] + [f"qd.{name}" for name in scene.velocities]

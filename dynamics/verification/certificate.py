@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -18,6 +18,8 @@ from ..equations.coriolis import coriolis, require_quadratic
 from ..equations.energies import energy
 from ..equations.equations_of_motion import bias, forward_dynamics, gravity_force, mass_matrix
 from ..equations.formulations.formulations import inverse_dynamics
+from ..equations.linearization.inverse_dynamics_derivatives import inverse_dynamics_derivatives
+from ..equations.linearization.linearization import state_space
 from ..equations.singular_mass_matrix import balanced
 from ..equations.states.evaluate import evaluate
 from ..equations.torque_decomposition import torque_by_joint_motion, torque_by_link
@@ -26,12 +28,12 @@ from ..systems.kinematics import ONE, ZERO
 from ..systems.model import Model, as_system
 from ..systems.system import System
 from . import peer_agreement as agreement
-from .derivatives import derivative_residuals
 from .held_states import Held, random_states
 from .residual import DIFFERENCES, POSITIVE, ROUNDING, Certificate, Residual, worst
 
 if TYPE_CHECKING:
     from ..io.load import Source
+
 
 STEP = 1e-3  # of differences, in units of the coordinates
 
@@ -180,7 +182,7 @@ class _Checks:
         return self.held.matrix * self._solved[:, None, self.system.n :]
 
     def always(self) -> Iterator[Residual]:
-        """What holds for every Lagrangian."""
+        """Residuals of every Lagrangian."""
         yield from self._mass_matrix()
         yield self._bias()
         yield self._forward()
@@ -197,7 +199,7 @@ class _Checks:
             yield self._differences(f"AD: slope of {name} along a line = differences", graph)
 
     def of_coriolis(self) -> Iterator[Residual]:
-        """What holds for one that is quadratic in the velocities."""
+        """Residuals of a Lagrangian that is quadratic in the velocities."""
         matrix = self.matrix(coriolis(self.system))
         qd = self.at["qd"]
         terms = np.abs(matrix) @ np.abs(qd)[..., None]
@@ -317,3 +319,37 @@ class _Checks:
         unexplained = np.maximum(np.abs(slope - narrow) - np.abs(wide - narrow), 0.0)
         scale = np.abs(slope) + np.max([np.abs(each) for each in around.values()], axis=0)
         return Residual(equation, worst(unexplained, scale), DIFFERENCES)
+
+
+def derivative_residuals(
+    system: System, value: Callable[[Graph], Array], inverse: Graph, inertia: Array, rng: np.random.Generator
+) -> Iterator[Residual]:
+    """Residuals of the derivatives of torques, and of accelerations, these times M: how far their equation is missed.
+
+    value: numbers of a graph at the states, (N, n_out).  inverse: of inverse dynamics.  inertia: M, (N, n, n).
+    """
+    n = system.n
+    line = rng.normal(size=4 * n)  # dxi, dqd, dqdd and dtau
+    xi, v, a, f = ([cg.constant(float(x)) for x in part] for part in np.split(line, 4))
+    seeds = dict(zip([*system.q, *system.qd], [*system.kinematics.rate(xi), *v], strict=True))
+
+    def along(graph: Graph, more: dict[cg.Node, cg.Node]) -> Array:
+        """The first n outputs' slopes."""
+        outputs = list(graph.outputs.values())[:n]
+        dots = tangents(seeds | more, outputs)
+        slopes = {f"{i}": dots.get(node, ZERO) for i, node in enumerate(outputs)}
+        return value(system.graph(slopes, system.q, system.qd, list(more)))
+
+    pushed = along(inverse, dict(zip(system.qdd, a, strict=True)))
+    entries = value(inverse_dynamics_derivatives(system))[:, n:].reshape(-1, 3, n, n)
+    terms = np.swapaxes(entries, 1, 2).reshape(-1, n, 3 * n) * line[: 3 * n]
+    equation = "derivatives: dtau/dq, dtau/dqd and M along a line = AD of inverse dynamics"
+    yield Residual(equation, worst(terms.sum(axis=-1) - pushed, np.abs(terms).sum(axis=-1)), ROUNDING)
+    pushed = along(forward_dynamics(system), dict(zip(system.tau, f, strict=True)))
+    matrices = value(state_space(system))
+    a_rows, b_rows = matrices[:, : 4 * n * n].reshape(-1, 2 * n, 2 * n), matrices[:, 4 * n * n :].reshape(-1, 2 * n, n)
+    terms = np.concatenate([a_rows, b_rows], axis=-1)[:, n:] * np.delete(line, np.s_[2 * n : 3 * n])
+    missed = inertia @ (terms.sum(axis=-1) - pushed)[..., None]
+    sizes = np.abs(inertia) @ np.abs(terms).sum(axis=-1)[..., None]
+    equation = "derivatives: A and B of the linearization along a line = AD of forward dynamics"
+    yield Residual(equation, worst(missed[..., 0], sizes[..., 0]), ROUNDING)

@@ -20,11 +20,9 @@ from ..io.load import compiled
 from ..io.mujoco_twin import joint_order, mujoco
 from ..multibody.body import Body, MechanismError
 from ..multibody.mechanism import Mechanism, as_mechanism
-from ..peers.case import Case
-from ..peers.contender import Peer, UnavailableError
 from ..peers.mujoco import MujocoPeer
-from ..peers.pinocchio import PinocchioPeer
-from ..peers.pinocchio_loops import constrained_accelerations
+from ..peers.peer import Peer, PeerModel, UnavailableError
+from ..peers.pinocchio import PinocchioPeer, constrained_accelerations
 from ..systems.model import Model
 from .residual import PEERS, PROXIMAL, Residual
 
@@ -39,11 +37,11 @@ TINY = 2.0**-40  # of the heaviest body: a mass that weighs nothing beside what 
 
 
 class NotComparableError(Exception):
-    """Why a peer has nothing to say of a model."""
+    """Raised when a peer has nothing to say of a model."""
 
 
 class Sizes(NamedTuple):
-    """What is put in place of masses and inertias that differ: little mass, and the inertia of a body of the model."""
+    """Stand-ins for masses and inertias that differ: little mass, and the inertia of a body of the model."""
 
     mass: float  # kg; bodies that have no more are without mass
     inertia: float  # kg m^2
@@ -153,11 +151,11 @@ class Asked(Protocol):
         ...
 
     def without(self, terms: Sequence[str], sizes: Sizes) -> Asked:
-        """The same, with these of the `TERMS` taken out."""
+        """The peer with these of the `TERMS` taken out."""
         ...
 
 
-class _At(Case):
+class _At(PeerModel):
     """A case that is asked at a state of ours."""
 
     state: Array
@@ -169,7 +167,7 @@ class _At(Case):
 class Translation:
     """A peer on the model as `to_mjcf` writes it."""
 
-    def __init__(self, make: Callable[[Case], Peer], mechanism: Mechanism) -> None:
+    def __init__(self, make: Callable[[PeerModel], Peer], mechanism: Mechanism) -> None:
         self.make, self.mechanism = make, mechanism
         self.case = _At("the model", mechanism)
         self.peer = make(self.case)
@@ -184,7 +182,7 @@ class Translation:
         return np.array(rows)
 
     def without(self, terms: Sequence[str], sizes: Sizes) -> Translation:
-        """The same model with these of the `TERMS` taken out."""
+        """The model with these of the `TERMS` taken out."""
         return Translation(self.make, without(self.mechanism, terms, sizes))
 
 
@@ -205,7 +203,7 @@ class Original:
         return np.array(rows)
 
     def without(self, terms: Sequence[str], sizes: Sizes) -> Original:
-        """The same model with these of the `TERMS` taken out."""
+        """The model with these of the `TERMS` taken out."""
         mj = copy.copy(self.mj)
         for name in terms:
             TERMS[name].theirs(mj, sizes)
@@ -223,7 +221,7 @@ def peers(model: Model, twin: Original | None = None) -> Iterator[tuple[str, Cal
 
 
 def residual(name: str, peer: Asked, model: Model, at: Mapping[str, Array]) -> Residual:
-    """How far the inverse dynamics of a peer is from ours, with what explains it where that is too far."""
+    """Difference of the inverse dynamics of a peer from ours, with the terms that explain it where it is too large."""
     bodies = bare(model)
     value = disagreement(bodies, peer, at)
     note = "" if value <= PEERS.value else explanation(bodies, peer, at)
@@ -249,7 +247,7 @@ def disagreement(model: Mechanism, peer: Asked, at: Mapping[str, Array]) -> floa
 
 
 def with_loops(model: Model, at: Mapping[str, Array]) -> tuple[list[Residual], list[str]]:
-    """How far accelerations with constraints are from those of peers, and what is not compared, a sentence each.
+    """Differences of accelerations with constraints from those of peers, and sentences on what is not compared.
 
     at: states that meet the constraints.
     """
@@ -287,7 +285,7 @@ def _without_forces(model: Model) -> Mechanism:
     return replace(bodies, forces=(), parameters={}) if bodies.forces else bodies
 
 
-def _translated(make: Callable[[Case], Peer], model: Model) -> Translation:
+def _translated(make: Callable[[PeerModel], Peer], model: Model) -> Translation:
     try:
         return Translation(make, bare(model))
     except ImportError:

@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cgraph.extend import Array, html_lines, html_table
-
-if TYPE_CHECKING:
-    from cgraph.extend import Json
+from cgraph.extend import Array, Json, html_lines, html_table
 
 
 @dataclass(frozen=True)
 class Bound:
-    """How large a residual may be, and why."""
+    """Largest value of a residual, and its reason."""
 
     name: str
     value: float
@@ -46,7 +42,7 @@ class Residual:
 
 @dataclass(frozen=True)
 class Certificate:
-    """What holds of a model's graphs at random states, as `certify` makes it.
+    """Equations of a model's graphs held at random states, as `certify` makes it.
 
     Parameters
     ----------

@@ -49,7 +49,7 @@ def test_a_program_loads_what_it_uses(code: str, most: int) -> None:
 USAGE = """
 import contextlib, io
 from viz.cli import main
-from viz.commands.parser import COMMANDS
+from viz.commands.command import COMMANDS
 known = ["draw chain --out a.svg --formulation best", "code chain", "simulate chain --t-end 0", "lint chain --box q0=1"]
 for line in ["", "--help", "--version", "best", "draw", *known, *[f"{name} --best" for name in COMMANDS]]:
     said = io.StringIO()

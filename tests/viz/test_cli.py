@@ -20,10 +20,11 @@ import dynamics as dyn
 import viz
 from dynamics import scenes
 from dynamics.scenes import scenes as registry
+from tests.each_row import each_row
 from tests.slow import slow
 from viz import cli
 from viz.commands.arguments import FORMULATIONS, IN_PYTHON
-from viz.commands.parser import COMMANDS, complete, parse
+from viz.commands.command import COMMANDS, complete, parse
 
 
 def run(*arguments: str, cwd=None) -> subprocess.CompletedProcess[str]:
@@ -82,27 +83,55 @@ def test_a_model_file_stands_where_a_scene_s_name_does(tmp_path, capsys):
     assert capsys.readouterr().err == said
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("arguments", "said"),
     [
-        (["draw", "quadruple_pendulum", "--out", "x.dot"], "there is no scene 'quadruple_pendulum'"),
-        (["draw", "nowhere.xml", "--out", "x.dot"], "there is no file 'nowhere.xml'"),
-        (["draw", "nowhere.urdf", "--out", "x.dot"], "there is no file 'nowhere.urdf'"),
-        (["draw", "a_file", "--out", "x.dot"], "'a_file' is not XML, as MJCF and URDF are"),
-        (["draw", ".", "--out", "x.dot"], "'.' is a folder, and a model is a file"),
-        (["draw", "chain", "--ignore", "--out", "x.dot"], "scene 'chain' has no option 'ignore'"),
-        (["draw", "chain", "--floating", "--out", "x.dot"], "scene 'chain' has no option 'floating'"),
-        (["draw", "spring_mass", "--out", "x.jpg"], "must end in .svg, .png, .dot or .txt"),
-        (["draw", "spring_mass", "--out", "missing/x.dot"], "does not exist"),
+        ("draw quadruple_pendulum --out x.dot", "there is no scene 'quadruple_pendulum'"),
+        ("draw nowhere.xml --out x.dot", "there is no file 'nowhere.xml'"),
+        ("draw nowhere.urdf --out x.dot", "there is no file 'nowhere.urdf'"),
+        ("draw a_file --out x.dot", "'a_file' is not XML, as MJCF and URDF are"),
+        ("draw . --out x.dot", "'.' is a folder, and a model is a file"),
+        ("draw chain --ignore --out x.dot", "scene 'chain' has no option 'ignore'"),
+        ("draw chain --floating --out x.dot", "scene 'chain' has no option 'floating'"),
+        ("draw spring_mass --out x.jpg", "must end in .svg, .png, .dot or .txt"),
+        ("draw spring_mass --out missing/x.dot", "does not exist"),
         (["draw", "spring_mass", "--out", "x.dot", "--collapse", "link 9"], "link 9"),
-        (["paper", "--out", "a_file"], "cannot write into the folder a_file: a_file is a file"),
-        (["certify", "nowhere.xml"], "there is no file 'nowhere.xml'"),
+        ("paper --out a_file", "cannot write into the folder a_file: a_file is a file"),
+        ("certify nowhere.xml", "there is no file 'nowhere.xml'"),
+        ("why triple_pendulum tau0 q9", "nothing in the graph is called 'q9'"),
+        ("why triple_pendulum tau9 q0", "nothing in the graph is called 'tau9'"),
+        ("why spring_mass tau0 q0 --at zz=1", "the graph has no input zz"),
+        ("lint spring_mass --box zz=0:1", "the graph has no input zz"),
+        ("inspect spring_mass --out x.html --t-end 1e9", "--t-end must be at most 1000 s"),
+        ("compare nowhere", "there is no scene 'nowhere'"),
+        ("lint nowhere.py:system", "there is no file 'nowhere.py'"),
+        (["simulate", "chain", "--start", "joint 11=1"], "there is no joint 11; did you mean"),
+        ("simulate chain --every 1e-300", "--every 1e-300 makes "),
+        ("simulate chain --csv nowhere/a.csv", "cannot write"),
+        ("simulate chain --method rk5", "method must be one of "),
+        ("lesson --out lesson.txt", "--out must end in .html"),
+        ("report nothing", "there is no scene 'nothing'"),
+        ("report spring_mass spring_mass", "each scene needs a name of its own"),
+        ("report spring_mass --methods rk5", "there is no method 'rk5'"),
+        ("report spring_mass --start 1", "the start needs 2 numbers"),
+        ("report spring_mass --without gravity", "--without goes with --pruning"),
+        ("report spring_mass --lock a=1", "--lock goes with --pruning"),
+        ("report spring_mass --pruning --quick", "--quick goes with a report of run times or --stability"),
+        (["report", "spring_mass", "--pruning", "--peers", ""], "--peers goes with a report of run times"),
+        ("report --stability --budget 3", "--budget goes with a report of run times"),
+        ("report --stability --ignore", "--ignore goes with a report of run times or --pruning"),
+        ("report --stability --pruning", "one at a time"),
+        ("report --pruning", "a report needs a scene"),
+        ("report --compare speed", "comparisons are orders, taylor, stiff, loops, energy, got 'speed'"),
+        ("report --compare orders --json", "--json goes with a report of run times"),
+        ("report chain --compare orders", "a report needs a scene, or --stability or --compare and none"),
+        ("report chain --pruning --lock a=1 --lock a=2", "--lock takes each body once"),
     ],
 )
 def test_a_mistake_gets_one_line_and_exit_status_2(tmp_path, monkeypatch, capsys, arguments, said):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "a_file").write_text("in the way")
-    assert cli.main(arguments) == 2
+    assert cli.main(arguments.split() if isinstance(arguments, str) else arguments) == 2
     error = capsys.readouterr().err
     assert error.count("\n") == 1
     assert error.startswith("cgraph: error: ")
@@ -126,15 +155,53 @@ def test_what_the_system_says_has_no_number(monkeypatch, capsys):
     assert capsys.readouterr().err == "cgraph: error: /nowhere/at/all: No such file or directory\n"
 
 
-WRONG = ([], ["paint"], ["draw"], ["draw", "chain", "--out", "x.dot", "--formulation", "f"])
-
-
-@pytest.mark.parametrize("arguments", WRONG)
-def test_wrong_usage_gets_the_usage_and_exit_status_2(capsys, arguments):
+@each_row(
+    ("arguments", "said"),
+    [
+        ("", ""),
+        ("paint", ""),
+        ("draw", ""),
+        ("draw chain --out x.dot --formulation f", ""),
+        ("lint", ""),
+        ("why spring_mass tau0", ""),
+        ("why spring_mass tau0 q0 --k -1", ""),
+        ("why spring_mass tau0 q0 --at q0", ""),
+        ("why spring_mass tau0 q0 --at q0=nan", ""),
+        ("why spring_mass tau0 q0 --at q0=1,q0=2", ""),
+        ("lint spring_mass --box q0=0:1,q0=0:2", ""),
+        ("certify spring_mass --seed -1", ""),
+        ("bench --budget -1", ""),
+        ("inspect spring_mass --out x.html --t-end 0", ""),
+        ("why spring_mass tau0 q0 --svg answer.png", ""),
+        ("why spring_mass tau0 q0 --forward --formulation kinetic_only", ""),
+        ("lint spring_mass --box q0=1", ""),
+        ("lint spring_mass --box q0=2:1", ""),
+        ("compare spring_mass --formulations chain_rule", ""),
+        ("compare spring_mass --formulations chain_rule none", ""),
+        ("lesson", ""),
+        ("simulate chain --start a,b", ""),
+        ("simulate chain --start q0=1,q0=2", ""),
+        ("simulate chain --t-end -1", ""),
+        ("simulate chain --rtol 0", ""),
+        ("draw chain --out a.dot --forward --formulation kinetic_only", ""),
+        ("report spring_mass --start a,b", "argument --start: expected a finite number, got 'a'"),
+        ("report spring_mass --start 1,nan", "argument --start: expected a finite number, got 'nan'"),
+        ("report spring_mass --pruning --lock tip=x", "argument --lock: expected a finite number, got 'x'"),
+        (
+            "report spring_mass --pruning --lock tip",
+            "argument --lock: expected a body and a coordinate, BODY=AT, got 'tip'",
+        ),
+        ("report spring_mass --budget -1", "argument --budget: expected a positive number, got '-1'"),
+        ("report spring_mass --t-end inf", "argument --t-end: expected a finite number, got 'inf'"),
+    ],
+)
+def test_wrong_usage_gets_the_usage_and_exit_status_2(capsys, arguments, said):
     with pytest.raises(SystemExit) as stop:
-        cli.main(arguments)
+        cli.main(arguments.split())
     assert stop.value.code == 2
-    assert "usage: cgraph" in capsys.readouterr().err
+    error = capsys.readouterr().err
+    assert "usage: cgraph" in error
+    assert said in error
 
 
 NAMES = [*COMMANDS]
@@ -247,7 +314,7 @@ def test_words_of_a_list_may_stand_between_options():
     assert parse(["report", "--quick", "chain", "--json", "spring_mass"]).scenes == ["chain", "spring_mass"]
 
 
-@pytest.mark.parametrize("arguments", [["draw", "chain", "chain", "--out", "a.dot"], ["bench", "--quickly"]])
+@each_row("arguments", [["draw", "chain", "chain", "--out", "a.dot"], ["bench", "--quickly"]])
 def test_what_no_list_takes_is_refused(capsys, arguments):
     with pytest.raises(SystemExit) as stop:
         parse(arguments)
@@ -310,10 +377,10 @@ def test_json_of_a_report_writes_no_file_unless_a_folder_is_named(tmp_path, monk
         "draw spring_mass --out {}",
     ],
 )
-@pytest.mark.parametrize("target", ["missing/a.svg", "folder.svg"])
+@each_row("target", ["missing/a.svg", "folder.svg"])
 def test_a_place_that_cannot_be_written_is_told_before_the_work(tmp_path, monkeypatch, capsys, arguments, target):
     monkeypatch.chdir(tmp_path)
-    (tmp_path / "folder.svg").mkdir()
+    (tmp_path / "folder.svg").mkdir(exist_ok=True)
     assert cli.main(arguments.format(target).split()) == 2
     printed = capsys.readouterr()
     assert printed.out == ""

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from viz import cli
-from viz.commands.parser import COMMANDS
+from viz.commands.command import COMMANDS
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "commands.md").read_text(encoding="utf-8")

@@ -1,11 +1,10 @@
 """The theme: names in mathematical letters, an order of tags, and colors that mean one thing."""
 
-import pytest
-
+from tests.each_row import each_row
 from viz import theme
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("name", "shown"),
     [
         ("q0", "q₀"),

@@ -1,4 +1,4 @@
-"""Canvases: pictures drawn by Pillow, and animations of them as GIF, APNG or MP4."""
+"""Canvases: pictures drawn by Pillow, their colors, and animations as GIF, APNG or MP4."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import io
 import shutil
 import subprocess
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import ModuleType
@@ -18,6 +19,41 @@ from .. import theme
 if TYPE_CHECKING:
     from PIL.Image import Image
     from PIL.ImageFont import FreeTypeFont, ImageFont
+
+
+@dataclass(frozen=True)
+class Colors:
+    """page, text, and faint: what stands still or was wanted; wrong: the one color of what is wrong; series."""
+
+    page: str
+    text: str
+    faint: str
+    wrong: str
+    links: tuple[str, ...]
+    series: tuple[str, ...]
+
+
+LIGHT = Colors(
+    theme.WHITE,
+    theme.TEXT,
+    theme.tint(theme.GRAY, 0.55),
+    theme.SPURIOUS,
+    theme.LINKS,
+    tuple(each for each in theme.SERIES if each not in (theme.YELLOW, theme.SPURIOUS)),
+)
+DARK = Colors(
+    theme.DARK_PAGE,
+    theme.DARK_TEXT,
+    "#5C6066",
+    "#FF8A4D",
+    tuple(theme.tint(each, 0.7) for each in theme.LINKS),
+    tuple(
+        theme.WHITE if each == theme.BLACK else theme.tint(each, 0.8)
+        for each in theme.SERIES
+        if each not in (theme.YELLOW, theme.SPURIOUS)
+    ),
+)
+
 
 RATE = 25  # frames a second: a GIF counts in hundredths, and browsers slow down what is faster than 50
 KINDS = (".gif", ".png", ".apng", ".mp4")
@@ -66,11 +102,11 @@ class Canvas:
         self._draw.text((_FINE * at[0], _FINE * at[1]), text, color, _font(_FINE * size), anchor)
 
     def width_of(self, text: str, size: int) -> float:
-        """How wide a text is."""
+        """Width of a text."""
         return float(self._draw.textlength(text, _font(_FINE * size))) / _FINE
 
     def picture(self) -> Image:
-        """What is drawn, smoothed."""
+        """Picture, smoothed."""
         picture: Image = self.image.reduce(_FINE)
         return picture
 

@@ -11,8 +11,7 @@ import numpy as np
 
 from cgraph.extend import Array
 
-from .canvas import RATE, Canvas, Point
-from .colors import DARK, LIGHT, Colors
+from .canvas import DARK, LIGHT, RATE, Canvas, Colors, Point
 
 SIDE, TITLE, CLOCK, MARGIN = 340, 30, 26, 14  # pixels: of a panel, its title, the time below, and around
 SIZE, SMALL = 14, 12  # of letters
@@ -26,7 +25,7 @@ ROUNDING = 1e-12  # of the largest value of a curve: a change that is none
 
 @dataclass(frozen=True)
 class Motion:
-    """What a panel shows.  values: (T, k, 2) points [m] or (T, m) curves, `FINE` rows a frame.  wrong: painted so."""
+    """Content of a panel.  values: (T, k, 2) points [m] or (T, m) curves, `FINE` rows a frame.  wrong: painted so."""
 
     title: str
     values: Array
@@ -161,7 +160,7 @@ class Curves(Panel):
 
 
 def film(panel: Panel, t: Array, dark: bool = False, title: str = "") -> Callable[[int], Canvas]:
-    """What draws a frame: the panels of the motions side by side, the time below.
+    """Function that draws a frame: the panels of the motions side by side, the time below.
 
     title: above all, empty for none.  t: (T,) [s], of which every `FINE`th is a frame.
     """

@@ -10,9 +10,8 @@ import dynamics as dyn
 from cgraph import extend
 
 from . import library
-from .arguments import FORMULATIONS, answer, positive, say, takes_a_scene
+from .arguments import FORMULATIONS, answer, positive, say, started, takes_a_scene, takes_a_start
 from .command import Command
-from .point_arguments import started, takes_a_start
 
 DRIVEN = ("euler_embedded", "chain_rule")
 WORDS = {"euler_embedded": "by definition", "chain_rule": "by the chain rule"}  # others by their names

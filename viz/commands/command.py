@@ -1,4 +1,4 @@
-"""The parser of one command, which has its arguments once it is named, and names in its help once that is shown."""
+"""The table of the commands and their parsers, which have their arguments once a command is named."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ import argparse
 from collections.abc import Callable, Iterable, Sequence
 from importlib import import_module
 from typing import Any
+
+from cgraph import __version__
 
 
 class Command(argparse.ArgumentParser):
@@ -36,11 +38,68 @@ class Command(argparse.ArgumentParser):
             action.help = action.help and action.help.format(**told)
 
     def parse_known_args(self, args: Sequence[str] | None = None, namespace: Any = None) -> Any:  # type: ignore[override]
-        """As argparse has it, which asks this of the command that is named."""
+        """Options of a command, loaded first; argparse asks this of the command that is named."""
         self.load()
         return super().parse_known_args(args, namespace)
 
     def format_help(self) -> str:
-        """As argparse has it."""
+        """Help of a command, completed first."""
         self.complete()
         return super().format_help()
+
+
+# What each does, in the order of the help. To add a command, write its file and name it here.
+COMMANDS = {
+    "paper": "the paper's six figures and its table, measured, in one folder",
+    "bench": "our speed beside what is installed: CasADi, Pinocchio, MuJoCo, heyoka, JAX, SymPy, PyTorch",
+    "report": "error beside run time of every integrator, ours and others', as pages",
+    "scenes": "the scenes, with the size of their graphs",
+    "draw": "draw the graph of a scene's equations (SVG, PNG or DOT) or list it (TXT)",
+    "code": "write a scene's equations as C, WebAssembly or Python",
+    "certify": "equations that a scene's graphs must fulfil, and agreement with peers; status 1 if any fails",
+    "inspect": "one page on which a scene's equations unfold, move and answer; status 1 for a motion cut short",
+    "live": "one page that computes a scene's motion, with sliders and meters",
+    "simulate": "the motion of a scene: how the run went, its energy, and as CSV; status 1 if it is cut short",
+    "animate": "a film of a scene in motion (GIF, APNG or MP4); status 1 for a motion cut short",
+    "type": "a page that a Lagrangian is typed into: derived, checked, drawn, moving",
+    "lint": "check that a scene's equations are those of the chain rule; status 1 and the blame if they are not",
+    "why": "the paths by which an output depends on an input, and what they weigh",
+    "compare": "compare two formulations of a scene's equations, node by node; status 1 where they differ",
+    "lesson": "a page for a class, on any scene: predict, reveal, play; with answers",
+    "completion": "a script that lets the Tab key complete commands and options",
+}
+
+
+def parsers() -> tuple[argparse.ArgumentParser, dict[str, Command]]:
+    """The parser of the command line, and those of its commands; what it parses has `run`, the command's function."""
+    whole = argparse.ArgumentParser(
+        prog="cgraph", description="Equations of motion as computational graphs: see, count, draw and simulate them."
+    )
+    whole.add_argument("--version", action="version", version=f"cgraph {__version__}")
+    commands = whole.add_subparsers(title="commands", required=True, metavar="COMMAND", parser_class=Command)
+    for name, about in COMMANDS.items():
+        commands.add_parser(name, help=about).file = name
+    return whole, dict(commands.choices)
+
+
+def complete() -> dict[str, Command]:
+    """The parsers of all commands by name, with their arguments and all that their help says."""
+    _, commands = parsers()
+    for command in commands.values():
+        command.complete()
+    return commands
+
+
+def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
+    """The options that arguments stand for. Wrong ones end in SystemExit with status 2, after the usage.
+
+    argparse takes the words of a list from one place; of those that an option parts (`a --quick b`) the rest follow.
+    """
+    whole, _ = parsers()
+    options, rest = whole.parse_known_args(arguments)
+    if rest:
+        words = getattr(options, getattr(options, "words", ""), None)
+        if words is None or any([each.startswith("-") for each in rest]):
+            whole.error(f"unrecognized arguments: {' '.join(rest)}")
+        words.extend(rest)
+    return options

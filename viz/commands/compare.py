@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import cgraph as cg
 import dynamics as dyn
@@ -17,18 +16,16 @@ from .arguments import (
     MOMENTUM_FORM,
     answer_and_draw,
     check_picture,
+    filled,
     may_draw_and_print,
     scene_of,
+    size_data,
+    size_table,
     state_names,
     takes_a_scene,
     unless_json,
 )
 from .command import Command
-from .point_arguments import filled
-from .sizes import size_data, size_table
-
-if TYPE_CHECKING:
-    from cgraph.extend import Json
 
 
 def add(parser: Command) -> None:
@@ -87,7 +84,7 @@ def run(options: argparse.Namespace) -> int:
     return 1 if any(only) else 0
 
 
-def _forms(scene: dyn.scenes.Scene, graphs: Mapping[str, cg.Graph]) -> tuple[dict[str, Json], str]:
+def _forms(scene: dyn.scenes.Scene, graphs: Mapping[str, cg.Graph]) -> tuple[dict[str, extend.Json], str]:
     """Sizes of both forms, and how far they agree at a state, as data and as text."""
     sizes, apart = size_data(graphs), library.form_agreement(scene, graphs, filled(graphs[library.LAGRANGE], scene, {}))
     agreement = (

@@ -8,8 +8,7 @@ import dynamics as dyn
 from cgraph import extend
 
 from .arguments import answer
-from .command import Command
-from .parser import parsers
+from .command import Command, parsers
 
 SHELLS = ("bash", "zsh", "fish")
 

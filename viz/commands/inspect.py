@@ -8,11 +8,10 @@ from pathlib import Path
 from cgraph import extend
 
 from . import library
-from .arguments import MOMENTUM_FORM, answer, positive, say, takes_a_scene, unless_json
+from .arguments import MOMENTUM_FORM, answer, positive, say, started, takes_a_scene, takes_a_start, unless_json
 from .command import Command
-from .point_arguments import started, takes_a_start
 
-LONGEST = 1000.0  # s: seconds of work for an arm of ten links
+LONGEST_MOTION = 1000.0  # s: seconds of work for an arm of ten links
 
 
 def add(parser: Command) -> None:
@@ -30,9 +29,9 @@ def add(parser: Command) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Write the page; 1 where the motion ends before its time, which the page then says."""
-    if options.t_end is not None and options.t_end > LONGEST:
+    if options.t_end is not None and options.t_end > LONGEST_MOTION:
         raise ValueError(
-            f"--t-end must be at most {LONGEST:g} s, got {options.t_end:g} s: a page has {library.FRAMES} times"
+            f"--t-end must be at most {LONGEST_MOTION:g} s, got {options.t_end:g} s: a page has {library.FRAMES} times"
         )
     library.html_target("--out", options.out)
     say(f"reading {options.scene}")

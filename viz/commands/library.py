@@ -1,4 +1,4 @@
-"""What commands use of the library beyond its public names, loaded when a command runs."""
+"""Names of the library that commands use beyond the public ones, loaded when a command runs."""
 # ruff: noqa: F401
 # mypy: implicit-reexport
 
@@ -19,14 +19,14 @@ if TYPE_CHECKING:
     from dynamics.experiments import pruning
     from dynamics.experiments.machine import machine
     from dynamics.experiments.speed import bench as speed
+    from dynamics.experiments.speed.bench import tables
     from dynamics.experiments.speed.bench_figures import FIGURES
-    from dynamics.experiments.speed.bench_table import tables
-    from dynamics.experiments.stability import stability, stability_table
+    from dynamics.experiments.stability import stability
     from dynamics.experiments.text_table import table
-    from dynamics.experiments.work_precision import named_settings, work_precision
+    from dynamics.experiments.work_precision import named_tasks, work_precision
     from dynamics.experiments.work_precision.cold_start import STARTS
     from dynamics.experiments.work_precision.comparisons import COMPARISONS
-    from dynamics.experiments.work_precision.report import PEERS, to_csv
+    from dynamics.experiments.work_precision.measurement import PEERS, to_csv
     from dynamics.integrators import TABLEAUS
     from dynamics.io.load import compiled
     from dynamics.scenes.start import Start, moving_start, rest_text, with_start
@@ -38,14 +38,13 @@ if TYPE_CHECKING:
     from ..graph_drawing.render import check_can_draw, render_png, render_svg, tags_to_collapse
     from ..lessons.lesson import SCREENS, lesson
     from ..models.animate import animate, frames
-    from ..models.constant_momenta import constant_momentum
     from ..models.driven_motion import driven
     from ..models.inspect import inspection_page
     from ..models.inspection import FRAMES, inspection
     from ..models.live import live_page
-    from ..models.open_loops import tree_alone
+    from ..models.remarks import constant_momentum, tree_alone
     from ..pages import pruning as pruning_page, stability as stability_page, work_precision as work_precision_page
-    from ..pages.document_files import check_folder, document_files
+    from ..pages.document import check_folder, document_files
     from ..pages.html import html_target
     from ..paper.paper import paper
     from ..plots.plot import check_can_plot

@@ -9,11 +9,17 @@ import dynamics as dyn
 
 from . import library
 from .arguments import (
+    REST,
     answer_and_draw,
+    box,
     check_picture,
     equations_of,
+    filled,
     may_draw_and_print,
+    point,
     scene_of,
+    size_data,
+    size_table,
     state_names,
     takes_a_scene,
     takes_equations,
@@ -21,8 +27,6 @@ from .arguments import (
     verdict_of,
 )
 from .command import Command
-from .point_arguments import REST, box, filled, point
-from .sizes import size_data, size_table
 
 
 def add(parser: Command) -> None:

@@ -6,9 +6,8 @@ import argparse
 from pathlib import Path
 
 from . import library
-from .arguments import answer, say, takes_a_scene
+from .arguments import answer, say, started, takes_a_scene, takes_a_start
 from .command import Command
-from .point_arguments import started, takes_a_start
 
 
 def add(parser: Command) -> None:

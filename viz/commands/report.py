@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import argparse
 import shutil
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, NamedTuple
+from typing import Any
 
 import dynamics as dyn
+from cgraph import extend
 
-from . import library, pruning_report, stability_report
-from .arguments import IN_PYTHON, READING, answer, number, positive, reading, reads_files, say, unless_json
+from . import library
+from .arguments import IN_PYTHON, READING, answer, number, positive, reading, reads_files, say, start, unless_json
 from .command import Command
-from .point_arguments import start
 
 CURVES, STABILITY, PRUNING, COMPARE = "a report of run times", "--stability", "--pruning", "--compare"
 
@@ -38,7 +39,7 @@ FOLDER = Path("report")
 def add(parser: Command) -> None:
     """The command's arguments."""
     parser.names |= {
-        "scenes": lambda: [*dyn.scenes.names(), *library.named_settings.names()],
+        "scenes": lambda: [*dyn.scenes.names(), *library.named_tasks.names()],
         "methods": lambda: dyn.METHODS,
         "peers": lambda: library.PEERS,
         "comparisons": lambda: library.COMPARISONS,
@@ -95,8 +96,8 @@ def run(options: argparse.Namespace) -> int | None:
             raise ValueError(f"--{name.replace('_', '-')} goes with {' or '.join(with_these)}, not with {kind}")
     runs: dict[str, Callable[[argparse.Namespace], int | None]] = {
         CURVES: _curves,
-        STABILITY: stability_report.run,
-        PRUNING: pruning_report.run,
+        STABILITY: _stability,
+        PRUNING: _pruning,
         COMPARE: _comparisons,
     }
     if options.out is not None:
@@ -111,32 +112,20 @@ def _locked(text: str) -> tuple[str, float]:
     return body, number(at)
 
 
-class _Exact(NamedTuple):
-    """Exact motions that are there, and those that come: files in a folder of their own until the report is whole."""
-
-    kept: Path | None
-    folder: Path
-
-    def files(self) -> dict[Path, str | bytes]:
-        """Those that came."""
-        if self.kept is None:
-            return {}
-        files: dict[Path, str | bytes] = {}
-        for path in self.folder.iterdir():
-            there, content = self.kept / path.name, path.read_bytes()
-            if not there.is_file() or there.read_bytes() != content:
-                files[there] = content
-        return files
-
-
 @contextmanager
-def _exact_motions(out: Path | None) -> Iterator[_Exact]:
+def _exact_motions(out: Path | None) -> Iterator[tuple[Path, Callable[[], dict[Path, str | bytes]]]]:
+    """A folder with the exact motions that are kept, and the files of those that come, for when the report is whole."""
     kept = None if out is None else out / "exact"
-    with TemporaryDirectory() as folder:
-        if kept is not None and kept.is_dir():
-            for path in kept.glob("*.json"):
-                shutil.copy(path, folder)
-        yield _Exact(kept, Path(folder))
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        for path in kept.glob("*.json") if kept else ():
+            shutil.copy(path, folder)
+
+        def new() -> dict[Path, str | bytes]:
+            files = {kept / path.name: path.read_bytes() for path in folder.iterdir()} if kept else {}
+            return {path: text for path, text in files.items() if not path.is_file() or path.read_bytes() != text}
+
+        yield folder, new
 
 
 def _comparisons(options: argparse.Namespace) -> None:
@@ -145,31 +134,31 @@ def _comparisons(options: argparse.Namespace) -> None:
     if unknown := [name for name in names if name not in library.COMPARISONS]:
         raise ValueError(f"comparisons are {', '.join(library.COMPARISONS)}, got {unknown[0]!r}")
     print(library.machine())
-    with _exact_motions(options.out) as exact:
+    with _exact_motions(options.out) as (folder, new):
         for name in names or library.COMPARISONS:
-            for text in library.COMPARISONS[name](str(exact.folder)):
+            for text in library.COMPARISONS[name](str(folder)):
                 print(f"\n{text}", flush=True)
-        answer("", exact.files(), folder=options.out)
+        answer("", new(), folder=options.out)
 
 
 def _curves(options: argparse.Namespace) -> None:
     """A page of run time beside error for each scene."""
-    named = {library.named_settings.load(name, reading=reading(options)).name for name in options.scenes}
+    named = {library.named_tasks.load(name, reading=reading(options)).name for name in options.scenes}
     if len(named) < len(options.scenes):
         raise ValueError(f"each scene needs a name of its own for its files, got {', '.join(options.scenes)}")
     chosen = {"t_end": options.t_end, "start": options.start, "reading": reading(options)}
     peers = tuple(library.PEERS) if options.peers is None else tuple(filter(None, options.peers.split(",")))
     if options.out is not None:
         library.check_can_plot()
-    with _exact_motions(options.out) as exact:
-        found, lines, files = _measured(options, chosen, peers, exact.folder)
-        answer(unless_json(options, found, "\n".join(lines)), files | exact.files(), folder=options.out)
+    with _exact_motions(options.out) as (folder, new):
+        found, lines, files = _measured(options, chosen, peers, folder)
+        answer(unless_json(options, found, "\n".join(lines)), files | new(), folder=options.out)
 
 
 def _measured(
     options: argparse.Namespace, chosen: dict[str, Any], peers: tuple[str, ...], exact: Path
 ) -> tuple[list[dict[str, Any]], list[str], dict[Path, str | bytes]]:
-    """What a report has: its data, what is printed of it, and its files."""
+    """Data, lines to print and files of a report."""
     found, lines, files = [], [], dict[Path, str | bytes]()
     for name in options.scenes:
         report = library.work_precision.work_precision(
@@ -192,3 +181,63 @@ def _measured(
             points = sum(len(each.points) for each in report.curves)
             lines.append(f"{[*written][-1]}: {len(report.curves)} integrators, {points} points")
     return found, lines, files
+
+
+NAME = "stability"  # of the files
+
+
+def _stability(options: argparse.Namespace) -> int:
+    """Write the page and print the table; 1 for a row beyond its bound without a known reason."""
+    if options.out is not None:
+        library.check_can_plot()
+    begin = time.perf_counter()
+    found = library.stability.run(options.quick, say)
+    content = library.stability.to_dict(found, time.perf_counter() - begin, options.quick)
+    files: dict[Path, str | bytes] = {}
+    text = library.stability.text(found)
+    if options.out is not None:
+        files |= library.document_files(
+            options.out, NAME, library.stability_page.document(content), content, library.stability.to_csv(found)
+        )
+        text = f"{text}\n{[*files][-1]}"
+    answer(unless_json(options, content, text), files, folder=options.out)
+    unexplained = [f"{each.case} by {each.method}" for each in found if not each.explained]
+    if unexplained:
+        say(f"beyond its bound without a known reason: {', '.join(unexplained)}")
+    return 1 if unexplained else 0
+
+
+def _pruning(options: argparse.Namespace) -> None:
+    """Write a page for each scene."""
+    without = [each for each in (options.without or "").split(",") if each]
+    if unknown := [each for each in without if each not in dyn.EFFECTS]:
+        raise ValueError(f"effects are {', '.join(dyn.EFFECTS)}, got {unknown[0]!r}")
+    locked = options.lock or []
+    lock = dict(locked)
+    if len(lock) < len(locked):
+        raise ValueError(f"--lock takes each body once, got {', '.join(body for body, _ in locked)}")
+    found, lines, files = [], [], dict[Path, str | bytes]()
+    for name in options.scenes:
+        scene = dyn.scenes.load(name, **reading(options))
+        effects = [each for each in dyn.EFFECTS if each not in without]
+        content = library.pruning.report(scene, effects=effects, lock=_bodies(scene, lock))
+        found.append(content)
+        if options.out is not None:
+            document = library.pruning_page.document(content)
+            written = library.document_files(options.out, content["name"], document, content, kind="pruning")
+            files |= written
+            sizes = [f"{each['equations']} {each['full']['nodes']} to {each['pruned']['nodes']} nodes"
+                     for each in content["graphs"]]  # fmt: skip
+            lines.append(f"{[*written][-1]}: {', '.join(sizes)}")
+    answer(unless_json(options, found, "\n".join(lines)), files, folder=options.out)
+
+
+def _bodies(scene: dyn.scenes.Scene, lock: dict[str, float]) -> dict[str, float]:
+    """Joints to lock by their bodies' names, where they may be given by their coordinates'."""
+    moving = scene.mechanism.moving if scene.mechanism else ()
+    bodies = [body.name for body in moving]
+    of = {body.coordinate: body.name for body in moving} | {name: name for name in bodies}
+    if unknown := [name for name in lock if name not in of]:
+        known = extend.or_nearest(unknown[0], list(of)) if of else "it has no bodies"
+        raise ValueError(f"{scene.name} has no joint {unknown[0]!r:.80} to lock; {known}")
+    return {of[name]: at for name, at in lock.items()}

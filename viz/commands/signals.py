@@ -25,7 +25,7 @@ class Stopped(SystemExit):
 
 
 class _Process:
-    """Where the process stands."""
+    """State of the process."""
 
     loading = False  # nothing is begun, so there is nothing to clean up
     settled = False  # the answer is complete: what comes now comes too late
@@ -54,14 +54,14 @@ def ignore_late() -> None:
 
 
 def watch_loading() -> None:
-    """Until a command begins, a signal ends the process at once."""
+    """Let a signal end the process at once, until a command begins."""
     _Process.loading = True
     _watch()
 
 
 @contextmanager
 def stoppable() -> Iterator[None]:
-    """Within, a signal raises Stopped; what was the signals' before is so afterwards, but for a process of ours."""
+    """Let a signal raise Stopped; handlers that were there before are so afterwards, but in a process of ours."""
     before = {} if _Process.loading else _watch()
     _Process.loading = _Process.settled = False
     _Process.number = 0
@@ -91,7 +91,7 @@ def _watch() -> dict[signal.Signals, signal._HANDLER]:
 
 
 def _unraisable(lost: sys.UnraisableHookArgs) -> None:
-    """Of an exception that leaves a callback or a finalizer Python prints that it is ignored: ours is raised again."""
+    """Silence Python's line that an exception in a callback or finalizer is ignored: ours is raised again."""
     if not issubclass(lost.exc_type, Stopped):
         _Process.hook(lost)
 

@@ -9,9 +9,8 @@ from typing import Any
 import dynamics as dyn
 from cgraph import extend
 
-from .arguments import MOMENTUM_FORM, answer, positive, takes_a_scene, unless_json
+from .arguments import MOMENTUM_FORM, answer, positive, started, takes_a_scene, takes_a_start, unless_json
 from .command import Command
-from .point_arguments import started, takes_a_start
 
 METHOD = "dop853"
 SHOWN = 12  # states that the summary names
@@ -65,7 +64,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _summary(run: dyn.Trajectory) -> dict[str, Any]:
-    """How a run went, as data."""
+    """Facts of a run, as data."""
     import numpy as np
 
     stats = run.stats

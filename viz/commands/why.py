@@ -10,10 +10,14 @@ from cgraph import extend
 
 from . import library
 from .arguments import (
+    REST,
     answer_and_draw,
     check_picture,
     equations_of,
+    filled,
     may_draw_and_print,
+    point,
+    point_text,
     scene_of,
     takes_a_scene,
     takes_equations,
@@ -21,7 +25,6 @@ from .arguments import (
     whole,
 )
 from .command import Command
-from .point_arguments import REST, filled, point, point_text
 
 
 def add(parser: Command) -> None:
@@ -94,7 +97,7 @@ def _not_connected(options: argparse.Namespace, scene: dyn.scenes.Scene, names: 
 
 
 def _constant(scene: dyn.scenes.Scene, names: extend.Names, options: argparse.Namespace) -> str:
-    """That the momentum is constant whose rate was asked for, or the coordinate that its rate was asked by; or ""."""
+    """Sentence on a constant momentum whose rate was asked for, or whose coordinate the rate was asked by; or ""."""
     output, source = names.meant(options.output), names.meant(options.input)
     told = [
         library.constant_momentum(name)

@@ -1,4 +1,4 @@
-"""What a drawing of a graph consists of: a box for every node and output, an arrow for every edge."""
+"""Boxes and arrows of a drawing of a graph: a box for every node and output, an arrow for every edge."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class _Subject:
         return self.part.get(node, f"n{self.number[node]}")
 
     def told(self, node: Node) -> str:
-        """What a tooltip calls a node: the name of its part, the %number of the listing, its name or its value."""
+        """Name of a node in a tooltip: the name of its part, the %number of the listing, its name or its value."""
         if node in self.part:
             return self.part[node]
         return f"%{self.listed.number[node]}" if node.args else self.listed.short(node)

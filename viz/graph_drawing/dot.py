@@ -1,4 +1,4 @@
-"""The drawing of a graph as DOT, the language of Graphviz."""
+"""The drawing of a graph as DOT, the language of Graphviz, and short formulas for its nodes."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 from cgraph import Edge, Graph, Node
 from cgraph.extend import (
+    Names,
     counted,
     require_choice,
     require_flag,
@@ -24,6 +25,7 @@ from .draw_shapes import digraph, draw_arrows, draw_boxes, draw_legend, literal
 
 if TYPE_CHECKING:
     from graphviz import Digraph
+
 
 DIRECTIONS = ("BT", "TB", "LR", "RL")
 
@@ -134,7 +136,7 @@ def _edges(marked: Collection[Edge]) -> frozenset[Edge]:
 
 
 def _marks(marked: Collection[Node] | Mapping[str, Collection[Node]], words: str) -> dict[Node, Paint]:
-    """How each marked node is painted."""
+    """Paint of each marked node."""
     groups = marked if isinstance(marked, Mapping) else {words: marked}
     if len(groups) > len(theme.MARKS):
         raise ValueError(f"marked nodes come in at most {len(theme.MARKS)} groups, got {len(groups)}")
@@ -165,3 +167,20 @@ def _cluster_rule(clusters: bool | Sequence[str] | ClusterRule) -> ClusterRule:
     given = [clusters] if isinstance(clusters, str) else clusters
     chosen = frozenset(require_sequence("clusters", given, "tags, or True, False or a function of a node", str))
     return lambda node: _only(node.tags & chosen)
+
+
+LENGTH = 10  # characters that fit a node
+
+
+def short_formulas(graph: Graph, names: Mapping[str, str], length: int = LENGTH) -> dict[Node, str]:
+    """The formulas of those operations without a name that have one of at most `length` characters.
+
+    names: {name in the graph: text shown}.
+    """
+    texts = Names(graph, names)
+    formulas = {
+        node: texts.text(node, 2 * length).replace(" * ", " ")
+        for node in graph.nodes
+        if node.args and node.name is None
+    }
+    return {node: text for node, text in formulas.items() if len(text) <= length and "%" not in text}

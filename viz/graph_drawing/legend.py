@@ -1,4 +1,4 @@
-"""A legend as a picture, small, for several drawings that share their colors."""
+"""A legend as a picture, small, for drawings that share their colors, and ink for dark pages."""
 
 from __future__ import annotations
 
@@ -40,3 +40,21 @@ def legend_svg(kinds: Sequence[Paint], columns: int = 2) -> str:
         f'<polygon fill="white" stroke="none" points="0,0 0,{height} {width:.0f},{height} {width:.0f},0"/>'
         f"{''.join(entries)}</g></svg>\n"
     )
+
+
+# Boxes keep their light paint, under dark letters; what lies between and around them changes: ground, lines and frames.
+_DARK = f"""\
+<style>@media (prefers-color-scheme: dark) {{
+polygon[fill="white"][stroke="none"] {{ fill: {theme.DARK_PAGE}; }}
+[stroke="{theme.LINE.lower()}"] {{ stroke: {theme.DARK_LINE}; }}
+.edge polygon[fill="{theme.LINE.lower()}"] {{ fill: {theme.DARK_LINE}; }}
+.cluster path, .cluster polygon {{ fill: none; }}
+.graph > text, .cluster text, .edge text {{ fill: {theme.DARK_TEXT}; }}
+}}</style>
+"""
+
+
+def to_adaptive(svg: str) -> str:
+    """SVG of `render_svg`, with ink and ground for dark pages where the reader's system asks for them."""
+    head, rest = svg.split(">", 1)
+    return f"{head}>\n{_DARK}{rest.lstrip()}"

@@ -1,4 +1,4 @@
-"""Graphs by depth: a row for each length of the longest way from the leaves, the same rows for all panels."""
+"""Graphs by depth: a row for each length of the longest way from the leaves, as nodes and lines, or as silhouettes."""
 
 from __future__ import annotations
 
@@ -76,11 +76,16 @@ def levels_svg(panels: Sequence[LevelPanel], scale: Scale) -> str:
         marks = {words: scale.y(level, depth) for words, level in panel.marks.items()}
         drawn += [*_words(panel, x, width, marks), *_lines(panel.graph, at), *_nodes(panel.graph, at, scale)]
         x += width + SIDE
+    heights = {level: scale.y(level, depth) for level in range(0, depth + 1, scale.ticks)}
+    return _with_rows(x - SIDE, heights, scale.y(0, depth) + scale.row / 2, drawn)
+
+
+def _with_rows(right: float, heights: Mapping[int, float], bottom: float, drawn: Sequence[str]) -> str:
+    """The picture, with lines and numbers of its rows.  heights: {level: pixels from the top}."""
     rows = []
-    for level in range(0, depth + 1, scale.ticks):
-        y = scale.y(level, depth)
-        rows += [rule(SIDE - 10, x - SIDE, y, 'stroke-opacity="0.2"'), label(SIDE - 14, y + 4, str(level), "end")]
-    return picture(x - SIDE + 8, scale.y(0, depth) + scale.row / 2 + FOOT, [*rows, *drawn])
+    for level, y in heights.items():
+        rows += [rule(SIDE - 10, right, y, 'stroke-opacity="0.2"'), label(SIDE - 14, y + 4, str(level), "end")]
+    return picture(right + 8, bottom + FOOT, [*rows, *drawn])
 
 
 def _across(graph: Graph, scale: Scale) -> tuple[dict[Node, tuple[float, int]], float]:
@@ -193,3 +198,49 @@ def picture(width: float, height: float, parts: Sequence[str]) -> str:
         f'fill="{theme.TEXT}"><polygon fill="white" stroke="none" points="0,0 0,{height:.0f} {width:.0f},{height:.0f} '
         f'{width:.0f},0"/>{"".join(parts)}</g></svg>\n'
     )
+
+
+TICKS = 100  # levels between numbers
+
+
+def silhouettes_svg(panels: Sequence[LevelPanel], row: float = 1.0, node: float = 1.0) -> str:
+    """The panels side by side, leaves at the bottom, the same rows for all; nodes of a row by their colors.
+
+    row, node: pixels of a level and of a node across.  Dark as `to_adaptive` makes it.
+    """
+    depth = max([panel.graph.counts().depth for panel in panels])
+
+    def y(level: float) -> float:
+        return HEAD + (depth - level) * row
+
+    drawn, x = list[str](), SIDE
+    for panel in panels:
+        counts = panel.graph.counts()
+        sizes = f"{counted(counts.nodes, 'node')}, {counts.depth} deep"
+        width = max(node * counts.width, *[0.62 * FONT * len(text) for text in (panel.title, sizes)])
+        top = y(counts.depth) - 24
+        drawn += [label(x, top, panel.title, "start", 'font-weight="bold"'), label(x, top + 17, sizes, "start")]
+        for paint, path in _rows(panel.graph, x, node).items():
+            rows = "".join(
+                [f"M{left:.1f} {y(k + 0.5):.1f}h{wide:.1f}v{row:.1f}h{-wide:.1f}z" for k, left, wide in path]
+            )
+            drawn.append(f'<path d="{rows}" fill="{paint.line}"/>')
+        x += width + SIDE
+    return _with_rows(x - SIDE, {level: y(level) for level in range(0, depth + 1, TICKS)}, y(0), drawn)
+
+
+def _rows(graph: Graph, x: float, node: float) -> dict[theme.Paint, list[tuple[int, float, float]]]:
+    """{color: (level, left end, width) of its bar on every level that has it}."""
+    paints = list(theme.ROLES.values())
+    levels: dict[int, dict[theme.Paint, int]] = {}
+    for each, level in levels_of(graph).items():
+        paint = theme.ROLES[theme.role_of(each)]
+        row = levels.setdefault(level, {})
+        row[paint] = row.get(paint, 0) + 1
+    bars: dict[theme.Paint, list[tuple[int, float, float]]] = {}
+    for level, row in levels.items():
+        left = x
+        for paint in sorted(row, key=paints.index):
+            bars.setdefault(paint, []).append((level, left, node * row[paint]))
+            left += node * row[paint]
+    return bars

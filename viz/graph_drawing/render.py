@@ -1,23 +1,25 @@
-"""Pictures from DOT: SVG by Graphviz, from the system or from WebAssembly, and PNG from that SVG."""
+"""Pictures from DOT: SVG by Graphviz, from the system or from WebAssembly, PNG from that SVG, and places of boxes."""
 
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
 import sys
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from importlib.util import find_spec
-from typing import Protocol
+from typing import NamedTuple, Protocol
+from xml.etree import ElementTree
 
 from cgraph import Graph, constant
-from cgraph.extend import install, real_number, require_choice, require_graph
+from cgraph.extend import install, memo, real_number, require_choice, require_graph
 
 from .. import theme
 from .dot import to_dot
 
 ENGINES = ("dot", "neato", "fdp", "sfdp", "circo", "twopi", "osage", "patchwork")
-LONGEST = 1e6  # s, that a drawing may be waited for
+LONGEST_WAIT = 1e6  # s, that a drawing may be waited for
 LARGE = 500  # nodes; beyond, a layered drawing takes long and shows little
 
 # The WebAssembly Graphviz runs in a process of its own: it has no time limit, it aborts the process when threads use
@@ -46,7 +48,7 @@ class RenderError(RuntimeError):
 
 
 class Drawing(Protocol):
-    """What `to_dot` returns: something that holds its DOT text."""
+    """Result of `to_dot`: something that holds its DOT text."""
 
     @property
     def source(self) -> str:
@@ -84,8 +86,8 @@ def render_svg(dot_source: str | Drawing, *, engine: str = "dot", timeout: float
     (True, 2)
     """
     require_choice("engine", engine, ENGINES)
-    if not 0.0 < real_number("timeout", timeout) <= LONGEST:
-        raise ValueError(f"timeout must be positive, up to {LONGEST:g} s, got {timeout!r} s")
+    if not 0.0 < real_number("timeout", timeout) <= LONGEST_WAIT:
+        raise ValueError(f"timeout must be positive, up to {LONGEST_WAIT:g} s, got {timeout!r} s")
     source = dot_source if isinstance(dot_source, str) else getattr(dot_source, "source", None)
     if not isinstance(source, str):
         raise TypeError(f"render_svg needs DOT text or what to_dot returns, got {type(dot_source).__name__}")
@@ -220,3 +222,86 @@ def graph_svg(graph: Graph) -> str:
     if len(graph.nodes) > LARGE:
         raise RenderError(f"{len(graph.nodes)} nodes are too many for one picture: collapse tags with viz.to_dot")
     return render_svg(to_dot(graph), timeout=20.0)
+
+
+POINTS = 72.0  # in an inch, the unit of Graphviz; a point of its SVG is a pixel here
+HEAD = 7.0  # length of an arrowhead, pixels
+_SVG = "{http://www.w3.org/2000/svg}"
+_NUMBER = re.compile(r"-?[0-9.]+(?:e-?[0-9]+)?")
+
+Size = tuple[float, float]
+Line = tuple[int, int]
+
+
+class Positions(NamedTuple):
+    """Centers of shapes in pixels, y downward; lines as SVG paths with their arrowheads; the size of the whole."""
+
+    centers: Sequence[Size]
+    lines: Mapping[Line, str]
+    size: Size
+
+
+def positions(drawings: Sequence[tuple[Sequence[Size], Sequence[Line]]]) -> list[Positions]:
+    """Layered drawings, each of shapes (width, height) in pixels and lines that lead upward, in one run of Graphviz.
+
+    Raises RenderError where there is no Graphviz, or it fails.
+    """
+    return list(_positions(tuple((tuple(sizes), tuple(lines)) for sizes, lines in drawings)))
+
+
+@memo(64)
+def _positions(drawings: tuple[tuple[tuple[Size, ...], tuple[Line, ...]], ...]) -> tuple[Positions, ...]:
+    root = ElementTree.fromstring(render_svg(_dot(drawings), timeout=20.0))  # noqa: S314 (Graphviz's own text)
+    shapes = {group.get("id", ""): group for group in root.iter(f"{_SVG}g")}
+    return tuple(_read(shapes, k, *drawing) for k, drawing in enumerate(drawings))
+
+
+def _dot(drawings: Sequence[tuple[Sequence[Size], Sequence[Line]]]) -> str:
+    """One graph with a cluster for each drawing, which keeps them apart."""
+    text = ['digraph { rankdir=BT; ranksep=0.38; nodesep=0.16; edge [arrowhead=none]; node [fixedsize=true, label=""]']
+    for k, (sizes, lines) in enumerate(drawings):
+        text.append(f"subgraph cluster_{k} {{ id=d{k}; margin=8")
+        for i, (width, height) in enumerate(sizes):
+            text.append(f"d{k}n{i} [id=d{k}n{i}, shape=box, width={width / POINTS:.4f}, height={height / POINTS:.4f}]")
+        text += [f"d{k}n{source} -> d{k}n{target} [id=d{k}e{source}_{target}]" for source, target in lines]
+        text.append("}")
+    return "\n".join([*text, "}"])
+
+
+def _read(shapes: Mapping[str, ElementTree.Element], k: int, sizes: Sequence[Size], lines: Sequence[Line]) -> Positions:
+    left, top, right, bottom = _extent(shapes[f"d{k}"])
+    centers = []
+    for i in range(len(sizes)):
+        x0, y0, x1, y1 = _extent(shapes[f"d{k}n{i}"])
+        centers.append((round((x0 + x1) / 2 - left, 1), round((y0 + y1) / 2 - top, 1)))
+    paths = {}
+    for source, target in lines:
+        path = shapes[f"d{k}e{source}_{target}"].find(f"{_SVG}path")
+        assert path is not None
+        flat = [float(number) for number in _NUMBER.findall(path.get("d", ""))]
+        moved = [(x - left, y - top) for x, y in zip(flat[::2], flat[1::2], strict=True)]
+        paths[source, target] = _with_head(moved)
+    return Positions(centers, paths, (round(right - left, 1), round(bottom - top, 1)))
+
+
+def _extent(group: ElementTree.Element) -> tuple[float, float, float, float]:
+    """Left, top, right and bottom of a box."""
+    polygon = group.find(f"{_SVG}polygon")
+    assert polygon is not None
+    flat = [float(number) for number in _NUMBER.findall(polygon.get("points", ""))]
+    return min(flat[::2]), min(flat[1::2]), max(flat[::2]), max(flat[1::2])
+
+
+def _with_head(points: Sequence[Size]) -> str:
+    """A curve of Bezier's, M p C p p p .., with an open arrowhead along its end."""
+    (x, y), end = points[0], points[-1]
+    before = next((point for point in reversed(points[:-1]) if point != end), (end[0], end[1] + 1.0))
+    length = ((end[0] - before[0]) ** 2 + (end[1] - before[1]) ** 2) ** 0.5
+    a, b = (end[0] - before[0]) / length, (end[1] - before[1]) / length
+    feet = [(end[0] - HEAD * a + s * 0.55 * HEAD * b, end[1] - HEAD * b - s * 0.55 * HEAD * a) for s in (1.0, -1.0)]
+    curve = " ".join([_text(point) for point in points[1:]])
+    return f"M{x:.1f} {y:.1f}C{curve}M{_text(feet[0])}L{_text(end)}L{_text(feet[1])}"
+
+
+def _text(point: Size) -> str:
+    return f"{point[0]:.1f} {point[1]:.1f}"

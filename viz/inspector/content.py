@@ -1,18 +1,15 @@
-"""What an inspector shows: graphs that are versions of one another, their one state, a motion, tables."""
+"""Contents of an inspector: graphs that are versions of one another, their one state, a motion, tables."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from cgraph import Edge, Graph, Node
 from cgraph.extend import Array, real_array
-
-if TYPE_CHECKING:
-    pass
 
 UNKNOWN = 0.5  # an input's value where none is given: a product with 0 would show nothing
 

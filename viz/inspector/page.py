@@ -5,46 +5,23 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from html import escape
 from string import Template
-from types import MappingProxyType
-from typing import TYPE_CHECKING, NamedTuple
 
 from cgraph import Graph, Node, __version__
-from cgraph.extend import Array, require_graph, require_mapping, require_sequence, require_texts
+from cgraph.extend import Array, Json, require_graph, require_mapping, require_sequence, require_texts
 
 from .. import theme
 from ..pages import html
 from ..pages.document import Table
-from ..pages.html import Page, asset
+from ..pages.html import Page, Panel, asset
 from ..pages.operations import operations
 from .content import Motion, State, StateTable, Version
 from .record import record
-
-if TYPE_CHECKING:
-    from cgraph.extend import Json
 
 SCRIPTS = (
     "texts.js", "values.js", "state.js", "paths.js", "formula.js", "layers.js", "places.js",
     "arrange.js", "picture.js", "view.js", "marks.js", "panels.js", "results.js", "sweeps.js", "lesson.js", "arm.js",
     "motion.js", "keys.js", "app.js",
 )  # fmt: skip
-
-
-class Panel(NamedTuple):
-    """A part that another module adds: markup beside the picture or at the end, style, scripts before and after start.
-
-    first: JavaScript for the record that the page shows first, where its own data are none.  run: JavaScript that
-    begins the panel; `inspector` is what app.js lends to other scripts.  data: as `html.compose` takes them.  allowed:
-    what the policy lets scripts do.
-    """
-
-    body: str = ""
-    style: str = ""
-    script: str = ""
-    first: str = ""
-    run: str = ""
-    end: str = ""
-    allowed: str = ""
-    data: Mapping[str, Json] = MappingProxyType({})
 
 
 def page(

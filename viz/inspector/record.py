@@ -20,24 +20,19 @@ is wrong, steps [{words, nodes, value, joint}]. Where nodes stand is the page's 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING
 
 from cgraph import Graph, Node
-from cgraph.extend import ADJOINT, PRIMAL, TANGENT, columns
+from cgraph.extend import ADJOINT, PRIMAL, TANGENT, Json, columns
 
 from .. import theme
-from ..graph_drawing.positions import Positions, positions
-from ..graph_drawing.render import RenderError
-from ..pages.graph import graph_data
+from ..graph_drawing.render import Positions, RenderError, positions
+from ..pages.operations import graph_data
 from .content import Motion, State, StateTable, Version
-
-if TYPE_CHECKING:
-    from cgraph.extend import Json
 
 STAGES = {PRIMAL: "as written", ADJOINT: "reverse sweep", TANGENT: "forward sweep"}
 SMALL = 60  # nodes of a graph that is laid out by Graphviz
 NODE_HEIGHT, LEAF_HEIGHT = 34.0, 30.0  # pixels, as in arrange.js
-LONGEST = 24  # letters of a name for which a box has room
+LONGEST_NAME = 24  # letters of a name for which a box has room
 Letters = Callable[[str], str]
 
 
@@ -106,8 +101,8 @@ def _motion(motion: Motion, letters: Letters) -> dict[str, Json]:
 
 
 def _letters(names: Mapping[str, str]) -> Letters:
-    """What the picture shows of a name: what a person calls it, or letters where that is long."""
-    shown = {name: text for name, text in theme.called(names).items() if len(text) <= LONGEST}
+    """Label of a name in the picture: its display name, or letters where that is long."""
+    shown = {name: text for name, text in theme.called(names).items() if len(text) <= LONGEST_NAME}
     return lambda name: shown.get(name) or theme.pretty(name)
 
 
@@ -170,7 +165,7 @@ _Plan = tuple[list[Node | str], list[tuple[float, float]], list[tuple[int, int]]
 
 
 def _planned(graph: Graph, letters: Letters) -> _Plan:
-    """What is drawn of a graph, its nodes but constants and its outputs, their sizes, and the lines between them."""
+    """Parts of a drawing: nodes but constants, and outputs, their sizes, and the lines between them."""
     shown: list[Node | str] = [node for node in graph.nodes if node.value is None]
     at = {node: i for i, node in enumerate(shown)}
     lines = [(at[edge.source], at[edge.target]) for edge in graph.edges if edge.source.value is None]

@@ -8,9 +8,8 @@ from cgraph import Graph, Node
 from dynamics import System, forward_dynamics, gravity_force
 
 from ..pages import html
-from ..pages.graph import graph_data
-from .screen import Screen, number
-from .subject import LARGEST, SHOWN, Subject
+from ..pages.operations import graph_data
+from .subject import LARGEST, SHOWN, Screen, Subject, number
 
 
 def closed_loop(subject: Subject) -> Screen:

@@ -10,9 +10,8 @@ from cgraph.extend import Array
 from dynamics import forward_dynamics, mass_matrix
 
 from ..pages import html
-from ..pages.graph import graph_data
-from .screen import Screen, number
-from .subject import LARGEST, SHOWN, Subject
+from ..pages.operations import graph_data
+from .subject import LARGEST, SHOWN, Screen, Subject, number
 
 _SAME = 1e-9  # of an inertia: a smaller difference is rounding
 

@@ -11,13 +11,12 @@ from dynamics import SimulationWarning, energy, simulate, state_equation
 
 from .. import theme
 from ..pages import html
-from ..pages.graph import graph_data
-from .screen import Screen, number
-from .subject import LARGEST, Subject
+from ..pages.operations import graph_data
+from .subject import LARGEST, Screen, Subject, number
 
 FACTORS = (2, 4, 16)
 STEPS, FINE = 100, 16  # of the coarse motion, and how many of the reference's there are in one
-LONGEST, HALVINGS = 1.0, 20  # s, of the motion whose order is measured, and how often it is halved
+LONGEST_MOTION, HALVINGS = 1.0, 20  # s, of the motion whose order is measured, and how often it is halved
 ROUNDING = 1e-13  # of some hundred steps: an error that says nothing about a method
 SMALL = 1e-5  # of the largest coordinate: an error that has not grown beyond its order
 
@@ -75,7 +74,7 @@ def _measured(subject: Subject) -> tuple[float, dict[int, float]]:
 
     Raises RuntimeError for a motion that has none.
     """
-    t_end = min(subject.scene.t_end, LONGEST)
+    t_end = min(subject.scene.t_end, LONGEST_MOTION)
     for _ in range(HALVINGS):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SimulationWarning)  # that the error is large is what is looked for

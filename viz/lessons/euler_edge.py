@@ -9,17 +9,14 @@ from dynamics import Verdict, formulation_sizes, formulation_verdict, inverse_dy
 from dynamics.equations.formulations.formulation_sizes import INERTIAL_TERM, blamed
 
 from .. import theme
-from ..graph_drawing.dark import to_adaptive
-from ..graph_drawing.dot import to_dot
-from ..graph_drawing.legend import kinds_in, legend_svg
+from ..graph_drawing.dot import short_formulas, to_dot
+from ..graph_drawing.legend import kinds_in, legend_svg, to_adaptive
 from ..graph_drawing.render import render_svg
-from ..graph_drawing.short_formulas import short_formulas
 from ..pages import html
 from ..pages.formulations import TITLES, WHY_FEWER, size_table
-from ..pages.graph import graph_data
 from ..pages.mathml import equations
-from .screen import Screen, number
-from .subject import LARGEST, SHOWN, Subject, lagrangian_graph
+from ..pages.operations import graph_data
+from .subject import LARGEST, SHOWN, Screen, Subject, lagrangian_graph, number
 
 STEPS = (1.0, 0.1, 0.01, 1e-3, 1e-6)  # s
 DRAWN = 60  # nodes, at most, of a graph that is drawn
@@ -51,7 +48,7 @@ def euler_edge(subject: Subject) -> Screen:
 
 
 def _expected(stays: bool, verdict: Verdict) -> str:
-    """What a teacher expects of the class."""
+    """Expectation of the teacher."""
     if stays:
         return "Expect hands for A: a smaller step cures almost every other error of a simulation."
     if not verdict.differs:

@@ -19,8 +19,7 @@ from .closed_loop import closed_loop
 from .elimination import elimination
 from .energy_and_step import energy_and_step
 from .euler_edge import euler_edge
-from .screen import Screen
-from .subject import Subject, formula, lagrangian_graph, subject_of
+from .subject import Screen, Subject, formula, lagrangian_graph, subject_of
 from .sweeps import sweeps
 from .torque_parts import torque_parts
 
@@ -90,7 +89,7 @@ def page(subject: Subject, screens: Sequence[Screen]) -> Page:
 
 
 def scripts() -> str:
-    """What there is to play with, and what it needs."""
+    """Scripts of the plays, and of what they need."""
     return "\n".join([values(), asset(html.__package__, "elements.js", "graph.js"), asset(__package__, "plays.js")])
 
 

@@ -10,11 +10,9 @@ from cgraph import Graph, Node
 from cgraph.extend import Names, columns, cotangents
 from dynamics import inverse_dynamics
 
-from ..graph_drawing.dot import to_dot
+from ..graph_drawing.dot import short_formulas, to_dot
 from ..graph_drawing.render import render_svg
-from ..graph_drawing.short_formulas import short_formulas
-from .screen import Screen, inline
-from .subject import Subject, lagrangian_graph
+from .subject import Screen, Subject, inline, lagrangian_graph
 
 ROWS = 120  # nodes that the page walks through
 DRAWN = 40  # nodes, at most, of a graph that is drawn
@@ -90,7 +88,7 @@ def _text(node: Node, called: Mapping[Node, str]) -> str:
 
 
 def _what(node: Node) -> str:
-    """What the slope at an input is."""
+    """Meaning of the slope at an input."""
     name = node.name or ""
     if node.args or not name[-1:].isdigit():
         return ""

@@ -1,4 +1,4 @@
-"""Why this torque: what of it moves mass, what goes around the bend, what holds weight and springs."""
+"""Parts of a torque: what of it moves mass, what goes around the bend, what holds weight and springs."""
 
 from __future__ import annotations
 
@@ -10,9 +10,8 @@ from cgraph.extend import Array
 from dynamics import inverse_dynamics
 
 from ..pages import html
-from ..pages.graph import graph_data
-from .screen import Screen, number
-from .subject import LARGEST, SHOWN, Subject
+from ..pages.operations import graph_data
+from .subject import LARGEST, SHOWN, Screen, Subject, number
 
 PARTS = ("inertia: what q̈ takes", "velocity: Coriolis, centrifugal, damping", "position: weight and springs")
 MOVED = 3  # joints with three sliders

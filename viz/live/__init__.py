@@ -1,6 +1,5 @@
 """The live motion: a panel that computes a system's motion in the page, by WebAssembly."""
 
-from .content import Live
-from .page import EVALUATION, Panel, page_text, panel
+from .page import Live, page_text, panel
 
-__all__ = ["EVALUATION", "Live", "Panel", "page_text", "panel"]
+__all__ = ["Live", "page_text", "panel"]

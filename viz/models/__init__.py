@@ -1,1 +1,1 @@
-"""What is shown of a model, in a line: its page, its motion."""
+"""Pages and films of a model."""

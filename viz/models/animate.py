@@ -168,7 +168,7 @@ def _times(motions: Collection[Trajectory], speed: float) -> Array:
 
 
 def frames(length: float, speed: float) -> int:
-    """How many frames a film of some seconds has. Raises ValueError for fewer than 2, or too many."""
+    """Number of frames of a film of some seconds. Raises ValueError for fewer than 2, or too many."""
     count = length * RATE / speed
     if not 1.0 <= count < MOST_FRAMES:
         raise ValueError(

@@ -15,7 +15,7 @@ from ..pages.html import html_target
 from ..typed import box
 from .inspection import Inspection, inspection
 from .live import live_panel
-from .open_loops import tree_alone
+from .remarks import tree_alone
 from .typed_text import text_or_none
 
 LIVELY = 10  # velocities: larger models have a page of their motion alone, `live_page`
@@ -105,7 +105,7 @@ def inspection_page(scene: scenes.Scene, content: Inspection, moved: str = "", t
         at=content.at,
         derived=content.derived,
         motion=content.motion,
-        tables=[content.shares] if content.shares else [],
+        tables=[each for each in (content.shares, content.carried) if each],
         names=display_names(scene),
         units=content.units,
         columns={body.name: body.parent for body in mechanism.moving} if mechanism else None,
@@ -118,5 +118,5 @@ def inspection_page(scene: scenes.Scene, content: Inspection, moved: str = "", t
 
 
 def cut_short(content: Inspection) -> str:
-    """That the motion ends before its time, and why."""
+    """Sentence on a motion that ends before its time."""
     return f"The motion is not whole: it {content.stopped}."

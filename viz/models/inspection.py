@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -28,8 +28,8 @@ from dynamics.equations.momentum.hamiltonian import velocities
 from dynamics.equations.momentum.legendre import is_quadratic
 from dynamics.equations.state_equation import state_equation
 from dynamics.equations.torque_decomposition import torque_by_link
-from dynamics.multibody.joint_positions import skeleton
 from dynamics.multibody.joint_coordinates import display_units
+from dynamics.multibody.joint_positions import skeleton
 from dynamics.scenes import Scene
 from dynamics.simulation.simulate import simulate
 from dynamics.simulation.trajectory import Trajectory
@@ -37,6 +37,8 @@ from dynamics.systems.display_names import display_names
 from dynamics.systems.system import System
 
 from ..inspector import Motion, StateTable, Step, Version
+from ..pages.document import Table
+from .carried import carried
 
 FORMULATIONS = ("euler_embedded", "kinetic_only", "chain_rule")  # those of the paper, the flawed ones first
 FRAMES, RATE = 150, 30.0  # most instants shown, and how many a second
@@ -55,7 +57,7 @@ class Inspection:
 
     at: {input: (T,) or a number}, the one state of all versions.  derived: the inputs of embedded formulations from it,
     q0_old = q0 - dt q_dot0 and qd0_old = qd0 - dt qdd0; None where there are none.
-    shares: what each partial Lagrangian takes of the torques, None for one part.
+    shares: what each partial Lagrangian takes of the torques, None for one part.  carried: see `carried`.
     stopped: why the motion ends before its time, empty where it does not.
     units: {name in the graphs: unit}, where they are known.
     """
@@ -65,6 +67,7 @@ class Inspection:
     at: Mapping[str, float | Array]
     derived: Graph | None = None
     shares: StateTable | None = None
+    carried: Table | None = None
     stopped: str = ""
     units: Mapping[str, str] = field(default_factory=dict)
 
@@ -120,7 +123,8 @@ def inspection(
             versions[name] = _version(scene, name)
         derived, shares = _derived(system), _shares(scene)
     stopped = "" if run.stats.success else run.stats.message
-    return _along(scene, run, versions, state | {"dt": DT}, derived, shares, stopped=stopped)
+    shown = _along(scene, run, versions, state | {"dt": DT}, derived, shares, stopped=stopped)
+    return shown if forward else replace(shown, carried=carried(scene))
 
 
 def _along(
@@ -142,7 +146,7 @@ def _along(
     at = {name: value for name, value in state.items() if name in inputs}
     units = units | {"t": "s", "dt": "s"}
     motion = Motion(run.t) if places is None else Motion(run.t, *places)
-    return Inspection(versions, motion, at, derived, shares, stopped, units)
+    return Inspection(versions, motion, at, derived, shares, stopped=stopped, units=units)
 
 
 def _hamilton(scene: Scene, end: float, times: Array | None, say: Callable[[str], None]) -> Inspection:
@@ -231,7 +235,7 @@ def _named(**tables: Array) -> dict[str, float | Array]:
 
 
 def _shares(scene: Scene) -> StateTable | None:
-    """What each partial Lagrangian takes of the torques, and damping and forces where there are any; the sum of all."""
+    """Shares of the torques of each partial Lagrangian, of damping and forces where there are any, and their sum."""
     system, mechanism = scene.system, scene.mechanism
     if len(system.partial_lagrangians) < 2 or (mechanism is not None and mechanism.base_parameters):
         return None

@@ -20,9 +20,9 @@ from dynamics.equations.formulations.formulations import momentum_rate
 from dynamics.equations.momentum.hamiltonian import hamilton_equations, velocities
 from dynamics.equations.state_equation import state_equation, state_inputs
 from dynamics.integrators import TABLEAUS
+from dynamics.multibody.joint_coordinates import display_units
 from dynamics.multibody.joint_positions import drawn_points, view
 from dynamics.multibody.mechanism import Mechanism
-from dynamics.multibody.joint_coordinates import display_units
 from dynamics.scenes import Scene
 from dynamics.scenes.start import Start, moving_start, with_start
 from dynamics.simulation.simulate import simulate
@@ -30,9 +30,8 @@ from dynamics.simulation.trajectory import SimulationWarning
 from dynamics.systems.display_names import display_names
 from dynamics.systems.model import Model
 
-from ..inspector import Panel
-from ..live import EVALUATION, Live, page_text, panel
-from ..pages.html import Page, html_target
+from ..live import Live, page_text, panel
+from ..pages.html import Page, Panel, html_target
 
 MOST_BODIES = 4  # of a mechanism whose masses become parameters by themselves
 SAMPLES = 16  # states at which the extent of a mechanism is looked at
@@ -91,8 +90,9 @@ def live_page(model: Model, path: str | os.PathLike[str] | None = None, *, start
 
 def live_panel(scene: Scene, *, momentum: bool = False) -> Panel:
     """The motion of a scene as a panel at the end of another page, closed at first."""
-    live = panel(live_of(scene, momentum=momentum))
-    return Panel(style=live.style, run=live.script, end=live.folded(), allowed=EVALUATION, data=live.data)
+    shown = panel(live_of(scene, momentum=momentum))
+    closed = f'<details id="live"><summary>Live: computed as you watch</summary>\n{shown.body}</details>'
+    return shown._replace(body="", end=closed)
 
 
 def live_of(scene: Scene, *, momentum: bool = False) -> Live:
@@ -189,7 +189,7 @@ def _momenta(scene: Scene, values: Mapping[str, float]) -> dict[str, float]:
 
 
 def _places(scene: Scene, rate: Graph, start: dict[str, float]) -> tuple[dict[str, Node], tuple[int, ...]]:
-    """Where joints and tips are in the picture: x0, y0, x1, .. over the inputs of the state equation."""
+    """Places of joints and tips in the picture: x0, y0, x1, .. over the inputs of the state equation."""
     if scene.mechanism is None:
         return {}, ()
     inputs = dict(zip(rate.input_names, rate.inputs, strict=True))
@@ -212,7 +212,7 @@ def _places(scene: Scene, rate: Graph, start: dict[str, float]) -> tuple[dict[st
 
 
 def _scale(name: str, value: float, unit: str, weight: float) -> float:
-    """How far a slider reaches to both sides of 0."""
+    """Reach of a slider to both sides of 0."""
     if name.startswith("tau"):
         return _round(2.0 * weight) if weight else 10.0
     usual = USUAL.get(unit, 1.0)

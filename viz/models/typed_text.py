@@ -15,7 +15,7 @@ from cgraph.extend import OPS, columns, real_array, topological
 from dynamics.systems.model import Model, as_system
 from dynamics.systems.system import System
 
-MOST = 4  # coordinates that the page takes
+MOST_COORDINATES = 4  # coordinates that the page takes
 _NAME = re.compile(r"[^\W\d_][A-Za-z0-9_]*")
 _RESERVED = re.compile(r"(q|qd|qdd|tau|lambda)\d+(_old)?|t|dt|pi|π|.+dot\d*|time|damping|tau|force|coordinates?|[qLTV]")
 _ALIASES = ("ln", "arcsin", "arccos", "arctan", "arctan2", "min", "max")  # functions of the page beside the operations
@@ -61,9 +61,15 @@ def typed_text(model: Model, q: Sequence[float] | None = None, qd: Sequence[floa
     x(0) = 1
     """
     system = as_system(model)
-    if system.n > MOST or system.n != system.nq or system.kinematics.quasi is not None or len(system.constraints):
+    if (
+        system.n > MOST_COORDINATES
+        or system.n != system.nq
+        or system.kinematics.quasi is not None
+        or len(system.constraints)
+    ):
         raise ValueError(
-            f"the page takes up to {MOST} coordinates whose rates are velocities, without constraints; got {system!r}"
+            f"the page takes up to {MOST_COORDINATES} coordinates whose rates are velocities, without constraints; "
+            f"got {system!r}"
         )
     return _Writer(system).text(_start("q", q, system), _start("qd", qd, system))
 

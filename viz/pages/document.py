@@ -1,9 +1,16 @@
-"""Documents: headings, words, tables and pictures, as one HTML page or as Markdown beside picture files."""
+"""Documents: headings, words, tables and pictures, as one HTML page or as Markdown, and the files of one."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import json
+import re
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
+from pathlib import Path
+from tempfile import TemporaryFile
+
+from cgraph.extend import Json
 
 from . import html
 
@@ -63,7 +70,7 @@ class Document:
 
 
 def left_out(what: Sequence[str]) -> list[Block]:
-    """What the model of a page has not of the file that it was read from; it stands at the top."""
+    """Blocks at the top of a page on what its model has not of the file that it was read from."""
     return [Paragraph(f"Left out of the model: {'; '.join(what)}.", warning=True)] if what else []
 
 
@@ -116,3 +123,41 @@ def _markdown(blocks: Sequence[Block], folder: str) -> list[str]:
 
 def _row(cells: Sequence[str]) -> str:
     return "| " + " | ".join([cell.replace("|", "\\|") for cell in cells]) + " |"
+
+
+def check_folder(folder: Path) -> None:
+    """Write a file into the folder and leave nothing behind, the folder included: before the work of filling it.
+
+    Raises OSError, with the folder in its message.
+    """
+    ancestors = [folder, *folder.parents]
+    missing = [path for path in ancestors if not path.exists()]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        files = [path for path in ancestors if path.exists() and not path.is_dir()]
+        why = f"{files[0]} is a file" if files else error.strerror or str(error)
+        raise OSError(error.errno, f"cannot write into the folder {folder}: {why}") from error
+    finally:
+        for path in missing:
+            with suppress(OSError):  # not made, or somebody else has put something there
+                path.rmdir()
+
+
+def document_files(
+    folder: Path, name: str, document: Document, data: Mapping[str, Json], rows: str | None = None, *, kind: str = ""
+) -> dict[Path, str]:
+    """The files of one document in a folder, {path: text}, the page last.
+
+    They are called by the name, with `_` for what a file's name should not have, and `-kind` where there is a kind.
+    data: what the document was made of.  rows: as CSV; without them that file is left out.
+    """
+    stem = "-".join(filter(None, [re.sub(r"[^A-Za-z0-9.+-]+", "_", name).strip("_"), kind]))
+    files = {f"-{picture.name}.svg": picture.svg for picture in document.pictures()}
+    files[".json"] = json.dumps(data, indent=1)
+    if rows is not None:
+        files[".csv"] = rows
+    files |= {".md": to_markdown(document, f"{stem}-"), ".html": to_html(document)}
+    return {folder / f"{stem}{ending}": text for ending, text in files.items()}

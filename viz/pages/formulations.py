@@ -36,6 +36,6 @@ def size_table(sizes: Mapping[tuple[str, str], Sequence[int]]) -> Table:
 
 
 def _mistakes(nodes: int, edges: int, missing: int) -> str:
-    """What is there by mistake, and what is not there by mistake."""
+    """Words on nodes and edges that are there by mistake, and terms that are missing."""
     kinds = ((nodes, "node"), (edges, "edge"), (missing, "missing term"))
     return ", ".join([f"{count} {kind}{'s' * (count != 1)}" for count, kind in kinds if count]) or "none"

@@ -1,6 +1,6 @@
 // Graphs in a page: values of their nodes, slopes of their edges, adjoints of an output; and steps of a rate.
 //
-// A graph is {nodes, inputs, outputs} as `graph_data` of viz/pages/graph.py has it, an operation a row of the table.
+// A graph is {nodes, inputs, outputs} as `graph_data` of viz/pages/operations.py has it, an operation a row of the table.
 
 /** The operation of every node, and the numbers of its arguments: none of a constant and an input. */
 const opsOf = ({ nodes }) => nodes.map((node) => (Array.isArray(node) ? node[0] : node === null ? "variable" : "constant"));

@@ -11,8 +11,10 @@ from collections.abc import Mapping, Sequence
 from html import escape
 from importlib.resources import files
 from pathlib import Path
+from types import MappingProxyType
+from typing import NamedTuple
 
-from cgraph.extend import check_writable, require_path
+from cgraph.extend import Json, check_writable, require_path
 
 from .. import theme
 
@@ -69,6 +71,24 @@ class Page(str):
             f'<iframe srcdoc="{escape(self)}" sandbox="allow-scripts" title="cgraph page" '
             f'style="width:100%;height:{FRAME_HEIGHT}px;border:0"></iframe>'
         )
+
+
+class Panel(NamedTuple):
+    """A part that another module adds: markup beside the picture or at the end, style, scripts before and after start.
+
+    first: JavaScript for the record that the page shows first, where its own data are none.  run: JavaScript that
+    begins the panel; `inspector` is what app.js lends to other scripts.  data: as `compose` takes them.  allowed:
+    what the policy lets scripts do.
+    """
+
+    body: str = ""
+    style: str = ""
+    script: str = ""
+    first: str = ""
+    run: str = ""
+    end: str = ""
+    allowed: str = ""
+    data: Mapping[str, Json] = MappingProxyType({})
 
 
 def compose(

@@ -1,4 +1,4 @@
-"""What a notebook shows of a graph and of a motion: pictures that fit the cell, and how to see more."""
+"""Pictures of a graph and of a motion for a notebook's cell, and how to see more."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ HALF = 4.0  # inches, of a panel
 
 
 class Rows(Protocol):
-    """What is plotted of a `dynamics.Trajectory`."""
+    """Parts of a `dynamics.Trajectory` that are plotted."""
 
     t: Array
     q: Array

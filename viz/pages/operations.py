@@ -1,18 +1,16 @@
-"""The operations of the table for scripts of pages: values as JavaScript, partials as programs, formulas as trees."""
+"""Graphs and operations for scripts of pages: values as JavaScript, partials as programs, formulas as trees."""
 
 from __future__ import annotations
 
 import json
+import math
 import re
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from xml.etree import ElementTree
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import OPS, Op
-
-if TYPE_CHECKING:
-    from cgraph.extend import Json
+from cgraph.extend import OPS, Json, Op
 
 Part = str | int | list[Any]  # of a formula: a text, the number of an argument, [element, attributes, *parts]
 
@@ -86,3 +84,26 @@ def _parts(text: str | None) -> list[Part]:
     return [
         int(part[1:-1]) if re.fullmatch(r"{\d}", part) else part for part in re.split(r"({\d})", text or "") if part
     ]
+
+
+def graph_data(graph: Graph) -> dict[str, Json]:
+    """{nodes, inputs, outputs} of a graph.
+
+    nodes, arguments before uses: a constant as its value, an input as null, else [operation, *numbers of its
+    arguments]; [[name of an input, its number, -1 where nothing uses it]]; [[name of an output, number of a node]].
+    """
+    number = {node: i for i, node in enumerate(graph.nodes)}
+    return {
+        "nodes": [
+            _number(node.value) if node.value is not None
+            else [node.op.name, *[number[arg] for arg in node.args]] if node.args else None
+            for node in graph.nodes
+        ],
+        "inputs": [[name, number.get(node, -1)] for name, node in zip(graph.input_names, graph.inputs, strict=True)],
+        "outputs": [[name, number[node]] for name, node in graph.outputs.items()],
+    }  # fmt: skip
+
+
+def _number(value: float) -> float | str:
+    """JSON has no infinity."""
+    return value if math.isfinite(value) else str(value).replace("inf", "Infinity")

@@ -11,11 +11,9 @@ from dynamics.experiments.speed.bench_scenes import SCENES, chain
 from dynamics.experiments.text_table import csv_text
 
 from .. import theme
-from ..graph_drawing.dark import to_adaptive
-from ..graph_drawing.legend import kinds_in, legend_svg
-from ..graph_drawing.levels import LevelPanel, Scale, levels_svg
+from ..graph_drawing.legend import kinds_in, legend_svg, to_adaptive
+from ..graph_drawing.levels import LevelPanel, Scale, levels_svg, silhouettes_svg
 from ..graph_drawing.render import render_png
-from ..graph_drawing.silhouettes import silhouettes_svg
 from ..pages import html
 from ..theme import Paint
 from .part import Part

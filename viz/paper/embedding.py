@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from dynamics.experiments.paper_numbers.embedding_error import EmbeddingError, embedding_errors
+from dynamics.experiments.paper_numbers import EmbeddingError, embedding_errors
 from dynamics.experiments.text_table import csv_text
 
 from ..pages import html

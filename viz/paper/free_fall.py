@@ -2,24 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from cgraph.extend import Json
 from dynamics import scenes
-from dynamics.experiments.paper_numbers.free_fall import (
-    free_fall,
-    largest_differences,
-    mujoco_free_fall,
-)
+from dynamics.experiments.paper_numbers import free_fall, largest_differences, mujoco_free_fall
 from dynamics.experiments.text_table import csv_text
 
 from ..pages import html
 from ..plots import plot
 from .part import Part, pictures
-
-if TYPE_CHECKING:
-    from cgraph.extend import Json
 
 SNAPSHOTS = 6
 

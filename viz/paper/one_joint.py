@@ -7,15 +7,13 @@ from cgraph.extend import format_polynomial
 from dynamics import formulation_sizes, scenes
 from dynamics.equations.formulations.blame import Blame
 from dynamics.equations.formulations.formulation_sizes import INERTIAL_TERM, blamed, formulation_size
-from dynamics.experiments.paper_numbers.equation3 import PAPER, equation3, torque_terms
+from dynamics.experiments.paper_numbers import PAPER, equation3, torque_terms
 from dynamics.experiments.text_table import csv_text
 
 from .. import theme
-from ..graph_drawing.dark import to_adaptive
-from ..graph_drawing.dot import to_dot
-from ..graph_drawing.legend import kinds_in, legend_svg
+from ..graph_drawing.dot import short_formulas, to_dot
+from ..graph_drawing.legend import kinds_in, legend_svg, to_adaptive
 from ..graph_drawing.render import render_png, render_svg
-from ..graph_drawing.short_formulas import short_formulas
 from ..pages import html
 from ..pages.formulations import TITLES, WHY_FEWER, size_table
 from .part import Part

@@ -6,11 +6,13 @@ import json
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
+
+from cgraph.extend import Json
 
 from ..graph_drawing.render import check_can_draw
 from ..pages import html
-from ..pages.document_files import check_folder
+from ..pages.document import check_folder
 from ..plots import plot
 from .by_depth import figure7
 from .embedding import embedding
@@ -19,9 +21,6 @@ from .one_joint import equations, figure1, figure2, figure3, sizes
 from .part import Part
 from .scaling import scaling_of_counts
 from .timing import figure6
-
-if TYPE_CHECKING:
-    from cgraph.extend import Json
 
 QUICK_EVALUATIONS = 100  # of each formulation, for Figure 6
 QUICK_ARMS = (1, 3)  # links, for the law of the embedding

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, NamedTuple
 
+from cgraph.extend import Json
+
 from ..graph_drawing.render import render_png
 from ..plots import plot
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from cgraph.extend import Json
 
 SCALE = 160 / 96  # of a plot as PNG: 160 pixels an inch
 

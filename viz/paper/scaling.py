@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from dynamics.experiments.paper_numbers.node_scaling import COUNTS, FITTED_FROM, NodeScaling, node_scaling
+from dynamics.experiments.paper_numbers import COUNTS, FITTED_FROM, NodeScaling, node_scaling
 from dynamics.experiments.text_table import csv_text
 from dynamics.simulation.progress_bar import Progress
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from dynamics.experiments.paper_numbers.table_1 import PAPER_MS, Row, table_1
+from cgraph.extend import Json
+from dynamics.experiments.paper_numbers import PAPER_MS, Row, table_1
 from dynamics.experiments.text_table import csv_text
 
 from ..pages import html
@@ -16,7 +17,6 @@ from .part import Part, pictures
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from cgraph.extend import Json
 
 EVALUATIONS = 1000  # as in the paper
 

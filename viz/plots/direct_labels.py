@@ -151,7 +151,7 @@ def _name(axis: Axes, lines: Sequence[Line]) -> None:
 
 
 class Box(NamedTuple):
-    """Where a name could be, in pixels."""
+    """Place where a name could be, in pixels."""
 
     left: float
     right: float
@@ -159,7 +159,7 @@ class Box(NamedTuple):
     height: float
 
     def cost(self, end: Points, placed: Sequence[Box], inked: Points, letter: float) -> float:
-        """How bad it is there: on another name is worst, then on curves, then far from the end."""
+        """Cost of a place: on another name is worst, then on curves, then far from the end."""
         names = sum(
             other.left - 2 * letter < self.right
             and self.left - 2 * letter < other.right

@@ -14,7 +14,6 @@ from cgraph.extend import Array, install
 from .. import theme
 
 if TYPE_CHECKING:
-    from matplotlib.collections import LineCollection
     from matplotlib.figure import Figure
 
 STYLE: dict[Any, Any] = {
@@ -76,24 +75,7 @@ def to_adaptive_svg(figure: Figure, *, background: bool = False) -> str:
     return f"{head}<style>svg {{ color: {theme.TEXT}; fill: currentColor;{light} }} {dark}</style>\n <defs>{rest}"
 
 
-def painted_line(points: Array, values: Array, limits: tuple[float, float], colors: Sequence[str]) -> LineCollection:
-    """A line whose pieces are painted by their values, on a logarithmic scale from the first color to the last.
-
-    points: (T, 2).  values: (T - 1,), positive.
-    """
-    from matplotlib.collections import LineCollection
-    from matplotlib.colors import LinearSegmentedColormap, LogNorm
-
-    pieces = np.stack([points[:-1], points[1:]], axis=1)
-    ramp = LinearSegmentedColormap.from_list("ramp", list(colors))
-    return LineCollection(
-        pieces.tolist(), array=values, cmap=ramp, norm=LogNorm(*limits), linewidths=1.6, capstyle="round"
-    )
-
-
-def snapshots(
-    times: Array, positions: Array, instants: Sequence[float], traces: bool = True, dots: Array | None = None
-) -> Figure:
+def snapshots(times: Array, positions: Array, instants: Sequence[float], dots: Array | None = None) -> Figure:
     """Poses of an arm at `instants`, a panel each, with the way each joint has come.
 
     times: (T,) [s].  positions: (T, n + 1, 2) [m], base, joints and tip.  dots: another's positions at the same times,
@@ -111,8 +93,7 @@ def snapshots(
             row = int(np.abs(times - instant).argmin())
             for joint in range(1, positions.shape[1]):
                 color = theme.LINKS[(joint - 1) % len(theme.LINKS)]
-                if traces:
-                    axis.plot(*positions[: row + 1, joint][::-stride].T, color=color, linewidth=1.1, alpha=0.75)
+                axis.plot(*positions[: row + 1, joint][::-stride].T, color=color, linewidth=1.1, alpha=0.75)
                 axis.plot(*positions[row, joint - 1 : joint + 1].T, color=color, linewidth=5, solid_capstyle="round")
             axis.plot(*positions[row, :-1].T, "o", color="white", markeredgecolor=theme.LINE, markersize=5.5)
             if dots is not None:

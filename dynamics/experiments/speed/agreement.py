@@ -12,8 +12,8 @@ from ...equations.equations_of_motion import bias, forward_dynamics, mass_matrix
 from ...equations.formulations.formulations import inverse_dynamics
 from ...multibody.builders.planar_arm import planar_arm
 from ...multibody.mechanism import Mechanism
-from ...peers.case import Case
 from ...peers.mujoco import MujocoPeer
+from ...peers.peer import PeerModel
 from ...peers.pinocchio import PinocchioPeer
 from ..text_table import table
 
@@ -31,7 +31,7 @@ def agreement(links: int = LINKS, count: int = STATES) -> Iterator[str]:
             try:
                 for n in range(1, links + 1):
                     arm = random_arm(n, mass_model)
-                    worst = differences(arm, make(Case(name, arm)), count)
+                    worst = differences(arm, make(PeerModel(name, arm)), count)
                     rows.append([str(n), *[f"{worst[quantity]:.1e}" for quantity in QUANTITIES]])
             except ImportError as missing:
                 yield f"{title}: not measured, {missing}"

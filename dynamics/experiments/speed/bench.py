@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import statistics
+import string
+import textwrap
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -9,12 +12,12 @@ from functools import partial
 
 import numpy as np
 
-from cgraph.extend import Array
+from cgraph.extend import Array, install
 
 from ...multibody.mechanism import as_mechanism
-from ...peers import PEERS, Case
-from ...peers.case import MOTIONS, TASKS
-from ...peers.contender import MODES
+from ...peers import PEERS, PeerModel
+from ...peers.peer import MODES, MOTIONS, TASKS
+from ..text_table import WIDTH, digits, table
 from .bench_scenes import QUICK, SCENES, load
 from .worker import Load, Prepared, Worker
 
@@ -80,7 +83,7 @@ def bench(
     loads: dict[str, Load] = {name: partial(load, name, **(reading or {})) for name in scenes}
     cases = {}
     for name, scene in loads.items():  # a wrong name is told before anything is measured
-        cases[name] = Case(name, scene())
+        cases[name] = PeerModel(name, scene())
     wanted = [name for name, kind in PEERS.items() if name == OURS or (name in peers and kind.installed)]
     ours = PEERS[OURS].offers
     asked = {
@@ -94,13 +97,13 @@ def bench(
     return _rows(cases, loads, asked, wanted, repeats, budget, say)
 
 
-def _has(case: Case, task: str) -> bool:
+def _has(case: PeerModel, task: str) -> bool:
     """Whether there is such a task of the model."""
     return task not in MOTIONS or case.nq == case.n
 
 
 def _rows(
-    cases: dict[str, Case],
+    cases: dict[str, PeerModel],
     loads: dict[str, Load],
     asked: dict[str, list[str]],
     peers: list[str],
@@ -127,7 +130,7 @@ def _rows(
                 pool.end()
 
 
-def _row(case: Case, task: str, mode: str, pool: WorkerPool, repeats: int) -> Row:
+def _row(case: PeerModel, task: str, mode: str, pool: WorkerPool, repeats: int) -> Row:
     row = Row(case.name, task, mode, case.n)
     ready = pool.prepared(task, mode, row.skipped)
     samples: dict[str, list[float]] = {peer: [] for peer in ready}
@@ -152,8 +155,8 @@ def _row(case: Case, task: str, mode: str, pool: WorkerPool, repeats: int) -> Ro
     return row
 
 
-def _start(case: Case, task: str, mode: str) -> Array:
-    """What the values of a step or a loop are measured from: they move little, and it is the motion that counts."""
+def _start(case: PeerModel, task: str, mode: str) -> Array:
+    """Origin of the values of a step or a loop: they move little, and it is the motion that counts."""
     if mode == "loop":
         return case.point(task)
     if task == "rk4":
@@ -201,3 +204,110 @@ class WorkerPool:
 
 
 __all__ = ["AGREES", "MODES", "OURS", "PEERS", "QUICK", "SCENES", "TASKS", "Cell", "Row", "bench"]
+
+
+HOW = f"{install('bench')}; PyTorch by itself"  # to install what is missing
+
+
+def tables(rows: Sequence[Row], where: str = "") -> str:
+    """All tables of these rows, with what the columns and marks mean.  where: the machine, in words."""
+    shown = [peer for peer in PEERS if any(peer in row.cells or peer in row.skipped for row in rows)]
+    missing = [peer for peer, kind in PEERS.items() if not kind.installed]
+    lines = [
+        *([*textwrap.wrap(where, WIDTH), ""] if where else []),
+        "Medians of alternating turns on one core. In brackets: times ours, above 1 where ours is faster.",
+        f"* the fastest of its row.  ! it differs from ours by more than {AGREES:g}.  - a: not measured, see below.",
+        "",
+        *[f"{peer:<11} {PEERS[peer].about}" for peer in shown],
+        *(textwrap.wrap(f"not installed: {', '.join(missing)} ({HOW})", WIDTH) if missing else []),
+    ]
+    for task, about in TASKS.items():
+        of_task = [row for row in rows if row.task == task]
+        if not of_task:
+            continue
+        lines += ["", "", f"{about[0].upper()}{about[1:]}"]
+        for mode, says in MODES.items():
+            if of_mode := [row for row in of_task if row.mode == mode]:
+                lines += ["", f"{says[0].upper()}{says[1:]} [us]", *_table(of_mode, _times), *_spread(of_mode)]
+        first = [row for row in of_task if row.mode == of_task[0].mode]
+        lines += ["", "From the model to the first result [s], and the nodes of our graph", *_table(first, _made, True)]
+        lines += ["", "Largest difference from ours, over the largest entry", *_table(_worst(of_task), _differences)]
+    return "\n".join(lines)
+
+
+def _times(row: Row) -> dict[str, tuple[str, str]]:
+    """Time, and ratio with marks, of each peer."""
+    ours = row.cells.get(OURS)
+    best = min([cell.micros for cell in row.cells.values()], default=0.0)
+    result = {}
+    for peer, cell in row.cells.items():
+        ratio = f"[{digits(cell.micros / ours.micros, 2)}]" if ours and peer != OURS else ""
+        marks = ("*" if cell.micros == best else "") + ("" if agrees(cell) else "!")
+        result[peer] = digits(cell.micros, 3), ratio + marks
+    return result
+
+
+def _made(row: Row) -> dict[str, tuple[str, str]]:
+    return {peer: (digits(cell.made, 2), "") for peer, cell in row.cells.items()}
+
+
+def _differences(row: Row) -> dict[str, tuple[str, str]]:
+    return {
+        peer: (f"{cell.difference:.0e}", "" if agrees(cell) else "!")
+        for peer, cell in row.cells.items()
+        if peer != OURS and cell.difference is not None
+    }
+
+
+def _worst(rows: Sequence[Row]) -> list[Row]:
+    """One row for each scene, of each peer the cell that differs most over the modes."""
+    result: dict[str, Row] = {}
+    for row in rows:
+        kept = result.setdefault(row.scene, Row(row.scene, row.task, row.mode, row.coordinates))
+        for peer, cell in row.cells.items():
+            worst = kept.cells[peer].difference if peer in kept.cells else None
+            if worst is None or not (cell.difference is None or cell.difference <= worst):
+                kept.cells[peer] = cell
+    return list(result.values())
+
+
+def agrees(cell: Cell) -> bool:
+    """The difference, where one is known, is that of rounding; NaN is not."""
+    return cell.difference is None or cell.difference <= AGREES
+
+
+def _table(rows: Sequence[Row], read: Callable[[Row], dict[str, tuple[str, str]]], nodes: bool = False) -> list[str]:
+    """Lines of a table; blocks of columns under each other where they do not fit, then its footnotes."""
+    cells = {row.scene: read(row) for row in rows}
+    notes: dict[str, str] = {}  # reason: letter
+    shown = [peer for peer in PEERS if any(peer in cells[row.scene] for row in rows)]
+    unseen: dict[str, str] = {}  # peer: reason, where it is the same for all
+    for row in rows:
+        for peer, reason in row.skipped.items():
+            if peer in shown:
+                letter = notes.setdefault(reason, string.ascii_lowercase[min(len(notes), 25)])
+                cells[row.scene][peer] = "-", letter
+            else:
+                unseen[peer] = reason
+    head = ["scene", *(["nodes"] if nodes else []), *shown]
+    sizes = {row.scene: row.cells[OURS].size if OURS in row.cells else None for row in rows}
+    of_ours = {scene: [str(size or "")] if nodes else [] for scene, size in sizes.items()}
+    lines = table(
+        head, [[scene, *of_ours[scene], *[of.get(peer, "") for peer in shown]] for scene, of in cells.items()]
+    )
+    lines += [f"{letter}: {reason}" for reason, letter in notes.items()]
+    return lines + [f"without {peer}: {reason}" for peer, reason in unseen.items()]
+
+
+def _spread(rows: Sequence[Row]) -> list[str]:
+    """Spread of the turns of the peers."""
+    spreads = {
+        (peer, row.scene): 100.0 * (cell.high - cell.low) / cell.micros
+        for row in rows
+        for peer, cell in row.cells.items()
+    }
+    if not spreads:
+        return []
+    worst = max(spreads, key=lambda each: spreads[each])
+    usual, most = digits(statistics.median(spreads.values()), 2), digits(spreads[worst], 2)
+    return [f"spread between quartiles: {usual} % of the median as a rule, {most} % at most ({', '.join(worst)})"]

@@ -15,7 +15,7 @@ class BenchFigure(NamedTuple):
     takes: tuple[str, ...]
 
     def run(self, **numbers: int) -> Iterator[str]:
-        """What is printed. The module is imported now."""
+        """Texts to print. The module is imported now."""
         module, _, name = self.home.rpartition(".")
         parts: Iterator[str] = getattr(import_module(f"..{module}", __package__), name)(**numbers)
         return parts

@@ -17,8 +17,8 @@ from ...io.write_mjcf import to_mjcf
 from ...multibody.builders.planar_arm import planar_arm
 from ...multibody.loops import Loop
 from ...multibody.mechanism import Mechanism
-from ...peers.contender import Contender
-from ...peers.pinocchio_loops import constraint_dynamics
+from ...peers.peer import TimedTask
+from ...peers.pinocchio import constraint_dynamics
 from ..text_table import table
 from .worker import repetitions, timed
 
@@ -35,27 +35,27 @@ def pinned(links: int) -> tuple[Mechanism, Mechanism]:
     return arm, Mechanism(arm.bodies, arm.gravity, loops=[Loop("point", "tip", to_at=PIN)])
 
 
-def ours(held: Mechanism, x: Array) -> Contender:
+def ours(held: Mechanism, x: Array) -> TimedTask:
     """The compiled graph, bound to its arrays: accelerations and the force of the pin."""
     compiled, n = cg.compile(forward_dynamics(held)), len(x) // 3
     out = np.empty(compiled.n_out)
-    return Contender(compiled.bind(np.array(x), out), lambda _: out[:n])
+    return TimedTask(compiled.bind(np.array(x), out), lambda _: out[:n])
 
 
-def pinocchio(held: Mechanism, x: Array) -> Contender:
+def pinocchio(held: Mechanism, x: Array) -> TimedTask:
     """constraintDynamics, proximal, without its stabilisation."""
     run, result = constraint_dynamics(held, PROXIMAL)(x)
-    return Contender(run, lambda _: result())
+    return TimedTask(run, lambda _: result())
 
 
-def connected(arm: Mechanism, x: Array) -> Contender:
+def connected(arm: Mechanism, x: Array) -> TimedTask:
     """mj_forward with an equality constraint, which is soft: other accelerations, the same work."""
     module, n = mujoco(), len(x) // 3
     hold = f'<equality><connect body1="{arm.moving[-1].name}" anchor="0 0 {-LENGTH}"/></equality>'
     model = module.MjModel.from_xml_string(to_mjcf(arm).replace("</worldbody>", f"</worldbody>{hold}"))
     data = module.MjData(model)
     data.qpos[:], data.qvel[:], data.qfrc_applied[:] = x[:n], x[n : 2 * n], x[2 * n :]
-    return Contender(lambda: module.mj_forward(model, data), lambda _: data.qacc)
+    return TimedTask(lambda: module.mj_forward(model, data), lambda _: data.qacc)
 
 
 def closed_chains(repeats: int = REPEATS) -> Iterator[str]:
@@ -87,7 +87,7 @@ def closed_chains(repeats: int = REPEATS) -> Iterator[str]:
     yield "\n".join(["chains pinned at the tip; microseconds a call", *table(header, rows)])
 
 
-def _check(links: int, one: Contender, other: Contender) -> None:
+def _check(links: int, one: TimedTask, other: TimedTask) -> None:
     """Raise ArithmeticError where accelerations differ by more than Pinocchio's iteration leaves."""
     ours, theirs = one.result(one.run()), other.result(other.run())
     off = float(np.abs(ours - theirs).max() / np.abs(ours).max())

@@ -7,7 +7,6 @@ trajectory. Peers run the first of the trajectories.
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable, Iterator
 
@@ -17,12 +16,13 @@ from cgraph.extend import Array
 
 from ... import scenes
 from ...io.mujoco_twin import rollout
-from ...peers.case import AnyState, Case, rk4_step
 from ...peers.jax import JaxPeer
 from ...peers.mujoco import MujocoPeer
+from ...peers.peer import AnyState, PeerModel, rk4_step
 from ...simulation.ensembles.simulate_many import simulate_many
 from ..machine import load
 from ..text_table import table
+from .worker import single_core
 
 SCENE = "triple_pendulum"
 STEPS, DT = 1000, 1e-3  # s
@@ -48,20 +48,19 @@ def ours(q: Array, qd: Array) -> Run:
 
 def mujoco(q: Array, qd: Array) -> Run:
     """MuJoCo's rollout in one thread; contacts and whatever else the pendulum does not need are off."""
-    peer = MujocoPeer(Case(SCENE, scenes.load(SCENE)))
+    peer = MujocoPeer(PeerModel(SCENE, scenes.load(SCENE)))
     model, n = peer.twin.model, q.shape[1]
     model.opt.timestep = DT
-    starts = np.hstack([np.zeros((len(q), 1)), q[:, peer.at], qd[:, peer.at]])  # time, qpos, qvel
+    starts = peer.starts(np.hstack([q, qd]))
     states = np.empty((BLOCK, STEPS, 1 + 2 * n))
     blocks = [starts[k : k + BLOCK] for k in range(0, len(starts), BLOCK)]
     runs = [rollout(model, some, states[: len(some)]) for some in blocks]
-    ours_in_theirs = np.concatenate([1 + peer.order, 1 + n + peer.order])
 
     def run() -> Array:
         ends = []
         for some, each in zip(blocks, runs, strict=True):
             each()
-            ends.append(states[: len(some), -1, ours_in_theirs])
+            ends.append(states[: len(some), -1, peer.taken])
         return np.concatenate(ends)
 
     return run
@@ -69,7 +68,7 @@ def mujoco(q: Array, qd: Array) -> Run:
 
 def jax(q: Array, qd: Array) -> Run:
     """JAX's own derivatives of the same Lagrangian: jit of vmap of lax.scan, in double precision."""
-    peer = JaxPeer(Case(SCENE, scenes.load(SCENE)))
+    peer = JaxPeer(PeerModel(SCENE, scenes.load(SCENE)))
 
     def step(x: AnyState, _: None) -> tuple[AnyState, None]:
         return rk4_step(peer.rate, x, DT), None
@@ -81,14 +80,8 @@ def jax(q: Array, qd: Array) -> Run:
 
 def ensembles(count: int = COUNT, repeats: int = REPEATS) -> Iterator[str]:
     """First runs as they are ready, and then the table."""
-    cores = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else set()
-    if cores:
-        os.sched_setaffinity(0, {min(cores)})  # before JAX counts them
-    try:
+    with single_core():  # before JAX counts them
         yield from _measured(count, repeats)
-    finally:
-        if cores:
-            os.sched_setaffinity(0, cores)
 
 
 def _measured(count: int, repeats: int) -> Iterator[str]:

@@ -5,20 +5,20 @@ A variant is another way to write or to solve the same equations, through the pu
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-import cgraph as cg
-from cgraph import Graph, Node
+from cgraph import Graph
 
 from ...equations.accelerations import accelerations
 from ...equations.equations_of_motion import forward_dynamics
 from ...multibody.builders.planar_arm import planar_links
 from ...multibody.mechanism import Mechanism
 from ...systems.system import System
-from ..paper_numbers.fit import exponent
+from ..paper_numbers import exponent
+from ..stability.single_evaluations import by_centers
 from ..text_table import table
 from .bench_scenes import binary_tree, chain, turned_arm
 
@@ -51,31 +51,17 @@ def from_lagrangian(model: Mechanism) -> Graph:
     return accelerations(plain, "recursive")
 
 
-def by_centers(model: Mechanism) -> Graph:
+def of_centers(model: Mechanism) -> Graph:
     """A planar arm with the velocities of the centers of mass: K = m v.v / 2 + I w^2 / 2, and its bias from L."""
-    links, gravity = planar_links(model), -float(np.asarray(model.gravity)[2])
-
-    def lagrangian(q: Sequence[Node], qd: Sequence[Node], t: Node) -> list[Node]:
-        partials = []
-        angle, omega = cg.constant(0.0), cg.constant(0.0)
-        x, y, height = cg.constant(0.0), cg.constant(0.0), cg.constant(0.0)
-        for turn, rate, link in zip(q, qd, links, strict=True):
-            angle, omega = angle + turn, omega + rate
-            s, c = cg.sin(angle), cg.cos(angle)
-            u, v = x + link.center * omega * c, y + link.center * omega * s
-            kinetic = 0.5 * link.mass * (u * u + v * v) + 0.5 * link.inertia * (omega * omega)
-            partials.append(kinetic - link.mass * gravity * (height - link.center * c))
-            x, y, height = x + link.length * omega * c, y + link.length * omega * s, height - link.length * c
-        return partials
-
-    system = model.system
-    return accelerations(System(lagrangian, system.coordinates, damping=system.damping), "recursive")
+    links, gravity, system = planar_links(model), -float(np.asarray(model.gravity)[2]), model.system
+    other = System(lambda q, qd, t: by_centers(q, qd, links, gravity), system.coordinates, damping=system.damping)
+    return accelerations(other, "recursive")
 
 
 VARIANTS = {
     "every idea": Variant(lambda model: forward_dynamics(model, "recursive")),
     "bias from the Lagrangian": Variant(from_lagrangian),
-    "energy by the center's velocity": Variant(by_centers, planar=True),
+    "energy by the center's velocity": Variant(of_centers, planar=True),
     "dense": Variant(lambda model: forward_dynamics(model, "dense"), 15),
 }
 

@@ -45,7 +45,7 @@ SYMORO = {  # inverse dynamics, mass matrix, forward dynamics of base numbers, r
 
 
 class Operations(NamedTuple):
-    """Of one graph.  turns: sines and cosines.  depth: operations on the longest path."""
+    """Operations of one graph.  turns: sines and cosines.  depth: operations on the longest path."""
 
     products: int
     sums: int

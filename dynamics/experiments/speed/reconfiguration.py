@@ -37,13 +37,13 @@ MIDDLE = 0.5  # of the arm: which joint is locked
 
 
 def tool(version: int) -> Body:
-    """What is attached to the tip."""
+    """Tool for the tip."""
     grip = Joint("fixed", position=(0.1, 0.0, -0.2))
     return Body("tool", grip, mass=1.0 + 1e-3 * version, center=(0.0, 0.05, 0.0), inertia=(2e-3, 3e-3, 4e-3))
 
 
 def angle(version: int) -> float:
-    """Where the joint in the middle is locked [rad]."""
+    """Angle at which the joint in the middle is locked [rad]."""
     return 0.2 + 1e-3 * version
 
 
@@ -54,7 +54,7 @@ def by_kernels(mechanism: Mechanism) -> Torque:
 
 
 def by_rebuild(mechanism: Mechanism) -> Torque:
-    """As from a mechanism that shares nothing with another."""
+    """By a mechanism that shares nothing with another."""
     fresh = Mechanism(mechanism.bodies, mechanism.gravity, locked=mechanism.locked)
     function = cg.compile(inverse_dynamics(fresh))
     return lambda q: np.asarray(function(np.concatenate([q, q / 2, -q])))

@@ -19,7 +19,7 @@ from ...multibody.builders.planar_arm import planar_arm
 from ...multibody.mechanism import Mechanism
 from ...multiprecision.chain_equations import accelerations
 from ...systems.model import as_system
-from ..fresh_process import run_fresh
+from ..machine import run_fresh
 from ..text_table import digits, table
 from .bench_scenes import turned_arm
 
@@ -53,7 +53,7 @@ class Stages:
         self.spent: dict[str, Spent] = {}
 
     def __call__(self, name: str, function: Callable[[], Made]) -> Made:
-        """What the function returns, its cost noted under that name."""
+        """Run a stage, its cost noted under that name."""
         begin, worked = time.perf_counter(), time.process_time()
         result = function()
         self.spent[name] = Spent(time.perf_counter() - begin, time.process_time() - worked, _peak())
@@ -110,7 +110,7 @@ def long_chains(links: int = LINKS) -> Iterator[str]:
 
 
 def _fresh(function: str, kind: str, n: int) -> str:
-    """What a function below writes of a chain, in a process of its own."""
+    """Output of a function below on a chain, in a process of its own."""
     done = run_fresh(__name__, f"{function}({kind!r}, {n})")
     if done.returncode:
         raise RuntimeError(f"{kind} chain of {n} links: {done.stderr.strip()[-200:]}")

@@ -1,4 +1,4 @@
-"""Worker: a process of its own for one peer on one scene, which prepares contenders and runs them when told.
+"""Worker: a process of its own for one peer on one scene, which prepares tasks and runs them when told.
 
 A peer that takes too long or falls over is ended with its process; the others go on.
 """
@@ -23,7 +23,8 @@ from typing import Any
 from cgraph.extend import Array
 
 from ...multibody.mechanism import MechanismWarning
-from ...peers import PEERS, Case, Contender, UnavailableError
+from ...peers import PEERS, PeerModel, TimedTask, UnavailableError
+from ...peers.peer import EVALUATIONS
 from ...scenes import Scene
 
 Load = Callable[[], Scene]  # makes the model anew in the worker; lambdas do not travel
@@ -39,7 +40,7 @@ _ONE_CORE = {
 
 @dataclass(frozen=True)
 class Prepared:
-    """A contender that is ready.  seconds: from the model to its first result.  values: that result."""
+    """A timed task that is ready.  seconds: from the model to its first result.  values: that result."""
 
     seconds: float
     values: Array
@@ -48,7 +49,7 @@ class Prepared:
 
 @dataclass(frozen=True)
 class Refused:
-    """A contender that is not, and why."""
+    """Reason why a task is not ready."""
 
     reason: str
 
@@ -60,12 +61,12 @@ class Worker:
         context = multiprocessing.get_context("spawn")
         self._pipe, theirs = context.Pipe()
         self._process = context.Process(target=_serve, args=(theirs, load, peer), daemon=True)
-        with _single_core(), _interrupts_held():
+        with single_core(), _interrupts_held():
             self._process.start()
         theirs.close()
 
     def prepare(self, task: str, mode: str, budget: float) -> Prepared | Refused:
-        """Make and check the contender for a task and a mode; the process ends if it takes longer than `budget` s."""
+        """Make and check the timed task; the process ends if it takes longer than `budget` s."""
         if (told := self._tell(task, mode)) is not None:
             return told
         if not self._pipe.poll(budget):
@@ -103,7 +104,7 @@ class Worker:
 
     @property
     def alive(self) -> bool:
-        """It can still be asked."""
+        """Whether the process can still be asked."""
         return self._process.is_alive()
 
     def end(self) -> None:
@@ -123,48 +124,48 @@ def _serve(pipe: Connection, load: Load, name: str) -> None:
     warnings.simplefilter("ignore", MechanismWarning)  # the first process has said what is left out
     with suppress(EOFError, BrokenPipeError):
         kind = PEERS[name]
-        with suppress(Exception):  # loading a package is no part of making a contender; what is wrong shows again there
+        with suppress(Exception):  # loading a package is no part of making a task; what is wrong shows again there
             kind.load()
             import_module(kind.package)
-        contenders: dict[tuple[str, str], tuple[Contender, int]] = {}
-        case, peer = Case(name, load()), None
+        tasks: dict[tuple[str, str], tuple[TimedTask, int]] = {}
+        case, peer = PeerModel(name, load()), None
         while True:
             asked = pipe.recv()
-            if asked in contenders:
-                pipe.send(timed(*contenders[asked]))
+            if asked in tasks:
+                pipe.send(timed(*tasks[asked]) / EVALUATIONS[asked[1]])
                 continue
             start = time.perf_counter()
             try:
                 peer = peer or kind.make(case)
-                contender = peer.prepare(*asked)
-                result = contender.run()
+                task = peer.prepare(*asked)
+                result = task.run()
                 seconds = time.perf_counter() - start
-                contenders[asked] = contender, repetitions(contender)
-                pipe.send(Prepared(seconds, contender.result(result), contender.size))
+                tasks[asked] = task, repetitions(task)
+                pipe.send(Prepared(seconds, task.result(result), task.size))
             except UnavailableError as error:
                 pipe.send(Refused(str(error)))
             except Exception as error:  # noqa: BLE001 (whatever a peer's own code raises is a line in the report)
                 pipe.send(Refused(f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"))
 
 
-def repetitions(contender: Contender) -> int:
-    """How many runs make a measurable time."""
+def repetitions(task: TimedTask) -> int:
+    """Number of runs that make a measurable time."""
     start = time.perf_counter()
-    contender.run()
+    task.run()
     once = time.perf_counter() - start
     return max(1, math.ceil(CHUNK / once)) if once < CHUNK else 1
 
 
-def timed(contender: Contender, repetitions: int) -> float:
-    """Seconds for an evaluation."""
-    run = contender.run
+def timed(task: TimedTask, repetitions: int) -> float:
+    """Seconds for a run."""
+    run = task.run
     gc.disable()
     try:
         run()  # other processes have had the caches since
         start = time.perf_counter()
         for _ in range(repetitions):
             run()
-        return (time.perf_counter() - start) / (repetitions * contender.evaluations)
+        return (time.perf_counter() - start) / repetitions
     finally:
         gc.enable()
 
@@ -184,8 +185,8 @@ def _interrupts_held() -> Iterator[None]:
 
 
 @contextmanager
-def _single_core() -> Iterator[None]:
-    """Processes started within run on one core, the same for all, and start no threads to share it."""
+def single_core() -> Iterator[None]:
+    """This process and those started within run on one core, the same for all, and start no threads to share it."""
     before = {name: os.environ.get(name) for name in _ONE_CORE}
     os.environ.update(_ONE_CORE)
     cores = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else set()

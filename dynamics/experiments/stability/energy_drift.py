@@ -13,9 +13,8 @@ from cgraph.extend import Array
 from ...multibody.builders.planar_arm import planar_arm
 from ...scenes import Scene
 from ...simulation.simulate import simulate
-from .case_result import CaseResult, Measurement
+from .case_result import CaseResult, Measurement, reason
 from .cases.orbits import kepler
-from .known_limits import reason
 
 STEPS, QUICK = 10**6, 10**5
 BLOCKS = 16  # whose means are taken as independent; their residuals show how far they are that
@@ -32,7 +31,7 @@ MOTIONS: dict[str, tuple[Scene, float]] = {  # without chaos, and the step to ru
 
 
 class Drift(NamedTuple):
-    """Of an energy over a run: relative to `size`."""
+    """Drift of an energy over a run, relative to `size`."""
 
     band: float  # largest less smallest
     drift: float  # the change over the run by the straight line of least squares

@@ -9,6 +9,8 @@ whose parameters are inputs), the exact values come from Newton-Euler equations 
 
 In double-double the parameters are inputs too. Built in, products of them are rounded when the graph is made, each on
 its own, and then m l_1 l_2, m l_1 and m g no longer belong to one m: with a mass of 1e12 that moves the light links.
+
+Besides, sine and cosine of the backends at random angles of every size, in ulps of the exact value.
 """
 
 from __future__ import annotations
@@ -16,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -29,9 +31,9 @@ from ...equations.formulations.formulations import inverse_dynamics
 from ...multibody.builders.planar_arm import planar_arm, planar_links
 from ...multibody.mechanism import Mechanism
 from ...multiprecision.chain_equations import Pair, accelerations, torques
+from ...multiprecision.flint_numbers import working
 from ...systems.system import System
-from .case_result import CaseResult, Measurement
-from .known_limits import reason
+from .case_result import CaseResult, Measurement, reason
 
 SECTION = "Single evaluations"
 ULP = 2.0**-52
@@ -43,7 +45,7 @@ SEED = 2025
 
 
 class Task(NamedTuple):
-    """What is evaluated.  doubled: in double-double, see above."""
+    """Quantity to evaluate.  doubled: in double-double, see above."""
 
     derive: Callable[..., Graph]
     exact: Callable[..., Pair]
@@ -152,7 +154,7 @@ class Arms:
         self._graph = task.derive(arm_with_parameters(n))
 
     def functions(self, arm: Mechanism) -> list[Compiled]:
-        """What evaluates the task, one for each backend; in double-double one for all arms."""
+        """Functions of the task, one for each backend; in double-double one for all arms."""
         return self._doubled if self.task.doubled else self._compiled(self.task.derive(arm))
 
     @cached_property
@@ -208,7 +210,7 @@ def arm_with_parameters(n: int) -> System:
     )
 
 
-def by_centers(q: Sequence[Node], qd: Sequence[Node], links: Sequence[LinkParameters], gravity: Node) -> list[Node]:
+def by_centers(q: Sequence[Node], qd: Sequence[Node], links: Sequence[Any], gravity: Node | float) -> list[Node]:
     """The partial Lagrangians by positions and velocities of the centers of mass, K = m v.v / 2 + I w^2 / 2."""
     partials: list[Node] = []
     angle, omega = q[0], qd[0]
@@ -224,3 +226,66 @@ def by_centers(q: Sequence[Node], qd: Sequence[Node], links: Sequence[LinkParame
         r = link.length
         x, y, height = x + r * omega * c, y + r * omega * s, height - r * c
     return partials
+
+
+SINES, SINE_CASE = "Sine and cosine", "sine and cosine"
+SINE_BOUND = 2.0  # ulp, what cgraph promises of its polynomials; a correctly rounded value is within half of one
+COUNT, QUICK_COUNT = 4000, 500  # angles of each range
+DIGITS = 360  # more than the largest angle has before its point
+RANGES: dict[str, tuple[float, float]] = {  # decimal exponents
+    "1e-300 .. 1": (-300.0, 0.0),
+    "1 .. 1e6": (0.0, 6.0),
+    "1e6 .. 1e9": (6.0, 9.0),
+    "1e9 .. 1e16": (9.0, 16.0),
+    "1e16 .. 1e308": (16.0, 308.0),
+}
+
+
+def sine_results(count: int = COUNT, backends: Sequence[str] | None = None) -> Iterator[CaseResult]:
+    """A result for each backend, at single points and in a batch, with a measurement for each range of angles."""
+    x = cg.variable("x")
+    graph = cg.Graph([x], {"sin": cg.sin(x), "cos": cg.cos(x)})
+    points = {name: angles(low, high, count) for name, (low, high) in RANGES.items()}
+    known = {name: exact(each) for name, each in points.items()}
+    for backend in backends or available():
+        function = cg.compile(graph, backend)
+        for way, evaluate in ((backend, _one_by_one), (f"{backend}, batch", _in_a_batch)):
+            off = {name: ulps(evaluate(function, points[name]), known[name]) for name in RANGES}
+            rows = tuple(
+                [Measurement(f"{name} rad", off[name], SINE_BOUND, "ulp", "of the exact value") for name in off]
+            )
+            about = f"{count} random angles of each range, both signs"
+            yield CaseResult(SINES, SINE_CASE, about, way, rows, reason=reason(SINES, SINE_CASE, way, rows))
+
+
+def _one_by_one(function: cg.Compiled, points: Array) -> Array:
+    return np.array([function([each]) for each in points.tolist()]).T
+
+
+def _in_a_batch(function: cg.Compiled, points: Array) -> Array:
+    return function.batch(points[None])
+
+
+def angles(low: float, high: float, count: int) -> Array:
+    """Random angles, their logarithms uniform, and of both signs."""
+    rng = np.random.default_rng(SEED)
+    sizes: Array = 10.0 ** rng.uniform(low, high, count)
+    return np.where(rng.random(count) < 0.5, -sizes, sizes)
+
+
+def exact(points: Array) -> Pair:
+    """Sine and cosine, (2, N)."""
+    with working(DIGITS) as number:
+        at = [number(x) for x in points.tolist()]
+        rows = [[x.sin() for x in at], [x.cos() for x in at]]
+        high = [[float(each.mid()) for each in row] for row in rows]
+        low = [
+            [float((each - near).mid()) for each, near in zip(row, nearest, strict=True)]
+            for row, nearest in zip(rows, high, strict=True)
+        ]
+    return Pair(np.array(high), np.array(low))
+
+
+def ulps(values: Array, known: Pair) -> float:
+    """The largest error."""
+    return float(np.max(np.abs(known.deviation(values)) / np.spacing(np.abs(known.high))))

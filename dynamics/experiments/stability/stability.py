@@ -1,16 +1,20 @@
-"""Stability: the table of stiff and extreme cases, a result a row, and its forms as plain data and as CSV."""
+"""Stability: the table of stiff and extreme cases, a result a row, and its forms as text, plain data and CSV."""
 
 from __future__ import annotations
 
+import itertools
+import math
+import textwrap
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from ...multiprecision.flint_numbers import flint
 from ..machine import load, machine
-from ..text_table import csv_text
-from . import case_runs, energy_drift, huge_angles, single_evaluations
-from .case_result import CaseResult
+from ..text_table import GAPS, WIDTH, csv_text, number, table
+from . import case_runs, energy_drift, single_evaluations
+from .case_result import CaseResult, Measurement
 
 QUICK = (  # cases of a quick run: one of each kind, none that takes a while to compile
     "spring pendulum, k = 1e+12",
@@ -40,7 +44,7 @@ ABOUT = {
     "component's size, where a size is |y_i| + sum_j |dy_i/dx_j| |x_j| over all inputs and parameters: the "
     "componentwise condition. 1 is what rounding the data once would do. Exact values from Newton-Euler equations "
     "with a dense solve in multiprecision; the worst of five random states, backends, single points and batches.",
-    huge_angles.SECTION: "The largest error over random angles, in units of the last place of the exact value.",
+    single_evaluations.SINES: "The largest error over random angles, in units of the last place of the exact value.",
 }
 
 
@@ -63,7 +67,7 @@ def results(quick: bool = False) -> Iterator[CaseResult]:
     yield from case_runs.results(QUICK if quick else None)
     yield from energy_drift.results(energy_drift.QUICK if quick else energy_drift.STEPS)
     yield from single_evaluations.results(single_evaluations.QUICK if quick else single_evaluations.LINKS)
-    yield from huge_angles.results(huge_angles.QUICK if quick else huge_angles.COUNT)
+    yield from single_evaluations.sine_results(single_evaluations.QUICK_COUNT if quick else single_evaluations.COUNT)
 
 
 def to_dict(rows: Sequence[CaseResult], seconds: float, quick: bool = False) -> dict[str, Any]:
@@ -88,3 +92,72 @@ def to_csv(results: Sequence[CaseResult]) -> str:
     rows = [row | each for row in [one.to_dict() for one in results] for each in row["measurements"]]
     columns = [*of_row, *of_value, *of_run]
     return csv_text(columns, [[row[name] for name in columns] for row in rows])
+
+
+NAMES = 34  # characters of a case's name on a line
+INDENT = " " * 13  # of a reason
+
+
+def text(results: Sequence[CaseResult]) -> str:
+    """All sections, with the reason under each limit, and a line of counts."""
+    lines = []
+    for section, about in ABOUT.items():
+        rows = [row for row in results if row.section == section]
+        if rows:
+            lines += [section, *textwrap.wrap(about, WIDTH), "", *_section(rows), ""]
+    return "\n".join([*lines, summary(results)])
+
+
+def summary(results: Sequence[CaseResult]) -> str:
+    """Count of each verdict."""
+    counts = Counter(row.verdict for row in results)
+    return f"{len(results)} rows: {', '.join(f'{counts[word]} {word}' for word in ('meets', 'limit', 'unexplained'))}"
+
+
+def _section(rows: Sequence[CaseResult]) -> list[str]:
+    runs = any(row.steps or row.rejected for row in rows)
+    header = ["verdict", "case", "method", *(["steps", "time"] if runs else [])]
+    left = [_left(row, runs) for row in rows]
+    taken = [max(map(len, column)) for column in zip(header, *[line for lines in left for line in lines], strict=True)]
+    space = WIDTH - sum(taken) - len(taken) * len(GAPS[0])
+    right = [_packed([_measured(each) for each in row.measurements], space) for row in rows]
+    none = [""] * len(header)
+    cells = [
+        [[*(before or none), after or ""] for before, after in itertools.zip_longest(*pair)]
+        for pair in zip(left, right, strict=True)
+    ]
+    header.append("figures, and in brackets their bounds")
+    title, *below = table(header, [line for row in cells for line in row], left=(0, 1, 2, len(none)))
+    lines, rest = [title], iter(below)
+    for row, of_row, after in itertools.zip_longest(rows, cells, rows[1:]):
+        lines += itertools.islice(rest, len(of_row))
+        if not row.meets and (after is None or after.meets or _why(after) != _why(row)):  # once for rows that share it
+            lines += textwrap.wrap(_why(row), WIDTH, initial_indent=INDENT, subsequent_indent=INDENT)
+    return lines
+
+
+def _why(row: CaseResult) -> str:
+    return ": ".join(filter(None, [row.stopped, row.reason or "no reason is known"]))
+
+
+def _left(row: CaseResult, runs: bool) -> list[list[str]]:
+    """The cells before the measurements; a long name goes on in the lines below."""
+    run = [f"{row.steps}" + (f"+{row.rejected}" if row.rejected else ""), f"{row.seconds:.2f} s"] if runs else []
+    first, *more = textwrap.wrap(row.case, NAMES)
+    return [[row.verdict, first, row.method, *run], *[["", part, "", *["" for _ in run]] for part in more]]
+
+
+def _measured(measurement: Measurement) -> str:
+    bound = "" if math.isinf(measurement.bound) else f" ({number(measurement.bound)})"
+    return f"{measurement.quantity} {number(measurement.value)}{bound}{'' if measurement.meets else ' !'}"
+
+
+def _packed(texts: Sequence[str], width: int) -> list[str]:
+    """Texts on as few lines as they take, none broken."""
+    lines: list[str] = []
+    for part in texts:
+        if lines and len(lines[-1]) + 2 + len(part) <= width:
+            lines[-1] += f", {part}"
+        else:
+            lines.append(part)
+    return lines

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -25,9 +24,7 @@ from ...simulation.ensembles.simulate_many import simulate_many
 from ...simulation.events.event import Event
 from ...simulation.simulate import simulate
 from ...systems.system import System
-from ..text_table import table
-from .answers import COUNT
-from .trust import RIGHT, SAID, SILENT, SLACK, Verdict, trust
+from .trust import COUNT, RIGHT, SAID, SILENT, SLACK, Verdict, counted, trust
 
 CASCADES = 100
 UNITS = 6.0  # decades of the units of length and time, each way
@@ -112,7 +109,7 @@ def _free(x: Fraction, v: Fraction, t: Fraction, pull: Fraction) -> tuple[Fracti
 
 
 def _folded(x: Fraction, v: Fraction, low: Fraction, high: Fraction) -> tuple[Fraction, Fraction]:
-    """Of a point on a line that is folded at both walls."""
+    """State of a point on a line that is folded at both walls."""
     times, inside = divmod(x - low, high - low)
     return (low + inside, v) if times % 2 == 0 else (high - inside, -v)
 
@@ -203,17 +200,8 @@ def _error(balls: Balls, q: Array, qd: Array) -> float:
 def cascades(count: int = CASCADES) -> Iterator[str]:
     """The verdicts on so many cascades by all methods, and in words those that are not right."""
     judged = [judge_balls(number, method) for method in (None, *METHODS) for number in range(count)]
-    rows = []
-    for method in dict.fromkeys([each.method for each in judged]):
-        chosen = [each for each in judged if each.method == method]
-        counts = Counter([each.verdict for each in chosen])
-        worst = max([each.excess for each in chosen if each.excess == each.excess], default=math.nan)
-        rows.append([method, *[str(counts[verdict]) for verdict in (RIGHT, SAID, SILENT)], f"{worst:.2g}"])
-    yield f"{count} cascades of 2 to 5 equal balls, by exact fractions; excess: error over {TOLERANCE:g}"
-    yield "\n".join(table(["method", RIGHT, SAID, SILENT, "largest excess"], rows))
-    for each in judged:
-        if each.verdict != RIGHT:
-            yield f"{each.verdict}: {each.name}, {each.method}: excess {each.excess:.3g}; {each.words}"
+    title = f"{count} cascades of 2 to 5 equal balls, by exact fractions; excess: error over {TOLERANCE:g}"
+    yield from counted(title, judged, {"largest excess": lambda chosen, ends: f"{max(ends, default=math.nan):.2g}"})
 
 
 def with_cascades(count: int = COUNT) -> Iterator[str]:

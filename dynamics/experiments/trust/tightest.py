@@ -14,8 +14,8 @@ from ..text_table import table
 from ..work_precision.measurement import Tried, in_turns
 from ..work_precision.trajectory_peers import EPSILON, Heyoka
 from ..work_precision.trajectory_runs import Ours, Solver, problem_of
-from .answers import Answer, answer
-from .random_lagrangians import LAGRANGIANS, random_setting
+from .random_motions import LAGRANGIANS, random_task
+from .trust import Answer, answer
 
 METHOD, TURNS = "taylor", 5
 FLOOR = EPSILON / 4.0  # of an error in a ratio: less is luck
@@ -34,23 +34,23 @@ class Duel:
     status: str = ""
 
 
-def duel(number: int, method: str = METHOD, tolerance: float = EPSILON) -> Duel | None:
-    """One of our methods at this tolerance, and heyoka at its default; None of a motion that has no end or is stiff."""
-    setting, truth = random_setting(number), answer(number)
-    if truth.end is None or setting.stiff:
+def duel(number: int) -> Duel | None:
+    """Our Taylor method and heyoka, both at the resolution of float64; None of a motion that has no end or is stiff."""
+    task, truth = random_task(number), answer(number)
+    if truth.end is None or task.stiff:
         return None
-    problem, smallest = problem_of(setting), min([size for size in truth.size if size] or [1.0])
-    both: tuple[Solver, Solver] = Ours(method, setting, smallest, problem), Heyoka(setting, smallest, problem)
+    problem, smallest = problem_of(task), min([size for size in truth.size if size] or [1.0])
+    both: tuple[Solver, Solver] = Ours(METHOD, task, smallest, problem), Heyoka(task, smallest, problem)
     tried = []
     for solver in both:
-        run = solver.ready(tolerance if solver.ours else EPSILON)
+        run = solver.ready(EPSILON)
         outcome = run()
         if outcome.status:
-            return Duel(setting.name, (math.nan, math.nan), (math.nan, math.nan), f"{solver.name}: {outcome.status}")
+            return Duel(task.name, (math.nan, math.nan), (math.nan, math.nan), f"{solver.name}: {outcome.status}")
         tried.append(Tried(0.0, run, outcome, _error(truth, outcome.x)))
     in_turns(tried, TURNS)
     first, second = tried
-    return Duel(setting.name, (first.error, second.error), (min(first.seconds), min(second.seconds)))
+    return Duel(task.name, (first.error, second.error), (min(first.seconds), min(second.seconds)))
 
 
 def _error(truth: Answer, x: Array) -> float:

@@ -5,21 +5,97 @@ from __future__ import annotations
 import math
 import warnings
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
-from cgraph.extend import NoSeriesError
+import cgraph as cg
+from cgraph.extend import Array, NoSeriesError
 
 from ...integrators import METHODS
+from ...multiprecision import Reference, ReferenceFailedError
+from ...multiprecision.solution import from_text
 from ...simulation.run_options import METHOD, RunOptions
 from ...simulation.simulate import simulate
+from ...simulation.steps.scipy_solvers import solve_ivp
 from ...simulation.trajectory import Trajectory
-from ..setting import Setting
+from ..accuracy_task import AccuracyTask
 from ..text_table import table
-from .answers import COUNT, Answer, answer
-from .random_starts import jump, random_motion
+from ..work_precision.trajectory_runs import problem_of
+from .random_motions import EACH, LAGRANGIANS, STARTS, jump, random_motion
+
+FILE = Path(__file__).with_name("answers.json")
+COUNT = LAGRANGIANS + EACH * len(STARTS)
+DIGITS = 30
+PARTS = 8  # of the motion: an error may be made at the start of any
+RTOL, NUDGE = 1e-7, 2.0**-12  # of motions beside the motion: their errors, and how far they start aside, in sizes
+REGULAR = 1e8  # condition of a flow that is inverted
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The end of a motion, or why it has none.
+
+    end: at t_end; None where the motion runs into a singularity before.  size: the largest value of each state on the
+    way, (m,).
+    growth: the largest factor by which a small relative error at any time, in the sizes of the states, has grown at
+    t_end, at least 1.
+    """
+
+    end: Reference | None
+    size: tuple[float, ...]
+    growth: float
+    how: str
+
+
+def answer(number: int) -> Answer:
+    """The answer to the random motion of this number, from the file beside this one or computed."""
+    task = random_motion(number)
+    kept = task.kept(FILE, str(number))
+    if kept is None:
+        return compute(task)
+    end = from_text([task.t_end], [kept["x"]], kept["error"], kept["how"]) if "x" in kept else None
+    return Answer(end, tuple(kept["size"]), kept["growth"], kept["how"])
+
+
+def compute(task: AccuracyTask) -> Answer:
+    """The answer to a task, by `reference`; the growth by SciPy."""
+    times = [task.t_end * k / PARTS for k in range(PARTS + 1)]
+    try:
+        motion = task.solution(times, digits=DIGITS)
+    except ReferenceFailedError as error:
+        return Answer(None, (), 1.0, str(error))
+    assert motion is not None
+    end = Reference(motion.t[-1:], motion.decimal[-1:], motion.error, motion.how)
+    size, growth = size_and_growth(task, times, np.max(np.abs(motion.x), axis=0))
+    return Answer(end, tuple(size.tolist()), growth, motion.how)
+
+
+def size_and_growth(task: AccuracyTask, times: Sequence[float], size: Array) -> tuple[Array, float]:
+    """The largest value of each state, (m,), and the largest row sum of the flow from any of these times to the last.
+
+    The flow is measured in units of the sizes, by differences of motions of SciPy's solvers; `size` is a first guess.
+    """
+    rate = cg.compile(problem_of(task).rate)
+    unit = np.where(size > 0.0, size, 1.0)
+
+    def motion(x: Array, at: Sequence[float] | None = times) -> Array:
+        options = {"rtol": RTOL, "atol": RTOL * unit, "method": "Radau" if task.stiff else "DOP853", "t_eval": at}
+        return np.asarray(solve_ivp()(lambda t, x: rate([*x, t]), (0.0, task.t_end), x, **options).y.T)
+
+    start = np.array(task.start)
+    size = np.maximum(size, np.abs(motion(start, None)).max(axis=0))  # of all its steps, layers included
+    unit = np.where(size > 0.0, size, 1.0)
+    columns = []
+    for j in range(len(start)):
+        aside = unit * (np.arange(len(start)) == j) * NUDGE
+        columns.append((motion(start + aside) - motion(start - aside)) / (2.0 * NUDGE * unit))
+    flows = np.stack(columns, axis=2)  # (T, m, m), from the start
+    usable = [flow for flow in flows[:-1] if np.linalg.cond(flow) < REGULAR]
+    return size, max([1.0, *[float(np.abs(flows[-1] @ np.linalg.inv(flow)).sum(axis=1).max()) for flow in usable]])
+
 
 RIGHT, SAID, SILENT = "right", "said", "silent"
 SLACK = 100.0  # times rtol times the growth: an error that is right
@@ -48,29 +124,29 @@ class Verdict:
 
 def judge(number: int, method: str | None = None) -> Verdict:
     """The verdict on one random motion by a method with default arguments."""
-    setting, truth = random_motion(number), answer(number)
+    task, truth = random_motion(number), answer(number)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        start = setting.q, setting.qd or None
+        start = task.q, task.qd or None
         try:
-            run = simulate(setting.model, *start, setting.t_end, method or METHOD, progress=False)
+            run = simulate(task.model, *start, task.t_end, method or METHOD, progress=False)
         except NoSeriesError as error:
-            return Verdict(setting.name, method or DEFAULT, SAID, math.nan, str(error), 0, 0.0)
+            return Verdict(task.name, method or DEFAULT, SAID, math.nan, str(error), 0, 0.0)
     words = "; ".join([str(each.message) for each in caught])
-    excess = _excess(setting, truth, run)
-    slack = JUMPS if setting.name.startswith(jump.__name__) else SLACK
+    excess = _excess(task, truth, run)
+    slack = JUMPS if task.name.startswith(jump.__name__) else SLACK
     right = excess <= slack or (truth.end is None and not run.stats.success)
     verdict = RIGHT if right else SAID if words else SILENT
-    return Verdict(setting.name, method or DEFAULT, verdict, excess, words, run.stats.steps, run.stats.seconds)
+    return Verdict(task.name, method or DEFAULT, verdict, excess, words, run.stats.steps, run.stats.seconds)
 
 
-def _excess(setting: Setting, truth: Answer, run: Trajectory) -> float:
+def _excess(task: AccuracyTask, truth: Answer, run: Trajectory) -> float:
     if truth.end is None or not run.stats.success:
         return math.nan
     size = np.array(truth.size)
     error = np.abs(truth.end.deviation(np.hstack([run.q[-1:], run.qd[-1:]]))[0])
     relative = np.divide(error, size, out=np.where(error > 0.0, np.inf, 0.0), where=size > 0.0)
-    tolerance = RunOptions(setting.t_end, run.stats.method).relative
+    tolerance = RunOptions(task.t_end, run.stats.method).relative
     return float(np.max(relative) / (tolerance * truth.growth))
 
 
@@ -84,27 +160,33 @@ def verdicts(
 
 
 def trust(count: int = COUNT) -> Iterator[str]:
-    """The verdicts counted by method, and in words those that are silent."""
-    judged = list(verdicts(range(count)))
-    methods = list(dict.fromkeys([each.method for each in judged]))
+    """The verdicts counted by method, and in words those that are not right."""
+    right = f"right to {SLACK:g}, where forces jump to {JUMPS:g}"
+    title = f"{count} random motions, default arguments; excess: error over rtol times growth, {right}"
+    figures: dict[str, Callable[[Sequence[Verdict], list[float]], str]] = {
+        "median excess": lambda chosen, ends: f"{np.median(ends):.2g}",
+        "largest": lambda chosen, ends: f"{max(ends):.2g}",
+        "seconds": lambda chosen, ends: f"{sum(each.seconds for each in chosen):.2f}",
+    }
+    yield from counted(title, list(verdicts(range(count))), figures)
+
+
+def counted(
+    title: str, judged: Sequence[Verdict], figures: Mapping[str, Callable[[Sequence[Verdict], list[float]], str]]
+) -> Iterator[str]:
+    """A title, the verdicts and figures by method, and in words the verdicts that are not right.
+
+    figures: {head of a column: text of the verdicts of a method, and of the excesses of their ends}.
+    """
     rows = []
-    for method in methods:
+    for method in dict.fromkeys([each.method for each in judged]):
         chosen = [each for each in judged if each.method == method]
         counts = Counter([each.verdict for each in chosen])
         ends = [each.excess for each in chosen if each.excess == each.excess]
-        rows.append(
-            [
-                method,
-                *[str(counts[verdict]) for verdict in (RIGHT, SAID, SILENT)],
-                f"{np.median(ends):.2g}",
-                f"{max(ends):.2g}",
-                f"{sum(each.seconds for each in chosen):.2f}",
-            ]
-        )
-    head = ["method", RIGHT, SAID, SILENT, "median excess", "largest", "seconds"]
-    right = f"right to {SLACK:g}, where forces jump to {JUMPS:g}"
-    yield f"{count} random motions, default arguments; excess: error over rtol times growth, {right}"
-    yield "\n".join(table(head, rows))
+        texts = [figure(chosen, ends) for figure in figures.values()]
+        rows.append([method, *[str(counts[verdict]) for verdict in (RIGHT, SAID, SILENT)], *texts])
+    yield title
+    yield "\n".join(table(["method", RIGHT, SAID, SILENT, *figures], rows))
     for each in judged:
         if each.verdict != RIGHT:
             yield f"{each.verdict}: {each.name}, {each.method}: excess {each.excess:.3g}; {each.words}"

@@ -16,15 +16,15 @@ from importlib import import_module
 from importlib.util import find_spec
 from typing import Any
 
-from ...peers import Case, UnavailableError
+from ...peers import PeerModel, UnavailableError
 from ...peers.casadi import CasadiPeer, casadi
 from ...peers.heyoka import heyoka, leave_cache
 from ...simulation.run_options import SCIPY
 from ...simulation.simulate import simulate
-from ..fresh_process import run_fresh
-from ..setting import Setting
-from .named_settings import load
-from .trajectory_peers import MOST, casadi_equations, heyoka_derivatives, heyoka_equations
+from ..accuracy_task import AccuracyTask
+from ..machine import run_fresh
+from .named_tasks import load
+from .trajectory_peers import MOST_STEPS, casadi_equations, heyoka_derivatives, heyoka_equations
 from .trajectory_runs import problem_of
 
 RTOL = 1e-9  # of all but heyoka, whose default is the resolution of float64
@@ -51,45 +51,45 @@ class ColdStart:
 class _Start:
     about: str
     packages: tuple[str, ...]
-    run: Callable[[Setting], object]
+    run: Callable[[AccuracyTask], object]
     primed: bool = False  # the first start is there to fill a cache, and does not count
 
 
-def _ours(setting: Setting, method: str | None = None) -> None:
-    method = method or ("radau" if setting.stiff else "dop853")
-    start = setting.q, setting.qd or None
-    run = simulate(setting.model, *start, setting.t_end, method, rtol=RTOL, atol=RTOL, progress=False)
+def _ours(task: AccuracyTask, method: str | None = None) -> None:
+    method = method or ("radau" if task.stiff else "dop853")
+    start = task.q, task.qd or None
+    run = simulate(task.model, *start, task.t_end, method, rtol=RTOL, atol=RTOL, progress=False)
     if not run.stats.success:
         raise RuntimeError(run.stats.message)
 
 
-def _heyoka(setting: Setting, compact: bool = False, cached: bool = False) -> None:
+def _heyoka(task: AccuracyTask, compact: bool = False, cached: bool = False) -> None:
     """From the Lagrangian by heyoka's own derivatives; a state equation, or what it cannot derive, from ours."""
     hy = heyoka()
     if not cached:
         leave_cache(hy)
     try:
-        system = heyoka_derivatives(hy, setting)
+        system = heyoka_derivatives(hy, task)
     except UnavailableError:
-        system = heyoka_equations(hy, problem_of(setting))
-    run = hy.taylor_adaptive(system, list(setting.start), compact_mode=compact)
-    outcome, _, _, steps, *_ = run.propagate_until(setting.t_end, max_steps=MOST)
+        system = heyoka_equations(hy, problem_of(task))
+    run = hy.taylor_adaptive(system, list(task.start), compact_mode=compact)
+    outcome, _, _, steps, *_ = run.propagate_until(task.t_end, max_steps=MOST_STEPS)
     if outcome != hy.taylor_outcome.time_limit:
         raise RuntimeError(f"stopped after {steps} steps")
 
 
-def _casadi(setting: Setting) -> None:
+def _casadi(task: AccuracyTask) -> None:
     """From the Lagrangian by CasADi's own derivatives; a state equation as it is."""
     ca = casadi()
-    if setting.mechanical:
-        case = Case(setting.name, setting.model)
+    if task.mechanical:
+        case = PeerModel(task.name, task.model)
         q, qd = ca.SX.sym("q", case.n), ca.SX.sym("qd", case.n)
         qdd = CasadiPeer(case).function("forward")(ca.vertcat(q, qd, ca.SX.zeros(case.n)))
         equations = {"x": ca.vertcat(q, qd), "ode": ca.vertcat(qd, qdd)}
     else:
-        equations = casadi_equations(ca, problem_of(setting))
+        equations = casadi_equations(ca, problem_of(task))
     options = {"reltol": RTOL, "abstol": RTOL, "max_num_steps": 1_000_000}
-    ca.integrator("run", "cvodes", equations, 0.0, setting.t_end, options)(x0=list(setting.start))
+    ca.integrator("run", "cvodes", equations, 0.0, task.t_end, options)(x0=list(task.start))
 
 
 STARTS = {
@@ -97,7 +97,7 @@ STARTS = {
     "scipy": _Start(
         "our graph, LLVM, and SciPy's DOP853 (Radau where it is stiff) on it",
         ("llvmlite.binding", "scipy.integrate"),
-        lambda setting: _ours(setting, SCIPY + ("Radau" if setting.stiff else "DOP853")),
+        lambda task: _ours(task, SCIPY + ("Radau" if task.stiff else "DOP853")),
     ),
     "CasADi": _Start("CasADi's own derivatives in its virtual machine, and a run of CVODES", ("casadi",), _casadi),
     "heyoka compact": _Start(
@@ -124,7 +124,7 @@ def cold_starts(
     budget: float = 60.0,
     say: Callable[[str], None] = lambda line: None,
 ) -> list[ColdStart]:
-    """Cold starts of a setting, in turns.  name, options: as of `named_settings.load`.
+    """Cold starts of a task, in turns.  name, options: as of `named_tasks.load`.
 
     budget: seconds after which one is given up.  What needs a package that is not installed is left out.
     """
@@ -161,7 +161,7 @@ def cold_starts(
 
 
 def _in_a_process(request: dict[str, Any], budget: float) -> dict[str, float] | str:
-    """What `child` printed, or why it did not."""
+    """Answer of `child`, or the reason why there is none."""
     try:
         done = run_fresh(__name__, "child()", json.dumps(request), budget)
     except subprocess.TimeoutExpired:
@@ -181,7 +181,7 @@ def child() -> None:
     for package in start.packages:
         import_module(package)
     loading = time.perf_counter() - begin
-    setting = load(request["name"], **request["options"])
+    task = load(request["name"], **request["options"])
     begin = time.perf_counter()
-    start.run(setting)
+    start.run(task)
     sys.stdout.write(json.dumps({"seconds": time.perf_counter() - begin, "loading": loading}))

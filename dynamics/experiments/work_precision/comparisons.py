@@ -22,12 +22,12 @@ from ...multibody.builders.planar_arm import planar_arm
 from ...peers import UnavailableError
 from ...simulation.simulate import simulate
 from ...simulation.steps.scipy_solvers import solve_ivp
-from ..setting import Setting
+from ..accuracy_task import AccuracyTask
 from ..stability.energy_drift import SYMPLECTIC, drift
 from ..text_table import table
 from .cold_start import cold_starts
 from .measurement import ErrorMetrics, Tried, in_turns
-from .named_settings import load
+from .named_tasks import load
 from .trajectory_peers import EPSILON, Cvodes, Heyoka
 from .trajectory_runs import Ours, Outcome, Scipy, Solver, problem_of
 from .work_precision import error_metrics, work_precision
@@ -40,25 +40,25 @@ STEPS, STEP, STARTS = 10**6, 0.01, 12  # of `energy`: steps, their length [s], a
 
 
 class Subject(NamedTuple):
-    """A setting made ready: the size of its smallest state, its equations, and what measures errors."""
+    """A task made ready: the size of its smallest state, its equations, and what measures errors."""
 
-    setting: Setting
+    task: AccuracyTask
     smallest: float
     problem: Problem
     metrics: ErrorMetrics
 
     @property
     def title(self) -> str:
-        """What is integrated, and what its exact motion is worth."""
-        exact, until = self.metrics.exact, f"{self.setting.name}, to t = {self.setting.t_end:g} s"
+        """Title: the motion, and the error of its reference."""
+        exact, until = self.metrics.exact, f"{self.task.name}, to t = {self.task.t_end:g} s"
         return f"{until}. Exact motion: {exact.how}; its error {exact.error:.0e}"
 
 
 def subject(name: str, folder: str, **options: Any) -> Subject:
-    """The setting of that name.  folder: where exact motions are kept."""
-    setting = load(name, **options)
-    metrics = error_metrics(setting, folder=folder)
-    return Subject(setting, metrics.smallest, problem_of(setting), metrics)
+    """The task of that name.  folder: where exact motions are kept."""
+    task = load(name, **options)
+    metrics = error_metrics(task, folder=folder)
+    return Subject(task, metrics.smallest, problem_of(task), metrics)
 
 
 @dataclass
@@ -76,7 +76,7 @@ class Comparison:
             self.add(method, partial(Ours, method), knobs)
 
     def add(self, name: str, make: Callable[..., Solver], knobs: Iterable[float], most: int | None = None) -> None:
-        """A solver made of (setting, smallest, problem), at knobs from coarse to fine, until `most` are good."""
+        """A solver made of (task, smallest, problem), at knobs from coarse to fine, until `most` are good."""
         runs = self.tried[name] = []
         try:
             solver = make(*self.subject[:3])
@@ -108,7 +108,7 @@ class Comparison:
             times = [f"{1e3 * seconds:.3f}", f"{seconds / ours:.2f}", f"{each.error:.1e}", f"{each.knob:.1e}"]
             counts = ["-" if count is None else str(count) for count in (out.steps, out.evaluations)]
             rows.append([name, *times, *counts])
-        title = f"error at most {self.error:g} at t = {self.subject.setting.t_end:g} s"
+        title = f"error at most {self.error:g} at t = {self.subject.task.t_end:g} s"
         return "\n".join([title, *table(header, rows), *self.refused])
 
 
@@ -207,8 +207,8 @@ def numpy_rate() -> Callable[[float, Array], Array]:
 class SolveIvp(Solver):
     """SciPy's solve_ivp with DOP853 on a rate in Python. Raises ImportError without SciPy."""
 
-    def __init__(self, rate: Callable[[float, Array], object], setting: Setting, smallest: float, _: Problem) -> None:
-        super().__init__("solve_ivp", "SciPy's solve_ivp, DOP853", setting, smallest)
+    def __init__(self, rate: Callable[[float, Array], object], task: AccuracyTask, smallest: float, _: Problem) -> None:
+        super().__init__("solve_ivp", "SciPy's solve_ivp, DOP853", task, smallest)
         self.rate, self.solve = rate, solve_ivp()
 
     def ready(self, knob: float) -> Callable[[], Outcome]:
@@ -216,12 +216,12 @@ class SolveIvp(Solver):
         return lambda: self._run(knob)[0]
 
     def rows(self, knob: float) -> Array:
-        """The states at the setting's times, (T, m); NaN from where it stopped."""
-        return self._run(knob, self.setting.times)[1]
+        """The states at the task's times, (T, m); NaN from where it stopped."""
+        return self._run(knob, self.task.times)[1]
 
     def _run(self, knob: float, times: list[float] | None = None) -> tuple[Outcome, Array]:
         options = {"method": "DOP853", "rtol": knob, "atol": self.absolute(knob), "t_eval": times}
-        run = self.solve(self.rate, (0.0, self.setting.t_end), self.start, **options)
+        run = self.solve(self.rate, (0.0, self.task.t_end), self.start, **options)
         return Outcome(run.y[:, -1], len(run.t) - 1, None, run.nfev), run.y.T
 
 

@@ -1,4 +1,4 @@
-"""Measurement of solvers: their errors against the exact motion, and run times taken in turns."""
+"""Measurement of solvers: their errors against the exact motion, and run times in turns; and the report of them."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ import math
 import statistics
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -17,11 +18,153 @@ from cgraph.extend import Array
 from ...equations.energies import energy
 from ...integrators import Problem
 from ...multiprecision import Reference
+from ...simulation.run_options import SCIPY
 from ...systems.model import as_system
-from ..paper_numbers.fit import exponent
-from ..setting import INTERVALS, Setting
-from .report import Curve, Point
+from ..accuracy_task import INTERVALS, AccuracyTask
+from ..paper_numbers import exponent
+from ..text_table import csv_text
+from .cold_start import ColdStart
 from .trajectory_runs import CHOSEN, EQUAL, Outcome, Solver
+
+OURS = "ours"
+PEERS = {"MuJoCo": "MuJoCo", "SciPy": SCIPY, "heyoka": "heyoka", "CasADi": "CVODES"}  # how their solvers' names begin
+TARGETS = (1e-3, 1e-6, 1e-9, 1e-12)
+
+
+@dataclass(frozen=True)
+class Point:
+    """One knob of one solver.  None: not told by the solver.
+
+    knob: the number of equal steps, or the relative tolerance.  step: t_end over the accepted steps [s].
+    seconds, median: the shortest and the median of the timed runs.
+    error: of the state at t_end; largest: over all times; see `AccuracyTask.scales`.
+    drift: largest change of energy, over the largest kinetic energy of the motion; of a conservative system.
+    """
+
+    knob: float
+    step: float | None
+    seconds: float
+    median: float
+    steps: int | None
+    rejected: int | None
+    evaluations: int | None
+    error: float
+    largest: float
+    drift: float | None
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One solver.  kind: "equal steps" or "chosen steps".  order: declared.  fitted: see `fitted_order`.
+
+    model_error: largest difference of its rates from ours along the motion, relative to the largest rate of the same
+    state; None where the rates are ours.
+    stopped: why there is no finer point.
+    """
+
+    name: str
+    about: str
+    ours: bool
+    kind: str
+    order: int | None
+    fitted: float | None
+    model_error: float | None
+    stopped: str
+    points: tuple[Point, ...]
+
+
+@dataclass(frozen=True)
+class WorkPrecision:
+    """The report of one task.  absent: {solver: why it is not there}.  load: of the machine, at start and end."""
+
+    name: str
+    about: str
+    states: int
+    t_end: float
+    nodes: int  # of the rate's graph
+    conservative: bool
+    stiff: bool
+    relative_to: str  # errors: "largest", "given" sizes, or the "own" value of the state at that time
+    times: tuple[float, ...]
+    reference: str  # how the exact motion was computed
+    reference_error: float
+    reference_seconds: float
+    machine: str
+    load: tuple[float | None, float | None]
+    curves: tuple[Curve, ...]
+    cold: tuple[ColdStart, ...]
+    absent: dict[str, str] = field(default_factory=dict)
+    left_out: tuple[str, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """All of it as plain data for JSON; None in place of what is no number."""
+        plain: dict[str, Any] = _plain(asdict(self) | {"targets": [asdict(each) for each in targets(self.curves)]})
+        return plain
+
+
+@dataclass(frozen=True)
+class Target:
+    """The fastest of ours, and of a peer, with at most this error at t_end.  ratio: to the fastest of ours."""
+
+    error: float
+    group: str
+    name: str
+    knob: float
+    seconds: float
+    ratio: float | None
+
+
+def targets(curves: Sequence[Curve], errors: Sequence[float] = TARGETS) -> list[Target]:
+    """For each error, ours first."""
+    fastest_runs = []
+    for error in errors:
+        ours = None
+        for group in (OURS, *PEERS):
+            fastest = _fastest([each for each in curves if group_of(each) == group], error)
+            if fastest is None:
+                continue
+            curve, point = fastest
+            if group == OURS:
+                ours = point.seconds
+            ratio = None if ours is None else point.seconds / ours
+            fastest_runs.append(Target(error, group, curve.name, point.knob, point.seconds, ratio))
+    return fastest_runs
+
+
+def group_of(curve: Curve) -> str:
+    """Ours, or the peer that a solver belongs to."""
+    return OURS if curve.ours else next(peer for peer, begin in PEERS.items() if curve.name.startswith(begin))
+
+
+def _fastest(curves: Sequence[Curve], error: float) -> tuple[Curve, Point] | None:
+    met = [(curve, point) for curve in curves for point in curve.points if point.error <= error]
+    return min(met, key=lambda each: each[1].seconds, default=None)
+
+
+COLUMNS = (
+    *("solver", "kind", "declared_order", "fitted_order", "knob", "step", "seconds", "median_seconds", "steps"),
+    *("rejected", "evaluations", "error_at_end", "largest_error", "energy_drift", "model_error"),
+)
+
+
+def to_csv(report: WorkPrecision) -> str:
+    """The points of a report as CSV, a line each; an empty cell is what is not known."""
+    rows = []
+    for curve in report.curves:
+        for p in curve.points:
+            first = (curve.name, curve.kind, curve.order, curve.fitted, p.knob, p.step, p.seconds, p.median)
+            rest = (p.steps, p.rejected, p.evaluations, p.error, p.largest, p.drift, curve.model_error)
+            rows.append([*first, *rest])
+    return csv_text(COLUMNS, rows)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {name: _plain(each) for name, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(each) for each in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
 
 CHUNK = 5e-3  # s, of runs that are timed in one turn
 WORST, FLOOR = 1e-1, 5e-12  # errors between which an order is fitted: above is no order yet, below is rounding
@@ -33,12 +176,12 @@ STALLED = 2  # knobs in a row without a smaller error, after which no finer one 
 class ErrorMetrics:
     """Errors of states against the exact motion, and the change of energy of conservative systems."""
 
-    def __init__(self, setting: Setting, exact: Reference) -> None:
-        self.setting, self.exact, self.scales = setting, exact, setting.scales(exact)
+    def __init__(self, task: AccuracyTask, exact: Reference) -> None:
+        self.task, self.exact, self.scales = task, exact, task.scales(exact)
         self.smallest = float(self.scales.min())  # size of a state
         self.energies: Graph | None = None
-        if setting.conservative:
-            system, of_energy = as_system(setting.model), energy(setting.model)
+        if task.conservative:
+            system, of_energy = as_system(task.model), energy(task.model)
             self.energies = Graph(of_energy.inputs, of_energy.outputs | {"K": system.kinetic})
 
     def errors(self, rows: Array) -> Array:
@@ -58,7 +201,7 @@ class ErrorMetrics:
         """The largest change of energy over the rows, over the largest kinetic energy."""
         if self.energies is None:
             return None
-        inputs = dict(zip(self.energies.input_names, rows.T, strict=False)) | dict(self.setting.parameters)
+        inputs = dict(zip(self.energies.input_names, rows.T, strict=False)) | dict(self.task.parameters)
         values = {name: np.asarray(value) for name, value in self.energies.evaluate(inputs).items()}
         turned = float(np.max(values["K"])) or float(np.max(np.abs(values["E"]))) or 1.0
         return float(np.max(np.abs(values["E"] - values["E"][0]))) / turned
@@ -84,7 +227,7 @@ class Entry:
     stopped: str = ""
 
     def curve(self, metrics: ErrorMetrics, problem: Problem) -> Curve:
-        """What the report keeps."""
+        """Curve of the report."""
         solver = self.solver
         points = tuple([_point(solver, each, metrics) for each in self.tried])
         theirs = solver.rates(metrics.exact.x)
@@ -111,7 +254,7 @@ def _point(solver: Solver, tried: Tried, metrics: ErrorMetrics) -> Point:
         drift = metrics.drift(rows) if math.isfinite(largest) else None
     return Point(
         tried.knob,
-        metrics.setting.t_end / outcome.steps if outcome.steps else None,
+        metrics.task.t_end / outcome.steps if outcome.steps else None,
         min(tried.seconds),
         statistics.median(tried.seconds),
         outcome.steps,
@@ -189,7 +332,7 @@ def fitted_order(steps: Sequence[float], errors: Sequence[float], finest: int | 
 
 
 def _fitted(kind: str, points: Sequence[Point]) -> float | None:
-    """Of equal steps by the largest error; of chosen ones, whose dense output has another order, by that at the end."""
+    """Fitted order by the largest error; of chosen steps, whose dense output has another order, by that at the end."""
     told = [each for each in points if each.step]
     steps = [each.step or 0.0 for each in told]
     if kind == EQUAL:

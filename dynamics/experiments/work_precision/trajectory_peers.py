@@ -14,14 +14,14 @@ from cgraph.extend import Array
 
 from ...integrators import Problem
 from ...io.mujoco_twin import rollout
-from ...peers import Case, UnavailableError
+from ...peers import PeerModel, UnavailableError
 from ...peers.casadi import NAMES as CASADI_NAMES, casadi
 from ...peers.heyoka import expressions, heyoka
 from ...peers.mujoco import MujocoPeer
 from ...peers.translate import translated
 from ...simulation.run_options import SCIPY, SCIPY_SOLVERS
 from ...systems.arguments import TIME
-from ..setting import INTERVALS, Setting
+from ..accuracy_task import INTERVALS, AccuracyTask
 from .trajectory_runs import EQUAL, Outcome, Scipy, Solver
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 EPSILON = 2.0**-52
 COMPACT = 300  # nodes of the rate; beyond, heyoka's code written out takes minutes to compile
-MOST = 100_000  # steps of heyoka and of CVODES
+MOST_STEPS = 100_000  # steps of heyoka and of CVODES
 MUJOCO = {"Euler": 1, "RK4": 4, "implicit": 1, "implicitfast": 1}  # with the orders of their errors
 CVODES: dict[str, dict[str, Any]] = {
     "BDF": {},
@@ -43,17 +43,15 @@ class Mujoco(Solver):
 
     kind = EQUAL
 
-    def __init__(self, integrator: str, setting: Setting, smallest: float) -> None:
-        super().__init__(f"MuJoCo {integrator}", "MuJoCo's own equations and loop", setting, smallest)
+    def __init__(self, integrator: str, task: AccuracyTask, smallest: float) -> None:
+        super().__init__(f"MuJoCo {integrator}", "MuJoCo's own equations and loop", task, smallest)
         self.order = MUJOCO[integrator]
-        if not setting.mechanical:
+        if not task.mechanical:
             raise UnavailableError("takes rigid bodies, not a system of first order")
-        self.peer = MujocoPeer(Case(setting.name, setting.model))
+        self.peer = MujocoPeer(PeerModel(task.name, task.model))
         self.model = self.peer.twin.model
         self.model.opt.integrator = getattr(self.peer.mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}")
-        n, order, at = self.peer.case.n, self.peer.order, self.peer.at
-        self.taken = np.concatenate([1 + order, 1 + n + order])  # ours among time, qpos, qvel
-        self.begin = np.concatenate([[0.0], self.start[:n][at], self.start[n:][at]])[None]
+        self.begin = self.peer.starts(self.start[None])
 
     def ready(self, knob: float) -> Callable[[], Outcome]:
         """The run with that knob, everything before it done: what is timed."""
@@ -61,32 +59,32 @@ class Mujoco(Solver):
 
         def whole() -> Outcome:
             run()
-            return Outcome(states[0, -1, self.taken], int(knob))
+            return Outcome(states[0, -1, self.peer.taken], int(knob))
 
         return whole
 
     def rows(self, knob: float) -> Array:
-        """The states at the setting's times, (T, m); NaN from where it stopped."""
+        """The states at the task's times, (T, m); NaN from where it stopped."""
         steps = int(knob)
         states, run = self._states(steps)
         run()
         every = steps // INTERVALS
-        ours: Array = np.vstack([self.start, states[0, every - 1 :: every][:, self.taken]])
+        ours: Array = np.vstack([self.start, states[0, every - 1 :: every][:, self.peer.taken]])
         return ours
 
     def _states(self, steps: int) -> tuple[Array, Callable[[], object]]:
-        """Where the states of a run go, (1, steps, ..), and the run."""
+        """Memory of the states of a run, (1, steps, ..), and the run."""
         states = np.empty((1, steps, self.begin.shape[1]))
         native = rollout(self.model, self.begin, states)
 
         def run() -> None:
-            self.model.opt.timestep = self.setting.t_end / steps  # shared by the runs of all steps
+            self.model.opt.timestep = self.task.t_end / steps  # shared by the runs of all steps
             native()
 
         return states, run
 
     def rates(self, x: Array) -> Array:
-        """Its rates, (T, m), at states (T, m): velocities as they are, accelerations by MuJoCo."""
+        """Rates, (T, m), at states (T, m): velocities as they are, accelerations by MuJoCo."""
         n, order, at = self.peer.case.n, self.peer.order, self.peer.at
         twin, none = self.peer.twin, np.zeros(self.peer.case.n)
         accelerations = [twin.accelerations(row[:n][at], row[n:][at], none)[order] for row in x]
@@ -98,14 +96,14 @@ class Heyoka(Solver):
 
     tolerances = (1e-4, 1e-7, 1e-10, 1e-12, EPSILON)  # each is compiled anew; the last is its default
 
-    def __init__(self, setting: Setting, smallest: float, problem: Problem, derivatives: bool = False) -> None:
+    def __init__(self, task: AccuracyTask, smallest: float, problem: Problem, derivatives: bool = False) -> None:
         self.compact = len(problem.rate.nodes) > COMPACT
         how = "compact mode" if self.compact else "written out"
         whose = "its own derivatives" if derivatives else "our equations"
-        super().__init__("heyoka Taylor", f"heyoka's taylor_adaptive on {whose}, {how}", setting, smallest)
+        super().__init__("heyoka Taylor", f"heyoka's taylor_adaptive on {whose}, {how}", task, smallest)
         self.heyoka = heyoka()
         hy = self.heyoka
-        self.system = heyoka_derivatives(hy, setting) if derivatives else heyoka_equations(hy, problem)
+        self.system = heyoka_derivatives(hy, task) if derivatives else heyoka_equations(hy, problem)
         self._made: dict[float, taylor_adaptive] = {}
 
     def integrator(self, knob: float) -> taylor_adaptive:
@@ -123,30 +121,30 @@ class Heyoka(Solver):
     def ready(self, knob: float) -> Callable[[], Outcome]:
         """The run with that knob, everything before it done: what is timed."""
         integrator = self.integrator(knob)
-        t_end, limit = self.setting.t_end, self.heyoka.taylor_outcome.time_limit
+        t_end, limit = self.task.t_end, self.heyoka.taylor_outcome.time_limit
 
         def run() -> Outcome:
             integrator.time = 0.0
             integrator.state[:] = self.start
-            outcome, _, _, steps, *_ = integrator.propagate_until(t_end, max_steps=MOST)
+            outcome, _, _, steps, *_ = integrator.propagate_until(t_end, max_steps=MOST_STEPS)
             status = "" if outcome == limit else f"stopped after {steps} steps"
             return Outcome(integrator.state.copy(), steps, None, None, status)
 
         return run
 
     def rows(self, knob: float) -> Array:
-        """The states at the setting's times, (T, m); NaN from where it stopped."""
+        """The states at the task's times, (T, m); NaN from where it stopped."""
         integrator = self.integrator(knob)
-        times = self.setting.times
+        times = self.task.times
         if times[0] > 0.0:
-            integrator.propagate_until(times[0], max_steps=MOST)
-        states: Array = integrator.propagate_grid(times, max_steps=MOST)[-1]
+            integrator.propagate_until(times[0], max_steps=MOST_STEPS)
+        states: Array = integrator.propagate_grid(times, max_steps=MOST_STEPS)[-1]
         result = np.full((len(times), len(self.start)), math.nan)
         result[: len(states)] = states
         return result
 
     def rates(self, x: Array) -> Array:
-        """Its rates of the states, (T, m), at states (T, m)."""
+        """Rates of the states, (T, m), at states (T, m)."""
         variables, expressions = zip(*self.system, strict=True)
         function = self.heyoka.cfunc(list(expressions), list(variables), compact_mode=True)
         times = {"time": np.zeros(len(x))} if function.is_time_dependent else {}
@@ -159,19 +157,24 @@ class Cvodes(Solver):
 
     tolerances = tuple([10.0**-k for k in range(3, 13)])
 
-    def __init__(self, kind: str, setting: Setting, smallest: float, problem: Problem) -> None:
-        super().__init__(f"CVODES {kind}", "CasADi's cvodes on our equations", setting, smallest)
+    def __init__(self, kind: str, task: AccuracyTask, smallest: float, problem: Problem) -> None:
+        super().__init__(f"CVODES {kind}", "CasADi's cvodes on our equations", task, smallest)
         self.casadi = casadi()
         self.options = CVODES[kind]
         self.equations = casadi_equations(self.casadi, problem)
 
     def _function(self, knob: float, times: Sequence[float]) -> Function:
-        options = {"reltol": knob, "abstol": self.absolute(knob), "max_num_steps": MOST, "show_eval_warnings": False}
+        options = {
+            "reltol": knob,
+            "abstol": self.absolute(knob),
+            "max_num_steps": MOST_STEPS,
+            "show_eval_warnings": False,
+        }
         return self.casadi.integrator("run", "cvodes", self.equations, 0.0, list(times), options | self.options)
 
     def ready(self, knob: float) -> Callable[[], Outcome]:
         """The run with that knob, everything before it done: what is timed."""
-        function, start = self._function(knob, [self.setting.t_end]), self.start.tolist()
+        function, start = self._function(knob, [self.task.t_end]), self.start.tolist()
 
         def run() -> Outcome:
             state = np.array(function(x0=start)["xf"]).ravel()
@@ -181,13 +184,13 @@ class Cvodes(Solver):
         return run
 
     def rows(self, knob: float) -> Array:
-        """The states at the setting's times, (T, m); NaN from where it stopped."""
-        times = self.setting.times
+        """The states at the task's times, (T, m); NaN from where it stopped."""
+        times = self.task.times
         states: Array = np.array(self._function(knob, times)(x0=self.start.tolist())["xf"]).T
         return states
 
     def rates(self, x: Array) -> Array:
-        """Its rates of the states, (T, m), at states (T, m)."""
+        """Rates of the states, (T, m), at states (T, m)."""
         ca, parts = self.casadi, self.equations
         rate = ca.Function("rate", [parts["x"], parts["t"]], [parts["ode"]])
         return np.array([np.array(rate(row, 0.0)).ravel() for row in x])
@@ -203,11 +206,11 @@ def heyoka_equations(hy: ModuleType, problem: Problem) -> list[tuple[expression,
     return list(zip(states, [hy.expression(values[rate]) for rate in graph.outputs.values()], strict=True))
 
 
-def heyoka_derivatives(hy: ModuleType, setting: Setting) -> list[tuple[expression, expression]]:
+def heyoka_derivatives(hy: ModuleType, task: AccuracyTask) -> list[tuple[expression, expression]]:
     """heyoka's own equations, from the Lagrangian. Raises UnavailableError for what it cannot derive."""
-    if not setting.mechanical:
+    if not task.mechanical:
         raise UnavailableError("derives equations of a Lagrangian alone")
-    case = Case(setting.name, setting.model)
+    case = PeerModel(task.name, task.model)
     rates, inputs = expressions(case, "forward")
     rates = hy.subs(rates, {f"last_{i}": hy.expression(0.0) for i in range(case.n)})
     state = inputs[: 2 * case.n]
@@ -222,14 +225,14 @@ def casadi_equations(ca: ModuleType, problem: Problem) -> dict[str, SX]:
     return {"x": x, "t": t, "ode": ca.vertcat(*[values[rate] for rate in graph.outputs.values()])}
 
 
-def offers(setting: Setting, smallest: float, problem: Problem, backend: str) -> dict[str, Callable[[], Solver]]:
+def offers(task: AccuracyTask, smallest: float, problem: Problem, backend: str) -> dict[str, Callable[[], Solver]]:
     """The peers that could be asked, by name; making one raises ImportError, UnavailableError or ValueError."""
     makers: dict[str, Callable[[], Solver]] = {}
     for solver in SCIPY_SOLVERS:
-        makers[f"{SCIPY}{solver}"] = partial(Scipy, solver, setting, smallest, problem, backend)
+        makers[f"{SCIPY}{solver}"] = partial(Scipy, solver, task, smallest, problem, backend)
     for integrator in MUJOCO:
-        makers[f"MuJoCo {integrator}"] = partial(Mujoco, integrator, setting, smallest)
-    makers["heyoka Taylor"] = partial(Heyoka, setting, smallest, problem)
+        makers[f"MuJoCo {integrator}"] = partial(Mujoco, integrator, task, smallest)
+    makers["heyoka Taylor"] = partial(Heyoka, task, smallest, problem)
     for kind in CVODES:
-        makers[f"CVODES {kind}"] = partial(Cvodes, kind, setting, smallest, problem)
+        makers[f"CVODES {kind}"] = partial(Cvodes, kind, task, smallest, problem)
     return makers

@@ -1,4 +1,4 @@
-"""Solvers: ways to integrate a setting, timed from its start to t_end; ours, and SciPy on our compiled rate."""
+"""Solvers: ways to integrate a task, timed from its start to t_end; ours, and SciPy on our compiled rate."""
 
 from __future__ import annotations
 
@@ -21,11 +21,11 @@ from ...simulation.steps.integration import integration
 from ...simulation.steps.scipy_solvers import ScipyIntegration, scipy_solver
 from ...simulation.steps.step_program import CompiledSteps, compile_steps, step_program
 from ...simulation.steps.stepping import Integration, NativeRun
-from ..setting import Setting
+from ..accuracy_task import AccuracyTask
 
 EQUAL, CHOSEN = "equal steps", "chosen steps"
 TRIAL = 4096  # steps that tell how long many more take
-LONGEST = 3.0  # s; a run that takes longer is given up
+LONGEST_RUN = 3.0  # s; a run that takes longer is given up
 
 
 class Outcome(NamedTuple):
@@ -39,7 +39,7 @@ class Outcome(NamedTuple):
 
 
 class Solver(ABC):
-    """A way to integrate one setting.
+    """A way to integrate one task.
 
     kind: `EQUAL`, where the knob is the number of steps, or `CHOSEN`, where it is the relative tolerance.
     order: of its error, as declared; None where that is no fixed number.
@@ -50,20 +50,20 @@ class Solver(ABC):
     ours = False
     tolerances: Sequence[float] = tuple([10.0**-k for k in range(3, 16)])
 
-    def __init__(self, name: str, about: str, setting: Setting, smallest: float) -> None:
-        self.name, self.about, self.setting, self.smallest = name, about, setting, smallest
-        self.start = np.array(setting.start)
+    def __init__(self, name: str, about: str, task: AccuracyTask, smallest: float) -> None:
+        self.name, self.about, self.task, self.smallest = name, about, task, smallest
+        self.start = np.array(task.start)
 
     @abstractmethod
     def ready(self, knob: float) -> Callable[[], Outcome]:
-        """What is timed: the run with that knob, everything before it done. Raises for what cannot be done."""
+        """Run with that knob, everything before it done: what is timed. Raises for a knob that cannot be had."""
 
     @abstractmethod
     def rows(self, knob: float) -> Array:
-        """The states at the setting's times, (T, m); NaN from where it stopped."""
+        """The states at the task's times, (T, m); NaN from where it stopped."""
 
     def rates(self, x: Array) -> Array | None:
-        """Its own rates of the states, (T, m), at states (T, m); None where they are computed by our graph."""
+        """Rates of the states, (T, m), at states (T, m); None where they are computed by our graph."""
         return None
 
     def absolute(self, knob: float) -> float:
@@ -71,10 +71,10 @@ class Solver(ABC):
         return knob * self.smallest
 
 
-def problem_of(setting: Setting) -> Problem:
-    """The setting's equations, with parameters bound and no force applied."""
-    inputs = state_inputs(setting.model)
-    return derive(setting.model, dict(inputs.parameters) | dict.fromkeys(inputs.applied, 0.0))
+def problem_of(task: AccuracyTask) -> Problem:
+    """The task's equations, with parameters bound and no force applied."""
+    inputs = state_inputs(task.model)
+    return derive(task.model, dict(inputs.parameters) | dict.fromkeys(inputs.applied, 0.0))
 
 
 def finished(run: Integration, start: Array) -> Outcome:
@@ -84,8 +84,8 @@ def finished(run: Integration, start: Array) -> Outcome:
         for block in run.blocks(start):
             if len(block.x):
                 last = block.x[-1]
-            if time.perf_counter() - begin > LONGEST:
-                status = f"took longer than {LONGEST:g} s"
+            if time.perf_counter() - begin > LONGEST_RUN:
+                status = f"took longer than {LONGEST_RUN:g} s"
                 break
     return Outcome(np.array(last), run.steps, run.rejected, run.evaluations, run.status or status)
 
@@ -97,7 +97,7 @@ def recorded(run: Integration, start: Array, times: Sequence[float]) -> Array:
     with np.errstate(all="ignore"):
         for block in run.blocks(start):
             recorder.add(block)
-            if time.perf_counter() - begin > 2 * LONGEST:
+            if time.perf_counter() - begin > 2 * LONGEST_RUN:
                 break
     states = recorder.table()[1]
     result = np.full((len(times), len(start)), math.nan)
@@ -110,8 +110,8 @@ class Ours(Solver):
 
     ours = True
 
-    def __init__(self, name: str, setting: Setting, smallest: float, problem: Problem, backend: str = "auto") -> None:
-        super().__init__(name, "ours", setting, smallest)
+    def __init__(self, name: str, task: AccuracyTask, smallest: float, problem: Problem, backend: str = "auto") -> None:
+        super().__init__(name, "ours", task, smallest)
         self.problem, self.backend, self.method = problem, backend, METHODS[name]
         self.order = self.method.order
         self.kind = CHOSEN if self.method.adaptive else EQUAL
@@ -126,28 +126,28 @@ class Ours(Solver):
         return compile_steps(program, self.backend)
 
     def _options(self, knob: float, times: Sequence[float], max_steps: float = math.inf) -> RunOptions:
-        t_end = self.setting.t_end
+        t_end = self.task.t_end
         if self.method.adaptive:
             return RunOptions(t_end, self.name, rtol=knob, atol=self.absolute(knob), t_eval=times)
         return RunOptions(t_end, self.name, dt=t_end / knob, t_eval=times, max_steps=max_steps)
 
     def ready(self, knob: float) -> Callable[[], Outcome]:
         """The run to t_end, without dense output."""
-        if self.kind == EQUAL and self._at_least(knob) > LONGEST:  # such a run does not look at the clock on its way
-            return lambda: Outcome(self.start, status=f"would take longer than {LONGEST:g} s")
-        compiled, options = self._plain, self._options(knob, [self.setting.t_end])
+        if self.kind == EQUAL and self._at_least(knob) > LONGEST_RUN:  # one that does not look at the clock on its way
+            return lambda: Outcome(self.start, status=f"would take longer than {LONGEST_RUN:g} s")
+        compiled, options = self._plain, self._options(knob, [self.task.t_end])
         return lambda: finished(integration(NativeRun(compiled, options)), self.start)
 
     def _at_least(self, knob: float) -> float:
         """Seconds that so many equal steps take, by the first few of them."""
-        run = integration(NativeRun(self._plain, self._options(knob, [self.setting.t_end], TRIAL)))
+        run = integration(NativeRun(self._plain, self._options(knob, [self.task.t_end], TRIAL)))
         begin = time.perf_counter()
         finished(run, self.start)
         return (time.perf_counter() - begin) * knob / min(knob, TRIAL)
 
     def rows(self, knob: float) -> Array:
-        """The states at the setting's times, (T, m); NaN from where it stopped."""
-        times = self.setting.times
+        """The states at the task's times, (T, m); NaN from where it stopped."""
+        times = self.task.times
         return recorded(integration(NativeRun(self._dense, self._options(knob, times))), self.start, times)
 
 
@@ -156,13 +156,15 @@ class Scipy(Solver):
 
     tolerances = tuple([10.0**-k for k in range(3, 14)])  # it takes none smaller than 2e-14
 
-    def __init__(self, solver: str, setting: Setting, smallest: float, problem: Problem, backend: str = "auto") -> None:
-        super().__init__(SCIPY + solver, "SciPy's solver on our compiled rate", setting, smallest)
+    def __init__(
+        self, solver: str, task: AccuracyTask, smallest: float, problem: Problem, backend: str = "auto"
+    ) -> None:
+        super().__init__(SCIPY + solver, "SciPy's solver on our compiled rate", task, smallest)
         self._solver = scipy_solver(problem, solver, backend)
         self.order = {"DOP853": 8, "Radau": 5, "RK45": 5}.get(solver)
 
     def _options(self, knob: float, times: Sequence[float] | None) -> RunOptions:
-        return RunOptions(self.setting.t_end, self.name, rtol=knob, atol=self.absolute(knob), t_eval=times)
+        return RunOptions(self.task.t_end, self.name, rtol=knob, atol=self.absolute(knob), t_eval=times)
 
     def ready(self, knob: float) -> Callable[[], Outcome]:
         """The run to t_end, which records its steps alone."""
@@ -170,6 +172,6 @@ class Scipy(Solver):
         return lambda: finished(ScipyIntegration(solver, options), self.start)._replace(rejected=None)
 
     def rows(self, knob: float) -> Array:
-        """The states at the setting's times, (T, m); NaN from where it stopped."""
-        times = self.setting.times
+        """The states at the task's times, (T, m); NaN from where it stopped."""
+        times = self.task.times
         return recorded(ScipyIntegration(self._solver, self._options(knob, times)), self.start, times)

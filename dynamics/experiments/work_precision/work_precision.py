@@ -1,4 +1,4 @@
-"""Work and precision: run time beside error of every integrator on one setting, ours and others', in one run."""
+"""Work and precision: run time beside error of every integrator on one task, ours and others', in one run."""
 
 from __future__ import annotations
 
@@ -10,12 +10,11 @@ from typing import Any
 from ...integrators import METHODS, Problem
 from ...multiprecision import Reference
 from ...peers import UnavailableError
+from ..accuracy_task import AccuracyTask
 from ..machine import load as load_of_machine, machine
-from ..setting import Setting
 from .cold_start import STARTS, cold_starts
-from .measurement import Entry, ErrorMetrics, in_turns, sweep
-from .named_settings import load
-from .report import PEERS, WorkPrecision
+from .measurement import PEERS, Entry, ErrorMetrics, WorkPrecision, in_turns, sweep
+from .named_tasks import load
 from .trajectory_peers import offers
 from .trajectory_runs import EQUAL, Ours, Solver, problem_of
 
@@ -39,10 +38,10 @@ def work_precision(
     options: dict[str, Any] | None = None,
     say: Callable[[str], None] = lambda line: None,
 ) -> WorkPrecision:
-    """The report of a setting.
+    """The report of a task.
 
-    name, options: as of `named_settings.load`.  methods: ours.  peers: of `PEERS`; what is not installed is absent.
-    digits: of the exact motion (default: the setting's).  turns: all solvers run in turns, this often.  limit: seconds
+    name, options: as of `named_tasks.load`.  methods: ours.  peers: of `PEERS`; what is not installed is absent.
+    digits: of the exact motion (default: the task's).  turns: all solvers run in turns, this often.  limit: seconds
     of a run after which no finer knob is tried, thrice as long for the others.  cold: of `cold_start.STARTS`, with
     `cold_turns` turns and `budget` seconds each.  folder: where exact motions are kept.  backend: see `simulate`.
     say: takes progress lines.
@@ -53,15 +52,15 @@ def work_precision(
     check_names(("method", methods, METHODS), ("peer", peers, PEERS), ("cold start", cold, STARTS))
     if turns < 1 or not limit > 0.0:
         raise ValueError(f"turns must be at least 1 and limit positive, got {turns!r} and {limit!r} s")
-    setting = load(name, **(options or {}))
+    task = load(name, **(options or {}))
     begin, before = time.perf_counter(), load_of_machine()
     say(f"{name}: exact motion")
-    metrics = error_metrics(setting, digits, folder)
+    metrics = error_metrics(task, digits, folder)
     spent = time.perf_counter() - begin
-    problem = problem_of(setting)
+    problem = problem_of(task)
     absent: dict[str, str] = {}
     entries: list[Entry] = []
-    for solver in _solvers(setting, metrics.smallest, problem, methods, peers, backend, absent):
+    for solver in _solvers(task, metrics.smallest, problem, methods, peers, backend, absent):
         say(f"{name}: {solver.name}")
         entry = sweep(solver, metrics, limit if solver.ours else PATIENCE * limit)
         if entry.tried:
@@ -72,19 +71,19 @@ def work_precision(
     in_turns([tried for entry in entries for tried in entry.tried], turns)
     curves = tuple([entry.curve(metrics, problem) for entry in entries])
     started = cold_starts(name, options or {}, cold, turns=cold_turns, budget=budget, say=say) if cold else []
-    load_now, described = load_of_machine(), _described(setting, problem, metrics.exact)
+    load_now, described = load_of_machine(), _described(task, problem, metrics.exact)
     measured: dict[str, Any] = {"curves": curves, "cold": tuple(started), "absent": absent, "reference_seconds": spent}
     return WorkPrecision(**described, **measured, machine=machine(), load=(before, load_now))
 
 
-def _described(setting: Setting, problem: Problem, exact: Reference) -> dict[str, Any]:
-    """What the report says of the setting and of its exact motion."""
+def _described(task: AccuracyTask, problem: Problem, exact: Reference) -> dict[str, Any]:
+    """Facts of the report on the task and its exact motion."""
     fields = ("name", "about", "t_end", "conservative", "stiff", "left_out")
-    return {name: getattr(setting, name) for name in fields} | {
+    return {name: getattr(task, name) for name in fields} | {
         "states": problem.size,
         "nodes": len(problem.rate.nodes),
-        "relative_to": "own" if setting.decades else "given" if setting.size else "largest",
-        "times": tuple(setting.times),
+        "relative_to": "own" if task.decades else "given" if task.size else "largest",
+        "times": tuple(task.times),
         "reference": exact.how,
         "reference_error": exact.error,
     }
@@ -97,16 +96,16 @@ def check_names(*choices: tuple[str, Iterable[str], Iterable[str]]) -> None:
             raise ValueError(f"there is no {what} {unknown[0]!r}; there are {', '.join(known)}")
 
 
-def error_metrics(setting: Setting, digits: int | None = None, folder: str | Path | None = None) -> ErrorMetrics:
-    """The setting's exact motion, and errors against it. Raises ValueError where no such motion is known."""
-    exact = setting.solution(setting.times, folder, digits)
+def error_metrics(task: AccuracyTask, digits: int | None = None, folder: str | Path | None = None) -> ErrorMetrics:
+    """The task's exact motion, and errors against it. Raises ValueError where no such motion is known."""
+    exact = task.solution(task.times, folder, digits)
     if exact is None:
-        raise ValueError(f"no solution of {setting.name!r} is known to compare with")
-    return ErrorMetrics(setting, exact)
+        raise ValueError(f"no solution of {task.name!r} is known to compare with")
+    return ErrorMetrics(task, exact)
 
 
 def _solvers(
-    setting: Setting,
+    task: AccuracyTask,
     smallest: float,
     problem: Problem,
     methods: Sequence[str],
@@ -114,20 +113,18 @@ def _solvers(
     backend: str,
     absent: dict[str, str],
 ) -> Iterable[Solver]:
-    """Those that can be made; why others cannot goes to `absent`."""
+    """Solvers that can be made; reasons why others cannot go to `absent`."""
     makers: dict[str, Callable[[], Solver]] = {
-        method: lambda method=method: Ours(method, setting, smallest, problem, backend)  # type: ignore[misc]
+        method: lambda method=method: Ours(method, task, smallest, problem, backend)  # type: ignore[misc]
         for method in METHODS
         if method in methods
     }
     begins = tuple([PEERS[peer] for peer in peers])
-    makers |= {
-        name: make for name, make in offers(setting, smallest, problem, backend).items() if name.startswith(begins)
-    }
+    makers |= {name: make for name, make in offers(task, smallest, problem, backend).items() if name.startswith(begins)}
     for name, make in makers.items():
         try:
             solver = make()
-            if solver.kind == EQUAL and setting.decades:
+            if solver.kind == EQUAL and task.decades:
                 absent[name] = "equal steps cannot span this many powers of ten"
                 continue
             yield solver

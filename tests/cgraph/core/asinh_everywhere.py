@@ -187,7 +187,7 @@ def test_it_can_be_typed_and_the_page_differentiates_it():
 def test_reference_solutions_take_it_and_ask_for_a_multiprecision_value_that_they_lack():
     pytest.importorskip("flint")
     from dynamics.multiprecision.flint_numbers import working
-    from dynamics.multiprecision.taylor_series import Series
+    from dynamics.multiprecision.taylor_integrator import Series
     from dynamics.systems.ode_system import OdeSystem
 
     def coefficients(row):

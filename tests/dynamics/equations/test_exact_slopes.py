@@ -40,10 +40,10 @@ def ours(tree: dyn.Mechanism, state: tuple[Array, ...]) -> Slopes:
 
 
 def pinocchios(tree: dyn.Mechanism, state: tuple[Array, ...]) -> Slopes:
-    from dynamics.peers import Case
+    from dynamics.peers import PeerModel
     from dynamics.peers.pinocchio import PinocchioPeer
 
-    peer, (q, qd, qdd, tau) = PinocchioPeer(Case("tree", tree)), state
+    peer, (q, qd, qdd, tau) = PinocchioPeer(PeerModel("tree", tree)), state
     return Slopes(
         peer.slopes(np.concatenate([q, qd, qdd]), "inverse-derivatives"),
         peer.slopes(np.concatenate([q, qd, tau]), "derivatives"),

@@ -12,7 +12,7 @@ import cgraph as cg
 import dynamics as dyn
 from cgraph import structure_hash
 from dynamics.equations.formulations.formulations import SMALL
-from dynamics.experiments.trust.random_lagrangians import LAGRANGIANS, random_setting
+from dynamics.experiments.trust.random_motions import LAGRANGIANS, random_task
 from dynamics.multibody.joints import COMPOSITIONS, TYPES
 from dynamics.multibody.mechanism import WORLD, Body, Joint, Mechanism
 from tests.dynamics.mechanisms import (
@@ -79,12 +79,12 @@ def test_the_trees_have_every_joint() -> None:
 
 @mark.parametrize("number", [*range(0, LAGRANGIANS, 9), *slow(*[k for k in range(LAGRANGIANS) if k % 9])])
 def test_torques_of_a_random_lagrangian_are_those_of_the_chain_rule(number: int) -> None:
-    setting = random_setting(number)
-    rng, n = np.random.default_rng(number), setting.system.n
-    parts = {"q": np.array(setting.q) + 0.1 * rng.normal(size=n) * np.abs(setting.q), "qd": np.array(setting.qd)}
-    parts["qdd"] = rng.normal(size=n) * np.abs(setting.q)
+    task = random_task(number)
+    rng, n = np.random.default_rng(number), task.system.n
+    parts = {"q": np.array(task.q) + 0.1 * rng.normal(size=n) * np.abs(task.q), "qd": np.array(task.qd)}
+    parts["qdd"] = rng.normal(size=n) * np.abs(task.q)
     at = {f"{name}{i}": float(x) for name, row in parts.items() for i, x in enumerate(row)} | {"t": 0.7}
-    by_velocities, right = (dyn.inverse_dynamics(setting.system, each) for each in ("newton_euler", "chain_rule"))
+    by_velocities, right = (dyn.inverse_dynamics(task.system, each) for each in ("newton_euler", "chain_rule"))
     values = [graph.evaluate({name: at[name] for name in graph.input_names}) for graph in (by_velocities, right)]
     for name, size in rounding_size(right, at).items():
         assert abs(values[0][name] - values[1][name]) <= SAME * max(size, abs(values[1][name]))

@@ -15,16 +15,16 @@ from cgraph.extend import ldl_elimination
 from dynamics.equations.linearization import linearize_many
 from dynamics.experiments.machine import machine
 from dynamics.experiments.speed import bench as module
-from dynamics.experiments.speed.bench import MODES, PEERS, TASKS, Cell, Row, WorkerPool, bench
+from dynamics.experiments.speed.bench import MODES, PEERS, TASKS, Cell, Row, WorkerPool, bench, tables
 from dynamics.experiments.speed.bench_scenes import SCENES, free_tree, load
-from dynamics.experiments.speed.bench_table import tables
 from dynamics.experiments.speed.worker import Prepared, Refused, Worker
 from dynamics.experiments.text_table import digits
 from dynamics.io.mujoco_twin import MujocoTwin
-from dynamics.peers import Case, UnavailableError, ours
-from dynamics.peers.case import BATCH, DERIVATIVES, DT, MOTIONS, NUDGE, PASSES
+from dynamics.peers import PeerModel, UnavailableError, ours
 from dynamics.peers.ours import with_inertial_parameters
+from dynamics.peers.peer import BATCH, DERIVATIVES, DT, MOTIONS, NUDGE, PASSES
 from dynamics.peers.translate import translated
+from tests.each_row import each_row
 from viz import cli
 
 ROUNDING = 1e-10  # of a loop: the motion is that much larger than the last bit of the state it is taken from
@@ -64,7 +64,7 @@ def tree() -> dyn.Mechanism:
 class Reference:
     """MuJoCo asked at single states, with steps and loops written out here."""
 
-    def __init__(self, case: Case) -> None:
+    def __init__(self, case: PeerModel) -> None:
         pytest.importorskip("mujoco")
         self.n, self.twin = case.n, MujocoTwin(case.model)
         names = case.model.coordinates
@@ -141,11 +141,11 @@ OFFERED = [
 ]
 
 
-@pytest.mark.parametrize(("name", "task", "mode"), [each for each in OFFERED if "gradient" not in each.values[1]])
+@each_row(("name", "task", "mode"), [each for each in OFFERED if "gradient" not in each.values[1]], by="name")
 def test_a_peer_finds_what_mujoco_finds(name, task, mode):
-    case = Case("planar 3", load("planar 3").model)
+    case = PeerModel("planar 3", load("planar 3").model)
     reference, x = Reference(case), case.point(task)
-    contender, found = prepared(name, case, task, mode)
+    _, found = prepared(name, case, task, mode)
     if mode == "batch":
         points = case.points(task)
         rows = 2 * case.n if task == "rk4" else case.n
@@ -158,13 +158,12 @@ def test_a_peer_finds_what_mujoco_finds(name, task, mode):
     else:
         start = x[: len(found)] if task in ("rk4", "motion") else 0.0
         assert difference(found, reference.value(task, x), start) < rounding(task)
-    assert contender.evaluations == {"call": 1, "loop": PASSES, "batch": BATCH}[mode]
 
 
 @pytest.fixture(scope="module")
 def pushed():
     """Directions of the start and of the torques, and how far |q|^2 of MuJoCo's motion goes along them."""
-    case = Case("planar 3", load("planar 3").model)
+    case = PeerModel("planar 3", load("planar 3").model)
     reference, x, n = Reference(case), case.point("gradient"), case.n
     start, torques = np.zeros((2, len(x)))
     start[: 2 * n], torques[2 * n :] = [0.3, -0.5, 0.2, 1.0, 0.4, -0.7], np.resize([1.0, -1.5, 0.5], PASSES * n)
@@ -187,7 +186,7 @@ def test_a_gradient_is_the_slope_of_mujoco_s_motion(name, task, mode, pushed):
 
 
 def test_a_gradient_by_inertial_numbers_is_that_of_motions_with_other_numbers():
-    case = Case("planar 3", load("planar 3").model)
+    case = PeerModel("planar 3", load("planar 3").model)
     _, found = prepared("ours", case, "inertial-gradient", "call")
     model, numbers = with_inertial_parameters(case.model)
     q, qd, tau = np.split(case.point("gradient"), [3, 6])
@@ -206,7 +205,7 @@ def test_a_gradient_by_inertial_numbers_is_that_of_motions_with_other_numbers():
     assert found[len(case.point("gradient")) :] @ along == pytest.approx(expected, rel=DIFFERENCES)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("name", "task"),
     [
         (name, task)
@@ -214,9 +213,10 @@ def test_a_gradient_by_inertial_numbers_is_that_of_motions_with_other_numbers():
         for task in TASKS
         if (task, "call") in PEERS[name].offers and task not in MOTIONS
     ],
+    by="name",
 )
 def test_a_peer_knows_springs_armature_slides_and_the_order_of_joints(name, task):
-    case = Case("tree", tree())
+    case = PeerModel("tree", tree())
     _, found = prepared(name, case, task, "call")
     x = case.point(task)
     assert difference(found, Reference(case).value(task, x), x if task == "rk4" else 0.0) < rounding(task)
@@ -228,7 +228,7 @@ def test_slopes_of_a_free_base_are_those_along_its_displacements(name, task):
     limb = dyn.Joint("revolute", axis=(0.0, 1.0, 0.5), damping=0.2, stiffness=1.5, spring_reference=0.3, armature=0.05)
     kwargs = {"center": (0.05, 0.02, -0.1), "inertia": (0.02, 0.03, 0.025)}
     base = dyn.Body("base", dyn.Joint("free", damping=0.3, armature=0.07), mass=1.2, **kwargs)
-    case = Case("free", dyn.Mechanism([base, dyn.Body("limb", limb, "base", mass=0.8, **kwargs)]))
+    case = PeerModel("free", dyn.Mechanism([base, dyn.Body("limb", limb, "base", mass=0.8, **kwargs)]))
     _, found = prepared(name, case, task, "call")
     make = {"inverse": dyn.inverse_dynamics, "forward": dyn.forward_dynamics}[DERIVATIVES[task]]
     function, rate = (values(case.bound(each(case.model))) for each in (make, dyn.state_equation))
@@ -243,7 +243,7 @@ def test_slopes_of_a_free_base_are_those_along_its_displacements(name, task):
 
 @pytest.mark.parametrize(("model", "mode"), [(free_tree(7), "call"), (free_tree(7), "batch"), (tree(), "call")])
 def test_derivatives_of_a_large_model_by_one_piece_of_code_for_all_columns(model, mode, monkeypatch):
-    case = Case("a model", model)
+    case = PeerModel("a model", model)
     expected = prepared("ours", case, "derivatives", mode)[1]
     for each in (ours, linearize_many):
         monkeypatch.setattr(each, "WRITTEN_OUT", 0)
@@ -259,11 +259,11 @@ def test_a_model_with_quaternions_has_no_motions():
 @pytest.fixture(scope="module")
 def floating():
     """A free base with a link, and the results of our code without LLVM at the states of a batch."""
-    case = Case("free", free_tree(7))
+    case = PeerModel("free", free_tree(7))
     return case, {task: prepared("ours-numpy", case, task, "batch")[1] for task in TASKS if task not in MOTIONS}
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("name", "task", "mode"),
     [
         pytest.param(
@@ -274,6 +274,7 @@ def floating():
         if not {"loop", "jax", *MOTIONS} & set(each.values)
     ]
     + [pytest.param("jax", task, "batch", marks=pytest.mark.slow) for task in CALLED],
+    by="name",
 )
 def test_a_peer_moves_a_free_base_as_we_do(name, task, mode, floating):
     case, ours = floating
@@ -300,7 +301,7 @@ def test_a_peer_takes_parameters_and_applied_forces(name):
         forces=lambda q, qd, t, p: [p["k"] * qd[0] ** 2],
         damping=0.5,
     )
-    case = Case("rotor", system)
+    case = PeerModel("rotor", system)
     mode = "batch" if name == "ours-numpy" else "call"
     if name in ("pinocchio", "mujoco"):
         with pytest.raises(UnavailableError, match="rigid bodies"):
@@ -314,7 +315,7 @@ def test_a_peer_takes_parameters_and_applied_forces(name):
 def test_a_system_that_depends_on_time_is_refused():
     driven = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 + t * q[0], coordinates=["x"])
     with pytest.raises(ValueError, match="depends on time"):
-        Case("driven", driven)
+        PeerModel("driven", driven)
 
 
 def test_the_dense_solve_finds_what_numpy_finds():
@@ -362,7 +363,7 @@ def test_what_a_peer_s_own_code_raises_is_a_reason():
     assert not worker.alive
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("choice", "said"),
     [
         ({"scenes": ["planar 4"]}, "there is no scene 'planar 4'"),
@@ -435,7 +436,7 @@ def test_the_bench_goes_on_without_ours(monkeypatch):
             self.turn = lambda *_: 1e-6
 
     monkeypatch.setattr(module, "Worker", Answering)
-    found = module._row(Case("planar 3", SCENES["planar 3"]()), "forward", "call", pool, 3)
+    found = module._row(PeerModel("planar 3", SCENES["planar 3"]()), "forward", "call", pool, 3)
     assert found.skipped == {"ours": "not ready within 1 s"}
     assert found.cells["mujoco"].difference is None
 

@@ -16,7 +16,7 @@ from dynamics.experiments.speed.bench_figures import FIGURES
 from dynamics.experiments.speed.bench_scenes import turned_arm
 from dynamics.experiments.speed.node_counts import VARIANTS
 from dynamics.experiments.text_table import WIDTH, csv_text, table
-from dynamics.peers import PEERS, Case
+from dynamics.peers import PEERS, PeerModel
 from tests.dynamics.figures import balanced_order, both_forms, parallel_c
 from viz import cli
 
@@ -43,7 +43,7 @@ def test_a_variant_computes_the_same_with_other_nodes(name: str) -> None:
 def test_arms_agree_with_peers(peer: str, mass_model: str) -> None:
     pytest.importorskip(PEERS[peer].package)
     arm = random_arm(4, mass_model)
-    made: Any = PEERS[peer].make(Case(peer, arm))
+    made: Any = PEERS[peer].make(PeerModel(peer, arm))
     worst = differences(arm, made, 5)
     assert set(worst) == set(QUANTITIES)
     assert max(worst.values()) < POINTS

@@ -18,6 +18,7 @@ from tests import high_precision
 from tests.dynamics.experiments import sensitivity
 from tests.dynamics.models import Array
 from tests.dynamics.split_state import split_state
+from tests.each_row import each_row
 from tests.slow import slow
 
 Rate = Callable[[Array, float], Any]  # of the state and t, written without the library
@@ -179,7 +180,7 @@ def values(case: StabilityCase, state: Array, t: float) -> dict[str, float]:
     return result | ({"t": t} if given.timed else {})
 
 
-@mark.parametrize("name", [param(name, marks=mark.slow if name == "100 links" else ()) for name in BY_HAND])
+@each_row("name", [param(name, marks=mark.slow if name == "100 links" else ()) for name in BY_HAND])
 def test_equations_are_those_written_by_hand(name: str) -> None:
     case = cases.load(name)
     graph = state_equation(case.model)
@@ -282,7 +283,7 @@ def test_the_free_body_starts_with_its_momentum_along_the_vertical() -> None:
 WITH_INVARIANTS = [name for name, case in cases.table().items() if case.invariants and len(case.start) < LARGE]
 
 
-@mark.parametrize("name", WITH_INVARIANTS)
+@each_row("name", WITH_INVARIANTS)
 def test_invariants_do_not_change_along_the_motion(name: str) -> None:
     """Their derivative along the rates, by differences in fifty digits."""
     case = cases.load(name)
@@ -300,7 +301,7 @@ def test_invariants_do_not_change_along_the_motion(name: str) -> None:
             assert abs(float(change[key])) <= ROUNDING * size[key], key  # constants of both graphs are rounded
 
 
-@mark.parametrize("name", [*[name for name in cases.names() if name != "1000 links"], *slow("1000 links")])
+@each_row("name", [*[name for name in cases.names() if name != "1000 links"], *slow("1000 links")])
 def test_what_is_watched_can_be_measured(name: str) -> None:
     case = cases.load(name)
     invariants = (
@@ -325,7 +326,7 @@ LIMITS = [name for name, case in cases.table().items() if case.exact is not None
 CLOSED = [name for name, case in cases.table().items() if case.exact is not None and case.method is not None]
 
 
-@mark.parametrize("name", CLOSED)
+@each_row("name", CLOSED)
 def test_closed_form_is_the_motion_of_the_model(name: str) -> None:
     """To a time by which the motion has moved; the rest is marked slow. Constants of the graph may be rounded."""
     compare(cases.load(name), min(cases.load(name).t_end, 1.0))

@@ -9,6 +9,7 @@ from dynamics.systems.model import as_system
 from tests import high_precision
 from tests.dynamics.lagrange_by_mpmath import floats, lagrange
 from tests.dynamics.models import MODELS, Array, at, before, named, random_arm, run, states
+from tests.each_row import each_row
 
 DTS = np.geomspace(1e-4, 1e-6, 5)  # s: the second-order term is then below 1e-3 of the first
 SLOPE = 0.02  # of a line through logarithms, whose curvature over DTS is the second-order term
@@ -68,7 +69,7 @@ def test_kinetic_only_is_wrong_for_a_real_arm_at_any_dt(case: Case) -> None:
 
 
 @mark.parametrize("dt", [1e-6, 1e-3, 0.1, 1.0])
-@mark.parametrize("formulation", ["kinetic_only", "kinetic_only_exact"])
+@each_row("formulation", ["kinetic_only", "kinetic_only_exact"])
 def test_kinetic_only_is_exact_for_one_joint_at_any_dt(formulation: str, dt: float) -> None:
     case = Case(1)
     tau = run(dyn.inverse_dynamics(case.arm, formulation), before(case.state, dt))
@@ -82,14 +83,14 @@ def test_the_chain_rule_is_exact(case: Case) -> None:
 
 
 @mark.parametrize("dt", [1e-6, 1e-3, 0.1, 1.0])
-@mark.parametrize("n", [1, 2, 3, 6])
+@each_row("n", [1, 2, 3, 6])
 def test_kinetic_only_exact_equals_the_chain_rule_at_any_dt(n: int, dt: float) -> None:
     case = Case(n)
     tau = run(dyn.inverse_dynamics(case.arm, "kinetic_only_exact"), before(case.state, dt))
     assert tau == approx(case.tau, rel=0.0, abs=ROUNDING * case.largest)
 
 
-@mark.parametrize("name", MODELS)
+@each_row("name", MODELS)
 def test_the_limits_hold_for_any_lagrangian(name: str) -> None:
     """With explicit time, terms linear in velocity, damping and forces; at dt = 1e-7 s, an error of first order."""
     first_order = 1e-5

@@ -7,7 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from pytest import mark
 
 import dynamics as dyn
 from dynamics.experiments.speed.operation_counts import (
@@ -21,6 +20,7 @@ from dynamics.experiments.speed.operation_counts import (
     published_mass_matrix,
     robot,
 )
+from tests.each_row import each_row
 from tests.slow import slow
 
 PAGE = Path(__file__).parents[3] / "docs/operations.md"
@@ -42,7 +42,7 @@ def rows() -> Iterator[tuple[str, str, list[int]]]:
 ROWS = {(what, name): numbers for what, name, numbers in rows()}
 
 
-@mark.parametrize(
+@each_row(
     ("what", "name"),
     [each for each in ROWS if len(MODELS[each[1]].moving) <= SMALL]
     + slow(*[each for each in ROWS if len(MODELS[each[1]].moving) > SMALL]),

@@ -9,7 +9,7 @@ from pytest import approx, importorskip, mark, param
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.experiments.stability import huge_angles, single_evaluations
+from dynamics.experiments.stability import single_evaluations
 from dynamics.multibody.builders.planar_arm import arm_of_links, planar_links
 from tests.dynamics.lagrange_by_mpmath import floats, lagrange
 from tests.dynamics.models import Array
@@ -140,7 +140,7 @@ def test_a_constant_that_is_off_is_seen() -> None:
 
 
 def test_angles_fill_their_range_with_both_signs() -> None:
-    found = huge_angles.angles(6.0, 9.0, 1000)
+    found = single_evaluations.angles(6.0, 9.0, 1000)
     assert np.min(np.abs(found)) >= 1e6
     assert np.max(np.abs(found)) <= 1e9
     assert 400 < np.count_nonzero(found > 0.0) < 600
@@ -148,24 +148,24 @@ def test_angles_fill_their_range_with_both_signs() -> None:
 
 def test_sine_and_cosine_of_huge_angles_are_reduced_exactly() -> None:
     importorskip("flint")
-    found = list(huge_angles.results(100))
+    found = list(single_evaluations.sine_results(100))
     assert len(found) == 2 * len(single_evaluations.available())
     assert all(each.meets for each in found), [each.measurements for each in found]
 
 
 def test_an_angle_that_is_reduced_in_float64_is_seen() -> None:
     importorskip("flint")
-    points = huge_angles.angles(6.0, 9.0, 50)
-    known = huge_angles.exact(points)
-    assert huge_angles.ulps(np.array([np.sin(points), np.cos(points)]), known) <= 1.0
+    points = single_evaluations.angles(6.0, 9.0, 50)
+    known = single_evaluations.exact(points)
+    assert single_evaluations.ulps(np.array([np.sin(points), np.cos(points)]), known) <= 1.0
     short = np.fmod(points, 2.0 * math.pi)
-    assert huge_angles.ulps(np.array([np.sin(short), np.cos(short)]), known) > 1e3
+    assert single_evaluations.ulps(np.array([np.sin(short), np.cos(short)]), known) > 1e3
 
 
 def test_sines_are_those_of_mpmath() -> None:
     importorskip("flint")
     mpmath = importorskip("mpmath")
-    points = huge_angles.angles(200.0, 308.0, 20)
+    points = single_evaluations.angles(200.0, 308.0, 20)
     with mpmath.workdps(400):
         sines = [float(mpmath.sin(mpmath.mpf(x))) for x in points.tolist()]
-    assert huge_angles.exact(points).high[0].tolist() == sines
+    assert single_evaluations.exact(points).high[0].tolist() == sines

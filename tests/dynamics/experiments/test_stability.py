@@ -13,18 +13,17 @@ from pytest import MonkeyPatch, approx, importorskip, mark, raises
 
 from dynamics.experiments import text_table
 from dynamics.experiments.stability import (
+    case_result as limits,
     case_runs,
     cases,
     energy_drift,
-    known_limits as limits,
     single_evaluations,
-    solutions,
     stability,
-    stability_table,
 )
 from dynamics.experiments.stability.case_result import CaseResult, Measurement
 from dynamics.integrators import METHODS, Method, runge_kutta
 from dynamics.integrators.tableau import DOPRI5
+from tests.each_row import each_row
 from tests.early_end import stops
 
 STIFF, SMOOTH = "Robertson, to 1e11", "heavy top"
@@ -79,7 +78,7 @@ def test_every_limit_is_of_a_row_that_exists_and_is_told_in_the_documentation() 
 
 
 def test_the_file_has_a_solution_of_every_case_that_has_one() -> None:
-    kept = json.loads(solutions.FILE.read_text(encoding="utf-8"))
+    kept = json.loads(case_runs.FILE.read_text(encoding="utf-8"))
     assert set(kept) == {name for name, case in cases.table().items() if case.exact or case.method}
     for name, entry in kept.items():
         case = cases.load(name)
@@ -91,7 +90,7 @@ def test_the_file_has_a_solution_of_every_case_that_has_one() -> None:
 
 def kept_is_computed(name: str) -> None:
     case = cases.load(name)
-    kept, computed = solutions.solution(case), case.solution()
+    kept, computed = case_runs.known_solution(case), case.solution()
     assert kept is not None
     assert computed is not None
     size = case.sizes(computed)
@@ -99,7 +98,7 @@ def kept_is_computed(name: str) -> None:
     assert np.max(np.abs(kept.deviation(computed.x)[0]) / size) <= STORED * grown
 
 
-@mark.parametrize("name", [*[name for name, case in cases.table().items() if case.exact], "mass ratio 1e-12"])
+@each_row("name", [*[name for name, case in cases.table().items() if case.exact], "mass ratio 1e-12"])
 def test_a_solution_in_the_file_is_the_one_computed(name: str) -> None:
     importorskip("mpmath")
     importorskip("flint")
@@ -117,7 +116,7 @@ def test_a_case_with_another_start_is_computed_anew() -> None:
     importorskip("mpmath")
     case = cases.load("exponential decay")
     moved = replace(case, t_end=1.0)
-    found = solutions.solution(moved)
+    found = case_runs.known_solution(moved)
     assert found is not None
     assert found.x[0, 0] == math.exp(-1.0)
 
@@ -159,7 +158,7 @@ def test_a_run_that_stops_meets_nothing(monkeypatch: MonkeyPatch) -> None:
 
 def test_invariants_are_those_of_the_case_and_errors_those_of_the_state() -> None:
     case = cases.load("Kepler, e = 0.9")
-    solution = solutions.solution(case)
+    solution = case_runs.known_solution(case)
     run = case_runs.trajectory(case, "dop853")
     x, y, u, v = np.concatenate([run.q, run.qd], axis=1).T
     found = case_runs.changes(case, run, {"energy", "angular momentum"})
@@ -232,7 +231,7 @@ ROWS = [
 
 
 def test_the_table_fits_its_width_and_gives_every_reason_once() -> None:
-    text = stability_table.text([*ROWS[:2], ROWS[1], *ROWS[2:]])
+    text = stability.text([*ROWS[:2], ROWS[1], *ROWS[2:]])
     assert max(map(len, text.splitlines())) <= text_table.WIDTH
     assert " ".join(text.split()).count("a reason " * 19) == 1
     assert "stopped at t = 1 s: no reason is known" in text

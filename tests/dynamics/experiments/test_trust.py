@@ -3,10 +3,8 @@
 import pytest
 from pytest import mark
 
-from dynamics.experiments.trust.answers import COUNT, answer, compute
-from dynamics.experiments.trust.random_lagrangians import FAMILIES, LAGRANGIANS, random_setting
-from dynamics.experiments.trust.random_starts import EACH, FAMILIES as STARTS, random_motion
-from dynamics.experiments.trust.trust import ADAPTIVE, RIGHT, SAID, SILENT, judge
+from dynamics.experiments.trust.random_motions import EACH, FAMILIES, LAGRANGIANS, STARTS, random_motion, random_task
+from dynamics.experiments.trust.trust import ADAPTIVE, COUNT, RIGHT, SAID, SILENT, answer, compute, judge
 
 QUICK = 8  # of the random Lagrangians: one of each family; of the random starts, too
 SPREAD = 1e-2  # relative: growth is measured by differences
@@ -32,9 +30,9 @@ def test_kept_answers_are_computed_again(number: int) -> None:
 
 
 def test_the_same_number_is_the_same_system() -> None:
-    names = [random_setting(number).name for number in range(2 * len(FAMILIES))]
+    names = [random_task(number).name for number in range(2 * len(FAMILIES))]
     assert len(set(names)) == len(names)
-    first, second = random_setting(11), random_setting(11)
+    first, second = random_task(11), random_task(11)
     assert (first.start, first.t_end) == (second.start, second.t_end)
     assert first.system.lagrangian.op is second.system.lagrangian.op
 

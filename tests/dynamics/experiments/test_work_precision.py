@@ -15,12 +15,21 @@ import pytest
 from pytest import approx, raises
 
 import dynamics as dyn
-from dynamics.experiments.setting import INTERVALS, Setting
+from dynamics.experiments.accuracy_task import INTERVALS, AccuracyTask
 from dynamics.experiments.work_precision import measurement
 from dynamics.experiments.work_precision.cold_start import cold_starts
-from dynamics.experiments.work_precision.measurement import FLOOR, Entry, ErrorMetrics, fitted_order
-from dynamics.experiments.work_precision.named_settings import load, names
-from dynamics.experiments.work_precision.report import Curve, Point, WorkPrecision, targets, to_csv
+from dynamics.experiments.work_precision.measurement import (
+    FLOOR,
+    Curve,
+    Entry,
+    ErrorMetrics,
+    Point,
+    WorkPrecision,
+    fitted_order,
+    targets,
+    to_csv,
+)
+from dynamics.experiments.work_precision.named_tasks import load, names
 from dynamics.experiments.work_precision.trajectory_peers import EPSILON, Cvodes, Heyoka, Mujoco, heyoka_derivatives
 from dynamics.experiments.work_precision.trajectory_runs import (
     CHOSEN,
@@ -34,6 +43,7 @@ from dynamics.experiments.work_precision.trajectory_runs import (
 from dynamics.experiments.work_precision.work_precision import work_precision
 from dynamics.integrators import METHODS
 from dynamics.multiprecision import Reference
+from tests.each_row import each_row
 
 T_END = 10.0  # s, of the scene spring_mass: q = cos t
 ROUNDING = 1e-9  # a thousand times that of a power of R(i h) in float64
@@ -176,15 +186,15 @@ def test_csv_and_json_hold_the_points(report: WorkPrecision) -> None:
     assert content["targets"][0]["group"] == "ours"
 
 
-def exact_motion(found: Setting, digits: int) -> Reference:
-    """The setting's own, at its times."""
+def exact_motion(found: AccuracyTask, digits: int) -> Reference:
+    """The task's own, at its times."""
     exact = found.solution(found.times, digits=digits)
     assert exact is not None
     return exact
 
 
-def setting(name: str, **options: Any) -> tuple[Setting, ErrorMetrics, float]:
-    """A setting with its exact motion, to twenty digits."""
+def task(name: str, **options: Any) -> tuple[AccuracyTask, ErrorMetrics, float]:
+    """A task with its exact motion, to twenty digits."""
     pytest.importorskip("flint")
     found = load(name, **options)
     metrics = ErrorMetrics(found, exact_motion(found, 20))
@@ -192,11 +202,11 @@ def setting(name: str, **options: Any) -> tuple[Setting, ErrorMetrics, float]:
 
 
 @pytest.fixture(scope="module")
-def arm() -> tuple[Setting, ErrorMetrics, float]:
-    return setting("triple_pendulum", t_end=1.0)
+def arm() -> tuple[AccuracyTask, ErrorMetrics, float]:
+    return task("triple_pendulum", t_end=1.0)
 
 
-def test_mujoco_s_rk4_makes_the_error_that_ours_makes(arm: tuple[Setting, ErrorMetrics, float]) -> None:
+def test_mujoco_s_rk4_makes_the_error_that_ours_makes(arm: tuple[AccuracyTask, ErrorMetrics, float]) -> None:
     pytest.importorskip("mujoco")
     found, metrics, smallest = arm
     theirs, ours = Mujoco("RK4", found, smallest), Ours("rk4", found, smallest, problem_of(found))
@@ -216,7 +226,7 @@ def test_mujoco_s_order_of_the_joints_is_undone() -> None:
         dyn.Body(name, dyn.Joint("revolute", (0.0, 1.0, 0.0), (0.1, 0.0, -0.3)), parent, mass, (0.0, 0.0, -0.2))
         for name, parent, mass in (("a", "world", 1.0), ("b", "a", 0.5), ("c", "a", 0.7), ("d", "b", 0.3))
     ]
-    found = Setting("tree", "", dyn.Mechanism(bodies), (0.1, 0.4, -0.3, 0.8), (0.5, -0.2, 0.7, 0.3), 0.5)
+    found = AccuracyTask("tree", "", dyn.Mechanism(bodies), (0.1, 0.4, -0.3, 0.8), (0.5, -0.2, 0.7, 0.3), 0.5)
     metrics, theirs = ErrorMetrics(found, exact_motion(found, 15)), Mujoco("RK4", found, 1.0)
     assert list(theirs.peer.order) != [0, 1, 2, 3]
     assert metrics.at_end(theirs.ready(512)().x) < 1e-8
@@ -228,7 +238,7 @@ def test_mujoco_s_order_of_the_joints_is_undone() -> None:
 
 @pytest.mark.parametrize("kind", ["Euler", "implicit", "implicitfast"])
 def test_mujoco_s_first_order_integrators_come_nearer_with_the_step(
-    arm: tuple[Setting, ErrorMetrics, float], kind: str
+    arm: tuple[AccuracyTask, ErrorMetrics, float], kind: str
 ) -> None:
     pytest.importorskip("mujoco")
     found, metrics, smallest = arm
@@ -238,7 +248,7 @@ def test_mujoco_s_first_order_integrators_come_nearer_with_the_step(
 
 
 @pytest.mark.parametrize("damping", [0.1, 0.2])
-def test_the_error_of_a_model_is_told_apart(arm: tuple[Setting, ErrorMetrics, float], damping: float) -> None:
+def test_the_error_of_a_model_is_told_apart(arm: tuple[AccuracyTask, ErrorMetrics, float], damping: float) -> None:
     """MuJoCo's rates are ours to rounding; with another damping they differ by what that damping does."""
     pytest.importorskip("mujoco")
     found, metrics, smallest = arm
@@ -250,7 +260,7 @@ def test_the_error_of_a_model_is_told_apart(arm: tuple[Setting, ErrorMetrics, fl
     assert difference < SAME_RATES if damping == 0.1 else 1e-3 < difference < 10.0
 
 
-def test_cvodes_gets_our_equations(arm: tuple[Setting, ErrorMetrics, float]) -> None:
+def test_cvodes_gets_our_equations(arm: tuple[AccuracyTask, ErrorMetrics, float]) -> None:
     pytest.importorskip("casadi")
     found, metrics, smallest = arm
     for kind in ("BDF", "Adams"):
@@ -264,7 +274,7 @@ def test_cvodes_gets_our_equations(arm: tuple[Setting, ErrorMetrics, float]) -> 
 
 def test_heyoka_gets_our_equations() -> None:
     pytest.importorskip("heyoka")
-    found, metrics, smallest = setting("spring_mass")
+    found, metrics, smallest = task("spring_mass")
     theirs = Heyoka(found, smallest, problem_of(found))
     assert metrics.at_end(theirs.ready(EPSILON)().x) < LAST_BITS
     assert metrics.at_end(theirs.ready(1e-4)().x) < 1e-2
@@ -291,7 +301,7 @@ def test_heyokas_derivatives_leave_its_cache_as_it_is() -> None:
 
 def test_scipy_runs_on_our_rate() -> None:
     pytest.importorskip("scipy")
-    found, metrics, smallest = setting("spring_mass")
+    found, metrics, smallest = task("spring_mass")
     for solver in ("DOP853", "LSODA", "Radau"):
         theirs = Scipy(solver, found, smallest, problem_of(found))
         assert metrics.at_end(theirs.ready(1e-7)().x) < 1e-7 * THOUSANDFOLD
@@ -321,7 +331,7 @@ class Broken(Solver):
 
 
 def test_a_solver_that_fails_keeps_its_good_points_and_a_reason() -> None:
-    found, metrics, smallest = setting("spring_mass")
+    found, metrics, smallest = task("spring_mass")
     entry = measurement.sweep(Broken("broken", "", found, smallest), metrics, 1.0)
     assert [each.knob for each in entry.tried] == [1e-2, 1e-3]
     assert entry.stopped == "is not finite"
@@ -360,7 +370,7 @@ def test_another_start_has_another_exact_motion() -> None:
     assert exact.x[-1] == approx(np.array([2.0 * math.sin(1.0), 2.0 * math.cos(1.0)]), rel=1e-14)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("arguments", "said"),
     [
         ({"name": "nothing"}, "there is no scene 'nothing'"),

@@ -17,6 +17,7 @@ import dynamics as dyn
 from dynamics.multibody.mechanism import Body, Joint, Mechanism, MechanismError
 from tests.dynamics.mechanisms import EVERY_FAMILY, FAMILIES
 from tests.dynamics.models import error
+from tests.each_row import each_row
 from tests.slow import slow
 from tests.tolerances import EQUATIONS
 
@@ -209,7 +210,7 @@ def test_what_is_no_source_is_said(load: Any) -> None:
 
 
 @mark.parametrize("load", [dyn.load_mjcf, dyn.load_urdf])
-@mark.parametrize("source", ["robot\n" * 5000, "x" * 5000, "<robot name='\ud800'/>", "a\0b", "\ud800", "", "<", "<!--"])
+@each_row("source", ["robot\n" * 5000, "x" * 5000, "<robot name='\ud800'/>", "a\0b", "\ud800", "", "<", "<!--"])
 def test_what_cannot_be_read_is_one_sentence(load: Any, source: str) -> None:
     with raises(
         MechanismError, match=r"cannot be read: File name too long|is not XML: |there is no file|is a folder"
@@ -386,7 +387,7 @@ def test_what_acts_from_outside_is_left_out_with_a_warning_and_no_error() -> Non
 
 
 @mark.parametrize("number", ["nan", "inf"])
-@mark.parametrize("attribute", ["stiffness", "damping", "armature", "ref", "pos", "axis"])
+@each_row("attribute", ["stiffness", "damping", "armature", "ref", "pos", "axis"])
 def test_a_number_that_is_not_finite_is_one_sentence(
     tmp_path: Path, monkeypatch: Any, capfd: Any, attribute: str, number: str
 ) -> None:

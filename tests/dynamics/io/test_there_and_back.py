@@ -17,6 +17,7 @@ from dynamics.io.stand_ins import STAND_IN
 from dynamics.multibody.loops import Loop
 from dynamics.multibody.mechanism import WORLD, Body, Joint, Mechanism, MechanismError
 from tests.dynamics.mechanisms import FAMILIES, random_inertia, random_rotation
+from tests.each_row import each_row
 
 EPS = 2.0**-52
 TURNED = 8 * EPS  # axes and rotations: angles or a quaternion, and their sines or squares, a few roundings each; what
@@ -183,7 +184,7 @@ def test_random_loops_come_back_or_are_refused(writer: str, count: int, record_p
     assert len(found["same"]) >= max(1, count // 8)
 
 
-@mark.parametrize(
+@each_row(
     ("writer", "loops", "message"),
     [
         (

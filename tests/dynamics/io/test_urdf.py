@@ -17,6 +17,7 @@ from dynamics.multibody.algebra.spatial import rotation
 from dynamics.multibody.mechanism import Body, Joint, Mechanism, MechanismError
 from tests.dynamics.mechanisms import random_inertia
 from tests.dynamics.models import error
+from tests.each_row import each_row
 from tests.tolerances import EQUATIONS, LAST_BITS
 
 Array = np.ndarray
@@ -307,7 +308,7 @@ def test_moments_below_rounding_of_the_mass_may_be_negative() -> None:
 
 
 @mark.parametrize("unit", [1e-6, 1.0, 1e6])
-@mark.parametrize("digits", [4, 6, 7])
+@each_row("digits", [4, 6, 7])
 @mark.filterwarnings("ignore:body 'a'. no body has principal moments:dynamics.MechanismWarning")
 def test_moments_that_rounding_makes_negative_are_zero_and_said(digits: int, unit: float) -> None:
     """Moments of thin rods, (m, m, 0) turned at random, as they are printed; ten last places more are a mistake."""
@@ -483,7 +484,7 @@ WRONG = [
 ]
 
 
-@mark.parametrize(("text", "message"), WRONG)
+@each_row(("text", "message"), WRONG)
 def test_what_is_wrong_is_one_sentence(text: str, message: str, tmp_path: Path) -> None:
     with raises(MechanismError, match=re.escape(message)) as caught:
         dyn.load_urdf(text, ignore=True)

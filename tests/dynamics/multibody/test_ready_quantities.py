@@ -74,12 +74,12 @@ def test_a_frame_s_quantities_are_rates_of_one_another(base: str, axes: str) -> 
 @mark.parametrize("seed", SEEDS)
 def test_mujoco_finds_the_same(seed: int) -> None:
     mujoco = importorskip("mujoco")
-    from dynamics.peers.case import Case
     from dynamics.peers.mujoco import MujocoPeer
+    from dynamics.peers.peer import PeerModel
 
     mechanism = random_tree(300 + seed)
     at, n = state(mechanism, seed), mechanism.system.n
-    peer = MujocoPeer(Case("tree", mechanism))
+    peer = MujocoPeer(PeerModel("tree", mechanism))
     model, data = peer.twin.model, peer.twin.data
     data.qpos[:], data.qvel[:] = at["q"][peer.q_at], at["qd"][peer.at]
     mujoco.mj_forward(model, data)

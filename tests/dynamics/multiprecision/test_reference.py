@@ -20,6 +20,7 @@ from dynamics.multiprecision import REFERENCE_METHODS, Reference, ReferenceFaile
 from dynamics.multiprecision.flint_numbers import working
 from dynamics.systems.ode_system import OdeSystem
 from tests.dynamics.split_state import split_state
+from tests.each_row import each_row
 from tests.slow import slow
 
 pytest.importorskip("flint", reason="reference solutions need python-flint")
@@ -281,7 +282,7 @@ def test_deviation_is_told_below_the_rounding_of_the_reference() -> None:
         third.deviation([[1.0, 2.0]])
 
 
-@mark.parametrize(
+@each_row(
     ("changed", "words"),
     [
         ({"q": [1.0, 2.0]}, r"q must have shape \(1,\), one for each coordinate, got \(2,\)"),

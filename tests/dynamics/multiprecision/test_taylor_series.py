@@ -5,17 +5,18 @@ from typing import Any
 
 import mpmath
 import pytest
-from pytest import mark, raises
+from pytest import raises
 
 import cgraph as cg
 from cgraph.core.node import apply
 from cgraph.operations.operation import OPS
 from dynamics.systems.ode_system import OdeSystem
+from tests.each_row import each_row
 from tests.high_precision import OPERATIONS
 
 pytest.importorskip("flint", reason="reference solutions need python-flint")
 from dynamics.multiprecision.flint_numbers import value, working
-from dynamics.multiprecision.taylor_series import Series
+from dynamics.multiprecision.taylor_integrator import Series
 
 ORDER = 12
 TWELVE_ORDERS = 1e-25  # relative, of numbers with 60 digits that mpmath differentiates numerically
@@ -41,7 +42,7 @@ def coefficients(build: Callable[[list[cg.Node]], cg.Node], point: tuple[float, 
         return [mpmath.mpf((k * found[k]).mid().str(55, radius=False)) for k in range(1, ORDER + 2)]
 
 
-@mark.parametrize(("name", "point"), [(op.name, point) for op in OPS.values() for point in op.samples])
+@each_row(("name", "point"), [(op.name, point) for op in OPS.values() for point in op.samples])
 def test_series_of_every_operation_is_that_of_mpmath(name: str, point: tuple[float, ...]) -> None:
     """An operation without a multiprecision value says so, and one that jumps."""
     if OPS[name].jumps is not None:
@@ -61,7 +62,7 @@ def test_series_of_every_operation_is_that_of_mpmath(name: str, point: tuple[flo
         assert max(abs(a - b) for a, b in zip(found, expected, strict=True)) <= TWELVE_ORDERS * size
 
 
-@mark.parametrize("exponent", [-3.0, -1.0, 0.0, 0.5, 1.0, 2.0, 5.0, 7.5, 100.0])
+@each_row("exponent", [-3.0, -1.0, 0.0, 0.5, 1.0, 2.0, 5.0, 7.5, 100.0])
 def test_series_of_powers(exponent: float) -> None:
     with mpmath.mp.workdps(60):
         expected = mpmath.taylor(lambda t: paths((1.3,), mpmath.mpf, t)[0] ** exponent, 0, ORDER)

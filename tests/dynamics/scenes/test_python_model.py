@@ -9,6 +9,7 @@ import pytest
 
 import dynamics as dyn
 from dynamics import scenes
+from tests.each_row import each_row
 
 PENDULUM = """
 import cgraph as cg
@@ -65,7 +66,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
             del sys.modules[name]
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("name", "called", "coordinates"),
     [
         ("models.py:system", "models.system", ("swing",)),
@@ -89,7 +90,7 @@ def test_any_model_in_python_is_a_scene(name, called, coordinates, folder, capsy
     assert capsys.readouterr().out == ""  # what a file prints is no answer
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("name", "message"),
     [
         ("nowhere.py:system", "there is no file 'nowhere.py'"),

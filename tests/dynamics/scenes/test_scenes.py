@@ -13,6 +13,7 @@ from pytest import mark, raises, warns
 import dynamics as dyn
 from dynamics import scenes
 from dynamics.multibody.mechanism import MechanismError
+from tests.each_row import each_row
 
 INERTIAL = '<inertial pos="0.1 0.2 -0.3" mass="1.3" diaginertia="0.3 0.4 0.5"/>'
 MJCF = f"""<?xml version="1.0"?><!-- a hinge and a slide --><mujoco><worldbody>
@@ -150,7 +151,7 @@ def test_what_acts_from_outside_is_left_out_and_said(file: Any) -> None:
     assert scene.system.n == 2
 
 
-@mark.parametrize(
+@each_row(
     ("text", "message"),
     [
         (None, "there is no file "),

@@ -9,12 +9,13 @@ import cgraph as cg
 import dynamics as dyn
 from dynamics import scenes
 from dynamics.scenes.start import moving_start, rest_text, start_text, with_start
+from tests.each_row import each_row
 
 ARM = scenes.of_model(dyn.planar_arm([1.0, 1.0], [1.0, 1.0]))
 FIRST = scenes.of_model(dyn.OdeSystem(lambda x, t: [-x[0]], ["decay"]))
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("scene", "start", "q", "qd"),
     [
         (ARM, {"q0": 0.3, "qd1": 1.0}, (0.3, 0.0), (0.0, 1.0)),
@@ -79,7 +80,7 @@ RESTING = {
 }
 
 
-@pytest.mark.parametrize("name", RESTING)
+@each_row("name", RESTING)
 def test_a_scene_that_would_rest_for_ever_starts_where_it_moves(name):
     scene, rate = moving_start(RESTING[name]), dyn.state_equation(RESTING[name])
     assert scene.q + scene.qd != RESTING[name].q + RESTING[name].qd

@@ -7,7 +7,7 @@ from pytest import mark
 
 import dynamics as dyn
 from dynamics.multibody.algebra.spatial import Array, from_quaternion, rotation
-from dynamics.multiprecision import closed_forms
+from tests.dynamics.free_rotor import free_rotor
 
 MOMENTS = [1.0, 2.0, 3.0]  # kg m^2, of the rotor
 ROUNDING = 2e-15  # of some hundred steps, compensated
@@ -72,7 +72,7 @@ def states(run: dyn.Trajectory) -> Array:
 def test_a_free_rotor_turns_as_jacobis_functions_say(omega: list[float]) -> None:
     pytest.importorskip("mpmath")
     times = [0.7, 10.0]
-    exact = closed_forms.free_rotor(times, MOMENTS, omega)
+    exact = free_rotor(times, MOMENTS, omega)
     run = dyn.simulate(rotor(), [1.0, 0.0, 0.0, 0.0], omega, times[-1], "gauss8", dt=0.02, t_eval=times)
     assert exact.relative_error(np.hstack([rotations(run.q).reshape(-1, 9), run.qd])) < 2 * ROUNDING
 

@@ -15,8 +15,9 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
+from tests.each_row import each_row
 from viz import cli, theme
-from viz.commands.point_arguments import filled
+from viz.commands.arguments import filled
 
 RIGHT, FLAWED = ("chain_rule", "chain_rule_literal"), ("euler_embedded", "kinetic_only", "kinetic_only_exact")
 MODEL = """<mujoco><compiler angle="radian"/><worldbody>
@@ -48,7 +49,7 @@ def by_complex_step(graph: cg.Graph, output: str, name: str, at: dict[str, float
     return values[graph.outputs[output]].imag / 1e-200
 
 
-@pytest.mark.parametrize("formulation", RIGHT)
+@each_row("formulation", RIGHT)
 def test_lint_proves_that_the_chain_rule_keeps_q_and_qd_apart(capsys, formulation):
     text = said(capsys, "lint", "triple_pendulum", "--formulation", formulation)
     assert text.count("Holds: ") == 3
@@ -56,7 +57,7 @@ def test_lint_proves_that_the_chain_rule_keeps_q_and_qd_apart(capsys, formulatio
     assert "q.joint 1, q.joint 2 and q.joint 3 are inputs" in text
 
 
-@pytest.mark.parametrize("formulation", FLAWED)
+@each_row("formulation", FLAWED)
 def test_lint_blames_the_edges_of_the_embedding(capsys, formulation):
     exact = formulation == "kinetic_only_exact"  # embedded, but no derivative is taken through it
     found = figures(capsys, "lint", "triple_pendulum", "--formulation", formulation, status=int(not exact))
@@ -68,7 +69,7 @@ def test_lint_blames_the_edges_of_the_embedding(capsys, formulation):
     assert (finding["derivatives_through"] == 0) == exact
 
 
-@pytest.mark.parametrize("n", [1, 2, 3, 5, 8])
+@each_row("n", [1, 2, 3, 5, 8])
 def test_the_fewest_edges_to_cut_are_one_for_each_joint(n):
     arm = dyn.scenes.load("chain", n=n)
     groups = [f"q{i}" for i in range(n)], [f"qd{i}" for i in range(n)]
@@ -390,65 +391,6 @@ def test_the_answer_is_drawn(tmp_path, capsys):
     assert svg.startswith("<svg")
     assert "only euler_embedded" in svg
     assert "only chain_rule" in svg
-
-
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["why", "triple_pendulum", "tau0", "q9"], "nothing in the graph is called 'q9'"),
-        (["why", "triple_pendulum", "tau9", "q0"], "nothing in the graph is called 'tau9'"),
-        (["why", "spring_mass", "tau0", "q0", "--at", "zz=1"], "the graph has no input zz"),
-        (["lint", "spring_mass", "--box", "zz=0:1"], "the graph has no input zz"),
-        (["inspect", "spring_mass", "--out", "x.html", "--t-end", "1e9"], "--t-end must be at most 1000 s"),
-        (["compare", "nowhere"], "there is no scene 'nowhere'"),
-        (["lint", "nowhere.py:system"], "there is no file 'nowhere.py'"),
-        (["simulate", "chain", "--start", "joint 11=1"], "there is no joint 11; did you mean"),
-        (["simulate", "chain", "--every", "1e-300"], "--every 1e-300 makes "),
-        (["simulate", "chain", "--csv", "nowhere/a.csv"], "cannot write"),
-        (["simulate", "chain", "--method", "rk5"], "method must be one of "),
-        (["lesson", "--out", "lesson.txt"], "--out must end in .html"),
-    ],
-)
-def test_a_mistake_gets_one_line_and_exit_status_2(capsys, arguments, message):
-    assert cli.main(arguments) == 2
-    error = capsys.readouterr().err
-    assert error.startswith("cgraph: error: ")
-    assert error.count("\n") == 1
-    assert message in error
-
-
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ["lint"],
-        ["why", "spring_mass", "tau0"],
-        ["why", "spring_mass", "tau0", "q0", "--k", "-1"],
-        ["why", "spring_mass", "tau0", "q0", "--at", "q0"],
-        ["why", "spring_mass", "tau0", "q0", "--at", "q0=nan"],
-        ["why", "spring_mass", "tau0", "q0", "--at", "q0=1,q0=2"],
-        ["lint", "spring_mass", "--box", "q0=0:1,q0=0:2"],
-        ["certify", "spring_mass", "--seed", "-1"],
-        ["bench", "--budget", "-1"],
-        ["inspect", "spring_mass", "--out", "x.html", "--t-end", "0"],
-        ["why", "spring_mass", "tau0", "q0", "--svg", "answer.png"],
-        ["why", "spring_mass", "tau0", "q0", "--forward", "--formulation", "kinetic_only"],
-        ["lint", "spring_mass", "--box", "q0=1"],
-        ["lint", "spring_mass", "--box", "q0=2:1"],
-        ["compare", "spring_mass", "--formulations", "chain_rule"],
-        ["compare", "spring_mass", "--formulations", "chain_rule", "none"],
-        ["lesson"],
-        ["simulate", "chain", "--start", "a,b"],
-        ["simulate", "chain", "--start", "q0=1,q0=2"],
-        ["simulate", "chain", "--t-end", "-1"],
-        ["simulate", "chain", "--rtol", "0"],
-        ["draw", "chain", "--out", "a.dot", "--forward", "--formulation", "kinetic_only"],
-    ],
-)
-def test_wrong_usage_has_exit_status_2(capsys, arguments):
-    with pytest.raises(SystemExit) as stop:
-        cli.main(arguments)
-    assert stop.value.code == 2
-    assert "usage: cgraph" in capsys.readouterr().err
 
 
 def test_a_point_keeps_parameters_and_is_always_the_same():

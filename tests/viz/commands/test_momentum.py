@@ -9,6 +9,7 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
+from tests.each_row import each_row
 from viz import cli, theme
 
 ROUNDING = 1e-12  # relative, for sums of a few hundred products
@@ -124,7 +125,7 @@ COMMANDS = ["draw {} --out a.dot", "lint {}", "why {} p0_dot q0", "compare {}", 
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-@pytest.mark.parametrize(
+@each_row(
     ("scene", "message"),
     [
         ("own.py:ring", "constraint 'ring' holds the momenta"),

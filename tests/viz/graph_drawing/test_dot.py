@@ -13,6 +13,7 @@ import pytest
 import cgraph as cg
 from cgraph.core.node import apply
 from cgraph.operations.operation import OPS, Op
+from tests.each_row import each_row
 from viz import render_svg, theme, to_dot
 from viz.graph_drawing.dot import main_tag
 
@@ -95,7 +96,7 @@ def test_an_operation_shows_its_symbol() -> None:
             assert drawn[f"n{i}"]["label"] == node.op.symbol
 
 
-@pytest.mark.parametrize("op", [op for op in OPS.values() if op.symbol], ids=lambda op: op.name)
+@each_row("op", [op for op in OPS.values() if op.symbol])
 def test_every_row_of_the_table_can_be_drawn(op: Op) -> None:
     inputs = cg.variables([f"x{i}" for i in range(op.arity)])
     graph = cg.Graph(inputs, {"y": apply(op, *inputs)})

@@ -9,8 +9,7 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
-from viz.graph_drawing.levels import LevelPanel, Scale, levels_of, levels_svg, longest_way
-from viz.graph_drawing.silhouettes import silhouettes_svg
+from viz.graph_drawing.levels import LevelPanel, Scale, levels_of, levels_svg, longest_way, silhouettes_svg
 
 SCALE = Scale(row=15.0, gap=13.0, width=8.0, height=8.0, ticks=5)
 GRAPHS = {

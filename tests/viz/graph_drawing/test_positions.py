@@ -5,9 +5,8 @@ from itertools import combinations
 
 import pytest
 
-import viz.graph_drawing.positions as module
-from viz.graph_drawing.positions import positions
-from viz.graph_drawing.render import RenderError
+import viz.graph_drawing.render as module
+from viz.graph_drawing.render import RenderError, positions
 
 BOXES = [(50.0, 34.0), (90.0, 30.0), (58.0, 34.0), (46.0, 30.0)]
 DIAMOND = [(0, 1), (0, 2), (1, 3), (2, 3)]

@@ -17,6 +17,7 @@ import cgraph as cg
 import dynamics as dyn
 import viz
 from dynamics.equations.states.consistent_state import nearest_state
+from tests.each_row import each_row
 from tests.hostile_texts import HOSTILE, hostile_page
 from viz import cli
 from viz.inspector import Motion, Table, Version
@@ -146,7 +147,7 @@ def test_a_notebook_shows_it_in_a_frame():
     assert shown.count('"') == 8  # the page's own are escaped
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("make", "said"),
     [
         (lambda graph: viz.page([]), "versions"),

@@ -21,8 +21,7 @@ from tests.tolerances import SUMS
 from viz.inspector.content import Motion, State, StateTable, Version
 from viz.inspector.record import record
 from viz.models.inspection import Inspection, inspection
-from viz.pages.graph import graph_data
-from viz.pages.operations import slopes
+from viz.pages.operations import graph_data, slopes
 
 pytestmark = pytest.mark.usefixtures("without_graphviz")
 JAVASCRIPT_LIBM = 1e-12  # relative: a browser's sin and exp may differ from the C library's in the last bits

@@ -25,7 +25,7 @@ from viz.lessons.energy_and_step import energy_and_step
 from viz.lessons.euler_edge import euler_edge
 from viz.lessons.subject import lagrangian_graph, subject_of
 from viz.lessons.torque_parts import torque_parts
-from viz.pages.graph import graph_data
+from viz.pages.operations import graph_data
 
 VOID = {"meta", "br", "img", "link", "input", "hr"}
 

@@ -16,6 +16,7 @@ import cgraph as cg
 import dynamics as dyn
 import viz
 from dynamics.integrators import TABLEAUS
+from tests.each_row import each_row
 from viz.live import Live, page_text
 from viz.live.page import SCRIPTS
 from viz.models.live import live_of
@@ -202,7 +203,7 @@ def test_a_link_brings_back_the_whole_state_to_the_last_bit(script):
     assert script("run.now().since.most") == 0.0
 
 
-@pytest.mark.parametrize(
+@each_row(
     "link",
     ["", "%", "null", "[1]", "{", '{"dt":-1,"q0":"a","method":"x","time":null,"zz":3,"values":{"q0":"a","zz":3}}'],
 )
@@ -346,7 +347,7 @@ def made(**changed):
     return Live(**fields | changed)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("changed", "kind", "said"),
     [
         ({"rate": 3}, TypeError, "needs a cg.Graph, got int"),

@@ -13,7 +13,8 @@ import pytest
 import dynamics as dyn
 import viz
 from dynamics import scenes
-from viz.animation.colors import DARK, LIGHT
+from tests.each_row import each_row
+from viz.animation.canvas import DARK, LIGHT
 from viz.models.animate import _at, frames
 
 Image = pytest.importorskip("PIL.Image")
@@ -109,7 +110,7 @@ def test_a_notebook_plays_it():
     assert film._repr_html_().startswith('<img src="data:image/gif;base64,')
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("arguments", "named", "message"),
     [
         (

@@ -13,7 +13,9 @@ from cgraph import Graph
 from dynamics.multibody.joint_positions import skeleton
 from dynamics.scenes.scenes import Scene
 from tests.early_end import stops
+from tests.sources import ROOT
 from tests.tolerances import EQUATIONS
+from viz.models.carried import carried
 from viz.models.inspection import DT, FORMULATIONS, Inspection, inspection
 
 ARM = cache(lambda: inspection(dyn.scenes.load("triple_pendulum")))
@@ -150,3 +152,31 @@ def test_a_motion_that_does_not_begin_is_told():
     weightless = dyn.System(lambda q, qd, t, p: p["m"] * qd[0] ** 2 - q[0] ** 2, ["x"], {"m": 0.0})
     with pytest.raises(ValueError, match=r"accelerations that are not finite: the motion stopped at t = 0 s: "):
         inspection(Scene("weightless", "", weightless, (1.0,), (0.0,), 1.0))
+
+
+def test_what_ad_of_the_energy_carries_is_counted_by_link_and_by_what_it_is() -> None:
+    arm = dyn.scenes.load("triple_pendulum")
+    table = carried(arm)
+    assert table is not None
+    counts = {
+        row[0]: dict(zip(table.header[1:], [int(cell or 0) for cell in row[1:]], strict=True)) for row in table.rows
+    }
+    rates = next(head for head in table.header if "cancels" in head)
+    text = (ROOT / "docs" / "explanation.md").read_text(encoding="utf-8")
+    told = "Of the 139 that only the chain rule has, 49 are rates of\nslopes"
+    assert told in text
+    assert (counts["all"]["all"], counts["all"][rates]) == (139, 49)
+    assert [counts[f"link {k}"][rates] for k in (1, 2, 3)] == [1, 26, 21]
+    for row in counts.values():
+        assert sum([count for head, count in row.items() if head != "all"]) == row["all"]
+    for head in table.header[1:]:
+        assert sum([row[head] for part, row in counts.items() if part != "all"]) == counts["all"][head]
+    whole, lean = (len(dyn.inverse_dynamics(arm, name).nodes) for name in ("chain_rule", "newton_euler"))
+    assert f"of {whole} nodes" in table.caption
+    assert f"the {lean} of equations by velocities" in table.caption
+
+
+def test_a_rotor_carries_nothing_that_cancels() -> None:
+    assert carried(dyn.scenes.load("spring_mass")) is None
+    content = inspection(dyn.scenes.load("spring_mass"), t_end=0.1)
+    assert content.carried is None

@@ -4,8 +4,17 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from viz.pages.document import Document, Paragraph, Picture, Section, Table, to_html, to_markdown
-from viz.pages.document_files import check_folder, document_files
+from viz.pages.document import (
+    Document,
+    Paragraph,
+    Picture,
+    Section,
+    Table,
+    check_folder,
+    document_files,
+    to_html,
+    to_markdown,
+)
 
 
 def test_markdown_has_what_the_page_has() -> None:

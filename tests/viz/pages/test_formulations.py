@@ -10,8 +10,8 @@ import cgraph as cg
 import dynamics as dyn
 from dynamics.equations.formulations.formulation_sizes import PAPER, TORQUE, blamed
 from viz import theme
+from viz.graph_drawing.dot import short_formulas
 from viz.graph_drawing.legend import kinds_in, legend_svg
-from viz.graph_drawing.short_formulas import short_formulas
 from viz.models.inspection import inspection
 from viz.pages.document import Document, to_markdown
 from viz.pages.formulations import COLORS, TITLES, size_table

@@ -9,8 +9,7 @@ import pytest
 
 from viz import cli
 from viz.pages import stability
-from viz.pages.document import Document, to_html
-from viz.pages.document_files import document_files
+from viz.pages.document import Document, document_files, to_html
 
 pytest.importorskip("matplotlib")
 

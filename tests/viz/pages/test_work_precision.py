@@ -197,55 +197,6 @@ def test_an_interrupted_report_leaves_no_file(tmp_path: Path, monkeypatch: pytes
     assert left == []
 
 
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["report", "nothing"], "there is no scene 'nothing'"),
-        (["report", "spring_mass", "spring_mass"], "each scene needs a name of its own"),
-        (["report", "spring_mass", "--methods", "rk5"], "there is no method 'rk5'"),
-        (["report", "spring_mass", "--start", "1"], "the start needs 2 numbers"),
-        (["report", "spring_mass", "--without", "gravity"], "--without goes with --pruning"),
-        (["report", "spring_mass", "--lock", "a=1"], "--lock goes with --pruning"),
-        (["report", "spring_mass", "--pruning", "--quick"], "--quick goes with a report of run times or --stability"),
-        (["report", "spring_mass", "--pruning", "--peers", ""], "--peers goes with a report of run times"),
-        (["report", "--stability", "--budget", "3"], "--budget goes with a report of run times"),
-        (["report", "--stability", "--ignore"], "--ignore goes with a report of run times or --pruning"),
-        (["report", "--stability", "--pruning"], "one at a time"),
-        (["report", "--pruning"], "a report needs a scene"),
-        (["report", "--compare", "speed"], "comparisons are orders, taylor, stiff, loops, energy, got 'speed'"),
-        (["report", "--compare", "orders", "--json"], "--json goes with a report of run times"),
-        (["report", "chain", "--compare", "orders"], "a report needs a scene, or --stability or --compare and none"),
-        (["report", "chain", "--pruning", "--lock", "a=1", "--lock", "a=2"], "--lock takes each body once"),
-    ],
-)
-def test_mistakes_get_one_line(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], said: str
-) -> None:
-    assert cli.main([*arguments, "--out", str(tmp_path / "r")]) == 2
-    error = capsys.readouterr().err
-    assert error.count("\n") == 1
-    assert said in error
-    assert not (tmp_path / "r").exists()
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        (["--start", "a,b"], "argument --start: expected a finite number, got 'a'"),
-        (["--start", "1,nan"], "argument --start: expected a finite number, got 'nan'"),
-        (["--pruning", "--lock", "tip=x"], "argument --lock: expected a finite number, got 'x'"),
-        (["--pruning", "--lock", "tip"], "argument --lock: expected a body and a coordinate, BODY=AT, got 'tip'"),
-        (["--budget", "-1"], "argument --budget: expected a positive number, got '-1'"),
-        (["--t-end", "inf"], "argument --t-end: expected a finite number, got 'inf'"),
-    ],
-)
-def test_wrong_numbers_name_the_option(capsys: pytest.CaptureFixture[str], arguments: list[str], said: str) -> None:
-    with pytest.raises(SystemExit) as stop:
-        cli.main(["report", "spring_mass", *arguments])
-    assert stop.value.code == 2
-    assert said in capsys.readouterr().err
-
-
 @pytest.mark.parametrize("arguments", [["spring_mass"], ["spring_mass", "--pruning"], ["--stability"]])
 def test_a_folder_that_cannot_be_filled_is_found_before_the_work(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, arguments: list[str]

@@ -12,8 +12,7 @@ import pytest
 
 import dynamics as dyn
 from cgraph.extend import write_files
-from dynamics.experiments.paper_numbers.embedding_error import EmbeddingError
-from dynamics.experiments.paper_numbers.table_1 import timing
+from dynamics.experiments.paper_numbers import EmbeddingError, timing
 from tests.tolerances import SOLVED
 from viz import theme
 from viz.graph_drawing.render import RenderError

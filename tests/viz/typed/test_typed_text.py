@@ -7,6 +7,7 @@ import re
 import pytest
 from hypothesis import given, strategies as st
 
+from tests.each_row import each_row
 from tests.viz.typed.typed_script import run_typed
 
 PENDULUM = """\
@@ -19,7 +20,7 @@ x1 = l*sin(theta), y1 = -l*cos(theta)
 COUNTS = "(text) => { const { nodes, edges } = formulation(parsed(text), 'euler_embedded'); return [nodes, edges]; }"
 
 
-@pytest.mark.parametrize(
+@each_row(
     "line",
     [
         "L = 0.5*m*l**2*thetadot**2 + m*g*l*cos(theta)",
@@ -76,7 +77,7 @@ def test_where_a_point_stays_is_no_parameter_unless_a_formula_has_it():
 L = "L = x'^2\n"
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("text", "sentence", "place"),
     [
         ("", "Line 1: There is no Lagrangian: write a line L = ..., or T = ... and V = ....", ""),

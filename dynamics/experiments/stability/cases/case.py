@@ -1,4 +1,4 @@
-"""A case: a setting that is hard for arithmetic or for an integrator, what to measure on the way, and bounds."""
+"""A case: a task that is hard for arithmetic or for an integrator, what to measure on the way, and bounds."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from cgraph import Graph, Node
 
 from ....equations.energies import energy
 from ....systems.model import Model, as_ode, as_system
-from ...setting import Setting
+from ...accuracy_task import AccuracyTask
 
 RTOL = 1e-9  # the relative tolerance that the bounds are for
 ATOL = 1e-3 * RTOL  # the absolute one, in the SI unit of each state
@@ -35,13 +35,14 @@ class Criterion:
 
 
 @dataclass(frozen=True)
-class StabilityCase(Setting):
+class StabilityCase(AccuracyTask):
     """One row of the stability table; `about` says what is hard here. `exact` may be of a limit of the motion.
 
     atol: absolute tolerance, where that of one in a thousand of RTOL in SI units is too much or too little; for all
     states, or for each.
     growth: what the flow makes of a small relative error of the start by t_end (the largest of all states, each
-    relative to its size); the tests measure it. None where there is no solution to compare with.
+    relative to its size); the tests measure it. None where there is no solution to compare with. Where no criterion is
+    of the error, `error_criterion(growth)` is the last.
     invariants(model): a graph over the state (and t, parameters) whose outputs do not change along the motion.
     """
 
@@ -50,6 +51,11 @@ class StabilityCase(Setting):
     atol: float | tuple[float, ...] = ATOL
     growth: float | None = None
     invariants: Callable[[Model], Graph] | None = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.growth is not None and not any([each.quantity.startswith("error") for each in self.criteria]):
+            object.__setattr__(self, "criteria", (*self.criteria, error_criterion(self.growth)))
 
 
 def error_criterion(growth: float, why: str = GROWN, quantity: str = "error") -> Criterion:

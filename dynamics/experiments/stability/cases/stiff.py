@@ -37,8 +37,6 @@ def _undamped(stiffness: float, growth: float | None) -> StabilityCase:
     if growth is None:  # too many oscillations to follow; their mean is known
         why = "the rigid pendulum is the limit: its distance is of the order of the extension, m g / k"
         criteria.append(Criterion("error 1 3", limit, why))
-    else:
-        criteria.append(error_criterion(growth))
     stretch = GRAVITY / stiffness
     return StabilityCase(
         name=f"spring pendulum, k = {stiffness:g}",

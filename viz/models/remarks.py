@@ -1,4 +1,4 @@
-"""What is said where a model has loops or other constraints, and inverse dynamics is that of its tree."""
+"""Sentences on a model: that inverse dynamics is that of its tree, and that a momentum is constant."""
 
 from __future__ import annotations
 
@@ -21,3 +21,8 @@ def tree_alone(scene: scenes.Scene) -> str:
     return (
         f"Inverse dynamics is that of the tree, without the forces of the {what} {names}: forward dynamics has these."
     )
+
+
+def constant_momentum(name: str) -> str:
+    """A sentence for a velocity of `conserved_momenta`."""
+    return f"The momentum of {name!r} is constant while no torque acts on it: neither L nor a force depends on it."

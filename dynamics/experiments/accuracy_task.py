@@ -1,10 +1,12 @@
-"""Setting: a scene with the exact motion that runs of it are measured against."""
+"""AccuracyTask: a scene with the exact motion that runs of it are measured against."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -21,7 +23,7 @@ DECADES = 12  # of the times, where they are spread by powers of ten
 
 
 @dataclass(frozen=True)
-class Setting(Scene):
+class AccuracyTask(Scene):
     """A scene and its exact motion.  q, qd: of an OdeSystem the states, and nothing.
 
     size: a natural size of each state, which errors are relative to; empty for the largest values of the motion.
@@ -41,6 +43,16 @@ class Setting(Scene):
     def start(self) -> tuple[float, ...]:
         """q and then qd, or the states of an OdeSystem."""
         return (*self.q, *self.qd)
+
+    @property
+    def identity(self) -> dict[str, Any]:
+        """Start and end to the last bit, by which a motion that is kept is known."""
+        return {"start": [float(each).hex() for each in self.start], "t": self.t_end.hex()}
+
+    def kept(self, file: Path, key: str) -> dict[str, Any] | None:
+        """The entry of this motion in a JSON file of entries; None where there is none, or one of another motion."""
+        entry: dict[str, Any] | None = json.loads(file.read_text(encoding="utf-8")).get(key) if file.exists() else None
+        return entry if entry is not None and entry.items() >= self.identity.items() else None
 
     @property
     def times(self) -> list[float]:
@@ -74,7 +86,7 @@ class Setting(Scene):
 
     @property
     def mechanical(self) -> bool:
-        """It has coordinates and velocities."""
+        """Whether the model has coordinates and velocities."""
         return as_ode(self.model) is None
 
     @property
@@ -93,7 +105,7 @@ class Setting(Scene):
         return tuple([max(abs(a), abs(b)) or 1.0 for a, b in zip(self.start, end, strict=True)])
 
     def scales(self, exact: Reference) -> Array:
-        """What errors at all times are relative to, (T, m)."""
+        """Scale of the errors at all times, (T, m)."""
         if self.decades:
             return np.where(exact.x == 0.0, 1.0, np.abs(exact.x))
         return np.broadcast_to(self.size or scale(exact.x), exact.x.shape)

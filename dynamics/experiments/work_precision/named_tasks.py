@@ -1,4 +1,4 @@
-"""The settings that integrators are compared on, by name: scenes, cases of the stability table, and model files."""
+"""The tasks that integrators are compared on, by name: scenes, cases of the stability table, and model files."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from pathlib import Path
 
 from ... import scenes
 from ...scenes.start import Start, with_start
-from ..setting import Setting
+from ..accuracy_task import AccuracyTask
 from ..stability import cases
 from ..stability.cases.orbits import kepler
 
-SETTINGS: dict[str, Callable[[], Setting]] = {
+TASKS: dict[str, Callable[[], AccuracyTask]] = {
     **{f"kepler {e:g}": partial(kepler, e, 3.5, 1.0) for e in (0.3, 0.5, 0.7, 0.9)},
     "spring pendulum 1e8": partial(cases.load, "damped spring pendulum, k = 1e+08"),
     "van der pol 1e6": partial(cases.load, "Van der Pol, mu = 1e+06"),
@@ -23,8 +23,8 @@ SETTINGS: dict[str, Callable[[], Setting]] = {
 
 
 def names() -> list[str]:
-    """Names of the settings beside the scenes, the cases and the files."""
-    return list(SETTINGS)
+    """Names of the tasks beside the scenes, the cases and the files."""
+    return list(TASKS)
 
 
 def load(
@@ -33,28 +33,28 @@ def load(
     t_end: float | None = None,
     start: Start | None = None,
     reading: Mapping[str, bool] | None = None,
-) -> Setting:
-    """The setting of that name: of `SETTINGS`, a scene, a case, or an MJCF or URDF file.
+) -> AccuracyTask:
+    """The task of that name: of `TASKS`, a scene, a case, or an MJCF or URDF file.
 
     t_end [s], start: in place of its own.  reading: options of `dynamics.scenes.of_file`.
     Raises ValueError for a name that is none of these, a horizon that is not positive, or a start of another length.
     """
-    fixed = SETTINGS.get(name) or (partial(cases.load, name) if name in cases.names() else None)
+    fixed = TASKS.get(name) or (partial(cases.load, name) if name in cases.names() else None)
     if fixed is not None:
-        setting = fixed()
+        task = fixed()
     elif name in scenes.names() or Path(name).suffix or ":" in name:
-        setting = Setting(**vars(scenes.load(name, **({} if name in scenes.names() else reading or {}))))
+        task = AccuracyTask(**vars(scenes.load(name, **({} if name in scenes.names() else reading or {}))))
     else:
         raise ValueError(
-            f"there is no scene {name!r}; there are {', '.join([*scenes.names(), *SETTINGS])}, the cases "
+            f"there is no scene {name!r}; there are {', '.join([*scenes.names(), *TASKS])}, the cases "
             f"({', '.join(cases.names()[:3])}, ..), files that end in .xml or .urdf, and models as file.py:name"
         )
     if t_end is not None:
         if not (math.isfinite(t_end) and t_end > 0.0):
             raise ValueError(f"t_end must be positive and finite, got {t_end!r} s")
-        setting = replace(setting, t_end=float(t_end))
+        task = replace(task, t_end=float(t_end))
     if start is not None:
         if fixed is not None:
             raise ValueError(f"{name!r} has a start of its own; scenes and files take others")
-        setting = with_start(setting, start)
-    return setting
+        task = with_start(task, start)
+    return task

@@ -1,9 +1,13 @@
-"""Case: one model of the bench, and the states at which everybody is asked."""
+"""Peers and what they are asked: a model with the states of each task, and a task made ready to be timed."""
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import cached_property
+from importlib import import_module
+from types import ModuleType
 from typing import Any, TypeVar
 
 import numpy as np
@@ -11,7 +15,7 @@ from numpy.typing import NDArray
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Array, topological
+from cgraph.extend import Array, install, topological
 
 from ..equations.state_equation import normalization
 from ..integrators.tableau import RK4
@@ -40,7 +44,7 @@ DT = 1e-5  # s, the step of RK4: short, so that a thousand of them do not magnif
 NUDGE = 1e-8  # how far a pass moves each block of its input along its result
 
 
-class Case:
+class PeerModel:
     """A model, its system with its parameters bound, and what goes into each task.
 
     Raises ValueError for a system that depends on time.
@@ -71,19 +75,23 @@ class Case:
         """The inputs of a batch, (n_in, BATCH)."""
         return self._normalized(np.random.default_rng(1).normal(size=(self.width(task), BATCH)))
 
+    def inputs(self, task: str, mode: str) -> Array:
+        """The inputs of a mode: of a batch its points, else one point."""
+        return self.points(task) if mode == "batch" else self.point(task)
+
     def _normalized(self, x: Array) -> Array:
-        """The same with quaternions of length 1."""
+        """Inputs with quaternions of length 1."""
         graph = normalization(self.model)
         if graph is not None:
             x[: self.nq + self.n] = cg.compile(graph, backend="numpy").batch(x[: self.nq + self.n])
         return x
 
     def width(self, task: str) -> int:
-        """How many numbers go into a task."""
+        """Number of inputs of a task."""
         return self.nq + {"rk4": 1, **dict.fromkeys(MOTIONS, PASSES + 1)}.get(task, 2) * self.n
 
     def nudges(self, task: str) -> NDArray[np.intp]:
-        """Which result moves each input from one pass of a loop to the next."""
+        """Index of the result that moves each input from one pass of a loop to the next."""
         return np.arange(self.width(task)) % self.n
 
 
@@ -101,3 +109,51 @@ def rk4_step(rate: Callable[[AnyState], AnyState], x: AnyState, dt: float = DT) 
         if len(slopes) < len(RK4.b):
             slopes.append(rate(at))
     return at
+
+
+# How a task is asked for.
+MODES = {
+    "call": "a call from Python: the call alone, its arguments and its result in the peer's own memory",
+    "loop": "an evaluation in a native loop of 1000, each pass on the result of the one before",
+    "batch": "a state of a batch of 4096, one core",
+}
+
+
+EVALUATIONS = {"call": 1, "loop": PASSES, "batch": BATCH}  # of the task, in one run
+
+
+class UnavailableError(Exception):
+    """Raised when a peer cannot do this task for this model, though it has a function for such."""
+
+
+def required(module: str, name: str) -> ModuleType:
+    """The module of a package. Raises ImportError naming the extra when it is not installed."""
+    try:
+        return import_module(module)
+    except ImportError as error:
+        raise ImportError(f"{name} is not installed: {install('bench')}") from error
+
+
+@dataclass(frozen=True)
+class TimedTask:
+    """A way to do a task.
+
+    run: what is timed, `EVALUATIONS` of the task.  result: what `run` gave -> the values in the order of the task's
+    graph: (n_out,) of a call, (n_out, BATCH) of a batch, the carry after the last pass of a loop.
+    size: instructions or nodes of one evaluation, where they can be counted.
+    """
+
+    run: Callable[[], object]
+    result: Callable[[Any], Array]
+    size: int | None = None
+
+
+class Peer(ABC):
+    """One piece of software on one case. Making it raises ImportError when the software is not installed."""
+
+    def __init__(self, case: PeerModel) -> None:
+        self.case = case
+
+    @abstractmethod
+    def prepare(self, task: str, mode: str) -> TimedTask:
+        """The task in a mode, compiled. Raises UnavailableError."""

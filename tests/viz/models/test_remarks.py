@@ -11,7 +11,7 @@ from tests.dynamics.linkages import four_bar
 from viz import cli
 from viz.models.inspect import inspection_page
 from viz.models.inspection import inspection
-from viz.models.open_loops import tree_alone
+from viz.models.remarks import tree_alone
 
 SCENE = """
 from tests.dynamics.linkages import four_bar

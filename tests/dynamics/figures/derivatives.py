@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cgraph.extend import Array
-
-from .. import theme
-from .plot import GRID, empty_figure, painted_line, style
+from viz import theme
+from viz.plots.plot import GRID, empty_figure, style
 
 if TYPE_CHECKING:
+    from matplotlib.collections import LineCollection
     from matplotlib.figure import Figure
 
 COLORS = (theme.BLUE, theme.ORANGE, theme.GREEN, theme.PURPLE)  # seen on white and on black
@@ -52,6 +52,21 @@ def dots(panels: Sequence[Dots]) -> Figure:
             axis.grid(axis="y", **GRID)
         figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=4, frameon=False)
     return figure
+
+
+def painted_line(points: Array, values: Array, limits: tuple[float, float], colors: Sequence[str]) -> LineCollection:
+    """A line whose pieces are painted by their values, on a logarithmic scale from the first color to the last.
+
+    points: (T, 2).  values: (T - 1,), positive.
+    """
+    from matplotlib.collections import LineCollection
+    from matplotlib.colors import LinearSegmentedColormap, LogNorm
+
+    pieces = np.stack([points[:-1], points[1:]], axis=1)
+    ramp = LinearSegmentedColormap.from_list("ramp", list(colors))
+    return LineCollection(
+        pieces.tolist(), array=values, cmap=ramp, norm=LogNorm(*limits), linewidths=1.6, capstyle="round"
+    )
 
 
 def painted_paths(path: Array, t: Array, values: Mapping[str, Array], label: str) -> Figure:

@@ -5,8 +5,8 @@ import pytest
 
 pytest.importorskip("matplotlib")
 
+from tests.dynamics.figures.derivatives import Dots, dots, painted_paths
 from viz import theme
-from viz.plots.derivatives import Dots, dots, painted_paths
 from viz.plots.plot import to_adaptive_svg
 
 

@@ -1,1 +1,0 @@
-"""The numbers of Kusaka and Tanaka (2025), measured."""
