@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from cgraph.extend import Array, real_array
 
 from ...equations.equations_of_motion import forward_dynamics, momentum
-from ...equations.states.arrays_at import arrays_at
+from ...equations.states.evaluate import arrays_at
 from ..body import Body, MechanismError, vector
 from ..mechanism import Mechanism, require_mechanism
 from ..structure import bound_body

@@ -8,7 +8,7 @@ import pytest
 import cgraph as cg
 import dynamics as dyn
 from cgraph import Node
-from dynamics.experiments.trust.random_lagrangians import random_setting
+from dynamics.experiments.trust.random_motions import random_task
 from tests.dynamics.models import Array, run
 
 AGREEMENT = 1e-13  # of the largest torque
@@ -56,8 +56,8 @@ def compared(model: dyn.System, q: Array, qd: Array, seed: int) -> tuple[dict[st
 
 @pytest.mark.parametrize("count", [8, pytest.param(200, marks=[pytest.mark.slow, pytest.mark.timeout(3600)])])
 def test_inverse_dynamics_by_default_and_by_velocities_is_that_of_the_chain_rule(count: int) -> None:
-    settings = [random_setting(number) for number in range(count)]
-    rows = {setting.name: (setting.model, np.array(setting.q), np.array(setting.qd)) for setting in settings}
+    tasks = [random_task(number) for number in range(count)]
+    rows = {task.name: (task.model, np.array(task.q), np.array(task.qd)) for task in tasks}
     rows |= {f"linkage {seed}": linkage(seed) for seed in range(count)}
     found = {name: compared(*row, seed) for seed, (name, row) in enumerate(rows.items())}
     worst = {

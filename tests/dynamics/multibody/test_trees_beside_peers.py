@@ -11,7 +11,7 @@ from pytest import mark, param
 
 import dynamics as dyn
 from dynamics.peers import PEERS
-from dynamics.peers.case import Case
+from dynamics.peers.peer import PeerModel
 from tests.dynamics.mechanisms import EVERY_KIND, random_state, random_tree
 from tests.dynamics.models import run
 
@@ -54,7 +54,7 @@ def errors(mechanism: dyn.Mechanism, seed: int) -> dict[str, float]:
     for peer in INSTALLED:
         if peer == "mujoco" and any(not body.joint.type.mjcf for body in mechanism.moving):
             continue  # which it has not
-        theirs = PEERS[peer].make(Case("tree", mechanism)).quantities(**rows)  # type: ignore[attr-defined]
+        theirs = PEERS[peer].make(PeerModel("tree", mechanism)).quantities(**rows)  # type: ignore[attr-defined]
         theirs["recursive"] = theirs["tau"]
         for name, scale in scales.items():
             result[f"{peer} {name}"] = float(np.abs(ours[name] - theirs[name]).max() / scale.max())
