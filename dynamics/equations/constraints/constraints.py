@@ -52,7 +52,7 @@ class Rows(NamedTuple):
 
         written: the builder of L and z, if it is another.
         """
-        with building(written or build):
+        with building(written or build):  # F = L + s . z
             for weight, z in zip(self.multipliers, self.rates, strict=True):
                 lagrangian = lagrangian + weight * z
         s = self.multipliers
@@ -75,6 +75,7 @@ class Rows(NamedTuple):
         """
         slopes, m = [cotangents({z: ONE}, system.qd, build) for z in self.rates], len(self.rates)
         whole = system.mass_matrix(lagrangian, build) if composites else hessian_nodes(lagrangian, system.qd, build)
+        # [[0, J], [J^T, M]], the lower triangle
         matrix = [[ZERO] * (k + 1) for k in range(m)]
         matrix += [[*[slope[i] for slope in slopes], *row[: i + 1]] for i, row in enumerate(whole)]
         solved = ldl_solve(matrix, [*rhs[system.n :], *rhs[: system.n]], build, check=check and not m)

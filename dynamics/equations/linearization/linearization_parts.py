@@ -156,6 +156,7 @@ def _parts(system: System, method: str) -> LinearizationParts:
     qdd = accelerations(system, BY_ENERGY if method == "dense" else method)  # of the M that is factored below
     slopes = torque_derivatives(system, folded(list(qdd.outputs.values()), build), build)
     with building(build):
+        # M dqdd = -(dtau/dq) xi, then -(dtau/dqd) dqd
         sides = [[-row[j] for row in rows] for rows in (slopes.by_q, slopes.by_qd) for j in range(n)]
     solve, rest = mass_solve(system, build, method), {"C": system.kinematics.brackets(build)}
     return LinearizationParts(qdd.inputs, sides, solve, rest, velocity_form, build)
@@ -195,6 +196,7 @@ def _slopes(system: System, rows: ConstraintRows, solved: Graph, build: Builder)
     pulls = cotangents(dict(zip(rows.rates, s, strict=True)), system.qd, build)
     dots = tangents(state_rate(system, system.qdd) | {system.t: ONE}, rows.rates, build)
     with building(build):
+        # tau - J^T lambda, then dz/dt
         equations = [torque - force for torque, force in zip(tau.outputs.values(), pulls, strict=True)]
     equations += [dots.get(z, ZERO) for z in rows.rates]
     slopes = entries(state_slopes(system, equations, build))

@@ -32,7 +32,7 @@ def momentum_form(
     w: Matrix, x: Matrix, inverse: Matrix, second: Matrix, gain: Matrix, by_q: Matrix, brackets: Matrix
 ) -> tuple[Matrix, Matrix]:
     """A and B of W, X, M^-1, S, R, F_q and C."""
-    k = by_upper(np.swapaxes(np.swapaxes(w, -1, -2) @ x, -1, -2))
+    k = by_upper(np.swapaxes(np.swapaxes(w, -1, -2) @ x, -1, -2))  # K = W^T M^-1 W
     rates = brackets + -x  # du/dxi, and below the upper right block -(du/dxi)^T - R M^-1
     low = (second - k) - gain @ -x + by_q
     last = 0.0 - np.swapaxes(rates, -1, -2) - gain @ inverse
@@ -64,6 +64,7 @@ def _parts(transform: Legendre, *, momenta: bool) -> LinearizationParts:
         twist = [folded(row, build, of_state) for row in twist]
     forces = state_slopes(system, folded(system.forces, build), build)
     with building(build):
+        # R = P - F_u, where F_u has the damping D with its sign turned
         gain = [[a - b for a, b in zip(twist[i], forces[i][n:], strict=True)] for i in range(n)]
         for i, damping in enumerate(system.damping):
             gain[i][i] = gain[i][i] + damping

@@ -109,10 +109,12 @@ def reduced_linearization(
     holonomic = sum(k < len(system.constraints.positions) for k in kept)
     following = _following(system, kept, slopes[:, n:])
     a, b = linearize(model, *at, tau, t=t, parameters=parameters)
+    # J_phi xi = 0, then (dz/dq) xi + J dqd = 0
     rows = np.vstack([np.hstack([slopes[:holonomic, n:], np.zeros((holonomic, n))]), slopes])
     rows = rows / np.abs(rows).max(axis=1, keepdims=True, initial=0.0)
     rest = [*following[:holonomic], *[n + j for j in following]]
     chosen = [j for j in range(2 * n) if j not in rest]
+    # dx = N dy: entries that are chosen are dy, the rest follow from them
     displacements = np.eye(2 * n)[:, chosen]
     displacements[rest] = -np.linalg.solve(rows[:, rest], rows[:, chosen])
     names = [f"{kind}.{name}" for kind in ("q", "qd") for name in system.velocities]
