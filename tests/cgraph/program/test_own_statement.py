@@ -18,7 +18,7 @@ HERE = "tests/cgraph/program/own_statement_everywhere.py"
 def test_both_runners_both_modes_and_many_take_the_statement() -> None:
     pytest.importorskip("llvmlite")
     page = PAGES["docs/extending.md"]
-    blocks = [code for _, code, _ in examples(page[page.index("## A statement") : page.index("## An integrator")])]
+    blocks = [code for _, code, _ in examples(page[page.index("## A statement") : page.index("## An equation")])]
     code = "\n".join([*blocks, "import pytest, sys", f"sys.exit(pytest.main(['-qp', 'no:cacheprovider', {HERE!r}]))"])
     done = subprocess.run(
         [sys.executable, "-c", code],

@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 import cgraph as cg
-from cgraph.program.functions import compile as functions
-from cgraph.program.runners import native_runner
+from cgraph.program.runners import native_runner, python_runner, runner
 from cgraph.util import threads
 from cgraph.util.threads import share, thread_count
 
@@ -38,7 +37,8 @@ def function(request, monkeypatch):
     if "without" in request.param:
         monkeypatch.setitem(sys.modules, "llvmlite", None)
     monkeypatch.setattr(native_runner, "WORK", 24 * len(graph().nodes))
-    monkeypatch.setattr(functions, "BLOCK", 24)
+    for module in (python_runner, runner):
+        monkeypatch.setattr(module, "BLOCK", 24)
     return cg.compile(graph(), request.param.partition(" ")[0])
 
 
