@@ -125,7 +125,8 @@ def gradient(
         are; or a controller in closed form, as for `simulate`, whose parameters may be in `wrt`.
     events : Event or iterable of Event
         Those of `simulate`: where one ends the motion or resets its state depends on all before, and so do the steps
-        after it. Not with a row of forces a step.
+        after it. The motion arrives there by a step of its own length, where `simulate` reads the state off its dense
+        output: `value` may differ from that of its run by the error of a step. Not with a row of forces a step.
     estimate_error : bool, optional
         Of equal steps, whether a motion in steps of half the length estimates the error of the state, with a
         `SimulationWarning` where it is beyond `rtol`, 1e-3, and `atol`, 0; which takes half as long again. By
