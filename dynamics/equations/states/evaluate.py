@@ -110,10 +110,18 @@ def input_rows(
     system: System, names: Sequence[str], state: State, t: float, parameters: Mapping[str, float] | None
 ) -> Array:
     """Inputs by their names, (N, n_in), or (n_in,) of one state, which `evaluate` takes likewise."""
-    values, shape = _input_values(system, names, state, t, parameters)
-    rows = np.empty((*shape, len(names)))
-    for k, value in enumerate(values.values()):
-        rows[..., k] = value
+    numbers, (arrays, shape) = _numbers(system, t, parameters), _arrays(system, state)
+    rows, place = np.empty((*shape, len(names))), {name: k for k, name in enumerate(names)}
+    for name in place.keys() & numbers.keys():
+        rows[..., place[name]] = numbers[name]
+    for part, array in arrays.items():
+        inputs = [place.get(f"{part}{i}") for i in range(array.shape[-1])]
+        if inputs and inputs[0] is not None and inputs == [*range(inputs[0], inputs[0] + len(inputs))]:
+            rows[..., inputs[0] : inputs[0] + len(inputs)] = array  # as one block
+            continue
+        for i, k in enumerate(inputs):
+            if k is not None:
+                rows[..., k] = array[..., i]
     return rows
 
 
