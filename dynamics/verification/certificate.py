@@ -14,6 +14,7 @@ import cgraph as cg
 from cgraph import Graph
 from cgraph.extend import Array, Builder, cotangents, real_number, require_whole, tangents
 
+from ..equations.constraints.constraint_rank import CLEAR
 from ..equations.coriolis import coriolis, require_quadratic
 from ..equations.energies import energy
 from ..equations.equations_of_motion import bias, forward_dynamics, gravity_force, mass_matrix
@@ -28,7 +29,7 @@ from ..systems.kinematics import ONE, ZERO
 from ..systems.model import Model, as_system
 from ..systems.system import System
 from . import peer_agreement as agreement
-from .held_states import Held, random_states
+from .held_states import Held, new_rows, random_states
 from .residual import DIFFERENCES, POSITIVE, ROUNDING, Certificate, Residual, worst
 
 if TYPE_CHECKING:
@@ -46,8 +47,9 @@ def certify(
 ) -> Certificate:
     """Check the model's graphs against each other, against differences of L, and against MuJoCo and Pinocchio.
 
-    With constraints the states meet them; the equations are those of the whole, J^T lambda in them, and of the rows.
-    Inverse dynamics and tables are those of the system without.
+    With constraints the states meet them, and are no singular positions, where a row follows from the others: other
+    states are drawn then. Where none is seen, slopes of accelerations are left out. The equations are those of the
+    whole, J^T lambda in them, and of the rows. Inverse dynamics and tables are those of the system without.
 
     A peer that disagrees is asked again with one term taken out on both sides, then two; what restores the agreement is
     in the residual's note.
@@ -111,12 +113,19 @@ def certify(
 
 def _among_graphs(checks: _Checks) -> tuple[list[Residual], list[str]]:
     """The residuals among the model's graphs, and what says nothing of it."""
-    residuals = list(checks.always())
+    residuals, left_out = list(checks.always()), []
+    if doubtful := np.count_nonzero(checks.new_rows < CLEAR):
+        left_out.append(
+            f"slopes of accelerations: at {doubtful} of {len(checks.new_rows)} states a constraint says nothing, or "
+            "next to nothing, that the others do not say, and accelerations are not determined"
+        )
+    if not checks.moves:
+        left_out.append("M and the Coriolis matrix on motions: the constraints admit none")
     try:
         require_quadratic(checks.system)
     except ValueError as error:
-        return residuals, [f"the Coriolis matrix: {error}"]
-    return [*residuals, *checks.of_coriolis()], []
+        return residuals, [*left_out, f"the Coriolis matrix: {error}"]
+    return [*residuals, *checks.of_coriolis()], left_out
 
 
 class _Checks:
@@ -126,6 +135,7 @@ class _Checks:
         self.system, self.at, self.t, self.rng = system, at, t, rng
         self.timed = system.t in system.extra_inputs
         self.held = Held(system, self.value)
+        self.new_rows = np.array([new_rows(system, q, t) for q in at["q"]])
 
     def value(self, graph: Graph, **other: ArrayLike | None) -> Array:
         """Outputs, (N, n_out), at the states, some of them replaced."""
@@ -152,6 +162,16 @@ class _Checks:
     @cached_property
     def inertia(self) -> Array:
         return self.matrix(mass_matrix(self.system))
+
+    @cached_property
+    def admitted(self) -> Array:
+        """M of the motions that constraints admit."""
+        return self.held.admitted(self.inertia)
+
+    @property
+    def moves(self) -> bool:
+        """Whether the constraints admit a motion."""
+        return bool(self.admitted.shape[-1])
 
     @cached_property
     def bias(self) -> Array:
@@ -190,10 +210,10 @@ class _Checks:
         yield self._energy()
         yield self._sum("links: partial torques add up to tau", torque_by_link(self.system))
         yield self._adjoint()
-        yield from derivative_residuals(self.system, self.value, self.inverse, self.inertia, self.rng)
+        yield from derivative_residuals(self.system, self.value, self.inverse, self.inertia, self.new_rows, self.rng)
         graphs = {"L": self.graph({"L": self.system.lagrangian}), "tau": self.inverse}
         if self.held.any:
-            yield self.held.closed(self.accelerations)
+            yield self.held.closed(self.accelerations, self.inertia, np.abs(self.held_by).sum(axis=-1))
             graphs["the constraints and their rates"] = self.graph(self.held.rows)
         for name, graph in graphs.items():
             yield self._differences(f"AD: slope of {name} along a line = differences", graph)
@@ -209,7 +229,7 @@ class _Checks:
             worst(force + self.gravity - self.bias, terms[..., 0] + np.abs(self.gravity)),
             ROUNDING,
         )
-        if not self.timed:
+        if self.moves and not self.timed:
             rate = self.matrix(self.rate(mass_matrix(self.system)))
             skew = rate - 2.0 * matrix
             # What does not change at a state is a sum of products that cancel: only others show how large these are.
@@ -228,7 +248,9 @@ class _Checks:
             ROUNDING,
         )
         yield Residual("M: d2L/dqd2 = columns of inverse dynamics", worst(columns - self.inertia, terms), ROUNDING)
-        sizes = np.linalg.eigvalsh(balanced(self.held.admitted(self.inertia)))
+        if not self.moves:
+            return
+        sizes = np.linalg.eigvalsh(balanced(self.admitted))
         smallest, rounding = float(sizes.min()), n * np.finfo(float).eps
         kind = "regular, but indefinite, " if smallest < 0.0 < sizes.max() else "negative, " if smallest < 0.0 else ""
         if np.abs(sizes).min() <= rounding:
@@ -322,11 +344,19 @@ class _Checks:
 
 
 def derivative_residuals(
-    system: System, value: Callable[[Graph], Array], inverse: Graph, inertia: Array, rng: np.random.Generator
+    system: System,
+    value: Callable[[Graph], Array],
+    inverse: Graph,
+    inertia: Array,
+    new_rows: Array,
+    rng: np.random.Generator,
 ) -> Iterator[Residual]:
     """Residuals of the derivatives of torques, and of accelerations, these times M: how far their equation is missed.
 
+    Multipliers of rows of which a share s is new are rounded by 1 / s, and slopes that have them by 1 / s^2.
+
     value: numbers of a graph at the states, (N, n_out).  inverse: of inverse dynamics.  inertia: M, (N, n, n).
+    new_rows: s, (N,); slopes of accelerations are not determined where it is not clear.
     """
     n = system.n
     line = rng.normal(size=4 * n)  # dxi, dqd, dqdd and dtau
@@ -345,11 +375,18 @@ def derivative_residuals(
     terms = np.swapaxes(entries, 1, 2).reshape(-1, n, 3 * n) * line[: 3 * n]
     equation = "derivatives: dtau/dq, dtau/dqd and M along a line = AD of inverse dynamics"
     yield Residual(equation, worst(terms.sum(axis=-1) - pushed, np.abs(terms).sum(axis=-1)), ROUNDING)
+    clear = new_rows >= CLEAR
+    if not clear.any():
+        return
+    slopes = np.abs(terms[..., : 2 * n]).sum(axis=-1) + np.abs(
+        line[3 * n :]
+    )  # of the forces, which constraints take up
     pushed = along(forward_dynamics(system), dict(zip(system.tau, f, strict=True)))
     matrices = value(state_space(system))
     a_rows, b_rows = matrices[:, : 4 * n * n].reshape(-1, 2 * n, 2 * n), matrices[:, 4 * n * n :].reshape(-1, 2 * n, n)
     terms = np.concatenate([a_rows, b_rows], axis=-1)[:, n:] * np.delete(line, np.s_[2 * n : 3 * n])
-    missed = inertia @ (terms.sum(axis=-1) - pushed)[..., None]
-    sizes = np.abs(inertia) @ np.abs(terms).sum(axis=-1)[..., None]
+    missed = (inertia @ (terms.sum(axis=-1) - pushed)[..., None])[..., 0]
+    sizes = (np.abs(inertia) @ np.abs(terms).sum(axis=-1)[..., None])[..., 0] + slopes
+    sizes = sizes[clear] / new_rows[clear, None] ** 2
     equation = "derivatives: A and B of the linearization along a line = AD of forward dynamics"
-    yield Residual(equation, worst(missed[..., 0], sizes[..., 0]), ROUNDING)
+    yield Residual(equation, worst(missed[clear], sizes), ROUNDING)

@@ -11,13 +11,15 @@ import cgraph as cg
 from cgraph import Graph
 from cgraph.extend import Array, Builder, cotangents, tangents
 
+from ..equations.constraints.constraint_rank import CLEAR
+from ..equations.constraints.nearly_redundant_rows import least_new
 from ..equations.states.consistent_state import nearest_state
 from ..systems.constraints import ConstraintError
 from ..systems.kinematics import ONE, ZERO
 from ..systems.system import System
 from .residual import ROUNDING, Residual, worst
 
-TRIALS = 20  # for a state that constraints let be
+TRIALS = 20  # for a state that constraints let be, and at which their rank is clear
 DEPENDENT = 1e-9  # of the largest singular value of J, its columns scaled to kinetic energy: rows that say nothing
 
 
@@ -36,15 +38,29 @@ def random_states(system: System, count: int, t: float, speed: float, rng: np.ra
 
 
 def _moved(system: System, q: Array, qd: Array, t: float, rng: np.random.Generator) -> tuple[Array, Array]:
-    """The state on the constraints; another one where this cannot be moved there."""
-    for k in range(TRIALS):
+    """The state on the constraints; another one where this cannot be moved there, or where their rank is not clear.
+
+    Newton's method is drawn to such states: those of linkages whose links lie on one another, say.
+    """
+    refused, doubtful = ConstraintError(), list[tuple[Array, Array]]()
+    for _ in range(TRIALS):
         try:
-            return nearest_state(system, q, qd, t)
-        except ConstraintError:
-            if k == TRIALS - 1:
-                raise
-            (q,) = _configurations(system, 1, rng)
-    raise AssertionError
+            state = nearest_state(system, q, qd, t)
+        except ConstraintError as error:
+            refused = error
+        else:
+            if new_rows(system, state[0], t) >= CLEAR:
+                return state
+            doubtful.append(state)
+        (q,) = _configurations(system, 1, rng)
+    if not doubtful:
+        raise refused
+    return doubtful[0]
+
+
+def new_rows(system: System, q: Array, t: float) -> float:
+    """How much of the constraint that is nearest to a sum of the others is new; 1 without constraints."""
+    return least_new(system.constraints, q, t, system.parameters) if len(system.constraints) else 1.0
 
 
 def _configurations(system: System, count: int, rng: np.random.Generator) -> Array:
@@ -86,20 +102,31 @@ class Held:
         """M of the motions that the rows admit, (N, k, k); M itself, (N, n, n), without rows."""
         if not self.any:
             return inertia
-        size = np.sqrt(np.abs(np.diagonal(inertia, axis1=1, axis2=2)))
-        size = np.where(size > 0.0, size, 1.0)[:, :, None]
+        size = _sizes(inertia)
         _, values, vectors = np.linalg.svd(np.swapaxes(self.matrix / size, 1, 2))
         rank = int((values > DEPENDENT * values.max(axis=1, keepdims=True)).sum(axis=1).max())
         kernel = np.swapaxes(vectors, 1, 2)[:, :, rank:] / size
         return np.asarray(np.swapaxes(kernel, 1, 2) @ inertia @ kernel)
 
-    def closed(self, accelerations: Array) -> Residual:
-        """The rows stay 0: their second rates, of all rows, also of those that were left out as saying nothing new."""
+    def closed(self, accelerations: Array, inertia: Array, forces: Array) -> Residual:
+        """The rows stay 0: their second rates, of all rows, also of those that were left out as saying nothing new.
+
+        forces: of the constraints in absolute value, (N, n): accelerations are M^-1 of forces that in part cancel.
+        """
         system, (build, rates) = self.system, (Builder(), self.system.constraints.rates)
         x_dot = dict(zip(system.q, system.q_dot, strict=True)) | {system.t: ONE}
         dots = tangents(x_dot, rates, build)
         graph = system.graph({str(k): dots.get(z, ZERO) for k, z in enumerate(rates)}, system.q, system.qd)
         change, pushed = self.value(graph), np.swapaxes(self.matrix, 1, 2) * accelerations[:, None, :]
-        terms = np.abs(change) + np.abs(pushed).sum(axis=-1)
+        size = _sizes(inertia)
+        scaled = np.linalg.pinv(inertia / size / np.swapaxes(size, 1, 2), hermitian=True)  # singular without mass
+        cancelled = np.abs(np.swapaxes(self.matrix / size, 1, 2)) @ np.abs(scaled) @ (forces[..., None] / size)
+        terms = np.abs(change) + np.abs(pushed).sum(axis=-1) + cancelled[..., 0]
         equation = "constraints: J qdd + (dz/dt at qdd = 0) = 0, all rows"
         return Residual(equation, worst(change + pushed.sum(axis=-1), terms), ROUNDING)
+
+
+def _sizes(inertia: Array) -> Array:
+    """The root of the diagonal of M, (N, n, 1), 1 where it is 0: velocities times it are scaled to kinetic energy."""
+    size = np.sqrt(np.abs(np.diagonal(inertia, axis1=1, axis2=2)))
+    return np.where(size > 0.0, size, 1.0)[:, :, None]

@@ -158,26 +158,31 @@ def inverse_dynamics(model: Model, formulation: str | None = None, *, simplify: 
     system = as_system(model)
     if formulation is not None:
         require_choice("formulation", formulation, FORMULATIONS)
-    if not require_flag("simplify", simplify):
-        names = SMALL if formulation is None else (formulation,)
-        return min([torques(system, name) for name in names], key=lambda graph: size(cg.simplify(graph)))
+    require_flag("simplify", simplify)
     if formulation is None:
-        return shortened(system, _smaller)
+        formulation, graph = _smaller(system)
+        return graph if simplify else torques(system, formulation)
+    return _finished(system, formulation) if simplify else torques(system, formulation)
+
+
+def _finished(system: System, formulation: str) -> Graph:
+    """Inverse dynamics by one formulation, simplified, and of the `SMALL` ones shortened."""
     if formulation in SMALL:
         return shortened(system, lambda form: cg.simplify(torques(form, formulation)))
     return cg.simplify(torques(system, formulation))
 
 
-def _smaller(system: System) -> Graph:
-    """The smaller of the `SMALL` ones.
+def _smaller(system: System) -> tuple[str, Graph]:
+    """That of the `SMALL` ones whose finished graph is the smaller, and this graph.
 
     Of bodies the chain rule gave it in none of 1600 random trees beyond 58 nodes, unless most joints are slides, which
     take 7 nodes each; so for large graphs, which take long, it is not asked.
     """
-    by_velocities = cg.simplify(torques(system, newton_euler.__name__))
-    if system.body_terms is not None and len(by_velocities.nodes) > max(LONGEST, 10 * system.n):
+    by_velocities = newton_euler.__name__, _finished(system, newton_euler.__name__)
+    if system.body_terms is not None and len(by_velocities[1].nodes) > max(LONGEST, 10 * system.n):
         return by_velocities
-    return min(cg.simplify(torques(system)), by_velocities, key=size)
+    by_state = chain_rule.__name__, _finished(system, chain_rule.__name__)
+    return min(by_state, by_velocities, key=lambda pair: size(pair[1]))
 
 
 def size(graph: Graph) -> tuple[int, int]:

@@ -5,8 +5,10 @@ from __future__ import annotations
 import json
 import math
 import re
+from contextlib import suppress
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 import cgraph as cg
@@ -14,16 +16,19 @@ import dynamics as dyn
 from cgraph.operations.operation import OPS
 from dynamics.equations import accelerations
 from dynamics.equations.constraints.constraints import multiplier_outputs
+from dynamics.equations.states.consistent_state import nearest_state
 from dynamics.io.write_mjcf import to_mjcf
 from dynamics.systems.constraints import Constraints
 from dynamics.verification import certificate
 from dynamics.verification.certificate import certify
+from dynamics.verification.held_states import new_rows, random_states
 from dynamics.verification.residual import ROUNDING, Certificate, Residual
 from tests.dynamics.equations.test_constraints import moving_wall, pulleys, sleigh
-from tests.dynamics.linkages import four_bar, peaucellier
+from tests.dynamics.linkages import bar, four_bar, peaucellier
 from tests.dynamics.mechanisms import FAMILIES
 from tests.dynamics.models import MODELS
 from tests.dynamics.multibody.test_rolling import disk
+from tests.dynamics.tilted_linkages import random_linkage
 from tests.dynamics.units import Units, in_units
 from viz import cli
 
@@ -82,6 +87,53 @@ def test_loops_are_those_of_pinocchio() -> None:
         found = certify(model, 3)
         assert failed(found) == {}
         assert [each.value < 1e-11 for each in found.residuals if "constraintDynamics" in each.equation] == [True]
+
+
+@pytest.mark.filterwarnings("ignore::dynamics.ConstraintWarning")
+@pytest.mark.parametrize("count", [3, pytest.param(150, marks=[pytest.mark.slow, pytest.mark.timeout(3600)])])
+def test_random_linkages_with_more_rows_than_they_need_pass(count: int) -> None:
+    """Newton's method is drawn to singular positions of theirs; tilted, some are so everywhere, or held."""
+    models = {}
+    for k in range(count):
+        models[f"{k} exact"], models[f"{k} tilted"], *_ = random_linkage(k)
+    found = {}
+    for name, model in models.items():
+        with suppress(dyn.ConstraintError):  # tilted so far that its loops cannot be closed
+            found[name] = certify(model, 3)
+    assert {name: failed(each) for name, each in found.items() if not each.passed} == {}
+    judged = [name for name, each in found.items() if any("linearization" in row.equation for row in each.residuals)]
+    assert len(judged) > 0.9 * len(models)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_states_of_a_linkage_are_no_singular_positions(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Peaucellier's linkage folds, long bar on long bar, at most states that Newton's method finds."""
+    system = peaucellier().system
+    folded, _ = nearest_state(system, [-1.3, -1.4, -1.3, 4.9, 4.5, -0.2, -0.2], [0.0] * 7)
+    assert abs(math.remainder(folded[0] - folded[2], 2.0 * math.pi)) < 1e-12
+    assert new_rows(system, folded, 0.0) == 0.0
+    states = random_states(system, 5, 0.0, 1.0, np.random.default_rng(seed))
+    assert min(new_rows(system, q, 0.0) for q in states["q"]) > 0.05
+    assert failed(certify(peaucellier(), 3, seed)) == {}
+    monkeypatch.setattr(certificate, "state_space", lambda system: scaled(dyn.state_space(system), 1.0 + 1e-6))
+    assert [each.split(" along")[0] for each in failed(certify(peaucellier(), 3, seed))] == [
+        "derivatives: A and B of the linearization"
+    ]
+
+
+def scaled(graph: cg.Graph, factor: float) -> cg.Graph:
+    return cg.Graph(graph.inputs, {name: node * factor for name, node in graph.outputs.items()})
+
+
+@pytest.mark.filterwarnings("ignore::dynamics.ConstraintWarning")
+def test_where_all_states_are_singular_the_slopes_of_accelerations_are_left_out() -> None:
+    """The bars of a parallelogram that has to lie flat: its loop closes at one position, a singular one."""
+    bars = [bar("crank", "world", 0.4, (0, 0, 0)), bar("table", "crank", 0.6, (0.4, 0, 0))]
+    stretched = dyn.Mechanism(bars, loops=[dyn.Loop("point", "table", at=(0.6, 0, 0), to_at=(1.0, 0, 0))])
+    found = certify(stretched, 2)
+    assert failed(found) == {}
+    assert not [each for each in found.residuals if "linearization" in each.equation]
+    assert [each[:43] for each in found.left_out if "slopes" in each] == ["slopes of accelerations: at 2 of 2 states a"]
 
 
 def test_what_was_not_compared_of_loops_is_said() -> None:
