@@ -31,18 +31,18 @@ class Builder:
     def __call__(self, op: Row, args: tuple[Node, ...], label: Label, name: str | None = None) -> Node:
         """The node of this operation on these arguments; a name is kept by a node made here for the first time."""
         for arg in args:
-            if arg.op is not CONSTANT:  # a rule may fold an operation on nodes that are not all constants
+            if arg.op is not CONSTANT:  # rules are for arguments that are not all constants; the rest is below
                 if op.fold is not None and (node := op.fold(*args)) is not None:
                     return node  # type: ignore[no-any-return]
                 break
-        else:
+        else:  # no break: all are constants
             value = op.scalar(*[arg.value for arg in args])
             if value == value:  # no constant is NaN: the operation then stays
                 return constant(value)
         # a * b and b * a are one node, with a constant first, else in the order of the one that was made first.
         if op.commutative and args[1].op is CONSTANT and args[0].op is not CONSTANT:
             args = args[::-1]
-        key: tuple[str | int, ...]  # of identities: the garbage collector would follow nodes
+        key: tuple[str | int, ...]  # ids: the garbage collector would follow nodes; the node made keeps args alive
         if len(args) == 2:
             first, second = id(args[0]), id(args[1])
             key = (op.name, second, first) if op.commutative and first > second else (op.name, first, second)

@@ -47,7 +47,7 @@ def evaluate(nodes: Sequence[Node], outputs: Mapping[str, Node], values: Mapping
     results = {name: env[node] for name, node in outputs.items()}
     if shape is None:
         return results
-    taken = {id(value) for value in values.values()}  # arrays of the caller, then of other outputs: none is shared
+    taken = {id(value) for value in values.values()}  # the caller's, then earlier results: these are copied, not shared
     filled: dict[str, Value] = {}
     for name, value in results.items():
         fits = isinstance(value, np.ndarray) and value.shape == shape and id(value) not in taken

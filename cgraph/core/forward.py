@@ -53,25 +53,23 @@ def tangents(
 
 
 class ReachedNodes:
-    """The flags of nodes that one sweep, forward or reverse, reaches through operations that select.
+    """For each node a flag: a node that is not 0 exactly where one sweep, forward or reverse, reaches it.
 
     A selecting operation such as `where` has the partial 0 in an argument that it leaves out. Beyond it, whichever way
-    the sweep goes, the tangent or cotangent is 0 and must stay 0, though partials there may be infinite or NaN: of
-    where(x > 0, log(x), x), the cotangent of log(x) is 0 at x = 0, and its slope 1 / x is not asked. Any other 0 times
-    infinity is NaN, as in IEEE arithmetic.
+    the sweep goes, the tangent or cotangent is 0 and must stay 0, though partials there may be infinite or NaN: in
+    where(x > 0, log(x), x) at x = 0 the cotangent of log(x) is 0, and what it passes to x is 0 too, not 0 times 1 / x.
+    Any other 0 times infinity is NaN, as in IEEE arithmetic.
 
-    seeds: {seed: its value}, if a zero of it means the same, which matters where an operation has a singular slope;
-    else {seed: None}.
+    seeds: {seed: its flag}: its value, where a seed that is 0 is to reach nothing; else None.
     """
 
     def __init__(self, seeds: Mapping[Node, Node | None]) -> None:
-        # {node: the node that is not 0 where the sweep reaches it; None: the sweep reaches it everywhere}
-        self._flags: dict[Node, Node | None] = dict(seeds)
+        self._flags: dict[Node, Node | None] = dict(seeds)  # None: the sweep reaches the node everywhere
         self._behind_selection: set[Node] = set()
 
     def product(self, op: Row, source: Node, a: Node, b: Node) -> Node:
         """a * b for a partial of `op` and the tangent or cotangent of `source`; 0 where the sweep misses `source`."""
-        if op.selects or 0.0 in (a.value, b.value):
+        if op.selects or 0.0 in (a.value, b.value):  # then 0 times anything is 0: what a branch not taken contributes
             return apply(ROWS["zero_safe_mul"], a, b)
         flag = self._flags.get(source)
         may_be_infinite = op.singular is not None or source in self._behind_selection
@@ -83,10 +81,10 @@ class ReachedNodes:
     def pass_on(self, op: Row, source: Node, target: Node, partial: Node) -> None:
         """Say that the sweep reaches `target` from `source`, through an operation with this partial."""
         flag = self._flags.get(source)
-        if op.selects:
+        if op.selects:  # where `source` is reached and the partial is not 0, a logical and
             flag = partial if flag is None else apply(ROWS["where"], flag, partial, 0.0)
         if op.selects or source in self._behind_selection:
             self._behind_selection.add(target)
         other = self._flags.setdefault(target, flag)
-        if other is not flag:
+        if other is not flag:  # reached in two ways: not 0 where one of the flags is, a logical or
             self._flags[target] = None if flag is None or other is None else apply(ROWS["where"], other, 1.0, flag)

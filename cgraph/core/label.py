@@ -94,7 +94,7 @@ class Label:
 
     A label lives as long as a node has it. Labels of the same sets are one object, so that most comparisons are a
     comparison of pointers; of labels with many tags there may be two of the same meaning.
-    roles: among "input", "primal", "adjoint", "tangent".
+    roles: among "input", "primal", "adjoint", "tangent", see `Node`.
     """
 
     __slots__ = ("__weakref__", "_derived", "_lines", "_tags", "has_tags", "roles")

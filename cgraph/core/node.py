@@ -18,10 +18,12 @@ VARIABLE, CONSTANT = [Row(name, 0, float, float, lambda *_: ()) for name in ("va
 
 
 class Node:
-    """An immutable node of a computational graph: a constant, a named variable or an operation.
+    """A node of a computational graph: a constant, a named variable or an operation.
 
-    Nodes compare and hash by identity. Arithmetic with nodes and numbers makes new nodes, kept as written;
-    `<`, `<=`, `>`, `>=` make comparison nodes (1.0 or 0.0) for `cg.where`; `cg.equal` compares values.
+    Fields cannot be assigned, and operation, arguments and value never change; but the `Builder` that made a node may
+    widen its label, or give it a first name, when it is to make the same again. Nodes compare and hash by identity.
+    Arithmetic with nodes and numbers makes new nodes, kept as written; `<`, `<=`, `>`, `>=` make comparison nodes (1.0
+    or 0.0) for `cg.where`; `cg.equal` compares values.
 
     Attributes
     ----------
@@ -36,7 +38,7 @@ class Node:
     tags : frozenset of str
         Set by `cg.tag`.
     roles : frozenset of str
-        "input", "primal", "adjoint", "tangent": what differentiation made of it.
+        "input": a variable; "primal": made outside differentiation; "adjoint", "tangent": by reverse, by forward mode.
     lines : frozenset of SourceLine
         Where it was written, if `cg.recording_lines` was on.
 

@@ -21,13 +21,13 @@ def cotangents(
     through: Mapping[Node, Node] | None = None,
     zero_wins: bool = False,
 ) -> list[Node]:
-    """Cotangents x_bar = sum over seeds y of y_bar dy/dx of the nodes `wrt`; the constant 0 where no seed depends on x.
+    """Cotangents of the nodes x in `wrt`, x_bar = sum over seeds y of y_bar dy/dx; a constant 0 if no y depends on x.
 
     seeds: {y: y_bar}.  wrt: leaves or inner nodes; one may depend on another: the cotangent of an inner node counts
     every use of it, and goes on to its arguments.  build: what makes the nodes.
     fixed: inner nodes that count as independent: nothing goes on to their arguments.
-    through: {inner node: factor}; its cotangent is multiplied by the factor before it goes on to the arguments, so that
-    what depends on the factor has come this way.
+    through: {inner node: factor}; what the node's cotangent passes on to the arguments is multiplied by the factor. In
+    a result, the terms with the factor are those that came through this node, and at the factor 0 they are left out.
     zero_wins: a seed that is zero counts for nothing, also where a slope is infinite or NaN; else the result is NaN.
 
     >>> import cgraph as cg

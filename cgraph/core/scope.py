@@ -29,7 +29,8 @@ class Scope:
         self.label = label
 
 
-current: ContextVar[Scope] = ContextVar("cgraph scope", default=Scope(WRITTEN, None))  # noqa: B039 (see `building`)
+# The default is shared by all threads. A Scope can change, but only `building` lets one change, which it made itself.
+current: ContextVar[Scope] = ContextVar("cgraph scope", default=Scope(WRITTEN, None))  # noqa: B039
 
 
 @contextmanager
