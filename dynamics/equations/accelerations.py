@@ -19,7 +19,7 @@ from .constraints.constraints import (
     multiplier_outputs,
     unknown_names,
 )
-from .singular_mass_matrix import TORQUE, SingularMassMatrixError, no_inertia, without_inertia
+from .singular_mass_matrix import TORQUE, SingularMassMatrixError, coordinate_sizes, no_inertia, without_inertia
 
 DENSE_UP_TO = 7  # coordinates; beyond, the dense graph is larger on a tree of bodies, and takes long to build
 WORTH = 0.9  # of the recursive graph's nodes, at most, for the dense one: elimination keeps more digits
@@ -109,18 +109,18 @@ def _smallest(system: System, graphs: Sequence[Graph], worth: float) -> Graph:
 def _sizes(system: System, accelerations: Graph) -> dict[str, float]:
     """Sizes of states, torques and accelerations of bodies, which change with the units of mass, length and time.
 
-    Angles are of size 1, places of the length L that an angle of 1 moves the bodies by. With A, the acceleration of
-    bodies at rest, speeds are of size sqrt(A L), and torques are such that they accelerate by A, too. Of a Lagrangian
-    alone units are unknown: all is of size 1.
+    Coordinates have their `coordinate_sizes`, places the length L that an angle of 1 moves the bodies by. With A, the
+    acceleration of bodies at rest, speeds are of size sqrt(A L), and torques are such that they accelerate by A, too.
+    Of a Lagrangian alone units are unknown: all is of size 1.
     """
     if system.body_terms is None:
         return {}
     ways = [length or 1.0 for length in system.lengths]  # m of a unit
     longest = next((length for length in ways if length != 1.0), 1.0)
-    of_q, of_u = np.array(ways[: system.nq]), np.array(ways[system.nq :])
+    of_q, of_u = coordinate_sizes(system), np.array(ways[system.nq :])
     rng = np.random.default_rng(0)
     at: dict[str, Any] = dict.fromkeys(accelerations.input_names, 0.0) | dict(system.parameters)
-    at |= {f"q{i}": longest / way * rng.normal(size=DRAWN) for i, way in enumerate(of_q)}
+    at |= {f"q{i}": size * rng.normal(size=DRAWN) for i, size in enumerate(of_q)}
 
     def largest(force: float) -> float:
         """Acceleration [m/s^2] by a force [N] along all velocities, the largest of them, in the median over states."""
@@ -132,7 +132,7 @@ def _sizes(system: System, accelerations: Graph) -> dict[str, float]:
     falling, by_force = largest(0.0), largest(TORQUE) / TORQUE
     rate = falling if 0.0 < falling < np.inf else longest
     force = rate / by_force if 0.0 < by_force < np.inf else 1.0
-    sizes = {f"q{i}": longest / way for i, way in enumerate(of_q)}
+    sizes: dict[str, float] = {f"q{i}": size for i, size in enumerate(of_q)}
     for i, way in enumerate(of_u):
         sizes |= {f"qd{i}": np.sqrt(rate * longest) / way, f"tau{i}": force * way, f"qdd{i}": rate / way}
     others = [name for name in accelerations.outputs if name not in sizes]

@@ -14,7 +14,7 @@ from .equations_of_motion import bias
 from .substitute import substitute
 
 
-@Equation("q qd", Output("C_{}_{}", ("n", "n"), "N m s or N s"), rewritten=False)
+@Equation("q qd", Output("C_{}_{}", ("n", "n"), "N m s, N s or N s/m"), rewritten=False)
 def coriolis(system: System) -> Iterator[list[Node]]:
     """Coriolis matrix C(q, qd) with C qd + gravity_force = bias and dM/dt - 2 C skew.
 

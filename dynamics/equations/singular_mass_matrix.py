@@ -102,6 +102,14 @@ def balanced(matrix: Array) -> Array:
     return scale[..., :, None] * matrix * scale[..., None, :]
 
 
+def coordinate_sizes(system: System) -> list[float]:
+    """Sizes of coordinates, (nq,): of places the length [m] that an angle of 1 moves the bodies by; 1 of all others."""
+    longest = next((length for length in system.lengths if length not in (0.0, 1.0)), 1.0)
+    groups = list(system.kinematics.groups)
+    places = [x == 1.0 and groups.count(k) == 1 for x, k in zip(system.lengths, groups, strict=False)]
+    return [longest if place else 1.0 for place in places]  # several are one quantity, a quaternion
+
+
 def without_inertia(system: System, accelerations: Graph, mass_matrix: Callable[[], Graph]) -> list[int]:
     """The coordinates of which no digit of the acceleration is certain at some random states; [] where M has full rank.
 
@@ -111,10 +119,12 @@ def without_inertia(system: System, accelerations: Graph, mass_matrix: Callable[
     inputs, which are moved in their last place.
     """
     n, rng = system.n, np.random.default_rng(0)
+    sizes = {f"q{i}": size for i, size in enumerate(coordinate_sizes(system))}
     found: set[int] = set()
     unfolded: tuple[Graph, dict[str, float]] | None = None
     for k in range(STATES):
-        point = {name: 10.0**-k * float(rng.uniform(0.5, 1.5)) for name in accelerations.input_names}
+        drawn = {name: 10.0**-k * float(rng.uniform(0.5, 1.5)) for name in accelerations.input_names}
+        point = {name: sizes.get(name, 1.0) * x for name, x in drawn.items()}
         point |= {f"tau{i}": TORQUE * point[f"tau{i}"] for i in range(n)}
         inverse = _inverse(accelerations, point, n)
         finite = np.isfinite(inverse).all(axis=1)

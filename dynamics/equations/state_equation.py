@@ -18,7 +18,9 @@ from .equations_of_motion import SOLUTIONS, forward_dynamics
 FORMS = ("velocity", "momentum")  # of a motion: states (q, qd) or (q, p)
 
 
-@Equation("q qd tau", Output("q{}_dot", ("nq",)), Output("qd{}_dot", ("n",))).describes
+@Equation(
+    "q qd tau", Output("q{}_dot", ("nq",), "rad/s or m/s"), Output("qd{}_dot", ("n",), "rad/s^2 or m/s^2")
+).describes
 def state_equation(model: Model, method: str = "auto") -> Graph:
     """The time derivative of a model's state, xdot = f(x, tau, t).
 

@@ -113,8 +113,11 @@ def _of_rates(method: Partitioned, problem: Problem, composition: Composition) -
     stages = range(len(method.w))
     parts = [("q", "Q", "V", method.a), ("momentum", "P", "F", method.b)][: 2 if problem.momenta else 1]
     bases, slopes = tuple([part[0] for part in parts]), [part[2] for part in parts]
-    names = [*bases, *[f"{base}_rounding" for base in bases], "W0"]
-    names += [f"{name}{i}" for _, stage, slope, _ in parts for name in (stage, slope, "W") for i in stages]
+    m, first = problem.size, problem.nq if problem.momenta else problem.size
+    lengths = {f"W{i}": first for i in stages}
+    for (base, stage, slope, _), length in zip(parts, (first, m - first), strict=False):
+        names = base, f"{base}_rounding", *[f"{name}{i}" for name in (stage, slope) for i in stages]
+        lengths |= dict.fromkeys(names, length)
 
     def rates(at: Sequence[str], t: str, velocity: str, i: int = 0) -> Call:
         return Call(problem.rate, (*at, t, "p"), tuple([f"{name}{i}" for name in (velocity, *slopes[1:])]))
@@ -129,9 +132,8 @@ def _of_rates(method: Partitioned, problem: Problem, composition: Composition) -
             turn += [_stage(a[i], base, slope, f"{stage}{i}") for i in stages for base, stage, slope, a in parts]
             turn += [rates([f"{part[1]}{i}" for part in parts], f"time{i}", velocity, i) for i in stages]
         body = [*_iterated(method, turn), *[_added(base, slope, method.w) for base, _, slope, _ in parts]]
-    m = problem.size
     body = [end_to_end(m, ("x",), bases), *_in_turn(composition, body), end_to_end(m, bases, ("x_new",))]
-    return _step(method, dict.fromkeys(names, m // len(parts)), start, body)
+    return _step(method, lengths, start, body)
 
 
 def _step(method: Partitioned, lengths: dict[str, int], start: Sequence[Statement], body: list[Statement]) -> Step:

@@ -20,10 +20,10 @@ ROWS = ("n", "n")
 
 @Equation(
     "q qd qdd",
-    Output("tau{}", ("n",)),
-    Output("dtau_dq_{}_{}", ROWS),
-    Output("dtau_dqd_{}_{}", ROWS),
-    Output("M_{}_{}", ROWS),
+    Output("tau{}", ("n",), "N m or N"),
+    Output("dtau_dq_{}_{}", ROWS, "N m, N or N/m"),
+    Output("dtau_dqd_{}_{}", ROWS, "N m s, N s or N s/m"),
+    Output("M_{}_{}", ROWS, "kg m^2, kg m or kg"),
 )
 def inverse_dynamics_derivatives(system: System) -> Iterator[list[Node]]:
     """Torque tau of a motion with dtau/dq, dtau/dqd and M = dtau/dqdd, at any state.

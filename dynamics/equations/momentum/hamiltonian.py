@@ -74,7 +74,7 @@ def hamiltonian(model: Model, *, iterations: int = ITERATIONS, check: bool = Fal
     return shortened(as_system(model), derive)
 
 
-@Equation("q p tau", Output("q{}_dot", ("nq",)), Output("p{}_dot", ("n",), "N m or N")).describes
+@Equation("q p tau", Output("q{}_dot", ("nq",), "rad/s or m/s"), Output("p{}_dot", ("n",), "N m or N")).describes
 def hamilton_equations(
     model: Model, method: str = "recursive", *, iterations: int = ITERATIONS, check: bool = False
 ) -> Graph:

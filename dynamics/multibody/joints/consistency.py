@@ -14,7 +14,9 @@ from ..algebra.spatial import ZERO, cross
 from ..algebra.turns import UNIT
 from .joint_type import JointType
 
-TOLERANCE = 1e-9  # of the largest of its kind: rounding
+TOLERANCE = 1e-9  # of the largest of its kind
+ROUNDING = 1e-13  # of what it is made of, where that cancels
+HALVINGS = 60  # of the way from neutral coordinates, until all is finite
 
 
 @memo(64)
@@ -33,31 +35,47 @@ def contradiction(joint: JointType) -> str:
         moved = [*turned, *turn.out(velocity.linear)]
         given, derived = joint.acceleration(q, u), JointType.acceleration(joint, q, u)
     dots = tangents(dict(zip(q, rate, strict=True)), placed, build)
-    carried = cross(velocity.angular, velocity.linear)  # beside which accelerations may be rounding
     rates = [dots.get(node, ZERO) for node in placed]
     claims: list[tuple[str, list[Node], list[Node]]] = [
         ("velocity must be the rate of its turn and translation, along the rates of its coordinates", rates, moved),
         ("velocity must be linear in u", [*both.angular, *both.linear], [*apart.angular, *apart.linear]),
         (
             "acceleration must be the rate of its velocity at constant u",
-            [*given.angular, *given.linear, *carried],
-            [*derived.angular, *derived.linear, *carried],
+            [*given.angular, *given.linear],
+            [*derived.angular, *derived.linear],
         ),
     ]
-    neutral, sizes = np.array(joint.neutral), np.sin(np.arange(1.0, 1.0 + len(q) + 2 * len(u)) ** 2)  # any numbers
-    at = _values(list(joint.normalized(q)), q, neutral + 0.5 * sizes[: len(q)])
-    state = np.concatenate([at, sizes[len(q) :]])
-    for text, first, second in claims:
-        a, b = np.split(_values([*first, *second], [*q, *u, *v], state), 2)
-        if not np.abs(a - b).max() <= TOLERANCE * max(np.abs(a).max(), np.abs(b).max()):
-            return f"its {text}"
-    stands, away = np.array([*np.eye(3).ravel(), 0.0, 0.0, 0.0]), _values(placed, q, at)
-    off = np.abs(_values(placed, q, neutral) - stands)
-    if not (off[:9].max() <= TOLERANCE and off[9:].max() <= TOLERANCE * np.abs(away[9:]).max()):
+    sides = [node for _, first, second in claims for node in (*first, *second)]
+    neutral = np.array(joint.neutral)
+    away, values = _sample(joint, [*q, *u, *v], [*velocity.angular, *velocity.linear, *placed, *rate, *sides])
+    if not np.isfinite(values).all():
+        return "its turn, translation, velocity and rates must be finite about neutral coordinates"
+    angular, linear, _, shifted, rated, values = np.split(values, np.cumsum([3, 3, 9, 3, len(q)]))
+    hurry = max(np.abs(rated / away).max(), np.abs(angular).max())  # 1/s: how fast anything changes
+    length = max(np.abs(shifted).max(), np.abs(linear).max() / hurry)  # m
+    for power, (text, first, _) in zip((1, 1, 2), claims, strict=True):
+        (a, b), values = np.split(values[: 2 * len(first)], 2), values[2 * len(first) :]
+        for one, other, size in ((a[:-3], b[:-3], 1.0), (a[-3:], b[-3:], length)):  # angles and lengths: two units
+            largest = max(np.abs(one).max(), np.abs(other).max())
+            if not np.abs(one - other).max() <= TOLERANCE * largest + ROUNDING * size * hurry**power:
+                return f"its {text}"
+    off = np.abs(_values(placed, q, neutral) - np.array([*np.eye(3).ravel(), 0.0, 0.0, 0.0]))
+    if not (off[:9].max() <= TOLERANCE and off[9:].max() <= TOLERANCE * np.abs(shifted).max()):
         return "its turn and translation must be none at neutral coordinates"
     if joint.turns_with_body and not JointType.turns_with_body.fget(joint):  # type: ignore[attr-defined]
         return "its velocities must be along axes that turn with the body, as it says, at all coordinates"
     return "" if rate == u else _wrong_structure(joint)
+
+
+def _sample(joint: JointType, inputs: list[Node], nodes: list[Node]) -> tuple[Array, Array]:
+    """How far coordinates are from neutral ones at a state where all nodes are finite, and their values there."""
+    neutral, sizes, count = np.array(joint.neutral), np.sin(np.arange(1.0, 1.0 + len(inputs)) ** 2), len(joint.neutral)
+    for k in range(HALVINGS):
+        at = _values(list(joint.normalized(inputs[:count])), inputs[:count], neutral + 0.5 ** (k + 1) * sizes[:count])
+        values = _values(nodes, inputs, np.concatenate([at, sizes[count:]]))  # velocities are any numbers
+        if np.isfinite(values).all():
+            break
+    return at - neutral, values
 
 
 def _wrong_structure(joint: JointType) -> str:

@@ -8,6 +8,7 @@ import pytest
 import dynamics as dyn
 from dynamics.equations.equation import EQUATIONS, Equation, Output
 from tests.dynamics.mechanisms import floating, random_mechanism
+from tests.dynamics.units import Units, in_units
 from tests.test_docstrings import lacks
 
 ROWS = [name for name in dyn.__all__ if getattr(dyn, name) is not None and name in EQUATIONS]
@@ -46,6 +47,37 @@ def test_a_row_writes_the_tables_of_the_docstring(name: str) -> None:
         assert output.unit in words
     for section in ("Parameters", "Returns", "Raises", "Examples"):
         assert f"\n{section}\n---" in text
+
+
+@pytest.mark.parametrize("name", [name for name in ROWS if all(output.unit for output in EQUATIONS[name].outputs)])
+def test_the_powers_of_length_in_the_units_are_those_of_the_numbers(name: str) -> None:
+    """Of hinges and slides: where lengths are twice as many, entries are 1, 2 or 4 times as large, or a part of it."""
+    model, row = random_mechanism(4, ["revolute", "prismatic"], 1), EQUATIONS[name]
+    way = np.where([body.joint.type.turns for body in model.moving], 1.0, 2.0)
+    assert set(way) == {1.0, 2.0}
+    rng, factors = np.random.default_rng(0), {"p": 4.0 / way}
+    values = {kind: rng.uniform(0.5, 1.5, model.system.n) for kind in row.inputs}
+    factors |= {"tau": 4.0 / way} | dict.fromkeys(("q", "qd", "qdd"), way)
+
+    def entries(used: dyn.Mechanism, scale: float) -> dict[str, float]:
+        numbers = {kind: x * factors[kind] ** scale for kind, x in values.items()}
+        named = {f"{kind}{i}": float(v) for kind, x in numbers.items() for i, v in enumerate(x)}
+        found: dict[str, float] = getattr(dyn, name)(used).evaluate(named)
+        return found
+
+    here, there = entries(model, 0.0), entries(in_units(model, Units(length=2.0)), 1.0)
+    for output in row.outputs:
+        pairs = [(here[each], there[each]) for each in output.of(model.system) if here[each]]
+        powers = {round(float(np.log2(b / a)), 6) for a, b in pairs}
+        assert not pairs or powers == {float(power(unit)) for unit in output.unit.replace(" or ", ", ").split(", ")}
+
+
+def power(unit: str) -> int:
+    """The power of length in a unit."""
+    above, _, below = unit.partition("/")
+    parts = above.split(), below.strip("()").replace("s^2", "s").split()
+    count = [sum([{"m": 1, "m^2": 2, "N": 1, "J": 2}.get(part, 0) for part in side]) for side in parts]
+    return count[0] - count[1]
 
 
 @pytest.mark.parametrize("name", [name for name in ROWS if name != "state_equation"])

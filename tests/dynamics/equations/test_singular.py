@@ -264,6 +264,19 @@ def test_of_random_chains_those_without_inertia_are_refused(seed: int) -> None:
         assert len(forward_dynamics(mechanism).outputs) == mechanism.system.n
 
 
+@pytest.mark.parametrize("length", [2.0**-30, 2.0**-20, 1.0, 2.0**30])
+def test_a_slide_is_as_long_as_what_it_carries_in_any_unit(length: float) -> None:
+    """A ball, a slide and a universal joint, of nanometres in meters: nobody slides by a billion lengths."""
+    bodies = []
+    for k, kind in enumerate(["ball", "prismatic", "universal"]):
+        axis = [0.6, -0.5, 0.3] if kind == "prismatic" else [0.0, 0.0, 1.0]
+        joint = dyn.Joint(kind, axis, length * np.array([0.3, -0.7, 0.4]))
+        inertia = 0.01 * length**2 * np.diag([0.9, 1.0, 1.1])
+        bodies.append(dyn.Body(f"b{k}", joint, f"b{k - 1}" if k else "world", 1.0, length * np.full(3, 0.2), inertia))
+    graph = forward_dynamics(dyn.Mechanism(bodies))
+    assert [*graph.outputs] == [f"qdd{i}" for i in range(6)]
+
+
 @pytest.mark.parametrize("seed", [*range(6), *slow(*range(6, 300))])
 def test_slides_in_more_directions_than_there_are_have_no_inertia(seed: int) -> None:
     """M is constant, so that its pivots are folded: rounding of constants is what is left of one that should be zero.

@@ -120,11 +120,45 @@ class Squared(Angles):
         return super().velocity(q, self.rate(q, u))
 
 
+class Nowhere(Angles):
+    """At no real place."""
+
+    kind = "nowhere"
+
+    def translation(self, q: Nodes) -> Triple:
+        return cg.sqrt(-1.0 - q[0] * q[0]), ZERO, ZERO
+
+
 class Turned(Angles):
     """That is turned from the joint at neutral coordinates."""
 
     kind = "turned"
     neutral = (0.5, 0.0, 0.0)
+
+
+class Rail(Angles):
+    """A slider on a circle of that radius [m], by how far along x it is, which may turn by so much a radius.
+
+    turned, moved: what its velocities are off by, 1 of a right one.
+    """
+
+    kind = "rail"
+    coordinates = velocities = ("x",)
+    units, velocity_units, neutral, groups = ("m",), ("m/s",), (0.0,), (0,)
+
+    def __init__(self, radius: float, turns: float = 0.0, turned: float = 1.0, moved: float = 1.0) -> None:
+        self.radius, self.bend, self.turned, self.moved = radius, turns / radius, turned, moved
+
+    def rotation(self, q: Nodes) -> list[list[cg.Node]]:
+        return turn(X, self.bend * q[0])
+
+    def translation(self, q: Nodes) -> Triple:
+        return q[0], self.radius - cg.sqrt(self.radius**2 - q[0] * q[0]), ZERO
+
+    def velocity(self, q: Nodes, u: Nodes) -> Twist:
+        up = self.moved * q[0] * u[0] / cg.sqrt(self.radius**2 - q[0] * q[0])
+        linear = spatial.rotate_transpose(self.rotation(q), (u[0], up, ZERO))
+        return Twist((self.turned * self.bend * u[0], ZERO, ZERO), linear)
 
 
 class Bent(Angles):
@@ -146,6 +180,7 @@ WRONG = {
     Faster(): "its velocity must be the rate of its turn and translation, along the rates of its coordinates",
     Squared(): "its velocity must be linear in u",
     Still(): "its acceleration must be the rate of its velocity at constant u",
+    Nowhere(): "its turn, translation, velocity and rates must be finite about neutral coordinates",
     Turned(): "its turn and translation must be none at neutral coordinates",
     Constant(): "its velocities must be along axes that turn with the body, as it says, at all coordinates",
     Bent(): "structure does not belong to rate",
@@ -164,6 +199,16 @@ def test_a_type_that_contradicts_itself_is_refused_in_a_sentence(joint: Angles, 
 def test_no_type_of_the_library_contradicts_itself() -> None:
     own = [joint.with_pitch(0.3) for joint in TYPES.values() if type(joint).__module__.startswith("dynamics.")]
     assert not [joint.kind for joint in own if joint.moves and contradiction(joint)]
+
+
+@mark.parametrize("radius", [1e-9, 0.03, 1.0, 1e3])
+def test_a_type_is_judged_where_its_coordinates_are_defined_and_in_any_unit(radius: float) -> None:
+    """Angles beside lengths that are a billion times as small, or as large."""
+    assert not contradiction(Rail(radius))
+    assert not contradiction(Rail(radius, 2.0))
+    wrong = "its velocity must be the rate of its turn and translation"
+    for joint in (Rail(radius, 2.0, turned=1.01), Rail(radius, 2.0, moved=1.01)):
+        assert contradiction(joint).startswith(wrong)
 
 
 @fixture(autouse=True)

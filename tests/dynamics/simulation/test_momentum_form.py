@@ -82,6 +82,19 @@ def test_other_methods_step_momenta_too(method: str) -> None:
     assert canonical.q[-1] == pytest.approx(plain.q[-1], rel=1e-8, abs=1e-8)
 
 
+@pytest.mark.parametrize("method", ["gauss4", *slow("midpoint", "yoshida6")])
+def test_methods_of_gauss_step_more_coordinates_than_momenta(method: str) -> None:
+    """As those of a quaternion, whose length and whose energy they keep."""
+    body = dyn.Body("top", dyn.Joint("ball"), mass=1.3, center=(0.1, 0.2, 0.3), inertia=(0.3, 0.4, 0.5))
+    top, dt = dyn.Mechanism([body], gravity=(0.0, 0.0, -9.81)), {"midpoint": 2.0**-11}.get(method, 2.0**-6)
+    how: dict[str, Any] = {"t_end": 0.5, "method": method, "dt": dt, "estimate_error": False, "form": "momentum"}
+    run = dyn.simulate(top, [1.0, 0.0, 0.0, 0.0], [0.3, 0.6, 0.9], **how)
+    exact = dyn.simulate(top, [1.0, 0.0, 0.0, 0.0], [0.3, 0.6, 0.9], t_end=0.5, rtol=1e-12)
+    assert_same(run.q[-1], exact.q[-1], 1e-6)
+    assert_same(np.linalg.norm(run.q, axis=1), np.ones(len(run.t)), 1e-12)
+    assert np.ptp(run.energy) < 1e-6 * np.abs(run.energy).max()
+
+
 def watched(n: int) -> list[dyn.Event]:
     """Quantities of q, qd and t; one of them brakes all velocities, and turns the first."""
 
