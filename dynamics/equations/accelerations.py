@@ -92,18 +92,28 @@ def accelerations(system: System, method: str = "auto", check: bool = False) -> 
 def _smallest(system: System, graphs: Sequence[Graph], worth: float) -> Graph:
     """Smallest of graphs, the safest first, whose roundings carry little further than those of the first.
 
+    They are compared in motion, at rest with torques, and at rest without: where masses differ by decades, speeds and
+    torques can hide the digits that are lost of the accelerations by weight alone.
     worth: of the nodes of the one before, at most, for the last.
     """
-    chosen, most = graphs[0], None
+    chosen, limits = graphs[0], None
     for graph in graphs[1:]:
         limit = worth if graph is graphs[-1] else 1.0
         if _cost(graph) >= limit * _cost(chosen):
             continue
-        sizes = _sizes(system, graphs[0])
-        most = most or GROWTH * rounding_spread(graphs[0], system.parameters, sizes)
-        if rounding_spread(graph, system.parameters, sizes) <= most:
+        regimes = _regimes(system, graphs[0])
+        limits = limits or [GROWTH * rounding_spread(graphs[0], system.parameters, sizes) for sizes in regimes]
+        pairs = zip(regimes, limits, strict=True)
+        if all(rounding_spread(graph, system.parameters, sizes) <= most for sizes, most in pairs):
             chosen = graph
     return chosen
+
+
+def _regimes(system: System, accelerations: Graph) -> list[dict[str, float]]:
+    """Sizes of samples and of outputs: in motion, at rest with torques, and at rest by weight alone."""
+    moving = _sizes(system, accelerations)
+    driven = moving | {f"qd{i}": 0.0 for i in range(system.n)}
+    return [moving, driven, driven | {f"tau{i}": 0.0 for i in range(system.n)}]
 
 
 def _sizes(system: System, accelerations: Graph) -> dict[str, float]:
