@@ -52,7 +52,7 @@ class SharedSet:
 
     @property
     def key(self) -> frozenset[Any] | SharedSet:
-        """What a dictionary may know the set by: its members, or itself where they are many."""
+        """Key of the set in a dictionary: its members, or itself where they are many."""
         return self.part if self.base is None else self
 
     def __or__(self, other: SharedSet) -> SharedSet:
@@ -90,7 +90,7 @@ class SourceLine(NamedTuple):
 
 
 class Label:
-    """What a node means: tags of the person who wrote it, roles from differentiation, and source lines.
+    """Meaning of a node: tags of the person who wrote it, roles from differentiation, and source lines.
 
     A label lives as long as a node has it. Labels of the same sets are one object, so that most comparisons are a
     comparison of pointers; of labels with many tags there may be two of the same meaning.

@@ -9,7 +9,7 @@ from typing import Any
 
 @dataclass(frozen=True, eq=False)
 class Row:
-    """What the core knows of an operation; `cgraph.operations` has the rows, and what other parts know of them.
+    """Row of an operation as the core reads it; `cgraph.operations` has the rows, with the columns of other parts.
 
     name, arity: an identifier, and the number of arguments.
     scalar, array: value on floats, and on arrays that broadcast.

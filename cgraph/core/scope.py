@@ -16,7 +16,7 @@ Build = Callable[[Any, tuple[Any, ...], Label], Any]
 
 
 class Scope:
-    """What new nodes get: their label, and how they are built (None: kept as written)."""
+    """Label of new nodes, and the builder that makes them (None: kept as written)."""
 
     __slots__ = ("build", "label")
 

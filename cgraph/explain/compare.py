@@ -1,4 +1,4 @@
-"""What two graphs have in common by structure, and what only one of them has."""
+"""Comparison of two graphs by structure: common nodes, and nodes of one of them alone."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ class Comparison:
         return html_lines(str(self))
 
     def to_dict(self) -> dict[str, Json]:
-        """The same for JSON; nodes are numbered as in `graph.nodes` of their graph."""
+        """Dictionary for JSON; nodes are numbered as in `graph.nodes` of their graph."""
         left, right = ({node: i for i, node in enumerate(graph.nodes)} for graph in (self.left, self.right))
         return {
             "common": [[left[a], right[b]] for a, b in self.common],

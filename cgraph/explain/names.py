@@ -62,7 +62,7 @@ class Names:
     # Between a graph's name and what a person calls it.
 
     def shown(self, name: str) -> str:
-        """What a person calls a node, input or output of that name."""
+        """Name of a node, input or output as a person writes it."""
         return self._called.get(name, name)
 
     def meant(self, name: str) -> str:
@@ -70,7 +70,7 @@ class Names:
         return self._meant.get(name, name)
 
     def called(self, who: Name) -> str:
-        """What a person calls a node that is given by a name or itself."""
+        """Name, as a person writes it, of a node or of the name of one."""
         return self.shown(self.meant(who)) if isinstance(who, str) else self.text(who)
 
     def inputs_of(self, what: str, values: Mapping[str, Value]) -> dict[str, Value]:

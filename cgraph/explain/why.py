@@ -112,7 +112,7 @@ class Why:
         return "".join([html_text(each) for each in before]) + table + "".join([html_text(each) for each in after])
 
     def _sentences(self) -> tuple[list[str], list[str]]:
-        """What is said before the paths are listed, and after."""
+        """Sentences before and after the list of paths."""
         if not self.count:
             return [f"{self.output} does not depend on {self.input}; cg.why_not tells where it stops."], []
         said = [f"{self.output} depends on {self.input} along {count_text(self.count)}."]
@@ -132,7 +132,7 @@ class Why:
         return f"The {len(self.paths)} heaviest add up to {listed:.6g}{share}."
 
     def to_dict(self) -> dict[str, Json]:
-        """The same for JSON; nodes are numbered as in `graph.nodes`, an edge is (source, target, argument slot)."""
+        """Dictionary for JSON; nodes are numbered as in `graph.nodes`, an edge is (source, target, argument slot)."""
         number = {node: i for i, node in enumerate(self.graph.nodes)}
         return {
             "output": self.output,

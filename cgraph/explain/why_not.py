@@ -79,7 +79,7 @@ class WhyNot:
         return html_lines(str(self))
 
     def to_dict(self) -> dict[str, Json]:
-        """The same for JSON; nodes are numbered as in `graph.nodes`."""
+        """Dictionary for JSON; nodes are numbered as in `graph.nodes`."""
         nodes = self.graph.nodes
         return {
             "output": self.output,

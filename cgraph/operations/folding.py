@@ -190,5 +190,5 @@ def where(c: Node, a: Node, b: Node) -> Node | None:
 
 
 def same(a: Node, b: Node) -> Node | None:
-    """What both arguments are."""
+    """Argument that stands on both sides."""
     return a if a is b else None

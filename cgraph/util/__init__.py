@@ -1,1 +1,1 @@
-"""What any part uses: arrays as callers give them, files written whole, work shared among threads."""
+"""Helpers of every part: arrays as callers give them, files written whole, work shared among threads."""

@@ -33,7 +33,7 @@ def require_out(out: Array, shape: tuple[int, int], points: Array) -> None:
 
 
 def describe(value: object) -> str:
-    """What a value is that should have been an array of float64 of some shape."""
+    """Description of a value that should have been an array of float64 of some shape."""
     return f"{value.dtype} {value.shape}" if isinstance(value, np.ndarray) else type(value).__name__
 
 

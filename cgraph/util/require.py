@@ -1,4 +1,4 @@
-"""What public functions ask of plain arguments: flags, whole numbers, choices, sequences, mappings and paths.
+"""Checks of plain arguments of public functions: flags, whole numbers, choices, sequences, mappings and paths.
 
 what: what the value is, as the error begins.
 """

@@ -69,7 +69,7 @@ def share(work: Callable[[int], None], items: Iterable[int], threads: int) -> No
 def write_batch(
     width: int, columns: Callable[[Array, Array], None], points: Array, result: Array, threads: int
 ) -> None:
-    """What `columns` writes, (n_out, N), of points, (n_in, N), in blocks of that width."""
+    """Results (n_out, N) that `columns` writes for points (n_in, N), in blocks of that width."""
 
     def block(start: int) -> None:
         stop = start + width

@@ -41,7 +41,7 @@ def nearest(name: str, known: Iterable[str], most: int = 3) -> list[str]:
 
 @explain_failure
 def or_nearest(name: str, known: Sequence[str]) -> str:
-    """What an error says after "there is no ...": the nearest of the known names, or some of them.
+    """End of an error that begins with "there is no ...": the nearest of the known names, or some of them.
 
     >>> from cgraph.extend import or_nearest
     >>> or_nearest("kne", ["hip", "knee", "ankle"])

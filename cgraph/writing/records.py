@@ -15,7 +15,7 @@ Record = tuple[str, tuple[int, ...], Any, Any, tuple[Any, ...]]  # operation, ar
 
 
 def reduced(graph: Graph) -> tuple[Callable[..., Graph], tuple[object, ...]]:
-    """What `Graph.__reduce__` gives: the function that makes the graph again, and its arguments."""
+    """Result of `Graph.__reduce__`: the function that makes the graph again, and its arguments."""
     number = {node: i for i, node in enumerate(graph.nodes)}
     outputs = {name: number[node] for name, node in graph.outputs.items()}
     return restored, (graph.input_names, tuple(records(graph.nodes)), outputs)

@@ -29,7 +29,7 @@ class Bodies(Protocol):
 
     @property
     def moving(self) -> Sequence[Body]:
-        """Those that move, parents first."""
+        """Bodies that move, parents first."""
 
     @property
     def loops(self) -> Sequence[Loop]:

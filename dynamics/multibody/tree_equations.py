@@ -135,7 +135,7 @@ class TreeEquations:
         return partials
 
     def regrouped_lagrangians(self, q: Sequence[Node], qd: Sequence[Node]) -> list[Node]:
-        """Those of base numbers: of the sum only what no derivative shows is missing."""
+        """Lagrangians of base numbers: their sum lacks only terms that no derivative shows."""
         with building(Builder()):
             return [each.partial for each in self._moved(q, qd, self._fewest)]
 

@@ -38,5 +38,5 @@ class Finding:
         return self.text
 
     def to_dict(self) -> dict[str, Json]:
-        """The same for JSON."""
+        """Dictionary for JSON."""
         return {"kind": self.kind, "text": self.text, **self.data}

@@ -32,7 +32,7 @@ class Leak(NamedTuple):
 
 
 def check_independence(names: Names, first: Group, second: Group, function: str) -> tuple[list[Finding], list[str]]:
-    """What makes one group depend on the other, either way; and the proofs where nothing does.
+    """Violations by which one group depends on the other, either way, and the proofs where none does.
 
     Raises GraphError when the groups share a node.
     """
@@ -146,7 +146,7 @@ def _paths_through(
 
 
 def _leak(names: Names, source: Node, sink: Node, members: set[Node], function: str) -> Leak:
-    """What the derivative by `source` gains through `sink`: d sink / d source with all other members held fixed."""
+    """Share of the derivative by `source` that passes through `sink`: d sink / d source, all other members fixed."""
     a, b = names.text(source), names.text(sink)
     gained = f"d{function}/d{b}"
     slope = None

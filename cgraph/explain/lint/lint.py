@@ -79,7 +79,7 @@ class Lint:
         return html_table(("", ""), rows, texts=2) if rows else html_text(str(self))
 
     def to_dict(self) -> dict[str, Json]:
-        """The same for JSON; nodes are numbered as in `graph.nodes`, an edge is (source, target, argument slot)."""
+        """Dictionary for JSON; nodes are numbered as in `graph.nodes`, an edge is (source, target, argument slot)."""
         return {
             "ok": self.ok,
             "findings": [finding.to_dict() for finding in self.findings],

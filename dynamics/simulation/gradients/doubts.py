@@ -48,7 +48,7 @@ def doubts(
 
 
 def _unreached(segments: MotionSegments) -> list[list[str]]:
-    """Of the velocities of motions in momenta. Of accepted steps `MotionRequest.with_segments` has said it."""
+    """Doubts about velocities of motions in momenta; `MotionRequest.with_segments` has those of accepted steps."""
     motion, problem = segments.motion, segments.motion.problem
     if problem.missing is None or segments.events or not motion.segments[0].equal:
         return []
@@ -62,7 +62,7 @@ def _unreached(segments: MotionSegments) -> list[list[str]]:
 
 
 def _grown(segments: MotionSegments, start: Array, end: Array) -> list[list[str]]:
-    """Of every motion: whether what steps leave at its start may change the loss by more than the motion's size does.
+    """Flag of every motion: whether the error at its start may change the loss by more than its own size does.
 
     start, end: slopes of the loss by the state there. Of a loss along the way alone, its value is compared.
     """
@@ -85,7 +85,7 @@ def _grown(segments: MotionSegments, start: Array, end: Array) -> list[list[str]
 
 
 def _half_steps(segments: MotionSegments) -> list[list[str]]:
-    """Of equal steps, of every motion: by how much it is off, if by too much, beside one in steps of half the length.
+    """Error of every motion by equal steps, beside the motion by steps of half the length, where it is too large.
 
     Half of a step has the force of the step.
     """
@@ -125,7 +125,7 @@ def _half_steps(segments: MotionSegments) -> list[list[str]]:
 
 
 def _halved(segment: Segment, run: MotionRun) -> Segment:
-    """The same in equal steps of half the length, but for the last one, which an event cuts."""
+    """Segments in equal steps of half the length, but for the last step, which an event cuts."""
     t, steps = run.motion.t, 2 * len(run.motion.h)
     if not segment.event:
         return Segment(

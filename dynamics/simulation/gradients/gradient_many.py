@@ -168,7 +168,7 @@ def _parts(motions: MotionRequest) -> list[range]:
 
 
 def _shapes(motions: MotionRequest) -> dict[str, tuple[int, ...]]:
-    """Of the gradients of a motion, by the names of `wrt`."""
+    """Shapes of the gradients of a motion, by the names of `wrt`."""
     problem, nq = motions.problem, motions.problem.nq
     n = problem.size - nq
     shapes = {START: (nq if problem.system is None else n,), VELOCITY: (n,), TORQUE: motions.tau.shape[:-1]}

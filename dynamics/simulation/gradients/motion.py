@@ -87,12 +87,12 @@ class MotionRequest:
 
     @property
     def backend(self) -> str:
-        """Of what is compiled."""
+        """Back end of the compiled programs."""
         return self.options.backend
 
     @property
     def problem(self) -> Problem:
-        """What moves."""
+        """Problem of the motion."""
         return self.equations.problem
 
     @property
@@ -151,7 +151,7 @@ class MotionRequest:
 
     @property
     def force_at_end(self) -> Array:
-        """The same in the last step."""
+        """Applied force in the last step."""
         return self.tau[-1] if self.each_step else self.tau
 
 
@@ -257,7 +257,7 @@ def _rows(model: Model, tau: Any, *, many: bool) -> Array | None:
 
 
 def names_of(model: Model, wrt: str | Iterable[str] | None, *, closed: bool) -> tuple[str, ...]:
-    """What to differentiate by. By default the start, and the applied force where it is numbers."""
+    """Names to differentiate by: by default the start, and the applied force where it is numbers."""
     inputs = state_inputs(model)
     usual = [START] if not inputs.applied else [START, VELOCITY] if closed else [START, VELOCITY, TORQUE]
     if wrt is None:

@@ -41,7 +41,7 @@ class MotionEquations:
 
     @property
     def lengths(self) -> dict[str, int]:
-        """Of the registers of the parameters."""
+        """Lengths of the registers of the parameters."""
         count = len(self.problem.parameters) - self.forces - len(self.names)
         return dict(zip(PARAMETERS, (self.forces, len(self.names), count), strict=True))
 

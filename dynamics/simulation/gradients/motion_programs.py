@@ -51,7 +51,7 @@ class MotionPrograms:
 
 @dataclass(frozen=True)
 class ProgramRequest:
-    """What programs are made of.
+    """Request for the programs of a motion.
 
     each_step: whether the applied forces are new in every step.  wrt: among "tau", "p", "c", "h" and "t", besides the
     state.  forwards: tangents are pushed on, else cotangents pulled back.  many: motions go side by side.
@@ -92,7 +92,7 @@ def _with_derivative(passes: Linearization, linear: Linearized, results: list[st
 
 
 def _linearizations(request: ProgramRequest, made: Step) -> tuple[Linearization, Linearization | None]:
-    """Of a step with its running loss, and of what is before the first one."""
+    """Linearizations of a step with its running loss, and of the statements before the first step."""
     equations, problem, running = request.equations, request.equations.problem, request.running
     lengths = with_registers(made, {**equal_registers(problem), **equations.lengths, "arrival": 1, LOSS: 1})
     body: list[Statement] = list(made.derived)

@@ -150,14 +150,14 @@ class MotionRun:
         return self._vectors(self.start, memory), rows
 
     def last_slope(self, seed: Array) -> float:
-        """Of one motion: the cotangent of h of the last step, from that of x (m, 1) after it."""
+        """Cotangent of h of the last step of one motion, from the cotangent of x (m, 1) after the step."""
         memory = _linear_memory(self.step, self._constants, {"x": seed}, 1)
         _, _, tape = next(self.tape.recorded(backwards=True))
         row = self.step.derivative.run(memory, 1, 1, tape[-1:, : self.step.derivative.program.feed_width]).rows[0]
         return float(row[self.step.passes.varied.index("h")])
 
     def pushed(self, directions: Mapping[str, Array], lengths: Array) -> tuple[Array, Array]:
-        """Of one motion: states (steps + 1, m), and tangents (steps + 1, m, k) along k directions of start and inputs.
+        """States (steps + 1, m) of one motion, and tangents (steps + 1, m, k) along k directions of start and inputs.
 
         lengths: (steps, k), tangents of the lengths of the steps; none where these are constants.
         """
@@ -226,7 +226,7 @@ def _read(ready: Runner, memory: Array, name: str) -> Array:
 
 
 def _fed(motion: MotionRequest, first: int, last: int) -> Array:
-    """What the steps first .. last - 1 are fed, (.., width), or (.., width, N) where motions have their own forces."""
+    """Inputs of the steps first .. last - 1, (.., width), or (.., width, N) where motions have their own forces."""
     steps = slice(first, last)
     if not motion.each_step:
         return np.stack([motion.t[steps], motion.h[steps]], axis=1)

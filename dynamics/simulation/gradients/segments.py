@@ -82,7 +82,7 @@ class MotionSegments:
         return _through(self.motion.equations.end, self.motion, self.x, float(self.t[-1]))
 
     def _reset(self, number: int) -> Graph | None:
-        """What changes the state at the end of a segment."""
+        """Reset of the state at the end of a segment."""
         event = self.motion.segments[number].event
         return self.events[event].reset if event else None
 
