@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from ..core.node import Node, constant
 
-ROUNDING = 2.0**-50  # of constants of size 1 that are the cosine and the sine of one angle
+ANGLE_ROUNDING = 2.0**-50  # of constants of size 1 that are the cosine and the sine of one angle
 
 
 class Rotation(NamedTuple):
@@ -87,7 +87,7 @@ def _constant_pair(one: _Sum, other: _Sum) -> Rotation | None:
     c, s = one.cos, one.sin
     at_x, at_y = (other.cos, other.sin) if other.a is one.a else (other.sin, other.cos)
     sign = math.copysign(1.0, at_y.value * c.value)  # type: ignore[operator]
-    if max(abs(at_y.value - sign * c.value), abs(at_x.value + sign * s.value)) > ROUNDING:  # type: ignore[operator]
+    if max(abs(at_y.value - sign * c.value), abs(at_x.value + sign * s.value)) > ANGLE_ROUNDING:  # type: ignore[operator]
         return None
     return Rotation(one.node, other.node, one.a, one.b, c, s, 1.0, sign, one.products + other.products)
 
@@ -107,7 +107,7 @@ def _sum(node: Node, depends: Collection[Node], uses: dict[Node, int]) -> _Sum |
                 constants.append((sign * factor.value, of))
     if len(constants) == 2:
         (c, a), (s, b) = constants
-        unit = a is not b and abs(c * c + s * s - 1.0) <= ROUNDING
+        unit = a is not b and abs(c * c + s * s - 1.0) <= ANGLE_ROUNDING
         return _Sum(node, a, b, constant(c), constant(s), 1.0, 1.0, node.args) if unit else None
     if len(parts) < 2:
         return None

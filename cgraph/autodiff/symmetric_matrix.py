@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from ..core.node import Node, as_node
 
 ZERO = as_node(0.0)
-ROUNDING = 2.0**-50
+SUM_ROUNDING = 2.0**-50
 
 
 class SymmetricMatrix:
@@ -47,4 +47,4 @@ def _sum(a: Node, b: Node) -> Node:
     total = a + b
     if a.value is None or b.value is None or total.value is None:
         return total
-    return ZERO if abs(total.value) <= ROUNDING * abs(b.value) else total
+    return ZERO if abs(total.value) <= SUM_ROUNDING * abs(b.value) else total

@@ -7,7 +7,7 @@ class GraphError(ValueError):
     """A graph is not well formed, or is asked about inputs, outputs or nodes that it does not have."""
 
 
-LONGEST = 1000  # characters; a derived name, such as that of a second derivative, still fits
+MAX_LENGTH = 1000  # characters; a derived name, such as that of a second derivative, still fits
 
 
 def check_name(what: str, name: str, *, spaces: bool = True) -> str:
@@ -26,8 +26,8 @@ def check_name(what: str, name: str, *, spaces: bool = True) -> str:
         raise TypeError(f"the name of {what} must be a string, got {type(name).__name__}: {name!r:.60}")
     if not name:
         raise ValueError(f"the name of {what} must not be empty")
-    if len(name) > LONGEST:
-        raise ValueError(f"the name of {what} must have at most {LONGEST} characters, got {len(name)}: {name!r:.60}")
+    if len(name) > MAX_LENGTH:
+        raise ValueError(f"the name of {what} must have at most {MAX_LENGTH} characters, got {len(name)}: {name!r:.60}")
     if not name.isprintable():
         first = next(character for character in name if not character.isprintable())
         raise ValueError(f"the name of {what} must be printable, got {first!r} in {name!r:.60}")

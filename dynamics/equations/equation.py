@@ -18,7 +18,7 @@ from cgraph import Graph, Node, extend
 from ..systems.model import Model, as_system
 from ..systems.system import System
 
-LONGEST = 200  # nodes of a graph whose outputs are written anew
+LARGEST_REWRITTEN = 200  # nodes of a graph whose outputs are written anew
 WIDTH = 116  # letters of a line in a docstring
 COMMON = {  # parameters that mean the same in every function that has them
     "model": "model : Model\n    A system, a mechanism or a scene, with nq coordinates and n velocities.",
@@ -152,7 +152,7 @@ def shortened(system: System, derive: Callable[[System], Graph], *, mirrored: bo
         return graph
     if system.shortened is not None:
         graph = min(graph, derive(system.shortened), key=_size)
-    if mirrored or len(graph.nodes) > LONGEST:
+    if mirrored or len(graph.nodes) > LARGEST_REWRITTEN:
         return graph
     outputs = dict(zip(graph.outputs, extend.shortened(list(graph.outputs.values())), strict=True))
     return min(graph, cg.simplify(Graph(graph.inputs, outputs)), key=_size)

@@ -14,7 +14,7 @@ from ..multibody.mechanism import WORLD, Body, MechanismError
 
 SMALLEST = 1e-15  # kg, kg m^2: of a body that moves MuJoCo takes nothing below its mjMINVAL
 STAND_IN = math.nextafter(SMALLEST, 1.0)  # what nobody else writes
-ROUNDING = 2.0**-50  # of the largest moment of inertia: what is left of one that is zero
+INERTIA_ROUNDING = 2.0**-50  # of the largest moment of inertia: what is left of one that is zero
 _NEGLIGIBLE = 2.0**-30  # of what moves with it: a stand-in above this would be seen in MuJoCo's motion
 
 

@@ -13,7 +13,7 @@ from cgraph.extend import Array, real_number
 from ..multibody.algebra import spatial
 from ..multibody.mechanism import WORLD, Body, Mechanism, MechanismError, require_mechanism
 from ..systems.model import Model
-from .stand_ins import ROUNDING, with_stand_ins
+from .stand_ins import INERTIA_ROUNDING, with_stand_ins
 from .write_loops import equality_lines, numbers, site_lines
 
 
@@ -137,10 +137,10 @@ def _principal(body: Body) -> tuple[Array, Array]:
     if np.any(inertia - np.diag(moments)):
         moments, axes = np.linalg.eigh(inertia)
         axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])
-        moments = np.where(np.abs(moments) <= ROUNDING * moments.max(), 0.0, moments)
+        moments = np.where(np.abs(moments) <= INERTIA_ROUNDING * moments.max(), 0.0, moments)
     largest = int(moments.argmax())  # of a plate it is the sum of the others, and may not be more by rounding
     most = float(np.delete(moments, largest).sum())
-    if moments.min() < 0.0 or moments[largest] - most > ROUNDING * moments[largest]:
+    if moments.min() < 0.0 or moments[largest] - most > INERTIA_ROUNDING * moments[largest]:
         raise MechanismError(
             f"MuJoCo takes no body with principal moments {moments.tolist()}, as {body.name!r} has them"
         )

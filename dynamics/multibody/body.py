@@ -20,7 +20,7 @@ from .joints.consistency import contradiction
 from .parameters import Quantities, Quantity, entries, evaluated, names_in, symbol, vanishes
 
 WORLD = "world"
-ROUNDING = 1e-9  # of the largest entry: what is left of an inertia or a rotation that came through text
+TEXT_ROUNDING = 1e-9  # of the largest entry: what is left of an inertia or a rotation that came through text
 
 
 class MechanismError(ValueError):
@@ -195,7 +195,7 @@ def vector(what: str, value: object, shape: tuple[int, ...] = (3,)) -> Array:
 def checked_rotation(what: str, value: object) -> Array:
     """The value as a rotation, (3, 3). Raises MechanismError, naming `what`, unless it is one."""
     matrix = vector(what, value, (3, 3))
-    if np.abs(matrix.T @ matrix - np.eye(3)).max() > ROUNDING or np.linalg.det(matrix) < 0:
+    if np.abs(matrix.T @ matrix - np.eye(3)).max() > TEXT_ROUNDING or np.linalg.det(matrix) < 0:
         raise MechanismError(f"{what} must be a rotation matrix")
     return matrix
 
@@ -328,7 +328,7 @@ def _inertia(what: str, given: object, beside: float = 0.0) -> Array:
     if not math.isfinite(3.0 * scale + beside):
         given = f"{scale:g} kg m^2 about its center and {beside:g} kg m^2 by that of its mass"
         raise MechanismError(f"{what} about the joint is beyond float64, with {given}")
-    if np.abs(inertia - inertia.T).max() > ROUNDING * scale:
+    if np.abs(inertia - inertia.T).max() > TEXT_ROUNDING * scale:
         raise MechanismError(f"{what} must be symmetric")
     moments = np.linalg.eigvalsh(inertia)
     rounding = moment_rounding(scale, beside)
@@ -342,7 +342,7 @@ def _inertia(what: str, given: object, beside: float = 0.0) -> Array:
 
 def moment_rounding(scale: float, beside: float) -> float:
     """Rounding of a principal moment, beside the largest entry and the inertia of the mass about the joint."""
-    return ROUNDING * scale + spatial.SNAP * beside
+    return TEXT_ROUNDING * scale + spatial.SNAP * beside
 
 
 BODY_QUANTITIES: dict[str, Callable[[str, object], Any]] = {

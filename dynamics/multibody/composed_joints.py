@@ -15,7 +15,7 @@ from cgraph.extend import Array, is_finite, require_mapping
 from .algebra import spatial
 from .body import (
     JOINT_QUANTITIES,
-    ROUNDING,
+    TEXT_ROUNDING,
     WORLD,
     Body,
     Joint,
@@ -109,7 +109,7 @@ def _axes(where: str, joint: Joint) -> tuple[ArrayLike, ArrayLike, Array]:
     if all(part.along == AXIS for part in COMPOSITIONS[joint.kind]):
         raise MechanismError(f"{where}: a joint of the kind {joint.kind!r} has no second axis")
     second = unit_axis(f"{where}: second_axis", joint.second_axis)
-    if abs(second @ axis) > ROUNDING:
+    if abs(second @ axis) > TEXT_ROUNDING:
         raise MechanismError(
             f"{where}: second_axis must be at a right angle to axis, got {second.tolist()} beside {axis.tolist()}"
         )

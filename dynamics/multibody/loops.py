@@ -31,7 +31,7 @@ ROWS = {
     "rolling": ("height",),
 }
 SLIPS = ("slip x", "slip y")  # rows of velocities of a rolling wheel
-ROUNDING = 1e-9  # of the lengths of a loop: what is left of rows that numbers from text close
+CLOSURE_ROUNDING = 1e-9  # of the lengths of a loop: what is left of rows that numbers from text close
 
 
 @dataclass(frozen=True, eq=False)
@@ -293,6 +293,6 @@ def _without_rounding(rows: Sequence[Node], lengths: Sequence[float]) -> list[No
     """The rows, with 0 for constants that are rounding of the loop's lengths, or, of angles, of 1."""
     scale = [max(lengths, default=0.0)] * 3 + [1.0] * 3
     return [
-        ZERO if row.value is not None and abs(row.value) <= ROUNDING * size else row
+        ZERO if row.value is not None and abs(row.value) <= CLOSURE_ROUNDING * size else row
         for row, size in zip(rows, scale, strict=False)
     ]

@@ -14,7 +14,7 @@ from .arguments import Parameters, parameter_items, parameter_value
 from .model import Equations, Model, as_equations
 from .system import System, generalized_forces
 
-KEPT = 16  # systems that stay for another run
+SYSTEMS_KEPT = 16  # systems that stay for another run
 
 
 class Controlled(NamedTuple):
@@ -99,7 +99,7 @@ class _Request:
     forces: tuple[Node, ...] = field(compare=False)
 
 
-@memo(KEPT)
+@memo(SYSTEMS_KEPT)
 def _controlled(request: _Request) -> Controlled:
     return Controlled(_with_forces(request.system, request.forces, dict(request.gains)), request.forces)
 

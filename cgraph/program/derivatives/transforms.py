@@ -18,7 +18,7 @@ from ..runners.runner import Runner
 from .linearization import TURNS, Linearization, Linearized, require_program
 from .tape import Tape
 
-MOST = 4096  # passes in a block of a tape
+TAPE_BLOCK = 4096  # passes in a block of a tape
 
 
 def program_jvp(program: Program, wrt: Sequence[str] = (), *, constant: Sequence[str] = ()) -> Linearized:
@@ -111,7 +111,7 @@ class ProgramVjp:
         }
         memory = self.forward.memory(placed)
         tape = Tape(self.forward, lambda first, last: rows[first:last], self._checkpoints)
-        tape.run(memory, 0, passes, MOST)
+        tape.run(memory, 0, passes, TAPE_BLOCK)
         ends = {name: self.forward.read(memory, self.handed.get(name, name)).copy() for name in self._of}
         kept = {name: self.forward.read(memory, name) for name in self._passes.constants}
         same = {name: value for name, value in kept.items() if name in self.backward.program.registers}

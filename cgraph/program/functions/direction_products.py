@@ -19,7 +19,7 @@ from ..runners.runner import Runner
 from ..statements.call import Call
 from .colored_matrix import Derivative, mend, product_statements
 
-MOST = 2**22  # numbers in the rows of points and directions that are written at a time
+PANEL_NUMBERS = 2**22  # numbers in the rows of points and directions that are written at a time
 
 
 class _Buffers(NamedTuple):
@@ -75,7 +75,7 @@ class DirectionProducts:
     def many(self, points: Array, directions: Array, results: Array, threads: int) -> None:
         """The results, (N, k, results), of N points, each along k directions of its own, (N, k, entries)."""
         count = directions.shape[1]
-        size = max(1, MOST // (count * self._beside.program.registers["x"]))
+        size = max(1, PANEL_NUMBERS // (count * self._beside.program.registers["x"]))
         for start in range(0, len(points), size):
             here = slice(start, start + size)
             along, found = (

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from cgraph.extend import Json
 
 STATES = 3
-ROUNDING = 1e-9  # of the size of a row and its slopes
+ROW_ROUNDING = 1e-9  # of the size of a row and its slopes
 
 
 @documented
@@ -132,7 +132,7 @@ class _Curvature:
             at = point | {f"v{i}": float(x) for i, x in enumerate(v)} | {f"w{i}": float(x) for i, x in enumerate(w)}
             values = np.array(list(self.graph.evaluate(at).values()), dtype=np.float64).reshape(-1, 4)
             size = np.abs(values[:, 1:]).max(axis=1)
-            result |= {k for k in rows if abs(values[k, 0]) > ROUNDING * size[k]}
+            result |= {k for k in rows if abs(values[k, 0]) > ROW_ROUNDING * size[k]}
         return result
 
 
@@ -147,7 +147,7 @@ def _kernel(matrix: Array) -> Array:
         return np.eye(matrix.shape[1])
     size = np.abs(matrix).max(axis=1, keepdims=True)
     _, values, rows = np.linalg.svd(matrix / np.where(size > 0.0, size, 1.0))
-    rank = int((values > ROUNDING * values.max(initial=0.0)).sum())
+    rank = int((values > ROW_ROUNDING * values.max(initial=0.0)).sum())
     kernel: Array = rows[rank:].T
     return kernel
 

@@ -20,7 +20,7 @@ Matrix = Sequence[Sequence[float | Node]]  # (3, 3)
 ZERO = cg.constant(0.0)
 STILL: Triple = (ZERO, ZERO, ZERO)
 SNAP = 1e-14  # of length 1: a component of a rotation that is no more comes from a quarter turn, or one in text
-ROUNDING = 2.0**-48  # of the terms of a sum: what is left is their rounding if it is no more
+SUM_ROUNDING = 2.0**-48  # of the terms of a sum: what is left is their rounding if it is no more
 
 
 def rotation(axis: Array, angle: float) -> Array:
@@ -63,9 +63,9 @@ def without_rounding(total: Array, terms: Array) -> Array:
     if total.dtype == object:
         pairs = zip(map(plain, total.flat), terms.flat, strict=True)
         result = np.empty(total.size, dtype=object)
-        result[:] = [x if isinstance(x, Node) else 0.0 if abs(x) <= ROUNDING * size else x for x, size in pairs]
+        result[:] = [x if isinstance(x, Node) else 0.0 if abs(x) <= SUM_ROUNDING * size else x for x, size in pairs]
         return result.reshape(total.shape)
-    return np.where(np.abs(total) <= ROUNDING * terms, 0.0, total) + 0.0
+    return np.where(np.abs(total) <= SUM_ROUNDING * terms, 0.0, total) + 0.0
 
 
 def plain(value: float | Node) -> float | Node:

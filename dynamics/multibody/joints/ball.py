@@ -56,7 +56,7 @@ class Ball(SpatialJoint):
     def resists(self, mass: float, inertia: Array) -> bool:
         """Inertia about every axis, more than rounding leaves of the largest."""
         moments = np.linalg.eigvalsh(inertia)
-        return bool(moments[0] > spatial.ROUNDING * moments[2])
+        return bool(moments[0] > spatial.SUM_ROUNDING * moments[2])
 
     def unobservable(self, mass: float, moment: Array, inertia: Array) -> tuple[float, Array, Array]:
         """The mass, taken at the joint."""

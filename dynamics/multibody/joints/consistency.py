@@ -15,7 +15,7 @@ from ..algebra.turns import UNIT
 from .joint_type import JointType
 
 TOLERANCE = 1e-9  # of the largest of its kind
-ROUNDING = 1e-13  # of what it is made of, where that cancels
+RATE_ROUNDING = 1e-13  # of what it is made of, where that cancels
 HALVINGS = 60  # of the way from neutral coordinates, until all is finite
 
 
@@ -57,7 +57,7 @@ def contradiction(joint: JointType) -> str:
         (a, b), values = np.split(values[: 2 * len(first)], 2), values[2 * len(first) :]
         for one, other, size in ((a[:-3], b[:-3], 1.0), (a[-3:], b[-3:], length)):  # angles and lengths: two units
             largest = max(np.abs(one).max(), np.abs(other).max())
-            if not np.abs(one - other).max() <= TOLERANCE * largest + ROUNDING * size * hurry**power:
+            if not np.abs(one - other).max() <= TOLERANCE * largest + RATE_ROUNDING * size * hurry**power:
                 return f"its {text}"
     off = np.abs(_values(placed, q, neutral) - np.array([*np.eye(3).ravel(), 0.0, 0.0, 0.0]))
     if not (off[:9].max() <= TOLERANCE and off[9:].max() <= TOLERANCE * np.abs(shifted).max()):

@@ -62,7 +62,7 @@ class Free(SpatialJoint):
     def resists(self, mass: float, inertia: Array) -> bool:
         """Mass, and inertia about every axis through the center of mass; see `require_inertia`."""
         moments = np.linalg.eigvalsh(inertia)
-        return mass > 0.0 and bool(moments[0] > spatial.ROUNDING * moments[2])
+        return mass > 0.0 and bool(moments[0] > spatial.SUM_ROUNDING * moments[2])
 
 
 JOINT = Free()

@@ -26,7 +26,7 @@ from .motion_equations import at
 from .segments import Bars, MotionSegments, segments_of
 
 Loss = Callable[..., Node]
-KEPT = 64  # losses whose graphs stay for another run
+LOSSES_KEPT = 64  # losses whose graphs stay for another run
 
 
 @dataclass(frozen=True, eq=False)
@@ -247,7 +247,7 @@ def loss_graph(problem: Problem, node: Node) -> Graph:
     return _bound(_Quantity(problem, tuple(key), node))
 
 
-@memo(KEPT)
+@memo(LOSSES_KEPT)
 def _bound(quantity: _Quantity) -> Graph:
     return quantity.problem.observed({"loss": quantity.node})
 

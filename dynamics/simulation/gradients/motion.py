@@ -29,7 +29,7 @@ from ..steps.integration import integration_of
 from .motion_equations import PARAMETERS, MotionEquations, motion_equations
 
 START, VELOCITY, TORQUE = "q", "qd", "tau"
-KEPT = 16  # options and equal steps that stay for another run
+OPTIONS_KEPT = 16  # options and equal steps that stay for another run
 EQUAL = "rk4"  # by which equal steps are, unless another method is asked for
 _PLAIN = (float, int, str, bool, type(None))
 
@@ -234,7 +234,7 @@ def options_of(
     return checked(t_end, method, t0, *options.items())
 
 
-@memo(KEPT)
+@memo(OPTIONS_KEPT)
 def _checked_options(t_end: float, method: str, t0: float, *options: tuple[str, Any]) -> RunOptions:
     run = RunOptions(t_end, method, t0=t0, **dict(options))
     if run.scipy_solver is not None:
@@ -282,7 +282,7 @@ def equal_segment(run: RunOptions, rows: int | None) -> Segment:
     return _equal_segment(run.t0, run.t_end, count)
 
 
-@memo(KEPT)
+@memo(OPTIONS_KEPT)
 def _equal_segment(t0: float, t_end: float, count: int) -> Segment:
     t = np.append(t0 + np.arange(count) * ((t_end - t0) / count), t_end)
     t.flags.writeable = False  # of all who have it

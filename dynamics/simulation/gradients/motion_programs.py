@@ -20,7 +20,7 @@ from .motion_equations import PARAMETERS, MotionEquations, sharing
 
 LOSS = "loss"  # register: the running loss so far
 GIVEN = (*PARAMETERS, "t", "rtol", "atol")  # registers: what a motion has from without
-KEPT = 16  # motions whose programs stay ready for another run
+PROGRAMS_KEPT = 16  # motions whose programs stay ready for another run
 _T, _H = cg.variables("t h")
 _LATER = Graph([_T, _H], {"t": _T + _H})
 
@@ -68,7 +68,7 @@ class ProgramRequest:
     running: Graph | None = None
 
 
-@memo(KEPT)
+@memo(PROGRAMS_KEPT)
 def motion_programs(request: ProgramRequest) -> MotionPrograms:
     """The programs; of the last few requests, those made before."""
     made = request.method.step(request.equations.problem)
