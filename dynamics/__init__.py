@@ -29,15 +29,15 @@ if TYPE_CHECKING:
     from .equations.linearization.linearization import linearize, state_space
     from .equations.linearization.linearize_many import linearize_many
     from .equations.linearization.reduced_linearization import ReducedLinearization, reduced_linearization
+    from .equations.mass_matrix.singular_mass_matrix import SingularMassMatrixError, raise_if_singular
     from .equations.momentum.conserved_momenta import conserved_momenta
     from .equations.momentum.hamiltonian import hamilton_equations, hamiltonian
-    from .equations.singular_mass_matrix import SingularMassMatrixError, raise_if_singular
     from .equations.state_equation import state_equation
     from .equations.states.consistent_state import consistent_state
     from .equations.states.evaluate import arrays_at
     from .equations.states.freedom import Freedom, freedom
-    from .equations.torque_decomposition import torque_by_joint_motion, torque_by_link
-    from .equations.torque_table import TorqueTable
+    from .equations.torque_parts.torque_decomposition import torque_by_joint_motion, torque_by_link
+    from .equations.torque_parts.torque_table import TorqueTable
     from .experiments.stability import cases
     from .integrators import METHODS
     from .io.load import load_mjcf, load_urdf
@@ -48,8 +48,6 @@ if TYPE_CHECKING:
     from .multibody.changes.impact import Attached, FreeBody, Released, attach_with_impact, release
     from .multibody.changes.pruning import EFFECTS, OmittedTerm, PruneResult, prune
     from .multibody.forces.joint_force import Actuator, JointForce, JointFriction, JointLimit
-    from .multibody.mechanism import Body, Force, Joint, Loop, Mechanism, MechanismError, MechanismWarning
-    from .multibody.modification import Subtree
     from .multibody.quantities.frames import (
         frame_acceleration,
         frame_bias_acceleration,
@@ -61,6 +59,8 @@ if TYPE_CHECKING:
     from .multibody.quantities.recursive_inverse_dynamics import RecursiveInverseDynamics
     from .multibody.quantities.regressor import inertial_parameters, regressor
     from .multibody.quantities.whole_body import center_of_mass, center_of_mass_jacobian, spatial_momentum
+    from .multibody.trees.mechanism import Body, Force, Joint, Loop, Mechanism, MechanismError, MechanismWarning
+    from .multibody.trees.modification import Subtree
     from .multiprecision.reference import reference
     from .multiprecision.solution import Reference
     from .scenes.scenes import Scene

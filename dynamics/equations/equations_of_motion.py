@@ -10,11 +10,11 @@ from cgraph.extend import Builder, cotangents, require_choice, require_flag
 from ..systems.kinematics import ONE, ZERO
 from ..systems.model import Model, as_system
 from ..systems.system import System
-from .accelerations import accelerations
 from .bias_terms import bias_terms, bias_terms_of_lagrangian
 from .constraints.constraints import require_no_constraints
 from .equation import Equation, Output, entries, mirrored, shortened
-from .mass_matrix_solve import inverse, mass_solve, smaller_solution
+from .mass_matrix.accelerations import accelerations
+from .mass_matrix.mass_matrix_solve import inverse, mass_solve, smaller_solution
 from .substitute import substitute
 
 FEW = 2  # coordinates up to which a bias is also derived from the Lagrangian

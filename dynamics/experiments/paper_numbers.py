@@ -15,7 +15,7 @@ from cgraph.extend import Array, Polynomial, expand, format_polynomial
 from ..equations.formulations.formulations import inverse_dynamics, momentum_rate
 from ..io.mujoco_twin import MujocoTwin
 from ..multibody.builders.planar_arm import planar_arm
-from ..multibody.mechanism import require_mechanism
+from ..multibody.trees.mechanism import require_mechanism
 from ..peers.torch import eager_evaluations
 from ..scenes.scenes import Scene, spring_mass, triple_pendulum
 from ..simulation.simulate import simulate

@@ -18,7 +18,7 @@ from cgraph.extend import (
 )
 
 from ..equations.equations_of_motion import momentum
-from ..equations.singular_mass_matrix import SingularMassMatrixError
+from ..equations.mass_matrix.singular_mass_matrix import SingularMassMatrixError
 from ..equations.state_equation import FORMS
 from ..systems.arguments import new_variables
 from ..systems.system import System

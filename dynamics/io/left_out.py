@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from cgraph.extend import require_flag
 
 from ..equations.constraints.constraint_rank import independent_rows
-from ..multibody.mechanism import Mechanism, MechanismError, MechanismWarning
+from ..multibody.trees.mechanism import Mechanism, MechanismError, MechanismWarning
 from ..systems.constraints import ConstraintError
 
 

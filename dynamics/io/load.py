@@ -11,8 +11,8 @@ import numpy as np
 
 from cgraph.extend import require_flag
 
-from ..multibody.joint_coordinates import neutral
-from ..multibody.mechanism import Mechanism, MechanismError
+from ..multibody.bodies.joint_coordinates import neutral
+from ..multibody.trees.mechanism import Mechanism, MechanismError
 from .left_out import warned
 from .mujoco_twin import mujoco
 from .read_mjcf import compiled_mjcf, read_mjcf

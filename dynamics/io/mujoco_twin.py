@@ -13,7 +13,7 @@ import numpy as np
 from cgraph.extend import Array, install
 
 from ..multibody.builders.planar_arm import planar_links
-from ..multibody.mechanism import Mechanism, MechanismError, require_mechanism
+from ..multibody.trees.mechanism import Mechanism, MechanismError, require_mechanism
 from ..systems.model import Model
 from .write_mjcf import moving_alone, to_mjcf
 

@@ -12,7 +12,7 @@ from numpy.polynomial import Polynomial
 from cgraph.extend import Array
 
 from ..multibody.algebra import spatial
-from ..multibody.body import WORLD, Body, MechanismError
+from ..multibody.bodies.body import WORLD, Body, MechanismError
 from ..multibody.loops import Loop
 from .left_out import listed, present
 from .mujoco_twin import mujoco

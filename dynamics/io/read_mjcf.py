@@ -17,7 +17,7 @@ from cgraph.extend import Array
 
 from ..multibody.algebra import spatial
 from ..multibody.joints import TYPES
-from ..multibody.mechanism import WORLD, Body, Joint, Mechanism, MechanismError, MechanismWarning
+from ..multibody.trees.mechanism import WORLD, Body, Joint, Mechanism, MechanismError, MechanismWarning
 from .left_out import listed, present, refused_or_left_out
 from .mujoco_twin import mujoco
 from .read_equality import left_of_equalities, other_equalities, read_loops

@@ -13,11 +13,11 @@ import numpy as np
 from cgraph.extend import Array, require_flag
 
 from ..multibody.algebra import spatial
-from ..multibody.body import moment_rounding
+from ..multibody.bodies.body import moment_rounding
 from ..multibody.forces.joint_force import JointForce, JointFriction
 from ..multibody.joints import COMPOSITIONS, TYPES
 from ..multibody.loops import Loop
-from ..multibody.mechanism import WORLD, Body, Joint, Mechanism, MechanismError
+from ..multibody.trees.mechanism import WORLD, Body, Joint, Mechanism, MechanismError
 from .left_out import follows_itself, listed, present, refused_or_left_out
 from .smooth_forces import NONE, Smooth
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from cgraph.extend import Array, real_array, real_number, require_flag
 
-from ..multibody.body import Body, MechanismError
+from ..multibody.bodies.body import Body, MechanismError
 from ..multibody.forces.joint_force import Actuator, JointForce, JointFriction, JointLimit, Range
 from .mujoco_twin import mujoco
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 from xml.parsers import expat
 
-from ..multibody.mechanism import MechanismError
+from ..multibody.trees.mechanism import MechanismError
 
 _BEFORE_XML = "\ufeff \t\r\n"  # what editors leave there
 

@@ -10,7 +10,7 @@ import numpy as np
 from cgraph.extend import Array
 
 from ..multibody.algebra.spatial import SNAP
-from ..multibody.mechanism import WORLD, Body, MechanismError
+from ..multibody.trees.mechanism import WORLD, Body, MechanismError
 
 SMALLEST = 1e-15  # kg, kg m^2: of a body that moves MuJoCo takes nothing below its mjMINVAL
 STAND_IN = math.nextafter(SMALLEST, 1.0)  # what nobody else writes

@@ -9,8 +9,8 @@ import numpy as np
 
 from ..multibody.algebra import spatial
 from ..multibody.loops import Loop
-from ..multibody.mechanism import WORLD, Mechanism, MechanismError
 from ..multibody.parameters import Quantities
+from ..multibody.trees.mechanism import WORLD, Mechanism, MechanismError
 from .left_out import follows_itself
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from cgraph.extend import Array, real_number
 
 from ..multibody.algebra import spatial
-from ..multibody.mechanism import WORLD, Body, Mechanism, MechanismError, require_mechanism
+from ..multibody.trees.mechanism import WORLD, Body, Mechanism, MechanismError, require_mechanism
 from ..systems.model import Model
 from .stand_ins import INERTIA_ROUNDING, with_stand_ins
 from .write_loops import equality_lines, numbers, site_lines

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from cgraph.extend import Array
 
-from ..multibody.mechanism import WORLD, Body, MechanismError, require_mechanism
 from ..multibody.parameters import vanishes
+from ..multibody.trees.mechanism import WORLD, Body, MechanismError, require_mechanism
 from ..systems.model import Model
 from .read_urdf import FAR, GRAVITY
 from .write_loops import mimic_lines, numbers

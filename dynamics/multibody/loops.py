@@ -16,7 +16,7 @@ from ..equations.constraints.nearly_redundant_rows import without_nearly_redunda
 from ..systems.constraints import Constraints, LoopRow
 from .algebra import spatial
 from .algebra.spatial import ZERO, Triple
-from .body import WORLD, Body, Joint, MechanismError, checked_name, checked_rotation, vector
+from .bodies.body import WORLD, Body, Joint, MechanismError, checked_name, checked_rotation, vector
 from .joints import COMPOSITIONS
 from .sweeps.kinematic_chain import KinematicChain, kinematic_chains
 from .sweeps.kinematic_tree import Carrier

@@ -10,8 +10,8 @@ import numpy as np
 
 from cgraph.extend import Array
 
-from ..multibody.body import Body
-from ..multibody.mechanism import Mechanism
+from ..multibody.bodies.body import Body
+from ..multibody.trees.mechanism import Mechanism
 from .flint_numbers import Number, flint, working
 
 if TYPE_CHECKING:

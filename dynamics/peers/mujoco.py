@@ -7,7 +7,7 @@ import numpy as np
 from cgraph.extend import Array
 
 from ..io.mujoco_twin import MujocoTwin, joint_order, rollout
-from ..multibody.mechanism import Mechanism, as_mechanism
+from ..multibody.trees.mechanism import Mechanism, as_mechanism
 from .peer import DT, PASSES, Peer, PeerModel, TimedTask, UnavailableError
 
 

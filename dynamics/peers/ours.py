@@ -19,8 +19,8 @@ from ..equations.linearization.linearization import state_space
 from ..equations.linearization.linearization_parts import LinearizationParts, linearization_parts
 from ..equations.linearization.linearize_many import WRITTEN_OUT, linearization_program, linearize_many
 from ..equations.state_equation import state_equation
-from ..multibody.body import Body
-from ..multibody.mechanism import Mechanism, as_mechanism
+from ..multibody.bodies.body import Body
+from ..multibody.trees.mechanism import Mechanism, as_mechanism
 from ..simulation.gradients.gradient import gradient
 from ..systems.model import Model
 from .peer import DT, MOTIONS, NUDGE, PASSES, Peer, PeerModel, TimedTask, UnavailableError, rk4_step

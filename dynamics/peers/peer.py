@@ -19,7 +19,7 @@ from cgraph.extend import Array, install, topological
 
 from ..equations.state_equation import normalization
 from ..integrators.tableau import RK4
-from ..multibody.mechanism import as_mechanism
+from ..multibody.trees.mechanism import as_mechanism
 from ..systems.arguments import TIME
 from ..systems.model import Model, as_system
 from ..systems.system import System

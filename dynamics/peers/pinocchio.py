@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike
 
 from cgraph.extend import Array
 
-from ..multibody.body import WORLD
-from ..multibody.joint_coordinates import per_velocity, places
+from ..multibody.bodies.body import WORLD
+from ..multibody.bodies.joint_coordinates import per_velocity, places
 from ..multibody.loops import Loop
-from ..multibody.mechanism import Mechanism
+from ..multibody.trees.mechanism import Mechanism
 from .mujoco import bodies
 from .peer import BATCH, DERIVATIVES, Peer, PeerModel, TimedTask, UnavailableError, rk4_step
 from .pinocchio_model import PinocchioModel, pinocchio

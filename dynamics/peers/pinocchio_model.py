@@ -10,10 +10,10 @@ import numpy as np
 
 from cgraph.extend import Array
 
-from ..multibody.body import WORLD, Body
-from ..multibody.joint_coordinates import places
+from ..multibody.bodies.body import WORLD, Body
+from ..multibody.bodies.joint_coordinates import places
 from ..multibody.joints import AxialJoint, quaternion
-from ..multibody.mechanism import Mechanism
+from ..multibody.trees.mechanism import Mechanism
 from .peer import UnavailableError, required
 
 if TYPE_CHECKING:

@@ -20,7 +20,7 @@ from cgraph.extend import real_array, real_number
 
 from ..io.load import load_at_start
 from ..multibody.builders.planar_arm import planar_arm
-from ..multibody.mechanism import Mechanism, as_mechanism
+from ..multibody.trees.mechanism import Mechanism, as_mechanism
 from ..systems.model import Model, as_ode, as_system
 from ..systems.ode_system import OdeSystem
 from ..systems.system import System

@@ -13,7 +13,7 @@ from cgraph.extend import or_nearest, real_array, real_number
 
 from ..equations.state_equation import state_equation
 from ..equations.states.consistent_state import nearest_state
-from ..multibody.joint_coordinates import display_units
+from ..multibody.bodies.joint_coordinates import display_units
 from .scenes import Scene
 
 Known = TypeVar("Known", bound=Scene)

@@ -47,7 +47,7 @@ class Model(Protocol):
 
     @property
     def mechanism(self) -> object | None:
-        """The bodies, a `Mechanism`; see `dynamics.multibody.mechanism.as_mechanism`."""
+        """The bodies, a `Mechanism`; see `dynamics.multibody.trees.mechanism.as_mechanism`."""
 
 
 def as_system(model: Model) -> System:

@@ -21,10 +21,10 @@ from ..equations.equations_of_motion import bias, forward_dynamics, gravity_forc
 from ..equations.formulations.formulations import inverse_dynamics
 from ..equations.linearization.inverse_dynamics_derivatives import inverse_dynamics_derivatives
 from ..equations.linearization.linearization import state_space
-from ..equations.singular_mass_matrix import balanced
+from ..equations.mass_matrix.singular_mass_matrix import balanced
 from ..equations.states.evaluate import evaluate
-from ..equations.torque_decomposition import torque_by_joint_motion, torque_by_link
-from ..equations.torque_table import TorqueTable
+from ..equations.torque_parts.torque_decomposition import torque_by_joint_motion, torque_by_link
+from ..equations.torque_parts.torque_table import TorqueTable
 from ..systems.kinematics import ONE, ZERO
 from ..systems.model import Model, as_system
 from ..systems.system import System

@@ -18,8 +18,8 @@ from ..equations.formulations.formulations import inverse_dynamics
 from ..equations.states.evaluate import evaluate
 from ..io.load import compiled
 from ..io.mujoco_twin import joint_order, mujoco
-from ..multibody.body import Body, MechanismError
-from ..multibody.mechanism import Mechanism, as_mechanism
+from ..multibody.bodies.body import Body, MechanismError
+from ..multibody.trees.mechanism import Mechanism, as_mechanism
 from ..peers.mujoco import MujocoPeer
 from ..peers.peer import Peer, PeerModel, UnavailableError
 from ..peers.pinocchio import PinocchioPeer, constrained_accelerations

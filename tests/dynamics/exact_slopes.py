@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import dynamics as dyn
-from dynamics.multibody.joint_coordinates import places
+from dynamics.multibody.bodies.joint_coordinates import places
 from dynamics.multiprecision.flint_numbers import flint, working
 
 Array = np.ndarray[Any, np.dtype[np.float64]]

@@ -11,8 +11,8 @@ import numpy as np
 
 import dynamics as dyn
 from dynamics.multibody.algebra.spatial import rotation
-from dynamics.multibody.joint_coordinates import places
-from dynamics.multibody.mechanism import WORLD, Body, Joint, Mechanism
+from dynamics.multibody.bodies.joint_coordinates import places
+from dynamics.multibody.trees.mechanism import WORLD, Body, Joint, Mechanism
 from tests.slow import slow
 
 Array = np.ndarray[Any, np.dtype[np.float64]]

@@ -9,7 +9,7 @@ import numpy as np
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.multibody.body import BODY_QUANTITIES, JOINT_QUANTITIES
+from dynamics.multibody.bodies.body import BODY_QUANTITIES, JOINT_QUANTITIES
 
 
 class Replaced:

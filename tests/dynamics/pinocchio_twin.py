@@ -7,7 +7,7 @@ import pinocchio
 
 import dynamics as dyn
 from dynamics.multibody.builders.planar_arm import planar_links
-from dynamics.multibody.mechanism import WORLD
+from dynamics.multibody.trees.mechanism import WORLD
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

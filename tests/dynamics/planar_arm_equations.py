@@ -18,7 +18,7 @@ import numpy as np
 
 from cgraph.extend import Array
 from dynamics.multibody.builders.planar_arm import planar_links
-from dynamics.multibody.mechanism import Mechanism
+from dynamics.multibody.trees.mechanism import Mechanism
 from dynamics.multiprecision.chain_equations import Pair
 from dynamics.multiprecision.flint_numbers import Number, flint, working
 

@@ -9,7 +9,7 @@ import numpy as np
 from flint import arb, arb_mat, ctx
 
 from dynamics import Mechanism
-from dynamics.multibody.joint_coordinates import places
+from dynamics.multibody.bodies.joint_coordinates import places
 from tests.dynamics.mechanisms import Array
 
 Vector = list[Any]

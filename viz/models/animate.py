@@ -23,8 +23,8 @@ from cgraph.extend import (
     write_files,
 )
 from dynamics import Trajectory, scenes
-from dynamics.multibody.joint_positions import skeleton
-from dynamics.multibody.mechanism import as_mechanism
+from dynamics.multibody.trees.joint_positions import skeleton
+from dynamics.multibody.trees.mechanism import as_mechanism
 from dynamics.systems.model import Model
 
 from ..animation.canvas import KINDS, RATE, check_can_animate, encode

@@ -27,9 +27,9 @@ from dynamics.equations.momentum.both_forms import HAMILTON, LAGRANGE, VELOCITIE
 from dynamics.equations.momentum.hamiltonian import velocities
 from dynamics.equations.momentum.legendre import is_quadratic
 from dynamics.equations.state_equation import state_equation
-from dynamics.equations.torque_decomposition import torque_by_link
-from dynamics.multibody.joint_coordinates import display_units
-from dynamics.multibody.joint_positions import skeleton
+from dynamics.equations.torque_parts.torque_decomposition import torque_by_link
+from dynamics.multibody.bodies.joint_coordinates import display_units
+from dynamics.multibody.trees.joint_positions import skeleton
 from dynamics.scenes import Scene
 from dynamics.simulation.simulate import simulate
 from dynamics.simulation.trajectory import Trajectory

@@ -20,9 +20,9 @@ from dynamics.equations.formulations.formulations import momentum_rate
 from dynamics.equations.momentum.hamiltonian import hamilton_equations, velocities
 from dynamics.equations.state_equation import state_equation, state_inputs
 from dynamics.integrators import TABLEAUS
-from dynamics.multibody.joint_coordinates import display_units
-from dynamics.multibody.joint_positions import drawn_points, view
-from dynamics.multibody.mechanism import Mechanism
+from dynamics.multibody.bodies.joint_coordinates import display_units
+from dynamics.multibody.trees.joint_positions import drawn_points, view
+from dynamics.multibody.trees.mechanism import Mechanism
 from dynamics.scenes import Scene
 from dynamics.scenes.start import Start, moving_start, with_start
 from dynamics.simulation.simulate import simulate

@@ -14,7 +14,7 @@ from ...systems.model import Model, as_system
 from ...systems.system import System
 from ..equation import Equation, Output, documented, shortened
 from ..equations_of_motion import forward_dynamics
-from ..singular_mass_matrix import raise_if_singular
+from ..mass_matrix.singular_mass_matrix import raise_if_singular
 from ..state_equation import FORMS
 from ..states.evaluate import evaluate
 from ..states.initial_value import normalized

@@ -30,12 +30,12 @@ from cgraph.extend import (
 
 from ...systems.kinematics import ONE, ZERO
 from ...systems.system import System
-from ..accelerations import BY_ENERGY, DENSE_UP_TO, accelerations
 from ..bias_terms import state_rate
 from ..constraints.constraints import Rows as ConstraintRows, constraint_rows
 from ..equation import entries
 from ..formulations.formulations import torques
-from ..mass_matrix_solve import MassSolve, Rows, linear, mass_solve, smaller_solution, units
+from ..mass_matrix.accelerations import BY_ENERGY, DENSE_UP_TO, accelerations
+from ..mass_matrix.mass_matrix_solve import MassSolve, Rows, linear, mass_solve, smaller_solution, units
 from .inverse_dynamics_derivatives import state_slopes, torque_derivatives
 
 Matrix = NDArray[Any]  # of numbers, (.., n, k), or of nodes, (n, k)

@@ -21,7 +21,7 @@ from cgraph.extend import Builder, building, cotangents, folded, hessian_nodes
 from ...systems.kinematics import ONE
 from ...systems.system import System
 from ..equation import entries, mirrored
-from ..mass_matrix_solve import Rows, mass_solve, smaller_solution
+from ..mass_matrix.mass_matrix_solve import Rows, mass_solve, smaller_solution
 from ..momentum.hamiltonian import ITERATIONS
 from ..momentum.legendre import Legendre
 from .inverse_dynamics_derivatives import state_slopes

@@ -14,8 +14,8 @@ from cgraph.extend import Builder, Order, SingularError, building, cotangents, f
 from ...systems.constraints import ConstraintError
 from ...systems.kinematics import ONE, ZERO
 from ...systems.system import System
-from ..accelerations import require_inertia
-from ..singular_mass_matrix import SingularMassMatrixError, no_inertia
+from ..mass_matrix.accelerations import require_inertia
+from ..mass_matrix.singular_mass_matrix import SingularMassMatrixError, no_inertia
 
 SHORTER, LONGER = (
     1.0 / 16.0,

@@ -11,7 +11,7 @@ import cgraph as cg
 from ...equations.equations_of_motion import bias, forward_dynamics, mass_matrix
 from ...equations.formulations.formulations import inverse_dynamics
 from ...multibody.builders.planar_arm import planar_arm
-from ...multibody.mechanism import Mechanism
+from ...multibody.trees.mechanism import Mechanism
 from ...peers.mujoco import MujocoPeer
 from ...peers.peer import PeerModel
 from ...peers.pinocchio import PinocchioPeer

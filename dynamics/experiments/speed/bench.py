@@ -14,7 +14,7 @@ import numpy as np
 
 from cgraph.extend import Array, install
 
-from ...multibody.mechanism import as_mechanism
+from ...multibody.trees.mechanism import as_mechanism
 from ...peers import PEERS, PeerModel
 from ...peers.peer import MODES, MOTIONS, TASKS
 from ..text_table import WIDTH, digits, table

@@ -12,9 +12,9 @@ import numpy as np
 
 from ... import scenes
 from ...multibody.algebra.spatial import rotation
-from ...multibody.body import WORLD, Body, Joint
+from ...multibody.bodies.body import WORLD, Body, Joint
 from ...multibody.builders.planar_arm import planar_arm
-from ...multibody.mechanism import Mechanism
+from ...multibody.trees.mechanism import Mechanism
 from ...scenes import Scene
 
 

@@ -16,7 +16,7 @@ from ...io.mujoco_twin import mujoco
 from ...io.write_mjcf import to_mjcf
 from ...multibody.builders.planar_arm import planar_arm
 from ...multibody.loops import Loop
-from ...multibody.mechanism import Mechanism
+from ...multibody.trees.mechanism import Mechanism
 from ...peers.peer import TimedTask
 from ...peers.pinocchio import constraint_dynamics
 from ..text_table import table

@@ -12,10 +12,10 @@ import numpy as np
 
 from cgraph import Graph
 
-from ...equations.accelerations import accelerations
 from ...equations.equations_of_motion import forward_dynamics
+from ...equations.mass_matrix.accelerations import accelerations
 from ...multibody.builders.planar_arm import planar_links
-from ...multibody.mechanism import Mechanism
+from ...multibody.trees.mechanism import Mechanism
 from ...systems.system import System
 from ..paper_numbers import exponent
 from ..stability.single_evaluations import by_centers

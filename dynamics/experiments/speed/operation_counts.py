@@ -19,9 +19,9 @@ from cgraph import Graph
 from ...equations.equations_of_motion import forward_dynamics, mass_matrix
 from ...equations.formulations.formulations import inverse_dynamics
 from ...multibody.algebra.spatial import rotation
-from ...multibody.body import WORLD, Body, Joint
+from ...multibody.bodies.body import WORLD, Body, Joint
 from ...multibody.builders.planar_arm import planar_arm
-from ...multibody.mechanism import Mechanism
+from ...multibody.trees.mechanism import Mechanism
 from ..text_table import table
 
 Row = tuple[float, float, float] | tuple[float, float, float, str]  # alpha [degrees], a, d [m]; "prismatic"

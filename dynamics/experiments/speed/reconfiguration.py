@@ -22,9 +22,9 @@ from ...equations.formulations.formulations import inverse_dynamics
 from ...io.mujoco_twin import mujoco
 from ...io.write_mjcf import to_mjcf
 from ...multibody.algebra.spatial import rotation
-from ...multibody.body import Body, Joint
-from ...multibody.mechanism import Mechanism
+from ...multibody.bodies.body import Body, Joint
 from ...multibody.quantities.recursive_inverse_dynamics import RecursiveInverseDynamics
+from ...multibody.trees.mechanism import Mechanism
 from ..text_table import table
 from .bench_scenes import turned_arm
 

@@ -16,7 +16,7 @@ from cgraph.extend import Array, ldl_elimination
 from ...equations.equations_of_motion import bias, forward_dynamics, mass_matrix
 from ...equations.linearization.linearize_many import linearize_many
 from ...multibody.builders.planar_arm import planar_arm
-from ...multibody.mechanism import Mechanism
+from ...multibody.trees.mechanism import Mechanism
 from ...multiprecision.chain_equations import accelerations
 from ...systems.model import as_system
 from ..machine import run_fresh

@@ -22,7 +22,7 @@ from typing import Any
 
 from cgraph.extend import Array
 
-from ...multibody.mechanism import MechanismWarning
+from ...multibody.trees.mechanism import MechanismWarning
 from ...peers import PEERS, PeerModel, TimedTask, UnavailableError
 from ...peers.peer import EVALUATIONS
 from ...scenes import Scene

@@ -29,7 +29,7 @@ from cgraph.extend import Array
 from ...equations.equations_of_motion import forward_dynamics
 from ...equations.formulations.formulations import inverse_dynamics
 from ...multibody.builders.planar_arm import planar_arm, planar_links
-from ...multibody.mechanism import Mechanism
+from ...multibody.trees.mechanism import Mechanism
 from ...multiprecision.chain_equations import Pair, accelerations, torques
 from ...multiprecision.flint_numbers import working
 from ...systems.system import System

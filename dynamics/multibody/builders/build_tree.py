@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike
 
 from cgraph.extend import Array
 
-from ..body import WORLD, Body, Joint, MechanismError, shape_of, vector
-from ..mechanism import Mechanism
+from ..bodies.body import WORLD, Body, Joint, MechanismError, shape_of, vector
 from ..parameters import Quantities
+from ..trees.mechanism import Mechanism
 
 _FIELDS = [each.name for each in fields(Body) if each.name not in ("name", "parent")]
 

@@ -13,9 +13,9 @@ from cgraph import Node
 from cgraph.extend import real_number
 
 from ...systems.arguments import coefficients, parameter_items, parameter_value, sequence
-from ..body import WORLD, Body, Joint
-from ..mechanism import Mechanism
+from ..bodies.body import WORLD, Body, Joint
 from ..parameters import Quantity, bound, symbol
+from ..trees.mechanism import Mechanism
 
 AXIS = (0.0, -1.0, 0.0)  # of the hinges: a positive angle swings the hanging arm towards +x
 TIP = "tip"  # the body without mass that marks the end of the last link

@@ -12,9 +12,9 @@ from cgraph.extend import Array, real_array
 
 from ...equations.equations_of_motion import forward_dynamics, momentum
 from ...equations.states.evaluate import arrays_at
-from ..body import Body, MechanismError, vector
-from ..mechanism import Mechanism, require_mechanism
-from ..structure import bound_body
+from ..bodies.body import Body, MechanismError, vector
+from ..trees.mechanism import Mechanism, require_mechanism
+from ..trees.structure import bound_body
 
 _COMPONENTS = ("x y z", "vx vy vz", "wx wy wz")
 

@@ -20,7 +20,7 @@ from cgraph.extend import (
 
 from ...equations.formulations.formulations import SMALL, inverse_dynamics, size
 from ...systems.model import Model, as_system
-from ..mechanism import as_mechanism
+from ..trees.mechanism import as_mechanism
 from .switched_effects import EFFECTS as EFFECTS, absent_parts, has_effect, without_effect  # noqa: PLC0414 (public with `prune`)
 
 GROUPS = ("q", "qd", "qdd", "tau")

@@ -9,12 +9,12 @@ from typing import Any
 from ...equations.equations_of_motion import gravity_force
 from ...systems.model import Model, as_system
 from ...systems.system import System
-from ..body import Body
-from ..composed_joints import locked_parts, parts_of
-from ..joint_coordinates import places
-from ..mechanism import Mechanism, as_mechanism
+from ..bodies.body import Body
+from ..bodies.composed_joints import locked_parts, parts_of
+from ..bodies.joint_coordinates import places
 from ..parameters import vanishes
-from ..structure import changed
+from ..trees.mechanism import Mechanism, as_mechanism
+from ..trees.structure import changed
 
 EFFECTS = ("gravity", "damping", "springs", "armature", "forces")
 FREE_FALL = (0.0, 0.0, -9.81)  # m/s^2, put in to count what gravity would take

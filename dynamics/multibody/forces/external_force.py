@@ -15,7 +15,7 @@ from cgraph import Node
 from cgraph.extend import Builder, building, cotangents, topological
 
 from ..algebra.spatial import ZERO, Triple
-from ..body import MechanismError, vector
+from ..bodies.body import MechanismError, vector
 from ..sweeps.kinematic_chain import KinematicChain
 
 FORCE = "force"  # tag

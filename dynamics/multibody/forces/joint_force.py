@@ -13,8 +13,8 @@ import cgraph as cg
 from cgraph import Node
 from cgraph.extend import Builder, building, check_name, real_array, real_number
 
-from ..body import Body, MechanismError
-from ..joint_coordinates import places
+from ..bodies.body import Body, MechanismError
+from ..bodies.joint_coordinates import places
 from ..joints import COMPOSITIONS
 from .external_force import FORCE, Force, check_force
 

@@ -22,9 +22,9 @@ from ...systems.model import Model
 from ...systems.system import System
 from ..algebra import spatial
 from ..algebra.spatial import ZERO
-from ..body import vector
-from ..mechanism import require_mechanism
+from ..bodies.body import vector
 from ..sweeps.kinematic_chain import KinematicChain
+from ..trees.mechanism import require_mechanism
 
 AXES = ("world", "body")
 

@@ -20,9 +20,8 @@ from cgraph.extend import Array, Builder, building, cotangents, memo, real_array
 
 from ..algebra.spatial import STILL, ZERO, Triple
 from ..algebra.spatial_vectors import Twist
-from ..joint_coordinates import places
+from ..bodies.joint_coordinates import places
 from ..joints import JointType
-from ..mechanism import Mechanism, require_mechanism
 from ..sweeps.links import Link, LinkState
 from ..sweeps.outward import (
     Motion,
@@ -32,6 +31,7 @@ from ..sweeps.outward import (
     propagate_motion,
     wrench,
 )
+from ..trees.mechanism import Mechanism, require_mechanism
 
 MOTION, WRENCH = 9, 6  # numbers: angular velocity, angular and linear acceleration; force and moment
 

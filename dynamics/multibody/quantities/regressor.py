@@ -15,11 +15,11 @@ from ...systems.model import Model
 from ...systems.system import System
 from ..algebra import spatial
 from ..algebra.turns import MatrixTurn
-from ..body import WORLD, quantities
-from ..joint_coordinates import quasi_velocities
-from ..mechanism import Mechanism, as_mechanism
+from ..bodies.body import WORLD, quantities
+from ..bodies.joint_coordinates import quasi_velocities
 from ..sweeps.links import Link, axes_of, link, link_states
 from ..sweeps.outward import energy, ground, motions
+from ..trees.mechanism import Mechanism, as_mechanism
 
 PARAMETERS = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")  # the order of Pinocchio
 _LOWER = ((0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2))  # entries of I in that order

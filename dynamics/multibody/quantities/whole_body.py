@@ -20,10 +20,10 @@ from ...systems.model import Model
 from ...systems.system import System
 from ..algebra import spatial
 from ..algebra.spatial import ZERO, Triple
-from ..body import MechanismError
-from ..mechanism import Mechanism, require_mechanism
+from ..bodies.body import MechanismError
 from ..sweeps.links import link_states
 from ..sweeps.outward import Motion, energy, motions
+from ..trees.mechanism import Mechanism, require_mechanism
 from .frames import jacobian_rows
 
 POINTS = ("origin", "center of mass")

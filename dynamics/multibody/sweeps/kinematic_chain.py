@@ -16,7 +16,7 @@ from cgraph.extend import Array
 from ..algebra import spatial
 from ..algebra.spatial import STILL, Triple, plus
 from ..algebra.turns import in_a_row
-from ..body import WORLD, Body
+from ..bodies.body import WORLD, Body
 from .kinematic_tree import Carrier
 from .links import LinkState, axes_of
 

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from cgraph.extend import Array, Builder, building, is_finite
 
 from ..algebra import spatial
-from ..body import WORLD, Body, Joint, MechanismError, vector
+from ..bodies.body import WORLD, Body, Joint, MechanismError, vector
 from ..parameters import entries, names_in, vanishes
 from .links import MergedBody, axes_of, inertia_in
 

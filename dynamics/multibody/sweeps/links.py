@@ -16,8 +16,8 @@ from ..algebra import spatial
 from ..algebra.spatial import Matrix, Triple
 from ..algebra.spatial_vectors import Twist
 from ..algebra.turns import Turn
-from ..body import Body
-from ..joint_coordinates import places
+from ..bodies.body import Body
+from ..bodies.joint_coordinates import places
 from ..joints import JointType
 from ..parameters import symbol
 

@@ -14,9 +14,9 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import Builder, SingularError, building, cotangents, folded, solve_nodes, tangents, topological
 
-from ...equations.accelerations import DENSE_UP_TO
 from ...equations.bias_terms import bias_terms
 from ...equations.constraints.constraints import constraint_rows
+from ...equations.mass_matrix.accelerations import DENSE_UP_TO
 from ...equations.substitute import substitute
 from ...integrators import Problem
 from ...systems.arguments import new_variables

@@ -14,7 +14,7 @@ from cgraph import structure_hash
 from dynamics.equations.formulations.formulations import SMALL
 from dynamics.experiments.trust.random_motions import LAGRANGIANS, random_task
 from dynamics.multibody.joints import COMPOSITIONS, TYPES
-from dynamics.multibody.mechanism import WORLD, Body, Joint, Mechanism
+from dynamics.multibody.trees.mechanism import WORLD, Body, Joint, Mechanism
 from tests.dynamics.mechanisms import (
     TREES as MODELS,
     random_body,

@@ -8,7 +8,7 @@ import pytest
 import cgraph as cg
 import dynamics as dyn
 from cgraph.extend import hessian_nodes, topological
-from dynamics.equations.accelerations import accelerations
+from dynamics.equations.mass_matrix.accelerations import accelerations
 from dynamics.peers.translate import translated
 from tests.dynamics.textbook import TEXTBOOK, points
 

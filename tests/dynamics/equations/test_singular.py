@@ -11,7 +11,7 @@ import pytest
 import cgraph as cg
 import dynamics as dyn
 from dynamics.equations.equations_of_motion import SOLUTIONS, forward_dynamics
-from dynamics.equations.singular_mass_matrix import SingularMassMatrixError, raise_if_singular
+from dynamics.equations.mass_matrix.singular_mass_matrix import SingularMassMatrixError, raise_if_singular
 from tests.slow import slow
 from tests.tolerances import CONDITIONED, LAST_BITS
 

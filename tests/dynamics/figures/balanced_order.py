@@ -14,7 +14,7 @@ from cgraph import Graph, Node
 from cgraph.extend import Builder, folded, solve_nodes, topological
 from dynamics.experiments.speed.bench_scenes import chain, turned_arm
 from dynamics.experiments.text_table import digits, table
-from dynamics.multibody.mechanism import Mechanism
+from dynamics.multibody.trees.mechanism import Mechanism
 from tests.dynamics.figures.parallel_c import times
 
 MODELS: dict[str, Callable[[], Mechanism]] = {

@@ -10,7 +10,7 @@ from pytest import approx, importorskip, mark, param, raises, warns
 import cgraph as cg
 import dynamics as dyn
 from dynamics.equations.states.consistent_state import nearest_state
-from dynamics.multibody.mechanism import Mechanism, MechanismError
+from dynamics.multibody.trees.mechanism import Mechanism, MechanismError
 from tests.slow import slow
 
 mujoco = importorskip("mujoco")

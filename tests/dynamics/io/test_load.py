@@ -14,7 +14,7 @@ from pytest import approx, importorskip, mark, param, raises, warns
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.multibody.mechanism import Body, Joint, Mechanism, MechanismError
+from dynamics.multibody.trees.mechanism import Body, Joint, Mechanism, MechanismError
 from tests.dynamics.mechanisms import EVERY_FAMILY, FAMILIES
 from tests.dynamics.models import error
 from tests.each_row import each_row

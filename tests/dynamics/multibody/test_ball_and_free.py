@@ -12,7 +12,7 @@ from pytest import approx, importorskip, mark, param, raises
 import dynamics as dyn
 from cgraph import Graph
 from dynamics.multibody.algebra.spatial import from_quaternion
-from dynamics.multibody.joint_coordinates import per_velocity
+from dynamics.multibody.bodies.joint_coordinates import per_velocity
 from dynamics.peers.pinocchio_model import PinocchioModel
 from dynamics.systems.system import System
 from dynamics.verification.certificate import certify

@@ -17,7 +17,7 @@ import cgraph as cg
 import dynamics as dyn
 from dynamics.io.mujoco_twin import MujocoTwin
 from dynamics.multibody.algebra.spatial import from_quaternion, rotation, to_quaternion
-from dynamics.multibody.mechanism import Body, Joint, Mechanism, MechanismError
+from dynamics.multibody.trees.mechanism import Body, Joint, Mechanism, MechanismError
 from tests.dynamics.mechanisms import (
     EVERY_FAMILY,
     FAMILIES,

@@ -10,7 +10,7 @@ from pytest import approx, mark
 
 import dynamics as dyn
 from cgraph import Graph
-from dynamics.multibody.mechanism import WORLD, Body, Joint, Mechanism
+from dynamics.multibody.trees.mechanism import WORLD, Body, Joint, Mechanism
 from tests.dynamics.mechanisms import FAMILIES, PLAIN, random_body, random_mechanism, turned_arm, turned_tree
 from tests.dynamics.models import Array
 from tests.slow import slow

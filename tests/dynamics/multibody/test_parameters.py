@@ -14,7 +14,7 @@ import cgraph as cg
 import dynamics as dyn
 from cgraph import Graph
 from dynamics.multibody.algebra.spatial import from_quaternion
-from dynamics.multibody.mechanism import Body, Joint, Mechanism, MechanismError
+from dynamics.multibody.trees.mechanism import Body, Joint, Mechanism, MechanismError
 from dynamics.verification.certificate import certify
 from tests.dynamics.mechanisms import FAMILIES, random_body, random_inertia, random_rotation
 from tests.dynamics.models import Array

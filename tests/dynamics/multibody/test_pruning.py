@@ -10,8 +10,8 @@ from pytest import approx, importorskip, mark, raises
 import cgraph as cg
 import dynamics as dyn
 from cgraph.writing.structure_hash import structure_hash
-from dynamics.equations.accelerations import accelerations
 from dynamics.equations.formulations.formulations import torques
+from dynamics.equations.mass_matrix.accelerations import accelerations
 from tests.dynamics.mechanisms import FAMILIES, random_inertia, random_rotation, turned_arm
 from tests.dynamics.models import error, run
 from tests.dynamics.multibody.test_reconfiguration import arm

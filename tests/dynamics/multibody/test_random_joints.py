@@ -17,7 +17,7 @@ import dynamics as dyn
 from dynamics.multibody.algebra import spatial
 from dynamics.multibody.algebra.spatial import Triple
 from dynamics.multibody.algebra.spatial_vectors import Twist
-from dynamics.multibody.joint_coordinates import places
+from dynamics.multibody.bodies.joint_coordinates import places
 from dynamics.multibody.joints import TYPES, SpatialJoint
 from tests.dynamics.mechanisms import Array, random_body, random_joint, random_state
 from tests.slow import slow

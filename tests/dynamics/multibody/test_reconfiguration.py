@@ -7,7 +7,7 @@ from pytest import approx, mark, raises
 
 import dynamics as dyn
 from cgraph.writing.structure_hash import structure_hash
-from dynamics.multibody.body import WORLD
+from dynamics.multibody.bodies.body import WORLD
 from tests.dynamics.mechanisms import random_mechanism
 from tests.slow import slow
 from tests.tolerances import EQUATIONS, LONG_SUM, SHORT_SUM, TORQUES

@@ -13,7 +13,7 @@ from pytest import approx, mark, param
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.equations.singular_mass_matrix import balanced
+from dynamics.equations.mass_matrix.singular_mass_matrix import balanced
 from dynamics.multibody.algebra.spatial import rotation
 from tests.dynamics.mechanisms import Array, random_body
 from tests.dynamics.models import run

@@ -299,7 +299,7 @@ def test_nothing_depends_on_the_unit_of_length(kind: str, length: float) -> None
 
 def test_the_certificate_looks_at_bias_and_derivatives(monkeypatch: MonkeyPatch) -> None:
     """Of a type of joint that is wrong about itself, and was not refused, each finds its own."""
-    monkeypatch.setattr("dynamics.multibody.body.contradiction", lambda joint: "")
+    monkeypatch.setattr("dynamics.multibody.bodies.body.contradiction", lambda joint: "")
     said = {
         kind: {each.equation.partition(" ")[0] for each in certify(twins(kind, 11)[0], 2).residuals if not each.passed}
         for kind in ("angles", "polar", "still", "constant")

@@ -14,8 +14,8 @@ import pytest
 import cgraph as cg
 import dynamics as dyn
 from cgraph.operations.operation import OPS
-from dynamics.equations import accelerations
 from dynamics.equations.constraints.constraints import multiplier_outputs
+from dynamics.equations.mass_matrix import accelerations
 from dynamics.equations.states.consistent_state import nearest_state
 from dynamics.io.write_mjcf import to_mjcf
 from dynamics.systems.constraints import Constraints

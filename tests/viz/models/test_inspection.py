@@ -10,7 +10,7 @@ import pytest
 
 import dynamics as dyn
 from cgraph import Graph
-from dynamics.multibody.joint_positions import skeleton
+from dynamics.multibody.trees.joint_positions import skeleton
 from dynamics.scenes.scenes import Scene
 from tests.early_end import stops
 from tests.sources import ROOT

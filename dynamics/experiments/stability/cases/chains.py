@@ -9,7 +9,7 @@ import cgraph as cg
 
 from ....equations.equations_of_motion import momentum
 from ....multibody.builders.planar_arm import planar_arm
-from ....multibody.mechanism import Body, Joint, Mechanism
+from ....multibody.trees.mechanism import Body, Joint, Mechanism
 from ....multiprecision import closed_forms
 from ....systems.system import System
 from .case import GROWN, RTOL, SLACK, Criterion, StabilityCase, conserved, energy_criterion

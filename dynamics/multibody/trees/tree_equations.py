@@ -12,17 +12,16 @@ import cgraph as cg
 from cgraph import Node
 from cgraph.extend import Array, Builder, building, hessian_nodes
 
-from ..systems.body_terms import BiasForce, MotionState, TorqueDerivatives
-from .algebra import spatial
-from .body import Body, quantities
-from .joints import JointType
-from .structure import Moved, Structure
-from .sweeps.base_parameters import base_parameter_links, without_axial_moments
-from .sweeps.equation_links import equation_links
-from .sweeps.links import Link, LinkState, link_states, parents_of
-from .sweeps.mass_matrix import Carried, mass_matrix_columns, size_of
-from .sweeps.outward import Acceleration, Motion, base_acceleration, ground, propagate_acceleration, wrench
-from .sweeps.subtree_momentum import (
+from ...systems.body_terms import BiasForce, MotionState, TorqueDerivatives
+from ..algebra import spatial
+from ..bodies.body import Body, quantities
+from ..joints import JointType
+from ..sweeps.base_parameters import base_parameter_links, without_axial_moments
+from ..sweeps.equation_links import equation_links
+from ..sweeps.links import Link, LinkState, link_states, parents_of
+from ..sweeps.mass_matrix import Carried, mass_matrix_columns, size_of
+from ..sweeps.outward import Acceleration, Motion, base_acceleration, ground, propagate_acceleration, wrench
+from ..sweeps.subtree_momentum import (
     COMPOSITE,
     SubtreeMomentum,
     about_parent,
@@ -30,6 +29,7 @@ from .sweeps.subtree_momentum import (
     momentum_rates,
     with_known_momenta,
 )
+from .structure import Moved, Structure
 
 WORTH = 0.9  # of the nodes of a mass matrix from the Lagrangian, at most, for one by composite inertias
 UNEVEN = 200.0  # times a body's moments of inertia, at most, for base numbers that are not looked at further
@@ -197,7 +197,7 @@ class TreeEquations:
         """Torques of all bodies, with their springs, and their derivatives."""
         if not self._turning:
             return None
-        from .sweeps.torque_derivatives import torque_derivatives
+        from ..sweeps.torque_derivatives import torque_derivatives
 
         with building(build):
             up = base_acceleration(self.ground).linear

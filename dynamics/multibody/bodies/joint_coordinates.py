@@ -12,10 +12,10 @@ import cgraph as cg
 from cgraph import Node
 from cgraph.extend import Array
 
-from ..systems.quasi_velocities import QuasiVelocities
+from ...systems.quasi_velocities import QuasiVelocities
+from ..joints import JointType
+from ..parameters import Quantities
 from .body import WORLD, Body
-from .joints import JointType
-from .parameters import Quantities
 
 Value = TypeVar("Value")
 _FORCES = {"rad/s": "N m", "m/s": "N"}

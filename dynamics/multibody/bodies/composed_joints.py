@@ -12,7 +12,9 @@ from numpy.typing import ArrayLike
 
 from cgraph.extend import Array, is_finite, require_mapping
 
-from .algebra import spatial
+from ..algebra import spatial
+from ..joints import COMPOSITIONS
+from ..joints.composition import AXIS
 from .body import (
     JOINT_QUANTITIES,
     TEXT_ROUNDING,
@@ -26,8 +28,6 @@ from .body import (
     unit_axis,
     vector,
 )
-from .joints import COMPOSITIONS
-from .joints.composition import AXIS
 
 _NUMBERS = ("damping", "stiffness", "spring_reference", "armature")
 

@@ -8,10 +8,10 @@ from typing import Self
 
 from numpy.typing import ArrayLike
 
-from .body import WORLD, Body, MechanismError
-from .forces.external_force import Force
-from .forces.joint_force import JointForce
-from .loops import Loop
+from ..bodies.body import WORLD, Body, MechanismError
+from ..forces.external_force import Force
+from ..forces.joint_force import JointForce
+from ..loops import Loop
 from .structure import Structure, changed, used_names
 
 

@@ -21,8 +21,8 @@ from cgraph.extend import (
     topological,
 )
 
-from ..systems.kinematics import ONE, ZERO
-from ..systems.system import System
+from ...systems.kinematics import ONE, ZERO
+from ...systems.system import System
 from .singular_mass_matrix import SingularMassMatrixError
 
 DENSE_PATH = 12  # coordinates from the world to a tip; a dense factorization loses digits with about their fourth power

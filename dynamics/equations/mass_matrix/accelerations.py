@@ -11,10 +11,10 @@ import cgraph as cg
 from cgraph import Graph
 from cgraph.extend import Builder, Order, SingularError, building, rounding_spread
 
-from ..systems.constraints import ConstraintError
-from ..systems.system import System
-from .bias_terms import BiasTerms, bias_terms
-from .constraints.constraints import (
+from ...systems.constraints import ConstraintError
+from ...systems.system import System
+from ..bias_terms import BiasTerms, bias_terms
+from ..constraints.constraints import (
     constraint_rows,
     multiplier_outputs,
     unknown_names,

@@ -12,9 +12,9 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import Array, real_array
 
-from .body import Body
-from .joint_coordinates import coordinate_names, places
-from .loops import Loop
+from ..bodies.body import Body
+from ..bodies.joint_coordinates import coordinate_names, places
+from ..loops import Loop
 
 _SEEN = 1e-6  # of the way that points go: how near to the plane of the picture they turn
 _FLAT = 1e-9  # of the largest extent: a direction in which nothing moves or lies

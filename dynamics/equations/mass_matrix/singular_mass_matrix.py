@@ -11,10 +11,10 @@ import cgraph as cg
 from cgraph import Graph, Node, extend
 from cgraph.extend import Array, SingularError, real_array, solve_nodes, topological
 
-from ..systems.model import Model, as_system
-from ..systems.system import System
-from .constraints.constraints import unknown_names
-from .substitute import substitute
+from ...systems.model import Model, as_system
+from ...systems.system import System
+from ..constraints.constraints import unknown_names
+from ..substitute import substitute
 
 STATES = 3
 TORQUE = 2.0**200  # so large that no other force counts

@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike
 from cgraph import Graph, Node
 from cgraph.extend import Array, Names, html_table, require_whole, topological
 
-from ..systems.display_names import display_names
-from ..systems.system import System
-from .states.evaluate import evaluate
+from ...systems.display_names import display_names
+from ...systems.system import System
+from ..states.evaluate import evaluate
 
 STRUCTURAL_ZERO = "·"  # a cell that is zero by structure, at every state
 LONGEST_EXPRESSION = 40  # characters of a cell that is written out, with q0 for the coordinate's name

@@ -14,10 +14,10 @@ from numpy.typing import ArrayLike
 from cgraph import Node
 from cgraph.extend import Array, check_name, is_finite
 
-from .algebra import spatial
-from .joints import COMPOSITIONS, TYPES, JointType
-from .joints.consistency import contradiction
-from .parameters import Quantities, Quantity, entries, evaluated, names_in, symbol, vanishes
+from ..algebra import spatial
+from ..joints import COMPOSITIONS, TYPES, JointType
+from ..joints.consistency import contradiction
+from ..parameters import Quantities, Quantity, entries, evaluated, names_in, symbol, vanishes
 
 WORLD = "world"
 TEXT_ROUNDING = 1e-9  # of the largest entry: what is left of an inertia or a rotation that came through text

@@ -8,12 +8,12 @@ import cgraph as cg
 from cgraph import Node
 from cgraph.extend import Builder, building, folded
 
-from ..systems.model import Model, as_system
-from ..systems.system import System
-from .coriolis import coriolis_matrix, require_quadratic
-from .equation import documented, mirrored
-from .equations_of_motion import bias, gravity_force
-from .formulations.formulations import lagrange_sweeps
+from ...systems.model import Model, as_system
+from ...systems.system import System
+from ..coriolis import coriolis_matrix, require_quadratic
+from ..equation import documented, mirrored
+from ..equations_of_motion import bias, gravity_force
+from ..formulations.formulations import lagrange_sweeps
 from .torque_table import TorqueTable
 
 _ENERGIES = {"kinetic", "potential"}

@@ -15,15 +15,15 @@ import cgraph as cg
 from cgraph import Node
 from cgraph.extend import kept_by_first
 
-from .algebra import spatial
-from .body import BODY_QUANTITIES, JOINT_QUANTITIES, Body, MechanismError, checked, quantities
-from .composed_joints import parts_of
-from .forces.external_force import Force
-from .forces.joint_force import JointForce
-from .loops import Loop
-from .parameters import Quantities, bound, entries, evaluated, names_in
-from .sweeps.links import Link, LinkState, axes_of, link
-from .sweeps.outward import Motion, energy, propagate_motion
+from ..algebra import spatial
+from ..bodies.body import BODY_QUANTITIES, JOINT_QUANTITIES, Body, MechanismError, checked, quantities
+from ..bodies.composed_joints import parts_of
+from ..forces.external_force import Force
+from ..forces.joint_force import JointForce
+from ..loops import Loop
+from ..parameters import Quantities, bound, entries, evaluated, names_in
+from ..sweeps.links import Link, LinkState, axes_of, link
+from ..sweeps.outward import Motion, energy, propagate_motion
 
 
 class Moved(NamedTuple):

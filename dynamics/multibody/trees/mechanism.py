@@ -14,15 +14,13 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import Array, Builder, building, real_array, require_flag, require_mapping
 
-from ..systems.arguments import parameter_value
-from ..systems.body_terms import BodyTerms
-from ..systems.model import Model
-from ..systems.system import System
-from .body import WORLD, Body, Joint, MechanismError, MechanismWarning, quantities, vector
-from .composed_joints import locked_parts, outer_names, require_parents
-from .forces.external_force import Force, generalized_forces
-from .forces.joint_force import JointForce, add_joint_forces, check_any_force
-from .joint_coordinates import (
+from ...systems.arguments import parameter_value
+from ...systems.body_terms import BodyTerms
+from ...systems.model import Model
+from ...systems.system import System
+from ..bodies.body import WORLD, Body, Joint, MechanismError, MechanismWarning, quantities, vector
+from ..bodies.composed_joints import locked_parts, outer_names, require_parents
+from ..bodies.joint_coordinates import (
     coordinate_names,
     lengths,
     neutral,
@@ -31,14 +29,16 @@ from .joint_coordinates import (
     quasi_velocities,
     velocity_names,
 )
+from ..forces.external_force import Force, generalized_forces
+from ..forces.joint_force import JointForce, add_joint_forces, check_any_force
+from ..loops import Loop, check_loops, of_loops, position_rows, velocity_rows
+from ..parameters import Quantity, bound, entries, names_in, symbol
+from ..sweeps.kinematic_chain import KinematicChain, kinematic_chains
+from ..sweeps.kinematic_tree import Carrier, lock_joints, merge_fixed_bodies, parents_first, require_inertia, resists
+from ..sweeps.links import Link
 from .joint_positions import skeleton
-from .loops import Loop, check_loops, of_loops, position_rows, velocity_rows
 from .modification import ModifiableStructure
-from .parameters import Quantity, bound, entries, names_in, symbol
 from .structure import bound_body, bound_force, changed, listed, require_values, used_names
-from .sweeps.kinematic_chain import KinematicChain, kinematic_chains
-from .sweeps.kinematic_tree import Carrier, lock_joints, merge_fixed_bodies, parents_first, require_inertia, resists
-from .sweeps.links import Link
 from .tree_equations import TreeEquations
 
 __all__ = [
