@@ -169,6 +169,16 @@ def _cluster_rule(clusters: bool | Sequence[str] | ClusterRule) -> ClusterRule:
     return lambda node: _only(node.tags & chosen)
 
 
+def plain_drawing(
+    graph: Graph, names: Mapping[str, str], marked: Collection[Node] = (), marked_edges: Collection[Edge] = ()
+) -> Digraph:
+    """The drawing of a small graph with short formulas, without frames and legend; arguments as of `to_dot`."""
+    formulas = short_formulas(graph, names)
+    return to_dot(
+        graph, names=names, formulas=formulas, marked=marked, marked_edges=marked_edges, clusters=False, legend=False
+    )
+
+
 LENGTH = 10  # characters that fit a node
 
 

@@ -127,7 +127,7 @@ def compose(title: str, data: Mapping[str, Json] | None, tables: Sequence[Table]
     added = "\n".join([panel.script for panel in panels])
     body = Template(asset(__package__, "page.html")).substitute(
         title=escape(title),
-        tables="".join(html.table(table.caption, table.header, table.rows) for table in tables),
+        tables="".join([table.html() for table in tables]),
         version=f"cgraph {__version__}",
         panels="".join([panel.body for panel in panels]),
     )

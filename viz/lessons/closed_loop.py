@@ -7,7 +7,7 @@ from html import escape
 from cgraph import Graph, Node
 from dynamics import System, forward_dynamics, gravity_force
 
-from ..pages import html
+from ..pages.document import Table
 from ..pages.operations import graph_data
 from .subject import LARGEST, SHOWN, Screen, Subject, number
 
@@ -52,8 +52,8 @@ def closed_loop(subject: Subject) -> Screen:
         right,
         f"<p>λ = {number(first)}: as much as it takes so that the row stays zero, no more. It does no work, for along what "
         "is still allowed to move, J q̇ = 0.</p>"
-        + html.table("Accelerations at rest", ["joint", "free", "held"], rows)
-        + html.table("Multipliers", ["row", "λ"], [[a, number(b)] for a, b in zip(shown, multipliers, strict=True)][:SHOWN]),
+        + Table("Accelerations at rest", ["joint", "free", "held"], rows).html()
+        + Table("Multipliers", ["row", "λ"], [[a, number(b)] for a, b in zip(shown, multipliers, strict=True)][:SHOWN]).html(),
         "Find a place where the clamp has nothing to do. Is it where nothing moves at all?"
         if play["sliders"] else "Accelerations without and with the rows, at rest.",
         play if nodes <= LARGEST else None,

@@ -9,7 +9,7 @@ import numpy as np
 from cgraph.extend import Array
 from dynamics import forward_dynamics, mass_matrix
 
-from ..pages import html
+from ..pages.document import Table
 from ..pages.operations import graph_data
 from .subject import LARGEST, SHOWN, Screen, Subject, number
 
@@ -55,7 +55,7 @@ def elimination(subject: Subject) -> Screen:
         "L<sub>ki</sub>² D<sub>k</sub>. From the tip to the base, a joint has to know the joints beyond it alone, as the "
         "articulated bodies of robotics do. cgraph does this on the graph of L itself: accelerations of this system "
         f"take {size} nodes.</p>"
-        + html.table("Inertia felt at a joint", ["joint", "all others locked", "pivot"], rows),
+        + Table("Inertia felt at a joint", ["joint", "all others locked", "pivot"], rows).html(),
         "Take out joint after joint, from the tip. Orange: the pivot. Then bend the system and start again.",
         play if len(graph.nodes) <= LARGEST and n <= 2 * SHOWN else None,
         f"The pivot is {number(free)}. A door with a second door hinged to it is easier to push than one with both in line "

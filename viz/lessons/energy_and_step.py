@@ -10,7 +10,7 @@ from cgraph.extend import Array
 from dynamics import SimulationWarning, energy, simulate, state_equation
 
 from .. import theme
-from ..pages import html
+from ..pages.document import Table
 from ..pages.operations import graph_data
 from .subject import LARGEST, Screen, Subject, number
 
@@ -62,7 +62,7 @@ def energy_and_step(subject: Subject) -> Screen:
         "<p>The slopes of rk4 are weighed so that all terms of the error up to dt⁴ cancel. So half the step leaves about a "
         f"sixteenth of the error, a tenth of the step a ten-thousandth. {told} "
         "Euler's error is only halved.</p>"
-        + html.table("rk4: largest error of a coordinate", ["dt [s]", "at the end"], rows),
+        + Table("rk4: largest error of a coordinate", ["dt [s]", "at the end"], rows).html(),
         "Move the number of steps. Orange: Euler's energy over time; blue: that of rk4; dashed: that of rk4 with very small steps.",
         play if len(rate.nodes) <= LARGEST else None,
         "Of a braked system energy falls by right: the line to compare with is the dashed one.",

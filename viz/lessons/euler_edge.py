@@ -9,10 +9,10 @@ from dynamics import Verdict, formulation_sizes, formulation_verdict, inverse_dy
 from dynamics.equations.formulations.formulation_sizes import INERTIAL_TERM, blamed
 
 from .. import theme
-from ..graph_drawing.dot import short_formulas, to_dot
+from ..graph_drawing.dot import plain_drawing
 from ..graph_drawing.legend import kinds_in, legend_svg, to_adaptive
 from ..graph_drawing.render import render_svg
-from ..pages import html
+from ..pages.document import Picture, Table
 from ..pages.formulations import TITLES, WHY_FEWER, size_table
 from ..pages.mathml import equations
 from ..pages.operations import graph_data
@@ -91,10 +91,10 @@ def _reveal(subject: Subject, errors: list[tuple[float, np.ndarray]], stays: boo
     )
     joints = subject.joints[:SHOWN]
     rows = [[f"{dt:g}", *[number(error) for error in each[: len(joints)]]] for dt, each in errors]
-    steps = html.table("Error of the torque by definition", ["dt [s]", *joints], rows)
-    sizes = size_table(formulation_sizes(subject.system))
+    steps = Table("Error of the torque by definition", ["dt [s]", *joints], rows).html()
+    sizes = size_table(formulation_sizes(subject.system)).html()
     why = f"<p>{verdict.lacking or WHY_FEWER}</p>" * verdict.differs
-    return said + _drawing(subject) + steps + html.table(sizes.caption, sizes.header, sizes.rows) + why
+    return said + _drawing(subject) + steps + sizes + why
 
 
 def _second_try(subject: Subject, right: np.ndarray) -> str:
@@ -128,22 +128,13 @@ def _drawing(subject: Subject) -> str:
         if len(graph.nodes) > DRAWN:
             return ""
         if not pictures:
-            pictures = html.figure(
-                to_adaptive(legend_svg(kinds_in(graph, wrong))), "The colors of both pictures.", None
-            )
-        dot = to_dot(
-            graph,
-            names=subject.names,
-            formulas=short_formulas(graph, subject.names),
-            marked=wrong,
-            marked_edges=edges,
-            clusters=False,
-            legend=False,
-        )
+            legend = legend_svg(kinds_in(graph, wrong))
+            pictures = Picture("", to_adaptive(legend), "The colors of both pictures.", None).html()
+        svg = render_svg(plain_drawing(graph, subject.names, wrong, edges))
         caption = (
             f"The inertial term, {TITLES[formulation]}: {len(wrong)} of {len(graph.nodes)} nodes are there by mistake."
         )
-        pictures += html.figure(to_adaptive(render_svg(dot)), caption, None)
+        pictures += Picture("", to_adaptive(svg), caption, None).html()
     return pictures
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from cgraph.extend import Array
 from dynamics import inverse_dynamics
 
-from ..pages import html
+from ..pages.document import Table
 from ..pages.operations import graph_data
 from .subject import LARGEST, SHOWN, Screen, Subject, number
 
@@ -32,6 +32,7 @@ def torque_parts(subject: Subject) -> Screen:
     rows = [[joint_name, *[number(value) for value in column], number(column.sum())]
             for joint_name, column in zip(subject.joints[:SHOWN], parts.T, strict=False)]  # fmt: skip
     states = [f"{kind}{i}" for i in range(min(system.n, MOVED)) for kind in ("q", "qd", "qdd")]
+    table = Table("Parts of the torque", ["joint", "inertia", "velocity", "position", "torque"], rows)
     play = {
         "kind": "parts",
         "graph": graph_data(graph),
@@ -49,7 +50,7 @@ def torque_parts(subject: Subject) -> Screen:
         PARTS,
         int(sizes.argmax()),
         "<p>The same graph of the torque, asked three times: at rest without acceleration, then with q̈ alone, then with "
-        f"q̇ alone. The three add up to the torque.</p>{html.table('Parts of the torque', ['joint', 'inertia', 'velocity', 'position', 'torque'], rows)}",
+        f"q̇ alone. The three add up to the torque.</p>{table.html()}",
         "Move the joints. Make the velocity part the largest; then find a place where holding still costs nothing.",
         play if len(graph.nodes) <= LARGEST else None,
         f"At {name} the parts are {', '.join(number(value) for value in parts[:, joint])}.",
