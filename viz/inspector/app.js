@@ -81,8 +81,8 @@ function compute(app) {
 }
 
 function boundsIn(app, graph, slopes, values) {
-  const errors = app.state.errorsOf(graph), bounds = errorBounds(graph, slopes, values, errors);
-  return app.state.solved ? bounds : sharpened(graph, slopes, values, bounds, errors);
+  const own = ownErrors(graph, values, app.state.errorsOf(graph)), bounds = errorBounds(graph, slopes, own, 0);
+  return app.state.solved ? bounds : sharpened(graph, slopes, values, bounds, own);
 }
 
 /** Noise of a graph's values: computed only where an output may be noise. */

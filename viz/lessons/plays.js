@@ -65,10 +65,9 @@ function button(board, text, press) {
 }
 /** A table whose cells can be written anew: {write(rows), cells}. */
 function grid(board, header) {
-  const body = tag("tbody");
-  const head = tag("thead", {}, tag("tr", {}, ...header.map((name) => tag("th", {}, name))));
-  board.append(tag("div", { class: "scroll" }, tag("table", {}, head, body)));
-  return (rows, classes = () => "") => body.replaceChildren(
+  const made = table(header, []);
+  board.append(scrolled(made));
+  return (rows, classes = () => "") => made.tBodies[0].replaceChildren(
     ...rows.map((row, i) => tag("tr", {}, ...row.map((text, j) => {
       const cell = tag("td", {}, text);
       const kind = classes(i, j);

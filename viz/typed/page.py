@@ -21,10 +21,8 @@ FILES = (
     "derivatives.js",
     "equations.js",
     "verdict.js",
-    "lint.js",
     "motion.js",
     "record.js",
-    "examples.js",
     "interface.js",
 )
 
@@ -40,7 +38,7 @@ def engine() -> str:
 
 def script() -> str:
     """The engine with what it needs, for a program that has no page."""
-    return f'"use strict";\n{operations()}{asset(html.__package__, "graph.js")}{engine()}'
+    return f'"use strict";\n{operations()}{asset(html.__package__, "graph.js", "slopes.js")}{engine()}'
 
 
 TITLE = "Your own Lagrangian"
