@@ -28,13 +28,12 @@ def closed_loop(subject: Subject) -> Screen:
     choices, right = _choices(first, static)
     rows = [[joint, number(a), number(answer[f"qdd{i}"])]
             for i, (joint, a) in enumerate(zip(subject.joints[:SHOWN], free.tolist(), strict=False))]  # fmt: skip
-    states = [f"q{i}" for i in range(min(subject.system.n, SHOWN))]
     play = {
         "kind": "loop",
         "free": graph_data(free_graph),
         "held": graph_data(held_graph),
         "values": subject.values | still,
-        "sliders": [] if own or subject.system.kinematics.quasi else subject.sliders(states, -3.2, 3.2),
+        "sliders": [] if own else subject.sliders(),
         "joints": subject.joints[:SHOWN],
         "multipliers": dict(zip(names, shown, strict=True)),
     }

@@ -25,12 +25,11 @@ def elimination(subject: Subject) -> Screen:
     first, tip = escape(subject.joints[0]), escape(subject.joints[-1])
     same = locked - free <= _SAME * locked
     rows = [[name, number(matrix[i, i]), number(pivots[i])] for i, name in enumerate(subject.joints[:SHOWN])]
-    states = [f"q{i}" for i in range(min(n, SHOWN))]
     play = {
         "kind": "elimination",
         "graph": graph_data(graph),
         "n": n,
-        "sliders": subject.sliders(states, -3.2, 3.2) if subject.system.kinematics.quasi is None else [],
+        "sliders": subject.sliders(),
         "joints": subject.joints,
     }
     size = len(forward_dynamics(subject.system).nodes)

@@ -128,7 +128,7 @@ def _drawing(subject: Subject) -> str:
         if len(graph.nodes) > DRAWN:
             return ""
         if not pictures:
-            legend = legend_svg(kinds_in(graph, wrong))
+            legend = legend_svg(kinds_in(graph, marked=wrong))
             pictures = Picture("", to_adaptive(legend), "The colors of both pictures.", None).html()
         svg = render_svg(plain_drawing(graph, subject.names, wrong, edges))
         caption = (
@@ -141,12 +141,11 @@ def _drawing(subject: Subject) -> str:
 def _play(subject: Subject, right: Graph, wrong: Graph) -> dict[str, object] | None:
     if len(right.nodes) + len(wrong.nodes) > LARGEST:
         return None
-    states = [f"q{i}" for i in range(min(subject.system.nq, SHOWN))]
     return {
         "kind": "step",
         "right": graph_data(right),
         "wrong": graph_data(wrong),
-        "sliders": subject.sliders(states, -3.2, 3.2) if subject.system.kinematics.quasi is None else [],
+        "sliders": subject.sliders(),
         "joints": subject.joints[:SHOWN],
         "colors": [theme.FORMULATIONS["chain_rule"], theme.FORMULATIONS["euler_embedded"]],
     }

@@ -31,12 +31,11 @@ def torque_parts(subject: Subject) -> Screen:
     )
     rows = [[joint_name, *[number(value) for value in column], number(column.sum())]
             for joint_name, column in zip(subject.joints[:SHOWN], parts.T, strict=False)]  # fmt: skip
-    states = [f"{kind}{i}" for i in range(min(system.n, MOVED)) for kind in ("q", "qd", "qdd")]
     table = Table("Parts of the torque", ["joint", "inertia", "velocity", "position", "torque"], rows)
     play = {
         "kind": "parts",
         "graph": graph_data(graph),
-        "sliders": subject.sliders(states, -3.2, 3.2) if system.kinematics.quasi is None else [],
+        "sliders": subject.sliders(("q", "qd", "qdd"), MOVED),
         "joints": subject.joints[:SHOWN],
         "parts": [part.partition(":")[0] for part in PARTS],
     }

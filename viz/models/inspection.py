@@ -9,7 +9,7 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import PRIMAL, TANGENT, Array, real_number, topological
+from cgraph.extend import PRIMAL, TANGENT, Array, counted, real_number, topological
 from dynamics.equations.equations_of_motion import forward_dynamics
 from dynamics.equations.formulations.formulations import inverse_dynamics
 from dynamics.equations.formulations.node_classes import (
@@ -99,7 +99,7 @@ def inspection(
     if scene.ode is not None:
         return _first_order(scene, end, times)
     system = scene.system
-    count = f"{system.nq} coordinate{'s' * (system.nq != 1)}"
+    count = counted(system.nq, "coordinate")
     say(f"{scene.name}: deriving the equations of {count}, compiling them, and a motion of {end:g} s")
     run = simulate(system, scene.q, scene.qd, end, "dopri5", rtol=1e-6, t_eval=times)
     say(f"{scene.name}: deriving forward dynamics")
@@ -161,12 +161,12 @@ def _hamilton(scene: Scene, end: float, times: Array | None, say: Callable[[str]
     depth = {name: counts.depth for name, counts in sizes.items()}
     about = (
         "Rates of coordinates and momenta. The velocities are solved from the momenta, "
-        f"{_operations(depth[VELOCITIES_ALONE])} deep; the rates of the momenta stand on them, {depth[HAMILTON]} deep "
-        f"in all, in {len(hamilton.nodes)} nodes. There is no acceleration and no bias."
+        f"{counted(depth[VELOCITIES_ALONE], 'operation')} deep; the rates of the momenta stand on them, "
+        f"{depth[HAMILTON]} deep in all, in {len(hamilton.nodes)} nodes. There is no acceleration and no bias."
     )
     beside = (
         "The same motion by accelerations: at the velocities of these momenta, torque less bias, solved. "
-        f"{_operations(depth[LAGRANGE])} deep, {len(forms[LAGRANGE].nodes)} nodes."
+        f"{counted(depth[LAGRANGE], 'operation')} deep, {len(forms[LAGRANGE].nodes)} nodes."
     )
     steps = elimination(hamilton, display_names(scene)) if is_quadratic(system) else ()
     versions = {
@@ -175,10 +175,6 @@ def _hamilton(scene: Scene, end: float, times: Array | None, say: Callable[[str]
     }
     stopped = "" if run.stats.success else run.stats.message
     return _along(scene, run, versions, state, velocities(system), stopped=stopped)
-
-
-def _operations(count: int) -> str:
-    return f"{count} operation{'s' * (count != 1)}"
 
 
 def _rows(graph: Graph) -> dict[str, list[Node]]:

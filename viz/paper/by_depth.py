@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 from cgraph import Counts, Graph
 from dynamics import hamilton_equations, scenes, state_equation
@@ -13,7 +13,6 @@ from .. import theme
 from ..graph_drawing.legend import kinds_in, legend_svg, to_adaptive
 from ..graph_drawing.levels import LevelPanel, Scale, levels_svg, silhouettes_svg
 from ..pages.document import Block, Paragraph, Picture, Table
-from ..theme import Paint
 from .part import Part, drawn
 
 TITLES = {LAGRANGE: "Lagrange: accelerations of (q, q̇)", HAMILTON: "Hamilton: rates of (q, p)"}
@@ -47,7 +46,8 @@ def figure7(larger: Mapping[str, str] = LARGER) -> Part:
     arm = levels_svg(
         [LevelPanel(TITLES[name], graph, marks.get(name, {})) for name, graph in shown[ARM].items()], SMALL
     )
-    legend = legend_svg(_kinds([*shown[SPRING].values(), *shown[ARM].values()]))
+    kinds = kinds_in(*shown[SPRING].values(), *shown[ARM].values())
+    legend = legend_svg(theme.in_words(kinds, theme.MOTION_WORDS))
     orders = {f"{form}, {method}": graph for method in METHODS for form, graph in _chain(LINKS, method).items()}
     silhouettes = silhouettes_svg([LevelPanel(title, graph) for title, graph in orders.items()])
     header = ("", *[f"{size}, {form}" for size in SIZES for form in ("Lagrange", "Hamilton")])
@@ -64,13 +64,6 @@ def figure7(larger: Mapping[str, str] = LARGER) -> Part:
     data = {name: {form: _size(counts) for form, counts in each.items()} for name, each in sizes.items()}
     data[f"a planar chain of {LINKS}"] = {title: _size(graph.counts()) for title, graph in orders.items()}
     return Part("forms", "Figure 7: both forms by depth", blocks, data)
-
-
-def _kinds(graphs: Sequence[Graph]) -> list[Paint]:
-    """The kinds of nodes of all, in the words of equations of motion."""
-    found = {kind for graph in graphs for kind in kinds_in(graph)}
-    order = [kind for kind in (*theme.ROLES.values(), theme.OUTPUT) if kind in found]
-    return theme.in_words(order, theme.MOTION_WORDS)
 
 
 def _size(counts: Counts) -> dict[str, int]:

@@ -50,33 +50,50 @@ def equations() -> Part:
     return Part("equations", "Equation (3) from the graph", blocks, data, {"equations.txt": text})
 
 
-def figure1() -> Part:
-    """Figure 1: by definition, with the Euler relation embedded."""
-    size = formulation_size(*blamed(scenes.load("spring_mass"), INERTIAL_TERM, "euler_embedded"))
-    caption = (
-        f"Figure 1. By definition, with the Euler relation embedded. {size.spurious_nodes} of {size.nodes} nodes and "
-        f"{size.spurious_edges} of {size.edges} edges (in vermillion) are there by mistake: the spring's energy is "
-        "attached to the momentum through θ = ω dt + θ old."
-    )
-    return _drawn("fig1", "Figure 1: by definition", "euler_embedded", caption)
+FIGURES = {  # name: heading, formulation, caption
+    "fig1": (
+        "Figure 1: by definition",
+        "euler_embedded",
+        (
+            "Figure 1. By definition, with the Euler relation embedded. {spurious_nodes} of {nodes} nodes and {spurious_edges} "
+            "of {edges} edges (in vermillion) are there by mistake: the spring's energy is attached to the momentum through "
+            "θ = ω dt + θ old."
+        ),
+    ),
+    "fig2": (
+        "Figure 2: kinetic only",
+        "kinetic_only",
+        (
+            "Figure 2. Kinetic energy in place of L in the velocity derivative. The spring is gone from the inertial term, "
+            "which is right here; the Euler relation ω = α dt + ω old is still in the graph. Colors as above."
+        ),
+    ),
+    "fig3": (
+        "Figure 3: chain rule",
+        "chain_rule",
+        (
+            "Figure 3. The chain rule, dp/dt = ∇p · (ω, α), from the full Lagrangian. No dt, no earlier state, and nothing "
+            "of the spring: ω and θ stay independent. Colors as above."
+        ),
+    ),
+}
 
 
-def figure2() -> Part:
-    """Figure 2: kinetic energy only."""
-    caption = (
-        "Figure 2. Kinetic energy in place of L in the velocity derivative. The spring is gone from the inertial term, "
-        "which is right here; the Euler relation ω = α dt + ω old is still in the graph. Colors as above."
-    )
-    return _drawn("fig2", "Figure 2: kinetic only", "kinetic_only", caption)
+def figure(name: str) -> Part:
+    """One of Figures 1 to 3, the inertial term of the rotor on a spring with its momentum, its counts in the caption.
 
-
-def figure3() -> Part:
-    """Figure 3: the chain rule."""
-    caption = (
-        "Figure 3. The chain rule, dp/dt = ∇p · (ω, α), from the full Lagrangian. No dt, no earlier state, and nothing "
-        "of the spring: ω and θ stay independent. Colors as above."
-    )
-    return _drawn("fig3", "Figure 3: chain rule", "chain_rule", caption)
+    The legend of all stands above the first.
+    """
+    heading, formulation, words = FIGURES[name]
+    graph, wrong = blamed(scenes.load("spring_mass"), INERTIAL_TERM, formulation)
+    size = formulation_size(graph, wrong)
+    caption = f"{words.format(**size._asdict())} {size.nodes} nodes, {size.edges} edges."
+    drawing = plain_drawing(graph, theme.ONE_JOINT, wrong.nodes, wrong.edges)
+    blocks = [drawn(name, render_svg(drawing), caption, "auto")]
+    if name == "fig1":
+        legend = to_adaptive(legend_svg(kinds_in(graph, marked=wrong.nodes)))
+        blocks.insert(0, Picture("legend", legend, "The colors of Figures 1 to 3.", "auto"))
+    return Part(name, heading, blocks, size._asdict(), {f"{name}.dot": str(drawing.source)})
 
 
 def sizes() -> Part:
@@ -92,18 +109,3 @@ def sizes() -> Part:
     ]
     data = {f"{term}, {formulation}": size._asdict() for (term, formulation), size in counted.items()}
     return Part("sizes", "Sizes of the graphs", blocks, data)
-
-
-def _drawn(name: str, heading: str, formulation: str, caption: str) -> Part:
-    """The inertial term of the rotor on a spring with its momentum, as SVG, PNG and DOT, its counts in the caption.
-
-    The legend of all stands above the first.
-    """
-    graph, wrong = blamed(scenes.load("spring_mass"), INERTIAL_TERM, formulation)
-    size = formulation_size(graph, wrong)
-    drawing = plain_drawing(graph, theme.ONE_JOINT, wrong.nodes, wrong.edges)
-    blocks = [drawn(name, render_svg(drawing), f"{caption} {size.nodes} nodes, {size.edges} edges.", "auto")]
-    if name == "fig1":
-        legend = to_adaptive(legend_svg(kinds_in(graph, wrong.nodes)))
-        blocks.insert(0, Picture("legend", legend, "The colors of Figures 1 to 3.", "auto"))
-    return Part(name, heading, blocks, size._asdict(), {f"{name}.dot": str(drawing.source)})

@@ -16,7 +16,7 @@ from ..plots import plot
 from .by_depth import figure7
 from .embedding import embedding
 from .free_fall import figures4_and_5
-from .one_joint import equations, figure1, figure2, figure3, sizes
+from .one_joint import equations, figure, sizes
 from .part import Part
 from .scaling import scaling_of_counts
 from .timing import figure6
@@ -41,11 +41,11 @@ def paper(folder: Path, say: Callable[[str], None], *, quick: bool = False) -> P
     check_can_draw()
     plot.check_can_plot()
     check_folder(folder)
-    makers = {
+    makers: dict[str, Callable[[], Part]] = {
         "Equation (3), read off the graphs term by term": equations,
-        "Figure 1: by definition, with the Euler relation embedded": figure1,
-        "Figure 2: kinetic energy only": figure2,
-        "Figure 3: the chain rule": figure3,
+        "Figure 1: by definition, with the Euler relation embedded": partial(figure, "fig1"),
+        "Figure 2: kinetic energy only": partial(figure, "fig2"),
+        "Figure 3: the chain rule": partial(figure, "fig3"),
         "Sizes of these graphs, and of those of the whole torque": sizes,
         "The law of the embedding: torque error against dt": partial(embedding, QUICK_ARMS) if quick else embedding,
         "Figures 4 and 5: the three-link arm in free fall, by our graph and by MuJoCo": figures4_and_5,

@@ -79,7 +79,7 @@ def test_a_legend_has_the_kinds_that_are_there_and_is_small() -> None:
     graph = dyn.momentum_rate(dyn.scenes.load("spring_mass"), "chain_rule", keep_momentum=True)
     words = [paint.words for paint in kinds_in(graph)]
     assert words == [theme.ROLES[role].words for role in ("input", "adjoint", "several")] + [theme.OUTPUT.words]
-    assert kinds_in(graph, graph.nodes[-1:])[-1] is theme.MARKED
+    assert kinds_in(graph, marked=graph.nodes[-1:])[-1] is theme.MARKED
     svg = legend_svg(kinds_in(graph))
     assert 'height="40pt"' in svg
     assert all(f">{text}</text>" in svg for text in words)
