@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
@@ -21,6 +22,7 @@ from dynamics.equations.formulations.node_classes import (
     RATES,
     VELOCITIES,
     form_classes,
+    formulation_classes,
 )
 from dynamics.equations.formulations.verdict import formulation_verdict
 from dynamics.equations.momentum.both_forms import HAMILTON, LAGRANGE, VELOCITIES_ALONE, both_forms, form_sizes
@@ -36,9 +38,9 @@ from dynamics.simulation.trajectory import Trajectory
 from dynamics.systems.display_names import display_names
 from dynamics.systems.system import System
 
+from .. import theme
 from ..inspector import Motion, StateTable, Step, Version
 from ..pages.document import Table
-from .carried import carried
 
 FORMULATIONS = ("euler_embedded", "kinetic_only", "chain_rule")  # those of the paper, the flawed ones first
 FRAMES, RATE = 150, 30.0  # most instants shown, and how many a second
@@ -306,3 +308,34 @@ def _pivot(solved: Node, others: set[Node], place: Mapping[Node, int]) -> Node |
         rest += below
         seen.update(below)
     return min(found, key=lambda node: (bool(node.args), place[node]), default=None)
+
+
+BOTH = ("chain_rule", "newton_euler")
+
+
+def carried(scene: Scene) -> Table | None:
+    """The nodes that only the chain rule has, counted by part of the model and by what they are; None where none is.
+
+    The classes are those of `cgraph compare`: the rates of slopes are what -dL/dq cancels in part.
+    """
+    verdicts = [formulation_verdict(scene, name) for name in BOTH]
+    left, right = (each.graph for each in verdicts)
+    classes = cg.compare(left, right, classify=formulation_classes(verdicts)).classes("left")
+    counts = {tuple(name.rpartition(": ")[::2]): count for name, count in classes.items()}
+    if not counts:
+        return None
+    of_part, of_kind = Counter[str](), Counter[str]()
+    for (part, kind), count in counts.items():
+        of_part[part] += count
+        of_kind[kind] += count
+    kinds = [kind for kind, _ in of_kind.most_common()]
+    rows = []
+    for part in sorted(of_part, key=lambda part: (not part, theme.natural_order(part))):
+        cells = [str(counts.get((part, kind), "")) for kind in kinds]
+        rows.append([part or "no part", *cells, str(of_part[part])])
+    rows.append(["all", *[str(of_kind[kind]) for kind in kinds], f"{of_part.total()}"])
+    caption = (
+        f"What AD of the energy carries: of {len(left.nodes)} nodes by the chain rule these {of_part.total()} are not "
+        f"among the {len(right.nodes)} of equations by velocities, which never build what cancels"
+    )
+    return Table(caption, ["nodes of", *map(theme.pretty, kinds), "all"], rows)

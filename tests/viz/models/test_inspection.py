@@ -15,8 +15,7 @@ from dynamics.scenes.scenes import Scene
 from tests.early_end import stops
 from tests.sources import ROOT
 from tests.tolerances import EQUATIONS
-from viz.models.carried import carried
-from viz.models.inspection import DT, FORMULATIONS, Inspection, inspection
+from viz.models.inspection import DT, FORMULATIONS, Inspection, carried, inspection
 
 ARM = cache(lambda: inspection(dyn.scenes.load("triple_pendulum")))
 INTEGRATED = 1e-9  # N m: the state is one that the equations hold at, whatever the error of the motion
