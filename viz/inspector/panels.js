@@ -21,14 +21,11 @@ function fitted(text, most) {
 const MATHML = "http://www.w3.org/1998/Math/MathML";
 const BINDS = { sum: 1, function: 3, leaf: 4 }; // how strongly a text binds, as in the table of operations
 
-/** An element of MathML around texts and other elements. */
-function math(name, ...inside) {
-  const made = document.createElementNS(MATHML, name);
-  made.append(...inside);
-  return made;
-}
+/** An element of MathML around texts and other elements; with attributes, too. */
+const mathWith = (name, attributes, ...inside) => filled(document.createElementNS(MATHML, name), attributes, inside);
+const math = (name, ...inside) => mathWith(name, {}, ...inside);
 const number = (value) => math("mn", Number.isFinite(value) ? String(+value.toPrecision(4)) : String(value));
-const parenthesis = (text) => { const made = math("mo", text); made.setAttribute("stretchy", "false"); return made; };
+const parenthesis = (text) => mathWith("mo", { stretchy: "false" }, text);
 const fenced = (inside) => math("mrow", parenthesis("("), inside, parenthesis(")"));
 
 /** A node as an identifier: its name, or v with its number. */
@@ -42,9 +39,7 @@ function equation(version, node, depth) {
   const kept = version.args[node].length
     ? math("mrow", symbol(version, node), math("mo", "="), formula(version, node, depth, true)[0])
     : math("mrow", symbol(version, node));
-  const made = math("math", kept);
-  made.setAttribute("display", "block");
-  return made;
+  return mathWith("math", { display: "block" }, kept);
 }
 
 /** [MathML, how tightly it binds]. */
@@ -70,9 +65,7 @@ function formula(version, node, depth, whole) {
       return used.has(part) ? filled.cloneNode(true) : (used.add(part), filled); // an element has one place
     }
     const [name, attributes, ...inside] = part;
-    const made = math(name, ...inside.map(fill));
-    for (const key in attributes) made.setAttribute(key, attributes[key]);
-    return made;
+    return mathWith(name, attributes, ...inside.map(fill));
   };
   const used = new Set();
   return [fill(template), binding];

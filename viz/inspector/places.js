@@ -19,9 +19,14 @@ function placesOf(record, versions) {
   if (new Set(groups.flat().map((each) => JSON.stringify(each))).size > MANY) {
     groups = groups.map((own) => own.map((each) => (typeof each === "number" ? each : { ...each, title: "" })));
   }
+  const inputs = new Set(versions.flatMap((each) => each.inputs.map(([name]) => name)));
+  const leafOf = ({ names, constants }) => (node) => { // a named node stands for the input of that name
+    const name = names[node]?.[0];
+    return name !== undefined && inputs.has(name) ? `name ${name}` : constants.has(node) ? numberLeaf(constants.get(node)) : null;
+  };
   const found = new Map(), meaning = new Map(), keys = new Map(), clusterKeys = [], first = [];
   const place = versions.map((version, v) => {
-    const means = meanings(versions, version, meaning), seen = new Map();
+    const means = meanings(version, leafOf(version), meaning), seen = new Map();
     return version.ops.map((_, node) => {
       const group = JSON.stringify(groups[v][node]);
       const kind = `${means[node]} ${group}`, again = seen.get(kind) ?? 0;
@@ -68,25 +73,6 @@ function groupOf(version, node, bodies, untagged) {
   const rest = tags.filter((each) => !own.includes(each));
   const column = own[0] ?? rest.shift() ?? untagged, said = rest.filter((each) => !ENERGIES.includes(each));
   return { column, stage, title: (said.length ? said : rest).join(", ") || (own.length ? OTHER : ""), marked: version.marked.has(node) };
-}
-
-/** Of every node a number that nodes have in common that compute the same; a named node stands for the input of that name. */
-function meanings(versions, version, meaning) {
-  const inputs = new Set(versions.flatMap((each) => each.inputs.map(([name]) => name)));
-  const means = [];
-  version.ops.forEach((op, node) => {
-    const name = version.names[node]?.[0];
-    let key;
-    if (name !== undefined && inputs.has(name)) key = `name ${name}`;
-    else if (version.constants.has(node)) key = `value ${Object.is(version.constants.get(node), -0) ? "-0" : version.constants.get(node)}`;
-    else {
-      const args = version.args[node].map((arg) => means[arg]);
-      key = `${op} ${ROWS[op]?.commutative ? args.sort((a, b) => a - b) : args}`;
-    }
-    if (!meaning.has(key)) meaning.set(key, meaning.size);
-    means.push(meaning.get(key));
-  });
-  return means;
 }
 
 /** Columns in their order: bodies, then other tags, those first that all versions have, so that none leaves a gap. */

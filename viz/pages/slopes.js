@@ -1,4 +1,4 @@
-// Slopes of a graph: partials of its nodes, adjoints of an output, and what rounding makes of values.
+// Of a graph's nodes: partials, adjoints of an output, what rounding makes of values, and which compute the same.
 
 /** The operation of every node, and the numbers of its arguments: none of a constant and an input. */
 const opsOf = ({ nodes }) => nodes.map((node) => (Array.isArray(node) ? node[0] : node === null ? "variable" : "constant"));
@@ -41,3 +41,18 @@ function errorBounds({ args }, slopes, own, endless = Infinity) {
   });
   return bounds;
 }
+
+/** Of every node a number that nodes have in common that compute the same.
+ *
+ * leaf: what a node is by itself, if it is anything.  known: numbers of other graphs, which are joined to. */
+function meanings({ ops, args }, leaf, known = new Map()) {
+  const means = [];
+  ops.forEach((op, node) => {
+    const own = args[node].map((arg) => means[arg]);
+    const key = leaf(node) ?? `${op} ${ROWS[op]?.commutative ? own.sort((a, b) => a - b) : own}`;
+    if (!known.has(key)) known.set(key, known.size);
+    means.push(known.get(key));
+  });
+  return means;
+}
+const numberLeaf = (value) => `number ${Object.is(value, -0) ? "-0" : value}`;

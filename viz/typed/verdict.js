@@ -63,7 +63,11 @@ function blame(system, formulation, graph) {
   const through = variable("through the step"), marked = inverseDynamics(system, formulation, through);
   const [without, whole] = [0, 1].map((factor) => pairs(marked.nodes, folded(marked.nodes, new Builder(), new Map([[through, constant(factor)]]))));
   const wrong = new Set(marked.nodes.filter((node) => without.get(node).value === 0 && node.value !== 0));
-  const alike = sameStructure(graph.nodes), reach = new Map(marked.nodes.map((node) => [node, 0]));
+  const all = topological([...graph.nodes, ...whole.values()]), { number, ...arrays } = numbered(all, []);
+  const leaf = (node) => (all[node].args.length ? null : all[node].value === null ? `name ${all[node].name}` : numberLeaf(all[node].value));
+  const means = meanings({ ops: opsOf(arrays), args: argsOf(arrays) }, leaf), meaning = (node) => means[number.get(node)];
+  const same = new Map([...graph.nodes].reverse().map((node) => [meaning(node), node])), alike = (node) => same.get(meaning(node));
+  const reach = new Map(marked.nodes.map((node) => [node, 0]));
   [...marked.outputs.values()].forEach((node, i) => reach.set(node, reach.get(node) | (1 << i)));
   for (const node of [...marked.nodes].reverse()) for (const arg of node.args) reach.set(arg, reach.get(arg) | reach.get(node));
   const cut = new Map();
@@ -89,23 +93,6 @@ function blame(system, formulation, graph) {
     edges: [...cut].flatMap(([target, slots]) => [...new Set(slots)].map((slot) => [target.args[slot], target])),
     cancelled: new Set([...marked.outputs.keys()].filter((_, i) => touched & ~left & (1 << i))),
   };
-}
-/** A function from a node to the one of `nodes` that computes the same from the same, if any. */
-function sameStructure(nodes) {
-  const numbers = new Map(), known = new Map(), found = new Map();
-  const number = (output) => {
-    for (const node of topological([output])) {
-      if (known.has(node)) continue;
-      const args = node.args.map((arg) => known.get(arg));
-      if (ROWS[node.op]?.commutative) args.sort((a, b) => a - b);
-      const key = node.args.length ? `${node.op} ${args.join(" ")}` : node.value === null ? `name ${node.name}` : `number ${node.value}`;
-      if (!numbers.has(key)) numbers.set(key, numbers.size);
-      known.set(node, numbers.get(key));
-    }
-    return known.get(output);
-  };
-  for (const node of nodes) if (!found.has(number(node))) found.set(number(node), node);
-  return (node) => found.get(number(node));
 }
 
 const joined = (words) => (words.length > 1 ? `${words.slice(0, -1).join(", ")} and ${words.at(-1)}` : words[0] ?? "");
