@@ -79,18 +79,11 @@ def test_the_spurious_branch_is_seen_at_once_and_gone_by_the_chain_rule(show):
     assert titles == ["link 1", "link 2", "link 3", "damping"]  # no column for the Euler step, which is not in it
 
 
-def test_hostile_names_stay_texts_in_the_browser(browser, tmp_path):
+def test_hostile_names_stay_texts_in_the_browser(visit, tmp_path):
     """Every panel is filled, wide and narrow, light and dark; nothing runs, and the policy has nothing to refuse."""
-    said = []
-    page = browser.new_page()
-    page.on("console", lambda message: said.append(message.text))
-    page.on("pageerror", lambda error: said.append(str(error)))
-    page.on("dialog", lambda dialog: (said.append(dialog.message), dialog.dismiss()))
     for text, width, scheme in ((HOSTILE[0], 1400, "light"), (HOSTILE[1], 390, "dark"), (HOSTILE[3], 390, "light")):
         (tmp_path / "page.html").write_text(hostile_page(text), encoding="utf-8")
-        page.set_viewport_size({"width": width, "height": 800})
-        page.emulate_media(color_scheme=scheme)
-        page.goto((tmp_path / "page.html").as_uri())
+        page = visit(tmp_path / "page.html", width=width, height=800, color_scheme=scheme)
         for _ in range(2):
             page.click("#unfold")
         for group in page.locator("g.item").all():
@@ -102,8 +95,6 @@ def test_hostile_names_stay_texts_in_the_browser(browser, tmp_path):
         assert page.locator("#results th").nth(1).text_content() == text
         assert page.locator("img, body script:not([type]) ~ script, [onpointerover], [onload], [onerror]").count() == 0
         assert page.evaluate("document.documentElement.scrollWidth <= innerWidth + 1")
-    page.close()
-    assert said == []
 
 
 def test_detail_goes_from_nodes_to_bodies_and_back(show):
