@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import cgraph as cg
-from viz import graph_svg, render_png, render_svg, theme, to_dot
-from viz.graph_drawing.render import LARGE, RenderError
+from viz import render_png, render_svg, theme, to_dot
+from viz.graph_drawing.render import RenderError
 
 
 def square() -> cg.Graph:
@@ -191,15 +191,3 @@ def test_without_resvg_the_error_names_the_extra(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setitem(sys.modules, "resvg_py", None)
     with pytest.raises(ImportError, match=r"pip install '\.\[viz\]'"):
         render_png("<svg/>")
-
-
-def test_a_notebook_gets_the_drawing() -> None:
-    assert graph_svg(square()) == render_svg(to_dot(square()))
-
-
-def test_a_notebook_is_spared_a_graph_that_is_too_large() -> None:
-    x = y = cg.variable("x")
-    for _ in range(LARGE):
-        y = cg.sin(y)
-    with pytest.raises(RenderError, match=f"{LARGE + 1} nodes are too many"):
-        graph_svg(cg.Graph([x], {"y": y}))

@@ -10,7 +10,7 @@ import pytest
 import cgraph as cg
 import dynamics as dyn
 import viz
-from viz.inspector import Page
+from viz.pages.html import Page
 
 
 def lagrangian(q, qd, t):
