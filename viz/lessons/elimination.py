@@ -10,8 +10,7 @@ from cgraph.extend import Array
 from dynamics import forward_dynamics, mass_matrix
 
 from ..pages.document import Table
-from ..pages.operations import graph_data
-from .subject import LARGEST, SHOWN, Screen, Subject, number
+from .subject import SHOWN, Screen, Subject, number
 
 _SAME = 1e-9  # of an inertia: a smaller difference is rounding
 
@@ -25,13 +24,7 @@ def elimination(subject: Subject) -> Screen:
     first, tip = escape(subject.joints[0]), escape(subject.joints[-1])
     same = locked - free <= _SAME * locked
     rows = [[name, number(matrix[i, i]), number(pivots[i])] for i, name in enumerate(subject.joints[:SHOWN])]
-    play = {
-        "kind": "elimination",
-        "graph": graph_data(graph),
-        "n": n,
-        "sliders": subject.sliders(),
-        "joints": subject.joints,
-    }
+    play = subject.play("elimination", {"graph": graph}, n=n, sliders=subject.sliders(), joints=subject.joints)
     size = len(forward_dynamics(subject.system).nodes)
     return Screen(
         "elimination",
@@ -56,7 +49,7 @@ def elimination(subject: Subject) -> Screen:
         f"take {size} nodes.</p>"
         + Table("Inertia felt at a joint", ["joint", "all others locked", "pivot"], rows).html(),
         "Take out joint after joint, from the tip. Orange: the pivot. Then bend the system and start again.",
-        play if len(graph.nodes) <= LARGEST and n <= 2 * SHOWN else None,
+        play if n <= 2 * SHOWN else None,
         f"The pivot is {number(free)}. A door with a second door hinged to it is easier to push than one with both in line "
         "and welded.",
     )

@@ -15,8 +15,7 @@ from ..graph_drawing.render import render_svg
 from ..pages.document import Picture, Table
 from ..pages.formulations import TITLES, WHY_FEWER, size_table
 from ..pages.mathml import equations
-from ..pages.operations import graph_data
-from .subject import LARGEST, SHOWN, Screen, Subject, lagrangian_graph, number
+from .subject import SHOWN, Screen, Subject, lagrangian_graph, number
 
 STEPS = (1.0, 0.1, 0.01, 1e-3, 1e-6)  # s
 DRAWN = 60  # nodes, at most, of a graph that is drawn
@@ -41,7 +40,13 @@ def euler_edge(subject: Subject) -> Screen:
         1 if stays else 0,
         _reveal(subject, errors, stays, verdict) + _second_try(subject, torque),
         "Move dt, and the state. Both torques are those of the graphs, computed in this page.",
-        _play(subject, right, wrong),
+        subject.play(
+            "step",
+            {"right": right, "wrong": wrong},
+            sliders=subject.sliders(),
+            joints=subject.joints[:SHOWN],
+            colors=[theme.FORMULATIONS["chain_rule"], theme.FORMULATIONS["euler_embedded"]],
+        ),
         f"At dt = 1e-6 s the largest error is {number(last)}. {_expected(stays, verdict)} Listen for “but velocity does move position!” True along a motion, and the chain "
         "rule uses it; not in ∂L/∂q̇, where a state is varied that nothing has moved yet.",
     )
@@ -136,16 +141,3 @@ def _drawing(subject: Subject) -> str:
         )
         pictures += Picture("", to_adaptive(svg), caption, None).html()
     return pictures
-
-
-def _play(subject: Subject, right: Graph, wrong: Graph) -> dict[str, object] | None:
-    if len(right.nodes) + len(wrong.nodes) > LARGEST:
-        return None
-    return {
-        "kind": "step",
-        "right": graph_data(right),
-        "wrong": graph_data(wrong),
-        "sliders": subject.sliders(),
-        "joints": subject.joints[:SHOWN],
-        "colors": [theme.FORMULATIONS["chain_rule"], theme.FORMULATIONS["euler_embedded"]],
-    }

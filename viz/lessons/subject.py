@@ -21,6 +21,7 @@ from dynamics.systems.model import Model
 from dynamics.systems.system import System
 
 from .. import theme
+from ..pages.operations import graph_data
 
 DT = 1e-3  # s, of the embedded formulations
 LARGEST = 4000  # nodes that the page computes many times a second
@@ -79,6 +80,12 @@ class Subject:
             {"name": name, "shown": self.shown(name), "low": -REACH, "high": REACH, "value": self.values[name]}
             for name in names
         ]
+
+    def play(self, kind: str, graphs: Mapping[str, Graph], **other: object) -> dict[str, object] | None:
+        """What the page's script draws by these graphs, at its state; None where they are too large for it."""
+        if sum([len(graph.nodes) for graph in graphs.values()]) > LARGEST:
+            return None
+        return {"kind": kind} | {name: graph_data(graph) for name, graph in graphs.items()} | other
 
     def shown(self, name: str) -> str:
         """Display name of an input, output or node."""

@@ -10,8 +10,7 @@ from cgraph.extend import Array
 from dynamics import inverse_dynamics
 
 from ..pages.document import Table
-from ..pages.operations import graph_data
-from .subject import LARGEST, SHOWN, Screen, Subject, number
+from .subject import SHOWN, Screen, Subject, number
 
 PARTS = ("inertia: what q̈ takes", "velocity: Coriolis, centrifugal, damping", "position: weight and springs")
 MOVED = 3  # joints with three sliders
@@ -32,13 +31,13 @@ def torque_parts(subject: Subject) -> Screen:
     rows = [[joint_name, *[number(value) for value in column], number(column.sum())]
             for joint_name, column in zip(subject.joints[:SHOWN], parts.T, strict=False)]  # fmt: skip
     table = Table("Parts of the torque", ["joint", "inertia", "velocity", "position", "torque"], rows)
-    play = {
-        "kind": "parts",
-        "graph": graph_data(graph),
-        "sliders": subject.sliders(("q", "qd", "qdd"), MOVED),
-        "joints": subject.joints[:SHOWN],
-        "parts": [part.partition(":")[0] for part in PARTS],
-    }
+    play = subject.play(
+        "parts",
+        {"graph": graph},
+        sliders=subject.sliders(("q", "qd", "qdd"), MOVED),
+        joints=subject.joints[:SHOWN],
+        parts=[part.partition(":")[0] for part in PARTS],
+    )
     return Screen(
         "why-this-torque",
         "Why this torque?",
@@ -51,7 +50,7 @@ def torque_parts(subject: Subject) -> Screen:
         "<p>The same graph of the torque, asked three times: at rest without acceleration, then with q̈ alone, then with "
         f"q̇ alone. The three add up to the torque.</p>{table.html()}",
         "Move the joints. Make the velocity part the largest; then find a place where holding still costs nothing.",
-        play if len(graph.nodes) <= LARGEST else None,
+        play,
         f"At {name} the parts are {', '.join(number(value) for value in parts[:, joint])}.",
     )
 

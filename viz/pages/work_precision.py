@@ -123,10 +123,6 @@ def _panels(content: Content, x: str, name: str) -> tuple[list[Panel], list[str]
     return [panel for panel in panels if any(len(line.x) for line in panel.lines)], shown
 
 
-def _maker(name: str) -> str:
-    return next((color for begin, color in theme.MAKERS.items() if name.startswith(begin)), theme.GRAY)
-
-
 def _best(ours: Sequence[Row], content: Content) -> list[Row]:
     """The one of ours that is fastest at the smallest error that any of them reaches within a factor of a hundred."""
     reached = [(min(point["error"] for point in curve["points"]), curve) for curve in ours if curve["points"]]
@@ -151,7 +147,8 @@ def _line(curve: Row, x: str, y: str, color: int | str, dashed: bool, before: st
 def _look(curve: Row) -> tuple[int | str, bool]:
     """Color and dashes of a curve, the same on every page: one for every method of ours, and every maker of others."""
     if not curve["ours"]:
-        return _maker(curve["name"]), False
+        color = [color for begin, color in theme.MAKERS.items() if curve["name"].startswith(begin)]
+        return next(iter(color), theme.GRAY), False
     name = curve["name"].partition(" ")[0]
     number = theme.METHODS.index(name) if name in theme.METHODS else len(theme.METHODS)
     return number, number >= len(COLORS)

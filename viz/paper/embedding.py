@@ -48,7 +48,10 @@ def embedding(links: Sequence[int] = LINKS) -> Part:
         ),
     ]
     data = {
-        f"{law.formulation} n={law.n}": {"slope": _finite(law.slope), "limit": float(np.abs(law.limit).max())}
+        f"{law.formulation} n={law.n}": {
+            "slope": law.slope if np.isfinite(law.slope) else None,
+            "limit": float(np.abs(law.limit).max()),
+        }
         for law in laws
     }
     return Part("law", "How wrong, and why dt does not help", blocks, data)
@@ -70,7 +73,3 @@ def _panels(laws: Sequence[EmbeddingError]) -> list[Panel]:
     top = 4.0 * max(max(line.y) for line in panels[1].lines)
     panels[1].lines.append(Line("slope 1", steps, [top * dt / steps[0] for dt in steps], None))
     return panels
-
-
-def _finite(value: float) -> float | None:
-    return value if np.isfinite(value) else None
