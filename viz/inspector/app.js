@@ -226,7 +226,7 @@ function pick(app, node) {
 function goTo(app, node) {
   const c = app.plan.cluster[app.plan.place[app.index][node]];
   if (c >= 0) {
-    const column = app.plan.columns.indexOf(app.plan.clusters[c].column);
+    const column = app.plan.columnOf[c];
     if (app.view.closed.has(column)) toggle(app, "closed", column);
     if (app.view.folded.has(c)) toggle(app, "folded", c);
   }

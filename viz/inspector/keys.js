@@ -34,7 +34,7 @@ function zoom(app, factor, x, y) {
 
 /** Move the picture so that a node is in it. */
 function center(app, node) {
-  const at = app.drawn.items.get(app.drawn.shownBy[node])?.at;
+  const at = shownAs(app, node)?.at;
   if (!at) return;
   const { width, height } = app.svg.getBoundingClientRect(), { k } = app.seen;
   const x = app.seen.x + (at.x + at.w / 2) * k, y = app.seen.y + (at.y + at.h / 2) * k;
@@ -82,7 +82,7 @@ function listenToPointers(app, { hovered, clicked }) {
 function walk(app, key) {
   const { version, drawn } = app, node = app.picked >= 0 ? app.picked : version.outputs[0][2];
   if (app.picked < 0) { pick(app, node); center(app, node); return; }
-  const here = drawn.items.get(drawn.shownBy[node]);
+  const here = shownAs(app, node);
   const next = {
     ArrowUp: () => version.users[node][0],
     ArrowDown: () => version.args[node].find((arg) => !version.constants.has(arg)),
@@ -110,7 +110,7 @@ function foldHere(app) {
   if (app.picked < 0) return;
   const c = app.plan.cluster[app.plan.place[app.index][app.picked]];
   if (c < 0) return;
-  const column = app.plan.columns.indexOf(app.plan.clusters[c].column);
+  const column = app.plan.columnOf[c];
   if (app.view.closed.has(column)) toggle(app, "closed", column); else toggle(app, "folded", c);
 }
 

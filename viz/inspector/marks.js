@@ -94,11 +94,13 @@ function trace(app, id) {
   }
 }
 
-/** What shows a node: itself or the box that it is in, and the outputs that it is. */
+/** What shows a node: itself or the box that it is in. */
+const shownAs = ({ drawn }, node) => drawn.items.get(drawn.shownBy[node]);
+
+/** The same, and the outputs that it is. */
 function shapesOf(app, node) {
-  const { drawn } = app;
-  const outputs = [...drawn.items.values()].filter((item) => item.output && item.nodes.includes(node));
-  return [drawn.items.get(drawn.shownBy[node]), ...outputs].filter(Boolean);
+  const outputs = [...app.drawn.items.values()].filter((item) => item.output && item.nodes.includes(node));
+  return [shownAs(app, node), ...outputs].filter(Boolean);
 }
 
 function markPicked(app) {
@@ -115,7 +117,7 @@ function paintSweep(app) {
   if (app.sweep < 0) return;
   app.drawn.items.forEach((item) => { if (item.nodes.some((node) => passed(app, node))) item.group.classList.add("done"); });
   const node = nodeAtStep(app);
-  if (node >= 0) app.drawn.items.get(app.drawn.shownBy[node])?.group.classList.add("current");
+  if (node >= 0) shownAs(app, node)?.group.classList.add("current");
 }
 
 function paintPath(app) {
@@ -123,7 +125,7 @@ function paintPath(app) {
   app.svg.classList.toggle("tracing", Boolean(app.path));
   if (!app.path) return;
   const last = app.path.at(-1), { drawn } = app;
-  app.path.slice(0, -1).forEach((node) => drawn.items.get(drawn.shownBy[node])?.group.classList.add("onpath"));
+  app.path.slice(0, -1).forEach((node) => shownAs(app, node)?.group.classList.add("onpath"));
   shapesOf(app, last).forEach((item) => item.group.classList.add("onpath"));
   const steps = new Set([...app.path.slice(1).map((node, i) => `${app.path[i]} ${node}`), `${last} ${last}`]); // to an output
   for (const { path, pairs } of drawn.arrows) if (pairs.some(([s, t]) => steps.has(`${s} ${t}`))) path.classList.add("onpath");

@@ -8,7 +8,8 @@ const MANY = 60; // clusters; above, they are not split by energy
 const STAGES = ["as written", "reverse sweep", "forward sweep", "both sweeps"];
 const natural = new Intl.Collator("en", { numeric: true }).compare; // link 2 before link 10
 
-/** { clusters, columns, parents, stages, place, cluster }: of each version the place of every node, of each place its cluster.
+/** { clusters, columns, columnOf, parents, stages, place, cluster }: of a cluster its column, of each version the place of every
+ * node, of each place its cluster.
  *
  * A cluster is { column, stage, title, marked }. LEAF and RESULT stand for one: inputs, and sums that are outputs. */
 const LEAF_PLACE = -1, RESULT_PLACE = -2;
@@ -48,7 +49,7 @@ function placesOf(record, versions) {
   const clusters = [...keys.values()].sort(order), number = new Map(clusters.map((each, c) => [JSON.stringify(each), c]));
   const parents = new Map(record.columns);
   return {
-    clusters, columns, place, first, stages,
+    clusters, columns, place, first, stages, columnOf: clusters.map(({ column }) => columns.indexOf(column)),
     parents: columns.map((name) => columns.indexOf(parents.get(name))),
     tree: columns.map((name) => parents.has(name)),
     cluster: clusterKeys.map((key) => number.get(key) ?? Number(key)),

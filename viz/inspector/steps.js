@@ -60,8 +60,8 @@ function paintLesson(app) {
   clear(app, "lit", "past", "result");
   app.svg.classList.toggle("teaching", app.lesson >= 0);
   if (app.lesson < 0) return;
-  const { steps } = app.version, { drawn } = app;
-  const mark = (nodes, name) => nodes.forEach((node) => drawn.items.get(drawn.shownBy[node])?.group.classList.add(name));
+  const { steps } = app.version;
+  const mark = (nodes, name) => nodes.forEach((node) => shownAs(app, node)?.group.classList.add(name));
   steps.slice(0, app.lesson).forEach((step) => mark(step.nodes, "past"));
   mark(steps[app.lesson].nodes, "lit");
   shapesOf(app, steps[app.lesson].value).forEach((item) => item.group.classList.add("result"));
