@@ -10,6 +10,7 @@ import pytest
 import cgraph as cg
 import dynamics as dyn
 import viz
+from tests.each_row import each_row
 from tests.hostile_texts import HOSTILE, hostile_page
 from viz import cli, theme
 
@@ -51,7 +52,7 @@ FIRST = """() => {
 }"""  # noqa: E501 (a program)
 
 
-@pytest.mark.parametrize("scene", ["triple_pendulum", "spring_mass"])
+@each_row("scene", ["triple_pendulum", "spring_mass"])
 def test_the_first_view_is_whole_and_can_be_read(show, scene):
     page = show(scene)
     for version in "123":
@@ -253,7 +254,7 @@ def test_the_motion_moves_the_values_and_the_tables(show):
     assert page.inner_text("#clock") == f"{80 * 3.0 / 89:.2f} s"
 
 
-@pytest.mark.parametrize("links", [2, 3, 4, 10])
+@each_row("links", [2, 3, 4, 10])
 def test_no_table_is_cut_beside_the_picture_or_below_it(visit, tmp_path, links):
     """Rows and columns change places where that makes it fit; a table of many of both stands below the picture."""
     viz.inspect(dyn.scenes.load("chain", n=links), tmp_path / "arm.html", t_end=1.0)

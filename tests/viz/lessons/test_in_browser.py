@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
+
 import pytest
 
 import dynamics as dyn
 import viz
+from tests.each_row import each_row
 
 
 @pytest.fixture(scope="module")
@@ -40,8 +43,7 @@ def test_keys_are_enough(show):
     assert page.locator("#euler-edge .reveal[open]").count() == 1
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("width", [390, 1400])
+@each_row(("width", "scheme"), itertools.product((390, 1400), ("light", "dark")))
 def test_every_screen_fits_and_can_be_read(show, width, scheme):
     page = show(width=width, color_scheme=scheme)
     for k in range(6):

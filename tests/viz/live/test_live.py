@@ -166,7 +166,7 @@ def test_a_clock_that_goes_back_makes_no_step(script):
     assert script("run.advance(1.5 * data.dt)") == 1
 
 
-@pytest.mark.parametrize("dt", [1e-6, 1e-2, 0.1, 10.0])
+@each_row("dt", [1e-6, 1e-2, 0.1, 10.0])
 def test_the_course_to_come_is_short_and_smooth_whatever_dt_is(dt, script):
     """A picture takes no longer with a shorter dt, and the reference keeps its corners small with a longer one."""
     count, fine, end = script(
@@ -217,7 +217,7 @@ def test_the_clock_keeps_up_with_real_time_and_says_where_it_cannot(seconds, scr
     assert script("run.state.slow") is True
 
 
-@pytest.mark.parametrize("dt", [1e-7, 1e-3, 0.1, 10.0, 1e6])
+@each_row("dt", [1e-7, 1e-3, 0.1, 10.0, 1e6])
 def test_a_frame_takes_so_many_steps_at_most_whatever_dt_is(dt, script):
     counted = "{ ...machine, step: (inputs, method, h, count) => { steps += count; } }"
     script.engine.eval(f"var steps = 0, counting = liveRun({counted}, data); counting.state.dt = {dt}")
@@ -236,7 +236,7 @@ def test_a_value_that_is_no_number_is_not_taken(script):
 # What is made of a scene.
 
 
-@pytest.mark.parametrize("name", ["spring_mass", "triple_pendulum", "chain"])
+@each_row("name", ["spring_mass", "triple_pendulum", "chain"])
 def test_the_graphs_of_a_scene_say_what_the_library_says(name):
     scene = dyn.scenes.load(name) if name != "chain" else dyn.scenes.load(name, n=3)
     found = live_of(scene)
@@ -251,7 +251,7 @@ def test_the_graphs_of_a_scene_say_what_the_library_says(name):
     assert shown["energy"] == pytest.approx(shown["kinetic"] + shown["potential"])
 
 
-@pytest.mark.parametrize("name", ["spring_mass", "triple_pendulum"])
+@each_row("name", ["spring_mass", "triple_pendulum"])
 def test_in_momentum_form_the_state_is_of_momenta_and_moves_alike(name):
     scene = dyn.scenes.load(name)
     found, usual = live_of(scene, momentum=True), live_of(scene)

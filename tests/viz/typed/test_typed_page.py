@@ -11,6 +11,7 @@ import pytest
 import cgraph as cg
 import dynamics as dyn
 import viz
+from tests.each_row import each_row
 from tests.viz.typed.typed_script import run_typed
 from viz import cli
 
@@ -30,7 +31,7 @@ SYSTEMS = {
 }
 
 
-@pytest.mark.parametrize("name", SYSTEMS)
+@each_row("name", SYSTEMS)
 def test_a_system_written_as_text_means_the_same(name):
     """Node for node, as tags, which a text has not, do not change what is made."""
     system = SYSTEMS[name].system
@@ -70,7 +71,7 @@ def test_names_that_mean_something_in_a_text_are_renamed():
         assert run_typed(read, viz.typed_text(system, [0.3], [0.4])) == [[2.0], [0.3], [0.4], [0], 0], name
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("model", "kind", "words"),
     [
         (3, TypeError, "expected a System, a mechanism or a scene, got int: 3"),
