@@ -12,7 +12,6 @@ from ..pages.html import Page, Panel, asset
 from ..pages.operations import operations
 
 FILES = (
-    "tokens.js",
     "expressions.js",
     "statements.js",
     "system.js",
