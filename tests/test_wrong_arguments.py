@@ -282,7 +282,6 @@ CALLS = {
     "dyn.scenes.chain": call(dyn.scenes.chain, 2),
     "dyn.scenes.triple_pendulum": call(dyn.scenes.triple_pendulum, "rod"),
     "dyn.cases.load": call(dyn.cases.load, "exponential decay"),
-    "viz.graph_svg": call(viz.graph_svg, GRAPH),
     "viz.lesson": call(viz.lesson, ARM, None),
     "viz.animate": call(
         viz.animate, ARM, dyn.simulate(ARM, [0.1], [0.0], 0.04), None, kind=None, wanted=lambda t: t[:, np.newaxis],
@@ -623,7 +622,6 @@ GRAPH_FIRST = [
     (cg.why, ("y", "x")),
     (cg.why_not, ("y", "x")),
     (dyn.spurious_nodes, ()),
-    (viz.graph_svg, ()),
     (viz.page, ()),
     (viz.to_dot, ()),
 ]

@@ -8,7 +8,7 @@ if TYPE_CHECKING:
     from cgraph import __version__ as __version__
 
     from .graph_drawing.dot import to_dot
-    from .graph_drawing.render import graph_svg, render_png, render_svg
+    from .graph_drawing.render import render_png, render_svg
     from .inspector.page import page
     from .lessons.lesson import lesson
     from .models.animate import animate
@@ -21,7 +21,6 @@ if TYPE_CHECKING:
 __all__ = [
     "animate",
     "driven",
-    "graph_svg",
     "inspect",
     "lesson",
     "live_page",

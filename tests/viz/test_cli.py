@@ -43,7 +43,7 @@ def test_scenes_are_listed_with_the_sizes_of_their_graphs(capsys):
     assert "triple_pendulum" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("suffix", [".dot", ".txt", ".svg", ".png"])
+@each_row("suffix", [".dot", ".txt", ".svg", ".png"])
 def test_a_scene_is_drawn_or_listed(tmp_path, capsys, suffix):
     target = tmp_path / f"graph{suffix}"
     assert cli.main(["draw", "spring_mass", "--formulation", "euler_embedded", "--out", str(target)]) == 0
@@ -272,7 +272,7 @@ def test_the_version_is_one(capsys):
     assert re.fullmatch(r"\d+\.\d+\.\d+\S*", cg.__version__)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("line", "expected"),
     [
         ("cgraph insp", {"inspect"}),

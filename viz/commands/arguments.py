@@ -189,12 +189,16 @@ def check_picture(options: argparse.Namespace) -> None:
         library.check_can_draw(png=False)
 
 
-def answer_and_draw(options: argparse.Namespace, text: str, graph: cg.Graph, **marks: Any) -> None:
+def answer_and_draw(
+    options: argparse.Namespace, text: str, graph: cg.Graph, scene: dyn.scenes.Scene, **marks: Any
+) -> None:
     """The end of a command, with the drawing that `--svg` asks for.  marks: as `to_dot` takes them."""
     if not options.svg:
         answer(text)
         return
-    answer(text, {options.svg: library.render_svg(library.to_dot(graph, collapse=collapsed(graph), **marks))})
+    names = library.theme.called(dyn.display_names(scene))
+    drawing = library.to_dot(graph, collapse=collapsed(graph), names=names, **marks)
+    answer(text, {options.svg: library.render_svg(drawing)})
     say(f"drawn in {options.svg}")
 
 

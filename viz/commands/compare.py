@@ -77,8 +77,8 @@ def run(options: argparse.Namespace) -> int:
         options,
         unless_json(options, data, "\n".join([*lines, str(comparison), *told])),
         together.graph,
+        scene,
         marked=dict(zip(*groups, strict=True)),
-        names=library.theme.called(called),
         caption=f"{scene.name}: {' and '.join(named.values())} in one".replace("_", " "),
     )
     return 1 if any(only) else 0

@@ -84,12 +84,12 @@ def run(options: argparse.Namespace) -> int:
         options,
         unless_json(options, data, proof),
         graph,
+        scene,
         marked=(verdict.nodes if verdict else frozenset())
         .union(*[each.nodes for each in faults])
         .intersection(graph.nodes),
         marked_label="to blame",
         marked_edges=(verdict.edges | report.edges if verdict.differs else frozenset()) if verdict else report.edges,
-        names=library.theme.called(dyn.display_names(scene)),
         caption=f"{scene.name}: {what}",
     )
     return 0 if ok and held.ok else 1

@@ -65,8 +65,8 @@ def run(options: argparse.Namespace) -> None:
         options,
         unless_json(options, {"depends": True, "of_the_tree": bool(alone), "at": at} | found.to_dict() | balance, text),
         graph,
+        scene,
         marked_edges=found.edges,
-        names=library.theme.called(dyn.display_names(scene)),
         caption=f"{found.output} depends on {found.input}: {len(found.paths)} of {found.count} paths",
     )
 
@@ -87,11 +87,11 @@ def _not_connected(options: argparse.Namespace, scene: dyn.scenes.Scene, names: 
             "\n".join(filter(None, [str(stops), alone, constant])),
         ),
         graph,
+        scene,
         marked={
             f"made from {stops.input}": stops.reached & here,
             f"{stops.output} is made from it": stops.made_from & here,
         },
-        names=library.theme.called(dyn.display_names(scene)),
         caption=f"{stops.output} does not depend on {stops.input}",
     )
 

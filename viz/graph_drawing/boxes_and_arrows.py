@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from cgraph import Edge, Graph, Node
-from cgraph.extend import Names, columns
+from cgraph.extend import Names, columns, counted
 
 from .. import theme
 from ..theme import Paint
@@ -124,7 +124,7 @@ def _part_boxes(subject: _Subject, collapse: Sequence[str]) -> Iterator[Box]:
         part = f"c{i}"
         if not sizes[part]:  # every node of this tag belongs to an earlier one
             continue
-        words = f"{sizes[part]} node{'s' if sizes[part] > 1 else ''}"
+        words = counted(sizes[part], "node")
         marks = {paint: count for (box, paint), count in marked.items() if box == part}
         words += "".join([f", {count} {paint.words}" for paint, count in marks.items()])
         kind = next(iter(marks), theme.COLLAPSED)
@@ -180,7 +180,7 @@ def _arrows(subject: _Subject) -> Iterator[Arrow]:
     for (tail, head), edges in merged.items():
         mark = next(filter(None, [subject.mark_of(edge) for edge in edges]), None)
         ends = f"from {subject.told(edges[0].source)} to {subject.told(edges[0].target)}"
-        about = f"{len(edges)} edge{'s' if len(edges) > 1 else ''} {ends}"
+        about = f"{counted(len(edges), 'edge')} {ends}"
         attributes = {"id": f"e{tail.removeprefix('n')}-{head.removeprefix('n')}", "edgetooltip": about}
         if len(edges) > 1:
             attributes["label"] = f"×{len(edges)}"

@@ -116,7 +116,7 @@ def to_dot(
         require_texts("names", names),
         {} if formulas is None else require_mapping("formulas", formulas, "node: text"),
         _marks(marked, marked_label),
-        _edges(marked_edges),
+        frozenset(require_sequence("marked_edges", marked_edges, "edges", tuple)),
         _cluster_rule(clusters),
         require_sequence("collapse", collapse, "tags", str),
     )
@@ -129,10 +129,6 @@ def to_dot(
         draw_legend(drawing, theme.in_words(plan.kinds, words), vertical=rankdir in ("BT", "TB"))
     draw_arrows(drawing, plan.arrows)
     return drawing
-
-
-def _edges(marked: Collection[Edge]) -> frozenset[Edge]:
-    return frozenset(require_sequence("marked_edges", marked, "edges", tuple))
 
 
 def _marks(marked: Collection[Node] | Mapping[str, Collection[Node]], words: str) -> dict[Node, Paint]:
@@ -167,6 +163,16 @@ def _cluster_rule(clusters: bool | Sequence[str] | ClusterRule) -> ClusterRule:
     given = [clusters] if isinstance(clusters, str) else clusters
     chosen = frozenset(require_sequence("clusters", given, "tags, or True, False or a function of a node", str))
     return lambda node: _only(node.tags & chosen)
+
+
+def plain_drawing(
+    graph: Graph, names: Mapping[str, str], marked: Collection[Node] = (), marked_edges: Collection[Edge] = ()
+) -> Digraph:
+    """The drawing of a small graph with short formulas, without frames and legend; arguments as of `to_dot`."""
+    formulas = short_formulas(graph, names)
+    return to_dot(
+        graph, names=names, formulas=formulas, marked=marked, marked_edges=marked_edges, clusters=False, legend=False
+    )
 
 
 LENGTH = 10  # characters that fit a node

@@ -14,9 +14,9 @@ LINE, SWATCH, GAP = 20, 14, 6  # points: of an entry's height, of its square, an
 LETTER = 0.6  # of the font's size, the width of a letter
 
 
-def kinds_in(graph: Graph, marked: Collection[Node] = frozenset()) -> list[Paint]:
-    """The kinds of nodes that a drawing of the graph has, in the order of the theme."""
-    roles = {theme.role_of(node) for node in graph.nodes if node not in marked}
+def kinds_in(*graphs: Graph, marked: Collection[Node] = frozenset()) -> list[Paint]:
+    """The kinds of nodes that drawings of the graphs have, in the order of the theme."""
+    roles = {theme.role_of(node) for graph in graphs for node in graph.nodes if node not in marked}
     kinds = [paint for role, paint in theme.ROLES.items() if role in roles]
     return [*kinds, theme.OUTPUT, *([theme.MARKED] if marked else [])]
 

@@ -13,7 +13,7 @@ from typing import NamedTuple, Protocol
 from xml.etree import ElementTree
 
 from cgraph import Graph, constant
-from cgraph.extend import install, memo, real_number, require_choice, require_graph
+from cgraph.extend import install, memo, real_number, require_choice
 
 from .. import theme
 from .dot import to_dot
@@ -191,37 +191,6 @@ def tags_to_collapse(graph: Graph) -> list[str]:
         return []
     sizes = Counter([tag for node in graph.nodes for tag in node.tags])
     return sorted(sizes, key=lambda tag: (sizes[tag], theme.natural_order(tag)))
-
-
-def graph_svg(graph: Graph) -> str:
-    """The drawing of a graph that a notebook shows (entry point `svg` of the group `cgraph.renderers`).
-
-    Parameters
-    ----------
-    graph : Graph
-        A graph of at most `LARGE` nodes.
-
-    Returns
-    -------
-    str
-        SVG text, drawn by `to_dot` with its defaults.
-
-    Raises
-    ------
-    RenderError
-        Above `LARGE` nodes, and where `render_svg` does; the notebook then shows the text form.
-
-    Examples
-    --------
-    >>> import cgraph as cg
-    >>> x = cg.variable("x")
-    >>> graph_svg(cg.Graph([x], {"y": cg.sin(x)})).startswith("<svg")
-    True
-    """
-    require_graph("graph_svg", graph)
-    if len(graph.nodes) > LARGE:
-        raise RenderError(f"{len(graph.nodes)} nodes are too many for one picture: collapse tags with viz.to_dot")
-    return render_svg(to_dot(graph), timeout=20.0)
 
 
 POINTS = 72.0  # in an inch, the unit of Graphviz; a point of its SVG is a pixel here

@@ -81,8 +81,8 @@ function compute(app) {
 }
 
 function boundsIn(app, graph, slopes, values) {
-  const errors = app.state.errorsOf(graph), bounds = errorBounds(graph, slopes, values, errors);
-  return app.state.solved ? bounds : sharpened(graph, slopes, values, bounds, errors);
+  const own = ownErrors(graph, values, app.state.errorsOf(graph)), bounds = errorBounds(graph, slopes, own, 0);
+  return app.state.solved ? bounds : sharpened(graph, slopes, values, bounds, own);
 }
 
 /** Noise of a graph's values: computed only where an output may be noise. */
@@ -226,7 +226,7 @@ function pick(app, node) {
 function goTo(app, node) {
   const c = app.plan.cluster[app.plan.place[app.index][node]];
   if (c >= 0) {
-    const column = app.plan.columns.indexOf(app.plan.clusters[c].column);
+    const column = app.plan.columnOf[c];
     if (app.view.closed.has(column)) toggle(app, "closed", column);
     if (app.view.folded.has(c)) toggle(app, "folded", c);
   }

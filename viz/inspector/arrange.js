@@ -104,13 +104,13 @@ function overview(plan, aspect = CELL.aspect) {
 /** Columns side by side, in as few bands as the picture needs; rows by sweep. */
 function columnsIn(plan, folded, closed, aspect) {
   const sizes = plan.clusters.map((cluster, c) => {
-    if (folded.has(c) || closed.has(plan.columns.indexOf(cluster.column))) return { w: BOX.width, h: BOX.height };
+    if (folded.has(c) || closed.has(plan.columnOf[c])) return { w: BOX.width, h: BOX.height };
     const { width, height } = innerOf(plan, c);
     return { w: Math.max(width + 2 * BOX.pad, 7 * titleOf(cluster).length + 54), h: height + BOX.title + BOX.pad };
   });
   const cells = new Map();
   plan.clusters.forEach((cluster, c) => {
-    const column = plan.columns.indexOf(cluster.column), key = `${column} ${cluster.stage}`;
+    const column = plan.columnOf[c], key = `${column} ${cluster.stage}`;
     if (!closed.has(column)) cells.set(key, [...(cells.get(key) ?? []), c]);
   });
   const flowed = new Map([...cells].map(([key, own]) => [key, flow(own, sizes)]));

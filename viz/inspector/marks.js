@@ -1,4 +1,62 @@
-// Marks in the picture: what a node needs and what needs it, paths, steps of a sweep, what was found.
+// Marks in the picture: what a node needs and what needs it, paths and how many there are, steps of a sweep, what was found.
+
+/** Marks (1) on a node and all that it needs, or with `users` all that need it. */
+function reach(neighbours, start) {
+  const found = new Uint8Array(neighbours.length);
+  const stack = [start];
+  found[start] = 1;
+  while (stack.length) {
+    for (const next of neighbours[stack.pop()]) {
+      if (!found[next]) { found[next] = 1; stack.push(next); }
+    }
+  }
+  return found;
+}
+
+/** The number of paths from source to sink, exact. */
+function pathCount(version, source, sink) {
+  const counts = new Map([[source, 1n]]);
+  for (let node = source + 1; node <= sink; node++) {
+    let sum = 0n;
+    for (const arg of version.args[node]) sum += counts.get(arg) ?? 0n;
+    if (sum) counts.set(node, sum);
+  }
+  return counts.get(sink) ?? 0n;
+}
+
+/** The k paths of the greatest |product of slopes|, as [{ nodes, slots, product }]; those with a zero are left out.
+ *
+ * slots: by which argument each node but the first is reached. */
+function heaviest(version, slopes, source, sink, k) {
+  const needed = reach(version.args, sink);
+  const best = new Map([[source, [{ node: source, weight: 0, product: 1, before: null }]]]);
+  for (let node = source + 1; node <= sink; node++) {
+    if (!needed[node]) continue;
+    const ways = [];
+    version.args[node].forEach((arg, slot) => {
+      const slope = slopes[node][slot];
+      if (slope === 0 || !Number.isFinite(slope)) return;
+      for (const way of best.get(arg) ?? []) {
+        ways.push({ node, slot, weight: way.weight + Math.log(Math.abs(slope)), product: way.product * slope, before: way });
+      }
+    });
+    if (ways.length) best.set(node, ways.sort((a, b) => b.weight - a.weight).slice(0, k));
+  }
+  return (best.get(sink) ?? []).map((end) => {
+    const nodes = [], slots = [];
+    for (let way = end; way; way = way.before) {
+      nodes.unshift(way.node);
+      if (way.before) slots.unshift(way.slot);
+    }
+    return { nodes, slots, product: end.product };
+  });
+}
+
+/** A whole number in at most some 15 digits: 12345, or 3.21e+41. */
+function digits(count) {
+  const text = count.toString();
+  return text.length <= 15 ? text : `${text[0]}.${text.slice(1, 3)}e+${text.length - 1}`;
+}
 
 const clear = (app, ...names) => names.forEach((name) => app.svg.querySelectorAll(`.${name}`).forEach((each) => each.classList.remove(name)));
 
@@ -36,11 +94,13 @@ function trace(app, id) {
   }
 }
 
-/** What shows a node: itself or the box that it is in, and the outputs that it is. */
+/** What shows a node: itself or the box that it is in. */
+const shownAs = ({ drawn }, node) => drawn.items.get(drawn.shownBy[node]);
+
+/** The same, and the outputs that it is. */
 function shapesOf(app, node) {
-  const { drawn } = app;
-  const outputs = [...drawn.items.values()].filter((item) => item.output && item.nodes.includes(node));
-  return [drawn.items.get(drawn.shownBy[node]), ...outputs].filter(Boolean);
+  const outputs = [...app.drawn.items.values()].filter((item) => item.output && item.nodes.includes(node));
+  return [shownAs(app, node), ...outputs].filter(Boolean);
 }
 
 function markPicked(app) {
@@ -57,7 +117,7 @@ function paintSweep(app) {
   if (app.sweep < 0) return;
   app.drawn.items.forEach((item) => { if (item.nodes.some((node) => passed(app, node))) item.group.classList.add("done"); });
   const node = nodeAtStep(app);
-  if (node >= 0) app.drawn.items.get(app.drawn.shownBy[node])?.group.classList.add("current");
+  if (node >= 0) shownAs(app, node)?.group.classList.add("current");
 }
 
 function paintPath(app) {
@@ -65,7 +125,7 @@ function paintPath(app) {
   app.svg.classList.toggle("tracing", Boolean(app.path));
   if (!app.path) return;
   const last = app.path.at(-1), { drawn } = app;
-  app.path.slice(0, -1).forEach((node) => drawn.items.get(drawn.shownBy[node])?.group.classList.add("onpath"));
+  app.path.slice(0, -1).forEach((node) => shownAs(app, node)?.group.classList.add("onpath"));
   shapesOf(app, last).forEach((item) => item.group.classList.add("onpath"));
   const steps = new Set([...app.path.slice(1).map((node, i) => `${app.path[i]} ${node}`), `${last} ${last}`]); // to an output
   for (const { path, pairs } of drawn.arrows) if (pairs.some(([s, t]) => steps.has(`${s} ${t}`))) path.classList.add("onpath");

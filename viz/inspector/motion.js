@@ -1,4 +1,73 @@
-// The motion: its instants, played or chosen, and the mechanism in them.
+// The motion: its instants, played or chosen, and the mechanism in them as sticks.
+
+const FOLLOW = 5; // how much larger than the mechanism its way is where the frame goes with it
+
+const TURN = 1.5 * Math.PI; // what the largest torque is drawn as
+
+/** A view of the motion: functions that draw a frame, mark a joint and paint torques, and words for what is seen. */
+function armView(svg, motion) {
+  const range = (values) => [values.reduce((a, b) => Math.min(a, b), Infinity), values.reduce((a, b) => Math.max(a, b), -Infinity)];
+  const center = (points) => [0, 1].map((k) => { const [a, b] = range(points.map((each) => each[k])); return (a + b) / 2; });
+  const middles = motion.points.map(center);
+  const reach = motion.points.reduce((most, points, i) => points.reduce((far, [x, y]) => (
+    Math.max(far, Math.abs(x - middles[i][0]), Math.abs(y - middles[i][1]))), most), 0);
+  const [left, right] = range([0, ...motion.points.flat().map(([x]) => x)]);
+  const [low, high] = range([0, ...motion.points.flat().map(([, y]) => y)]);
+  const way = Math.max(right - left, high - low), size = way || 1;
+  const follows = way > FOLLOW * 2 * reach;
+  const half = follows ? Math.max(1.5 * reach, size / 100) : 0.58 * size;
+  svg.replaceChildren();
+  const r = half / 26, step = nice(0.8 * half);
+  const grid = element("path", { class: "grid", "stroke-width": r / 4 }, svg);
+  element("path", { class: "ground", d: `M${-4 * r} 0H${4 * r}`, "stroke-width": r / 2 }, svg);
+  const trace = element("path", { class: "trace", "stroke-width": r / 3 }, svg);
+  const sticks = motion.parents.map(() => element("path", { class: "stick", "stroke-width": 1.3 * r }, svg));
+  const joints = motion.parents.map(() => element("circle", { class: "joint", r, "stroke-width": r / 3 }, svg));
+  const turns = element("g", { class: "turns" }, svg);
+  const last = motion.parents.length - 1;
+  let points = motion.points[0];
+  const show = (frame, at = motion.points[frame]) => {
+    points = at;
+    const [cx, cy] = follows ? center(points) : [(left + right) / 2, (low + high) / 2];
+    svg.setAttribute("viewBox", `${cx - half} ${-cy - half} ${2 * half} ${2 * half}`);
+    if (follows) grid.setAttribute("d", lines(cx, cy, 2 * half, step));
+    points.forEach(([x, y], i) => {
+      const [px, py] = motion.parents[i] < 0 ? [x, y] : points[motion.parents[i]];
+      sticks[i].setAttribute("d", `M${px} ${-py}L${x} ${-y}`);
+      joints[i].setAttribute("cx", x);
+      joints[i].setAttribute("cy", -y);
+    });
+    const past = motion.points.slice(Math.max(0, frame - 40), frame + 1).map((each) => `${each[last][0]} ${-each[last][1]}`);
+    trace.setAttribute("d", `M${past.join("L")}`);
+  };
+  const mark = (joint) => joints.forEach((each, i) => each.setAttribute("class", i === joint ? "joint marked" : "joint"));
+  /** Torques as arcs about their joints, counterclockwise where positive: [[point, [share of the largest, of each part]]]. */
+  const paint = (torques) => {
+    turns.replaceChildren();
+    for (const [point, shares] of torques) shares.forEach((share, k) => {
+      const [x, y] = points[point], radius = r * (1.9 + 1.3 * k), turn = share * TURN;
+      if (Math.abs(turn) < 0.03) return;
+      const at = (angle, far = radius) => `${x + far * Math.sin(-angle)} ${-y - far * Math.cos(-angle)}`;
+      const back = turn - Math.sign(turn) * Math.min(0.35, Math.abs(turn));
+      element("path", { class: `turn part${k % 7}`, "stroke-width": 0.75 * r,
+        d: `M${at(0)}A${radius} ${radius} 0 ${Math.abs(turn) > Math.PI ? 1 : 0} ${turn > 0 ? 0 : 1} ${at(turn)}M${at(back, radius + 0.8 * r)}L${at(turn)}L${at(back, radius - 0.8 * r)}` }, turns);
+    });
+  };
+  const color = (parts) => sticks.forEach((each, i) => each.setAttribute("class", parts && motion.parents[i] >= 0 ? `stick part${motion.parents[i] % 7}` : "stick"));
+  return { show, mark, paint, color, words: follows ? `The frame goes with it; the lines stand still, ${+step.toPrecision(1)} m apart.` : "" };
+}
+
+/** The largest of 1, 2 and 5 times a power of ten up to a length. */
+function nice(length) {
+  const power = 10 ** Math.floor(Math.log10(length));
+  return [5, 2, 1].find((each) => each * power <= length) * power;
+}
+
+/** Lines of the world around a place, a step apart; twice as wide as high, for a wide picture. */
+function lines(cx, cy, half, step) {
+  const at = (middle) => Array.from({ length: 2 * Math.ceil(half / step) + 1 }, (_, i) => (Math.round(middle / step) + i - Math.ceil(half / step)) * step);
+  return [...at(cx).map((x) => `M${x} ${-cy - half}V${-cy + half}`), ...at(cy).map((y) => `M${cx - half} ${-y}H${cx + half}`)].join("");
+}
 
 const FPS = 30;
 const PARTS = 5; // columns of a table whose numbers are painted at the joints

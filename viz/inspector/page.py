@@ -18,9 +18,8 @@ from .content import Motion, State, StateTable, Version
 from .record import record
 
 SCRIPTS = (
-    "texts.js", "values.js", "state.js", "paths.js", "formula.js", "layers.js", "places.js",
-    "arrange.js", "picture.js", "view.js", "marks.js", "panels.js", "results.js", "sweeps.js", "lesson.js", "arm.js",
-    "motion.js", "keys.js", "app.js",
+    "state.js", "places.js", "arrange.js", "picture.js", "marks.js", "panels.js", "steps.js", "motion.js", "keys.js",
+    "app.js",
 )  # fmt: skip
 
 
@@ -127,7 +126,7 @@ def compose(title: str, data: Mapping[str, Json] | None, tables: Sequence[Table]
     added = "\n".join([panel.script for panel in panels])
     body = Template(asset(__package__, "page.html")).substitute(
         title=escape(title),
-        tables="".join(html.table(table.caption, table.header, table.rows) for table in tables),
+        tables="".join([table.html() for table in tables]),
         version=f"cgraph {__version__}",
         panels="".join([panel.body for panel in panels]),
     )
@@ -161,7 +160,7 @@ def _versions(graph: Graph | Sequence[Version], about: str, marked: frozenset[No
 
 def scripts() -> str:
     """The page's JavaScript: operations from their table, then the files."""
-    shared = asset(html.__package__, "elements.js", "address.js", "graph.js")
+    shared = asset(html.__package__, "elements.js", "tables.js", "address.js", "graph.js", "slopes.js")
     return "\n".join([operations(), shared, asset(__package__, *SCRIPTS)])
 
 

@@ -1,4 +1,75 @@
-// Words and numbers beside the picture: the node, why, results, inputs, counts, the legend.
+// Words, formulas and numbers beside the picture: the node, why, results, inputs, counts, the legend, tables.
+
+const quiet = (words) => tag("p", { class: "quiet" }, words);
+const rowHead = (...words) => tag("th", { scope: "row" }, ...words);
+const counted = (many, word) => `${many} ${word}${many === 1 ? "" : "s"}`;
+
+/** A number in three digits; at most `noise` in size it is rounding alone, and is 0. */
+function brief(value, noise = 0) {
+  if (Number.isNaN(value)) return "NaN";
+  if (!Number.isFinite(value)) return value > 0 ? "∞" : "−∞";
+  return Math.abs(value) <= noise ? "0" : numeral(value, 3).replace("e−", "e-");
+}
+
+/** A text of at most so many letters: of a longer one, its ends. */
+function fitted(text, most) {
+  const letters = [...text], room = Math.max(4, Math.floor(most) - 1);
+  if (letters.length <= room + 1) return text;
+  return `${letters.slice(0, Math.ceil(room / 2)).join("")}…${letters.slice(letters.length - Math.floor(room / 2)).join("")}`;
+}
+
+const MATHML = "http://www.w3.org/1998/Math/MathML";
+const BINDS = { sum: 1, function: 3, leaf: 4 }; // how strongly a text binds, as in the table of operations
+
+/** An element of MathML around texts and other elements; with attributes, too. */
+const mathWith = (name, attributes, ...inside) => filled(document.createElementNS(MATHML, name), attributes, inside);
+const math = (name, ...inside) => mathWith(name, {}, ...inside);
+const number = (value) => math("mn", Number.isFinite(value) ? String(+value.toPrecision(4)) : String(value));
+const parenthesis = (text) => mathWith("mo", { stretchy: "false" }, text);
+const fenced = (inside) => math("mrow", parenthesis("("), inside, parenthesis(")"));
+
+/** A node as an identifier: its name, or v with its number. */
+function symbol(version, node) {
+  const name = version.names[node];
+  return name ? math("mi", name[1]) : math("msub", math("mi", "v"), math("mn", String(node)));
+}
+
+/** The node's equation, `depth` operations deep. */
+function equation(version, node, depth) {
+  const kept = version.args[node].length
+    ? math("mrow", symbol(version, node), math("mo", "="), formula(version, node, depth, true)[0])
+    : math("mrow", symbol(version, node));
+  return mathWith("math", { display: "block" }, kept);
+}
+
+/** [MathML, how tightly it binds]. */
+function formula(version, node, depth, whole) {
+  if (version.constants.has(node)) {
+    const value = version.constants.get(node);
+    return [number(value), value < 0 ? BINDS.sum : BINDS.leaf];
+  }
+  const args = version.args[node];
+  if (!args.length || (!whole && (version.names[node] || depth <= 0))) return [symbol(version, node), BINDS.leaf];
+  const inner = args.map((arg) => formula(version, arg, depth - 1, false));
+  const known = FORMULA.get(version.ops[node]);
+  if (!known) {
+    const listed = inner.flatMap(([each], i) => (i ? [math("mo", ","), each] : [each]));
+    return [math("mrow", math("mi", version.ops[node]), fenced(math("mrow", ...listed))), BINDS.function];
+  }
+  const [template, least, binding] = known;
+  const fill = (part) => {
+    if (typeof part === "string") return part;
+    if (typeof part === "number") {
+      const [each, binds] = inner[part];
+      const filled = binds < least[part] ? fenced(each) : each;
+      return used.has(part) ? filled.cloneNode(true) : (used.add(part), filled); // an element has one place
+    }
+    const [name, attributes, ...inside] = part;
+    return mathWith(name, attributes, ...inside.map(fill));
+  };
+  const used = new Set();
+  return [fill(template), binding];
+}
 
 const PATHS = 5, DEPTH = 4;
 
@@ -105,7 +176,7 @@ function showCounts(app) {
   const ops = new Map();
   version.ops.forEach((op) => { ops.set(op, (ops.get(op) ?? 0) + 1); });
   const kinds = [...ops].sort((a, b) => b[1] - a[1]).map(([op, many]) => `${op} ${many}`);
-  byId("counts").replaceChildren(table(["nodes", "edges", "spurious"], rows),
+  byId("counts").replaceChildren(table(["", "nodes", "edges", "spurious"], rows),
     quiet(`Constants (${version.constants.size}) are written where they are used. ${kinds.join(", ")}.`));
 }
 
@@ -114,4 +185,73 @@ function showLegend(app) {
   const present = new Set(app.version.labels.map(([, role]) => role));
   if (app.version.marked.size || app.version.blamed.length) present.add("wrong");
   byId("legend").replaceChildren(...kinds.filter(([kind]) => present.has(kind)).map(([kind, words]) => tag("span", { class: kind }, words)));
+}
+
+const OFF = 0.01; // relative: what differs by more from the right version is marked
+const FITTING = 3; // columns of numbers for which there is room beside the picture
+
+const namedHead = (words, ...unit) => tag("th", { scope: "row", class: words.length > 16 ? "long" : "" }, words, ...unit);
+const largestOf = (values) => values.reduce((most, value) => (Number.isFinite(value) ? Math.max(most, Math.abs(value)) : most), 0);
+
+/** A table with a row for each name and a column for each head: its element, and its cells by row and column. */
+function numbers(app, heads, names) {
+  const cells = names.map(() => heads.map(() => tag("td")));
+  const rows = names.map(([name, words], i) => tag("tr", {}, namedHead(words, ...unitOf(app, name)), ...cells[i]));
+  return [scrolled(table(["", ...heads], rows)), cells];
+}
+function write(cell, text, kind = "") {
+  if (cell.textContent !== text) cell.textContent = text;
+  if (cell.className !== kind) cell.className = kind;
+}
+
+function makeResults(app) {
+  const { versions, tables } = app.state;
+  app.names = [...new Map(versions.flatMap((each) => each.outputs.map(([name, letters]) => [name, shownName(app, name, letters)])))];
+  app.right = versions.findLastIndex((each) => !each.flawed && versions.some((other) => other.flawed));
+  const [shown, cells] = numbers(app, versions.map((each) => each.name), app.names);
+  app.cells = cells;
+  byId("results").replaceChildren(shown, ...(app.right < 0 ? []
+    : [quiet(`In vermillion: differs from ${versions[app.right].name}. All at one state; 0 is what is below rounding.`)]));
+  byId("statetables").replaceChildren();
+  byId("wide").replaceChildren();
+  tables.forEach((each) => showTable(app, each));
+  for (const id of ["statetables", "wide"]) byId(id).hidden = !byId(id).children.length;
+}
+
+/** A table of the record: beside the picture, if need be with rows as columns; below it where both are many. */
+function showTable(app, each) {
+  const names = each.rows.map(([name]) => [name, shownName(app, name)]), wide = each.header.length > FITTING;
+  if (wide && names.length > FITTING) {
+    const [inside, cells] = numbers(app, each.header, names), made = tag("details", {}, tag("summary", {}, each.caption), inside);
+    made.ontoggle = () => dispatchEvent(new Event("resize")); // the picture has other room
+    each.cells = cells;
+    byId("wide").append(made);
+    return;
+  }
+  const unit = (name) => (app.units.has(name) ? ` [${app.units.get(name)}]` : "");
+  const [inside, cells] = wide ? numbers(app, names.map(([name, words]) => words + unit(name)), each.header.map((head) => ["", head]))
+    : numbers(app, each.header, names);
+  each.cells = wide ? names.map((_, i) => cells.map((row) => row[i])) : cells;
+  byId("statetables").append(tag("div", {}, tag("h2", {}, each.caption), inside));
+}
+
+/** Results of all versions at the one state, and what differs from the version that is right. */
+function showResults(app) {
+  const found = app.state.versions.map((each, i) => {
+    const own = i === app.index ? app.values : app.state.evaluate(each), noise = noiseIn(app, each, own);
+    return new Map(each.outputs.map(([name, , node]) => [name, [own[node], noise[node]]]));
+  });
+  app.names.forEach(([name], row) => found.forEach((each, column) => {
+    if (!each.has(name)) return;
+    const [value, noise] = each.get(name), [truth, blur] = found[app.right]?.get(name) ?? [value, 0];
+    const off = Math.abs(value - truth) > noise + blur + OFF * Math.max(Math.abs(value), Math.abs(truth));
+    write(app.cells[row][column], brief(value, noise), off ? "off" : "");
+  }));
+  for (const each of app.state.tables) {
+    const values = app.state.evaluate(each), noise = noiseIn(app, each, values);
+    each.rows.forEach(([, outputs], row) => outputs.forEach((out, column) => {
+      const node = each.outputs[out][2];
+      write(each.cells[row][column], brief(values[node], noise[node]));
+    }));
+  }
 }

@@ -73,7 +73,7 @@ function drawBodies(canvas) {
   const { plan, version, layout, view, shapes } = canvas;
   const inside = new Map();
   version.ops.forEach((_, node) => {
-    const c = clusterOf(plan, version, node), column = c >= 0 ? plan.columns.indexOf(plan.clusters[c].column) : -1;
+    const c = clusterOf(plan, version, node), column = plan.columnOf[c] ?? -1;
     if (view.closed.has(column)) inside.set(column, [...(inside.get(column) ?? []), node]);
   });
   for (const [column, nodes] of [...inside].sort((a, b) => a[0] - b[0])) {

@@ -1,4 +1,42 @@
-// The one state of the page: values of inputs by name, from which every version, derived input and table is computed.
+// Graphs made ready for the page, what rounding makes of their values, and the one state: inputs by name, from which all follows.
+
+/** A graph made ready: constants as numbers, uses of each node, edges in the order of evaluation, numbers as listed. */
+function prepare(version) {
+  const ops = opsOf(version), args = argsOf(version);
+  const constants = new Map(version.nodes.flatMap((node, i) => (ops[i] === "constant" ? [[i, Number(node)]] : [])));
+  const users = args.map(() => []);
+  const edges = [];
+  args.forEach((own, target) => own.forEach((source, slot) => {
+    users[source].push(target);
+    edges.push([source, target, slot]);
+  }));
+  let operations = 0;
+  const number = args.map((own) => (own.length ? ++operations : 0)); // as in Graph.listing(): %1 is the first operation
+  const byNumber = new Map(number.map((each, node) => [each, node]).filter(([each]) => each));
+  return { ...version, run: evaluator(version), ops, args, constants, users, edges, number, byNumber, operations, marked: new Set(version.marked),
+    crossed: new Set((version.blamed ?? []).map(([source, target]) => `${source} ${target}`)) };
+}
+
+const ROUNDING = 2 ** -53; // relative error of a rounded number
+
+/** The errors that the nodes of a version make: of constants none, of inputs those of the state, else of a rounded number. */
+function ownErrors({ constants, inputs }, values, errors) {
+  const given = new Map(inputs.map(([, node], i) => [node, errors[i]]));
+  return values.map((value, node) => (constants.has(node) ? 0 : given.get(node) ?? ROUNDING * Math.abs(value)));
+}
+
+/** Bounds, with those of faint outputs from their adjoints: ways from a node count with their signs, not their sizes.
+ *
+ * Along a long elimination the sizes of all ways grow without end, and what they add up to does not. */
+function sharpened(version, slopes, values, bounds, own) {
+  const sharp = bounds.slice();
+  for (const [, , output] of version.outputs) {
+    if (!(Math.abs(values[output]) <= bounds[output])) continue;
+    const sum = adjoints(version, slopes, output).reduce((all, bar, node) => (bar === 0 ? all : all + Math.abs(bar) * own[node]), 0);
+    if (sum < bounds[output]) sharp[output] = sum;
+  }
+  return sharp;
+}
 
 const GROWN = 2 ** 12; // how many times larger rounding becomes along a motion
 const KINDS = /^(qdd|qd|q|tau|lambda|p)\d+(_old|_dot)?$/; // of inputs and outputs: letters with a number

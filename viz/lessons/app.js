@@ -53,7 +53,7 @@ function guess(screen, choice) {
 /** What there is to play with, made when its screen is first seen. */
 function play(k) {
   const board = SCREENS[k].querySelector(".board"), what = LESSON.plays[k];
-  if (what && !board.hasChildNodes()) PLAYS[what.kind](board, { values: LESSON.values, ...what });
+  if (what && !board.hasChildNodes()) startPlay(board, { values: LESSON.values, ...what });
 }
 
 const NAV = document.querySelector("nav");

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from html import escape
 
-from cgraph import Graph, Node
+from cgraph import Node
 from dynamics import System, forward_dynamics, gravity_force
 
-from ..pages import html
-from ..pages.operations import graph_data
-from .subject import LARGEST, SHOWN, Screen, Subject, number
+from ..pages.document import Table
+from .subject import SHOWN, Screen, Subject, number
 
 
 def closed_loop(subject: Subject) -> Screen:
@@ -20,7 +19,8 @@ def closed_loop(subject: Subject) -> Screen:
     shown = list(held.constraints.names) if own else [f"clamp at {subject.joints[-1]}"]
     free_graph, held_graph = forward_dynamics(subject.system.without_constraints), forward_dynamics(held)
     still = {f"qd{i}": 0.0 for i in range(subject.system.n)}
-    free, answer = subject.evaluate(free_graph, **still), _solved(subject, held_graph, still)
+    free = subject.evaluate(free_graph, **still)
+    answer = dict(zip(held_graph.outputs, subject.evaluate(held_graph, **still).tolist(), strict=True))
     multipliers = [answer[name] for name in names]
     first = multipliers[0]
     weight = f"<b>{escape(shown[0])}</b>"
@@ -28,17 +28,15 @@ def closed_loop(subject: Subject) -> Screen:
     choices, right = _choices(first, static)
     rows = [[joint, number(a), number(answer[f"qdd{i}"])]
             for i, (joint, a) in enumerate(zip(subject.joints[:SHOWN], free.tolist(), strict=False))]  # fmt: skip
-    states = [f"q{i}" for i in range(min(subject.system.n, SHOWN))]
-    play = {
-        "kind": "loop",
-        "free": graph_data(free_graph),
-        "held": graph_data(held_graph),
-        "values": subject.values | still,
-        "sliders": [] if own or subject.system.kinematics.quasi else subject.sliders(states, -3.2, 3.2),
-        "joints": subject.joints[:SHOWN],
-        "multipliers": dict(zip(names, shown, strict=True)),
-    }
-    nodes = len(free_graph.nodes) + len(held_graph.nodes)
+    sliders = [] if own else subject.sliders()
+    play = subject.play(
+        "loop",
+        {"free": free_graph, "held": held_graph},
+        values=subject.values | still,
+        sliders=sliders,
+        joints=subject.joints[:SHOWN],
+        multipliers=dict(zip(names, shown, strict=True)),
+    )
     return Screen(
         "closed-loop",
         "A loop closes",
@@ -52,11 +50,11 @@ def closed_loop(subject: Subject) -> Screen:
         right,
         f"<p>λ = {number(first)}: as much as it takes so that the row stays zero, no more. It does no work, for along what "
         "is still allowed to move, J q̇ = 0.</p>"
-        + html.table("Accelerations at rest", ["joint", "free", "held"], rows)
-        + html.table("Multipliers", ["row", "λ"], [[a, number(b)] for a, b in zip(shown, multipliers, strict=True)][:SHOWN]),
+        + Table("Accelerations at rest", ["joint", "free", "held"], rows).html()
+        + Table("Multipliers", ["row", "λ"], [[a, number(b)] for a, b in zip(shown, multipliers, strict=True)][:SHOWN]).html(),
         "Find a place where the clamp has nothing to do. Is it where nothing moves at all?"
-        if play["sliders"] else "Accelerations without and with the rows, at rest.",
-        play if nodes <= LARGEST else None,
+        if sliders else "Accelerations without and with the rows, at rest.",
+        play,
         f"λ = {number(first)}. Where others are free to swing, it differs from the torque that holds the same place still.",
     )  # fmt: skip
 
@@ -79,10 +77,6 @@ def _clamped(system: System) -> System:
         quasi_velocities=system.kinematics.quasi,
         velocity_constraints=row,
     )
-
-
-def _solved(subject: Subject, graph: Graph, still: dict[str, float]) -> dict[str, float]:
-    return dict(zip(graph.outputs, subject.evaluate(graph, **still).tolist(), strict=True))
 
 
 def _choices(force: float, static: float) -> tuple[tuple[str, ...], int]:

@@ -9,9 +9,8 @@ import numpy as np
 from cgraph.extend import Array
 from dynamics import forward_dynamics, mass_matrix
 
-from ..pages import html
-from ..pages.operations import graph_data
-from .subject import LARGEST, SHOWN, Screen, Subject, number
+from ..pages.document import Table
+from .subject import SHOWN, Screen, Subject, number
 
 _SAME = 1e-9  # of an inertia: a smaller difference is rounding
 
@@ -25,14 +24,7 @@ def elimination(subject: Subject) -> Screen:
     first, tip = escape(subject.joints[0]), escape(subject.joints[-1])
     same = locked - free <= _SAME * locked
     rows = [[name, number(matrix[i, i]), number(pivots[i])] for i, name in enumerate(subject.joints[:SHOWN])]
-    states = [f"q{i}" for i in range(min(n, SHOWN))]
-    play = {
-        "kind": "elimination",
-        "graph": graph_data(graph),
-        "n": n,
-        "sliders": subject.sliders(states, -3.2, 3.2) if subject.system.kinematics.quasi is None else [],
-        "joints": subject.joints,
-    }
+    play = subject.play("elimination", {"graph": graph}, n=n, sliders=subject.sliders(), joints=subject.joints)
     size = len(forward_dynamics(subject.system).nodes)
     return Screen(
         "elimination",
@@ -55,9 +47,9 @@ def elimination(subject: Subject) -> Screen:
         "L<sub>ki</sub>² D<sub>k</sub>. From the tip to the base, a joint has to know the joints beyond it alone, as the "
         "articulated bodies of robotics do. cgraph does this on the graph of L itself: accelerations of this system "
         f"take {size} nodes.</p>"
-        + html.table("Inertia felt at a joint", ["joint", "all others locked", "pivot"], rows),
+        + Table("Inertia felt at a joint", ["joint", "all others locked", "pivot"], rows).html(),
         "Take out joint after joint, from the tip. Orange: the pivot. Then bend the system and start again.",
-        play if len(graph.nodes) <= LARGEST and n <= 2 * SHOWN else None,
+        play if n <= 2 * SHOWN else None,
         f"The pivot is {number(free)}. A door with a second door hinged to it is easier to push than one with both in line "
         "and welded.",
     )

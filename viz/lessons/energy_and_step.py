@@ -10,9 +10,9 @@ from cgraph.extend import Array
 from dynamics import SimulationWarning, energy, simulate, state_equation
 
 from .. import theme
-from ..pages import html
+from ..pages.document import Table
 from ..pages.operations import graph_data
-from .subject import LARGEST, Screen, Subject, number
+from .subject import Screen, Subject, number
 
 FACTORS = (2, 4, 16)
 STEPS, FINE = 100, 16  # of the coarse motion, and how many of the reference's there are in one
@@ -38,16 +38,16 @@ def energy_and_step(subject: Subject) -> Screen:
         else "This system moves so evenly that both are rounding."
     )
     rows = [[f"{t_end / (factor * STEPS):.3g}", number(error)] for factor, error in errors.items()]
-    play = {
-        "kind": "energy",
-        "rate": graph_data(rate),
-        "energy": graph_data(total),
-        "nq": subject.system.nq,
-        "n": subject.system.n,
-        "t_end": min(subject.scene.t_end, 3.0),
-        "fine": 2000 if len(rate.nodes) < 1000 else 500,
-        "colors": [theme.ORANGE, theme.BLUE],
-    }
+    play = subject.play(
+        "energy",
+        {"rate": rate},
+        energy=graph_data(total),
+        nq=subject.system.nq,
+        n=subject.system.n,
+        t_end=min(subject.scene.t_end, 3.0),
+        fine=2000 if len(rate.nodes) < 1000 else 500,
+        colors=[theme.ORANGE, theme.BLUE],
+    )
     return Screen(
         "energy-and-step",
         "Energy and the step",
@@ -62,9 +62,9 @@ def energy_and_step(subject: Subject) -> Screen:
         "<p>The slopes of rk4 are weighed so that all terms of the error up to dt⁴ cancel. So half the step leaves about a "
         f"sixteenth of the error, a tenth of the step a ten-thousandth. {told} "
         "Euler's error is only halved.</p>"
-        + html.table("rk4: largest error of a coordinate", ["dt [s]", "at the end"], rows),
+        + Table("rk4: largest error of a coordinate", ["dt [s]", "at the end"], rows).html(),
         "Move the number of steps. Orange: Euler's energy over time; blue: that of rk4; dashed: that of rk4 with very small steps.",
-        play if len(rate.nodes) <= LARGEST else None,
+        play,
         "Of a braked system energy falls by right: the line to compare with is the dashed one.",
     )
 

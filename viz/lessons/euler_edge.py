@@ -9,14 +9,13 @@ from dynamics import Verdict, formulation_sizes, formulation_verdict, inverse_dy
 from dynamics.equations.formulations.formulation_sizes import INERTIAL_TERM, blamed
 
 from .. import theme
-from ..graph_drawing.dot import short_formulas, to_dot
+from ..graph_drawing.dot import plain_drawing
 from ..graph_drawing.legend import kinds_in, legend_svg, to_adaptive
 from ..graph_drawing.render import render_svg
-from ..pages import html
+from ..pages.document import Picture, Table
 from ..pages.formulations import TITLES, WHY_FEWER, size_table
 from ..pages.mathml import equations
-from ..pages.operations import graph_data
-from .subject import LARGEST, SHOWN, Screen, Subject, lagrangian_graph, number
+from .subject import SHOWN, Screen, Subject, lagrangian_graph, number
 
 STEPS = (1.0, 0.1, 0.01, 1e-3, 1e-6)  # s
 DRAWN = 60  # nodes, at most, of a graph that is drawn
@@ -41,7 +40,13 @@ def euler_edge(subject: Subject) -> Screen:
         1 if stays else 0,
         _reveal(subject, errors, stays, verdict) + _second_try(subject, torque),
         "Move dt, and the state. Both torques are those of the graphs, computed in this page.",
-        _play(subject, right, wrong),
+        subject.play(
+            "step",
+            {"right": right, "wrong": wrong},
+            sliders=subject.sliders(),
+            joints=subject.joints[:SHOWN],
+            colors=[theme.FORMULATIONS["chain_rule"], theme.FORMULATIONS["euler_embedded"]],
+        ),
         f"At dt = 1e-6 s the largest error is {number(last)}. {_expected(stays, verdict)} Listen for “but velocity does move position!” True along a motion, and the chain "
         "rule uses it; not in ∂L/∂q̇, where a state is varied that nothing has moved yet.",
     )
@@ -91,10 +96,10 @@ def _reveal(subject: Subject, errors: list[tuple[float, np.ndarray]], stays: boo
     )
     joints = subject.joints[:SHOWN]
     rows = [[f"{dt:g}", *[number(error) for error in each[: len(joints)]]] for dt, each in errors]
-    steps = html.table("Error of the torque by definition", ["dt [s]", *joints], rows)
-    sizes = size_table(formulation_sizes(subject.system))
+    steps = Table("Error of the torque by definition", ["dt [s]", *joints], rows).html()
+    sizes = size_table(formulation_sizes(subject.system)).html()
     why = f"<p>{verdict.lacking or WHY_FEWER}</p>" * verdict.differs
-    return said + _drawing(subject) + steps + html.table(sizes.caption, sizes.header, sizes.rows) + why
+    return said + _drawing(subject) + steps + sizes + why
 
 
 def _second_try(subject: Subject, right: np.ndarray) -> str:
@@ -128,34 +133,11 @@ def _drawing(subject: Subject) -> str:
         if len(graph.nodes) > DRAWN:
             return ""
         if not pictures:
-            pictures = html.figure(
-                to_adaptive(legend_svg(kinds_in(graph, wrong))), "The colors of both pictures.", None
-            )
-        dot = to_dot(
-            graph,
-            names=subject.names,
-            formulas=short_formulas(graph, subject.names),
-            marked=wrong,
-            marked_edges=edges,
-            clusters=False,
-            legend=False,
-        )
+            legend = legend_svg(kinds_in(graph, marked=wrong))
+            pictures = Picture("", to_adaptive(legend), "The colors of both pictures.", None).html()
+        svg = render_svg(plain_drawing(graph, subject.names, wrong, edges))
         caption = (
             f"The inertial term, {TITLES[formulation]}: {len(wrong)} of {len(graph.nodes)} nodes are there by mistake."
         )
-        pictures += html.figure(to_adaptive(render_svg(dot)), caption, None)
+        pictures += Picture("", to_adaptive(svg), caption, None).html()
     return pictures
-
-
-def _play(subject: Subject, right: Graph, wrong: Graph) -> dict[str, object] | None:
-    if len(right.nodes) + len(wrong.nodes) > LARGEST:
-        return None
-    states = [f"q{i}" for i in range(min(subject.system.nq, SHOWN))]
-    return {
-        "kind": "step",
-        "right": graph_data(right),
-        "wrong": graph_data(wrong),
-        "sliders": subject.sliders(states, -3.2, 3.2) if subject.system.kinematics.quasi is None else [],
-        "joints": subject.joints[:SHOWN],
-        "colors": [theme.FORMULATIONS["chain_rule"], theme.FORMULATIONS["euler_embedded"]],
-    }

@@ -90,7 +90,9 @@ def page(subject: Subject, screens: Sequence[Screen]) -> Page:
 
 def scripts() -> str:
     """Scripts of the plays, and of what they need."""
-    return "\n".join([values(), asset(html.__package__, "elements.js", "graph.js"), asset(__package__, "plays.js")])
+    return "\n".join(
+        [values(), asset(html.__package__, "elements.js", "tables.js", "graph.js"), asset(__package__, "plays.js")]
+    )
 
 
 def _teacher(subject: Subject, screens: Sequence[Screen]) -> str:

@@ -65,10 +65,9 @@ function button(board, text, press) {
 }
 /** A table whose cells can be written anew: {write(rows), cells}. */
 function grid(board, header) {
-  const body = tag("tbody");
-  const head = tag("thead", {}, tag("tr", {}, ...header.map((name) => tag("th", {}, name))));
-  board.append(tag("div", { class: "scroll" }, tag("table", {}, head, body)));
-  return (rows, classes = () => "") => body.replaceChildren(
+  const made = table(header, []);
+  board.append(scrolled(made));
+  return (rows, classes = () => "") => made.tBodies[0].replaceChildren(
     ...rows.map((row, i) => tag("tr", {}, ...row.map((text, j) => {
       const cell = tag("td", {}, text);
       const kind = classes(i, j);
@@ -98,19 +97,25 @@ function bars(svg, groups, colors) {
   );
 }
 
+/** Make what there is to play with: a play fills the board, and returns what draws it at the values of the inputs. */
+function startPlay(board, play) {
+  const draw = PLAYS[play.kind](board, play, { ...play.values }, () => draw());
+  draw();
+}
+
 const PLAYS = {
-  step(board, play) {
-    const right = named(play.right), wrong = named(play.wrong), at = { ...play.values };
+  step(board, play, at, redraw) {
+    const right = named(play.right), wrong = named(play.wrong);
     const names = numbered("tau", play.joints.length), old = Object.keys(at).filter((name) => name.endsWith("_old"));
     const rate = {}; // of what is old, by a second
     for (const name of old) rate[name] = (play.values[name.slice(0, -4)] - play.values[name]) / play.values.dt;
     let still = false;
-    slider(board, "dt [s]", -6, 0, 0.1, -3, (x) => { at.dt = 10 ** x; draw(); }, (x) => digits(10 ** x));
-    sliders(board, play, at, () => draw());
-    const rest = button(board, "Let it rest", () => { still = !still; rest.setAttribute("aria-pressed", still); draw(); });
+    slider(board, "dt [s]", -6, 0, 0.1, -3, (x) => { at.dt = 10 ** x; redraw(); }, (x) => digits(10 ** x));
+    sliders(board, play, at, redraw);
+    const rest = button(board, "Let it rest", () => { still = !still; rest.setAttribute("aria-pressed", still); redraw(); });
     const write = grid(board, ["joint", "torque", "by definition", "error"]);
     const svg = board.appendChild(drawn("svg", { role: "img", "aria-label": "Torques, right and by definition" }));
-    const draw = () => {
+    return () => {
       const now = { ...at };
       if (still) for (const name in now) if (/^qd+\d+$/.test(name)) now[name] = 0;
       for (const name of old) now[name] = now[name.slice(0, -4)] - (still ? 0 : rate[name]) * at.dt;
@@ -118,18 +123,17 @@ const PLAYS = {
       write(names.map((name, i) => [play.joints[i], ...[good[name], bad[name], bad[name] - good[name]].map(digits)]));
       bars(svg, Object.fromEntries(names.map((name, i) => [play.joints[i], [good[name], bad[name]]])), play.colors);
     };
-    draw();
   },
-  sweeps(board, play) {
+  sweeps(board, play, at, redraw) {
     const rows = play.rows, count = rows.length;
     let step = 0;
     const buttons = board.appendChild(tag("div", { class: "buttons" }));
-    button(buttons, "Next", () => { step = Math.min(step + 1, 2 * count); draw(); });
-    button(buttons, "All values", () => { step = Math.max(step, count); draw(); });
-    button(buttons, "All slopes", () => { step = 2 * count; draw(); });
-    button(buttons, "Again", () => { step = 0; draw(); });
+    button(buttons, "Next", () => { step = Math.min(step + 1, 2 * count); redraw(); });
+    button(buttons, "All values", () => { step = Math.max(step, count); redraw(); });
+    button(buttons, "All slopes", () => { step = 2 * count; redraw(); });
+    button(buttons, "Again", () => { step = 0; redraw(); });
     const write = grid(board, ["node", "is", "value", "slope of L", ""]);
-    const draw = () => {
+    return () => {
       const now = step > count ? 2 * count - step : step - 1; // the row whose value or slope is new
       write(
         rows.map((row, i) => [row.node, row.text, i < step ? digits(row.value) : "·",
@@ -138,66 +142,62 @@ const PLAYS = {
       );
       rows.forEach((row, i) => document.getElementById(row.box)?.classList.toggle("lit", i === now));
     };
-    draw();
   },
-  parts(board, play) {
-    const torque = named(play.graph), at = { ...play.values };
+  parts(board, play, at, redraw) {
+    const torque = named(play.graph);
     const names = numbered("tau", play.joints.length);
     const zero = (kind) => Object.fromEntries(Object.keys(at).filter((name) => new RegExp(`^${kind}\\d+$`).test(name)).map((name) => [name, 0]));
-    sliders(board, play, at, () => draw());
+    sliders(board, play, at, redraw);
     const write = grid(board, ["joint", ...play.parts, "torque"]);
     const svg = board.appendChild(drawn("svg", { role: "img", "aria-label": "Parts of the torques" }));
-    const draw = () => {
+    return () => {
       const held = torque({ ...at, ...zero("qd"), ...zero("qdd") });
       const steady = torque({ ...at, ...zero("qdd") }), still = torque({ ...at, ...zero("qd") });
       const parts = names.map((name) => [still[name] - held[name], steady[name] - held[name], held[name]]);
       write(parts.map((row, i) => [play.joints[i], ...row.map(digits), digits(row[0] + row[1] + row[2])]));
       bars(svg, Object.fromEntries(parts.map((row, i) => [play.joints[i], row])), ["#56B4E9", "#E69F00", "#009E73"]);
     };
-    draw();
   },
-  elimination(board, play) {
-    const mass = named(play.graph), at = { ...play.values }, n = play.n;
+  elimination(board, play, at, redraw) {
+    const mass = named(play.graph), n = play.n;
     let step = 0;
-    sliders(board, play, at, () => { step = 0; draw(); });
+    sliders(board, play, at, () => { step = 0; redraw(); });
     const buttons = board.appendChild(tag("div", { class: "buttons" }));
-    button(buttons, "Take out the next joint", () => { step = Math.min(step + 1, n - 1); draw(); });
-    button(buttons, "Again", () => { step = 0; draw(); });
+    button(buttons, "Take out the next joint", () => { step = Math.min(step + 1, n - 1); redraw(); });
+    button(buttons, "Again", () => { step = 0; redraw(); });
     const write = grid(board, ["", ...play.joints]);
-    const draw = () => {
+    return () => {
       const found = mass(at), name = (i, j) => found[`M_${i}_${j}`];
       const matrix = play.joints.map((_, i) => play.joints.map((_, j) => name(i, j)));
       const shown = stages(matrix)[step], pivot = n - 1 - step;
       write(shown.map((row, i) => [play.joints[i], ...row.map((x, j) => (Math.max(i, j) > pivot && i !== j ? "" : digits(x)))]),
         (i, j) => (j === 0 ? "" : i === j - 1 && i === pivot ? "lit" : Math.max(i, j - 1) > pivot ? "gone" : ""));
     };
-    draw();
   },
-  loop(board, play) {
-    const free = named(play.free), held = named(play.held), at = { ...play.values };
-    sliders(board, play, at, () => draw());
+  loop(board, play, at, redraw) {
+    const free = named(play.free), held = named(play.held);
+    sliders(board, play, at, redraw);
     const write = grid(board, ["", "free", "held"]);
-    const draw = () => {
+    return () => {
       const a = free(at), b = held(at);
       write([...play.joints.map((name, i) => [name, digits(a[`qdd${i}`]), digits(b[`qdd${i}`])]),
         ...Object.entries(play.multipliers).map(([name, shown]) => [`λ, ${shown}`, "", digits(b[name])])]);
     };
-    draw();
   },
-  energy(board, play) {
+  energy(board, play, start, redraw) {
     const rate = named(play.rate), total = named(play.energy);
     const names = [...numbered("q", play.nq), ...numbered("qd", play.n)];
-    const energies = (method, steps) => motion(rate, play.values, names, play.t_end / steps, steps, method).map((state) => {
-      const at = { ...play.values };
+    const energies = (method, steps) => motion(rate, start, names, play.t_end / steps, steps, method).map((state) => {
+      const at = { ...start };
       names.forEach((name, i) => { at[name] = state[i]; });
       return total(at).E;
     });
     const fine = play.fine, exact = energies("rk4", fine);
     let steps = 100;
-    slider(board, "steps", 1, 3, 0.05, 2, (x) => { steps = Math.round(10 ** x); draw(); }, (x) => String(Math.round(10 ** x)));
+    slider(board, "steps", 1, 3, 0.05, 2, (x) => { steps = Math.round(10 ** x); redraw(); }, (x) => String(Math.round(10 ** x)));
     const svg = board.appendChild(drawn("svg", { role: "img", "aria-label": "Energy over time" }));
     const words = board.appendChild(tag("p", { role: "status" }));
-    const draw = () => {
+    return () => {
       const curves = ["euler", "rk4"].map((method) => energies(method, steps));
       const right = (i) => exact[Math.round((i * fine) / steps)] ?? NaN;
       const off = curves.map((curve) => Math.max(...curve.map((e, i) => Math.abs(e - right(i))).filter(Number.isFinite)));
@@ -217,6 +217,5 @@ const PLAYS = {
       words.textContent = `Step ${digits(play.t_end / steps)} s. Largest error of the energy: Euler ${digits(off[0])} J, ` +
         `rk4 ${digits(off[1])} J.`;
     };
-    draw();
   },
 };

@@ -21,10 +21,12 @@ from dynamics.systems.model import Model
 from dynamics.systems.system import System
 
 from .. import theme
+from ..pages.operations import graph_data
 
 DT = 1e-3  # s, of the embedded formulations
 LARGEST = 4000  # nodes that the page computes many times a second
 SHOWN = 6  # joints with a slider or a row of their own; of more, the first
+REACH = 3.2  # of a slider to both sides of 0
 _SPEEDS, _ACCELERATIONS, _BENDS = (1.0, -0.8, 0.6), (0.5, 1.0, -0.7), (0.0, -0.8, 0.9)  # in turn, for the joints
 
 
@@ -70,12 +72,20 @@ class Subject:
         found = graph.evaluate({name: values[name] for name in graph.input_names})
         return np.array([float(value) for value in found.values()])
 
-    def sliders(self, names: Sequence[str], low: float, high: float) -> list[dict[str, object]]:
-        """Sliders for inputs, with what they are called."""
+    def sliders(self, kinds: Sequence[str] = ("q",), most: int = SHOWN) -> list[dict[str, object]]:
+        """Sliders for the inputs of these kinds of the first joints; none where velocities are no rates of coordinates."""
+        free = self.system.kinematics.quasi is None
+        names = [f"{kind}{i}" for i in range(min(self.system.n, most)) for kind in kinds if free]
         return [
-            {"name": name, "shown": self.shown(name), "low": low, "high": high, "value": self.values[name]}
+            {"name": name, "shown": self.shown(name), "low": -REACH, "high": REACH, "value": self.values[name]}
             for name in names
         ]
+
+    def play(self, kind: str, graphs: Mapping[str, Graph], **other: object) -> dict[str, object] | None:
+        """What the page's script draws by these graphs, at its state; None where they are too large for it."""
+        if sum([len(graph.nodes) for graph in graphs.values()]) > LARGEST:
+            return None
+        return {"kind": kind} | {name: graph_data(graph) for name, graph in graphs.items()} | other
 
     def shown(self, name: str) -> str:
         """Display name of an input, output or node."""

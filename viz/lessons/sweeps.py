@@ -10,7 +10,7 @@ from cgraph import Graph, Node
 from cgraph.extend import Names, columns, cotangents
 from dynamics import inverse_dynamics
 
-from ..graph_drawing.dot import short_formulas, to_dot
+from ..graph_drawing.dot import plain_drawing
 from ..graph_drawing.render import render_svg
 from .subject import Screen, Subject, inline, lagrangian_graph
 
@@ -51,9 +51,7 @@ def _picture(subject: Subject, graph: Graph) -> str:
     """The graph of L, where it is small enough."""
     if len(graph.nodes) > DRAWN:
         return ""
-    formulas = short_formulas(graph, subject.names)
-    drawing = to_dot(graph, names=subject.names, formulas=formulas, clusters=False, legend=False)
-    return inline(render_svg(drawing), "sweep", "The graph of L")
+    return inline(render_svg(plain_drawing(graph, subject.names)), "sweep", "The graph of L")
 
 
 def _rows(subject: Subject, graph: Graph) -> list[dict[str, object]]:

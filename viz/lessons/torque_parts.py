@@ -9,9 +9,8 @@ import numpy as np
 from cgraph.extend import Array
 from dynamics import inverse_dynamics
 
-from ..pages import html
-from ..pages.operations import graph_data
-from .subject import LARGEST, SHOWN, Screen, Subject, number
+from ..pages.document import Table
+from .subject import SHOWN, Screen, Subject, number
 
 PARTS = ("inertia: what q̈ takes", "velocity: Coriolis, centrifugal, damping", "position: weight and springs")
 MOVED = 3  # joints with three sliders
@@ -31,14 +30,14 @@ def torque_parts(subject: Subject) -> Screen:
     )
     rows = [[joint_name, *[number(value) for value in column], number(column.sum())]
             for joint_name, column in zip(subject.joints[:SHOWN], parts.T, strict=False)]  # fmt: skip
-    states = [f"{kind}{i}" for i in range(min(system.n, MOVED)) for kind in ("q", "qd", "qdd")]
-    play = {
-        "kind": "parts",
-        "graph": graph_data(graph),
-        "sliders": subject.sliders(states, -3.2, 3.2) if system.kinematics.quasi is None else [],
-        "joints": subject.joints[:SHOWN],
-        "parts": [part.partition(":")[0] for part in PARTS],
-    }
+    table = Table("Parts of the torque", ["joint", "inertia", "velocity", "position", "torque"], rows)
+    play = subject.play(
+        "parts",
+        {"graph": graph},
+        sliders=subject.sliders(("q", "qd", "qdd"), MOVED),
+        joints=subject.joints[:SHOWN],
+        parts=[part.partition(":")[0] for part in PARTS],
+    )
     return Screen(
         "why-this-torque",
         "Why this torque?",
@@ -49,9 +48,9 @@ def torque_parts(subject: Subject) -> Screen:
         PARTS,
         int(sizes.argmax()),
         "<p>The same graph of the torque, asked three times: at rest without acceleration, then with q̈ alone, then with "
-        f"q̇ alone. The three add up to the torque.</p>{html.table('Parts of the torque', ['joint', 'inertia', 'velocity', 'position', 'torque'], rows)}",
+        f"q̇ alone. The three add up to the torque.</p>{table.html()}",
         "Move the joints. Make the velocity part the largest; then find a place where holding still costs nothing.",
-        play if len(graph.nodes) <= LARGEST else None,
+        play,
         f"At {name} the parts are {', '.join(number(value) for value in parts[:, joint])}.",
     )
 

@@ -4,13 +4,8 @@ const DECADES = [-5, 0]; // of dt on its slider
 const KEPT = 240; // instants in the strip of energies
 const TRACE = 120; // places of the tip
 
-/** A number with four digits, and a minus that is one. */
-function liveNumber(value) {
-  if (!Number.isFinite(value)) return "—";
-  const size = Math.abs(value);
-  const text = size !== 0 && (size < 1e-3 || size >= 1e5) ? value.toExponential(2) : String(+value.toPrecision(4));
-  return text.replaceAll("-", "−");
-}
+/** A number with four digits. */
+const liveNumber = (value) => (Number.isFinite(value) ? numeral(value, 4) : "—");
 
 async function startLive() {
   const data = JSON.parse(byId("live-data").textContent);
@@ -38,16 +33,15 @@ async function startLive() {
     });
     return tag("label", { class: "live-control" }, tag("span", {}, called, ...(unit ? [tag("small", {}, ` [${unit}]`)] : [])), slider, field);
   }
-  const groups = new Map();
-  data.inputs.forEach((input, i) => {
-    if (i === data.time) return;
-    if (!groups.has(input.group)) groups.set(input.group, []);
-    groups.get(input.group).push(control(i, input));
-  });
-  for (const [group, rows] of groups) {
-    const open = rows.length <= 8 ? { open: "" } : {};
-    $("controls").append(tag("details", open, tag("summary", {}, group), ...rows));
+  /** Rows [[group, row]] in their groups, which are open where they are short. */
+  function grouped(id, all, inside = (rows) => rows) {
+    const groups = new Map();
+    for (const [group, row] of all) groups.set(group, [...(groups.get(group) ?? []), row]);
+    for (const [group, rows] of groups) {
+      $(id).append(tag("details", rows.length <= 8 ? { open: "" } : {}, tag("summary", {}, group), ...inside(rows)));
+    }
   }
+  grouped("controls", data.inputs.flatMap((input, i) => (i === data.time ? [] : [[input.group, control(i, input)]])));
   $("method").append(...data.methods.map((name) => tag("option", { value: name }, name)));
   $("method").onchange = () => { state.method = $("method").value; changed(); };
   const setStep = (dt) => { if (dt > 0 && Number.isFinite(dt)) { state.dt = dt; state.owed = 0; changed(); } };
@@ -135,18 +129,10 @@ async function startLive() {
 
   // Meters
 
-  const cells = [];
-  const meterGroups = new Map();
-  data.meters.forEach(({ called, unit, group }, k) => {
-    if (!meterGroups.has(group)) meterGroups.set(group, []);
-    const cell = tag("td", { "data-meter": called });
-    cells.push([cell, k]);
-    meterGroups.get(group).push(tag("tr", {}, tag("th", { scope: "row" }, called), cell, tag("td", {}, unit)));
-  });
-  for (const [group, rows] of meterGroups) {
-    const open = rows.length <= 8 ? { open: "" } : {};
-    $("meters").append(tag("details", open, tag("summary", {}, group), tag("table", {}, tag("tbody", {}, ...rows))));
-  }
+  const cells = data.meters.map(({ called }) => tag("td", { "data-meter": called }));
+  grouped("meters", data.meters.map(({ called, unit, group }, k) => (
+    [group, tag("tr", {}, tag("th", { scope: "row" }, called), cells[k], tag("td", {}, unit))]
+  )), (rows) => [tag("table", {}, tag("tbody", {}, ...rows))]);
   const unitOf = (i) => data.inputs[i].unit;
   function error(id, { index, most, share }) {
     $(`${id}-bar`).value = share > 0 ? Math.min(1, Math.max(0, (Math.log10(share) + 12) / 12)) : share === 0 ? 0 : 1;
@@ -155,7 +141,7 @@ async function startLive() {
   }
   function show() {
     const now = motion.now();
-    cells.forEach(([cell, k]) => { cell.textContent = liveNumber(now.values[k]); });
+    cells.forEach((cell, k) => { cell.textContent = liveNumber(now.values[k]); });
     error("ahead", now.ahead);
     error("since", now.since);
     $("horizon").textContent = `${liveNumber(now.ahead.seconds)} s ahead`;

@@ -10,8 +10,8 @@ from html import escape
 from typing import Any
 
 import cgraph as cg
-from cgraph import Graph, GraphError
-from cgraph.extend import Json, is_finite, real_number, require_graph, require_mapping, require_sequence, require_texts
+from cgraph import Graph
+from cgraph.extend import Json
 
 from .. import theme
 from ..pages import html
@@ -25,52 +25,21 @@ GROUPS = (
     ("tau", "torques"),
 )  # of inputs, by the start of their names
 ENERGIES = 3  # the meters that the strip shows
-NEEDED = ("rk4", "dopri5")  # the method at first, and that of the reference
 
 
 @dataclass(frozen=True, eq=False)
 class Live:
     """A motion that a page computes as it is watched.
 
-    Parameters
-    ----------
-    rate : Graph
-        The state equation: its first inputs are the state, and output k is the rate of input k.
-    start : mapping of str to float
-        A value of every input.
-    shown : Graph, optional
-        Over the same inputs: an output for each meter, and then x and y of each point [m].
-    meters : sequence of (str, str, str)
-        Name, unit and group of each meter; the first three are kinetic, potential and total energy.
-    parents : sequence of int
-        Of each point the earlier one that it hangs on, or -1.
-    scales : mapping of str to float, optional
-        {input: how far its slider reaches to both sides of 0}. Default three times the value, or 1.
-    dt : float
-        The step at first, short enough that the picture is right [s].
-    methods : mapping of str to Tableau
-        Methods to choose from, such as `dynamics.integrators.TABLEAUS`; rk4 and dopri5 are needed.
-    names, units : mapping of str to str, optional
-        {input: what a person calls it} and its unit.
+    rate: the state equation, whose first inputs are the state, and output k the rate of input k.
+    start: a value of every input.  dt: the step at first [s].  methods: those of `dynamics.integrators.TABLEAUS`.
+    shown: over the same inputs, an output for each meter, then x and y of each point [m].
+    meters: name, unit and group, the first three kinetic, potential and total energy.
+    parents: of each point the earlier one that it hangs on, or -1.
+    scales: {input: how far its slider reaches to both sides of 0}, by default three times the value, or 1.
+    names, units: {input: what a person calls it, and its unit}.
 
-    Raises
-    ------
-    GraphError
-        For a graph that is no state equation, or a `shown` of other inputs.
-    ValueError
-        For an input without a finite value, a dt that is not positive, or points that do not fit `shown`.
-
-    Examples
-    --------
-    >>> import cgraph as cg
-    >>> from viz.live import Live
-    >>> from dynamics.integrators import TABLEAUS
-    >>> x, v = cg.variables("x v")
-    >>> spring = cg.Graph([x, v], {"x_dot": v, "v_dot": -x})
-    >>> energies = cg.Graph([x, v], {"K": v * v / 2, "P": x * x / 2, "E": (v * v + x * x) / 2})
-    >>> meters = [(name, "J", "energy") for name in energies.outputs]
-    >>> Live(spring, {"x": 1.0, "v": 0.0}, energies, meters, dt=0.01, methods=TABLEAUS).to_dict()["states"]
-    2
+    Raises ValueError for an input without a finite value.
     """
 
     rate: Graph
@@ -85,38 +54,9 @@ class Live:
     units: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        require_graph("Live", self.rate)
-        require_graph("Live", self.shown)
-        inputs = self.rate.input_names
-        if self.shown.input_names != inputs:
-            raise GraphError(f"shown must have the inputs of rate, {', '.join(inputs)}; it has others or another order")
-        if len(self.rate.outputs) > len(inputs):
-            raise GraphError(f"rate must be a state equation: {len(self.rate.outputs)} outputs of {len(inputs)} inputs")
-        values = require_mapping("start", self.start, "input: value")
-        for name in inputs:
-            if name not in values or not is_finite(real_number(f"start of {name}", values[name])):
+        for name in self.rate.input_names:
+            if not math.isfinite(self.start[name]):
                 raise ValueError(f"start needs a finite value of every input, and has none of {name}")
-        if not (real_number("dt", self.dt) > 0.0 and math.isfinite(self.dt)):
-            raise ValueError(f"dt must be positive and finite, got {self.dt!r} s")
-        if missing := [
-            name for name in NEEDED if name not in require_mapping("methods", self.methods, "name: Tableau")
-        ]:
-            raise ValueError(f"methods must have {missing[0]}, as dynamics.integrators.TABLEAUS has")
-        self._check_shown()
-
-    def _check_shown(self) -> None:
-        """Raise unless meters and points fit the outputs of `shown`."""
-        meters = require_sequence("meters", self.meters, "(name, unit, group)")
-        parents = require_sequence("parents", self.parents, "numbers of points")
-        if len(meters) < ENERGIES or len(meters) + 2 * len(parents) != len(self.shown.outputs):
-            raise ValueError(
-                f"shown must have an output for each meter, three energies first, and two for each point: "
-                f"{len(meters)} meters, {len(parents)} points, {len(self.shown.outputs)} outputs"
-            )
-        if any([not -1 <= parent < k for k, parent in enumerate(parents)]):
-            raise ValueError(f"parents must be -1 or an earlier point, got {list(parents)}")
-        for what in ("names", "units"):
-            require_texts(what, getattr(self, what))
 
     def to_dict(self) -> dict[str, Json]:
         """Data for the script of the page."""
@@ -169,36 +109,11 @@ def panel(live: Live) -> Panel:
     )
 
 
-def page_text(live: Live, *, title: str = "A motion, live", about: str = "") -> Page:
-    """One page on which a motion is computed as it is watched, with sliders, meters of energy and error, and a link.
+def page_text(live: Live, title: str, about: str = "") -> Page:
+    """One page on which a motion is computed as it is watched, by a WebAssembly module in it.
 
-    The equations and the steps are a WebAssembly module in the page; nothing is loaded from anywhere, and the policy
-    lets no script run but the page's own.
-
-    Parameters
-    ----------
-    live : Live
-        What moves.
-    title : str
-        Heading of the page.
-    about : str
-        What to see, a sentence or two.
-
-    Returns
-    -------
-    Page
-        The HTML text; a notebook shows it in a frame.
-
-    Raises
-    ------
-    TypeError
-        For what is no Live, or a title or about that is no text.
+    title: its heading.  about: what to see, a sentence or two.
     """
-    if not isinstance(live, Live):
-        raise TypeError(f"page_text needs a Live, got {type(live).__name__}: {live!r:.60}")
-    for what, text in (("title", title), ("about", about)):
-        if not isinstance(text, str):
-            raise TypeError(f"{what} of a page must be text, got {type(text).__name__}: {text!r:.60}")
     shown = panel(live)
     words = f"<p>{escape(about)}</p>\n" if about else ""
     body = f"<main>\n<h1>{escape(title)}</h1>\n{words}{shown.body}</main>"

@@ -10,8 +10,8 @@ from dynamics.equations.momentum.both_forms import HAMILTON
 from dynamics.scenes.start import Start, moving_start, rest_text, with_start
 from dynamics.systems.model import Model
 
-from ..inspector import Page, page
-from ..pages.html import html_target
+from ..inspector import page
+from ..pages.html import Page, html_target
 from ..typed import box
 from .inspection import Inspection, inspection
 from .live import live_panel

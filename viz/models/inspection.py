@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
@@ -9,7 +10,7 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import PRIMAL, TANGENT, Array, real_number, topological
+from cgraph.extend import PRIMAL, TANGENT, Array, counted, real_number, topological
 from dynamics.equations.equations_of_motion import forward_dynamics
 from dynamics.equations.formulations.formulations import inverse_dynamics
 from dynamics.equations.formulations.node_classes import (
@@ -21,6 +22,7 @@ from dynamics.equations.formulations.node_classes import (
     RATES,
     VELOCITIES,
     form_classes,
+    formulation_classes,
 )
 from dynamics.equations.formulations.verdict import formulation_verdict
 from dynamics.equations.momentum.both_forms import HAMILTON, LAGRANGE, VELOCITIES_ALONE, both_forms, form_sizes
@@ -36,9 +38,9 @@ from dynamics.simulation.trajectory import Trajectory
 from dynamics.systems.display_names import display_names
 from dynamics.systems.system import System
 
+from .. import theme
 from ..inspector import Motion, StateTable, Step, Version
 from ..pages.document import Table
-from .carried import carried
 
 FORMULATIONS = ("euler_embedded", "kinetic_only", "chain_rule")  # those of the paper, the flawed ones first
 FRAMES, RATE = 150, 30.0  # most instants shown, and how many a second
@@ -99,7 +101,7 @@ def inspection(
     if scene.ode is not None:
         return _first_order(scene, end, times)
     system = scene.system
-    count = f"{system.nq} coordinate{'s' * (system.nq != 1)}"
+    count = counted(system.nq, "coordinate")
     say(f"{scene.name}: deriving the equations of {count}, compiling them, and a motion of {end:g} s")
     run = simulate(system, scene.q, scene.qd, end, "dopri5", rtol=1e-6, t_eval=times)
     say(f"{scene.name}: deriving forward dynamics")
@@ -161,12 +163,12 @@ def _hamilton(scene: Scene, end: float, times: Array | None, say: Callable[[str]
     depth = {name: counts.depth for name, counts in sizes.items()}
     about = (
         "Rates of coordinates and momenta. The velocities are solved from the momenta, "
-        f"{_operations(depth[VELOCITIES_ALONE])} deep; the rates of the momenta stand on them, {depth[HAMILTON]} deep "
-        f"in all, in {len(hamilton.nodes)} nodes. There is no acceleration and no bias."
+        f"{counted(depth[VELOCITIES_ALONE], 'operation')} deep; the rates of the momenta stand on them, "
+        f"{depth[HAMILTON]} deep in all, in {len(hamilton.nodes)} nodes. There is no acceleration and no bias."
     )
     beside = (
         "The same motion by accelerations: at the velocities of these momenta, torque less bias, solved. "
-        f"{_operations(depth[LAGRANGE])} deep, {len(forms[LAGRANGE].nodes)} nodes."
+        f"{counted(depth[LAGRANGE], 'operation')} deep, {len(forms[LAGRANGE].nodes)} nodes."
     )
     steps = elimination(hamilton, display_names(scene)) if is_quadratic(system) else ()
     versions = {
@@ -175,10 +177,6 @@ def _hamilton(scene: Scene, end: float, times: Array | None, say: Callable[[str]
     }
     stopped = "" if run.stats.success else run.stats.message
     return _along(scene, run, versions, state, velocities(system), stopped=stopped)
-
-
-def _operations(count: int) -> str:
-    return f"{count} operation{'s' * (count != 1)}"
 
 
 def _rows(graph: Graph) -> dict[str, list[Node]]:
@@ -310,3 +308,34 @@ def _pivot(solved: Node, others: set[Node], place: Mapping[Node, int]) -> Node |
         rest += below
         seen.update(below)
     return min(found, key=lambda node: (bool(node.args), place[node]), default=None)
+
+
+BOTH = ("chain_rule", "newton_euler")
+
+
+def carried(scene: Scene) -> Table | None:
+    """The nodes that only the chain rule has, counted by part of the model and by what they are; None where none is.
+
+    The classes are those of `cgraph compare`: the rates of slopes are what -dL/dq cancels in part.
+    """
+    verdicts = [formulation_verdict(scene, name) for name in BOTH]
+    left, right = (each.graph for each in verdicts)
+    classes = cg.compare(left, right, classify=formulation_classes(verdicts)).classes("left")
+    counts = {tuple(name.rpartition(": ")[::2]): count for name, count in classes.items()}
+    if not counts:
+        return None
+    of_part, of_kind = Counter[str](), Counter[str]()
+    for (part, kind), count in counts.items():
+        of_part[part] += count
+        of_kind[kind] += count
+    kinds = [kind for kind, _ in of_kind.most_common()]
+    rows = []
+    for part in sorted(of_part, key=lambda part: (not part, theme.natural_order(part))):
+        cells = [str(counts.get((part, kind), "")) for kind in kinds]
+        rows.append([part or "no part", *cells, str(of_part[part])])
+    rows.append(["all", *[str(of_kind[kind]) for kind in kinds], f"{of_part.total()}"])
+    caption = (
+        f"What AD of the energy carries: of {len(left.nodes)} nodes by the chain rule these {of_part.total()} are not "
+        f"among the {len(right.nodes)} of equations by velocities, which never build what cancels"
+    )
+    return Table(caption, ["nodes of", *map(theme.pretty, kinds), "all"], rows)

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import re
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
+from html import escape
 from pathlib import Path
 from tempfile import TemporaryFile
 
 from cgraph.extend import Json
 
-from . import html
+from .html import STYLE, compose
 
 
 @dataclass(frozen=True)
@@ -23,27 +25,97 @@ class Paragraph:
     point: bool = False
     warning: bool = False
 
+    def html(self) -> str:
+        """The words as HTML."""
+        kind = ' class="warning"' if self.warning else ' class="point"' if self.point else ""
+        return f"<p{kind}>{escape(self.text)}</p>"
+
+    def markdown(self, folder: str) -> list[str]:
+        """Lines of Markdown."""
+        return [f"> {self.text}" if self.point or self.warning else self.text, ""]
+
+
+@dataclass(frozen=True)
+class Listing:
+    """Text in lines as they are."""
+
+    text: str
+
+    def html(self) -> str:
+        """The lines as HTML."""
+        return f"<pre>{escape(self.text)}</pre>"
+
+    def markdown(self, folder: str) -> list[str]:
+        """Lines of Markdown."""
+        return ["```", self.text.rstrip("\n"), "```", ""]
+
 
 @dataclass(frozen=True)
 class Table:
-    """Texts in rows; the first column is read to the left, the others to the right.  folded: shown when asked for."""
+    """Texts in rows; the first column is read to the left, the others to the right.
+
+    folded: shown when asked for.  file: the name of its CSV, without suffix; empty for none.
+    """
 
     caption: str
     header: Sequence[str]
     rows: Sequence[Sequence[str]]
     folded: bool = False
+    file: str = ""
+
+    def html(self) -> str:
+        """The table as HTML."""
+        head = "".join([f"<th>{escape(name)}</th>" for name in self.header])
+        body = "\n".join(
+            ["<tr>" + "".join([f"<td>{escape(cell)}</td>" for cell in row]) + "</tr>" for row in self.rows]
+        )
+        table = (
+            f'<div class="scroll"><table><caption>{escape(self.caption)}</caption><thead><tr>{head}</tr></thead>'
+            f"<tbody>\n{body}\n</tbody></table></div>"
+        )
+        return f"<details><summary>{escape(self.caption)}</summary>\n{table}\n</details>" if self.folded else table
+
+    def markdown(self, folder: str) -> list[str]:
+        """Lines of Markdown."""
+        rule = "|" + "|".join([":--", *["--:"] * (len(self.header) - 1)]) + "|"
+        return [f"**{self.caption}**", "", _row(self.header), rule, *map(_row, self.rows), ""]
 
 
 @dataclass(frozen=True)
 class Picture:
-    """SVG whose ink takes the page's colors, see `plot.to_adaptive_svg`.  name: of its file, without suffix."""
+    """SVG whose ink takes the page's colors, see `plot.to_adaptive_svg`.
+
+    name: of its file, without suffix; empty for none.  width: in the page; None leaves it to the page's style.
+    png: the scale of a PNG beside the SVG, as of `render_png`; 0 for none.
+    """
 
     name: str
     svg: str
     caption: str
+    width: str | None = "100%"
+    png: float = 0.0
+
+    def html(self) -> str:
+        """The picture inside the page, with its caption below, which is its alternative text too."""
+        data, caption = base64.b64encode(self.svg.encode()).decode(), escape(self.caption)
+        style = "" if self.width is None else f' style="width:{self.width};background:none"'
+        kind = ' class="plot"' if self.width == "100%" else ""
+        return (
+            f'<figure><img{kind} src="data:image/svg+xml;base64,{data}" alt="{caption}"{style}>'
+            f"<figcaption>{caption}</figcaption></figure>"
+        )
+
+    def markdown(self, folder: str) -> list[str]:
+        """Lines of Markdown.  folder: where the picture is, relative to the text."""
+        return [f"![{self.caption}]({folder}{self.name}.svg)", ""]
 
 
-Block = Paragraph | Table | Picture
+def _row(cells: Sequence[str]) -> str:
+    """A row of a table in Markdown."""
+    return "| " + " | ".join([cell.replace("|", "\\|") for cell in cells]) + " |"
+
+
+Block = Paragraph | Listing | Table | Picture
 
 
 @dataclass(frozen=True)
@@ -75,23 +147,21 @@ def left_out(what: Sequence[str]) -> list[Block]:
 
 
 def to_html(document: Document) -> str:
-    """The document as a page that needs no other file."""
-    sections = [(section.anchor, section.heading, _html(section.blocks)) for section in document.sections]
-    return html.page(document.title, _html(document.introduction), sections)
+    """The document as a page that needs no other file, with a line of links to its sections."""
+    title, sections = escape(document.title), document.sections
+    links = " ".join([f'<a href="#{escape(each.anchor)}">{escape(each.heading)}</a>' for each in sections])
+    body = "\n".join(
+        [
+            f'<section id="{escape(each.anchor)}">\n<h2>{escape(each.heading)}</h2>\n{_html(each.blocks)}\n</section>'
+            for each in sections
+        ]
+    )
+    text = f"<h1>{title}</h1>\n{_html(document.introduction)}\n<nav>{links}</nav>\n{body}"
+    return compose(document.title, text, STYLE)
 
 
 def _html(blocks: Sequence[Block]) -> str:
-    parts = []
-    for block in blocks:
-        match block:
-            case Paragraph(text, point, warning):
-                parts.append(html.point(text, warning=warning) if point or warning else html.paragraph(text))
-            case Table(caption, header, rows, folded):
-                table = html.table(caption, header, rows)
-                parts.append(html.folded(caption, table) if folded else table)
-            case Picture(_, svg, caption):
-                parts.append(html.figure(svg, caption, adapts=True))
-    return "\n".join(parts)
+    return "".join([block.html() for block in blocks])
 
 
 def to_markdown(document: Document, folder: str = "") -> str:
@@ -103,26 +173,7 @@ def to_markdown(document: Document, folder: str = "") -> str:
 
 
 def _markdown(blocks: Sequence[Block], folder: str) -> list[str]:
-    lines: list[str] = []
-    for block in blocks:
-        match block:
-            case Paragraph(text, point, warning):
-                lines += [f"> {text}" if point or warning else text, ""]
-            case Table(caption, header, rows, _):
-                lines += [
-                    f"**{caption}**",
-                    "",
-                    _row(header),
-                    "|" + "|".join([":--", *["--:"] * (len(header) - 1)]) + "|",
-                ]
-                lines += [*map(_row, rows), ""]
-            case Picture(name, _, caption):
-                lines += [f"![{caption}]({folder}{name}.svg)", ""]
-    return lines
-
-
-def _row(cells: Sequence[str]) -> str:
-    return "| " + " | ".join([cell.replace("|", "\\|") for cell in cells]) + " |"
+    return [line for block in blocks for line in block.markdown(folder)]
 
 
 def check_folder(folder: Path) -> None:

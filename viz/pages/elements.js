@@ -1,4 +1,4 @@
-// Elements of pages and of their pictures. Texts stay texts, whatever is in them.
+// Elements of pages and of their pictures, and numbers as texts. Texts stay texts, whatever is in them.
 
 const SVG = "http://www.w3.org/2000/svg";
 function filled(made, attributes, inside) {
@@ -13,3 +13,10 @@ const drawn = (name, attributes = {}, ...inside) => filled(document.createElemen
 /** An element of a picture, the last in another. */
 const element = (name, attributes, parent) => parent.appendChild(drawn(name, attributes));
 const byId = (id) => document.getElementById(id);
+
+/** A finite number in so many digits, of a very small or large one two less with its power of ten. */
+function numeral(value, digits) {
+  const size = Math.abs(value);
+  const text = size && (size < 1e-3 || size >= 1e5) ? value.toExponential(digits - 2) : String(+value.toPrecision(digits));
+  return text.replaceAll("-", "−");
+}

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from cgraph.extend import counted
+
 from .. import theme
 from .document import Table
 
@@ -38,4 +40,4 @@ def size_table(sizes: Mapping[tuple[str, str], Sequence[int]]) -> Table:
 def _mistakes(nodes: int, edges: int, missing: int) -> str:
     """Words on nodes and edges that are there by mistake, and terms that are missing."""
     kinds = ((nodes, "node"), (edges, "edge"), (missing, "missing term"))
-    return ", ".join([f"{count} {kind}{'s' * (count != 1)}" for count, kind in kinds if count]) or "none"
+    return ", ".join([counted(count, kind) for count, kind in kinds if count]) or "none"

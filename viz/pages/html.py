@@ -1,4 +1,4 @@
-"""Pages: one HTML file from its parts, and the figures, tables and words that are parts."""
+"""Pages: one HTML file from its parts, with its policy; and the files that are parts."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import hashlib
 import json
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from html import escape
 from importlib.resources import files
 from pathlib import Path
@@ -21,7 +21,7 @@ from .. import theme
 FRAME_HEIGHT = 760  # pixels in a notebook
 _COMMENT = re.compile(r"^ *(?://[^\n]*|/\*\*.*?\*/)\n", re.MULTILINE | re.DOTALL)  # that begins a line
 
-_STYLE = f"""
+STYLE = f"""
 :root {{ color-scheme: light dark; --text: {theme.TEXT}; --back: #FFFFFF; --soft: #F4F4F2; --line: #D8D8D4; }}
 @media (prefers-color-scheme: dark) {{ :root {{ --text: #E8E8E4; --back: #17181A; --soft: #232529; --line: #3A3D42; }} }}
 body {{ margin: 0 auto; padding: 1.5rem; max-width: 64rem; color: var(--text); background: var(--back);
@@ -130,57 +130,3 @@ def asset(package: str | None, *names: str) -> str:
 def _digest(text: str) -> str:
     """The name of an inline script or style in a content security policy."""
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
-
-
-def page(title: str, introduction: str, sections: Sequence[tuple[str, str, str]]) -> Page:
-    """A page of sections (anchor, heading, HTML), with a line of links to them. introduction is HTML."""
-    links = " ".join(f'<a href="#{escape(anchor)}">{escape(heading)}</a>' for anchor, heading, _ in sections)
-    body = "\n".join(
-        f'<section id="{escape(anchor)}">\n<h2>{escape(heading)}</h2>\n{content}\n</section>'
-        for anchor, heading, content in sections
-    )
-    return compose(title, f"<h1>{escape(title)}</h1>\n{introduction}\n<nav>{links}</nav>\n{body}", _STYLE)
-
-
-def figure(svg: str, caption: str, width: str | None = "100%", *, adapts: bool = False) -> str:
-    """An SVG picture inside the page, with its caption (text) below; the caption is its alternative text too.
-
-    adapts: the picture has no background, and ink for light and dark pages.  width: None leaves it to the page's style.
-    """
-    data = base64.b64encode(svg.encode()).decode()
-    style = "" if width is None else f' style="width:{width}{";background:none" if adapts else ""}"'
-    kind = ' class="plot"' if width == "100%" else ""
-    return (
-        f'<figure><img{kind} src="data:image/svg+xml;base64,{data}" alt="{escape(caption)}"{style}>'
-        f"<figcaption>{escape(caption)}</figcaption></figure>"
-    )
-
-
-def table(caption: str, header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table of texts; the first column is read to the left, the others to the right."""
-    head = "".join(f"<th>{escape(name)}</th>" for name in header)
-    body = "\n".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows)
-    return (
-        f'<div class="scroll"><table><caption>{escape(caption)}</caption><thead><tr>{head}</tr></thead>'
-        f"<tbody>\n{body}\n</tbody></table></div>"
-    )
-
-
-def folded(summary: str, content: str) -> str:
-    """Content (HTML) that is shown when its summary (text) is clicked."""
-    return f"<details><summary>{escape(summary)}</summary>\n{content}\n</details>"
-
-
-def paragraph(text: str) -> str:
-    """A paragraph of text."""
-    return f"<p>{escape(text)}</p>"
-
-
-def point(text: str, *, warning: bool = False) -> str:
-    """The one thing to see in a section, set apart; a warning in the color of what is wrong."""
-    return f'<p class="{"warning" if warning else "point"}">{escape(text)}</p>'
-
-
-def preformatted(text: str) -> str:
-    """Text in lines as they are."""
-    return f"<pre>{escape(text)}</pre>"

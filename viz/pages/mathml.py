@@ -18,7 +18,10 @@ def equations(graph: Graph, names: Mapping[str, str], lines: int = 12) -> str:
 
     names: {name in the graph: text shown}.
     """
-    shown = {name: names.get(name, theme.pretty(name)) for name in (*_names_of(graph), *graph.outputs)}
+    shown = {
+        name: names.get(name, theme.pretty(name))
+        for name in (*[node.name for node in graph.nodes if node.name], *graph.outputs)
+    }
     found = Formulas(graph.nodes, graph.outputs, _MATHML, shown).lines(list(graph.outputs.values()), lines)
     rows = "".join(
         f"<mtr><mtd>{left}</mtd><mtd><mo>=</mo></mtd><mtd>{right}</mtd></mtr>" for left, right in found.equations
@@ -27,10 +30,6 @@ def equations(graph: Graph, names: Mapping[str, str], lines: int = 12) -> str:
     rest = f"<p>{len(found.left_out)} of {total} lines are left out.</p>" if found.left_out else ""
     table = f'<mtable columnalign="right center left">{rows}</mtable>'
     return f'<div class="scroll"><math display="block">{table}</math></div>{rest}'
-
-
-def _names_of(graph: Graph) -> list[str]:
-    return [node.name for node in graph.nodes if node.name]
 
 
 def _names(names: Iterable[str]) -> dict[str, str]:

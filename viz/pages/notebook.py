@@ -33,27 +33,7 @@ class Rows(Protocol):
 def graph_html(graph: Graph) -> str:
     """The drawing of a graph, as wide as the cell at most; a large one folded by its tags, and the way to its page.
 
-    Parameters
-    ----------
-    graph : Graph
-        What is drawn.
-
-    Returns
-    -------
-    str
-        HTML with the picture inside.
-
-    Raises
-    ------
-    RenderError
-        Where Graphviz is missing or does not end; the notebook shows the text form then.
-
-    Examples
-    --------
-    >>> import cgraph as cg
-    >>> x = cg.variable("x")
-    >>> "<svg" in graph_html(cg.Graph([x], {"y": cg.sin(x)}))
-    True
+    Raises RenderError where Graphviz is missing or does not end; the notebook shows the text form then.
     """
     require_graph("graph_html", graph)
     tags = tags_to_collapse(graph)
@@ -68,24 +48,7 @@ def graph_html(graph: Graph) -> str:
 
 
 def node_html(node: Node) -> str:
-    """The formula of a node, as MathML; of a long one the last lines, and how many are left out.
-
-    Parameters
-    ----------
-    node : Node
-        What is shown.
-
-    Returns
-    -------
-    str
-        HTML.
-
-    Examples
-    --------
-    >>> import cgraph as cg
-    >>> "<math" in node_html(cg.sin(cg.variable("x")))
-    True
-    """
+    """The formula of a node, as MathML; of a long one the last lines, and how many are left out."""
     variables = [each for each in topological([node]) if not each.args and each.value is None]
     return equations(Graph(variables, {node.name or "node": node}), {"node": ""})
 
@@ -93,27 +56,7 @@ def node_html(node: Node) -> str:
 def trajectory_html(run: Rows) -> str:
     """The plot of a motion over time: coordinates and velocities, or states, and how the run went.
 
-    Parameters
-    ----------
-    run : dynamics.Trajectory
-        What `dynamics.simulate` gives.
-
-    Returns
-    -------
-    str
-        HTML with the picture inside.
-
-    Raises
-    ------
-    ImportError
-        Without matplotlib; the notebook shows the text form then.
-
-    Examples
-    --------
-    >>> import dynamics as dyn
-    >>> run = dyn.simulate(dyn.planar_arm([1.0], [1.0]), [0.1], [0.0], 1.0)
-    >>> "<svg" in trajectory_html(run)
-    True
+    Raises ImportError without matplotlib; the notebook shows the text form then.
     """
     from ..plots.plot import GRID, empty_figure, style, to_adaptive_svg
 

@@ -89,10 +89,21 @@ def _against_time(content: Content) -> Section:
 
 
 def _picture(name: str, panels: Sequence[Panel], caption: str, shared: bool = True) -> Block:
-    """The panels, or words where there is nothing to draw."""
-    if not panels:
+    """The panels that have points, or words where there is nothing to draw."""
+    drawn = [panel for panel in panels if any(len(line.x) for line in panel.lines)]
+    if not drawn:
         return Paragraph("No run gave numbers to draw.")
-    return Picture(name, to_adaptive_svg(labeled(panels, shared=shared)), caption)
+    return Picture(name, to_adaptive_svg(labeled(drawn, shared=shared)), caption)
+
+
+def _grouped(content: Content) -> dict[tuple[str, bool], list[Row]]:
+    """{(equal or chosen steps, whether they are ours): curves}."""
+    kinds = [(kind, ours) for kind in (EQUAL, CHOSEN) for ours in (True, False)]
+    return {each: [curve for curve in content["curves"] if (curve["kind"], curve["ours"]) == each] for each in kinds}
+
+
+def _panel(kind: str, ours: bool, x: str, y: str, lines: list[Line]) -> Panel:
+    return Panel(f"{'ours' if ours else 'others'}, {kind}", f"{x} (smaller to the right)", y, lines)
 
 
 def _panels(content: Content, x: str, name: str) -> tuple[list[Panel], list[str]]:
@@ -102,29 +113,14 @@ def _panels(content: Content, x: str, name: str) -> tuple[list[Panel], list[str]
     """
     panels: list[Panel] = []
     shown: list[str] = []
-    axes = f"{name} (smaller to the right)", "run time [s]"
-    for kind in (EQUAL, CHOSEN):
-        of_kind = [curve for curve in content["curves"] if curve["kind"] == kind]
-        ours, others = ([curve for curve in of_kind if curve["ours"] is mine] for mine in (True, False))
-        if ours:
-            panels.append(
-                Panel(
-                    f"ours, {kind}",
-                    *axes,
-                    [_line(curve, x, "seconds", *_look(curve)) for curve in ours],
-                )
-            )
-        if others:
-            best = _best(ours, content)
-            shown += [curve["name"] for curve in best]
-            drawn = [_line(curve, x, "seconds", *_look(curve)) for curve in others]
-            drawn += [_line(curve, x, "seconds", _look(curve)[0], True, "ours: ") for curve in best]
-            panels.append(Panel(f"others, {kind}", *axes, drawn))
-    return [panel for panel in panels if any(len(line.x) for line in panel.lines)], shown
-
-
-def _maker(name: str) -> str:
-    return next((color for begin, color in theme.MAKERS.items() if name.startswith(begin)), theme.GRAY)
+    groups = _grouped(content)
+    for (kind, ours), curves in groups.items():
+        lines = [_line(curve, x, "seconds", *_look(curve)) for curve in curves]
+        best = [] if ours or not curves else _best(groups[kind, True], content)
+        shown += [curve["name"] for curve in best]
+        lines += [_line(curve, x, "seconds", _look(curve)[0], True, "ours: ") for curve in best]
+        panels.append(_panel(kind, ours, name, "run time [s]", lines))
+    return panels, shown
 
 
 def _best(ours: Sequence[Row], content: Content) -> list[Row]:
@@ -151,7 +147,8 @@ def _line(curve: Row, x: str, y: str, color: int | str, dashed: bool, before: st
 def _look(curve: Row) -> tuple[int | str, bool]:
     """Color and dashes of a curve, the same on every page: one for every method of ours, and every maker of others."""
     if not curve["ours"]:
-        return _maker(curve["name"]), False
+        color = [color for begin, color in theme.MAKERS.items() if curve["name"].startswith(begin)]
+        return next(iter(color), theme.GRAY), False
     name = curve["name"].partition(" ")[0]
     number = theme.METHODS.index(name) if name in theme.METHODS else len(theme.METHODS)
     return number, number >= len(COLORS)
@@ -163,20 +160,15 @@ def _drawn(point: Row) -> bool:
 
 def _orders(content: Content) -> Section:
     panels = []
-    for kind in (EQUAL, CHOSEN):
-        for mine in (True, False):
-            curves = [curve for curve in content["curves"] if curve["kind"] == kind and curve["ours"] is mine]
-            lines = [
-                _line(curve, *(("step", "largest") if kind == EQUAL else ("knob", "error")), *_look(curve))
-                for curve in curves
-            ]
-            knobs = sorted({point["knob"] for curve in curves for point in curve["points"]}, reverse=True)
-            if kind == CHOSEN and len(knobs) > 1:
-                lines.append(Line("error = tolerance", knobs, knobs, None))
-            if any(len(line.x) for line in lines):
-                x = f"{'step [s]' if kind == EQUAL else 'relative tolerance'} (smaller to the right)"
-                y = "largest error" if kind == EQUAL else "error at the end"
-                panels.append(Panel(f"{'ours' if mine else 'others'}, {kind}", x, y, lines))
+    for (kind, ours), curves in _grouped(content).items():
+        equal = kind == EQUAL
+        columns = ("step", "largest") if equal else ("knob", "error")
+        axes = ("step [s]", "largest error") if equal else ("relative tolerance", "error at the end")
+        lines = [_line(curve, *columns, *_look(curve)) for curve in curves]
+        knobs = sorted({point["knob"] for curve in curves for point in curve["points"]}, reverse=True)
+        if not equal and len(knobs) > 1:
+            lines.append(Line("error = tolerance", knobs, knobs, None))
+        panels.append(_panel(kind, ours, *axes, lines))
     rows = [
         [
             curve["name"],

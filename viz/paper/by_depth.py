@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 from cgraph import Counts, Graph
 from dynamics import hamilton_equations, scenes, state_equation
 from dynamics.equations.momentum.both_forms import HAMILTON, LAGRANGE, VELOCITIES_ALONE, both_forms, form_sizes
 from dynamics.experiments.speed.bench_scenes import SCENES, chain
-from dynamics.experiments.text_table import csv_text
 
 from .. import theme
 from ..graph_drawing.legend import kinds_in, legend_svg, to_adaptive
 from ..graph_drawing.levels import LevelPanel, Scale, levels_svg, silhouettes_svg
-from ..graph_drawing.render import render_png
-from ..pages import html
-from ..theme import Paint
-from .part import Part
+from ..pages.document import Block, Paragraph, Picture, Table
+from .part import Part, drawn
 
 TITLES = {LAGRANGE: "Lagrange: accelerations of (q, q̇)", HAMILTON: "Hamilton: rates of (q, p)"}
 SPRING, ARM = "a rotor on a spring", "the three-link arm"
@@ -40,42 +37,33 @@ def figure7(larger: Mapping[str, str] = LARGER) -> Part:
     And the silhouettes of a long chain in both orders of elimination.  larger: {what it is called: one of the bench's `SCENES`}
     whose sizes are counted as well.
     """
-    drawn = {SPRING: both_forms(scenes.load("spring_mass")), ARM: both_forms(scenes.load("triple_pendulum"))}
-    sizes = {name: form_sizes(forms) for name, forms in drawn.items()}
+    shown = {SPRING: both_forms(scenes.load("spring_mass")), ARM: both_forms(scenes.load("triple_pendulum"))}
+    sizes = {name: form_sizes(forms) for name, forms in shown.items()}
     sizes |= {name: form_sizes(both_forms(SCENES[model]())) for name, model in larger.items()}
-    spring = levels_svg([LevelPanel(TITLES[name], graph) for name, graph in drawn[SPRING].items()], LARGE)
+    spring = levels_svg([LevelPanel(TITLES[name], graph) for name, graph in shown[SPRING].items()], LARGE)
     level = sizes[ARM][VELOCITIES_ALONE].depth
     marks: dict[str, Mapping[str, int]] = {HAMILTON: {"q̇ is solved": level}}
     arm = levels_svg(
-        [LevelPanel(TITLES[name], graph, marks.get(name, {})) for name, graph in drawn[ARM].items()], SMALL
+        [LevelPanel(TITLES[name], graph, marks.get(name, {})) for name, graph in shown[ARM].items()], SMALL
     )
-    legend = legend_svg(_kinds([*drawn[SPRING].values(), *drawn[ARM].values()]))
+    kinds = kinds_in(*shown[SPRING].values(), *shown[ARM].values())
+    legend = legend_svg(theme.in_words(kinds, theme.MOTION_WORDS))
     orders = {f"{form}, {method}": graph for method in METHODS for form, graph in _chain(LINKS, method).items()}
     silhouettes = silhouettes_svg([LevelPanel(title, graph) for title, graph in orders.items()])
-    table = ("", *[f"{size}, {form}" for size in SIZES for form in ("Lagrange", "Hamilton")]), _rows(sizes)
-    section = (
-        html.point(_answer(sizes[ARM]))
-        + html.figure(to_adaptive(spring), _caption("7a", SPRING, sizes[SPRING]), width="auto", adapts=True)
-        + html.figure(to_adaptive(legend), "The colors of Figure 7.", width="auto", adapts=True)
-        + html.figure(to_adaptive(arm), _caption("7b", ARM, sizes[ARM]), adapts=True)
-        + html.paragraph(_cause(sizes[ARM]))
-        + html.table("Sizes of both forms", *table)
-        + html.paragraph(_remedy(orders))
-        + html.figure(to_adaptive(silhouettes), _silhouettes_caption(LINKS), adapts=True)
-    )
-    files: dict[str, str | bytes] = {"fig7.csv": csv_text(*table)}
-    for name, svg in (("fig7a", spring), ("fig7b", arm), ("fig7c", silhouettes)):
-        files |= {f"{name}.svg": to_adaptive(svg), f"{name}.png": render_png(svg)}
+    header = ("", *[f"{size}, {form}" for size in SIZES for form in ("Lagrange", "Hamilton")])
+    blocks: list[Block] = [
+        Paragraph(_answer(sizes[ARM]), point=True),
+        drawn("fig7a", spring, _caption("7a", SPRING, sizes[SPRING]), "auto"),
+        Picture("", to_adaptive(legend), "The colors of Figure 7.", "auto"),
+        drawn("fig7b", arm, _caption("7b", ARM, sizes[ARM])),
+        Paragraph(_cause(sizes[ARM])),
+        Table("Sizes of both forms", header, _rows(sizes), file="fig7"),
+        Paragraph(_remedy(orders)),
+        drawn("fig7c", silhouettes, _silhouettes_caption(LINKS)),
+    ]
     data = {name: {form: _size(counts) for form, counts in each.items()} for name, each in sizes.items()}
     data[f"a planar chain of {LINKS}"] = {title: _size(graph.counts()) for title, graph in orders.items()}
-    return Part("forms", "Figure 7: both forms by depth", files, data, section)
-
-
-def _kinds(graphs: Sequence[Graph]) -> list[Paint]:
-    """The kinds of nodes of all, in the words of equations of motion."""
-    found = {kind for graph in graphs for kind in kinds_in(graph)}
-    order = [kind for kind in (*theme.ROLES.values(), theme.OUTPUT) if kind in found]
-    return theme.in_words(order, theme.MOTION_WORDS)
+    return Part("forms", "Figure 7: both forms by depth", blocks, data)
 
 
 def _size(counts: Counts) -> dict[str, int]:

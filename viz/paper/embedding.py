@@ -7,12 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from dynamics.experiments.paper_numbers import EmbeddingError, embedding_errors
-from dynamics.experiments.text_table import csv_text
 
-from ..pages import html
+from ..pages.document import Block, Paragraph, Table
 from ..pages.formulations import COLORS, TITLES
 from ..plots.direct_labels import Line, Panel, labeled
-from .part import Part, pictures
+from .part import Part, plotted
 
 LINKS = (1, 2, 3, 6)
 
@@ -20,7 +19,6 @@ LINKS = (1, 2, 3, 6)
 def embedding(links: Sequence[int] = LINKS) -> Part:
     """The law of the embedding: torque error against dt.  links: of the arms."""
     laws = embedding_errors(links)
-    drawn = pictures("law", labeled(_panels(laws), shared=False, room=0.5))
     header = ("formulation", "links", "slope", "largest entry of the limit [N m]", "error at dt = 1e-6 s [N m]")
     rows = [
         (
@@ -36,24 +34,27 @@ def embedding(links: Sequence[int] = LINKS) -> Part:
         "Left: the error does not vanish with dt. Right: the distance to τ + ∂L/∂q (by definition) and to τ + ∂K/∂q "
         "(kinetic only) vanishes with slope 1. Random states of planar arms."
     )
-    section = (
-        html.point(
-            "A smaller time step does not help: by definition the whole term ∂L/∂q is lost, kinetic only the part ∂K/∂q."
-        )
-        + html.figure(drawn.svg, caption, adapts=True)
-        + html.table("The law of the embedding", header, rows)
-        + html.paragraph(
+    blocks: list[Block] = [
+        Paragraph(
+            "A smaller time step does not help: by definition the whole term ∂L/∂q is lost, kinetic only the part ∂K/∂q.",
+            point=True,
+        ),
+        plotted("law", labeled(_panels(laws), shared=False, room=0.5), caption),
+        Table("The law of the embedding", header, rows, file="law"),
+        Paragraph(
             "Kinetic only is exact for one joint, where K does not depend on q, and wrong for a real arm under this plain "
             "embedding. It is exact again if the momentum is taken before the relation is embedded. The paper calls its "
             "kinetic-only method accurate on three links; its program is not public, so which of the two it is is not known."
-        )
-    )
-    files = drawn.files | {"law.csv": csv_text(header, rows)}
+        ),
+    ]
     data = {
-        f"{law.formulation} n={law.n}": {"slope": _finite(law.slope), "limit": float(np.abs(law.limit).max())}
+        f"{law.formulation} n={law.n}": {
+            "slope": law.slope if np.isfinite(law.slope) else None,
+            "limit": float(np.abs(law.limit).max()),
+        }
         for law in laws
     }
-    return Part("law", "How wrong, and why dt does not help", files, data, section)
+    return Part("law", "How wrong, and why dt does not help", blocks, data)
 
 
 def _panels(laws: Sequence[EmbeddingError]) -> list[Panel]:
@@ -72,7 +73,3 @@ def _panels(laws: Sequence[EmbeddingError]) -> list[Panel]:
     top = 4.0 * max(max(line.y) for line in panels[1].lines)
     panels[1].lines.append(Line("slope 1", steps, [top * dt / steps[0] for dt in steps], None))
     return panels
-
-
-def _finite(value: float) -> float | None:
-    return value if np.isfinite(value) else None

@@ -7,11 +7,10 @@ import numpy as np
 from cgraph.extend import Json
 from dynamics import scenes
 from dynamics.experiments.paper_numbers import free_fall, largest_differences, mujoco_free_fall
-from dynamics.experiments.text_table import csv_text
 
-from ..pages import html
+from ..pages.document import Block, Paragraph, Table
 from ..plots import plot
-from .part import Part, pictures
+from .part import Part, plotted
 
 SNAPSHOTS = 6
 
@@ -27,15 +26,13 @@ def figures4_and_5() -> Part:
         "Figure 4. The three-link arm in free fall by RK4 on the equations of motion from its own graph, with the way of "
         f"each joint. Start at rest at q = ({start}) rad, dt = 1e-3 s."
     )
-    drawn4 = pictures("fig4", ours)
-    files = dict(drawn4.files)
-    section = html.figure(drawn4.svg, caption4, adapts=True)
+    blocks: list[Block] = [plotted("fig4", ours, caption4)]
     data: dict[str, Json] = {"q_end": run.trajectory.q[-1].tolist()}
     try:
         other = mujoco_free_fall(run)
     except ImportError as error:
-        section += html.point(f"Figure 5 is missing on this machine. {error}", warning=True)
-        return Part("fall", "Figures 4 and 5: the fall", files, data | {"mujoco": None}, section)
+        blocks.append(Paragraph(f"Figure 5 is missing on this machine. {error}", warning=True))
+        return Part("fall", "Figures 4 and 5: the fall", blocks, data | {"mujoco": None})
 
     theirs = plot.snapshots(run.trajectory.t, run.positions, instants.tolist(), dots=other.positions)
     caption5 = (
@@ -45,15 +42,13 @@ def figures4_and_5() -> Part:
     differences = largest_differences(run, other)
     header = ("up to t [s]", "largest |difference in q| [rad]")
     rows = [(f"{t:.2f}", f"{difference:.2e}") for t, difference in differences]
-    drawn5 = pictures("fig5", theirs)
-    files |= {**drawn5.files, "fig5.csv": csv_text(header, rows)}
-    section += (
-        html.figure(drawn5.svg, caption5, adapts=True)
-        + html.table("Our trajectory and MuJoCo's", header, rows)
-        + html.paragraph(
+    blocks += [
+        plotted("fig5", theirs, caption5),
+        Table("Our trajectory and MuJoCo's", header, rows, file="fig5"),
+        Paragraph(
             "Both integrate by the classical Runge-Kutta method with the same step, so what differs is the equations of motion: "
             "ours from a Lagrangian by automatic differentiation, MuJoCo's from its composite-rigid-body algorithm."
-        )
-    )
+        ),
+    ]
     data |= {"mujoco": other.version, "largest_difference": differences[-1][1]}
-    return Part("fall", "Figures 4 and 5: the fall", files, data, section)
+    return Part("fall", "Figures 4 and 5: the fall", blocks, data)

@@ -11,13 +11,12 @@ from typing import NamedTuple
 from cgraph.extend import Json
 
 from ..graph_drawing.render import check_can_draw
-from ..pages import html
-from ..pages.document import check_folder
+from ..pages.document import Document, Paragraph, Section, check_folder, to_html
 from ..plots import plot
 from .by_depth import figure7
 from .embedding import embedding
 from .free_fall import figures4_and_5
-from .one_joint import equations, figure1, figure2, figure3, sizes
+from .one_joint import equations, figure, sizes
 from .part import Part
 from .scaling import scaling_of_counts
 from .timing import figure6
@@ -42,11 +41,11 @@ def paper(folder: Path, say: Callable[[str], None], *, quick: bool = False) -> P
     check_can_draw()
     plot.check_can_plot()
     check_folder(folder)
-    makers = {
+    makers: dict[str, Callable[[], Part]] = {
         "Equation (3), read off the graphs term by term": equations,
-        "Figure 1: by definition, with the Euler relation embedded": figure1,
-        "Figure 2: kinetic energy only": figure2,
-        "Figure 3: the chain rule": figure3,
+        "Figure 1: by definition, with the Euler relation embedded": partial(figure, "fig1"),
+        "Figure 2: kinetic energy only": partial(figure, "fig2"),
+        "Figure 3: the chain rule": partial(figure, "fig3"),
         "Sizes of these graphs, and of those of the whole torque": sizes,
         "The law of the embedding: torque error against dt": partial(embedding, QUICK_ARMS) if quick else embedding,
         "Figures 4 and 5: the three-link arm in free fall, by our graph and by MuJoCo": figures4_and_5,
@@ -60,8 +59,9 @@ def paper(folder: Path, say: Callable[[str], None], *, quick: bool = False) -> P
     for number, (what, make) in enumerate(makers.items(), start=1):
         say(f"[{number}/{len(makers)}] {what} ...")
         part = make()
-        files |= {folder / name: content for name, content in part.files.items()}
-        say(f"[{number}/{len(makers)}] {', '.join(part.files)}: ready")
+        made = part.files()
+        files |= {folder / name: content for name, content in made.items()}
+        say(f"[{number}/{len(makers)}] {', '.join(made)}: ready")
         parts.append(part)
     data = {part.name: part.data for part in parts}
     files[folder / "figures.json"] = json.dumps(data, indent=1, allow_nan=False) + "\n"
@@ -70,11 +70,10 @@ def paper(folder: Path, say: Callable[[str], None], *, quick: bool = False) -> P
 
 
 def _page(parts: Sequence[Part]) -> str:
-    introduction = html.paragraph(
+    introduction = Paragraph(
         "Lagrange's equation as a computational graph, after Kusaka and Tanaka, Robotics 2025, 14(9), 115. Three ways to write "
         "τ = d/dt ∂L/∂qd − ∂L/∂q: by definition with the Euler relation embedded (wrong), with the kinetic energy alone (right "
         "for one joint only), and by the chain rule (right). Every number on this page was measured when it was made."
     )
-    return html.page(
-        "The chain rule keeps q and qd apart", introduction, [(part.name, part.heading, part.section) for part in parts]
-    )
+    sections = [Section(part.name, part.heading, part.blocks) for part in parts]
+    return to_html(Document("The chain rule keeps q and qd apart", [introduction], sections))

@@ -1,13 +1,17 @@
-"""A part of the paper: its files, its figures as data and its section of the page; what all parts share."""
+"""A part of the paper: its section of the page, its files and its figures as data; what all parts share."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
 from cgraph.extend import Json
+from dynamics.experiments.text_table import csv_text
 
+from ..graph_drawing.legend import to_adaptive
 from ..graph_drawing.render import render_png
+from ..pages.document import Block, Picture, Table
 from ..plots import plot
 
 if TYPE_CHECKING:
@@ -18,23 +22,32 @@ SCALE = 160 / 96  # of a plot as PNG: 160 pixels an inch
 
 
 class Part(NamedTuple):
-    """One part of the paper: its files {name: content}, its figures as plain data, and its section of the page."""
+    """One part of the paper: its section of the page, its figures as plain data, and files that no block stands for."""
 
     name: str
     heading: str
-    files: dict[str, str | bytes]
+    blocks: Sequence[Block]
     data: Mapping[str, Json]
-    section: str
+    other: Mapping[str, str | bytes] = MappingProxyType({})
+
+    def files(self) -> dict[str, str | bytes]:
+        """{name: content} of the pictures and tables that have a file, and of the others."""
+        files: dict[str, str | bytes] = {}
+        for block in self.blocks:
+            if isinstance(block, Picture) and block.name:
+                files[f"{block.name}.svg"] = block.svg
+                if block.png:
+                    files[f"{block.name}.png"] = render_png(block.svg, scale=block.png)
+            elif isinstance(block, Table) and block.file:
+                files[f"{block.file}.csv"] = csv_text(block.header, block.rows)
+        return files | dict(self.other)
 
 
-class Pictures(NamedTuple):
-    """A plot as the files of a part, and as the SVG that the page shows."""
-
-    svg: str
-    files: dict[str, str | bytes]
+def plotted(name: str, figure: Figure, caption: str) -> Picture:
+    """A plot with its files."""
+    return Picture(name, plot.to_adaptive_svg(figure, background=True), caption, png=SCALE)
 
 
-def pictures(name: str, picture: Figure) -> Pictures:
-    """A plot rendered, once, as SVG, and as PNG from that SVG."""
-    svg = plot.to_adaptive_svg(picture, background=True)
-    return Pictures(svg, {f"{name}.svg": svg, f"{name}.png": render_png(svg, scale=SCALE)})
+def drawn(name: str, svg: str, caption: str, width: str = "100%") -> Picture:
+    """A drawing with its files."""
+    return Picture(name, to_adaptive(svg), caption, width, png=2.0)

@@ -8,10 +8,10 @@ from dynamics.experiments.paper_numbers import COUNTS, FITTED_FROM, NodeScaling,
 from dynamics.experiments.text_table import csv_text
 from dynamics.simulation.progress_bar import Progress
 
-from ..pages import html
+from ..pages.document import Block, Paragraph, Table
 from ..pages.formulations import COLORS, TITLES
 from ..plots.direct_labels import Line, Panel, labeled
-from .part import Part, pictures
+from .part import Part, plotted
 
 
 def scaling_of_counts(links: Sequence[int] = COUNTS) -> Part:
@@ -21,28 +21,28 @@ def scaling_of_counts(links: Sequence[int] = COUNTS) -> Part:
     """
     with Progress("scaling", 1.0) as progress:
         rows = node_scaling(links, report=progress)
-    drawn = pictures("scaling", labeled(_panels(rows), shared=False, rising=True, room=0.35))
     header, table = _exponents(rows, links[-1])
     caption = f"Inverse dynamics of chains of n equal rods. Exponents are fitted over n = {FITTED_FROM} to {links[-1]}."
-    section = (
-        html.point(
+    blocks: list[Block] = [
+        Paragraph(
             "The embedding is not what makes a graph grow quadratically: by definition and the contracted chain rule both grow "
-            "linearly. The chain rule taken literally, with the gradient of every momentum, is the quadratic one."
-        )
-        + html.figure(drawn.svg, caption, adapts=True)
-        + html.table("Fitted exponents", header, table)
-    )
+            "linearly. The chain rule taken literally, with the gradient of every momentum, is the quadratic one.",
+            point=True,
+        ),
+        plotted("scaling", labeled(_panels(rows), shared=False, rising=True, room=0.35), caption),
+        Table("Fitted exponents", header, table),
+    ]
     points = [
         (row.formulation, str(n), str(nodes), str(edges), f"{time:.3f}")
         for row in rows
         for n, nodes, edges, time in zip(row.n, row.nodes, row.edges, row.microseconds, strict=True)
     ]
-    files = drawn.files | {"scaling.csv": csv_text(("formulation", "n", "nodes", "edges", "microseconds"), points)}
+    points_csv = csv_text(("formulation", "n", "nodes", "edges", "microseconds"), points)
     data = {
         row.formulation: {"edges_exponent": row.fitted(row.edges), "nodes_exponent": row.fitted(row.nodes)}
         for row in rows
     }
-    return Part("scaling", "Scaling with the number of links", files, data, section)
+    return Part("scaling", "Scaling with the number of links", blocks, data, {"scaling.csv": points_csv})
 
 
 def _panels(rows: Sequence[NodeScaling]) -> list[Panel]:

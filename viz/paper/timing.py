@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING
 
 from cgraph.extend import Json
 from dynamics.experiments.paper_numbers import PAPER_MS, Row, table_1
-from dynamics.experiments.text_table import csv_text
 
-from ..pages import html
+from ..pages.document import Block, Paragraph, Table
 from ..pages.formulations import COLORS, TITLES
 from ..plots import plot
-from .part import Part, pictures
+from .part import Part, plotted
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,28 +26,25 @@ def figure6(evaluations: int = EVALUATIONS) -> Part:
     evaluations: random states, each evaluated once by each formulation in turn.
     """
     rows = table_1(evaluations)
-    ratios, times = _ratios(rows), _times(rows)
-    drawn = pictures("fig6", _bars(rows))
     caption = (
         f"Figure 6. Median time of one evaluation of the three-link arm's inverse dynamics over {evaluations} random "
         "states; the lines reach from the lower to the upper quartile. Each panel has its own scale. The paper's own "
         "figures, on the right, are means with one standard deviation."
     )
-    section = (
-        html.table("Table 1: ratios of medians to the chain rule's, and sizes", *ratios)
-        + html.point(_why(rows))
-        + html.figure(drawn.svg, caption, adapts=True)
-        + html.table("Times of one evaluation", *times)
-        + html.paragraph(
+    blocks: list[Block] = [
+        Table("Table 1: ratios of medians to the chain rule's, and sizes", *_ratios(rows), file="table1"),
+        Paragraph(_why(rows), point=True),
+        plotted("fig6", _bars(rows), caption),
+        Table("Times of one evaluation", *_times(rows), file="table1-times"),
+        Paragraph(
             "Interpreted: node by node in Python. Compiled: one generated Python function. PyTorch eager, measured where torch "
             "is installed, builds and differentiates its graph anew at every evaluation. "
             "Kinetic only has a few nodes more than by definition: it needs both ∂K/∂q and ∂L/∂q, where by definition needs "
             "∂L/∂q alone."
-        )
-    )
-    files = drawn.files | {"table1.csv": csv_text(*ratios), "table1-times.csv": csv_text(*times)}
+        ),
+    ]
     data = {row.formulation: _figures(row) for row in rows}
-    return Part("table1", "Figure 6 and Table 1: the cost", files, data, section)
+    return Part("table1", "Figure 6 and Table 1: the cost", blocks, data)
 
 
 def _bars(rows: Sequence[Row]) -> Figure:

@@ -113,7 +113,7 @@ function showDerived({ system, motion, record }) {
     const found = TYPED.verdict(system, name), words = found.differs ? "differs" : "holds";
     return tag("details", {}, tag("summary", {}, `lint, ${name.replace("_", " ")}: ${words}`), tag("pre", {}, TYPED.lint(system, found).join("\n")));
   });
-  byId("derived").replaceChildren(table(["nodes", "edges", "spurious"], rows), ...lint, ...(motion.error ? [] : motionWords(system, motion)));
+  byId("derived").replaceChildren(table(["", "nodes", "edges", "spurious"], rows), ...lint, ...(motion.error ? [] : motionWords(system, motion)));
 }
 function motionWords(system, motion) {
   const [first, last] = [motion.energy[0], motion.energy.at(-1)], exact = Number.isFinite(motion.change) ? `; half the step changes it by ${brief(motion.change)} of its size` : "";

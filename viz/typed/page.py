@@ -12,7 +12,6 @@ from ..pages.html import Page, Panel, asset
 from ..pages.operations import operations
 
 FILES = (
-    "tokens.js",
     "expressions.js",
     "statements.js",
     "system.js",
@@ -21,10 +20,8 @@ FILES = (
     "derivatives.js",
     "equations.js",
     "verdict.js",
-    "lint.js",
     "motion.js",
     "record.js",
-    "examples.js",
     "interface.js",
 )
 
@@ -40,7 +37,7 @@ def engine() -> str:
 
 def script() -> str:
     """The engine with what it needs, for a program that has no page."""
-    return f'"use strict";\n{operations()}{asset(html.__package__, "graph.js")}{engine()}'
+    return f'"use strict";\n{operations()}{asset(html.__package__, "graph.js", "slopes.js")}{engine()}'
 
 
 TITLE = "Your own Lagrangian"

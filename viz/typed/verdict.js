@@ -1,4 +1,4 @@
-// The verdict on a formulation: does it differ from the chain rule, by how much, and what in its graph is to blame?
+// The verdict on a formulation: does it differ from the chain rule, by how much, and what in its graph is to blame; and lint in words.
 
 const STATES = 24, SMALLEST = 2 ** -53; // states tried, a third of size 1, the rest from 1e-6 to 1e6; a rounding
 const DIFFERS = "This is not the torque of the chain rule, however small dt is";
@@ -36,37 +36,23 @@ function verdict(system, formulation) {
 
 /** The first state at which c is not 0, else the last; at how many it was finite; and c there, [[i, value]]. */
 function stateOf(system, c) {
-  const names = [...system.q, ...system.qd, ...system.extra].map(({ name }) => name), inner = topological(c), partials = within({ build: null },
-    () => inner.map((node) => (node.args.length ? partialsOf(node) : [])));
+  const inputs = [...system.q, ...system.qd, ...system.extra], inner = topological(c), { number, ...arrays } = numbered(inner, inputs);
+  const graph = { ops: opsOf(arrays), args: argsOf(arrays) }, run = evaluator(arrays);
+  const rounded = inner.map(({ op, args, value }) => SMALLEST * (args.length ? ROWS[op].rounding : value === null ? 1 : 0));
   let seed = 20250814, finite = 0, at, excess = [];
   const random = () => { seed = (seed * 16807) % 2147483647; return seed / 2147483647; }; // the same on every page
   for (let k = 0; k < STATES && !excess.length; k++) {
-    at = new Map(names.map((name) => {
+    at = new Map(inputs.map(({ name }) => {
       const size = k < STATES / 3 ? 1 : 10 ** (12 * random() - 6), x = size * (k % 2 ? random() : 2 * random() - 1); // a root or a logarithm needs k % 2
       return [name, system.parameters.get(name) ?? +x.toPrecision(3)];
     }));
-    const values = valuesOf([...inner, ...partials.flat()], at), errors = errorsOf(inner, partials, values);
-    const found = c.map((node) => [values[inner.indexOf(node)], errors.get(node)]);
+    const values = run([...at.values()]), errors = errorBounds(graph, slopesAt(graph, values), rounded.map((each, i) => each * Math.abs(values[i])));
+    const found = c.map((node) => [values[number.get(node)], errors[number.get(node)]]);
     if (!found.every(([value]) => Number.isFinite(value))) continue;
     finite += 1;
     excess = found.flatMap(([value, error], i) => (value && Math.abs(value) >= 10 * error ? [[i, value]] : []));
   }
   return { at, finite, excess };
-}
-/** What rounding can make of every node, to first order; values: of the nodes, then of their partials. */
-function errorsOf(nodes, partials, values) {
-  const errors = new Map();
-  let next = nodes.length;
-  nodes.forEach((node, i) => {
-    const own = node.args.length ? ROWS[node.op].rounding : node.value === null ? 1 : 0;
-    let error = own * SMALLEST * Math.abs(values[i]);
-    partials[i].forEach((_, slot) => {
-      const slope = Math.abs(values[next++]), before = errors.get(node.args[slot]);
-      if (slope && before) error += slope * before;
-    });
-    errors.set(node, error);
-  });
-  return errors;
 }
 
 /** What of the graph is there by the derivative through the step: nodes that serve nothing else, edges [source, target] by
@@ -77,7 +63,11 @@ function blame(system, formulation, graph) {
   const through = variable("through the step"), marked = inverseDynamics(system, formulation, through);
   const [without, whole] = [0, 1].map((factor) => pairs(marked.nodes, folded(marked.nodes, new Builder(), new Map([[through, constant(factor)]]))));
   const wrong = new Set(marked.nodes.filter((node) => without.get(node).value === 0 && node.value !== 0));
-  const alike = sameStructure(graph.nodes), reach = new Map(marked.nodes.map((node) => [node, 0]));
+  const all = topological([...graph.nodes, ...whole.values()]), { number, ...arrays } = numbered(all, []);
+  const leaf = (node) => (all[node].args.length ? null : all[node].value === null ? `name ${all[node].name}` : numberLeaf(all[node].value));
+  const means = meanings({ ops: opsOf(arrays), args: argsOf(arrays) }, leaf), meaning = (node) => means[number.get(node)];
+  const same = new Map([...graph.nodes].reverse().map((node) => [meaning(node), node])), alike = (node) => same.get(meaning(node));
+  const reach = new Map(marked.nodes.map((node) => [node, 0]));
   [...marked.outputs.values()].forEach((node, i) => reach.set(node, reach.get(node) | (1 << i)));
   for (const node of [...marked.nodes].reverse()) for (const arg of node.args) reach.set(arg, reach.get(arg) | reach.get(node));
   const cut = new Map();
@@ -104,20 +94,39 @@ function blame(system, formulation, graph) {
     cancelled: new Set([...marked.outputs.keys()].filter((_, i) => touched & ~left & (1 << i))),
   };
 }
-/** A function from a node to the one of `nodes` that computes the same from the same, if any. */
-function sameStructure(nodes) {
-  const numbers = new Map(), known = new Map(), found = new Map();
-  const number = (output) => {
-    for (const node of topological([output])) {
-      if (known.has(node)) continue;
-      const args = node.args.map((arg) => known.get(arg));
-      if (ROWS[node.op]?.commutative) args.sort((a, b) => a - b);
-      const key = node.args.length ? `${node.op} ${args.join(" ")}` : node.value === null ? `name ${node.name}` : `number ${node.value}`;
-      if (!numbers.has(key)) numbers.set(key, numbers.size);
-      known.set(node, numbers.get(key));
-    }
-    return known.get(output);
+
+const joined = (words) => (words.length > 1 ? `${words.slice(0, -1).join(", ")} and ${words.at(-1)}` : words[0] ?? "");
+const verb = (subjects, word) => (subjects.length > 1 ? word : `${word}s`);
+
+/** What people call the inputs and outputs of a graph: {q0: q.theta}. */
+function displayNames({ coordinates }) {
+  const kinds = [["q", ""], ["q", "_old"], ["qd", ""], ["qd", "_old"], ["qdd", ""], ["tau", ""]];
+  return new Map(coordinates.flatMap((name, i) => kinds.map(([kind, old]) => [`${kind}${i}${old}`, `${kind}${old}.${name}`])));
+}
+
+/** Sentences as `cgraph lint` has them, for the verdict on a formulation of inverse dynamics. */
+function lint(system, { graph, summary, lines, energy }) {
+  const names = displayNames(system), shown = (name) => names.get(name) ?? name;
+  const byName = new Map([...graph.inputs, ...graph.nodes].filter(({ name }) => name).map((node) => [node.name, node]));
+  const group = (nodes) => nodes.map(({ name }) => byName.get(name)).filter(Boolean);
+  const q = group(system.q), qd = group(system.qd), called = (nodes) => joined(nodes.map(({ name }) => shown(name)));
+  const used = new Set(graph.nodes), unused = graph.inputs.filter((node) => !used.has(node));
+  const first = [summary, ...lines], notes = unused.map(({ name }) => `Note: Nothing uses the input ${shown(name)}.`);
+  if (!q.length || !qd.length) return [...first, ...notes];
+  const proof = (nodes, on) => {
+    const start = `Holds: no path leads from ${called(on)} to ${called(nodes)}`;
+    if (!nodes.some((node) => node.args.length)) return `${start}: ${called(nodes)} ${nodes.length > 1 ? "are inputs" : "is an input"}.`;
+    const reached = new Set(topological(nodes));
+    return `${start}, made from ${called(graph.inputs.filter((node) => reached.has(node)))} alone.`;
   };
-  for (const node of nodes) if (!found.has(number(node))) found.set(number(node), node);
-  return (node) => found.get(number(node));
+  if (!q[0].args.length) return [...first, proof(q, qd), proof(qd, q), ...notes];
+  const targets = graph.nodes.filter((node) => q.includes(node));
+  const edges = targets.map((node) => [byName.get(node.name.replace("q", "qd")), node]);
+  const through = graph.nodes.some(({ label }) => label & COUPLING && label & ADJOINT);
+  const texts = edges.map(([from, to]) => `${shown(from.name)} * dt -> ${shown(to.name)}`), width = Math.max(...texts.map((text) => text.length));
+  const paths = [`${called(targets)} ${verb(targets, "depend")} on ${called(edges.map(([from]) => from))}. Without ${edges.length > 1 ? `these ${edges.length} edges` : "this edge"} there is no path:`];
+  edges.forEach(([from, to], i) => paths.push(
+    `  ${texts[i].padEnd(width)}  through it d${energy}/d${shown(from.name)} ${through ? "gains" : "would gain"} dt * d${energy}/d${shown(to.name)}`));
+  if (!through) paths.push("No derivative in this graph was taken that way.");
+  return [...first, ...paths, proof(qd, q), ...notes];
 }

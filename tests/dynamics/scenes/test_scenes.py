@@ -46,7 +46,7 @@ def loaded(*arguments: Any, **options: Any) -> scenes.Scene:
 # --- by name
 
 
-@mark.parametrize("name", scenes.names())
+@each_row("name", scenes.names())
 def test_a_scene_is_called_by_its_name_and_starts_in_a_state_of_its_model(name: str) -> None:
     scene = scenes.load(name)
     assert scene.name == name
@@ -60,7 +60,7 @@ def test_options_go_to_the_scene_s_function() -> None:
     assert not np.any(scenes.load("triple_pendulum", mass_model="point").model.bodies[0].inertia)
 
 
-@mark.parametrize(
+@each_row(
     ("name", "options", "message"),
     [
         ("chain", {"links": 4}, "scene 'chain' has no option 'links'; its options are n"),
@@ -75,13 +75,13 @@ def test_an_unknown_option_is_named_with_those_that_there_are(name: str, options
         scenes.load(name, **options)
 
 
-@mark.parametrize("n", [0, -1, 2.5, "3"])
+@each_row("n", [0, -1, 2.5, "3"])
 def test_a_chain_has_a_whole_number_of_links(n: Any) -> None:
     with raises(ValueError, match=f"^a chain needs at least one link, got {n!r}$"):
         scenes.load("chain", n=n)
 
 
-@mark.parametrize("name", ["swing", "", 3, None, ["chain"]])
+@each_row("name", ["swing", "", 3, None, ["chain"]])
 def test_what_is_neither_a_name_nor_a_file_is_named_with_the_scenes(name: Any) -> None:
     message = f"there is no scene {name!r}; the scenes are spring_mass, triple_pendulum, chain, any file that ends"
     with raises(ValueError, match="^" + re.escape(message)):

@@ -31,7 +31,7 @@ def test_a_start_is_given_by_names_or_as_numbers(scene, start, q, qd):
     assert (started.q, started.qd) == (q, qd)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("start", "message"),
     [
         ({"joint 3": 1.0}, "there is no joint 3; did you mean 'q.joint 2'"),
@@ -46,7 +46,7 @@ def test_a_start_that_does_not_fit_is_told(start, message):
         with_start(ARM, start)
 
 
-@pytest.mark.parametrize("scene", [*map(scenes.load, scenes.names()), FIRST], ids=lambda scene: scene.name)
+@each_row("scene", [*map(scenes.load, scenes.names()), FIRST])
 def test_every_name_of_a_state_sets_that_one_alone(scene):
     names = [f"q{i}" for i in range(len(scene.q))] + [f"qd{i}" for i in range(len(scene.qd))]
     called = dyn.display_names(scene)
@@ -102,7 +102,7 @@ def test_many_joints_are_not_wound_up():
     assert start_text(scene).endswith(", and 5 more")
 
 
-@pytest.mark.parametrize("name", scenes.names())
+@each_row("name", scenes.names())
 def test_a_scene_that_moves_keeps_its_start(name):
     scene = scenes.load(name)
     assert moving_start(scene) is scene

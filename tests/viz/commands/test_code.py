@@ -13,6 +13,7 @@ import cgraph as cg
 import dynamics as dyn
 from cgraph.core.node import apply
 from cgraph.operations.operation import OPS
+from tests.each_row import each_row
 from tests.tolerances import SUMS
 from tests.wasm import Instance
 from viz import cli
@@ -25,7 +26,7 @@ def point(graph):
     return [math.sin(1.0 + k) for k in range(len(graph.inputs))]
 
 
-@pytest.mark.parametrize("what", EQUATIONS)
+@each_row("what", EQUATIONS)
 def test_python_is_the_graph(what, capsys):
     """With what it calls above it: the text alone runs."""
     assert cli.main(["code", "triple_pendulum", "--python", "--what", what]) == 0
@@ -78,7 +79,7 @@ def test_c_is_one_text_or_two_files(tmp_path, capsys):
             subprocess.run([compiler, "-c", "-Werror", name, "-o", "out.o"], cwd=tmp_path, check=True)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("arguments", "said"),
     [
         ("--wasm", "--wasm needs --out"),

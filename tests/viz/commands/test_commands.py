@@ -273,7 +273,7 @@ def own(tmp_path, monkeypatch):
     return tmp_path
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("command", "word"),
     [
         ("inspect {} --t-end 0.1 --start knee=1 --out a.html", "chain_rule"),
@@ -295,7 +295,7 @@ def test_a_model_of_a_python_file_stands_where_a_scene_does(own, capsys, command
     assert "made" not in text
 
 
-@pytest.mark.parametrize(
+@each_row(
     "command",
     ["inspect {} --t-end 0.1 --out a.html", "lint {}", "why {} decay_dot decay", "draw {} --out a.dot", "simulate {}"],
 )
@@ -366,7 +366,7 @@ def test_two_runs_print_the_same_bytes(capsys):
     assert capsys.readouterr().out == other.stdout != ""
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("arguments", "status", "colors"),
     [
         (["lint", "spring_mass", "--formulation", "euler_embedded"], 1, theme.MARKS[:1]),

@@ -54,7 +54,7 @@ def sizes(graph):
     return {"nodes": counts.nodes, "edges": counts.edges, "depth": counts.depth, "width": counts.width}
 
 
-@pytest.mark.parametrize("scene", SCENES)
+@each_row("scene", SCENES)
 def test_lint_and_compare_have_the_sizes_of_both_forms(own, capsys, scene):
     model = dyn.scenes.load(scene)
     forms = dyn.state_equation(model), dyn.hamilton_equations(model)
@@ -82,7 +82,7 @@ def test_the_momenta_and_positions_are_proven_apart(own, capsys):
     assert text.splitlines()[-2].split()[-4:] == [str(counts.nodes), "238", str(counts.depth), "28"]
 
 
-@pytest.mark.parametrize("scene", ["triple_pendulum", "own.py:planet", "own.py:free"])
+@each_row("scene", ["triple_pendulum", "own.py:planet", "own.py:free"])
 def test_why_adds_up_to_the_derivative(own, capsys, scene):
     found = figures(capsys, "why", scene, "p0_dot", "q0", "--momentum", "--k", "1")
     if found["depends"]:
@@ -94,7 +94,7 @@ def test_why_adds_up_to_the_derivative(own, capsys, scene):
         assert scene == "own.py:free"
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("scene", "asked", "told"),
     [
         ("own.py:planet", "p_dot.phi q.r", True),
@@ -140,7 +140,7 @@ def test_what_has_no_momentum_graph_is_refused_in_one_sentence(own, capsys, comm
     assert message in error
 
 
-@pytest.mark.parametrize(
+@each_row(
     "arguments",
     [
         "lint spring_mass --momentum --forward",

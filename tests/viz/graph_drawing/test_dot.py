@@ -243,7 +243,7 @@ def test_clusters_follow_the_given_tags_or_function() -> None:
     assert list(clusters(graph, clusters=lambda node: "sines" if node.op.name == "sin" else None)) == ["sines"]
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("tags", "cluster"),
     [
         ((), None),

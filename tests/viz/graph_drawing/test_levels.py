@@ -9,6 +9,7 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
+from tests.each_row import each_row
 from viz.graph_drawing.levels import LevelPanel, Scale, levels_of, levels_svg, longest_way, silhouettes_svg
 
 SCALE = Scale(row=15.0, gap=13.0, width=8.0, height=8.0, ticks=5)
@@ -24,7 +25,7 @@ def rectangles(svg: str) -> list[tuple[float, float]]:
     return [(float(x), float(y)) for x, y in re.findall(r'<rect x="([-0-9.]+)" y="([-0-9.]+)"', svg)]
 
 
-@pytest.mark.parametrize("name", GRAPHS)
+@each_row("name", GRAPHS)
 def test_the_longest_way_has_an_operation_at_every_depth(name: str) -> None:
     graph = GRAPHS[name]
     level, way = levels_of(graph), longest_way(graph)

@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 import cgraph as cg
-from viz import graph_svg, render_png, render_svg, theme, to_dot
-from viz.graph_drawing.render import LARGE, RenderError
+from tests.each_row import each_row
+from viz import render_png, render_svg, theme, to_dot
+from viz.graph_drawing.render import RenderError
 
 
 def square() -> cg.Graph:
@@ -61,7 +62,7 @@ def test_the_webassembly_graphviz_draws_without_a_binary(no_binary: None) -> Non
     assert "</svg>" in render_svg("digraph { a -> b }")
 
 
-@pytest.mark.parametrize("engine", ["dot", "sfdp", "neato"])
+@each_row("engine", ["dot", "sfdp", "neato"])
 def test_engines_draw_every_node(engine: str) -> None:
     svg = render_svg("digraph { a -> b; c }", engine=engine)
     assert svg.count('class="node"') == 3
@@ -72,7 +73,7 @@ def test_an_unknown_engine_is_refused() -> None:
         render_svg("digraph {}", engine="magic")
 
 
-@pytest.mark.parametrize("timeout", [0.0, -1.0, float("nan")])
+@each_row("timeout", [0.0, -1.0, float("nan")])
 def test_a_time_limit_must_be_positive(timeout: float) -> None:
     with pytest.raises(ValueError, match="timeout must be positive"):
         render_svg("digraph {}", timeout=timeout)
@@ -175,13 +176,13 @@ def test_an_inch_is_96_pixels_at_scale_1() -> None:
     assert pixels(render_png(svg, scale=1.0)).shape == (96, 96)
 
 
-@pytest.mark.parametrize("scale", [0.0, -1.0, float("inf"), float("nan")])
+@each_row("scale", [0.0, -1.0, float("inf"), float("nan")])
 def test_a_scale_must_be_positive_and_finite(scale: float) -> None:
     with pytest.raises(ValueError, match="scale must be positive and finite"):
         render_png("<svg/>", scale=scale)
 
 
-@pytest.mark.parametrize("text", ["", "hello", "<svg"])
+@each_row("text", ["", "hello", "<svg"])
 def test_what_is_not_svg_is_refused(text: str) -> None:
     with pytest.raises(RenderError, match="not an SVG picture"):
         render_png(text)
@@ -191,15 +192,3 @@ def test_without_resvg_the_error_names_the_extra(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setitem(sys.modules, "resvg_py", None)
     with pytest.raises(ImportError, match=r"pip install '\.\[viz\]'"):
         render_png("<svg/>")
-
-
-def test_a_notebook_gets_the_drawing() -> None:
-    assert graph_svg(square()) == render_svg(to_dot(square()))
-
-
-def test_a_notebook_is_spared_a_graph_that_is_too_large() -> None:
-    x = y = cg.variable("x")
-    for _ in range(LARGE):
-        y = cg.sin(y)
-    with pytest.raises(RenderError, match=f"{LARGE + 1} nodes are too many"):
-        graph_svg(cg.Graph([x], {"y": y}))

@@ -10,6 +10,7 @@ import pytest
 import cgraph as cg
 import dynamics as dyn
 import viz
+from tests.each_row import each_row
 from tests.hostile_texts import HOSTILE, hostile_page
 from viz import cli, theme
 
@@ -51,7 +52,7 @@ FIRST = """() => {
 }"""  # noqa: E501 (a program)
 
 
-@pytest.mark.parametrize("scene", ["triple_pendulum", "spring_mass"])
+@each_row("scene", ["triple_pendulum", "spring_mass"])
 def test_the_first_view_is_whole_and_can_be_read(show, scene):
     page = show(scene)
     for version in "123":
@@ -79,18 +80,11 @@ def test_the_spurious_branch_is_seen_at_once_and_gone_by_the_chain_rule(show):
     assert titles == ["link 1", "link 2", "link 3", "damping"]  # no column for the Euler step, which is not in it
 
 
-def test_hostile_names_stay_texts_in_the_browser(browser, tmp_path):
+def test_hostile_names_stay_texts_in_the_browser(visit, tmp_path):
     """Every panel is filled, wide and narrow, light and dark; nothing runs, and the policy has nothing to refuse."""
-    said = []
-    page = browser.new_page()
-    page.on("console", lambda message: said.append(message.text))
-    page.on("pageerror", lambda error: said.append(str(error)))
-    page.on("dialog", lambda dialog: (said.append(dialog.message), dialog.dismiss()))
     for text, width, scheme in ((HOSTILE[0], 1400, "light"), (HOSTILE[1], 390, "dark"), (HOSTILE[3], 390, "light")):
         (tmp_path / "page.html").write_text(hostile_page(text), encoding="utf-8")
-        page.set_viewport_size({"width": width, "height": 800})
-        page.emulate_media(color_scheme=scheme)
-        page.goto((tmp_path / "page.html").as_uri())
+        page = visit(tmp_path / "page.html", width=width, height=800, color_scheme=scheme)
         for _ in range(2):
             page.click("#unfold")
         for group in page.locator("g.item").all():
@@ -102,8 +96,6 @@ def test_hostile_names_stay_texts_in_the_browser(browser, tmp_path):
         assert page.locator("#results th").nth(1).text_content() == text
         assert page.locator("img, body script:not([type]) ~ script, [onpointerover], [onload], [onerror]").count() == 0
         assert page.evaluate("document.documentElement.scrollWidth <= innerWidth + 1")
-    page.close()
-    assert said == []
 
 
 def test_detail_goes_from_nodes_to_bodies_and_back(show):
@@ -262,7 +254,7 @@ def test_the_motion_moves_the_values_and_the_tables(show):
     assert page.inner_text("#clock") == f"{80 * 3.0 / 89:.2f} s"
 
 
-@pytest.mark.parametrize("links", [2, 3, 4, 10])
+@each_row("links", [2, 3, 4, 10])
 def test_no_table_is_cut_beside_the_picture_or_below_it(visit, tmp_path, links):
     """Rows and columns change places where that makes it fit; a table of many of both stands below the picture."""
     viz.inspect(dyn.scenes.load("chain", n=links), tmp_path / "arm.html", t_end=1.0)

@@ -1,14 +1,14 @@
 """Places of nodes in layers: arguments below their uses, and nothing on top of another."""
 
 import numpy as np
-import pytest
 
+from tests.each_row import each_row
 from tests.page_script import run_script
 
 STEP, GAP = run_script("() => [LAYERS.step, LAYERS.gap]")
 
 
-@pytest.mark.parametrize("seed", range(4))
+@each_row("seed", range(4))
 def test_layers_put_arguments_below_and_nothing_on_top_of_another(seed):
     rng = np.random.default_rng(seed)
     widths = rng.uniform(30, 90, 60).tolist()

@@ -270,7 +270,7 @@ def test_what_rounding_leaves_is_told_from_what_is_small():
     )
     program = """(record) => {
       const state = makeState(record), [version] = state.versions, values = state.evaluate(version);
-      const noise = errorBounds(version, slopesAt(version, values), values);
+      const noise = errorBounds(version, slopesAt(version, values), ownErrors(version, values, []), 0);
       return version.outputs.map(([, , node]) => [brief(values[node], noise[node]), values[node], noise[node]]);
     }"""
     for unit in (1.0, 1e-9, 1e12):
@@ -294,8 +294,8 @@ def test_a_velocity_of_a_long_arm_is_no_noise_and_what_cancels_is():
     program = """(record) => {
       const state = makeState(record), [version] = state.versions;
       const values = state.evaluate(version), slopes = slopesAt(version, values);
-      const errors = state.errorsOf(version), bounds = errorBounds(version, slopes, values, errors);
-      const sharp = sharpened(version, slopes, values, bounds, errors);
+      const own = ownErrors(version, values, state.errorsOf(version)), bounds = errorBounds(version, slopes, own, 0);
+      const sharp = sharpened(version, slopes, values, bounds, own);
       return [state.solved, ...version.outputs.map(([, , node]) => [values[node], bounds[node], sharp[node]])];
     }"""
     state = State({name: at.get(name, 0.0) for name in graph.input_names})
@@ -313,7 +313,7 @@ def test_the_free_motion_takes_torques_of_zero_and_the_page_says_0():
       const state = makeState(record), version = state.versions[0];
       state.show(frame);
       const values = state.evaluate(version);
-      const noise = errorBounds(version, slopesAt(version, values), values);
+      const noise = errorBounds(version, slopesAt(version, values), ownErrors(version, values, []), 0);
       return version.outputs.map(([, , node]) => brief(values[node], noise[node]));
     })"""
     version = found.versions["chain_rule"]

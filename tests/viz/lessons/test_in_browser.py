@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
+
 import pytest
 
 import dynamics as dyn
 import viz
+from tests.each_row import each_row
 
 
 @pytest.fixture(scope="module")
@@ -13,32 +16,17 @@ def lesson(tmp_path_factory):
     """A page of the lesson on two links, as a file."""
     path = tmp_path_factory.mktemp("lesson") / "lesson.html"
     viz.lesson(dyn.planar_arm([1.0, 0.8], [1.0, 0.8]), path)
-    return path.as_uri()
+    return path
 
 
 @pytest.fixture
-def visit(browser, lesson):
-    """A function that opens the page; at the end nothing was said on the console and nothing was asked of the net."""
-    said, asked, pages = [], [], []
-
-    def opened(fragment: str = "", width: int = 1400, **options):
-        page = browser.new_context(viewport={"width": width, "height": 900}, **options).new_page()
-        page.on("console", lambda message: said.append(message.text))
-        page.on("pageerror", lambda error: said.append(str(error)))
-        page.on("request", lambda request: asked.append(request.url))
-        page.goto(lesson + fragment)
-        pages.append(page)
-        return page
-
-    yield opened
-    for page in pages:
-        page.context.close()
-    assert said == []
-    assert [url for url in asked if not url.startswith(("file:", "data:"))] == []
+def show(visit, lesson):
+    """Open the page."""
+    return lambda fragment="", width=1400, **options: visit(lesson, fragment, width, 900, **options)
 
 
-def test_keys_are_enough(visit):
-    page = visit()
+def test_keys_are_enough(show):
+    page = show()
     for _ in range(6):
         page.keyboard.press("a")
         page.keyboard.press("ArrowRight")
@@ -46,7 +34,7 @@ def test_keys_are_enough(visit):
     page.keyboard.press("b")  # a second guess does not count
     fragment = page.url.partition("#")[2]
     assert fragment == "6;000000"
-    again = visit(f"#{fragment}")
+    again = show(f"#{fragment}")
     assert again.inner_text("nav output") == page.inner_text("nav output")
     page.click("text=Start again")
     assert page.url.endswith("#1;------")
@@ -55,10 +43,9 @@ def test_keys_are_enough(visit):
     assert page.locator("#euler-edge .reveal[open]").count() == 1
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("width", [390, 1400])
-def test_every_screen_fits_and_can_be_read(visit, width, scheme):
-    page = visit(width=width, color_scheme=scheme)
+@each_row(("width", "scheme"), itertools.product((390, 1400), ("light", "dark")))
+def test_every_screen_fits_and_can_be_read(show, width, scheme):
+    page = show(width=width, color_scheme=scheme)
     for k in range(6):
         page.evaluate(f"go({k}); guess({k}, 0)")
         assert page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth") == 0
@@ -67,8 +54,8 @@ def test_every_screen_fits_and_can_be_read(visit, width, scheme):
     assert light == (scheme == "light")
 
 
-def test_what_one_moves_is_computed(visit):
-    page = visit("#1")
+def test_what_one_moves_is_computed(show):
+    page = show("#1")
     cells = "[...document.querySelectorAll('#euler-edge .board td')].map((cell) => cell.textContent)"
     before = page.evaluate(cells)
     page.click("text=Let it rest")
@@ -84,8 +71,8 @@ def test_what_one_moves_is_computed(visit):
     assert page.locator("#sweeps td.lit").count() == 1
 
 
-def test_print_has_all_questions_and_the_answers(visit):
-    page = visit("#3")
+def test_print_has_all_questions_and_the_answers(show):
+    page = show("#3")
     page.evaluate("window.dispatchEvent(new Event('beforeprint'))")
     page.emulate_media(media="print")
     assert page.evaluate("[...document.querySelectorAll('.screen')].filter((s) => s.offsetHeight).length") == 6

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
+
 import pytest
 
+from tests.each_row import each_row
 from viz import cli
 
 SPRING = """import dynamics as dyn
@@ -119,7 +122,7 @@ def data(page):
     return page.evaluate("JSON.parse(document.getElementById('live-data').textContent)")
 
 
-@pytest.mark.parametrize("fragment", ["#live=%", "#live=", "#live=5", "#nothing", "#live=%7B%22dt%22%3A%22x%22%7D"])
+@each_row("fragment", ["#live=%", "#live=", "#live=5", "#nothing", "#live=%7B%22dt%22%3A%22x%22%7D"])
 def test_a_link_that_says_nothing_opens_the_page_as_it_is(fragment, show):
     page = show(fragment=fragment)
     assert page.evaluate("[...live.machine.run]") == [each["value"] for each in data(page)["inputs"]]
@@ -140,8 +143,7 @@ def test_it_is_used_by_keys_alone(show):
     assert page.input_value("#live-dt-field") > before
 
 
-@pytest.mark.parametrize("command", ["live", "inspect"])
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@each_row(("command", "scheme"), itertools.product(("live", "inspect"), ("light", "dark")))
 def test_narrow_and_dark_pages_have_all_of_it(command, scheme, show):
     page = show(command, width=390, color_scheme=scheme)
     if command == "inspect":

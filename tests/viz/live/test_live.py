@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import hashlib
 import json
 import math
 import re
@@ -29,11 +28,6 @@ PENDULUM = dyn.scenes.load("triple_pendulum")
 @pytest.fixture(scope="module")
 def live():
     return live_of(PENDULUM)
-
-
-@pytest.fixture(scope="module")
-def text(live):
-    return page_text(live, title="An arm, live", about="It falls.")
 
 
 class Script:
@@ -172,7 +166,7 @@ def test_a_clock_that_goes_back_makes_no_step(script):
     assert script("run.advance(1.5 * data.dt)") == 1
 
 
-@pytest.mark.parametrize("dt", [1e-6, 1e-2, 0.1, 10.0])
+@each_row("dt", [1e-6, 1e-2, 0.1, 10.0])
 def test_the_course_to_come_is_short_and_smooth_whatever_dt_is(dt, script):
     """A picture takes no longer with a shorter dt, and the reference keeps its corners small with a longer one."""
     count, fine, end = script(
@@ -223,7 +217,7 @@ def test_the_clock_keeps_up_with_real_time_and_says_where_it_cannot(seconds, scr
     assert script("run.state.slow") is True
 
 
-@pytest.mark.parametrize("dt", [1e-7, 1e-3, 0.1, 10.0, 1e6])
+@each_row("dt", [1e-7, 1e-3, 0.1, 10.0, 1e6])
 def test_a_frame_takes_so_many_steps_at_most_whatever_dt_is(dt, script):
     counted = "{ ...machine, step: (inputs, method, h, count) => { steps += count; } }"
     script.engine.eval(f"var steps = 0, counting = liveRun({counted}, data); counting.state.dt = {dt}")
@@ -242,7 +236,7 @@ def test_a_value_that_is_no_number_is_not_taken(script):
 # What is made of a scene.
 
 
-@pytest.mark.parametrize("name", ["spring_mass", "triple_pendulum", "chain"])
+@each_row("name", ["spring_mass", "triple_pendulum", "chain"])
 def test_the_graphs_of_a_scene_say_what_the_library_says(name):
     scene = dyn.scenes.load(name) if name != "chain" else dyn.scenes.load(name, n=3)
     found = live_of(scene)
@@ -257,7 +251,7 @@ def test_the_graphs_of_a_scene_say_what_the_library_says(name):
     assert shown["energy"] == pytest.approx(shown["kinetic"] + shown["potential"])
 
 
-@pytest.mark.parametrize("name", ["spring_mass", "triple_pendulum"])
+@each_row("name", ["spring_mass", "triple_pendulum"])
 def test_in_momentum_form_the_state_is_of_momenta_and_moves_alike(name):
     scene = dyn.scenes.load(name)
     found, usual = live_of(scene, momentum=True), live_of(scene)
@@ -298,27 +292,6 @@ def test_a_denser_body_is_the_same_body():
 # The page.
 
 
-def test_the_page_is_one_small_file_that_loads_nothing(text):
-    assert len(text.encode()) < 60_000
-    assert set(re.findall(r"https?://[^\s\"'<]+", text)) == {"http://www.w3.org/2000/svg"}
-    assert not re.search(
-        r"@import|url\(|fetch\(|XMLHttpRequest|import\(|localStorage|\beval\(|new Function|innerHTML", text
-    )
-    assert re.findall(r'(?:src|href)="([^"]*)"', text) == ["data:,"]
-    assert not re.search(r"<[^>]* (on\w+|style)=", text)
-
-
-def test_the_policy_allows_webassembly_and_nothing_else(text):
-    (policy,) = re.findall(r'Security-Policy" content="([^"]*)"', text)
-    assert "'unsafe" not in policy
-    assert policy.count("'wasm-unsafe-eval'") == 1
-    (script,) = re.findall(r"<script>(.*?)</script>", text, re.DOTALL)
-    (style,) = re.findall(r"<style>(.*?)</style>", text, re.DOTALL)
-    for kind, content in (("script", script), ("style", style)):
-        digest = base64.b64encode(hashlib.sha256(content.encode()).digest()).decode()
-        assert f"{kind}-src 'sha256-{digest}'" in policy
-
-
 HOSTILE = "</script><script>alert(1)</script>"
 
 
@@ -335,40 +308,11 @@ def test_names_stay_texts():
     assert page._repr_html_().count('"') == 8
 
 
-def made(**changed):
+def test_a_start_that_is_no_number_is_told():
     x, v = cg.variables(["x", "v"])
-    fields = {
-        "rate": cg.Graph([x, v], {"a": v, "b": -x}),
-        "start": {"x": 1.0, "v": 0.0},
-        "shown": cg.Graph([x, v], {"K": v, "P": x, "E": v + x}),
-        "meters": [("K", "J", "energy")] * 3,
-        "methods": TABLEAUS,
-    }
-    return Live(**fields | changed)
-
-
-@each_row(
-    ("changed", "kind", "said"),
-    [
-        ({"rate": 3}, TypeError, "needs a cg.Graph, got int"),
-        (
-            {"shown": cg.Graph([cg.variable("v")], {"K": cg.variable("v")})},
-            cg.GraphError,
-            "must have the inputs of rate",
-        ),
-        ({"start": {"x": 1.0}}, ValueError, "has none of v"),
-        ({"start": {"x": 1.0, "v": math.nan}}, ValueError, "has none of v"),
-        ({"dt": 0.0}, ValueError, "dt must be positive"),
-        ({"methods": {"rk4": TABLEAUS["rk4"]}}, ValueError, "must have dopri5"),
-        ({"meters": [("K", "J", "energy")]}, ValueError, "three energies first"),
-        ({"parents": [0]}, ValueError, "an output for each meter"),
-    ],
-)
-def test_a_mistake_is_told_in_one_sentence(changed, kind, said):
-    with pytest.raises(kind, match=said) as caught:
-        made(**changed)
-    assert "\n" not in str(caught.value)
-    assert made().to_dict()["states"] == 2
+    graph = cg.Graph([x, v], {"a": v, "b": -x})
+    with pytest.raises(ValueError, match="has none of v"):
+        Live(graph, {"x": 1.0, "v": math.nan}, graph, [])
 
 
 def test_a_center_that_attracts_has_a_page():

@@ -97,7 +97,7 @@ def test_a_robot_that_flies_away_stays_in_the_frame():
     assert (middle[0] != middle[1]).any()
 
 
-@pytest.mark.parametrize("value", [0.0, 5e-324, -3.0, 1e20])
+@each_row("value", [0.0, 5e-324, -3.0, 1e20])
 def test_what_stands_still_is_drawn(value):
     still = replace(SWING, q=np.full_like(SWING.q, value), qd=np.zeros_like(SWING.qd))
     assert len(opened(viz.animate(SYSTEM, still))[0]) >= 1

@@ -5,6 +5,7 @@ import pytest
 
 import dynamics as dyn
 from cgraph import Graph
+from tests.each_row import each_row
 from tests.tolerances import SOLVED
 from viz.models.inspection import elimination
 
@@ -16,7 +17,7 @@ MODELS = {
 }
 
 
-@pytest.mark.parametrize("name", MODELS)
+@each_row("name", MODELS)
 def test_a_pivot_is_the_inertia_that_is_left_when_all_joints_further_out_follow(name):
     model = MODELS[name]
     graph, names = dyn.forward_dynamics(model), dyn.display_names(model)
@@ -44,7 +45,7 @@ def test_a_pivot_is_the_inertia_that_is_left_when_all_joints_further_out_follow(
     assert {node for node in graph.nodes if node.args} == set(lit)
 
 
-@pytest.mark.parametrize("name", MODELS)
+@each_row("name", MODELS)
 def test_the_velocities_of_momenta_have_the_same_pivots_and_the_rates_come_after_them(name):
     model = MODELS[name]
     names, graphs = dyn.display_names(model), (dyn.forward_dynamics(model), dyn.hamilton_equations(model))

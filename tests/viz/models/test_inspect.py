@@ -10,7 +10,8 @@ import pytest
 import cgraph as cg
 import dynamics as dyn
 import viz
-from viz.inspector import Page
+from tests.each_row import each_row
+from viz.pages.html import Page
 
 
 def lagrangian(q, qd, t):
@@ -46,12 +47,12 @@ def test_the_page_of_momenta_has_both_forms_their_rows_and_a_machine_of_momenta(
     assert [version["steps"] == [] for version in data["versions"]] == [False, True]
 
 
-@pytest.mark.parametrize("start", [{"swing": 1.0}, {"qd0": 1.0}, [0.0, 0.0]])
+@each_row("start", [{"swing": 1.0}, {"qd0": 1.0}, [0.0, 0.0]])
 def test_a_start_that_is_chosen_is_kept(start):
     assert NOTICE not in viz.inspect(PENDULUM, start=start, t_end=0.1, forward=True)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("arguments", "named", "message"),
     [
         ((PENDULUM, "page.txt"), {}, "must end in .html"),

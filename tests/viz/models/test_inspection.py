@@ -12,11 +12,11 @@ import dynamics as dyn
 from cgraph import Graph
 from dynamics.multibody.trees.joint_positions import skeleton
 from dynamics.scenes.scenes import Scene
+from tests.each_row import each_row
 from tests.early_end import stops
 from tests.sources import ROOT
 from tests.tolerances import EQUATIONS
-from viz.models.carried import carried
-from viz.models.inspection import DT, FORMULATIONS, Inspection, inspection
+from viz.models.inspection import DT, FORMULATIONS, Inspection, carried, inspection
 
 ARM = cache(lambda: inspection(dyn.scenes.load("triple_pendulum")))
 INTEGRATED = 1e-9  # N m: the state is one that the equations hold at, whatever the error of the motion
@@ -76,7 +76,7 @@ def test_forward_dynamics_and_a_system_without_places():
     assert np.allclose(qdd, -np.cos(found.motion.t), atol=1e-5)  # I = k = 1, let go at 1
 
 
-@pytest.mark.parametrize("name", ["spring_mass", "triple_pendulum"])
+@each_row("name", ["spring_mass", "triple_pendulum"])
 def test_both_forms_are_in_one_state_of_coordinates_and_momenta(name):
     scene = dyn.scenes.load(name)
     found = inspection(scene, momentum=True, t_end=0.3)
@@ -127,9 +127,7 @@ def test_a_mechanism_hangs_together():
     assert points[0] == pytest.approx(np.array([[0.0, -0.5], [0.0, -0.5] + a, [0.0, -0.5] + a + tip]))
 
 
-@pytest.mark.parametrize(
-    ("axis", "turns"), [((0, 1, 0), (-1,)), ((0, -1, 0), (1,)), ((1, 0, 0), (1,)), ((0, 0, 1), (1,))]
-)
+@each_row(("axis", "turns"), [((0, 1, 0), (-1,)), ((0, -1, 0), (1,)), ((1, 0, 0), (1,)), ((0, 0, 1), (1,))])
 def test_a_joint_turns_the_picture_one_way_or_the_other(axis, turns):
     """About y, x goes to the right and z up, so that a positive turn is clockwise; the others as they are seen."""
     hinge = dyn.Joint("revolute", axis=axis)

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import pytest
-
 import cgraph as cg
 import dynamics as dyn
 from dynamics.equations.formulations.formulation_sizes import PAPER, TORQUE, blamed
+from tests.each_row import each_row
 from viz import theme
 from viz.graph_drawing.dot import short_formulas
 from viz.graph_drawing.legend import kinds_in, legend_svg
@@ -25,7 +24,7 @@ def test_the_page_on_the_paper_has_the_table() -> None:
     assert text[text.index("|  |") :].strip() in (DOCS / "paper.md").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("name", ["spring_mass", "triple_pendulum"])
+@each_row("name", ["spring_mass", "triple_pendulum"])
 def test_lint_and_the_inspector_count_what_the_table_has(name: str) -> None:
     scene = dyn.scenes.load(name)
     sizes = {formulation: size for (term, formulation), size in dyn.formulation_sizes(scene).items() if term == TORQUE}
@@ -79,7 +78,7 @@ def test_a_legend_has_the_kinds_that_are_there_and_is_small() -> None:
     graph = dyn.momentum_rate(dyn.scenes.load("spring_mass"), "chain_rule", keep_momentum=True)
     words = [paint.words for paint in kinds_in(graph)]
     assert words == [theme.ROLES[role].words for role in ("input", "adjoint", "several")] + [theme.OUTPUT.words]
-    assert kinds_in(graph, graph.nodes[-1:])[-1] is theme.MARKED
+    assert kinds_in(graph, marked=graph.nodes[-1:])[-1] is theme.MARKED
     svg = legend_svg(kinds_in(graph))
     assert 'height="40pt"' in svg
     assert all(f">{text}</text>" in svg for text in words)

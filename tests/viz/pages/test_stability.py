@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from tests.each_row import each_row
 from viz import cli
 from viz.pages import stability
 from viz.pages.document import Document, document_files, to_html
@@ -86,7 +87,7 @@ def test_success_does_not_stand_in_the_box_of_a_warning(document: Document, undr
     assert '<p class="warning">1 of 4 rows' in to_html(document)
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("value", "bound", "share"),
     [
         (2.0, 4.0, 0.5),

@@ -8,6 +8,7 @@ import pytest
 
 import dynamics as dyn
 import viz
+from tests.each_row import each_row
 
 HOSTILE = "</script><script>alert(1)</script>"
 
@@ -116,7 +117,7 @@ def test_the_keyboard_is_enough(show):
     assert page.evaluate("document.activeElement.id") == "which"
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@each_row("scheme", ["light", "dark"])
 def test_a_narrow_page_is_whole(show, scheme):
     page = show(width=390, height=844, color_scheme=scheme)
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")

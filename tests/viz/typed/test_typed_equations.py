@@ -11,6 +11,7 @@ from hypothesis import given, settings, strategies as st
 import cgraph as cg
 import dynamics as dyn
 from dynamics.equations.formulations.formulations import torques
+from tests.each_row import each_row
 from tests.strategies import examples
 from tests.viz.typed.typed_script import run_typed
 from viz.commands.lint import lint_text
@@ -214,7 +215,7 @@ NAMED = {
 }
 
 
-@pytest.mark.parametrize("text", NAMED)
+@each_row("text", NAMED)
 def test_where_an_edge_alone_is_wrong_or_gone_the_page_says_so(text: str) -> None:
     differs, edges, lacking = NAMED[text]
     found, shown = run_typed(
