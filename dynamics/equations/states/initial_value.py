@@ -15,7 +15,7 @@ from cgraph.extend import Array, real_array
 from ...systems.arguments import parameter_value, per_coordinate
 from ...systems.model import Model
 from ..constraints.projection import projected_start
-from ..state_equation import StateInputs, normalization, state_inputs
+from ..state_equation import StateInputs, normalization, normalizer, state_inputs
 
 PAST = 1e-14  # of the end: some roundings, by which a last time may lie past it
 
@@ -168,11 +168,15 @@ def normalized(model: Model, x: Array) -> Array:
     graph = normalization(model)
     if graph is None:
         return x
-    columns = list(np.moveaxis(x, -1, 0))
-    with np.errstate(all="ignore"):
-        for _ in range(2):  # of a length that is far from 1, the first time is rounded
-            columns = list(graph.evaluate(dict(zip(graph.input_names, columns, strict=True))).values())
-    result = np.stack(np.broadcast_arrays(*columns), axis=-1)
+    if x.ndim == 1:
+        one = normalizer(graph)
+        result = one(one(x))  # of a length that is far from 1, the first time is rounded
+    else:
+        columns = list(np.moveaxis(x, -1, 0))
+        with np.errstate(all="ignore"):
+            for _ in range(2):
+                columns = list(graph.evaluate(dict(zip(graph.input_names, columns, strict=True))).values())
+        result = np.stack(np.broadcast_arrays(*columns), axis=-1)
     if not (good := np.isfinite(result)).all():
         *row, _ = np.argwhere(~good)[0].tolist()
         bad = [k for k, fine in enumerate(good[*row]) if not fine]
