@@ -31,7 +31,7 @@ def _fused(program: Program, statements: Sequence[Statement]) -> tuple[Statement
     done: list[Statement] = []
     run: list[Call | Map] = []
     for statement in statements:
-        if isinstance(statement, Call | Map):
+        if isinstance(statement, Map) or (isinstance(statement, Call) and not statement.exact):
             run.append(statement)
             continue
         done += _one_call(program, run)
