@@ -52,6 +52,11 @@ def given(values: Mapping[str, Any]) -> dict[str, Any]:
     return {_at(name): value for name, value in values.items()} | {_at("begins"): 1.0, "anew": 1.0}
 
 
+def instant(t0: float, t_end: float) -> float:
+    """The time after which a force that jumps at the start has jumped [s]."""
+    return max(math.ulp(t0), COLLAPSE * abs(t_end - t0))
+
+
 def with_first_step(steps: Program, problem: Problem, kinds: StateKinds, order: int, *, starts: bool) -> Program:
     """Chosen steps, of a method of this order, with the first one and the tolerances of a run that was given none.
 
