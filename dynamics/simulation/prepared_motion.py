@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Graph
-from cgraph.extend import Array, real_array, real_number
+from cgraph.extend import Array, real_number
 
 from ..equations.states.initial_value import other_inputs, start_state
 from ..integrators import METHODS, Problem, derive, force, in_form, total_energy
@@ -34,6 +34,7 @@ from .steps.stepper import Stepper, stepper
 from .steps.stepping import Integration
 from .trajectory import MotionError, SimulationWarning, Solution, Stats, Trajectory
 
+FLOAT = np.dtype(np.float64)
 KEPT = 16  # sets of parameter values, whose equations a motion keeps
 
 
@@ -48,28 +49,30 @@ class Moving:
         self.problem = derive(self.model, self.applied.bound(self.numbers))
         self.stepped = in_form(self.problem, form)
         self.events: EventProgram | None = event_program(self.stepped, events) if events else None
-        self.steppers, self.checked = threading.local(), False
-        system = self.model.system
-        self._plain = self.problem.normalization is None and (system is None or not len(system.constraints))
+        self.steppers = threading.local()
+        system, nq, m = self.model.system, self.problem.nq, self.problem.size
+        plain = self.problem.normalization is None and (system is None or not len(system.constraints))
+        self._nq = nq
+        self._shapes = ((nq,) if plain else None, None if system is None else (m - nq,))  # of q and qd
 
     def stepper(self, options: RunOptions) -> Stepper:
         """A memory in which motions run."""
         program = step_program(self.stepped, METHODS[options.method], dense=False)
         return stepper(compile_steps(program, options.backend), options, ())
 
-    def plain_start(self, q: ArrayLike, qd: ArrayLike | None) -> Array | None:
-        """The same as `start`, of arrays of the right shape and finite, without constraints; else None."""
-        nq, m = self.problem.nq, self.problem.size
-        if not self._plain or (qd is None) != (nq == m):
-            return None
-        x, first = np.empty(m), real_array("q", q)
-        last = None if qd is None else real_array("qd", qd)
-        if first.shape != (nq,) or (last is not None and last.shape != (m - nq,)):
-            return None
-        x[:nq] = first
-        if last is not None:
-            x[nq:] = last
-        return x if isfinite(x.dot(x)) else None
+    def halves(self, x: Array) -> tuple[Array, Array]:
+        """q and qd of a state (m,)."""
+        return x[: self._nq], x[self._nq :]
+
+    def fits(self, q: ArrayLike, qd: ArrayLike | None) -> bool:
+        """Whether q and qd are arrays that need nothing but to be finite."""
+        shapes = self._shapes
+        return (
+            type(q) is np.ndarray
+            and q.dtype == FLOAT
+            and q.shape == shapes[0]
+            and (qd is shapes[1] or (type(qd) is np.ndarray and qd.dtype == FLOAT and qd.shape == shapes[1]))
+        )
 
     def start(self, q: ArrayLike, qd: ArrayLike | None, t0: float) -> Array:
         """The state (m,) of q and qd in which a run starts."""
@@ -85,19 +88,20 @@ class RunGraphs(Mapping[str, Graph]):
     """The graphs of a trajectory, each made when it is first asked for."""
 
     def __init__(self, problem: Problem, applied: Applied) -> None:
-        self._made: dict[str, Graph] = {}
-        makers = {"rate": lambda: problem.rate}
+        self._made: dict[str, Any] = {}
+        makers: dict[str, Callable[[], Any]] = {"rate": lambda: problem.rate}
         if problem.system is not None:
             makers |= {"force": lambda: force(problem), "tau": lambda: applied.graph(problem)}
             makers["energy"] = lambda: total_energy(problem)
         if problem.multipliers is not None:
             makers["multipliers"] = lambda: problem.multipliers
-        self._makers: dict[str, Callable[[], Any]] = makers
+        self._makers = makers
 
     def __getitem__(self, name: str) -> Graph:
         if name not in self._made:
             self._made[name] = self._makers[name]()
-        return self._made[name]
+        made: Graph = self._made[name]
+        return made
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._makers)
@@ -216,12 +220,13 @@ class PreparedMotion:
             if not run.success:
                 raise MotionError(f"the motion did not reach t_end, {run.message}")
             return MotionEnd(float(run.t[-1]), run.q[-1], run.qd[-1])
-        stepper.begin(self._start(moving, q, qd, t0, t_end), t0, t_end)
-        stepper.until(t_end)
+        timely = type(t0) is float and type(t_end) is float and self._options.spans(t0, t_end)
+        if not (timely and moving.fits(q, qd) and stepper.begin_from(q, qd, t0, t_end)):  # see what is wrong
+            stepper.begin(self._start(moving, q, qd, t0, t_end), float(t0), float(t_end))
+        stepper.to_end()
         if stepper.failed:
             raise MotionError(f"the motion did not reach t_end, {stepper.failed}")
-        x, nq = stepper.state, moving.stepped.nq
-        return MotionEnd(stepper.t, x[:nq], x[nq:])
+        return MotionEnd(stepper.t, *moving.halves(stepper.state))
 
     def start(
         self,
@@ -298,11 +303,8 @@ class PreparedMotion:
 
     def _start(self, moving: Moving, q: ArrayLike, qd: ArrayLike | None, t0: float, t_end: float) -> Array:
         """The state (m,) in which a run starts, all arguments checked."""
-        if not (type(t0) is float and type(t_end) is float and isfinite(t_end - t0) and t_end != t0 and moving.checked):
-            self._options.over(t0, t_end, None).check(moving.problem.states)
-            moving.checked = self._options.adaptive
-        x = moving.plain_start(q, qd)
-        return moving.start(q, qd, t0) if x is None else x
+        self._options.over(t0, t_end, None).check(moving.problem.states)
+        return moving.start(q, qd, t0)
 
     def moving(self, parameters: Mapping[str, Any] | None) -> Moving:
         """What moves with these parameter values, of the last few the same again."""
