@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from ..statement import Execution, Lengths, Statement, require_length
@@ -40,7 +40,7 @@ class If(Statement):
     register: str
     body: tuple[Statement, ...]
     otherwise: tuple[Statement, ...] = ()
-    seldom: bool = False
+    seldom: bool = field(default=False, kw_only=True)
 
 
 @dataclass(frozen=True)

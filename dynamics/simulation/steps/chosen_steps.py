@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -57,7 +58,7 @@ class AdaptiveIntegration(NativeIntegration):
     def memory(self, x: Array) -> Array:
         """The memory before the first step."""
         options, end = self.options, self._hold(self.options.t0, x)
-        values = {
+        values: dict[str, Any] = {
             "t_end": options.t_end,
             "goal": end,
             "relative": self.relative,
@@ -66,7 +67,7 @@ class AdaptiveIntegration(NativeIntegration):
             "first": options.first_step or 0.0,
             "instant": instant(options.t0, options.t_end),
         }
-        state = {"x": x, "t": options.t0, "p": self.parameters, "sized": float(options.atol is None)}
+        state: dict[str, Any] = {"x": x, "t": options.t0, "p": self.parameters, "sized": float(options.atol is None)}
         return self.runner.memory(state | given(values))
 
     def _hold(self, t: float, x: Array) -> float:

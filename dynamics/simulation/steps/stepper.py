@@ -32,7 +32,7 @@ class Stepper(ABC):
         self.failed, self._run, runner = "", run, run.runner
         self._start = run.memory(np.zeros(run.program.size))
         self._memory = self._start.copy()
-        self._numbers: Any = memoryview(self._memory)  # whose items are read and written faster
+        self._numbers: Any = self._memory.data  # whose items are read and written faster
         self._x, self._advance = runner.read(self._memory, "x"), runner.advancing(self._memory)
         self._q, self._qd = self._x[: run.program.nq], self._x[run.program.nq :]
         places = np.arange(float(runner.size))
