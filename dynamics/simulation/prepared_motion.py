@@ -3,114 +3,33 @@
 from __future__ import annotations
 
 import math
-import threading
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property, partial
-from math import isfinite
+from functools import partial
 from typing import Any, NamedTuple
 
-import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph import Graph
-from cgraph.extend import Array, real_number
+from cgraph.extend import Array
 
-from ..equations.states.initial_value import other_inputs, start_state
-from ..integrators import METHODS, Problem, derive, force, in_form, total_energy
+from ..integrators import METHODS
 from ..systems.model import Model
-from .applied_forces import Applied, Tau, with_applied
+from .applied_forces import Tau
 from .events.event import Event
-from .events.event_program import EventProgram, event_program
+from .motion_steps import MotionSteps
+from .moving import Moving
 from .outcome import INTERRUPTED, REACHED, Recorder, outcome
 from .progress_bar import Progress
 from .row_values import converted, unreached_momenta
 from .run_options import SMALL, TABLES, RunOptions, room
 from .steps.dense_output import StepBlock
 from .steps.integration import integration_of
-from .steps.step_program import compile_steps, step_program
-from .steps.stepper import Stepper, stepper
+from .steps.stepper import Stepper
 from .steps.stepping import Integration
 from .trajectory import MotionError, SimulationWarning, Solution, Stats, Trajectory
 
-FLOAT = np.dtype(np.float64)
 KEPT = 16  # sets of parameter values, whose equations a motion keeps
-
-
-class Moving:
-    """What moves in the runs of a motion with these parameters: the equations, bound to numbers, and the events."""
-
-    def __init__(
-        self, model: Model, tau: Tau, events: Sequence[Event], form: str, parameters: Mapping[str, Any] | None
-    ) -> None:
-        self.model, self.applied = with_applied(model, tau, parameters)
-        self.numbers = other_inputs(self.model, self.applied.constant, parameters)
-        self.problem = derive(self.model, self.applied.bound(self.numbers))
-        self.stepped = in_form(self.problem, form)
-        self.events: EventProgram | None = event_program(self.stepped, events) if events else None
-        self.steppers = threading.local()
-        system, nq, m = self.model.system, self.problem.nq, self.problem.size
-        plain = self.problem.normalization is None and (system is None or not len(system.constraints))
-        self._nq = nq
-        self._shapes = ((nq,) if plain else None, None if system is None else (m - nq,))  # of q and qd
-
-    def stepper(self, options: RunOptions) -> Stepper:
-        """A memory in which motions run."""
-        program = step_program(self.stepped, METHODS[options.method], dense=False)
-        return stepper(compile_steps(program, options.backend), options, ())
-
-    def halves(self, x: Array) -> tuple[Array, Array]:
-        """q and qd of a state (m,)."""
-        return x[: self._nq], x[self._nq :]
-
-    def fits(self, q: ArrayLike, qd: ArrayLike | None) -> bool:
-        """Whether q and qd are arrays that need nothing but to be finite."""
-        shapes = self._shapes
-        return (
-            type(q) is np.ndarray
-            and q.dtype == FLOAT
-            and q.shape == shapes[0]
-            and (qd is shapes[1] or (type(qd) is np.ndarray and qd.dtype == FLOAT and qd.shape == shapes[1]))
-        )
-
-    def start(self, q: ArrayLike, qd: ArrayLike | None, t0: float) -> Array:
-        """The state (m,) of q and qd in which a run starts."""
-        return start_state(self.model, q, qd, self.numbers, t0)
-
-    @cached_property
-    def graphs(self) -> RunGraphs:
-        """What a trajectory computes accelerations, forces and energies by."""
-        return RunGraphs(self.problem, self.applied)
-
-
-class RunGraphs(Mapping[str, Graph]):
-    """The graphs of a trajectory, each made when it is first asked for."""
-
-    def __init__(self, problem: Problem, applied: Applied) -> None:
-        self._made: dict[str, Any] = {}
-        makers: dict[str, Callable[[], Any]] = {"rate": lambda: problem.rate}
-        if problem.system is not None:
-            makers |= {"force": lambda: force(problem), "tau": lambda: applied.graph(problem)}
-            makers["energy"] = lambda: total_energy(problem)
-        if problem.multipliers is not None:
-            makers["multipliers"] = lambda: problem.multipliers
-        self._makers = makers
-
-    def __getitem__(self, name: str) -> Graph:
-        if name not in self._made:
-            self._made[name] = self._makers[name]()
-        made: Graph = self._made[name]
-        return made
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._makers)
-
-    def __len__(self) -> int:
-        return len(self._makers)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        return dict, (dict(self),)
 
 
 class MotionEnd(NamedTuple):
@@ -159,6 +78,9 @@ class PreparedMotion:
         self._options, self._dense, self._events = options, dense_output, bool(events)
         self._moving = partial(Moving, model, tau, events, form)
         self._known: dict[Any, Moving] = {}
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_known": {}}  # another process makes its own memory
 
     def __call__(
         self,
@@ -361,106 +283,6 @@ class PreparedMotion:
             names.velocities,
             rows[1][:, nq:] if stepped.momenta else None,
         )
-
-
-class MotionSteps:
-    """A motion as it goes on, made by `PreparedMotion.start`. One thread at a time may move it.
-
-    By `step` to its end it has the states of the trajectory's rows, to the bit. An instant of `propagate_until` cuts a
-    step, so that those that follow are others, within the same tolerance.
-
-    Attributes
-    ----------
-    t : float
-        Where the motion is [s].
-    q, qd : ndarray
-        The state there, (nq,) and (n,) [rad or m, per second]; of an OdeSystem q is the state, and qd empty.
-
-    Examples
-    --------
-    >>> import dynamics as dyn
-    >>> motion = dyn.prepare(dyn.planar_arm([1.0], [1.0]), "rk4", dt=0.25)
-    >>> going = motion.start([0.1], [0.0], t_end=1.0)
-    >>> while going.t < 1.0:
-    ...     going.step()
-    ...     print(going.t, going.q.round(3))
-    0.25 [0.058]
-    0.5 [0.004]
-    0.75 [-0.055]
-    1.0 [-0.076]
-    """
-
-    def __init__(self, stepper: Stepper, x: Array, t0: float, t_end: float | None, nq: int) -> None:
-        self._stepper, self._nq, self._t_end = stepper, nq, None if t_end is None else float(t_end)
-        self._x, self._begun, self._direction = x, False, 0.0
-        stepper.begin(x, t0, t0 + 1.0 if t_end is None else t_end)
-
-    @property
-    def t(self) -> float:
-        """Where the motion is [s]."""
-        return self._stepper.t
-
-    @property
-    def q(self) -> Array:
-        """Coordinates, (nq,)."""
-        return self._stepper.state[: self._nq]
-
-    @property
-    def qd(self) -> Array:
-        """Velocities, (n,)."""
-        return self._stepper.state[self._nq :]
-
-    def step(self) -> None:
-        """One step more on the way to t_end.
-
-        Raises
-        ------
-        MotionError
-            Where the step cannot be made; the motion stays where it is.
-        ValueError
-            At t_end, and for a motion that was started without one.
-        """
-        if self._t_end is None or self._t_end == self.t:
-            where = "was started without one" if self._t_end is None else f"is there, at t = {self.t:g} s"
-            raise ValueError(f"a step goes on to t_end, and the motion {where}: propagate_until(t) goes on to a time")
-        self._go(self._t_end)
-        self._stepper.step()
-        self._judge()
-
-    def propagate_until(self, t: float) -> None:
-        """Steps to an instant, the last of which ends there.
-
-        Parameters
-        ----------
-        t : float
-            The instant [s], in the direction in which the motion goes.
-
-        Raises
-        ------
-        MotionError
-            Where the motion stops before; it stays there.
-        TypeError, ValueError
-            For what is no time, or one that the motion has left behind.
-        """
-        t = real_number("t", t)
-        if t == self.t:
-            return
-        self._go(t)
-        self._stepper.until(t)
-        self._judge()
-
-    def _go(self, t: float) -> None:
-        if not isfinite(t):
-            raise ValueError(f"t must be finite, got {t!r} s")
-        if self._direction * (t - self.t) < 0.0:
-            raise ValueError(f"the motion is at t = {self.t:g} s and does not go back to t = {t:g} s: start it anew")
-        if not self._begun:
-            self._stepper.begin(self._x, self.t, t if self._t_end is None else self._t_end)
-            self._direction, self._begun = math.copysign(1.0, t - self.t), True
-
-    def _judge(self) -> None:
-        if failed := self._stepper.failed:
-            raise MotionError(f"the motion {failed}")
 
 
 def _key(parameters: Mapping[str, Any]) -> Any:
