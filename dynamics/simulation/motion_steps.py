@@ -6,8 +6,8 @@ import math
 
 from cgraph.extend import Array, real_number
 
+from .outcome import MotionError
 from .steps.stepper import Stepper
-from .trajectory import MotionError
 
 
 class MotionSteps:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,7 +21,9 @@ from .events.event import Event
 from .events.event_program import EventProgram, event_program
 from .run_options import RunOptions
 from .steps.step_program import compile_steps, step_program
-from .steps.stepper import Stepper, stepper
+
+if TYPE_CHECKING:
+    from .steps.stepper import Stepper
 
 FLOAT = np.dtype(np.float64)
 
@@ -45,6 +47,8 @@ class Moving:
 
     def stepper(self, options: RunOptions) -> Stepper:
         """A memory in which motions run."""
+        from .steps.stepper import stepper  # without it a trajectory is all that is asked for
+
         program = step_program(self.stepped, METHODS[options.method], dense=False)
         return stepper(compile_steps(program, options.backend), options, ())
 

@@ -40,9 +40,10 @@ def prepare(
 
     Parameters
     ----------
-    model, method, dt, max_step, rtol, atol, events, dense_output, tau, first_step, max_steps, estimate_error, backend,
-    progress, form
+    model, method, dt, max_step, rtol, atol, events, dense_output, tau, first_step, max_steps, estimate_error
         As of `simulate`, which is this and a call.
+    backend, progress, form
+        The same.
 
     Returns
     -------
@@ -61,7 +62,7 @@ def prepare(
     >>> motion = dyn.prepare(dyn.planar_arm([1.0, 0.8], [1.0, 0.8]), "dop853", rtol=1e-10)
     >>> ends = [motion.end([angle, 0.0], [0.0, 0.0], t_end=0.5).q.round(3).tolist() for angle in (0.1, 0.2)]
     >>> ends
-    [[0.0, 0.001], [-0.001, 0.004]]
+    [[0.005, 0.039], [0.011, 0.077]]
     """
     options = RunOptions(
         ANY, method, dt, max_step, rtol, atol, None, first_step, max_steps, backend, progress, 0.0, estimate_error

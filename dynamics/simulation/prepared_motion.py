@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+import sys
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from numpy.typing import ArrayLike
 
@@ -17,17 +18,19 @@ from ..integrators import METHODS
 from ..systems.model import Model
 from .applied_forces import Tau
 from .events.event import Event
-from .motion_steps import MotionSteps
 from .moving import Moving
-from .outcome import INTERRUPTED, REACHED, Recorder, outcome
+from .outcome import INTERRUPTED, REACHED, MotionError, Recorder, outcome
 from .progress_bar import Progress
 from .row_values import converted, unreached_momenta
 from .run_options import SMALL, TABLES, RunOptions, room
 from .steps.dense_output import StepBlock
 from .steps.integration import integration_of
-from .steps.stepper import Stepper
 from .steps.stepping import Integration
-from .trajectory import MotionError, SimulationWarning, Solution, Stats, Trajectory
+from .trajectory import SimulationWarning, Solution, Stats, Trajectory
+
+if TYPE_CHECKING:
+    from .motion_steps import MotionSteps
+    from .steps.stepper import Stepper
 
 KEPT = 16  # sets of parameter values, whose equations a motion keeps
 
@@ -76,7 +79,7 @@ class PreparedMotion:
         self, model: Model, options: RunOptions, tau: Tau, events: Sequence[Event], form: str, dense_output: bool
     ) -> None:
         self._options, self._dense, self._events = options, dense_output, bool(events)
-        self._moving = partial(Moving, model, tau, events, form)
+        self._make = partial(Moving, model, tau, events, form)
         self._known: dict[Any, Moving] = {}
 
     def __getstate__(self) -> dict[str, Any]:
@@ -93,7 +96,7 @@ class PreparedMotion:
         parameters: Mapping[str, float] | None = None,
     ) -> Trajectory:
         """The motion from (q, qd) at t0 to t_end, to the bit that of `simulate`; arguments and errors as there."""
-        return self.run(q, qd, self._options.over(t0, t_end, t_eval), parameters, stacklevel=3)
+        return self._run(q, qd, self._options.over(t0, t_end, t_eval), parameters)
 
     def end(
         self,
@@ -135,10 +138,10 @@ class PreparedMotion:
         >>> motion.end([1.0], None, t_end=1.0).q.round(6)
         array([0.367879])
         """
-        moving = self.moving(parameters)
+        moving = self._moving(parameters)
         stepper = self._stepper(moving)
         if stepper is None:
-            run = self.run(q, qd, self._options.over(t0, t_end, [t_end]), parameters, stacklevel=3)
+            run = self._run(q, qd, self._options.over(t0, t_end, [t_end]), parameters)
             if not run.success:
                 raise MotionError(f"the motion did not reach t_end, {run.message}")
             return MotionEnd(float(run.t[-1]), run.q[-1], run.qd[-1])
@@ -191,7 +194,9 @@ class PreparedMotion:
         1.0 [-0.1] [-0.023]
         1.5 [-0.01] [0.311]
         """
-        moving = self.moving(parameters)
+        from .motion_steps import MotionSteps  # which a trajectory does not need
+
+        moving = self._moving(parameters)
         if not self._steps(moving):
             raise ValueError(
                 "single steps are of motions without events, sampled controllers, max_steps and SciPy's solvers, in "
@@ -228,26 +233,25 @@ class PreparedMotion:
         self._options.over(t0, t_end, None).check(moving.problem.states)
         return moving.start(q, qd, t0)
 
-    def moving(self, parameters: Mapping[str, Any] | None) -> Moving:
+    def _moving(self, parameters: Mapping[str, Any] | None) -> Moving:
         """What moves with these parameter values, of the last few the same again."""
         key = None if parameters is None else _key(parameters)
         if (found := self._known.get(key)) is None:
-            found = self._moving(parameters)
+            found = self._make(parameters)
             if len(self._known) >= KEPT:
                 self._known.pop(next(iter(self._known)), None)
             self._known[key] = found
         return found
 
-    def run(
+    def _run(
         self,
         q: ArrayLike,
         qd: ArrayLike | None,
         options: RunOptions,
         parameters: Mapping[str, float] | None,
-        stacklevel: int,
     ) -> Trajectory:
-        """The motion over the span of options; warnings are those of the caller at a level of the stack."""
-        moving = self.moving(parameters)
+        """The motion over the span of options."""
+        moving = self._moving(parameters)
         start = moving.start(q, qd, options.t0)
         options.check(moving.problem.states)
         options.check_room(len(start))
@@ -267,7 +271,7 @@ class PreparedMotion:
             stats = replace(stats, warnings=(*stats.warnings, *missed))
         early = not stats.success and not stats.message.startswith(INTERRUPTED)
         for text in [*([f"the run {stats.message}"] if early else []), *stats.warnings]:
-            warnings.warn(text, SimulationWarning, stacklevel=stacklevel)
+            warnings.warn(text, SimulationWarning, stacklevel=_level_of_caller())
         nq, names = stepped.nq, moving.model
         times, states = rows[0], converted(stepped.velocities, *rows)
         return Trajectory(
@@ -283,6 +287,14 @@ class PreparedMotion:
             names.velocities,
             rows[1][:, nq:] if stepped.momenta else None,
         )
+
+
+def _level_of_caller() -> int:
+    """Where in the stack, above who asks, these files were called from."""
+    level, frame = 1, sys._getframe(1)
+    while frame.f_back is not None and frame.f_globals["__name__"].startswith("dynamics.simulation."):
+        level, frame = level + 1, frame.f_back
+    return level
 
 
 def _key(parameters: Mapping[str, Any]) -> Any:

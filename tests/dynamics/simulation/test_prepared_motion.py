@@ -47,8 +47,8 @@ def test_its_rows_its_end_and_its_steps_are_those_of_simulate(method: str, backe
             motion(*START, t_end, t0, t_eval=times),
             dyn.simulate(ARM, *START, t_end, method, t0=t0, t_eval=times, **options),
         )
-        for start in (START, [np.array(part) for part in START]):  # twice: a memory that is used is as a new one
-            end = motion.end(*start, t_end, t0)
+        for kind in (list, np.array):  # twice: a memory that is used is as a new one
+            end = motion.end(kind(START[0]), kind(START[1]), t_end, t0)
             assert end.t == run.t[-1] == t_end
             np.testing.assert_array_equal(end.q, run.q[-1])
             np.testing.assert_array_equal(end.qd, run.qd[-1])
@@ -204,9 +204,10 @@ def test_an_end_that_is_not_reached_is_an_error_in_the_words_of_simulate(method:
 
 
 def test_single_steps_are_of_plain_motions() -> None:
-    for options in ({"max_steps": 3}, {"method": "scipy:RK45"}, {"form": "momentum"}):
+    refused: list[dict[str, Any]] = [{"max_steps": 3}, {"method": "scipy:RK45"}, {"form": "momentum"}]
+    for options in refused:
         with pytest.raises(ValueError, match="single steps are of motions without"):
-            dyn.prepare(ARM, **options).start(*START)  # type: ignore[arg-type]
+            dyn.prepare(ARM, **options).start(*START)
     with pytest.raises(ValueError, match="was started without one"):
         dyn.prepare(ARM).start(*START).step()
     for wrong in (math.nan, math.inf):
@@ -215,13 +216,14 @@ def test_single_steps_are_of_plain_motions() -> None:
 
 
 def test_what_is_fixed_is_checked_at_once() -> None:
-    for options, sentence in (
+    refused: list[tuple[dict[str, Any], str]] = [
         ({"method": "rk5"}, "method must be one of"),
         ({"dt": 0.1}, "chooses its steps"),
         ({"rtol": -1.0}, "rtol and atol"),
         ({"max_steps": 0}, "max_steps"),
         ({"dense_output": 1}, "dense_output"),
         ({"events": 3}, "events must be"),
-    ):
+    ]
+    for options, sentence in refused:
         with pytest.raises((TypeError, ValueError), match=sentence):
-            dyn.prepare(ARM, **options)  # type: ignore[arg-type]
+            dyn.prepare(ARM, **options)
