@@ -471,8 +471,8 @@ RECORDS = """
     cg.CSource cg.Comparison cg.Compiled cg.Counts cg.Edge cg.Lint cg.Loop cg.Node cg.Why cg.WhyNot
     dyn.Attached dyn.Certificate dyn.Crossings dyn.Ensemble dyn.EnsembleStats dyn.Force dyn.FreeBody
     dyn.ConstraintLint dyn.Freedom dyn.HeldForces dyn.JointForce dyn.MotionEnd dyn.MotionGradient dyn.MotionGradients
-    dyn.MotionSteps dyn.OmittedTerm dyn.PreparedMotion dyn.PruneResult dyn.QuasiVelocities dyn.ReducedLinearization dyn.Reference dyn.Released dyn.Sensitivities
-    dyn.Stats dyn.Subtree dyn.TorqueTable dyn.Trajectory dyn.Verdict
+    dyn.MotionSteps dyn.OmittedTerm dyn.PreparedMotion dyn.PruneResult dyn.QuasiVelocities dyn.ReducedLinearization
+    dyn.Reference dyn.Released dyn.Sensitivities dyn.Stats dyn.Subtree dyn.TorqueTable dyn.Trajectory dyn.Verdict
     extend.CompressedJacobian extend.Jets extend.Linearized extend.MathML extend.Pulled extend.Statement
     extend.StatementRow extend.Notation extend.Op extend.Record
 """

@@ -32,9 +32,9 @@ class MotionSteps:
     ...     going.step()
     ...     print(going.t, going.q.round(3))
     0.25 [0.058]
-    0.5 [0.004]
-    0.75 [-0.055]
-    1.0 [-0.076]
+    0.5 [-0.033]
+    0.75 [-0.095]
+    1.0 [-0.077]
     """
 
     def __init__(self, stepper: Stepper, x: Array, t0: float, t_end: float | None, nq: int) -> None:

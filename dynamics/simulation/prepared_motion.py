@@ -190,9 +190,9 @@ class PreparedMotion:
         >>> for k in range(3):
         ...     going.propagate_until(0.5 * (k + 1))
         ...     print(going.t, going.q.round(3), going.qd.round(3))
-        0.5 [0.004] [-0.312]
-        1.0 [-0.1] [-0.023]
-        1.5 [-0.01] [0.311]
+        0.5 [-0.034] [-0.361]
+        1.0 [-0.077] [0.245]
+        1.5 [0.086] [0.195]
         """
         from .motion_steps import MotionSteps  # which a trajectory does not need
 
