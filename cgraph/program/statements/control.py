@@ -93,10 +93,12 @@ def while_text(statement: While | FixedPoint, writer: Writer) -> None:
 
 def if_text(statement: If, writer: Writer) -> None:
     """Write as machine code."""
-    label = writer.label("if")
+    label, functions = writer.label("if"), writer.functions
+    before, functions.quick = functions.quick, functions.quick or statement.seldom
     writer.branch(statement.register, f"{label}.yes", f"{label}.no")
     for way, body in (("yes", statement.body), ("no", statement.otherwise)):
         writer.block(f"{label}.{way}")
         writer.run(body)
         writer.jump(f"{label}.end")
     writer.block(f"{label}.end")
+    functions.quick = before
