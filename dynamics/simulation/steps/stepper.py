@@ -41,6 +41,11 @@ class Stepper(ABC):
     registers: tuple[str, ...]  # that it reads and writes, of one number each
     stop: str  # the register by which passes end
 
+    def set_parameters(self, p: Sequence[float]) -> None:
+        """Values of the parameters in the runs that begin from here on."""
+        self._run.parameters = list(p)
+        self._run.runner.write(self._start, "p", self._run.parameters)
+
     @property
     def t(self) -> float:
         """Where the run is [s]."""
