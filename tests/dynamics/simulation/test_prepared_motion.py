@@ -127,6 +127,19 @@ def test_whatever_is_fixed(options: dict[str, Any]) -> None:
     np.testing.assert_array_equal(end.qd, run.qd[-1])
 
 
+def test_a_linkage_goes_on_step_by_step() -> None:
+    def energy(q: Any, qd: Any, t: Any) -> Any:
+        return 0.5 * (qd[0] ** 2 + qd[1] ** 2) - 9.81 * q[1]
+
+    rod = dyn.System(energy, "x y", constraints=lambda q, t: {"rod": 0.5 * (q[0] ** 2 + q[1] ** 2 - 1.0)})
+    run = dyn.simulate(rod, [1.0, 0.0], [0.0, 0.0], 1.0)
+    going = dyn.prepare(rod).start([1.0, 0.0], [0.0, 0.0], 1.0)
+    for q in run.q[1:]:
+        going.step()
+        np.testing.assert_array_equal(going.q, q)
+    np.testing.assert_array_equal(dyn.prepare(rod).end([1.0, 0.0], [0.0, 0.0], 1.0).q, run.q[-1])
+
+
 def test_parameters_are_those_of_the_call() -> None:
     pendulum = dyn.System(
         lambda q, qd, t, p: 0.5 * qd[0] ** 2 - p["stiffness"] * q[0] ** 2, ["angle"], parameters={"stiffness": 1.0}
