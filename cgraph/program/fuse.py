@@ -12,6 +12,7 @@ from ..core.traversal import rebuild
 from .program import Program
 from .statement import Statement, row_of
 from .statements.call import Call, Map, elements
+from .statements.control import If
 
 MOST = 1000  # operations of what is fused: it compiles in some tens of milliseconds, and a short run gains no more
 
@@ -30,12 +31,13 @@ def _fused(program: Program, statements: Sequence[Statement]) -> tuple[Statement
     done: list[Statement] = []
     run: list[Call | Map] = []
     for statement in statements:
-        if isinstance(statement, Call | Map):
+        if isinstance(statement, Map) or (isinstance(statement, Call) and not statement.exact):
             run.append(statement)
             continue
         done += _one_call(program, run)
         run = []
-        bodies = {name: _fused(program, getattr(statement, name)) for name in row_of(statement).bodies}
+        names = () if isinstance(statement, If) and statement.seldom else row_of(statement).bodies
+        bodies = {name: _fused(program, getattr(statement, name)) for name in names}
         if bodies:
             statement = replace(statement, **bodies)  # type: ignore[type-var]
         done.append(statement)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from ..statement import Execution, Lengths, Statement, require_length
@@ -29,6 +29,8 @@ class While(Statement):
 class If(Statement):
     """if (register > 0) body else otherwise; the register has length 1, and NaN is not positive.
 
+    seldom: whether it hardly ever runs, so that its speed is not worth the time to compile more code.
+
     >>> import cgraph as cg
     >>> from cgraph.extend import Call, If
     >>> n = cg.variable("n")
@@ -38,6 +40,7 @@ class If(Statement):
     register: str
     body: tuple[Statement, ...]
     otherwise: tuple[Statement, ...] = ()
+    seldom: bool = field(default=False, kw_only=True)
 
 
 @dataclass(frozen=True)
@@ -90,10 +93,12 @@ def while_text(statement: While | FixedPoint, writer: Writer) -> None:
 
 def if_text(statement: If, writer: Writer) -> None:
     """Write as machine code."""
-    label = writer.label("if")
+    label, functions = writer.label("if"), writer.functions
+    before, functions.quick = functions.quick, functions.quick or statement.seldom
     writer.branch(statement.register, f"{label}.yes", f"{label}.no")
     for way, body in (("yes", statement.body), ("no", statement.otherwise)):
         writer.block(f"{label}.{way}")
         writer.run(body)
         writer.jump(f"{label}.end")
     writer.block(f"{label}.end")
+    functions.quick = before

@@ -20,7 +20,7 @@ from ...systems.model import Model
 from ..applied_forces import with_applied
 from ..events.event import Event
 from ..events.event_program import event_program
-from ..outcome import Recorder, advise
+from ..outcome import MotionError, Recorder, advise
 from ..row_values import converted, unreached_momenta
 from ..run_options import METHOD, RunOptions, time_span
 from ..sampled_controller import SampledController
@@ -45,19 +45,6 @@ class Segment(NamedTuple):
     event: str = ""
     equal: int = 0
     end: float = 0.0
-
-
-class MotionError(ValueError):
-    """A motion that has no derivatives: it does not reach its end, or its equations were not solved.
-
-    Examples
-    --------
-    >>> import dynamics as dyn
-    >>> runaway = dyn.OdeSystem(lambda x, t: [x[0] * x[0]], ["x"])
-    >>> dyn.gradient(runaway, lambda x, t: x[0], [1.0], None, t_end=2.0)
-    Traceback (most recent call last):
-    dynamics.simulation.gradients.motion.MotionError: the motion did not reach t_end, stopped at t = 1 s: ...
-    """
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,356 @@
+"""PreparedMotion: a model, a method and options fixed once, for motions from many starts, in stages."""
+
+from __future__ import annotations
+
+import math
+import sys
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from numpy.typing import ArrayLike
+
+from cgraph.extend import Array
+
+from ..integrators import METHODS
+from ..systems.model import Model
+from .applied_forces import Tau
+from .events.event import Event
+from .moving import Moving
+from .outcome import INTERRUPTED, REACHED, MotionError, Recorder, outcome
+from .progress_bar import Progress
+from .row_values import converted, unreached_momenta
+from .run_options import SMALL, TABLES, RunOptions, room
+from .steps.dense_output import StepBlock
+from .steps.integration import integration_of
+from .steps.stepping import Integration
+from .trajectory import SimulationWarning, Solution, Stats, Trajectory
+
+if TYPE_CHECKING:
+    from .motion_steps import MotionSteps
+    from .steps.stepper import Stepper
+
+KEPT = 16  # sets of parameter values, whose equations a motion keeps
+
+
+class MotionEnd(NamedTuple):
+    """Where a motion ended, as `PreparedMotion.end` gives it.
+
+    Parameters
+    ----------
+    t : float
+        The end of the run, or the instant of the event that ended it [s].
+    q, qd : ndarray
+        The state there, (nq,) and (n,) [rad or m, per second]; of an OdeSystem q is the state, and qd empty.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> dyn.prepare(dyn.planar_arm([1.0], [1.0])).end([0.1], [0.0], t_end=1.0).q.round(3)
+    array([-0.077])
+    """
+
+    t: float
+    q: Array
+    qd: Array
+
+
+class PreparedMotion:
+    """Motions of one model by one method, all but start, end and parameter values fixed; made by `prepare`.
+
+    A call gives the Trajectory that `simulate` gives, to the bit. Any number of threads may call a motion at once: the
+    memory in which it runs is one for each thread.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> arm = dyn.planar_arm([1.0, 0.8], [1.0, 0.8])
+    >>> motion = dyn.prepare(arm, rtol=1e-12)
+    >>> motion([1.0, 0.5], [0.0, 0.0], t_end=1.0, t_eval=[0.5, 1.0]).q.round(3).tolist()
+    [[0.31, -0.04], [-0.989, 0.108]]
+    >>> t, q, qd = motion.end([1.0, 0.5], [0.0, 0.0], t_end=1.0)
+    >>> q.round(3).tolist()
+    [-0.989, 0.108]
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        options: RunOptions,
+        tau: Tau,
+        events: Sequence[Event],
+        form: str,
+        dense_output: bool,
+        varied: tuple[str, ...],
+    ) -> None:
+        self._options, self._dense, self._events, self._varied = options, dense_output, bool(events), varied
+        self._make = partial(Moving, model, tau, events, form, varied)
+        self._known: dict[Any, Moving] = {}
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_known": {}}  # another process makes its own memory
+
+    def __call__(
+        self,
+        q: ArrayLike,
+        qd: ArrayLike | None,
+        t_end: float,
+        t0: float = 0.0,
+        *,
+        t_eval: ArrayLike | None = None,
+        parameters: Mapping[str, float] | None = None,
+    ) -> Trajectory:
+        """The motion from (q, qd) at t0 to t_end, to the bit that of `simulate`; arguments and errors as there."""
+        return self._run(q, qd, self._options.over(t0, t_end, t_eval), parameters)
+
+    def end(
+        self,
+        q: ArrayLike,
+        qd: ArrayLike | None,
+        t_end: float,
+        t0: float = 0.0,
+        parameters: Mapping[str, float] | None = None,
+    ) -> MotionEnd:
+        """The end of the motion from (q, qd) at t0, alone: the last row of the trajectory, to the bit.
+
+        It takes some microseconds besides the steps: a memory is kept, and the machine code entered once for a short
+        run. With events, a sampled controller, constraints, momenta, `max_steps`, or where the error of equal steps is
+        estimated, it takes as long as the trajectory, and warns of what that warns of; else it does not judge whether
+        another method would be faster.
+
+        Parameters
+        ----------
+        q, qd, t_end, t0, parameters
+            As of `simulate`.
+
+        Returns
+        -------
+        MotionEnd
+            t, q, qd: at t_end, or at the event that ended the run.
+
+        Raises
+        ------
+        MotionError
+            Where the run stopped before its end, in the words of `Stats.message`.
+        TypeError, ValueError
+            As of `simulate`.
+
+        Examples
+        --------
+        >>> import dynamics as dyn
+        >>> decay = dyn.OdeSystem(lambda x, t: [-x[0]], ["x"])
+        >>> motion = dyn.prepare(decay, "rk4", dt=0.01, estimate_error=False)
+        >>> motion.end([1.0], None, t_end=1.0).q.round(6)
+        array([0.367879])
+        """
+        moving = self._moving(parameters)
+        stepper = self._stepper(moving)
+        if stepper is None:
+            run = self._run(q, qd, self._options.over(t0, t_end, [t_end]), parameters)
+            if not run.success:
+                raise MotionError(f"the motion did not reach t_end, {run.message}")
+            return MotionEnd(float(run.t[-1]), run.q[-1], run.qd[-1])
+        timely = type(t0) is float and type(t_end) is float and self._options.spans(t0, t_end)
+        if self._varied:
+            stepper.set_parameters(moving.values(parameters))
+        if not (timely and moving.fits(q, qd) and stepper.begin_from(q, qd, t0, t_end)):  # see what is wrong
+            stepper.begin(self._start(moving, q, qd, t0, t_end, parameters), float(t0), float(t_end))
+        stepper.to_end()
+        if stepper.failed:
+            raise MotionError(f"the motion did not reach t_end, {stepper.failed}")
+        return MotionEnd(stepper.t, *moving.halves(stepper.state))
+
+    def start(
+        self,
+        q: ArrayLike,
+        qd: ArrayLike | None,
+        t_end: float | None = None,
+        t0: float = 0.0,
+        parameters: Mapping[str, float] | None = None,
+    ) -> MotionSteps:
+        """The motion from (q, qd) at t0 as it goes on, step by step or from one instant to the next.
+
+        Parameters
+        ----------
+        q, qd, t0, parameters
+            As of `simulate`.
+        t_end : float, optional
+            Where `step` goes to, and by which the first step is chosen [s]; without it the first instant that
+            `propagate_until` is asked for.
+
+        Returns
+        -------
+        MotionSteps
+            With a memory of its own, for one thread at a time.
+
+        Raises
+        ------
+        TypeError, ValueError
+            As of `simulate`, and for a motion with events, a sampled controller, momenta, `max_steps`, or by one of
+            SciPy's solvers.
+
+        Examples
+        --------
+        >>> import dynamics as dyn
+        >>> motion = dyn.prepare(dyn.planar_arm([1.0], [1.0]), rtol=1e-10)
+        >>> going = motion.start([0.1], [0.0])
+        >>> for k in range(3):
+        ...     going.propagate_until(0.5 * (k + 1))
+        ...     print(going.t, going.q.round(3), going.qd.round(3))
+        0.5 [-0.034] [-0.361]
+        1.0 [-0.077] [0.245]
+        1.5 [0.086] [0.195]
+        """
+        from .motion_steps import MotionSteps  # which a trajectory does not need
+
+        moving = self._moving(parameters)
+        if not self._steps(moving):
+            raise ValueError(
+                "single steps are of motions without events, sampled controllers, max_steps and SciPy's solvers, in "
+                'form="velocity": call the motion, which gives its rows'
+            )
+        x = self._start(moving, q, qd, t0, t0 + 1.0 if t_end is None else t_end, parameters)
+        stepper = moving.stepper(self._options)
+        stepper.set_parameters(moving.values(parameters))
+        return MotionSteps(stepper, x, float(t0), t_end, moving.stepped.nq)
+
+    def _steps(self, moving: Moving) -> bool:
+        """Whether its steps are ours alone, with nothing done between them."""
+        options = self._options
+        return not (
+            self._events
+            or moving.applied.controller is not None
+            or options.scipy_solver is not None
+            or moving.stepped.momenta
+            or options.max_steps < math.inf
+        )
+
+    def _stepper(self, moving: Moving) -> Stepper | None:
+        """That of this thread; None where an end needs more than steps."""
+        steppers = moving.steppers
+        try:
+            found: Stepper | None = steppers.found
+        except AttributeError:
+            options = self._options
+            rounded = options.adaptive and self._steps(moving) and options.relative < METHODS[options.method].finest
+            plain = self._steps(moving) and not options.estimated and not rounded and moving.problem.projection is None
+            found = steppers.found = moving.stepper(options) if plain else None
+        return found
+
+    def _start(
+        self, moving: Moving, q: ArrayLike, qd: ArrayLike | None, t0: float, t_end: float, parameters: Any
+    ) -> Array:
+        """The state (m,) in which a run starts, all arguments checked."""
+        self._options.over(t0, t_end, None).check(moving.problem.states)
+        return moving.start(q, qd, t0, moving.values(parameters))
+
+    def _moving(self, parameters: Mapping[str, Any] | None) -> Moving:
+        """What moves with these values of parameters that are built in, of the last few the same again."""
+        if self._varied and isinstance(parameters, Mapping):
+            parameters = {name: value for name, value in parameters.items() if name not in self._varied}
+        key = None if parameters is None else _key(parameters)
+        if (found := self._known.get(key)) is None:
+            found = self._make(parameters)
+            if len(self._known) >= KEPT:
+                self._known.pop(next(iter(self._known)), None)
+            self._known[key] = found
+        return found
+
+    def _run(
+        self,
+        q: ArrayLike,
+        qd: ArrayLike | None,
+        options: RunOptions,
+        parameters: Mapping[str, float] | None,
+    ) -> Trajectory:
+        """The motion over the span of options."""
+        moving = self._moving(parameters)
+        p = moving.values(parameters)
+        start, values = moving.start(q, qd, options.t0, p), p or 0.0
+        options.check(moving.problem.states)
+        options.check_room(len(start))
+
+        # Write the steps of the method over the equations, and compile them; the states are (q, qd), or here (q, p)
+        stepped, hold = moving.stepped, moving.applied.hold(options, moving.stepped)
+        between = moving.events is not None or self._dense
+        made = partial(integration_of, stepped, parameters=p, events=moving.events, between=between)
+        run, x = made(options, hold=hold), converted(stepped.momentum, options.t0, start, values)
+
+        # Integrate, noting rows and events
+        steps: list[StepBlock] | None = [] if self._dense else None
+        stats, rows = _integrate(run, x, options, steps, made if hold is None else None)
+
+        # Put the result together
+        if missed := unreached_momenta(stepped, *rows, values, start=(options.t0, start, x)):
+            stats = replace(stats, warnings=(*stats.warnings, *missed))
+        early = not stats.success and not stats.message.startswith(INTERRUPTED)
+        for text in [*([f"the run {stats.message}"] if early else []), *stats.warnings]:
+            warnings.warn(text, SimulationWarning, stacklevel=_level_of_caller())
+        nq, names = stepped.nq, moving.model
+        times, states = rows[0], converted(stepped.velocities, *rows, values)
+        return Trajectory(
+            times,
+            states[:, :nq],
+            states[:, nq:],
+            stats,
+            run.crossings(nq, values),
+            moving.graphs(p),
+            None if steps is None else Solution(options.t0, x, steps, nq, moving.velocities(p)),
+            None if hold is None else hold.held,
+            names.coordinates,
+            names.velocities,
+            rows[1][:, nq:] if stepped.momenta else None,
+        )
+
+
+def _level_of_caller() -> int:
+    """Where in the stack, above who asks, these files were called from."""
+    level, frame = 1, sys._getframe(1)
+    while frame.f_back is not None and frame.f_globals["__name__"].startswith("dynamics.simulation."):
+        level, frame = level + 1, frame.f_back
+    return level
+
+
+def _key(parameters: Mapping[str, Any]) -> Any:
+    """What tells parameter values apart, 0.0 and -0.0 too; of what are none, a key of its own."""
+    try:
+        return tuple([(name, type(value), float(value).hex()) for name, value in parameters.items()])
+    except (TypeError, ValueError, OverflowError, AttributeError):
+        return object()
+
+
+def _integrate(
+    run: Integration,
+    x: Array,
+    options: RunOptions,
+    steps: list[StepBlock] | None,
+    again: Callable[[RunOptions], Integration] | None,
+) -> tuple[Stats, tuple[Array, Array]]:
+    """How a run from x goes, and its rows, times and states.  steps: see `_noted`.  again: see `outcome`."""
+    recorder = Recorder(x, options.times, options.t0, options.direction)
+    stats = outcome(run, x, recorder, options, _noted(run, x, recorder, options, steps), again)
+    if stats.message != REACHED:  # where it ended is its last row, also between the times of t_eval
+        recorder.add_last()
+    return stats, recorder.table()
+
+
+def _noted(
+    run: Integration, x: Array, recorder: Recorder, options: RunOptions, steps: list[StepBlock] | None
+) -> Iterator[StepBlock]:
+    """The blocks of a run, until rows and steps fill the memory.  steps: receives them, with their dense output."""
+    kept, most = 0, SMALL
+    with Progress("simulate", options.length, options.progress) as report:
+        for block in run.blocks(x):
+            if steps is not None:
+                steps.append(block if block.dense is not None else run.with_dense(block))
+                kept += steps[-1].nbytes
+            yield block if steps is None else steps[-1]
+            if recorder.size + kept > most:
+                most = room() / TABLES if most == SMALL else most
+                if recorder.size + kept > most:
+                    last = f"{recorder.last:.6g} s"
+                    run.status = f"stopped at t = {last}: the rows fill the memory; t_eval records fewer"
+                    return
+            report(abs(float(block.t[-1]) - options.t0))
