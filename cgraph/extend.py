@@ -25,7 +25,7 @@ moves them at sample points.
 
 **Run**: a `Program` is graphs over registers of numbers (`Call`, `Map`, `Sum`, `Factor`, `Solve`, `If`, `While`), and
 `runner` makes it machine code or Python. `program_jvp` and `program_vjp` are its derivatives, `many` is what memories
-side by side run, and `register_statement` adds a kind of statement. `copied` and `added` are the plainest ones.
+side by side run, and `register_statement` adds a kind of statement, and `effects` says what statements read and write. `copied` and `added` are the plainest ones.
 
 **At the edges**: `real_array`, `real_number`, `is_finite`, `check_name`, `require_graph`, `require_flag`,
 `require_whole`, `require_choice`, `require_sequence`, `require_mapping` and `require_path` check what a caller passed,
@@ -90,6 +90,7 @@ if TYPE_CHECKING:
         STATEMENTS as STATEMENTS,
         Statement as Statement,
         StatementRow as StatementRow,
+        effects as effects,
         register_statement as register_statement,
         require_length as require_length,
     )

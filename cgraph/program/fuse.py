@@ -13,6 +13,7 @@ from ..operations.operation import columns
 from .program import Program
 from .statement import Statement, row_of
 from .statements.call import Call, Map, elements
+from .statements.control import If
 
 MOST = 1000  # operations of what is fused: it compiles in some tens of milliseconds, and a short run gains no more
 
@@ -40,7 +41,8 @@ def _fused(program: Program, statements: Sequence[Statement], *, alike: bool) ->
             continue
         done += _one_call(program, run)
         run = []
-        bodies = {name: _fused(program, getattr(statement, name), alike=alike) for name in row_of(statement).bodies}
+        names = () if isinstance(statement, If) and statement.seldom else row_of(statement).bodies
+        bodies = {name: _fused(program, getattr(statement, name), alike=alike) for name in names}
         if bodies:
             statement = replace(statement, **bodies)  # type: ignore[type-var]
         done.append(statement)

@@ -135,7 +135,7 @@ def masked_if(statement: If, masked: Masked) -> None:
     masked.add(Call(graph, (statement.register, *masked.mask), (on, off)))
     for way, body in ((on, statement.body), (off, statement.otherwise)):
         if body:
-            masked.add(If(way, masked.body(statement, body, way)))
+            masked.add(If(way, masked.body(statement, body, way), seldom=statement.seldom))
 
 
 def masked_while(statement: While | FixedPoint, masked: Masked) -> None:

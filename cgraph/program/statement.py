@@ -158,7 +158,13 @@ def reads_and_writes(statement: Statement) -> tuple[Names, Names]:
 
 
 def effects(statements: Iterable[Statement]) -> tuple[dict[str, None], dict[str, None]]:
-    """The registers that are read before they are written, and those that are written, in order."""
+    """The registers that are read before they are written, and those that are written, in order, as keys.
+
+    >>> from cgraph.extend import copied, effects
+    >>> first, written = effects([copied("x", "y"), copied("y", "z")])
+    >>> list(first), list(written)
+    (['x'], ['y', 'z'])
+    """
     reads: dict[str, None] = {}
     writes: dict[str, None] = {}
     for statement in statements:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from cgraph.extend import STATEMENTS, Call, FixedPoint, Map, Statement, While, copied
+from cgraph.extend import Call, FixedPoint, Map, Statement, While, copied, effects
 
 from .problem import Problem
 
@@ -119,24 +119,13 @@ def with_registers(step: Step, own: Mapping[str, int]) -> dict[str, int]:
 
     Raises ValueError where one name has two meanings, and for a step that does not make x_new of x.
     """
-    written = set(_outputs([*step.rates, *step.prepare, *step.body, *step.kept]))
+    written = effects([*step.rates, *step.prepare, *step.body, *step.kept])[1]
     if "x_new" not in written or "x" in written:
         raise ValueError("a step has to write register 'x_new', and to leave 'x' as it is")
     twice = [name for name in (*step.lengths, *step.dense_lengths) if name in own and name not in SHARED]
     if twice:
         raise ValueError(f"a step cannot have a register {twice[0]!r}: a run has another of that name")
     return {**step.lengths, **own}
-
-
-def _outputs(statements: Sequence[Statement]) -> Iterator[str]:
-    """The registers that statements write."""
-    for each in statements:
-        row = STATEMENTS[type(each)]
-        for name in row.writes:
-            registers: str | tuple[str, ...] = getattr(each, name)
-            yield from [registers] if isinstance(registers, str) else registers
-        for name in row.bodies:
-            yield from _outputs(getattr(each, name))
 
 
 def rate_calls(problem: Problem, *statements: Sequence[Statement]) -> int:

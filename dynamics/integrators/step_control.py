@@ -8,6 +8,11 @@ at the tolerance; x_new what the trial arrived at; `fresh`, 1 before the first p
 at the stability limit of an explicit method; and of the last accepted step t_old, x_old and, for its dense output,
 dense1, ..
 
+A run begins with `anew` at 1, and goes on to a trial once it is set out, see `simulation.steps.first_step`: registers
+that a step hands on to the next are 0 then. `search` is positive while a first step is looked for: a trial then is none
+of the run, and not `recorded`. `trials` counts those of the run, and `due` is 1 after one by which sizes that make up
+atol are to be looked at, if it is `sized` by them: after 32, and then after twice as many.
+
 Where a force jumps, steps can only shrink. `jump` is the share of the `longest` of the last steps in which it may be
 missed, 0 where the caller has given atol: what its mean rate would make in that time counts into the `scale` of a
 component by `leap`, rtol times that time over h. A step far shorter than those before passes a jump so. A pole stays
@@ -19,15 +24,15 @@ says nothing of forces to come: the next is at most `still`.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Call, If, Map, Program, Statement, Sum, copied
+from cgraph.extend import Call, If, Map, Program, Statement, Sum, copied, effects
 
 from .elementwise import function
 from .problem import Problem
-from .step import Step, rate_calls, with_registers
+from .step import SHARED, Step, rate_calls, with_registers
 
 RUNNING, DONE, TOO_SMALL = 0.0, 1.0, 2.0  # register `status`
 SAFETY, SMALLEST, LARGEST = 0.9, 0.2, 5.0  # factors from one step to the next
@@ -43,7 +48,9 @@ SMALLEST_ATOL = 2.0**-1022  # in place of 0: a state that is 0 and stays 0 has n
 def registers(problem: Problem) -> dict[str, int]:
     """What every program has."""
     names = "t h tried next max_step min_step end fresh rtol accepted status rejected error error_old"
-    names += " evaluations at_limit t_old t_new jump longest leap still moved turned"
+    names += (
+        " evaluations at_limit t_old t_new jump longest leap still moved turned anew search trials due sized seen row"
+    )
     m = problem.size
     states = dict.fromkeys(("x", "x_new", "x_old", "atol"), m)
     return {**states, "p": len(problem.parameters), **dict.fromkeys(names.split(), 1)}
@@ -83,7 +90,11 @@ def control(order: int, evaluations: int) -> Call:
     order: of the step's size in the estimate.  evaluations: of the rate in a trial.
     """
     names = "error error_old tried t t_new end next max_step min_step rejected evaluations accepted".split()
-    error, old, tried, t, t_new, end, wanted, max_step, min_step, rejected, done, before = inputs = cg.variables(names)
+    names += "search trials sized seen".split()
+    error, old, tried, t, t_new, end, wanted, max_step, min_step, rejected, done, before, *rest = inputs = cg.variables(
+        names
+    )
+    search, trials, sized, seen = rest
     arrives = cg.equal(t_new, end)
     able = cg.maximum(arrives, cg.minimum(wanted, max_step) > cg.maximum(min_step, RESOLUTION * abs(t)))
     accepted = able * (error <= 1.0)
@@ -98,6 +109,9 @@ def control(order: int, evaluations: int) -> Call:
         "status": cg.where(accepted, cg.where(arrives, DONE, RUNNING), cg.where(able, RUNNING, TOO_SMALL)),
         "rejected": rejected + (1.0 - accepted),
         "evaluations": done + float(evaluations),
+        "row": cg.where(search, 0.0, accepted),
+        "trials": trials + 1.0,
+        "due": sized * (trials + 1.0 >= seen),
     }
     return Call(Graph(inputs, outputs), tuple(names), tuple(outputs))
 
@@ -146,7 +160,9 @@ def chosen(step: Step, problem: Problem, *, dense: bool, degree: int, starts: bo
     lengths = with_registers(step, registers(problem))
     rates, prepare = ([*part, *_counted(problem, part)] for part in (step.rates, step.prepare))
     first, again = ([*step.start, *rates], prepare) if step.handed else (step.start, [*rates, *prepare])
-    body: list[Statement] = [first_pass(*first)] if first else []
+    body: list[Statement] = _forgotten(step, lengths)
+    if first:
+        body.append(first_pass(*first))
     if again:
         body.append(If("accepted", tuple(again)))
     body += [trial(), *step.body, *step.error]
@@ -154,12 +170,20 @@ def chosen(step: Step, problem: Problem, *, dense: bool, degree: int, starts: bo
     after: list[Statement] = []
     if dense:
         polynomial, more = (step.dense, step.dense_lengths) if step.dense else _hermite(problem)
-        after += [*polynomial, *_counted(problem, polynomial)]
+        after.append(If("row", (*polynomial, *_counted(problem, polynomial))))
         lengths |= {**dict.fromkeys([f"dense{k + 1}" for k in range(degree)], problem.size), **more}
     body.append(accept_step(*after, *step.kept, *step.handed))
     if starts:
         body.append(If("accepted", (Call(Graph([], {"next": math.inf}), (), ("next",)),)))
-    return Program(lengths, body, recorded(dense, degree), record_if="accepted", stop="status")
+    return Program(lengths, body, recorded(dense, degree), record_if="row", stop="status")
+
+
+def _forgotten(step: Step, lengths: Mapping[str, int]) -> list[Statement]:
+    """Before the first trial, what one step hands on to the next is 0: what it reads before it writes it."""
+    first, _ = effects([*step.start, *step.rates, *step.prepare, *step.body, *step.error, *step.kept, *step.handed])
+    names = tuple([name for name in first if name in step.lengths and name not in SHARED])
+    count = sum([lengths[name] for name in names])
+    return [If("anew", (Call(Graph([], {f"zero{k}": 0.0 for k in range(count)}), (), names),))] if count else []
 
 
 def _counted(problem: Problem, statements: Sequence[Statement]) -> list[Call]:

@@ -29,6 +29,8 @@ class While(Statement):
 class If(Statement):
     """if (register > 0) body else otherwise; the register has length 1, and NaN is not positive.
 
+    seldom: whether it hardly ever runs, so that its speed is not worth the time to compile more code.
+
     >>> import cgraph as cg
     >>> from cgraph.extend import Call, If
     >>> n = cg.variable("n")
@@ -38,6 +40,7 @@ class If(Statement):
     register: str
     body: tuple[Statement, ...]
     otherwise: tuple[Statement, ...] = ()
+    seldom: bool = False
 
 
 @dataclass(frozen=True)

@@ -1,12 +1,16 @@
-"""State sizes: how large the components of a state have been, and the absolute tolerance that goes with them."""
+"""State sizes: which components of a state can be compared, and how large those of a kind are."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+import cgraph as cg
+from cgraph import Graph, Node
 from cgraph.extend import Array
 
 Flags = np.ndarray[Any, np.dtype[np.bool_]]
@@ -46,35 +50,38 @@ class StateKinds:
         result: Array = size + ROUNDING * alike.largest_of_kind(size)
         return result
 
+    @cached_property
+    def largest(self) -> Graph:
+        """`largest_of_kind` as a graph, (m) to (m)."""
+        values = cg.variables([f"x{k}" for k in range(len(self.kinds))])
+        pairs = list(zip(values, self.lengths, strict=True))
+        sizes = _largest_nodes([abs(value if length == 1.0 else length * value) for value, length in pairs], self.kinds)
+        return _numbered(values, [size / length for size, length in zip(sizes, self.lengths, strict=True)])
 
-class StateSizes:
-    """The absolute tolerance of a run that was given none, in the units of its states.
-
-    rtol times the largest value that the component, or another of its group, has had so far, or a ten-thousandth of the
-    largest of its kind, coordinates or velocities, angles and lengths compared by `lengths`. It grows with the motion.
-    """
-
-    def __init__(self, kinds: StateKinds, rtol: float, least: float) -> None:
-        self.kinds, self._rtol, self._least, self._one = kinds, rtol, least, _same(kinds.groups)
-        self._sizes = np.zeros(len(kinds.kinds))
-
-    def see(self, states: Array) -> None:
-        """Note the sizes of these states, (.., m)."""
-        with np.errstate(invalid="ignore"):
-            largest = np.abs(np.where(np.isfinite(states), states, 0.0)).max(axis=0, initial=0.0)
-        self._sizes = np.maximum(self._sizes, _largest(largest, self._one))
-
-    def tolerance(self) -> Array:
-        """The tolerance, (m,), by the states noted so far."""
-        sizes = np.maximum(self._sizes, OTHERS * self.kinds.largest_of_kind(self._sizes))
-        result: Array = np.maximum(self._rtol * sizes, self._least)
-        return result
+    @cached_property
+    def together(self) -> Graph | None:
+        """Sizes of components to those of quantities of several, such as a quaternion; None where there are none."""
+        values = cg.variables([f"x{k}" for k in range(len(self.groups))])
+        several = len(set(self.groups)) < len(values)
+        return _numbered(values, _largest_nodes(values, self.groups)) if several else None
 
 
 def _same(numbers: tuple[int, ...]) -> Flags:
     """Which are the same, (m, m)."""
     same: Flags = np.equal.outer(numbers, numbers)
     return same
+
+
+def _largest_nodes(values: Sequence[Node], alike: Sequence[int]) -> list[Node]:
+    """For each the largest of those of the same number."""
+    found: dict[int, Node] = {}
+    for value, number in zip(values, alike, strict=True):
+        found[number] = cg.maximum(found[number], value) if number in found else value
+    return [found[number] for number in alike]
+
+
+def _numbered(inputs: Sequence[Node], outputs: Sequence[Node]) -> Graph:
+    return Graph(inputs, {f"y{k}": node for k, node in enumerate(outputs)})
 
 
 def _largest(values: Array, alike: Flags) -> Array:

@@ -13,6 +13,7 @@ from ...integrators import Method, Problem
 from ...integrators.problem import constraint_rates
 from ...integrators.step_control import moved
 from ..estimates.state_sizes import StateKinds
+from .first_step import with_first_step
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +29,6 @@ class StepProgram:
     adaptive: bool
     dense: bool  # whether its record has dense output
     finest: float  # relative tolerance
-    starts: bool  # with a first step that the method chooses
     kinds: StateKinds
     normalization: Graph | None  # of states, see Problem; with constraints their projection, over states and t
     nq: int  # coordinates in a state, which come first
@@ -60,18 +60,20 @@ def step_program(problem: Problem, method: Method, *, dense: bool) -> StepProgra
     dense: whether a method that chooses its steps records its dense output.
     Raises SingularMassMatrixError for a coordinate without inertia, ValueError for a method that the model has not.
     """
+    steps, kinds = _normalized(method.program(problem, dense), problem, method), state_kinds(problem)
+    if method.adaptive:
+        steps = with_first_step(steps, problem, kinds, method.order, starts=method.starts)
     return StepProgram(
         problem.components,
         problem.parameters,
-        _normalized(method.program(problem, dense), problem, method),
+        steps,
         problem.rate,
         problem.timed,
         method.order,
         method.adaptive,
         dense and method.adaptive,
         method.finest,
-        method.starts,
-        state_kinds(problem),
+        kinds,
         between(problem),
         problem.nq,
         constraint_rates(problem) if method.adaptive else None,
