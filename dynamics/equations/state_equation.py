@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from cgraph import Graph
+from cgraph import Compiled, Graph, compile
 from cgraph.extend import kept_by_first, require_choice
 
 from ..systems.arguments import TIME
@@ -74,12 +74,22 @@ def normalization(model: Model) -> Graph | None:
 
     Inputs and outputs the states.
     """
-    system = model.system
-    quasi = None if system is None else system.kinematics.quasi
-    if system is None or quasi is None or quasi.normalized is None:
+    return None if model.system is None else _normalization(model.system)
+
+
+@kept_by_first
+def _normalization(system: System) -> Graph | None:
+    quasi = system.kinematics.quasi
+    if quasi is None or quasi.normalized is None:
         return None
     states = [*system.kinematics.normalized(system.q), *system.qd]
     return Graph([*system.q, *system.qd], {f"x{k}": node for k, node in enumerate(states)})
+
+
+@kept_by_first
+def normalizer(normalization: Graph) -> Compiled:
+    """The function of one state, in Python, for a start."""
+    return compile(normalization, "python")
 
 
 class StateInputs(NamedTuple):

@@ -24,6 +24,7 @@ RTOL, ATOL = 1e-9, 1e-10  # of chosen steps
 STEP = 1e-3  # s, of methods of equal steps
 BOUND = 1e-3  # of the estimated error of equal steps, relative
 TABLES = 3  # that the rows are in at most at once, while they are put together
+SMALL = 2.0**24  # bytes, below which nobody asks how many are free
 SHARE = 0.9  # of the free memory
 SCIPY = "scipy:"
 SCIPY_SOLVERS = ("Radau", "BDF", "LSODA", "DOP853", "RK45")
@@ -71,9 +72,7 @@ class RunOptions:
         check_method(self.method)
         if not isinstance(self.backend, str):
             raise TypeError(f"backend must be a string, got {type(self.backend).__name__}: {self.backend!r:.40}")
-        self._check_span()
-        for what in ("dt", "max_step", "first_step"):
-            value = getattr(self, what)
+        for what, value in (("dt", self.dt), ("max_step", self.max_step), ("first_step", self.first_step)):
             if value is not None and not (math.isfinite(real_number(what, value)) and value > 0.0):
                 raise ValueError(f"{what} must be positive and finite, got {value!r} s")
         if self.adaptive and self.dt is not None:
@@ -92,19 +91,13 @@ class RunOptions:
         most = real_number("max_steps", self.max_steps)
         if not (most >= 1.0 and (most == math.inf or most == int(most))):
             raise ValueError(f"max_steps must be a whole number, at least 1, or infinite, got {self.max_steps!r}")
-        normalized: dict[str, Any] = {"t0": float(self.t0), "t_end": float(self.t_end), "max_steps": most}
-        if self.t_eval is not None:
-            normalized["t_eval"] = times_to_record(self.t_eval, float(self.t_end), float(self.t0))
-        for name, value in normalized.items():
-            object.__setattr__(self, name, value)
+        self.__dict__.update(span(self.t0, self.t_end, self.t_eval), max_steps=most)
 
-    def _check_span(self) -> None:
-        t0, t_end = real_number("t0", self.t0), real_number("t_end", self.t_end)
-        if not (math.isfinite(t0) and math.isfinite(t_end)):
-            name, value = ("t_end", t_end) if math.isfinite(t0) else ("t0", t0)
-            raise ValueError(f"{name} must be finite, got {value!r} s")
-        if t0 == t_end:
-            raise ValueError(f"t_end must be another time than t0, got {self.t_end!r} s for both")
+    def over(self, t0: float, t_end: float, t_eval: ArrayLike | None) -> RunOptions:
+        """The same of another run. Raises as a run does for its times."""
+        other = object.__new__(RunOptions)
+        other.__dict__.update(self.__dict__, **span(t0, t_end, t_eval))
+        return other
 
     def _check_tolerances(self) -> None:
         rtol, atol = real_number("rtol", self.relative), np.asarray(self.absolute)
@@ -211,13 +204,24 @@ class RunOptions:
         """Raises MemoryError where every equal step as a row of m numbers would not fit."""
         if self.adaptive or self.t_eval is not None:
             return
-        steps, free = step_count(self.t_end - self.t0, self.step), room()
+        steps = step_count(self.t_end - self.t0, self.step)
         size = 8 * TABLES * steps * m
-        if size > free:
+        if size > SMALL and size > (free := room()):
             raise MemoryError(
                 f"{steps} steps of {m} numbers take {size / 2**30:.3g} GiB, and {free / 2**30:.3g} GiB are "
                 "free: record fewer times (t_eval)"
             )
+
+
+def span(t0: float, t_end: float, t_eval: ArrayLike | None) -> dict[str, Any]:
+    """The times of a run, checked."""
+    t0, t_end = real_number("t0", t0), real_number("t_end", t_end)
+    if not (math.isfinite(t0) and math.isfinite(t_end)):
+        name, value = ("t_end", t_end) if math.isfinite(t0) else ("t0", t0)
+        raise ValueError(f"{name} must be finite, got {value!r} s")
+    if t0 == t_end:
+        raise ValueError(f"t_end must be another time than t0, got {t_end!r} s for both")
+    return {"t0": t0, "t_end": t_end, "t_eval": None if t_eval is None else times_to_record(t_eval, t_end, t0)}
 
 
 def check_method(method: str) -> None:

@@ -1,32 +1,20 @@
-"""Simulation: the motion of a system from a start, as a Trajectory, in stages."""
+"""Simulation: the motion of a system from a start, as a Trajectory."""
 
 from __future__ import annotations
 
 import math
-import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import replace
-from functools import partial
+from collections.abc import Iterable, Mapping
 
 from numpy.typing import ArrayLike
 
-from cgraph import Graph
-from cgraph.extend import Array, require_flag
+from cgraph.extend import require_flag
 
-from ..equations.states.initial_value import initial_value
-from ..integrators import Problem, derive, force, in_form, total_energy
 from ..systems.model import Model
-from .applied_forces import Applied, Tau, with_applied
+from .applied_forces import Tau
 from .events.event import Event, as_events
-from .events.event_program import event_program
-from .outcome import INTERRUPTED, REACHED, Recorder, outcome
-from .progress_bar import Progress
-from .row_values import converted, unreached_momenta
-from .run_options import METHOD, TABLES, RunOptions, room, time_span
-from .steps.dense_output import StepBlock
-from .steps.integration import integration_of
-from .steps.stepping import Integration
-from .trajectory import SimulationWarning, Solution, Stats, Trajectory
+from .prepared_motion import PreparedMotion
+from .run_options import METHOD, RunOptions, time_span
+from .trajectory import Trajectory
 
 
 def simulate(
@@ -147,85 +135,9 @@ def simulate(
     >>> run.q.round(3).tolist()
     [[1.0, 0.5], [0.31, -0.04], [-0.989, 0.108]]
     """
-    # Check
     t0, t_end = time_span(t_end, t0, t_span)
-    arguments = (dt, max_step, rtol, atol, t_eval, first_step, max_steps, backend, progress)
-    options = RunOptions(t_end, method, *arguments, t0, estimate_error)
-    watched, dense_output = as_events(events), require_flag("dense_output", dense_output)
-    model, applied = with_applied(model, tau, parameters)
-    start = initial_value(model, q, qd, applied.constant, parameters, t0)
-    options.check(start.states)
-    options.check_room(len(start.x))
-
-    # Derive the equations, xdot = f(x, t), and the events as graphs; x is (q, qd), or in `stepped` (q, p)
-    problem = derive(model, applied.bound(start.bound))
-    stepped = in_form(problem, form)
-    program = event_program(stepped, watched) if watched else None
-    hold = applied.hold(options, stepped)
-
-    # Write the steps of the method over these graphs, and compile them
-    made = partial(integration_of, stepped, events=program, between=bool(watched) or dense_output)
-    run, x = made(options, hold=hold), converted(stepped.momentum, t0, start.x)
-
-    # Integrate, noting rows and events
-    steps: list[StepBlock] | None = [] if dense_output else None
-    stats, rows = _integrate(run, x, options, steps, made if hold is None else None)
-
-    # Put the result together
-    held = None if hold is None else hold.held
-    if missed := unreached_momenta(stepped, *rows, start=(t0, start.x, x)):
-        stats = replace(stats, warnings=(*stats.warnings, *missed))
-    early = not stats.success and not stats.message.startswith(INTERRUPTED)
-    for text in [*([f"the run {stats.message}"] if early else []), *stats.warnings]:
-        warnings.warn(text, SimulationWarning, stacklevel=2)
-    dense = None if steps is None else Solution(options.t0, x, steps, problem.nq, stepped.velocities)
-    (times, q, qd), momenta = _table(stepped, *rows)
-    crossings, graphs = run.crossings(problem.nq), _graphs(problem, applied)
-    return Trajectory(times, q, qd, stats, crossings, graphs, dense, held, model.coordinates, model.velocities, momenta)
-
-
-def _integrate(
-    run: Integration,
-    x: Array,
-    options: RunOptions,
-    steps: list[StepBlock] | None,
-    again: Callable[[RunOptions], Integration] | None,
-) -> tuple[Stats, tuple[Array, Array]]:
-    """How a run from x goes, and its rows, times and states.  steps: see `_noted`.  again: see `outcome`."""
-    recorder = Recorder(x, options.times, options.t0, options.direction)
-    stats = outcome(run, x, recorder, options, _noted(run, x, recorder, options, steps), again)
-    if stats.message != REACHED:  # where it ended is its last row, also between the times of t_eval
-        recorder.add_last()
-    return stats, recorder.table()
-
-
-def _noted(
-    run: Integration, x: Array, recorder: Recorder, options: RunOptions, steps: list[StepBlock] | None
-) -> Iterator[StepBlock]:
-    """The blocks of a run, until rows and steps fill the memory.  steps: receives them, with their dense output."""
-    most, kept = room() / TABLES, 0
-    with Progress("simulate", options.length, options.progress) as report:
-        for block in run.blocks(x):
-            if steps is not None:
-                steps.append(block if block.dense is not None else run.with_dense(block))
-                kept += steps[-1].nbytes
-            yield block if steps is None else steps[-1]
-            if recorder.size + kept > most:
-                last = f"{recorder.last:.6g} s"
-                run.status = f"stopped at t = {last}: the rows fill the memory; t_eval records fewer"
-                return
-            report(abs(float(block.t[-1]) - options.t0))
-
-
-def _table(stepped: Problem, times: Array, rows: Array) -> tuple[tuple[Array, Array, Array], Array | None]:
-    """t, q and qd of the rows that steps gave; and their momenta, if they are of these."""
-    states, nq = converted(stepped.velocities, times, rows), stepped.nq
-    return (times, states[:, :nq], states[:, nq:]), rows[:, nq:] if stepped.momenta else None
-
-
-def _graphs(problem: Problem, applied: Applied) -> dict[str, Graph]:
-    """What a trajectory computes accelerations, forces and energies by."""
-    forces, whole = force(problem), total_energy(problem)
-    graphs = {"rate": problem.rate} | ({} if forces is None else {"force": forces, "tau": applied.graph(problem)})
-    graphs |= {} if whole is None else {"energy": whole}
-    return graphs | ({} if problem.multipliers is None else {"multipliers": problem.multipliers})
+    options = RunOptions(
+        t_end, method, dt, max_step, rtol, atol, t_eval, first_step, max_steps, backend, progress, t0, estimate_error
+    )
+    motion = PreparedMotion(model, options, tau, as_events(events), form, require_flag("dense_output", dense_output))
+    return motion.run(q, qd, options, parameters, stacklevel=3)

@@ -15,7 +15,7 @@ from cgraph.extend import Array, real_array
 from ...systems.arguments import parameter_value, per_coordinate
 from ...systems.model import Model
 from ..constraints.projection import projected_start
-from ..state_equation import StateInputs, normalization, state_inputs
+from ..state_equation import StateInputs, normalization, normalizer, state_inputs
 
 PAST = 1e-14  # of the end: some roundings, by which a last time may lie past it
 
@@ -57,8 +57,21 @@ def initial_value(
 
     Raises TypeError or ValueError, naming the argument, for another shape or what is not finite.
     """
-    x, states, bound, _ = initial_values(model, q, qd, tau, parameters, t, many=False)
-    return InitialValue(x[0], states, bound)
+    bound = other_inputs(model, tau, parameters)
+    return InitialValue(start_state(model, q, qd, bound, t), state_inputs(model).states, bound)
+
+
+def other_inputs(model: Model, tau: Any = 0.0, parameters: Mapping[str, Any] | None = None) -> dict[str, float]:
+    """The numbers of the inputs of a model's state equation besides its states and t; see `initial_value`."""
+    return _other_inputs(model, tau, parameters, many=False)[0]
+
+
+def start_state(model: Model, q: ArrayLike, qd: ArrayLike | None, bound: Mapping[str, float], t: float = 0.0) -> Array:
+    """The state (m,) in which a motion starts, the other inputs as they are `bound`; see `initial_value`."""
+    x, system = normalized(model, np.concatenate(_state_parts(model, q, qd, many=False))), model.system
+    if system is None or not len(system.constraints):
+        return x
+    return projected_start(system, x, t, {name: bound[name] for name in system.parameters})
 
 
 def initial_values(
@@ -75,7 +88,10 @@ def initial_values(
 
     many: else one motion, whose arguments have no axis N.
     """
-    start = _given(model, q, qd, tau, parameters, many=many)
+    if not many:
+        one = initial_value(model, q, qd, tau, parameters, t)
+        return InitialValues(one.x[None], one.states, one.bound, {})
+    start = _given(model, q, qd, tau, parameters)
     system = model.system
     if system is None or not len(system.constraints):
         return start
@@ -94,49 +110,54 @@ def given_start(
     parameters: Mapping[str, float] | None = None,
 ) -> InitialValue:
     """The start as it is given, whether or not it meets the constraints of the model."""
-    x, states, bound, _ = _given(model, q, qd, tau, parameters, many=False)
-    return InitialValue(x[0], states, bound)
+    x = normalized(model, np.concatenate(_state_parts(model, q, qd, many=False)))
+    return InitialValue(x, state_inputs(model).states, other_inputs(model, tau, parameters))
 
 
 def _given(
-    model: Model,
-    q: ArrayLike,
-    qd: ArrayLike | None,
-    tau: Any,
-    parameters: Mapping[str, Any] | None,
-    *,
-    many: bool,
+    model: Model, q: ArrayLike, qd: ArrayLike | None, tau: Any, parameters: Mapping[str, Any] | None
 ) -> InitialValues:
-    """The starts as they are given."""
+    """The starts of N motions as they are given."""
+    bound, varied = _other_inputs(model, tau, parameters, many=True)
+    parts = _state_parts(model, q, qd, many=True)
+    counts = {what: len(array) for what, array in zip(("q", "qd"), parts, strict=False) if array.ndim == 2}
+    applied, states = state_inputs(model).applied, state_inputs(model).states
+    if varied.keys() & {*applied}:
+        counts["tau"] = len(varied[applied[0]])
+    counts |= {f"parameter {name!r}": len(varied[name]) for name in varied if name not in applied}
+    count = _one_count(counts)
+    x = normalized(model, np.concatenate([np.broadcast_to(part, (count, part.shape[-1])) for part in parts], axis=-1))
+    return InitialValues(x, states, bound, varied)
+
+
+def _other_inputs(
+    model: Model, tau: Any, parameters: Mapping[str, Any] | None, *, many: bool
+) -> tuple[dict[str, float], dict[str, Array]]:
+    """Inputs besides states and t that are the same for all motions, and columns, (N,), of those that are not."""
     inputs, system = state_inputs(model), model.system
-    n = len(inputs.applied)
-    nq = len(inputs.states) - n
     bound, varied = _parameters(inputs, parameters, many=many)
-    if parameters and system is not None:
-        system.require_values({**bound, **varied})
-    counts = {f"parameter {name!r}": len(column) for name, column in varied.items()}
     if system is None:
         if np.any(real_array("tau", tau)):
             raise ValueError(f"tau must be 0 for a system of first order, which no force acts on, got {tau!r:.60}")
+        return bound, varied
+    if parameters:
+        system.require_values({**bound, **varied})
+    if many and (tau := real_array("tau", tau)).ndim == 2:
+        columns = _rows("tau", tau, len(inputs.applied), "velocity", many=many).T
+        return bound, dict(zip(inputs.applied, columns, strict=True)) | varied
+    forces = per_coordinate("tau", tau.tolist() if isinstance(tau, np.ndarray) else tau, model.velocities)
+    return dict(zip(inputs.applied, forces, strict=True)) | bound, varied
+
+
+def _state_parts(model: Model, q: ArrayLike, qd: ArrayLike | None, *, many: bool) -> list[Array]:
+    """q and qd, each (n,) or, of many motions, also (N, n); of a system of first order q alone."""
+    nq, n = len(model.coordinates), len(model.velocities)
+    if model.system is None:
         if qd is not None:
             raise ValueError("qd must be None for a system of first order; q holds its whole state")
-        rows = {"q": _rows("q", q, nq, "state", many=many)}
-    else:
-        rows = {"q": _rows("q", q, nq, "coordinate", many=many)}
-        rows["qd"] = _rows("qd", qd, n, "coordinate" if n == nq else "velocity", many=many)
-        if many and (tau := real_array("tau", tau)).ndim == 2:
-            columns = _rows("tau", tau, n, "velocity", many=many).T
-            counts = {"tau": len(tau)} | counts
-            varied = dict(zip(inputs.applied, columns, strict=True)) | varied
-        else:
-            forces = per_coordinate("tau", tau.tolist() if isinstance(tau, np.ndarray) else tau, model.velocities)
-            bound = dict(zip(inputs.applied, forces, strict=True)) | bound
-    parts = list(rows.values())
-    if many:
-        count = _one_count({what: len(array) for what, array in rows.items() if array.ndim == 2} | counts)
-        parts = [np.broadcast_to(array, (count, array.shape[-1])) for array in parts]
-    x = normalized(model, np.concatenate(parts, axis=-1))
-    return InitialValues(x.reshape(-1, x.shape[-1]), inputs.states, bound, varied)
+        return [_rows("q", q, nq, "state", many=many)]
+    velocity = "coordinate" if n == nq else "velocity"
+    return [_rows("q", q, nq, "coordinate", many=many), _rows("qd", qd, n, velocity, many=many)]
 
 
 def normalized(model: Model, x: Array) -> Array:
@@ -147,11 +168,15 @@ def normalized(model: Model, x: Array) -> Array:
     graph = normalization(model)
     if graph is None:
         return x
-    columns = list(np.moveaxis(x, -1, 0))
-    with np.errstate(all="ignore"):
-        for _ in range(2):  # of a length that is far from 1, the first time is rounded
-            columns = list(graph.evaluate(dict(zip(graph.input_names, columns, strict=True))).values())
-    result = np.stack(np.broadcast_arrays(*columns), axis=-1)
+    if x.ndim == 1:
+        one = normalizer(graph)
+        result = one(one(x))  # of a length that is far from 1, the first time is rounded
+    else:
+        columns = list(np.moveaxis(x, -1, 0))
+        with np.errstate(all="ignore"):
+            for _ in range(2):
+                columns = list(graph.evaluate(dict(zip(graph.input_names, columns, strict=True))).values())
+        result = np.stack(np.broadcast_arrays(*columns), axis=-1)
     if not (good := np.isfinite(result)).all():
         *row, _ = np.argwhere(~good)[0].tolist()
         bad = [k for k, fine in enumerate(good[*row]) if not fine]
