@@ -84,7 +84,7 @@ def program_rows_ir(program: Program, name: str, lanes: int, flags: str, registe
     point, *results = [Place(places[each], program.registers[each]) for each in (name, *program.record)]
     calls = ["  %rows = call i64 @run(ptr %w, ptr null, i64 1, i64 1, ptr %done, ptr null)"]
     driver = rows_ir(Arithmetic(flags, lanes), point, results, calls, ["  %done = alloca i64, align 8"])
-    source = program_ir(replace(program, record=()), flags, lanes, 1, registers)
+    source = program_ir(replace(program, record=()), Arithmetic(flags, lanes, registers), 1)
     return Batch("\n".join([source, *driver, ""]), lanes * places[""])
 
 
@@ -115,11 +115,10 @@ class LaneCode:
         self._entry(*[array.ctypes.data for array in arrays], len(which), most, len(marks))
 
 
-def lane_ir(program: Program, kept: int, clock: str, flags: str, lanes: int, registers: int) -> Batch:
+def lane_ir(program: Program, kept: int, clock: str, arithmetic: Arithmetic) -> Batch:
     """The module with `lanes`, see `LaneCode`, of a program under masks whose first `kept` numbers outlive a pass."""
-    places = offsets(program.registers, 1)
-    arithmetic = Arithmetic(flags, lanes, registers, alike=True)
-    source = program_ir(replace(program, record=(), record_if=None, stop=None), flags, lanes, 1, registers, alike=True)
+    places, lanes = offsets(program.registers, 1), arithmetic.lanes
+    source = program_ir(replace(program, record=(), record_if=None, stop=None), arithmetic, 1)
     row, at = [], 0
     for name in program.record:
         row.append(_ROW.format(at=at, place=places[name] * lanes, count=program.registers[name], lanes=lanes))

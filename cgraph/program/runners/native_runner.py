@@ -13,7 +13,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ...codegen import llvm_engine as llvm
+from ...codegen.arithmetic import Arithmetic
 from ...codegen.bound_call import LONG, SHORT, bound_call
+from ...codegen.llvm_ir import point_arithmetic
 from ...core.evaluation import Array
 from ...core.scope import without_collection
 from ...util.memory import aligned
@@ -93,7 +95,10 @@ class NativeRunner(Runner):
         """Machine code that runs so many memories, made at its first use."""
         with self._lock:
             if lanes not in self._codes:
-                text = program_ir(program, self._flags, lanes, self.width, self._host.registers)
+                registers = self._host.registers
+                vectors = Arithmetic(self._flags, lanes, registers)
+                one = point_arithmetic(self._flags, registers)
+                text = program_ir(program, vectors if lanes > 1 else one, self.width)
                 self._codes[lanes] = self._compiled(text).function("run", _RUN)
         return self._codes[lanes]
 
@@ -153,23 +158,21 @@ class NativeRunner(Runner):
         begin = {places[other]: numbers for other, numbers in start.items()}
         return width, BatchCode(code, lanes, text.size, begin, columns=alone)
 
-    def lane_code(self, clock: str, results: Sequence[str] = ()) -> LaneCode | None:
-        """Machine code of memories in lanes, see `LaneCode`; none of programs with a feed or that run one memory alone.
-
-        clock: a register of length 1.  results: registers that are read after a run.
-        """
+    def lane_code(self, clock: str, results: Sequence[str] = (), *, alike: bool = True) -> LaneCode | None:
+        """Machine code of memories in lanes; see `Runner`."""
         from ..many import many, outliving
         from .batch_code import LaneCode, lane_ir
 
         if self.program.feed or any(row_of(each).beside is None for each in self.program.statements()):
             return None
         lanes, lengths = self._host.lanes, self.program.registers
+        arithmetic = Arithmetic(self._flags, lanes, self._host.registers, alike=alike)
         first = {*outliving(self._fused), *results}
         kept = [name for name in lengths if name in first]
         beside = replace(self._fused, registers={name: lengths[name] for name in dict.fromkeys([*kept, *lengths])})
-        masked, size = fused(many(beside, kept), alike=True), sum([lengths[name] for name in kept])
+        masked, size = fused(many(beside, kept), alike=alike), sum([lengths[name] for name in kept])
         with without_collection():
-            text = lane_ir(masked, size, clock, self._flags, lanes, self._host.registers)
+            text = lane_ir(masked, size, clock, arithmetic)
         return LaneCode(self._compiled(text.source), masked, kept, lanes, text.size)
 
     def _point_text(self, x: str, y: str) -> str:

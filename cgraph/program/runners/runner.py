@@ -176,10 +176,11 @@ class Runner(ABC):
         with _fitting(passes // every, self.program.width * count):
             return self._run_many(memories, passes, every, fed)
 
-    def lane_code(self, clock: str, results: Sequence[str] = ()) -> LaneCode | None:
+    def lane_code(self, clock: str, results: Sequence[str] = (), *, alike: bool = True) -> LaneCode | None:
         """Machine code of memories in lanes, see `LaneCode`; none in Python, with a feed, or of what runs alone.
 
-        clock: a register of length 1.  results: registers that are read after a run.
+        clock: a register of length 1.  results: registers that are read after a run.  alike: whether a memory has the
+        bits that it has alone; else sines and such are those of vectors, as in `run_many`.
         """
         return None
 

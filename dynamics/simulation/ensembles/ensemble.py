@@ -90,8 +90,16 @@ class RunTable:
         """The rows `which`, of runs that reached their end."""
         for name, values in {**columns, "success": True, "status": 0}.items():
             self.columns[name][which] = values
-        for k in which.tolist():
+        if len(which) == len(self.messages):
+            self.messages = [REACHED] * len(which)
+        for k in which.tolist() if len(which) < len(self.messages) else ():
             self.messages[k] = REACHED
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether a run has been."""
+        failed = np.flatnonzero(self.columns["status"] < 0).tolist()
+        return any(self.messages[k].startswith(INTERRUPTED) for k in failed)
 
     def put(self, here: slice, part: RunTable) -> None:
         """The rows of a part, in their place."""

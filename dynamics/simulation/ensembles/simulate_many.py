@@ -26,7 +26,7 @@ from ..events.event_program import EventProgram, event_program
 from ..outcome import INTERRUPTED
 from ..progress_bar import Progress
 from ..row_values import converted, unreached_momenta
-from ..run_options import METHOD, RunOptions, room, time_span
+from ..run_options import METHOD, SMALL, RunOptions, room, time_span
 from ..sampled_controller import SampledController
 from ..steps.equal_steps import EqualSteps, even_steps, step_count
 from ..steps.step_program import StepProgram, pickled_steps, step_program
@@ -38,8 +38,8 @@ from .workers import Map, Workers, checked, finished
 
 VECTOR = 8  # lanes, or a multiple of them, of every processor: a chunk of trajectories side by side is whole vectors
 LARGEST = 256  # trajectories in a chunk, unless asked for
-LONGEST = 4096  # of those in lanes, whose rows of steps take no more than ..
-NUMBERS = 2**22  # so many numbers
+LONGEST = 4096  # of those in lanes, of which a chunk's rows of steps have no more than ..
+NUMBERS = 2**22  # .. so many numbers
 SHARES = 4  # chunks for each worker, so that workers of unlike speed finish together
 UNKNOWN = 16  # workers behind a map, which does not say
 
@@ -150,14 +150,13 @@ def simulate_many(
     # Share out the work: what a worker is sent, and the starts of chunks of trajectories
     grids = [] if watched else _grids(program, options, len(start.x))
     sent = replace(options, t_eval=options.row_times) if watched else options
-    lanes, looked_for = (
-        not watched and fits_lanes(program, options, len(start.x)),
-        pickle.dumps(watch) if watched else b"",
-    )
+    lanes = not watched and fits_lanes(program, options, len(start.x)) and (program.adaptive or len(grids) == 1)
+    looked_for = pickle.dumps(watch) if watched else b""
     task = Task(pickled_steps(program), sent, count, tuple(grids), looked_for, lanes)
     p = np.array([start.varied[name] for name in problem.parameters]).reshape(-1, len(start.x)).T.copy()
     x = converted(problem.momentum, t0, start.x, p)
-    largest = min(LONGEST, max(LARGEST, NUMBERS // (count * program.steps.width))) if lanes else LARGEST
+    largest = min(LONGEST, max(VECTOR, NUMBERS // (count * program.steps.width))) if lanes else LARGEST
+    chunk = min(chunk, largest) if chunk is not None and lanes else chunk
     chunks = _chunks(x, p, chunk, team, largest, whole=bool(grids))
 
     # Integrate, by whoever takes the chunks and compiles the steps
@@ -211,7 +210,7 @@ def _warnings(stats: EnsembleStats) -> list[str]:
         for k in np.flatnonzero(stats.status < 0).tolist()
         if not stats.message[k].startswith(INTERRUPTED)
     }
-    doubtful = {k: texts[0] for k, texts in enumerate(stats.warnings) if texts}
+    doubtful = {k: texts[0] for k, texts in enumerate(stats.warnings) if texts} if any(stats.warnings) else {}
     many = f"of {len(stats.warnings)} trajectories"
     said = []
     if early:
@@ -238,8 +237,8 @@ def _check(method: str, chunk: int | None, tau: object) -> None:
 
 def _check_room(x: Array, rows: int) -> None:
     """Raises MemoryError where so many rows for every start (N, m) would not fit."""
-    size, free = 8 * len(x) * rows * x.shape[1], room()
-    if size > free:
+    size = 8 * len(x) * rows * x.shape[1]
+    if size > SMALL and size > (free := room()):
         raise MemoryError(
             f"{len(x)} trajectories of {rows} rows of {x.shape[1]} numbers take {size / 2**30:.3g} GiB, and "
             f"{free / 2**30:.3g} GiB are free: record fewer times (t_eval) or simulate fewer at once"

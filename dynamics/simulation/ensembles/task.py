@@ -27,7 +27,7 @@ from ..steps.integration import integration
 from ..steps.step_program import CompiledSteps, StepProgram, compile_steps
 from ..steps.stepping import BLOCK_TIME, NativeRun, StoppedError, begin_equal, failed_step
 from .ensemble import RunTable
-from .lanes import Lanes, LanesIntegration, lanes_of
+from .lanes import ChosenInLanes, EqualInLanes, InLanes, Lanes, lanes_of
 
 WORK = 2**21  # nodes computed in a block: half a millisecond for each vector
 NUMBERS = 2**22  # in the rows of a block
@@ -60,11 +60,6 @@ class Part:
             self.rows[here] = part.rows
         self.runs.put(here, part.runs)
         self.happened[here] = part.happened
-
-    @property
-    def interrupted(self) -> bool:
-        """Whether the chunk was not run to its end."""
-        return any([message.startswith(INTERRUPTED) for message in self.runs.messages])
 
 
 def not_begun(first: int, rows: Array, *, events: bool) -> Part:
@@ -262,12 +257,12 @@ class Task:
     count: int  # of the rows of a trajectory
     grids: tuple[EqualSteps, ...]  # of trajectories side by side; empty: one after another
     events: bytes = b""  # an EventProgram; nothing without events
-    lanes: bool = False  # of chosen steps: whether trajectories go in lanes, where the program can
+    lanes: bool = False  # whether trajectories go in lanes, where the program can
 
     def __call__(self, chunk: Chunk) -> Part:
         """Run the chunk."""
         part = self.run(chunk, np.empty((len(chunk.x), self.count, chunk.x.shape[1])), lambda: False)
-        if part.interrupted:
+        if part.runs.interrupted:
             raise KeyboardInterrupt
         return part
 
@@ -275,9 +270,11 @@ class Task:
         """Run the chunk into rows (k, T, m), to its end, or until soon after Ctrl-C or `stopped`: see the part."""
         part = not_begun(chunk.first, rows, events=bool(self.events))
         with np.errstate(all="ignore"):
+            if self.lanes and self._in_lanes(chunk, part, stopped):
+                return part
             if self.grids:
                 self._side_by_side(chunk, part, stopped)
-            elif not (self.lanes and self._in_lanes(chunk, part, stopped)):
+            else:
                 self._one_by_one(chunk, part, range(len(chunk.x)), stopped)
         return part
 
@@ -306,16 +303,21 @@ class Task:
             lanes = _lanes(self.pickled, self.options.backend)
         if lanes is None:
             return False
-        run, interrupted = LanesIntegration(lanes, self.options, chunk.x, chunk.p), False
+        run: InLanes
+        if self.grids:
+            run = EqualInLanes(lanes, self.options, chunk.x, chunk.p, self.grids[0])
+        else:
+            run = ChosenInLanes(lanes, self.options, chunk.x, chunk.p)
+        interrupted = False
         try:
             while run.advance(BLOCK_TIME):
                 if stopped():
                     raise StoppedError
         except (KeyboardInterrupt, StoppedError):
             interrupted = True
-        done, columns = run.result(part.rows)
-        part.runs.reached(done, **columns)
-        others = np.setdiff1d(np.arange(len(chunk.x)), done).tolist()
+        whole, columns = run.result(part.rows)
+        done, others = np.flatnonzero(whole), np.flatnonzero(~whole).tolist()
+        part.runs.reached(done, **{name: values[done] for name, values in columns.items()})
         if not interrupted:
             self._one_by_one(chunk, part, others, stopped)
         for k in others if interrupted else ():
