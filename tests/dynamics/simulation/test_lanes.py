@@ -21,6 +21,7 @@ COUNT = FEW + 5  # more than one vector, and not a whole number of them
 TIMES = [0.0, 0.11, 0.12, 0.5, 1.0]
 COMPARED = (0, 3, 8, COUNT - 1)
 TOP = np.diag([0.1, 0.2, 0.25])  # kg m^2
+ROUNDING = 1e-12  # of equal steps, whose lengths between rows are rounded otherwise alone
 LANES = ("dop853", "dopri5", "rodas", "taylor")
 
 
@@ -241,9 +242,9 @@ def test_what_cannot_go_in_lanes_goes_one_by_one() -> None:
 @mark.parametrize("times", [[1.0], [0.0, 0.5, 1.0], [0.25, 0.5, 0.75], None])
 @mark.parametrize("method", ["rk4", "verlet"])
 def test_equal_steps_are_the_same_with_an_estimate_and_without(method: str, times: Any) -> None:
-    model = spring() if method == "rk4" else random_arm(2)
+    model = random_arm(2)
     q, qd = starts(model, 8)
-    options = {"dt": 0.05, "t_eval": times}
+    options = {"dt": 0.02, "t_eval": times}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", dyn.SimulationWarning)
         beside = simulate_many(model, q, qd, 1.0, method, **options)
@@ -262,5 +263,5 @@ def test_one_of_equal_steps_that_fails_says_what_it_says_alone() -> None:
     for k in (0, 7, 20):
         one = dyn.simulate(model, x[k], None, 2.0, "rk4", **options)
         rows = int((fan.t <= one.t[-1]).sum())
-        assert np.array_equal(fan.q[k, :rows], one.q[:rows])
+        assert fan.q[k, :rows] == approx(one.q[:rows], rel=ROUNDING)
         assert (fan.stats.message[k], fan.stats.steps[k]) == (one.stats.message, one.stats.steps)
