@@ -69,11 +69,12 @@ if TYPE_CHECKING:
     from .simulation.events.event import Event
     from .simulation.gradients.gradient import MotionGradient, gradient
     from .simulation.gradients.gradient_many import MotionGradients, gradient_many
-    from .simulation.gradients.motion import MotionError
     from .simulation.gradients.sensitivities import Sensitivities, sensitivities
+    from .simulation.prepare import prepare
+    from .simulation.prepared_motion import MotionEnd, MotionSteps, PreparedMotion
     from .simulation.sampled_controller import HeldForces, SampledController
     from .simulation.simulate import simulate
-    from .simulation.trajectory import Crossings, SimulationWarning, Stats, Trajectory
+    from .simulation.trajectory import Crossings, MotionError, SimulationWarning, Stats, Trajectory
     from .systems.constraints import ConstraintError
     from .systems.controller import with_controller
     from .systems.display_names import display_names
@@ -111,11 +112,14 @@ __all__ = [
     "Mechanism",
     "MechanismError",
     "MechanismWarning",
+    "MotionEnd",
     "MotionError",
     "MotionGradient",
     "MotionGradients",
+    "MotionSteps",
     "OdeSystem",
     "OmittedTerm",
+    "PreparedMotion",
     "PruneResult",
     "QuasiVelocities",
     "RecursiveInverseDynamics",
@@ -178,6 +182,7 @@ __all__ = [
     "momentum_rate",
     "planar_arm",
     "potential_energy",
+    "prepare",
     "prune",
     "raise_if_singular",
     "reduced_linearization",

@@ -28,6 +28,11 @@ class Arithmetic(NamedTuple):
         return self.flags == "contract"
 
     @property
+    def unfused(self) -> Arithmetic:
+        """The same, but that products are rounded by themselves, so that what cancels is 0."""
+        return self._replace(flags="nsz") if self.fuses else self
+
+    @property
     def type(self) -> str:
         """The type of a value."""
         return "double" if self.lanes == 1 else f"<{self.lanes} x double>"

@@ -33,7 +33,7 @@ def _fused(program: Program, statements: Sequence[Statement], *, alike: bool) ->
     done: list[Statement] = []
     run: list[Call | Map] = []
     for statement in statements:
-        if isinstance(statement, Call | Map):
+        if isinstance(statement, Map) or (isinstance(statement, Call) and not statement.exact):
             if alike and not _as_before([*run, statement]):
                 done += _one_call(program, run)
                 run = []

@@ -23,16 +23,20 @@ class Functions:
         self.definitions: list[str] = []
         self._names: dict[tuple[object, ...], str] = {}
 
-    def call(self, graph: Graph, inputs: Lengths, outputs: Lengths) -> str:
-        """y = graph(x), where the input registers end to end are x, and the output registers y."""
+    def call(self, graph: Graph, inputs: Lengths, outputs: Lengths, *, exact: bool = False) -> str:
+        """y = graph(x), where the input registers end to end are x, and the output registers y.
+
+        exact: no product is joined with a sum.
+        """
         t, scope = self.arithmetic.type, [*_pointers("in", inputs), *_pointers("out", outputs)]
+        arithmetic = self.arithmetic.unfused if exact else self.arithmetic
 
         def lines() -> list[str]:
             x, y = _end_to_end(t, "in", inputs), _end_to_end(t, "out", outputs)
-            written = self._body(graph, self.arithmetic, x, y, scope)
+            written = self._body(graph, arithmetic, x, y, scope)
             return [*written.start, *written.lines]
 
-        return self._define((id(graph), inputs, outputs), "call", lines, len(inputs), len(outputs))
+        return self._define((id(graph), inputs, outputs, exact), "call", lines, len(inputs), len(outputs))
 
     def map(self, graph: Graph, inputs: Lengths, count: int, shared: Lengths = ()) -> str:
         """y[i] = graph(shared, x[i]) for i = 0 .. count - 1; an input of another length holds one number for all i.

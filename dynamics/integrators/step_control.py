@@ -24,11 +24,11 @@ says nothing of forces to come: the next is at most `still`.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Call, If, Map, Program, Statement, Sum, copied, effects
+from cgraph.extend import STATEMENTS, Call, If, Map, Program, Statement, Sum, copied, effects
 
 from .elementwise import function
 from .problem import Problem
@@ -160,7 +160,7 @@ def chosen(step: Step, problem: Problem, *, dense: bool, degree: int, starts: bo
     lengths = with_registers(step, registers(problem))
     rates, prepare = ([*part, *_counted(problem, part)] for part in (step.rates, step.prepare))
     first, again = ([*step.start, *rates], prepare) if step.handed else (step.start, [*rates, *prepare])
-    body: list[Statement] = _forgotten(step, lengths)
+    body = _forgotten(step)
     if first:
         body.append(first_pass(*first))
     if again:
@@ -178,12 +178,19 @@ def chosen(step: Step, problem: Problem, *, dense: bool, degree: int, starts: bo
     return Program(lengths, body, recorded(dense, degree), record_if="row", stop="status")
 
 
-def _forgotten(step: Step, lengths: Mapping[str, int]) -> list[Statement]:
-    """Before the first trial, what one step hands on to the next is 0: what it reads before it writes it."""
-    first, _ = effects([*step.start, *step.rates, *step.prepare, *step.body, *step.error, *step.kept, *step.handed])
-    names = tuple([name for name in first if name in step.lengths and name not in SHARED])
-    count = sum([lengths[name] for name in names])
-    return [If("anew", (Call(Graph([], {f"zero{k}": 0.0 for k in range(count)}), (), names),))] if count else []
+def _forgotten(step: Step) -> list[Statement]:
+    """Before the first trial, what one step hands on to the next is 0: what it reads before it is sure to write it."""
+    first: dict[str, None] = {}
+    written: set[str] = set()
+    for each in (*step.start, *step.rates, *step.prepare, *step.body, *step.error, *step.kept, *step.handed):
+        reads, writes = effects([each])
+        first |= {name: None for name in reads if name in step.lengths and name not in SHARED and name not in written}
+        if not STATEMENTS[type(each)].bodies:  # which may run no time at all
+            written |= {*writes}
+    return [If("anew", tuple([Map(_ZERO, (name,), (name,)) for name in (*first, "anew")]), seldom=True)]
+
+
+_ZERO = function("a", zero=0.0)
 
 
 def _counted(problem: Problem, statements: Sequence[Statement]) -> list[Call]:

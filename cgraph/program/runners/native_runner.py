@@ -119,6 +119,16 @@ class NativeRunner(Runner):
         call.kept = self, arrays  # type: ignore[attr-defined]  # whose addresses it has
         return call
 
+    def _advancing(self, memory: Array) -> Callable[[int], None]:
+        done, none, entry = np.zeros(1, np.int64), np.empty(1), self._entry
+        at, nowhere, count = memory.ctypes.data, none.ctypes.data, done.ctypes.data
+
+        def advance(passes: int) -> None:
+            entry(at, nowhere, passes, passes + 1, count, nowhere, 0)
+
+        advance.kept = self, memory, none, done  # type: ignore[attr-defined]  # whose addresses it has
+        return advance
+
     def _bind_pass(self, x: tuple[str, Array], y: tuple[str, Array]) -> tuple[Callable[[], None], Mapping[str, Array]]:
         code = self.point(x[0], y[0])
         memory = aligned(code.places[""])

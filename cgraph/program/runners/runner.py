@@ -152,6 +152,24 @@ class Runner(ABC):
 
         return call
 
+    def advancing(self, memory: Array) -> Callable[[int], None]:
+        """A function of a number of passes: `run` on this memory, without a record.
+
+        The memory, float64 (size,), is checked here and never again. Registers may be written between calls, such as
+        through `read`. One thread at a time may call it.
+        Raises GraphError for a memory of another shape or type, or a program with a feed.
+        """
+        if self.program.feed:
+            raise GraphError("a bound run takes no feed: give its registers a place in the memory")
+        self._check(memory, (self.size,), 0, 1)
+        return self._advancing(memory)
+
+    def _advancing(self, memory: Array) -> Callable[[int], None]:
+        def advance(passes: int) -> None:
+            self._run(memory, passes, passes + 1, np.empty((passes, 0)))
+
+        return advance
+
     @abstractmethod
     def _bind_pass(self, x: tuple[str, Array], y: tuple[str, Array]) -> tuple[Callable[[], None], Mapping[str, Array]]:
         """A function of nothing: one pass, of which a register x that is read and a y that is written lie in arrays.

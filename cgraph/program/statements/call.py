@@ -34,6 +34,8 @@ State = dict[str, list[float]]
 class Call(Statement):
     """outputs = graph(inputs), where registers end to end are the graph's inputs and outputs in order.
 
+    exact: whether products are rounded by themselves in machine code too, so that what cancels is 0.
+
     >>> import cgraph as cg
     >>> from cgraph.extend import Call
     >>> a, b = cg.variables("a b")
@@ -43,6 +45,7 @@ class Call(Statement):
     graph: Graph
     inputs: Names
     outputs: Names
+    exact: bool = False
 
 
 @dataclass(frozen=True)
@@ -245,7 +248,8 @@ def elements_beside(statement: Map | Sum, state: dict[str, Array], execution: Ex
 
 def call_text(call: Call, writer: Writer) -> None:
     """Write as machine code."""
-    name = writer.functions.call(call.graph, writer.lengths(call.inputs), writer.lengths(call.outputs))
+    lengths = writer.lengths(call.inputs), writer.lengths(call.outputs)
+    name = writer.functions.call(call.graph, *lengths, exact=call.exact)
     writer.calls(name, call.inputs, call.outputs)
 
 

@@ -13,7 +13,8 @@ from ..estimates.error_estimate import LAWLESS
 from ..estimates.state_sizes import off_by
 from ..row_values import unreached_momenta
 from ..steps.step_program import state_kinds
-from .motion import MotionError, Segment
+from ..trajectory import MotionError
+from .motion import Segment
 from .motion_run import MotionRun
 from .segments import MotionSegments
 

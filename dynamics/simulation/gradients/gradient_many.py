@@ -15,10 +15,10 @@ from cgraph import Node
 from cgraph.extend import Array
 
 from ...systems.model import Model
-from ..trajectory import SimulationWarning
+from ..trajectory import MotionError, SimulationWarning
 from .doubts import doubts
 from .gradient import Loss, differentiated
-from .motion import START, TORQUE, VELOCITY, MotionError, MotionRequest, motion_of
+from .motion import START, TORQUE, VELOCITY, MotionRequest, motion_of
 
 FEW = 4  # motions: fewer by a method that iterates are done sooner one by one
 WIDE = 16  # motions side by side: whole vectors of any processor, of which what is recorded stays in its caches

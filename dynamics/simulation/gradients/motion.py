@@ -26,6 +26,7 @@ from ..run_options import METHOD, RunOptions, time_span
 from ..sampled_controller import SampledController
 from ..steps.equal_steps import step_count
 from ..steps.integration import integration_of
+from ..trajectory import MotionError
 from .motion_equations import PARAMETERS, MotionEquations, motion_equations
 
 START, VELOCITY, TORQUE = "q", "qd", "tau"
@@ -45,19 +46,6 @@ class Segment(NamedTuple):
     event: str = ""
     equal: int = 0
     end: float = 0.0
-
-
-class MotionError(ValueError):
-    """A motion that has no derivatives: it does not reach its end, or its equations were not solved.
-
-    Examples
-    --------
-    >>> import dynamics as dyn
-    >>> runaway = dyn.OdeSystem(lambda x, t: [x[0] * x[0]], ["x"])
-    >>> dyn.gradient(runaway, lambda x, t: x[0], [1.0], None, t_end=2.0)
-    Traceback (most recent call last):
-    dynamics.simulation.gradients.motion.MotionError: the motion did not reach t_end, stopped at t = 1 s: ...
-    """
 
 
 @dataclass(frozen=True, eq=False)

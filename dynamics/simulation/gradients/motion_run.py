@@ -14,7 +14,8 @@ from cgraph.extend import Array, Runner, Tape, run_passes
 
 from ..steps.dense_output import Indices
 from ..steps.stepping import nonfinite, unsolved
-from .motion import MotionError, MotionRequest
+from ..trajectory import MotionError
+from .motion import MotionRequest
 from .motion_programs import LOSS, MotionPrograms, WithDerivative
 
 MOST_RECORDED = 128 * 2**20  # bytes of what is recorded of steps; of more, checkpoints are kept

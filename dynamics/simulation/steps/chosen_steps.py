@@ -10,11 +10,11 @@ from numpy.typing import ArrayLike
 
 from cgraph.extend import Array, Runner
 
-from ...integrators.step_control import COLLAPSE, DONE, RUNNING, SMALLEST_ATOL, TOO_SMALL
+from ...integrators.step_control import DONE, RUNNING, SMALLEST_ATOL, TOO_SMALL
 from ..row_values import values_of
 from ..run_options import RunOptions
 from .dense_output import StepBlock
-from .first_step import TOLERANCE, given
+from .first_step import TOLERANCE, given, instant
 from .flat_position import FlatPosition
 from .stepping import NativeIntegration, NativeRun, nonfinite
 
@@ -32,7 +32,7 @@ class AdaptiveIntegration(NativeIntegration):
 
     def blocks(self, x: Array) -> Iterator[StepBlock]:
         """The steps from x (m,) on, some at a time."""
-        memory = self._memory(x)
+        memory = self.memory(x)
         self.flat.begin(self.options.t0, x, self.parameters)
         while True:
             left = self.options.max_steps - self._number(memory, "trials")
@@ -52,12 +52,12 @@ class AdaptiveIntegration(NativeIntegration):
             if self.status:
                 return
             if status == TOO_SMALL:
-                self.status = self._too_small(memory) + self.flat.near(self.parameters)
+                self.status = self.too_small(memory) + self.flat.near(self.parameters)
             if status == TOO_SMALL or (status == DONE and not self._next_period(memory)):
                 return
 
-    def _memory(self, x: Array) -> Array:
-        """Before the first step."""
+    def memory(self, x: Array) -> Array:
+        """The memory before the first step."""
         end = self._hold(self.options.t0, x)
         return self.runner.memory({"x": x, "p": self.parameters, **beginning(self.options, self.relative, end)})
 
@@ -110,7 +110,8 @@ class AdaptiveIntegration(NativeIntegration):
                     f"the rounding of a step: raised to {self.relative:.3g}"
                 )
 
-    def _too_small(self, memory: Array) -> str:
+    def too_small(self, memory: Array) -> str:
+        """Why a run stopped whose step became too small."""
         t, x = self._number(memory, "t"), self.runner.read(memory, "x")
         where = f"stopped at t = {t:.6g} s: "
         rate = values_of(self.program.rate, [*x.tolist(), t, *self.parameters])
@@ -137,7 +138,7 @@ def beginning(options: RunOptions, relative: float, goal: float) -> dict[str, Ar
         "tolerance": np.maximum(options.absolute, SMALLEST_ATOL),
         "longest_step": options.longest_step,
         "first": options.first_step or 0.0,
-        "instant": max(float(np.spacing(abs(options.t0))), COLLAPSE * options.length),
+        "instant": instant(options.t0, options.t_end),
     }
     return {"t": options.t0, "sized": float(options.atol is None), **given(values)}
 

@@ -52,6 +52,11 @@ def given(values: Mapping[str, Any]) -> dict[str, Any]:
     return {_at(name): value for name, value in values.items()} | {_at("begins"): 1.0, "anew": 1.0}
 
 
+def instant(t0: float, t_end: float) -> float:
+    """The time after which a force that jumps at the start has jumped [s]."""
+    return max(math.ulp(t0), COLLAPSE * abs(t_end - t0))
+
+
 def with_first_step(steps: Program, problem: Problem, kinds: StateKinds, order: int, *, starts: bool) -> Program:
     """Chosen steps, of a method of this order, with the first one and the tolerances of a run that was given none.
 
@@ -101,7 +106,8 @@ def _copy(source: str, target: str) -> Map:
 
 
 def _rate(problem: Problem, x: str, t: str, target: str) -> Call:
-    return Call(problem.rate, (_at(x), _at(t), "p"), (_at(target),))
+    """A rate of which what cancels is 0: the looks ahead tell what rests from what moves."""
+    return Call(problem.rate, (_at(x), _at(t), "p"), (_at(target),), exact=True)
 
 
 def _rule(names: str, rule: Callable[..., Values]) -> Call:
@@ -256,10 +262,10 @@ def _euler(problem: Problem, kinds: StateKinds) -> list[Statement]:
         fine, more = cg.equal(doubts, 0.0), cg.maximum(turn < 2.0, (moving < m) * (moving > moving2))
         return {"fine": fine, "going": fine * more, "moving1": moving, "moving2": moving1}
 
-    m, next_time = (
-        problem.size,
-        lambda t, turn, toward, h: {"t_ahead": t + (turn + 1.0) * (toward * h), "turn": turn + 1.0},
-    )
+    def next_time(t: Node, turn: Node, toward: Node, h: Node) -> Values:
+        return {"t_ahead": t + (turn + 1.0) * (toward * h), "turn": turn + 1.0}
+
+    m = problem.size
     return [
         _map("x_ahead toward reach rate_ahead", "x_ahead", lambda x, toward, h, rate: x + toward * h * rate),
         _sum("x_ahead", "moving", lambda x: cg.not_equal(x, 0.0)),
@@ -298,7 +304,7 @@ def _set_out(problem: Problem) -> list[Statement]:
             "fresh": 1.0,
             "accepted": 1.0,
             "seen": FIRST_LOOK,
-            **dict.fromkeys("status rejected evaluations at_limit trials anew".split(), 0.0),
+            **dict.fromkeys("status rejected evaluations at_limit trials".split(), 0.0),
             **({} if problem.projection is None else {"farthest": 0.0}),
         }
 

@@ -114,6 +114,10 @@ class NativeIntegration(Integration):
         self._passes, self._factored = FIRST_PASSES, compiled.factorizations
         self._accepted = True
 
+    @abstractmethod
+    def memory(self, x: Array) -> Array:
+        """The memory before the first step from x (m,)."""
+
     def _count(self, steps: int, rejected: int = 0) -> None:
         """So many steps more.  rejected: trials that were not accepted, in all.
 
@@ -169,12 +173,7 @@ class FixedStepIntegration(NativeIntegration):
 
     def blocks(self, x: Array) -> Iterator[StepBlock]:
         """The steps from x (m,) on, some at a time."""
-        start: dict[str, float | Array | list[float]] = {"x": x}
-        if self.control is None:
-            start["p"] = self.parameters
-        if "fresh" in self.runner.program.registers:
-            start["fresh"] = 1.0
-        memory = self.runner.memory(start)
+        memory = self.memory(x)
         for stretch in self.stretches:
             self.stretch = stretch
             begin_equal(self.runner, memory, stretch.begin, stretch.h)
@@ -184,6 +183,15 @@ class FixedStepIntegration(NativeIntegration):
             yield from self._equal_steps(memory, stretch)
             if self.status:
                 return
+
+    def memory(self, x: Array) -> Array:
+        """The memory before the first step."""
+        start: dict[str, float | Array | list[float]] = {"x": x}
+        if self.control is None:
+            start["p"] = self.parameters
+        if "fresh" in self.runner.program.registers:
+            start["fresh"] = 1.0
+        return self.runner.memory(start)
 
     def _equal_steps(self, memory: Array, stretch: EqualSteps) -> Iterator[StepBlock]:
         """The steps of a stretch from a memory on."""
@@ -208,7 +216,7 @@ class FixedStepIntegration(NativeIntegration):
                 block = _block(rows[:, 0], rows[:, 1 : 1 + m], t_old, x_old)
                 yield block._replace(normalization=self.program.normalization)
             if failed:
-                self.status = self._failure(memory, rows[-1, 1 : 1 + m] if len(rows) else x_old)
+                self.status = self.failure(memory, rows[-1, 1 : 1 + m] if len(rows) else x_old)
                 return
 
     def with_dense(self, block: StepBlock) -> StepBlock:
@@ -233,7 +241,7 @@ class FixedStepIntegration(NativeIntegration):
                 states[k, row] = x
         return with_hermite(block, self.program.rate, self.parameters, states)
 
-    def _failure(self, memory: Array, before: Array) -> str:
+    def failure(self, memory: Array, before: Array) -> str:
         """Why the step from a state (m,) failed."""
         singular = self._number(memory, "singular") if "singular" in self.runner.program.registers else 0.0
         after = self.runner.read(memory, "x")

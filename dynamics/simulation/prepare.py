@@ -1,0 +1,69 @@
+"""`prepare`: a motion of which all but start, end and parameter values is fixed once."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+from numpy.typing import ArrayLike
+
+from cgraph.extend import require_flag
+
+from ..systems.model import Model
+from .applied_forces import Tau
+from .events.event import Event, as_events
+from .prepared_motion import PreparedMotion
+from .run_options import METHOD, RunOptions
+
+ANY = 1.0  # s: the span of options, in place of which each run has its own
+
+
+def prepare(
+    model: Model,
+    method: str = METHOD,
+    *,
+    dt: float | None = None,
+    max_step: float | None = None,
+    rtol: float | None = None,
+    atol: ArrayLike | None = None,
+    events: Event | Iterable[Event] = (),
+    dense_output: bool = False,
+    tau: Tau = 0.0,
+    first_step: float | None = None,
+    max_steps: float = math.inf,
+    estimate_error: bool | None = None,
+    backend: str = "auto",
+    progress: bool | None = None,
+    form: str = "velocity",
+) -> PreparedMotion:
+    """A model, a method and its options, fixed once for many motions.
+
+    Parameters
+    ----------
+    model, method, dt, max_step, rtol, atol, events, dense_output, tau, first_step, max_steps, estimate_error, backend,
+    progress, form
+        As of `simulate`, which is this and a call.
+
+    Returns
+    -------
+    PreparedMotion
+        `motion(q, qd, t_end)` gives the trajectory of `simulate`, `motion.end(q, qd, t_end)` its end alone, at the
+        price of its steps and some microseconds, and `motion.start(q, qd)` the motion step by step.
+
+    Raises
+    ------
+    TypeError, ValueError
+        As `simulate`, for what is fixed here; what belongs to a start or to parameters is checked with these.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> motion = dyn.prepare(dyn.planar_arm([1.0, 0.8], [1.0, 0.8]), "dop853", rtol=1e-10)
+    >>> ends = [motion.end([angle, 0.0], [0.0, 0.0], t_end=0.5).q.round(3).tolist() for angle in (0.1, 0.2)]
+    >>> ends
+    [[0.0, 0.001], [-0.001, 0.004]]
+    """
+    options = RunOptions(
+        ANY, method, dt, max_step, rtol, atol, None, first_step, max_steps, backend, progress, 0.0, estimate_error
+    )
+    return PreparedMotion(model, options, tau, as_events(events), form, require_flag("dense_output", dense_output))

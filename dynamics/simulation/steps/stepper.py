@@ -1,0 +1,169 @@
+"""Steppers: runs on one memory that is kept, entered as often as somebody asks for a step or an end."""
+
+from __future__ import annotations
+
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+
+import numpy as np
+
+from cgraph.extend import Array
+
+from ...integrators.step_control import RUNNING, TOO_SMALL
+from ..run_options import RunOptions
+from .chosen_steps import AdaptiveIntegration
+from .equal_steps import EqualSteps, equal_steps
+from .first_step import given, instant
+from .step_program import CompiledSteps
+from .stepping import BLOCK_TIME, FIRST_PASSES, FixedStepIntegration, NativeIntegration, NativeRun, begin_equal
+
+
+class Stepper(ABC):
+    """One run after another by one of our methods; one thread at a time.
+
+    state: that of the run, (m,).  failed: why it stopped, in words, else empty.
+    """
+
+    def __init__(self, run: NativeIntegration) -> None:
+        self.failed, self._run, runner = "", run, run.runner
+        self._start = run.memory(np.zeros(run.program.size))
+        self._memory = self._start.copy()
+        self._x, self._advance = runner.read(self._memory, "x"), runner.advancing(self._memory)
+        places = np.arange(float(runner.size))
+        self._at = {name: int(runner.read(places, name)[0]) for name in self.registers}
+
+    registers: tuple[str, ...]  # that it reads and writes, of one number each
+    stop: str  # the register by which passes end
+
+    @property
+    def t(self) -> float:
+        """Where the run is [s]."""
+        return float(self._memory[self._at["t"]])
+
+    @property
+    def state(self) -> Array:
+        """The state of the run, (m,)."""
+        return self._x.copy()
+
+    @abstractmethod
+    def begin(self, x: Array, t0: float, t_end: float) -> None:
+        """Start anew, from x (m,) at t0, on the way to t_end."""
+
+    @abstractmethod
+    def until(self, t: float) -> None:
+        """Steps to t, the last of which ends there; `failed` where they do not come there."""
+
+    @abstractmethod
+    def step(self) -> None:
+        """One step more on the way to t_end."""
+
+    def _passes(self, most: int = 2**62) -> None:
+        """So many passes, or until the program stops, in pieces of bounded time: Ctrl-C ends them in between."""
+        passes, memory, stop = FIRST_PASSES, self._memory, self._at[self.stop]
+        self._advance(min(passes, most))
+        most -= passes
+        while most > 0 and memory[stop] == RUNNING:
+            begin = time.perf_counter()
+            self._advance(min(passes, most))
+            most -= passes
+            spent = time.perf_counter() - begin
+            passes = max(1, int(passes * min(4.0, BLOCK_TIME / max(spent, 1e-9))))
+
+
+class ChosenStepper(Stepper):
+    """Steps chosen by error; a run that goes on after an end has steps as if that had been none, but for the last."""
+
+    registers = ("t", "end", "status", "anew", "row", *given({"t_end": 0, "goal": 0, "instant": 0}))
+    stop = "status"
+    _run: AdaptiveIntegration
+
+    def begin(self, x: Array, t0: float, t_end: float) -> None:
+        """Start anew, from x (m,) at t0, on the way to t_end."""
+        memory, at = self._memory, self._at
+        memory[:] = self._start
+        self._x[:] = x
+        memory[at["t"]], memory[at["start.t_end"]], memory[at["start.goal"]] = t0, t_end, t_end
+        memory[at["start.instant"]] = instant(t0, t_end)
+        self.failed = ""
+
+    def until(self, t: float) -> None:
+        """Steps to t, the last of which ends there."""
+        self._towards(t)
+        self._passes()
+        self._judge()
+
+    def step(self) -> None:
+        """One step more on the way to t_end."""
+        memory, row, status = self._memory, self._at["row"], self._at["status"]
+        self._towards(memory[self._at["start.t_end"]])
+        self._advance(1)
+        while memory[row] <= 0.0 and memory[status] == RUNNING:
+            self._advance(1)
+        self._judge()
+
+    def _towards(self, t: float) -> None:
+        self._memory[self._at["start.goal" if self._memory[self._at["anew"]] else "end"]] = t
+        self._memory[self._at["status"]] = RUNNING
+
+    def _judge(self) -> None:
+        if self._memory[self._at["status"]] == TOO_SMALL:
+            self.failed = self._run.too_small(self._memory)
+
+
+class EqualStepper(Stepper):
+    """Equal steps, of which those from a start or an end to the next end have one length."""
+
+    registers = ("t", "count", "nonfinite")
+    stop = "nonfinite"
+    _run: FixedStepIntegration
+
+    def begin(self, x: Array, t0: float, t_end: float) -> None:
+        """Start anew, from x (m,) at t0, on the way to t_end."""
+        self._memory[:] = self._start
+        self._x[:] = x
+        self._memory[self._at["t"]] = t0
+        self._t_end, self._left, self.failed = t_end, 0, ""
+
+    def until(self, t: float) -> None:
+        """Steps to t, the last of which ends there."""
+        stretch = self._stretch(t)
+        self._steps(stretch, stretch.steps)
+        self._left = 0
+
+    def step(self) -> None:
+        """One step more on the way to t_end."""
+        if not self._left:
+            self._way = self._stretch(self._t_end)
+            self._left = self._way.steps
+        self._left -= 1
+        self._steps(self._way, 1)
+
+    def _stretch(self, t: float) -> EqualSteps:
+        """The steps to t, which are begun."""
+        stretch = equal_steps([self.t, t], self._run.options.step)[0]
+        begin_equal(self._run.runner, self._memory, stretch.begin, stretch.h)
+        return stretch
+
+    def _steps(self, stretch: EqualSteps, steps: int) -> None:
+        memory, count = self._memory, self._at["count"]
+        before = memory.copy()
+        self._passes(steps)
+        if memory[self._at["nonfinite"]] != RUNNING:  # make all but the last again, for the state before it
+            done = int(memory[count] - before[count])
+            memory[:] = before
+            self._passes(done - 1) if done > 1 else None
+            last = self._x.copy()
+            self._advance(1)
+            self.failed = self._run.failure(memory, last)
+            self._x[:] = last
+        elif memory[count] == stretch.steps:
+            memory[self._at["t"]] = stretch.end
+
+
+def stepper(compiled: CompiledSteps, options: RunOptions, parameters: Sequence[float]) -> Stepper:
+    """A stepper of runs by these steps."""
+    run = NativeRun(compiled, options, parameters)
+    if compiled.program.adaptive:
+        return ChosenStepper(AdaptiveIntegration(run))
+    return EqualStepper(FixedStepIntegration(run))
