@@ -44,6 +44,9 @@ class AdaptiveIntegration(NativeIntegration):
             rows, _ = self._advance(memory, int(min(left, 2**31)), whole=False)
             status = self._number(memory, "status")
             self._count(len(rows), int(self._number(memory, "rejected")))
+            if "jacobians" in self.runner.program.registers:  # a method that keeps them counts by itself
+                self.jacobians = int(self._number(memory, "jacobians"))
+                self.factorizations = int(self._number(memory, "factorizations"))
             self.evaluations = int(self._number(memory, "evaluations"))
             if len(rows):
                 self._look(memory, rows, tolerance)
