@@ -70,11 +70,13 @@ if TYPE_CHECKING:
     from .simulation.gradients.gradient import MotionGradient, gradient
     from .simulation.gradients.gradient_many import MotionGradients, gradient_many
     from .simulation.gradients.sensitivities import Sensitivities, sensitivities
+    from .simulation.motion_steps import MotionSteps
+    from .simulation.outcome import MotionError
     from .simulation.prepare import prepare
-    from .simulation.prepared_motion import MotionEnd, MotionSteps, PreparedMotion
+    from .simulation.prepared_motion import MotionEnd, PreparedMotion
     from .simulation.sampled_controller import HeldForces, SampledController
     from .simulation.simulate import simulate
-    from .simulation.trajectory import Crossings, MotionError, SimulationWarning, Stats, Trajectory
+    from .simulation.trajectory import Crossings, SimulationWarning, Stats, Trajectory
     from .systems.constraints import ConstraintError
     from .systems.controller import with_controller
     from .systems.display_names import display_names

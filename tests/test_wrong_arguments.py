@@ -93,6 +93,7 @@ GRAPH, SQUARES = cg.Graph([X, Y], {"r": X * Y}), cg.Graph([X, Y], {"r": X * X + 
 HALVE = cg.Graph([X], {"next": 0.5 * X})
 LOOP = cg.loop(HALVE, {"x": "next"}, "python")
 DECAY = dyn.OdeSystem(lambda x, t: [-x[0]], ["x"])
+MOTION = dyn.prepare(ARM, "rk4", dt=0.01, backend="python", estimate_error=False)
 RUN = dyn.simulate(ARM, [0.1], [0.0], 0.02, "rk4", dt=0.01, backend="python", dense_output=True)
 TABLE, SYSTEM, SUBTREE = dyn.torque_by_link(ARM), dyn.System(lagrangian, ["a"]), TWO.subtree(TWO.bodies[1].name)
 EXACT = dyn.Reference((0.0, 1.0), (("0.0", "1.0"), ("0.0", "1.0")), 1e-30, "by hand")
@@ -210,6 +211,13 @@ CALLS = {
         dyn.simulate, ARM, [0.1], [0.0], 0.02, "rk4", t0=0.0, t_span=None, max_step=None, rtol=None, atol=None,
         t_eval=None, events=(), dense_output=False, tau=0.0, parameters=None, first_step=None, form="velocity", **RUNS
     ),
+    "dyn.prepare": call(
+        dyn.prepare, ARM, "rk4", max_step=None, rtol=None, atol=None, events=(), dense_output=False, tau=0.0,
+        first_step=None, form="velocity", **RUNS
+    ),
+    "dyn.PreparedMotion.end": call(MOTION.end, [0.1], [0.0], 0.02, 0.0, parameters=None),
+    "dyn.PreparedMotion.start": call(MOTION.start, [0.1], [0.0], 0.02, 0.0, parameters=None),
+    "dyn.MotionSteps.propagate_until": call(MOTION.start([0.1], [0.0], 1.0).propagate_until, 0.02),
     "dyn.gradient": call(
         dyn.gradient, ARM, lambda q, qd, t: q[0], [0.1], [0.0], 1.0, "euler", running=lambda q, qd, tau, t: q[0],
         wrt=["q"], t0=0.0, t_span=None, dt=1.0, max_step=None, rtol=None, atol=None, first_step=None, tau=[0.0],
@@ -462,9 +470,9 @@ OWN_ERRORS = {("extend.ldl_elimination", label) for label in ("objects", "huge")
 RECORDS = """
     cg.CSource cg.Comparison cg.Compiled cg.Counts cg.Edge cg.Lint cg.Loop cg.Node cg.Why cg.WhyNot
     dyn.Attached dyn.Certificate dyn.Crossings dyn.Ensemble dyn.EnsembleStats dyn.Force dyn.FreeBody
-    dyn.ConstraintLint dyn.Freedom dyn.HeldForces dyn.JointForce dyn.MotionGradient dyn.MotionGradients dyn.OmittedTerm
-    dyn.PruneResult dyn.QuasiVelocities dyn.ReducedLinearization dyn.Reference dyn.Released dyn.Sensitivities dyn.Stats
-    dyn.Subtree dyn.TorqueTable dyn.Trajectory dyn.Verdict
+    dyn.ConstraintLint dyn.Freedom dyn.HeldForces dyn.JointForce dyn.MotionEnd dyn.MotionGradient dyn.MotionGradients
+    dyn.MotionSteps dyn.OmittedTerm dyn.PreparedMotion dyn.PruneResult dyn.QuasiVelocities dyn.ReducedLinearization
+    dyn.Reference dyn.Released dyn.Sensitivities dyn.Stats dyn.Subtree dyn.TorqueTable dyn.Trajectory dyn.Verdict
     extend.CompressedJacobian extend.Jets extend.Linearized extend.MathML extend.Pulled extend.Statement
     extend.StatementRow extend.Notation extend.Op extend.Record
 """
@@ -479,7 +487,7 @@ LEFT_OUT = """cg.recording_lines cg.clear_cache cg.clear_caches cg.Compiled.bind
     extend.kept_by_first extend.memo
     extend.ProgramVjp extend.Tape extend.Tape.run extend.Tape.recorded extend.run_passes extend.Linearization.adjoint
     extend.Linearization.beside extend.Linearization.forward extend.Linearization.tangent extend.require_length
-    extend.Runner.read extend.Runner.write
+    extend.Runner.advancing extend.Runner.read extend.Runner.write extend.effects
     extend.Formulas.lines extend.Names.called extend.Names.formula extend.Names.inputs_of extend.Names.line
     extend.Names.meant extend.Names.short extend.Names.shown extend.Names.text"""
 

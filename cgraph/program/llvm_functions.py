@@ -16,11 +16,13 @@ class Functions:
 
     Every function takes pointers to registers, inputs first: `void f(in0, in1, .., out0, out1, ..)`.
     definitions: the lines of all functions.  width: of the vectors in which `map` goes through its elements.
+    quick: whether what is defined is to be compiled in little time, for it seldom runs.
     """
 
     def __init__(self, arithmetic: Arithmetic, width: int) -> None:
         self.arithmetic, self.width = arithmetic, width
         self.definitions: list[str] = []
+        self.quick = False
         self._names: dict[tuple[object, ...], str] = {}
 
     def call(self, graph: Graph, inputs: Lengths, outputs: Lengths, *, exact: bool = False) -> str:
@@ -185,18 +187,21 @@ class Functions:
             return [f"  {name} = getelementptr {(x if base == 'x' else y)[row]}"]
 
         written = body(graph, arithmetic, address, next(reversed(self._names.values())), scope, uniform=uniform)
-        self.definitions += written.definitions
+        for line in written.definitions:
+            quick = self.quick and line.startswith("define")
+            self.definitions.append(line.replace("noinline {", "noinline optnone {") if quick else line)
         return written
 
     def _define(
         self, key: tuple[object, ...], kind: str, lines: Callable[[], list[str]], inputs: int, outputs: int
     ) -> str:
         """The name of the function of this key, which is written when it is first asked for."""
+        key, how = (*key, self.quick), " noinline optnone" if self.quick else ""
         if key not in self._names:
             name = self._names[key] = f"{kind}{len(self._names)}"
             arguments = [*(f"ptr noalias %in{k}" for k in range(inputs))]
             arguments += [f"ptr noalias %out{k}" for k in range(outputs)]
-            head = f"define internal void @{name}({', '.join(arguments)}) nounwind {{"
+            head = f"define internal void @{name}({', '.join(arguments)}) nounwind{how} {{"
             inner = lines()  # which may define functions of its own
             self.definitions += [head, "start:", *inner, "  ret void", "}"]
         return self._names[key]

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from cgraph import Compiled, Graph, compile
+import cgraph as cg
+from cgraph import Graph
 from cgraph.extend import kept_by_first, require_choice
 
 from ..systems.arguments import TIME
@@ -87,9 +88,9 @@ def _normalization(system: System) -> Graph | None:
 
 
 @kept_by_first
-def normalizer(normalization: Graph) -> Compiled:
+def normalizer(normalization: Graph) -> cg.Compiled:
     """The function of one state, in Python, for a start."""
-    return compile(normalization, "python")
+    return cg.compile(normalization, "python")
 
 
 class StateInputs(NamedTuple):

@@ -25,6 +25,19 @@ REACHED = "reached t_end"
 INTERRUPTED = "interrupted"  # what the message of a run that Ctrl-C ended begins with
 
 
+class MotionError(ValueError):
+    """A motion that did not reach its end, or whose equations were not solved, where only the end or slopes count.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> runaway = dyn.OdeSystem(lambda x, t: [x[0] * x[0]], ["x"])
+    >>> dyn.gradient(runaway, lambda x, t: x[0], [1.0], None, t_end=2.0)
+    Traceback (most recent call last):
+    dynamics.simulation.outcome.MotionError: the motion did not reach t_end, stopped at t = 1 s: ...
+    """
+
+
 class Recorder:
     """The rows of a trajectory that starts with x at t0: every step, or the states at `times`.
 

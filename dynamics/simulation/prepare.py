@@ -7,13 +7,16 @@ from collections.abc import Iterable
 
 from numpy.typing import ArrayLike
 
-from cgraph.extend import require_flag
+from cgraph.extend import require_choice, require_flag
 
-from ..systems.model import Model
+from ..equations.state_equation import FORMS
+from ..equations.states.initial_value import other_inputs
+from ..systems.model import Model, as_equations
 from .applied_forces import Tau
 from .events.event import Event, as_events
 from .prepared_motion import PreparedMotion
 from .run_options import METHOD, RunOptions
+from .sampled_controller import SampledController
 
 ANY = 1.0  # s: the span of options, in place of which each run has its own
 
@@ -40,9 +43,10 @@ def prepare(
 
     Parameters
     ----------
-    model, method, dt, max_step, rtol, atol, events, dense_output, tau, first_step, max_steps, estimate_error, backend,
-    progress, form
+    model, method, dt, max_step, rtol, atol, events, dense_output, tau, first_step, max_steps, estimate_error
         As of `simulate`, which is this and a call.
+    backend, progress, form
+        The same.
 
     Returns
     -------
@@ -61,9 +65,13 @@ def prepare(
     >>> motion = dyn.prepare(dyn.planar_arm([1.0, 0.8], [1.0, 0.8]), "dop853", rtol=1e-10)
     >>> ends = [motion.end([angle, 0.0], [0.0, 0.0], t_end=0.5).q.round(3).tolist() for angle in (0.1, 0.2)]
     >>> ends
-    [[0.0, 0.001], [-0.001, 0.004]]
+    [[0.005, 0.039], [0.011, 0.077]]
     """
     options = RunOptions(
         ANY, method, dt, max_step, rtol, atol, None, first_step, max_steps, backend, progress, 0.0, estimate_error
     )
-    return PreparedMotion(model, options, tau, as_events(events), form, require_flag("dense_output", dense_output))
+    equations = as_equations(model)
+    require_choice("form", form, FORMS)
+    if not (callable(tau) or isinstance(tau, float | SampledController)):
+        other_inputs(equations, tau)
+    return PreparedMotion(equations, options, tau, as_events(events), form, require_flag("dense_output", dense_output))

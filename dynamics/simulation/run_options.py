@@ -99,6 +99,11 @@ class RunOptions:
         other.__dict__.update(self.__dict__, **span(t0, t_end, t_eval))
         return other
 
+    def spans(self, t0: float, t_end: float) -> bool:
+        """Whether a run may go from t0 to t_end."""
+        least = 0.0 if self.adaptive else RESOLUTION * max(abs(t0), abs(t_end))
+        return math.isfinite(t_end - t0) and t0 != t_end and self.step >= least
+
     def _check_tolerances(self) -> None:
         rtol, atol = real_number("rtol", self.relative), np.asarray(self.absolute)
         if not (rtol >= 0.0 and np.all((atol >= 0.0) & (atol + rtol > 0.0) & (atol + rtol < math.inf))):

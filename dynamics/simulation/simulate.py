@@ -7,13 +7,11 @@ from collections.abc import Iterable, Mapping
 
 from numpy.typing import ArrayLike
 
-from cgraph.extend import require_flag
-
 from ..systems.model import Model
 from .applied_forces import Tau
-from .events.event import Event, as_events
-from .prepared_motion import PreparedMotion
-from .run_options import METHOD, RunOptions, time_span
+from .events.event import Event
+from .prepare import prepare
+from .run_options import METHOD, time_span
 from .trajectory import Trajectory
 
 
@@ -136,8 +134,21 @@ def simulate(
     [[1.0, 0.5], [0.31, -0.04], [-0.989, 0.108]]
     """
     t0, t_end = time_span(t_end, t0, t_span)
-    options = RunOptions(
-        t_end, method, dt, max_step, rtol, atol, t_eval, first_step, max_steps, backend, progress, t0, estimate_error
+    motion = prepare(
+        model,
+        method,
+        dt=dt,
+        max_step=max_step,
+        rtol=rtol,
+        atol=atol,
+        events=events,
+        dense_output=dense_output,
+        tau=tau,
+        first_step=first_step,
+        max_steps=max_steps,
+        estimate_error=estimate_error,
+        backend=backend,
+        progress=progress,
+        form=form,
     )
-    motion = PreparedMotion(model, options, tau, as_events(events), form, require_flag("dense_output", dense_output))
-    return motion.run(q, qd, options, parameters, stacklevel=3)
+    return motion(q, qd, t_end, t0, t_eval=t_eval, parameters=parameters)

@@ -35,19 +35,6 @@ class SimulationWarning(UserWarning):
     """
 
 
-class MotionError(ValueError):
-    """A motion that did not reach its end, or whose equations were not solved, where only the end or slopes count.
-
-    Examples
-    --------
-    >>> import dynamics as dyn
-    >>> runaway = dyn.OdeSystem(lambda x, t: [x[0] * x[0]], ["x"])
-    >>> dyn.gradient(runaway, lambda x, t: x[0], [1.0], None, t_end=2.0)
-    Traceback (most recent call last):
-    dynamics.simulation.trajectory.MotionError: the motion did not reach t_end, stopped at t = 1 s: ...
-    """
-
-
 @dataclass(frozen=True)
 class Stats:
     """How a run went, in SciPy's words where it has them.

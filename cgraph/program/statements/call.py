@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import operator
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -45,7 +45,7 @@ class Call(Statement):
     graph: Graph
     inputs: Names
     outputs: Names
-    exact: bool = False
+    exact: bool = field(default=False, kw_only=True)
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from ..statement import Execution, Lengths, Statement, require_length
@@ -40,7 +40,7 @@ class If(Statement):
     register: str
     body: tuple[Statement, ...]
     otherwise: tuple[Statement, ...] = ()
-    seldom: bool = False
+    seldom: bool = field(default=False, kw_only=True)
 
 
 @dataclass(frozen=True)
@@ -93,10 +93,12 @@ def while_text(statement: While | FixedPoint, writer: Writer) -> None:
 
 def if_text(statement: If, writer: Writer) -> None:
     """Write as machine code."""
-    label = writer.label("if")
+    label, functions = writer.label("if"), writer.functions
+    before, functions.quick = functions.quick, functions.quick or statement.seldom
     writer.branch(statement.register, f"{label}.yes", f"{label}.no")
     for way, body in (("yes", statement.body), ("no", statement.otherwise)):
         writer.block(f"{label}.{way}")
         writer.run(body)
         writer.jump(f"{label}.end")
     writer.block(f"{label}.end")
+    functions.quick = before

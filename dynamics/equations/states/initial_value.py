@@ -89,8 +89,8 @@ def initial_values(
     many: else one motion, whose arguments have no axis N.
     """
     if not many:
-        one = initial_value(model, q, qd, tau, parameters, t)
-        return InitialValues(one.x[None], one.states, one.bound, {})
+        bound = other_inputs(model, tau, parameters)
+        return InitialValues(start_state(model, q, qd, bound, t)[None], state_inputs(model).states, bound, {})
     start = _given(model, q, qd, tau, parameters)
     system = model.system
     if system is None or not len(system.constraints):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -32,17 +32,11 @@ class StateKinds:
     groups: tuple[int, ...]
     lengths: tuple[float, ...]
     ordinary: bool
-    _lengths: Array = field(init=False, repr=False)
-    _alike: Flags = field(init=False, repr=False)  # which are of one kind, (m, m)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "_lengths", np.array(self.lengths))
-        object.__setattr__(self, "_alike", _same(self.kinds))
 
     def largest_of_kind(self, values: Array) -> Array:
         """For each component the largest size of those of its kind, as one of its own, (.., m)."""
-        result: Array = _largest(self._lengths * values, self._alike) / self._lengths
-        return result
+        columns = dict(zip(self.largest.input_names, np.moveaxis(values, -1, 0), strict=True))
+        return np.stack(list(self.largest.evaluate(columns).values()), axis=-1)
 
     def scale(self, size: Array) -> Array:
         """What errors are measured by, of components that have been so large, (.., m)."""
@@ -66,12 +60,6 @@ class StateKinds:
         return _numbered(values, _largest_nodes(values, self.groups)) if several else None
 
 
-def _same(numbers: tuple[int, ...]) -> Flags:
-    """Which are the same, (m, m)."""
-    same: Flags = np.equal.outer(numbers, numbers)
-    return same
-
-
 def _largest_nodes(values: Sequence[Node], alike: Sequence[int]) -> list[Node]:
     """For each the largest of those of the same number."""
     found: dict[int, Node] = {}
@@ -82,12 +70,6 @@ def _largest_nodes(values: Sequence[Node], alike: Sequence[int]) -> list[Node]:
 
 def _numbered(inputs: Sequence[Node], outputs: Sequence[Node]) -> Graph:
     return Graph(inputs, {f"y{k}": node for k, node in enumerate(outputs)})
-
-
-def _largest(values: Array, alike: Flags) -> Array:
-    """For each the largest size of those alike, (.., m)."""
-    largest: Array = np.where(alike, np.abs(values)[..., None, :], 0.0).max(axis=-1)
-    return largest
 
 
 def off_by(errors: Array, scale: Array, allowed: Array, components: tuple[str, ...]) -> str:

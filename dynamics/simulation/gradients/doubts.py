@@ -11,9 +11,9 @@ from cgraph.extend import Array
 
 from ..estimates.error_estimate import LAWLESS
 from ..estimates.state_sizes import off_by
+from ..outcome import MotionError
 from ..row_values import unreached_momenta
 from ..steps.step_program import state_kinds
-from ..trajectory import MotionError
 from .motion import Segment
 from .motion_run import MotionRun
 from .segments import MotionSegments

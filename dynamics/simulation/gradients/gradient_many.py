@@ -15,7 +15,8 @@ from cgraph import Node
 from cgraph.extend import Array
 
 from ...systems.model import Model
-from ..trajectory import MotionError, SimulationWarning
+from ..outcome import MotionError
+from ..trajectory import SimulationWarning
 from .doubts import doubts
 from .gradient import Loss, differentiated
 from .motion import START, TORQUE, VELOCITY, MotionRequest, motion_of

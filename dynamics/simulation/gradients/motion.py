@@ -20,13 +20,12 @@ from ...systems.model import Model
 from ..applied_forces import with_applied
 from ..events.event import Event
 from ..events.event_program import event_program
-from ..outcome import Recorder, advise
+from ..outcome import MotionError, Recorder, advise
 from ..row_values import converted, unreached_momenta
 from ..run_options import METHOD, RunOptions, time_span
 from ..sampled_controller import SampledController
 from ..steps.equal_steps import step_count
 from ..steps.integration import integration_of
-from ..trajectory import MotionError
 from .motion_equations import PARAMETERS, MotionEquations, motion_equations
 
 START, VELOCITY, TORQUE = "q", "qd", "tau"

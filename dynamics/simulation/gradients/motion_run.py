@@ -12,9 +12,9 @@ import numpy as np
 
 from cgraph.extend import Array, Runner, Tape, run_passes
 
+from ..outcome import MotionError
 from ..steps.dense_output import Indices
 from ..steps.stepping import nonfinite, unsolved
-from ..trajectory import MotionError
 from .motion import MotionRequest
 from .motion_programs import LOSS, MotionPrograms, WithDerivative
 

@@ -19,8 +19,8 @@ from cgraph.extend import Array, kept_by_first
 
 from ..events.event import Event
 from ..events.event_program import WatchedEvent, event_program
+from ..outcome import MotionError
 from ..row_values import values_of
-from ..trajectory import MotionError
 from .motion import TORQUE, MotionRequest, Segment
 from .motion_equations import PARAMETERS
 from .motion_programs import LOSS, MotionPrograms, ProgramRequest, motion_programs

@@ -5,8 +5,11 @@ from __future__ import annotations
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from math import isfinite
+from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from cgraph.extend import Array
 
@@ -16,7 +19,7 @@ from .chosen_steps import AdaptiveIntegration
 from .equal_steps import EqualSteps, equal_steps
 from .first_step import given, instant
 from .step_program import CompiledSteps
-from .stepping import BLOCK_TIME, FIRST_PASSES, FixedStepIntegration, NativeIntegration, NativeRun, begin_equal
+from .stepping import BLOCK_TIME, FIRST_PASSES, FixedStepIntegration, NativeIntegration, NativeRun
 
 
 class Stepper(ABC):
@@ -29,7 +32,9 @@ class Stepper(ABC):
         self.failed, self._run, runner = "", run, run.runner
         self._start = run.memory(np.zeros(run.program.size))
         self._memory = self._start.copy()
+        self._numbers: Any = self._memory.data  # whose items are read and written faster
         self._x, self._advance = runner.read(self._memory, "x"), runner.advancing(self._memory)
+        self._q, self._qd = self._x[: run.program.nq], self._x[run.program.nq :]
         places = np.arange(float(runner.size))
         self._at = {name: int(runner.read(places, name)[0]) for name in self.registers}
 
@@ -39,16 +44,34 @@ class Stepper(ABC):
     @property
     def t(self) -> float:
         """Where the run is [s]."""
-        return float(self._memory[self._at["t"]])
+        return float(self._numbers[self._at["t"]])
 
     @property
     def state(self) -> Array:
         """The state of the run, (m,)."""
         return self._x.copy()
 
-    @abstractmethod
     def begin(self, x: Array, t0: float, t_end: float) -> None:
         """Start anew, from x (m,) at t0, on the way to t_end."""
+        self._memory[:] = self._start
+        self._x[:] = x
+        self._begin(t0, t_end)
+
+    def begin_from(self, q: ArrayLike, qd: ArrayLike | None, t0: float, t_end: float) -> bool:
+        """The same of q and qd, of the right shapes; whether they are finite."""
+        self._memory[:] = self._start
+        self._q[:] = q
+        if qd is not None:
+            self._qd[:] = qd
+        self._begin(t0, t_end)
+        return isfinite(self._x.dot(self._x))
+
+    @abstractmethod
+    def _begin(self, t0: float, t_end: float) -> None: ...
+
+    @abstractmethod
+    def to_end(self) -> None:
+        """After `begin`, all steps; `failed` where they do not come to t_end."""
 
     @abstractmethod
     def until(self, t: float) -> None:
@@ -60,10 +83,10 @@ class Stepper(ABC):
 
     def _passes(self, most: int = 2**62) -> None:
         """So many passes, or until the program stops, in pieces of bounded time: Ctrl-C ends them in between."""
-        passes, memory, stop = FIRST_PASSES, self._memory, self._at[self.stop]
-        self._advance(min(passes, most))
+        passes, numbers, stop = FIRST_PASSES, self._numbers, self._at[self.stop]
+        self._advance(min(most, passes))
         most -= passes
-        while most > 0 and memory[stop] == RUNNING:
+        while most > 0 and numbers[stop] == RUNNING:
             begin = time.perf_counter()
             self._advance(min(passes, most))
             most -= passes
@@ -78,51 +101,49 @@ class ChosenStepper(Stepper):
     stop = "status"
     _run: AdaptiveIntegration
 
-    def begin(self, x: Array, t0: float, t_end: float) -> None:
-        """Start anew, from x (m,) at t0, on the way to t_end."""
-        memory, at = self._memory, self._at
-        memory[:] = self._start
-        self._x[:] = x
-        memory[at["t"]], memory[at["start.t_end"]], memory[at["start.goal"]] = t0, t_end, t_end
-        memory[at["start.instant"]] = instant(t0, t_end)
+    def _begin(self, t0: float, t_end: float) -> None:
+        numbers, at = self._numbers, self._at
+        numbers[at["t"]], numbers[at["start.t_end"]], numbers[at["start.goal"]] = t0, t_end, t_end
+        if self._run.program.timed:
+            numbers[at["start.instant"]] = instant(t0, t_end)
         self.failed = ""
 
     def until(self, t: float) -> None:
         """Steps to t, the last of which ends there."""
         self._towards(t)
+        self.to_end()
+
+    def to_end(self) -> None:
+        """All steps."""
         self._passes()
-        self._judge()
+        if self._numbers[self._at["status"]] == TOO_SMALL:
+            self.failed = self._run.too_small(self._memory)
 
     def step(self) -> None:
         """One step more on the way to t_end."""
-        memory, row, status = self._memory, self._at["row"], self._at["status"]
-        self._towards(memory[self._at["start.t_end"]])
+        numbers, row, status = self._numbers, self._at["row"], self._at["status"]
+        self._towards(numbers[self._at["start.t_end"]])
         self._advance(1)
-        while memory[row] <= 0.0 and memory[status] == RUNNING:
+        while numbers[row] <= 0.0 and numbers[status] == RUNNING:
             self._advance(1)
-        self._judge()
+        if numbers[status] == TOO_SMALL:
+            self.failed = self._run.too_small(self._memory)
 
     def _towards(self, t: float) -> None:
-        self._memory[self._at["start.goal" if self._memory[self._at["anew"]] else "end"]] = t
-        self._memory[self._at["status"]] = RUNNING
-
-    def _judge(self) -> None:
-        if self._memory[self._at["status"]] == TOO_SMALL:
-            self.failed = self._run.too_small(self._memory)
+        numbers, at = self._numbers, self._at
+        numbers[at["start.goal" if numbers[at["anew"]] else "end"]] = t
+        numbers[at["status"]] = RUNNING
 
 
 class EqualStepper(Stepper):
     """Equal steps, of which those from a start or an end to the next end have one length."""
 
-    registers = ("t", "count", "nonfinite")
+    registers = ("t", "start", "count", "h", "nonfinite")
     stop = "nonfinite"
     _run: FixedStepIntegration
 
-    def begin(self, x: Array, t0: float, t_end: float) -> None:
-        """Start anew, from x (m,) at t0, on the way to t_end."""
-        self._memory[:] = self._start
-        self._x[:] = x
-        self._memory[self._at["t"]] = t0
+    def _begin(self, t0: float, t_end: float) -> None:
+        self._numbers[self._at["t"]] = t0
         self._t_end, self._left, self.failed = t_end, 0, ""
 
     def until(self, t: float) -> None:
@@ -130,6 +151,10 @@ class EqualStepper(Stepper):
         stretch = self._stretch(t)
         self._steps(stretch, stretch.steps)
         self._left = 0
+
+    def to_end(self) -> None:
+        """All steps."""
+        self.until(self._t_end)
 
     def step(self) -> None:
         """One step more on the way to t_end."""
@@ -141,24 +166,25 @@ class EqualStepper(Stepper):
 
     def _stretch(self, t: float) -> EqualSteps:
         """The steps to t, which are begun."""
+        numbers, at = self._numbers, self._at
         stretch = equal_steps([self.t, t], self._run.options.step)[0]
-        begin_equal(self._run.runner, self._memory, stretch.begin, stretch.h)
+        numbers[at["start"]], numbers[at["count"]], numbers[at["h"]] = stretch.begin, 0.0, stretch.h
         return stretch
 
     def _steps(self, stretch: EqualSteps, steps: int) -> None:
-        memory, count = self._memory, self._at["count"]
+        memory, numbers, count = self._memory, self._numbers, self._at["count"]
         before = memory.copy()
         self._passes(steps)
-        if memory[self._at["nonfinite"]] != RUNNING:  # make all but the last again, for the state before it
-            done = int(memory[count] - before[count])
+        if numbers[self._at["nonfinite"]] != RUNNING:  # make all but the last again, for the state before it
+            done = int(numbers[count] - before[count])
             memory[:] = before
-            self._passes(done - 1) if done > 1 else None
-            last = self._x.copy()
+            self._passes(done - 1)
+            before[:] = memory
             self._advance(1)
-            self.failed = self._run.failure(memory, last)
-            self._x[:] = last
-        elif memory[count] == stretch.steps:
-            memory[self._at["t"]] = stretch.end
+            self.failed = self._run.failure(memory, self._run.runner.read(before, "x"))
+            memory[:] = before
+        elif numbers[count] == stretch.steps:
+            numbers[self._at["t"]] = stretch.end
 
 
 def stepper(compiled: CompiledSteps, options: RunOptions, parameters: Sequence[float]) -> Stepper:

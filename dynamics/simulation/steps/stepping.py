@@ -142,7 +142,7 @@ class NativeIntegration(Integration):
         spent = time.perf_counter() - begin
         if self.program.adaptive:
             self._accepted = self._number(memory, "accepted") != 0.0
-        if passes == self._passes == done:
+        if done == self._passes:
             self._passes = max(1, int(passes * min(4.0, BLOCK_TIME / max(spent, 1e-9))))
         return rows, done
 

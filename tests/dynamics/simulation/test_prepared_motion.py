@@ -1,0 +1,229 @@
+"""A prepared motion: to the bit what `simulate` gives, its end alone, and its steps one by one; from threads, too."""
+
+import math
+import pickle
+import warnings
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+import pytest
+from pytest import mark
+
+import dynamics as dyn
+from dynamics.integrators import METHODS
+from tests.dynamics.mechanisms import random_state, random_tree
+from tests.slow import slow
+
+ADAPTIVE = [name for name, method in METHODS.items() if method.adaptive]
+EQUAL = ["rk4", "euler", "gauss4", "verlet"]
+ARM = dyn.planar_arm([1.0, 0.8], [1.0, 0.8])
+START = [1.0, 0.5], [0.2, -0.1]
+SPAN = 0.4
+WITHIN = 1e-7  # relative, of steps that are cut, at tolerances of 1e-9
+
+
+def options_of(method: str) -> dict[str, Any]:
+    return {} if METHODS[method].adaptive else {"dt": 0.01, "estimate_error": False}
+
+
+def same(one: dyn.Trajectory, other: dyn.Trajectory) -> None:
+    for name in ("t", "q", "qd", "energy"):
+        np.testing.assert_array_equal(getattr(one, name), getattr(other, name), err_msg=name)
+    counts = ("steps", "rejected", "nfev", "dt", "message", "warnings")
+    assert [getattr(one.stats, name) for name in counts] == [getattr(other.stats, name) for name in counts]
+
+
+@mark.parametrize("method", [*ADAPTIVE, *EQUAL])
+@mark.parametrize("backend", ["auto", *slow("python")])
+def test_its_rows_its_end_and_its_steps_are_those_of_simulate(method: str, backend: str) -> None:
+    options = {**options_of(method), "backend": backend}
+    motion = dyn.prepare(ARM, method, **options)
+    for t0, t_end in ((0.0, SPAN), (1.5, 1.5 - SPAN)):
+        run = dyn.simulate(ARM, *START, t_end, method, t0=t0, **options)
+        same(motion(*START, t_end, t0), run)
+        times = np.linspace(t0, t_end, 5)
+        same(
+            motion(*START, t_end, t0, t_eval=times),
+            dyn.simulate(ARM, *START, t_end, method, t0=t0, t_eval=times, **options),
+        )
+        for kind in (list, np.array):  # twice: a memory that is used is as a new one
+            end = motion.end(kind(START[0]), kind(START[1]), t_end, t0)
+            assert end.t == run.t[-1] == t_end
+            np.testing.assert_array_equal(end.q, run.q[-1])
+            np.testing.assert_array_equal(end.qd, run.qd[-1])
+        going = motion.start(*START, t_end, t0)
+        states = [np.concatenate([going.q, going.qd])]
+        for t in run.t[1:]:
+            going.step()
+            states.append(np.concatenate([going.q, going.qd]))
+            assert going.t == t
+        np.testing.assert_array_equal(states, np.concatenate([run.q, run.qd], axis=1))
+        with pytest.raises(ValueError, match=f"the motion is there, at t = {t_end:g} s"):
+            going.step()
+
+
+@mark.parametrize("method", [*ADAPTIVE, *EQUAL])
+def test_instants_cut_its_steps(method: str) -> None:
+    motion = dyn.prepare(ARM, method, **options_of(method))
+    going, times = motion.start(*START), np.linspace(0.05, SPAN, 8)
+    first = motion.end(*START, float(times[0]))
+    for t in times.tolist():
+        going.propagate_until(t)
+        assert going.t == t
+        if t == times[0]:
+            np.testing.assert_array_equal(going.q, first.q)  # as of a motion that ends there
+    error = 0.1 if method == "euler" else 1e-4 if method == "verlet" else WITHIN
+    np.testing.assert_allclose(going.q, motion.end(*START, SPAN).q, rtol=error)
+    where = going.q
+    going.propagate_until(SPAN)  # it is there
+    np.testing.assert_array_equal(going.q, where)
+    with pytest.raises(ValueError, match=r"the motion is at t = 0\.4 s and does not go back to t = 0\.1 s"):
+        going.propagate_until(0.1)
+
+
+@mark.parametrize("seed", range(4))
+def test_motions_of_random_mechanisms(seed: int) -> None:
+    tree = random_tree(seed, 4)
+    q, qd, *_ = random_state(tree, seed)
+    motion = dyn.prepare(tree, rtol=1e-8)
+    run = dyn.simulate(tree, q, qd, SPAN, rtol=1e-8)
+    same(motion(q, qd, SPAN), run)
+    np.testing.assert_array_equal(motion.end(q, qd, SPAN).q, run.q[-1])
+
+
+@mark.parametrize(
+    "options",
+    [
+        {"dense_output": True},
+        {"events": dyn.Event("low", lambda q, qd, t: q[0] - 0.9)},
+        {"events": dyn.Event("low", lambda q, qd, t: q[0] - 0.9, terminal=True)},
+        {"events": dyn.Event("kick", lambda q, qd, t: q[0] - 0.9, reset=lambda q, qd, t: (q, [-qd[0], qd[1]]))},
+        {"tau": lambda q, qd, t: [-3.0 * qd[0], 0.1 * t]},
+        {"tau": dyn.SampledController(lambda q, qd, t: -2.0 * qd, period=0.05)},
+        {"tau": [0.1, 0.2], "form": "momentum"},
+        {"method": "rk4", "dt": 0.01},
+        {"method": "scipy:DOP853"},
+        {"max_steps": 5},
+    ],
+    ids=str,
+)
+def test_whatever_is_fixed(options: dict[str, Any]) -> None:
+    motion = dyn.prepare(ARM, **options)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", dyn.SimulationWarning)
+        run = dyn.simulate(ARM, *START, SPAN, **options)
+        same(motion(*START, SPAN), run)
+        assert {name: each.t.tolist() for name, each in run.events.items()} == {
+            name: each.t.tolist() for name, each in motion(*START, SPAN).events.items()
+        }
+        if not run.success:
+            with pytest.raises(dyn.MotionError, match=f"the motion did not reach t_end, {run.message}"):
+                motion.end(*START, SPAN)
+            return
+        end = motion.end(*START, SPAN)
+    assert end.t == run.t[-1]
+    np.testing.assert_array_equal(end.q, run.q[-1])
+    np.testing.assert_array_equal(end.qd, run.qd[-1])
+
+
+def test_parameters_are_those_of_the_call() -> None:
+    pendulum = dyn.System(
+        lambda q, qd, t, p: 0.5 * qd[0] ** 2 - p["stiffness"] * q[0] ** 2, ["angle"], parameters={"stiffness": 1.0}
+    )
+    motion = dyn.prepare(pendulum)
+    for value in (None, 1.0, 4.0, 1.0):
+        parameters = None if value is None else {"stiffness": value}
+        run = dyn.simulate(pendulum, [0.1], [0.0], 1.0, parameters=parameters)
+        same(motion([0.1], [0.0], 1.0, parameters=parameters), run)
+        np.testing.assert_array_equal(motion.end([0.1], [0.0], 1.0, parameters=parameters).q, run.q[-1])
+    for wrong in ({"stifness": 1.0}, {"stiffness": "much"}, [1.0]):
+        with pytest.raises((TypeError, ValueError), match="parameter"):
+            motion.end([0.1], [0.0], 1.0, parameters=wrong)  # type: ignore[arg-type]
+
+
+def test_threads_have_a_memory_each() -> None:
+    motion = dyn.prepare(ARM, "taylor")
+    starts = [[0.1 * k, -0.05 * k] for k in range(1, 40)]
+    alone = [motion.end(q, [0.0, 0.0], SPAN).q.tolist() for q in starts]
+    with ThreadPoolExecutor(4) as pool:
+        together = list(pool.map(lambda q: motion.end(q, [0.0, 0.0], SPAN).q.tolist(), starts))
+    assert together == alone
+
+
+def test_it_goes_to_other_processes() -> None:
+    motion = dyn.prepare(dyn.planar_arm([1.0], [1.0]))
+    end = motion.end([0.3], [0.0], 1.0)
+    np.testing.assert_array_equal(pickle.loads(pickle.dumps(motion)).end([0.3], [0.0], 1.0).q, end.q)
+    run = motion([0.3], [0.0], 1.0)
+    np.testing.assert_array_equal(pickle.loads(pickle.dumps(run)).energy, run.energy)
+
+
+@mark.parametrize("call", ["end", "start", "run"])
+@mark.parametrize(
+    ("start", "sentence"),
+    [
+        (([math.nan, 0.0], [0.0, 0.0], 1.0), "q must be finite"),
+        (([0.0, 0.0], [0.0, math.inf], 1.0), "qd must be finite"),
+        (([0.0], [0.0, 0.0], 1.0), "q must have shape"),
+        (([0.0, 0.0], [[0.0, 0.0]], 1.0), "qd must have shape"),
+        (([0.0, 0.0], None, 1.0), "qd must have shape"),
+        ((["a", "b"], [0.0, 0.0], 1.0), "q must be real numbers, got text"),
+        (([0.0, 0.0], [0.0, 0.0], 0.0), "t_end must be another time than t0"),
+        (([0.0, 0.0], [0.0, 0.0], math.nan), "t_end must be finite"),
+        (([0.0, 0.0], [0.0, 0.0], 1.0, math.inf), "t0 must be finite"),
+        (([0.0, 0.0], [0.0, 0.0], "1"), "t_end must be a number"),
+    ],
+)
+@mark.parametrize("method", ["dop853", "rk4"])
+def test_wrong_starts_are_refused_in_the_words_of_simulate(
+    method: str, start: tuple[Any, ...], sentence: str, call: str
+) -> None:
+    motion = dyn.prepare(ARM, method, **options_of(method))
+    arrays = [[np.array(part) if isinstance(part, list) else part for part in start[:2]], start[:2]]
+    for state in arrays:
+        with pytest.raises((TypeError, ValueError), match=sentence):
+            (motion if call == "run" else getattr(motion, call))(*state, *start[2:])
+
+
+@mark.parametrize("method", [*ADAPTIVE, "rk4"])
+def test_an_end_that_is_not_reached_is_an_error_in_the_words_of_simulate(method: str) -> None:
+    runaway = dyn.OdeSystem(lambda x, t: [x[0] * x[0]], ["x"])
+    motion = dyn.prepare(runaway, method, **options_of(method))
+    with pytest.warns(dyn.SimulationWarning):
+        message = dyn.simulate(runaway, [1.0], None, 2.0, method, **options_of(method)).message
+    with pytest.raises(dyn.MotionError) as caught:
+        motion.end([1.0], None, 2.0)
+    assert str(caught.value) == f"the motion did not reach t_end, {message}"
+    going = motion.start([1.0], None)
+    with pytest.raises(dyn.MotionError) as caught:
+        going.propagate_until(2.0)
+    assert str(caught.value) == f"the motion {message}"
+    assert math.isfinite(going.q[0])
+    assert motion.end([1.0], None, 0.5).t == 0.5  # the memory is as good as before
+
+
+def test_single_steps_are_of_plain_motions() -> None:
+    refused: list[dict[str, Any]] = [{"max_steps": 3}, {"method": "scipy:RK45"}, {"form": "momentum"}]
+    for options in refused:
+        with pytest.raises(ValueError, match="single steps are of motions without"):
+            dyn.prepare(ARM, **options).start(*START)
+    with pytest.raises(ValueError, match="was started without one"):
+        dyn.prepare(ARM).start(*START).step()
+    for wrong in (math.nan, math.inf):
+        with pytest.raises(ValueError, match="t must be finite"):
+            dyn.prepare(ARM).start(*START).propagate_until(wrong)
+
+
+def test_what_is_fixed_is_checked_at_once() -> None:
+    refused: list[tuple[dict[str, Any], str]] = [
+        ({"method": "rk5"}, "method must be one of"),
+        ({"dt": 0.1}, "chooses its steps"),
+        ({"rtol": -1.0}, "rtol and atol"),
+        ({"max_steps": 0}, "max_steps"),
+        ({"dense_output": 1}, "dense_output"),
+        ({"events": 3}, "events must be"),
+    ]
+    for options, sentence in refused:
+        with pytest.raises((TypeError, ValueError), match=sentence):
+            dyn.prepare(ARM, **options)
