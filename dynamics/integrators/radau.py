@@ -141,7 +141,7 @@ def _keeping() -> Call:
     theta, h, wanted = inputs = cg.variables("theta h next")
     slow, same = theta > FAST, abs(h)
     alike = (1.0 - slow) * (wanted >= same) * (wanted <= LONGER * same)
-    outputs = {"slow": slow, "current": 0.0, "next": cg.where(alike, same, wanted)}
+    outputs: dict[str, Node | float] = {"slow": slow, "current": 0.0, "next": cg.where(alike, same, wanted)}
     return Call(Graph(inputs, outputs), ("theta", "h", "next"), tuple(outputs))
 
 
