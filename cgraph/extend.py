@@ -26,7 +26,7 @@ moves them at sample points.
 **Run**: a `Program` is graphs over registers of numbers (`Call`, `Map`, `Sum`, `Factor`, `Solve`, `If`, `While`), and
 `runner` makes it machine code or Python. `program_jvp` and `program_vjp` are its derivatives, `many` is what memories
 side by side run, `register_statement` adds a kind of statement, and `effects` says what statements read and write.
-`copied` and `added` are the plainest ones.
+`copied` and `added` are the plainest ones. A `LaneCode` runs many memories, each to its own stop.
 
 **At the edges**: `real_array`, `real_number`, `is_finite`, `check_name`, `require_graph`, `require_flag`,
 `require_whole`, `require_choice`, `require_sequence`, `require_mapping` and `require_path` check what a caller passed,
@@ -85,6 +85,7 @@ if TYPE_CHECKING:
     )
     from .program.many import many as many
     from .program.program import Program as Program
+    from .program.runners.batch_code import LaneCode as LaneCode
     from .program.runners.choose_runner import runner as runner
     from .program.runners.runner import Record as Record, Runner as Runner
     from .program.statement import (

@@ -15,6 +15,7 @@ class Arithmetic(NamedTuple):
     lanes: int = 1  # doubles in a vector
     registers: int = REGISTERS  # values that are in registers at once
     together: int = 1  # at most so many arguments go into one call of a vector function, where lanes is 1
+    alike: bool = False  # whether each lane has the bits of one point: libm's where a function has no company there
 
     @property
     def polynomials(self) -> bool:

@@ -11,7 +11,7 @@ from ..operations.operation import OPS, columns
 from .arithmetic import REGISTERS, Arithmetic, bits, words_of
 from .parts import Parts, Step
 from .schedule import Joined, Merged, joined_calls, products_of, schedule
-from .vector_math import helpers
+from .vector_math import POLYNOMIAL, helpers
 
 TOGETHER = 4  # arguments in a joined call at one point: a vector of them is one register or two on every processor
 
@@ -63,6 +63,14 @@ def preamble(graphs: Iterable[Graph], arithmetic: Arithmetic) -> list[str]:
 def _joined_calls(graph: Graph, arithmetic: Arithmetic) -> dict[Node, Joined]:
     joined = arithmetic.polynomials and _vector(arithmetic).lanes > 1
     return joined_calls(graph, arithmetic.together) if joined else {}
+
+
+def _of_libm(graph: Graph, arithmetic: Arithmetic) -> set[Node]:
+    """The nodes that have no company in a call at one point, whose bits lanes have to have."""
+    if not arithmetic.alike or not arithmetic.polynomials:
+        return set()
+    joined = joined_calls(graph, TOGETHER)
+    return {node for node in graph.nodes if node.args and columns(node.op).library in POLYNOMIAL and node not in joined}
 
 
 def declarations(functions: Mapping[str, int]) -> list[str]:
@@ -146,7 +154,8 @@ def instructions(graph: Graph, arithmetic: Arithmetic, address: Address, name: s
         for row in outputs.get(step, ()) if isinstance(step, Node) else ():
             yield from [*address("y", f"%y{row}", row), f"  store {t} {r}, ptr %y{row}, align 8"]
 
-    merged = Merged(_joined_calls(graph, arithmetic), products_of(graph) if arithmetic.fuses else {})
+    products = products_of(graph) if arithmetic.fuses else {}
+    merged = Merged(_joined_calls(graph, arithmetic), products, _of_libm(graph, arithmetic))
     steps = _results_behind_calls(schedule(graph, merged), merged.calls)
     parts = Parts(steps, merged.calls, t, 8 * arithmetic.lanes, arithmetic.registers, leaf)
     written: list[list[str]] = [[]]
@@ -223,10 +232,8 @@ def _step(
         return _result(step, merged.calls[step], r, args[0], arithmetic)
     if step in merged.products:
         return r, _product_and_sum(step, merged.products[step], r, args, arithmetic)
-    t, call = (
-        arithmetic.type,
-        f"@{f'lanes{arithmetic.lanes}.' if arithmetic.lanes > 1 else ''}{columns(step.op).library}",
-    )
+    t, kind = arithmetic.type, "each" if step in merged.of_libm else "lanes"
+    call = f"@{f'{kind}{arithmetic.lanes}.' if arithmetic.lanes > 1 else ''}{columns(step.op).library}"
     if columns(step.op).llvm:
         return r, [f"  {line.format(*args, r=r, call=call, **words)}" for line in columns(step.op).llvm]
     return r, [f"  {r} = call {t} {call}({', '.join(f'{t} {arg}' for arg in args)})"]

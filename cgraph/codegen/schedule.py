@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from typing import NamedTuple
 
 from ..core.graph import Graph
@@ -23,10 +23,12 @@ class Merged(NamedTuple):
     """Several nodes of a graph that machine code does in one step.
 
     calls: {node: the call that gives it}.  products: {sum or difference: its argument that it multiplies itself}.
+    of_libm: nodes of a vector that each lane has from libm, though there is a polynomial.
     """
 
     calls: Mapping[Node, Joined]
     products: Mapping[Node, Node]
+    of_libm: Set[Node] = frozenset()
 
 
 def schedule(graph: Graph, merged: Merged) -> dict[Node | Joined, tuple[Node | Joined, ...]]:

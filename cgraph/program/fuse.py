@@ -9,6 +9,7 @@ from ..codegen.schedule import products_of
 from ..core.graph import Graph
 from ..core.node import Node, variable
 from ..core.traversal import rebuild
+from ..operations.operation import columns
 from .program import Program
 from .statement import Statement, row_of
 from .statements.call import Call, Map, elements
@@ -17,31 +18,41 @@ from .statements.control import If
 MOST = 1000  # operations of what is fused: it compiles in some tens of milliseconds, and a short run gains no more
 
 
-def fused(program: Program) -> Program:
+def fused(program: Program, *, alike: bool = False) -> Program:
     """The program with calls and maps that follow one another as one call where all of them are short.
 
     Long ones stay as they are: what they share, such as the rate in the stages of a step, is code that is there once.
     Products are rounded where they were, so that results have the same bits wherever functions of the C library are
     not joined with others.
+    alike: whether functions of the C library are joined with those that they are joined with already, and no others.
     """
-    return replace(program, body=_fused(program, program.body))
+    return replace(program, body=_fused(program, program.body, alike=alike))
 
 
-def _fused(program: Program, statements: Sequence[Statement]) -> tuple[Statement, ...]:
+def _fused(program: Program, statements: Sequence[Statement], *, alike: bool) -> tuple[Statement, ...]:
     done: list[Statement] = []
     run: list[Call | Map] = []
     for statement in statements:
         if isinstance(statement, Map) or (isinstance(statement, Call) and not statement.exact):
+            if alike and not _as_before([*run, statement]):
+                done += _one_call(program, run)
+                run = []
             run.append(statement)
             continue
         done += _one_call(program, run)
         run = []
         names = () if isinstance(statement, If) and statement.seldom else row_of(statement).bodies
-        bodies = {name: _fused(program, getattr(statement, name)) for name in names}
+        bodies = {name: _fused(program, getattr(statement, name), alike=alike) for name in names}
         if bodies:
             statement = replace(statement, **bodies)  # type: ignore[type-var]
         done.append(statement)
     return (*done, *_one_call(program, run))
+
+
+def _as_before(run: Sequence[Call | Map]) -> bool:
+    """Whether functions that may be joined have no other company in one call than each in its own."""
+    joining = [each for each in run if any(columns(node.op).vector for node in each.graph.nodes)]
+    return not joining or (len(joining) == 1 and (len(run) == 1 or isinstance(joining[0], Call)))
 
 
 def _one_call(program: Program, run: list[Call | Map]) -> list[Call | Map]:

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import replace
+from types import MappingProxyType
 
 from ..core.graph import Graph
 from ..operations.table import where
 from ..writing.naming import variables
 from .program import Program
-from .statement import Statement, reads_and_writes, row_of
+from .statement import Statement, bodies_of, names_in, reads_and_writes, row_of
 from .statements.call import Call, Map, copied
 from .statements.control import FixedPoint, If, While
 from .statements.memory import Push
 
 
-def many(program: Program) -> Program:
+def many(program: Program, kept: Iterable[str] | None = None) -> Program:
     """The program with its branches and loops under masks, for memories side by side.
 
     What its `If` and `While` decide by is 1 where they apply and else 0, and what they write is put back where they do
@@ -24,6 +25,9 @@ def many(program: Program) -> Program:
     run if any lane is positive, and a `While` as long as any is; a `FixedPoint` becomes a `While`, so that derivatives
     are taken before. Registers for masks, and for what is put back, stand after those of the program. `Runner.run_many`
     makes it.
+
+    kept: registers whose numbers matter after a pass, besides those that a pass reads before it sets them; none: all.
+    Others are put back only where something reads them.
 
     >>> import cgraph as cg
     >>> from cgraph.extend import Call, Program, While, many
@@ -40,20 +44,56 @@ def many(program: Program) -> Program:
     lengths, own = dict(program.registers), ":"
     while any([own in name for name in lengths]):
         own += ":"
-    masked = Masked(lengths, own=own)
+    after: dict[int, Set[str]] = {}
+    if kept is not None:
+        _live(program.body, {*kept, *outliving(program)}, after)
+    masked = Masked(lengths, own=own, after=after)
     masked.run(program.body)
     return replace(program, registers=lengths, body=tuple(masked.statements))
+
+
+def outliving(program: Program) -> list[str]:
+    """The registers that a pass reads, or that are read after it, before it is sure to have set them."""
+    read = {*program.record, *[name for name in (program.record_if, program.stop) if name is not None]}
+    first = _live(program.body, read, {})
+    return [name for name in program.registers if name in first]
+
+
+def _live(statements: Sequence[Statement], read: Set[str], after: dict[int, Set[str]]) -> Set[str]:
+    """The registers whose numbers before the statements matter, where those of `read` matter behind them.
+
+    after: receives, by the id of each statement with bodies, those that matter behind any of its bodies.
+    """
+    live = set(read)
+    for statement in reversed(statements):
+        row, bodies = row_of(statement), bodies_of(statement)
+        if bodies:  # which may run no time at all, or again
+            live |= {*names_in(statement, row.reads), *[name for body in bodies for name in _live(body, set(), {})]}
+            after[id(statement)] = frozenset(live)
+            for body in bodies:
+                _live(body, live, after)
+        else:
+            live = (live - {*names_in(statement, row.writes)}) | {*names_in(statement, row.reads)}
+    return live
 
 
 class Masked:
     """Statements that change the lanes of a mask alone, when what they write is put back in the others.
 
     lengths: of all registers; grows.  mask: the register that is 1 in its lanes, else 0; none: all lanes.
-    statements: what has been added.  written: registers to be put back.
+    statements: what has been added.  written: registers to be put back.  after: {id of a statement with bodies: the
+    registers that are read behind them}; of one that is not there all may be.
     """
 
-    def __init__(self, lengths: dict[str, int], mask: Sequence[str] = (), depth: int = 0, own: str = ":") -> None:
-        self.lengths, self.mask, self._depth, self._own = lengths, tuple(mask), depth, own
+    def __init__(
+        self,
+        lengths: dict[str, int],
+        mask: Sequence[str] = (),
+        depth: int = 0,
+        own: str = ":",
+        after: Mapping[int, Set[str]] = MappingProxyType({}),
+    ) -> None:
+        self.lengths, self.mask, self._depth, self._own, self.after = lengths, tuple(mask), depth, own, after
         self.statements: list[Statement] = []
         self.written: dict[str, None] = {}
 
@@ -71,11 +111,12 @@ class Masked:
         """Statements which change nothing of the program's in other lanes."""
         self.statements += statements
 
-    def body(self, statements: Sequence[Statement], mask: str) -> tuple[Statement, ...]:
-        """Statements in the lanes of a mask: what they write is kept before, and put back in the others."""
-        inner = Masked(self.lengths, (mask,), self._depth + 1, self._own)
+    def body(self, statement: Statement, statements: Sequence[Statement], mask: str) -> tuple[Statement, ...]:
+        """A body of a statement in the lanes of a mask: what it writes is kept before, and put back in the others."""
+        inner = Masked(self.lengths, (mask,), self._depth + 1, self._own, self.after)
         inner.run(statements)
-        before = {name: inner.register(f"{name} before", self.lengths[name]) for name in inner.written}
+        read = self.after.get(id(statement), inner.written)
+        before = {name: inner.register(f"{name} before", self.lengths[name]) for name in inner.written if name in read}
         keep = [copied(name, kept) for name, kept in before.items()]
         choose = [Map(_CHOSEN, (mask, name, kept), (name,)) for name, kept in before.items()]
         return (*keep, *inner.statements, *choose)
@@ -94,7 +135,7 @@ def masked_if(statement: If, masked: Masked) -> None:
     masked.add(Call(graph, (statement.register, *masked.mask), (on, off)))
     for way, body in ((on, statement.body), (off, statement.otherwise)):
         if body:
-            masked.add(If(way, masked.body(body, way)))
+            masked.add(If(way, masked.body(statement, body, way), seldom=statement.seldom))
 
 
 def masked_while(statement: While | FixedPoint, masked: Masked) -> None:
@@ -102,7 +143,7 @@ def masked_while(statement: While | FixedPoint, masked: Masked) -> None:
     going = masked.register("going")
     graph = _GOING_IN_MASK if masked.mask else _GOING
     masked.add(Call(graph, (statement.register, *masked.mask), (going,)))
-    turn = masked.body(statement.body, going)
+    turn = masked.body(statement, statement.body, going)
     masked.add(While(going, (*turn, Call(_GOING_IN_MASK, (statement.register, going), (going,)))))
 
 

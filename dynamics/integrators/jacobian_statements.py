@@ -1,9 +1,18 @@
-"""The Jacobian of the rate by statements of a program: written out, or a product in vectors for colors of columns."""
+"""The Jacobian of the rate by statements of a program: written out, or a product for colors of columns; its price."""
 
 from __future__ import annotations
 
 from cgraph import Graph
-from cgraph.extend import Call, CompressedJacobian, Map, Statement, compressed_jacobian, kept_by_first
+from cgraph.extend import (
+    Call,
+    CompressedJacobian,
+    Factor,
+    Map,
+    Program,
+    Statement,
+    compressed_jacobian,
+    kept_by_first,
+)
 
 from .problem import Problem, state_jacobian
 
@@ -22,6 +31,27 @@ def jacobian_statements(problem: Problem) -> tuple[list[Statement], dict[str, in
         Call(parts.entries, rows, ("jacobian",)),
     ]
     return statements, {"known": len(parts.primal.outputs)} | dict.fromkeys(("color", *rows), parts.colors)
+
+
+def prices(steps: Program, rate: Graph) -> tuple[float, float]:
+    """Operations of the Jacobian and of an LU factorization, the mean of those that steps make, in those of the rate.
+
+    0 where they make none. A factorization of n rows has 2/3 n^3, products, sums and quotients.
+    """
+    jacobian, factors, one = 0, [0.0], max(1, _operations(rate))
+    for each in steps.statements():
+        if isinstance(each, Call | Map) and any(
+            name == "known" or name.startswith("jacobian") for name in each.outputs
+        ):
+            turns = steps.registers[each.inputs[0]] if isinstance(each, Map) else 1
+            jacobian += turns * _operations(each.graph)
+        elif isinstance(each, Factor):
+            factors.append(2.0 / 3.0 * steps.registers[each.pivots] ** 3)
+    return jacobian / one, sum(factors) / max(1, len(factors) - 1) / one
+
+
+def _operations(graph: Graph) -> int:
+    return sum(bool(node.args) for node in graph.nodes)
 
 
 @kept_by_first

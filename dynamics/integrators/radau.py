@@ -2,7 +2,8 @@
 
 Hairer and Wanner, Solving Ordinary Differential Equations II, section IV.8. The stages' increments Z are the rows of
 Z = T W; in W the Newton equations fall apart into one real system of the size of the state, (r/h - J), and a complex
-one, (c/h - J), here as a real one of twice the size.
+one, (c/h - J), here as a real one of twice the size. While the iteration converges fast the Jacobian stays, and while
+steps are alike the factors do.
 """
 
 from __future__ import annotations
@@ -40,6 +41,9 @@ TURNS = 8.0  # of Newton's iteration, at most
 MOST_TURNS = 100.0  # where it goes on to rounding
 ROUNDING = 2.0**-52  # relative
 STALLS = 3.0  # turns that come no nearer: the rest is rounding
+FAST = 1e-3  # rate of convergence, below which the Jacobian serves the next step, too (section IV.8)
+LONGER = 1.1  # times as long as the one before: a step up to which is as long, since that saves its factorization
+SAME = 1e-10  # relative: lengths of steps that are the same but for the rounding of the time
 SMALL = 1e-6  # of the largest coordinate or velocity, below which a component is measured by it
 CHANGES = ("right0", "F1", "F2")  # of W in a turn
 
@@ -67,9 +71,13 @@ def radau_step(problem: Problem) -> Step:
     z, w, f = (tuple([f"{name}{k}" for k in range(3)]) for name in ("Z", "W", "F"))
     powers = tuple([f"power{k + 1}" for k in range(3)])
     slopes, on_the_way = jacobian_statements(problem)
+    factor = [*_matrices(m), copied("h", "h_factored"), _once_more("factorizations", 2.0)]
     body: list[Statement] = [
+        _renewed(),
+        If("renewed", (*slopes, _once_more("jacobians"))),
         _sizes(problem),
-        *_matrices(m),
+        _factored(),
+        If("factored", tuple(factor)),
         *[stage_time(f"time{k}", _C[k]) for k in range(3)],
         *_guess(z, powers),
         combined(_T_INVERSE, z, w),
@@ -78,22 +86,63 @@ def radau_step(problem: Problem) -> Step:
         _unsolved(),
     ]
     controls = "h_old nonfinite_real nonfinite_complex going turns stalled change change_old exact newton".split()
-    controls += "converged failed again sum".split()
+    controls += "converged failed again sum renewed current slow h_factored factored theta accepted next".split()
+    controls += ["jacobians", "factorizations"]
     lengths = _lengths(m) | on_the_way | dict.fromkeys((*powers, "error_vector", "size", "least"), m)
     lengths |= {"rtol": 1, "atol": m, "leap": 1, "evaluations": 1} | dict.fromkeys(controls, 1)
     zeros = Graph([], {f"{k}": 0.0 for k in range(m)})
     return Step(
         lengths,
         body,
-        prepare=[*slopes, Call(problem.rate, ("x", "t", "p"), ("rate",))],
-        start=[identity(m), *[Call(zeros, (), (name,)) for name in (*powers, "size")]],
-        kept=[combined(_POWERS, z, powers), copied("h", "h_old")],
+        prepare=[Call(problem.rate, ("x", "t", "p"), ("rate",))],
+        start=[identity(m), *[Call(zeros, (), (name,)) for name in (*powers, "size")], _nothing_kept()],
+        kept=[combined(_POWERS, z, powers), copied("h", "h_old"), _keeping()],
         fixed=("jacobian", "real", "complex", "size", "least", "rtol", "atol", "leap", *powers, *on_the_way, *controls),
         failed="failed",
         error=_estimate(problem, z),
         estimate=4,
         dense=[combined(_POWERS, z, ("dense1", "dense2", "dense3"))],
     )
+
+
+def _once_more(name: str, more: float = 1.0) -> Call:
+    """A count in a register."""
+    done = cg.variable("done")
+    return Call(Graph([done], {"done": done + more}), (name,), (name,))
+
+
+def _nothing_kept() -> Call:
+    """No Jacobian and no factors of a step before."""
+    return Call(Graph([], {"current": 0.0, "h_factored": 0.0}), (), ("current", "h_factored"))
+
+
+def _renewed() -> Call:
+    """Whether the Jacobian is evaluated: not if it is that of this state, or the last step converged fast by it.
+
+    After a trial by that of another state it is, and without an error to choose steps by always.
+    """
+    names = ("current", "accepted", "slow", "h_factored")
+    current, accepted, slow, before = inputs = cg.variables(names)
+    fast = accepted * cg.equal(slow, 0.0) * cg.not_equal(before, 0.0)
+    renewed = (1.0 - current) * (1.0 - fast)
+    outputs = {"renewed": renewed, "current": cg.maximum(current, renewed)}
+    return Call(Graph(inputs, outputs), names, tuple(outputs))
+
+
+def _factored() -> Call:
+    """Whether the matrices are made and factored: for another Jacobian, or a step of another length."""
+    h, before, renewed = inputs = cg.variables("h before renewed")
+    other = abs(h - before) > SAME * abs(h)
+    return Call(Graph(inputs, {"y": cg.maximum(renewed, other)}), ("h", "h_factored", "renewed"), ("factored",))
+
+
+def _keeping() -> Call:
+    """After an accepted step: whether the Jacobian serves the next, and, if that is hardly longer, its factors, too."""
+    theta, h, wanted = inputs = cg.variables("theta h next")
+    slow, same = theta > FAST, abs(h)
+    alike = (1.0 - slow) * (wanted >= same) * (wanted <= LONGER * same)
+    outputs: dict[str, Node | float] = {"slow": slow, "current": 0.0, "next": cg.where(alike, same, wanted)}
+    return Call(Graph(inputs, outputs), ("theta", "h", "next"), tuple(outputs))
 
 
 def _lengths(m: int) -> dict[str, int]:
@@ -227,6 +276,7 @@ def _judged(numbers: int) -> Call:
         "turns": turns + 1.0,
         "stalled": stalls,
         "change_old": change,
+        "theta": rate,
         "evaluations": done + 3.0,
     }
     return Call(Graph(inputs, outputs), names, tuple(outputs))

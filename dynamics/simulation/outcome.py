@@ -105,7 +105,7 @@ def outcome(
     seconds = time.perf_counter() - begin - estimate.seconds
     advise(run, recorder.last, options, x, again)
     counts = (run.steps, run.rejected, run.evaluations, run.largest, seconds)
-    of_matrices = (run.jacobians, run.factorizations)
+    of_matrices = (run.jacobians, run.factorizations, *run.prices)
     return ended(options.method, counts, run.status, run.event, of_matrices, run.warnings, error)
 
 
@@ -114,11 +114,11 @@ def ended(
     counts: tuple[int, int, int, float, float],
     status: str,
     event: str = "",
-    of_matrices: tuple[int, int] = (0, 0),
+    of_matrices: tuple[int, int, float, float] = (0, 0, 0.0, 0.0),
     said: Sequence[str] = (),
     error: ErrorEstimate | None = None,
 ) -> Stats:
-    """How a run went.  counts: steps to seconds of `Stats`.  of_matrices: njev and nlu.
+    """How a run went.  counts: steps to seconds of `Stats`.  of_matrices: njev, nlu and their costs.
 
     status, event: why it stopped early, or what ended it.  said: what speaks against it besides its error.
     """
@@ -129,10 +129,11 @@ def ended(
         not status,
         status or event or REACHED,
         -1 if status else int(bool(event)),
-        *of_matrices,
+        *of_matrices[:2],
         known and known.largest,
         known and known.last,
         (*said, known.warning) if known and known.warning else tuple(said),
+        *of_matrices[2:],
     )
 
 

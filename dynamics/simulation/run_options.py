@@ -170,6 +170,11 @@ class RunOptions:
         return None if self.t_eval is None else np.asarray(self.t_eval)
 
     @property
+    def between(self) -> bool:
+        """Whether times to record lie between the ends of a run."""
+        return self.times is not None and not {*self.times.tolist()} <= {self.t0, self.t_end}
+
+    @property
     def direction(self) -> float:
         """1.0, or -1.0 for a run back in time."""
         return math.copysign(1.0, self.t_end - self.t0)

@@ -42,19 +42,18 @@ def offsets(registers: Mapping[str, int], width: int) -> dict[str, int]:
     return places
 
 
-def program_ir(program: Program, flags: str = "", lanes: int = 1, width: int = 1, registers: int = REGISTERS) -> str:
+def program_ir(program: Program, arithmetic: Arithmetic, width: int = 1) -> str:
     """A module with the function `run`.
 
     int64_t run(
         double *memory, double *records, int64_t passes, int64_t every, int64_t *done, double *feed, int64_t stride
     )
 
-    The registers lie in `memory` as `offsets` says, each number a vector of `lanes`. A row is written to `records`
+    The registers lie in `memory` as `offsets` says, each number a vector of lanes. A row is written to `records`
     after every `every`th pass; the result is how many; the number of passes that were run goes to `done`. A row of
     `feed` is read before every pass, `stride` numbers after the last one.
     width: of the vectors in which `Map` goes through its elements.
     """
-    arithmetic = point_arithmetic(flags, registers) if lanes == 1 else Arithmetic(flags, lanes, registers)
     functions = Functions(arithmetic, width)
     run = _RunFunction(program, functions).lines()
     return "\n".join([*preamble(program.graphs(), arithmetic), *functions.definitions, *run, ""])

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import ctypes
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property, partial
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -12,19 +13,22 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ...codegen import llvm_engine as llvm
+from ...codegen.arithmetic import Arithmetic
 from ...codegen.bound_call import LONG, SHORT, bound_call
+from ...codegen.llvm_ir import point_arithmetic
 from ...core.evaluation import Array
 from ...core.scope import without_collection
 from ...util.memory import aligned
 from ..fuse import fused
 from ..program import Program, whole_graph
+from ..statement import row_of
 from .llvm_ir import offsets, point_ir, program_functions, program_ir, require_texts
 from .runner import Record, Runner
 
 if TYPE_CHECKING:
     from ...codegen.batch_ir import Batch
     from ...codegen.disk_cache import Cache
-    from .batch_code import BatchCode
+    from .batch_code import BatchCode, LaneCode
 
 _NUMBER = 8  # bytes
 _POINTER, _COUNT = ctypes.c_void_p, ctypes.c_int64
@@ -91,7 +95,10 @@ class NativeRunner(Runner):
         """Machine code that runs so many memories, made at its first use."""
         with self._lock:
             if lanes not in self._codes:
-                text = program_ir(program, self._flags, lanes, self.width, self._host.registers)
+                registers = self._host.registers
+                vectors = Arithmetic(self._flags, lanes, registers)
+                one = point_arithmetic(self._flags, registers)
+                text = program_ir(program, vectors if lanes > 1 else one, self.width)
                 self._codes[lanes] = self._compiled(text).function("run", _RUN)
         return self._codes[lanes]
 
@@ -160,6 +167,23 @@ class NativeRunner(Runner):
         places = offsets(self._fused_many.registers, 1) if start else {}
         begin = {places[other]: numbers for other, numbers in start.items()}
         return width, BatchCode(code, lanes, text.size, begin, columns=alone)
+
+    def lane_code(self, clock: str, results: Sequence[str] = (), *, alike: bool = True) -> LaneCode | None:
+        """Machine code of memories in lanes; see `Runner`."""
+        from ..many import many, outliving
+        from .batch_code import LaneCode, lane_ir
+
+        if self.program.feed or any(row_of(each).beside is None for each in self.program.statements()):
+            return None
+        lanes, lengths = self._host.lanes, self.program.registers
+        arithmetic = Arithmetic(self._flags, lanes, self._host.registers, alike=alike)
+        first = {*outliving(self._fused), *results}
+        kept = [name for name in lengths if name in first]
+        beside = replace(self._fused, registers={name: lengths[name] for name in dict.fromkeys([*kept, *lengths])})
+        masked, size = fused(many(beside, kept), alike=alike), sum([lengths[name] for name in kept])
+        with without_collection():
+            text = lane_ir(masked, size, clock, arithmetic)
+        return LaneCode(self._compiled(text.source), masked, kept, lanes, text.size)
 
     def _point_text(self, x: str, y: str) -> str:
         """The text in LLVM's language."""

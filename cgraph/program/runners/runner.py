@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,6 +20,9 @@ from ...util.threads import thread_count, write_batch
 from ..program import Program
 from ..statement import reads_and_writes, row_of
 from .llvm_ir import offsets
+
+if TYPE_CHECKING:
+    from .batch_code import LaneCode
 
 BLOCK = 512  # states of a batch in Python that are run between looks at the keyboard
 
@@ -190,6 +193,14 @@ class Runner(ABC):
         fed = self._fed(feed, (passes, self.program.feed_width, count))
         with _fitting(passes // every, self.program.width * count):
             return self._run_many(memories, passes, every, fed)
+
+    def lane_code(self, clock: str, results: Sequence[str] = (), *, alike: bool = True) -> LaneCode | None:
+        """Machine code of memories in lanes, see `LaneCode`; none in Python, with a feed, or of what runs alone.
+
+        clock: a register of length 1.  results: registers that are read after a run.  alike: whether a memory has the
+        bits that it has alone; else sines and such are those of vectors, as in `run_many`.
+        """
+        return None
 
     def batch(self, name: str, values: ArrayLike, threads: int | None = 1, *, out: Array | None = None) -> Array:
         """Record of one pass, (N, width), at each of N values of a register, (N, length), side by side in vectors.

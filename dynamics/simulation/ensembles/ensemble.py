@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from operator import attrgetter
 from typing import Any
 
 import numpy as np
 
 from cgraph.extend import Array
 
+from ..outcome import INTERRUPTED, REACHED
 from ..trajectory import Crossings, Stats
 
 Counts = np.ndarray[Any, np.dtype[np.int64]]
@@ -67,13 +67,52 @@ COLUMNS: dict[str, type] = dict.fromkeys(("steps", "rejected", "nfev", "status")
 COLUMNS |= dict.fromkeys(("dt", "error", "error_at_end"), np.float64)  # None is NaN
 
 
-def ensemble_stats(each: Sequence[Stats], more: Sequence[Sequence[str]], seconds: float) -> EnsembleStats:
-    """The statistics of runs side by side.  more: what speaks against each result besides."""
-    names = [*COLUMNS, "message", "warnings"]
-    *numbers, messages, warnings = zip(*map(attrgetter(*names), each), strict=True)
-    columns: dict[str, Any] = {name: np.array(numbers[k], dtype=kind) for k, (name, kind) in enumerate(COLUMNS.items())}
-    said = tuple([(*texts, *others) for texts, others in zip(warnings, more, strict=True)])
-    return EnsembleStats(each[0].method, seconds=seconds, message=messages, warnings=said, **columns)
+class RunTable:
+    """How runs side by side went, a row of `Stats` each, which are set as they end; before, they are interrupted.
+
+    columns: {name: numbers of all}.  messages, warnings: of each.
+    """
+
+    def __init__(self, count: int) -> None:
+        self.columns: dict[str, Any] = {name: np.zeros(count, dtype=kind) for name, kind in COLUMNS.items()}
+        self.columns["status"][:] = -1
+        self.columns["error"][:] = self.columns["error_at_end"][:] = np.nan
+        self.messages: list[str] = [INTERRUPTED] * count
+        self.warnings: list[tuple[str, ...]] = [()] * count
+
+    def set(self, k: int, stats: Stats) -> None:
+        """Row k."""
+        for name, column in self.columns.items():
+            column[k] = getattr(stats, name)
+        self.messages[k], self.warnings[k] = stats.message, stats.warnings
+
+    def reached(self, which: Counts, **columns: Any) -> None:
+        """The rows `which`, of runs that reached their end."""
+        for name, values in {**columns, "success": True, "status": 0}.items():
+            self.columns[name][which] = values
+        if len(which) == len(self.messages):
+            self.messages = [REACHED] * len(which)
+        for k in which.tolist() if len(which) < len(self.messages) else ():
+            self.messages[k] = REACHED
+
+    @property
+    def interrupted(self) -> bool:
+        """Whether a run has been."""
+        failed = np.flatnonzero(self.columns["status"] < 0).tolist()
+        return any(self.messages[k].startswith(INTERRUPTED) for k in failed)
+
+    def put(self, here: slice, part: RunTable) -> None:
+        """The rows of a part, in their place."""
+        for name, column in self.columns.items():
+            column[here] = part.columns[name]
+        self.messages[here], self.warnings[here] = part.messages, part.warnings
+
+    def stats(self, method: str, seconds: float, more: Mapping[int, Sequence[str]]) -> EnsembleStats:
+        """The statistics.  more: what speaks against results besides."""
+        for k, texts in more.items():
+            self.warnings[k] = (*self.warnings[k], *texts)
+        said = tuple(self.warnings)
+        return EnsembleStats(method, seconds=seconds, message=tuple(self.messages), warnings=said, **self.columns)
 
 
 @dataclass(frozen=True)

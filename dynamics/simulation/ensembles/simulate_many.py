@@ -26,17 +26,20 @@ from ..events.event_program import EventProgram, event_program
 from ..outcome import INTERRUPTED
 from ..progress_bar import Progress
 from ..row_values import converted, unreached_momenta
-from ..run_options import METHOD, RunOptions, room, time_span
+from ..run_options import METHOD, SMALL, RunOptions, room, time_span
 from ..sampled_controller import SampledController
 from ..steps.equal_steps import EqualSteps, even_steps, step_count
 from ..steps.step_program import StepProgram, pickled_steps, step_program
 from ..trajectory import SimulationWarning
-from .ensemble import Ensemble, EnsembleStats, ensemble_stats
+from .ensemble import Ensemble, EnsembleStats
+from .lanes import fits_lanes
 from .task import Chunk, Part, Task, iterates, not_begun
 from .workers import Map, Workers, checked, finished
 
 VECTOR = 8  # lanes, or a multiple of them, of every processor: a chunk of trajectories side by side is whole vectors
 LARGEST = 256  # trajectories in a chunk, unless asked for
+LONGEST = 4096  # of those in lanes, of which a chunk's rows of steps have no more than ..
+NUMBERS = 2**22  # .. so many numbers
 SHARES = 4  # chunks for each worker, so that workers of unlike speed finish together
 UNKNOWN = 16  # workers behind a map, which does not say
 
@@ -141,18 +144,23 @@ def simulate_many(
     # Derive the equations as graphs, and write the steps of the method over them
     begin = time.perf_counter()
     problem = in_form(derive(model, start.bound), form)
-    program, watch = step_program(problem, METHODS[method], dense=True), event_program(problem, watched)
+    program = step_program(problem, METHODS[method], dense=bool(watched) or options.between)
+    watch = event_program(problem, watched)
 
     # Share out the work: what a worker is sent, and the starts of chunks of trajectories
     grids = [] if watched else _grids(program, options, len(start.x))
     sent = replace(options, t_eval=options.row_times) if watched else options
-    task = Task(pickled_steps(program), sent, count, tuple(grids), pickle.dumps(watch) if watched else b"")
+    lanes = not watched and fits_lanes(program, options, len(start.x)) and (program.adaptive or len(grids) == 1)
+    looked_for = pickle.dumps(watch) if watched else b""
+    task = Task(pickled_steps(program), sent, count, tuple(grids), looked_for, lanes)
     p = np.array([start.varied[name] for name in problem.parameters]).reshape(-1, len(start.x)).T.copy()
     x = converted(problem.momentum, t0, start.x, p)
-    chunks = _chunks(x, p, chunk, team, whole=bool(grids))
+    largest = min(LONGEST, max(VECTOR, NUMBERS // (count * program.steps.width))) if lanes else LARGEST
+    chunk = min(chunk, largest) if chunk is not None and lanes else chunk
+    chunks = _chunks(x, p, chunk, team, largest, whole=bool(grids))
 
     # Integrate, by whoever takes the chunks and compiles the steps
-    whole = not_begun(method, 0, np.empty((len(x), count, problem.size)))
+    whole = not_begun(0, np.empty((len(x), count, problem.size)), events=bool(watched))
     _run(task, chunks, team, whole)
 
     # Put the result together
@@ -183,14 +191,14 @@ def _ensemble(
     seconds: float,
 ) -> Ensemble:
     """All that has come.  starts: q and qd, the states (N, m) that they make, and the parameters of the problem."""
-    times, rows, nq, each = options.row_times, whole.rows, problem.nq, [*zip(*starts, strict=True)]
-    logs = [split_crossings(watch, log, nq, p) for log, (*_, p) in zip(whole.happened, each, strict=True)]
+    times, rows, nq, p = options.row_times, whole.rows, problem.nq, starts[2]
+    logs = [split_crossings(watch, log, nq, p[k]) for k, log in enumerate(whole.happened)]
     crossings = {event.name: tuple([named[event.name] for named in logs]) for event in watch.events}
-    missed = [
-        unreached_momenta(problem, times, rows[k], p, start=(options.t0, q, x)) for k, (q, x, p) in enumerate(each)
-    ]
-    stats = ensemble_stats(whole.stats, missed, seconds)
-    states = converted(problem.velocities, times, rows, starts[2][:, None])
+    missed: dict[int, list[str]] = {}
+    for k, (q, x, numbers) in enumerate(zip(*starts, strict=True)) if problem.missing is not None else ():
+        missed[k] = unreached_momenta(problem, times, rows[k], numbers, start=(options.t0, q, x))
+    stats = whole.runs.stats(options.method, seconds, missed)
+    states = converted(problem.velocities, times, rows, p[:, None])
     momenta = rows[:, :, nq:] if problem.momenta else None
     return Ensemble(times, states[:, :, :nq], states[:, :, nq:], stats, crossings, momenta)
 
@@ -202,7 +210,7 @@ def _warnings(stats: EnsembleStats) -> list[str]:
         for k in np.flatnonzero(stats.status < 0).tolist()
         if not stats.message[k].startswith(INTERRUPTED)
     }
-    doubtful = {k: texts[0] for k, texts in enumerate(stats.warnings) if texts}
+    doubtful = {k: texts[0] for k, texts in enumerate(stats.warnings) if texts} if any(stats.warnings) else {}
     many = f"of {len(stats.warnings)} trajectories"
     said = []
     if early:
@@ -229,8 +237,8 @@ def _check(method: str, chunk: int | None, tau: object) -> None:
 
 def _check_room(x: Array, rows: int) -> None:
     """Raises MemoryError where so many rows for every start (N, m) would not fit."""
-    size, free = 8 * len(x) * rows * x.shape[1], room()
-    if size > free:
+    size = 8 * len(x) * rows * x.shape[1]
+    if size > SMALL and size > (free := room()):
         raise MemoryError(
             f"{len(x)} trajectories of {rows} rows of {x.shape[1]} numbers take {size / 2**30:.3g} GiB, and "
             f"{free / 2**30:.3g} GiB are free: record fewer times (t_eval) or simulate fewer at once"
@@ -247,10 +255,10 @@ def _grids(program: StepProgram, options: RunOptions, count: int) -> list[EqualS
     return grids if sum(grid.steps for grid in grids) <= options.max_steps else []
 
 
-def _chunks(x: Array, p: Array, chunk: int | None, workers: int | Map, *, whole: bool) -> list[Chunk]:
+def _chunks(x: Array, p: Array, chunk: int | None, workers: int | Map, largest: int, *, whole: bool) -> list[Chunk]:
     """The starts in chunks; whole: of whole vectors, so that a trajectory has the same neighbors in any chunk."""
     if chunk is None:
-        chunk = min(LARGEST, math.ceil(len(x) / (SHARES * (UNKNOWN if callable(workers) else workers))))
+        chunk = min(largest, math.ceil(len(x) / (SHARES * (UNKNOWN if callable(workers) else workers))))
     width = math.ceil(chunk / VECTOR) * VECTOR if whole else int(chunk)
     return [Chunk(k, x[k : k + width], p[k : k + width]) for k in range(0, len(x), width)]
 

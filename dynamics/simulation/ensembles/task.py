@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import pickle
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import NamedTuple
@@ -25,8 +25,9 @@ from ..run_options import RunOptions
 from ..steps.equal_steps import EqualSteps, equal_steps
 from ..steps.integration import integration
 from ..steps.step_program import CompiledSteps, StepProgram, compile_steps
-from ..steps.stepping import NativeRun, StoppedError, begin_equal, failed_step
-from ..trajectory import Stats
+from ..steps.stepping import BLOCK_TIME, NativeRun, StoppedError, begin_equal, failed_step
+from .ensemble import RunTable
+from .lanes import ChosenInLanes, EqualInLanes, InLanes, Lanes, lanes_of
 
 WORK = 2**21  # nodes computed in a block: half a millisecond for each vector
 NUMBERS = 2**22  # in the rows of a block
@@ -49,26 +50,21 @@ class Part:
 
     first: int
     rows: Array
-    stats: list[Stats]
-    happened: list[list[Happening]]  # the events of each
+    runs: RunTable
+    happened: list[list[Happening]]  # the events of each, if any are looked for
 
     def put(self, part: Part) -> None:
         """What a part gives, in its place."""
         here = slice(part.first, part.first + len(part.rows))
         if not np.may_share_memory(part.rows, self.rows):  # from another process
             self.rows[here] = part.rows
-        self.stats[here], self.happened[here] = part.stats, part.happened
-
-    @property
-    def interrupted(self) -> bool:
-        """Whether the chunk was not run to its end."""
-        return any(each.message.startswith(INTERRUPTED) for each in self.stats)
+        self.runs.put(here, part.runs)
+        self.happened[here] = part.happened
 
 
-def not_begun(method: str, first: int, rows: Array) -> Part:
+def not_begun(first: int, rows: Array, *, events: bool) -> Part:
     """The part of the chunk whose rows are to be here, before its first step."""
-    none = Stats(method, 0, 0, 0, 0.0, 0.0, success=False, message=INTERRUPTED, status=-1)
-    return Part(first, rows, [none] * len(rows), [[] for _ in rows])
+    return Part(first, rows, RunTable(len(rows)), [[] for _ in rows] if events else [])
 
 
 class VectorCode(NamedTuple):
@@ -218,15 +214,18 @@ class VectorizedIntegration:
 
     def end(self, status: str = "", errors: Sequence[ErrorEstimate] = ()) -> None:
         """Those that have not failed end, at their end or for a reason.  errors: of all, if they are estimated."""
-        evaluations = self.runner.read(self._memories, "evaluations")[0]
-        for k in np.flatnonzero(self._live).tolist():
-            self._note(k, self._done, int(evaluations[k]), status, errors[k] if errors else None)
+        evaluations, live = self.runner.read(self._memories, "evaluations")[0], np.flatnonzero(self._live)
+        if status or errors:
+            for k in live.tolist():
+                self._note(k, self._done, int(evaluations[k]), status, errors[k] if errors else None)
+        else:
+            self.part.runs.reached(live, steps=self._done, nfev=evaluations[live], dt=self._longest)
         for k in np.flatnonzero(self._good < self.part.rows.shape[1]).tolist():
             self.part.rows[k, self._good[k] :] = np.nan
 
     def _note(self, k: int, steps: int, evaluations: int, status: str, error: ErrorEstimate | None = None) -> None:
         counts = (steps, 0, evaluations, self._longest, 0.0)
-        self.part.stats[k] = ended(self._method, counts, status, error=error)
+        self.part.runs.set(k, ended(self._method, counts, status, error=error))
 
     def _fail(self, k: int, memory: Array, steps: int) -> int:
         """Note the step of a block of so many, begun with this memory, (size, 1), at which trajectory k failed.
@@ -258,19 +257,25 @@ class Task:
     count: int  # of the rows of a trajectory
     grids: tuple[EqualSteps, ...]  # of trajectories side by side; empty: one after another
     events: bytes = b""  # an EventProgram; nothing without events
+    lanes: bool = False  # whether trajectories go in lanes, where the program can
 
     def __call__(self, chunk: Chunk) -> Part:
         """Run the chunk."""
         part = self.run(chunk, np.empty((len(chunk.x), self.count, chunk.x.shape[1])), lambda: False)
-        if part.interrupted:
+        if part.runs.interrupted:
             raise KeyboardInterrupt
         return part
 
     def run(self, chunk: Chunk, rows: Array, stopped: Callable[[], bool]) -> Part:
         """Run the chunk into rows (k, T, m), to its end, or until soon after Ctrl-C or `stopped`: see the part."""
-        part = not_begun(self.options.method, chunk.first, rows)
+        part = not_begun(chunk.first, rows, events=bool(self.events))
         with np.errstate(all="ignore"):
-            (self._side_by_side if self.grids else self._one_by_one)(chunk, part, stopped)
+            if self.lanes and self._in_lanes(chunk, part, stopped):
+                return part
+            if self.grids:
+                self._side_by_side(chunk, part, stopped)
+            else:
+                self._one_by_one(chunk, part, range(len(chunk.x)), stopped)
         return part
 
     def _side_by_side(self, chunk: Chunk, part: Part, stopped: Callable[[], bool]) -> None:
@@ -292,21 +297,51 @@ class Task:
         except (KeyboardInterrupt, StoppedError):
             run.interrupt()
 
-    def _one_by_one(self, chunk: Chunk, part: Part, stopped: Callable[[], bool]) -> None:
+    def _in_lanes(self, chunk: Chunk, part: Part, stopped: Callable[[], bool]) -> bool:
+        """Whether that can be: else nothing is done. Runs that do not reach their end are made again, alone."""
+        with _lock:
+            lanes = _lanes(self.pickled, self.options.backend)
+        if lanes is None:
+            return False
+        run: InLanes
+        if self.grids:
+            run = EqualInLanes(lanes, self.options, chunk.x, chunk.p, self.grids[0])
+        else:
+            run = ChosenInLanes(lanes, self.options, chunk.x, chunk.p)
+        interrupted = False
+        try:
+            while run.advance(BLOCK_TIME):
+                if stopped():
+                    raise StoppedError
+        except (KeyboardInterrupt, StoppedError):
+            interrupted = True
+        whole, columns = run.result(part.rows)
+        done, others = np.flatnonzero(whole), np.flatnonzero(~whole).tolist()
+        part.runs.reached(done, **{name: values[done] for name, values in columns.items()})
+        if not interrupted:
+            self._one_by_one(chunk, part, others, stopped)
+        for k in others if interrupted else ():
+            part.runs.messages[k] = f"{INTERRUPTED}{run.reached(k)}"
+        return True
+
+    def _one_by_one(self, chunk: Chunk, part: Part, which: Iterable[int], stopped: Callable[[], bool]) -> None:
         with _lock:
             compiled = _compiled(self.pickled, self.options.backend)
         events = _event_program(self.events) if self.events else None
-        for k, x in enumerate(chunk.x):
+        whole = True
+        for k in which:
+            if not whole:
+                part.rows[k] = np.nan
+                continue
+            x = chunk.x[k]
             run = integration(NativeRun(compiled, self.options, chunk.p[k].tolist(), stopped), events=events)
             recorder = Recorder(x, self.options.times, self.options.t0, self.options.direction)
-            part.stats[k] = outcome(run, x, recorder, self.options)
+            part.runs.set(k, outcome(run, x, recorder, self.options))
             if isinstance(run, WatchedIntegration):
                 part.happened[k] = run.log.happened
             states = recorder.table()[1]
             part.rows[k, : len(states)], part.rows[k, len(states) :] = states, np.nan
-            if part.stats[k].message.startswith(INTERRUPTED):
-                part.rows[k + 1 :] = np.nan
-                return
+            whole = not part.runs.messages[k].startswith(INTERRUPTED)
 
 
 _lock = threading.Lock()  # threads that come at the same time wait for one to make the code
@@ -320,6 +355,11 @@ def _vector_code(pickled: bytes, backend: str) -> VectorCode:
 @memo(KEPT)
 def _compiled(pickled: bytes, backend: str) -> CompiledSteps:
     return compile_steps(pickle.loads(pickled), backend)  # noqa: S301  # it came with the task itself
+
+
+@memo(KEPT)
+def _lanes(pickled: bytes, backend: str) -> Lanes | None:
+    return lanes_of(pickle.loads(pickled), backend)  # noqa: S301  # it came with the task itself
 
 
 @memo(KEPT)

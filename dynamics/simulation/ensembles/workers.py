@@ -59,7 +59,7 @@ def finished(task: Task, chunks: Sequence[Chunk], workers: int | Map, table: Arr
         for chunk in chunks:
             part = task.run(chunk, _rows(table, chunk), lambda: False)
             yield part
-            if part.interrupted:
+            if part.runs.interrupted:
                 raise KeyboardInterrupt
     else:
         with closing(_by_threads(task, chunks, min(workers, len(chunks)), table)) as parts:

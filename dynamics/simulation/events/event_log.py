@@ -341,7 +341,7 @@ class WatchedIntegration(Integration):
     def _count(self, run: Integration, rejected: int, evaluations: int) -> None:
         self.rejected, self.evaluations = rejected + run.rejected, evaluations + run.evaluations
         self.jacobians = sum(segment.jacobians for segment in self._segments)
-        self.factorizations = sum(segment.factorizations for segment in self._segments)
+        self.factorizations, self.prices = sum(segment.factorizations for segment in self._segments), run.prices
         self.largest, self.stiff = max(self.largest, run.largest), self.stiff or run.stiff
         self.slope = run.slope
         self.warnings = list(dict.fromkeys([*self.warnings, *run.warnings, *self.log.warnings]))

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from cgraph.extend import Array, Runner
 
 from ...integrators.step_control import DONE, RUNNING, SMALLEST_ATOL, TOO_SMALL
 from ..row_values import values_of
+from ..run_options import RunOptions
 from .dense_output import StepBlock
 from .first_step import TOLERANCE, given, instant
 from .flat_position import FlatPosition
@@ -43,6 +44,9 @@ class AdaptiveIntegration(NativeIntegration):
             rows, _ = self._advance(memory, int(min(left, 2**31)), whole=False)
             status = self._number(memory, "status")
             self._count(len(rows), int(self._number(memory, "rejected")))
+            if "jacobians" in self.runner.program.registers:  # a method that keeps them counts by itself
+                self.jacobians = int(self._number(memory, "jacobians"))
+                self.factorizations = int(self._number(memory, "factorizations"))
             self.evaluations = int(self._number(memory, "evaluations"))
             if len(rows):
                 self._look(memory, rows, tolerance)
@@ -57,18 +61,8 @@ class AdaptiveIntegration(NativeIntegration):
 
     def memory(self, x: Array) -> Array:
         """The memory before the first step."""
-        options, end = self.options, self._hold(self.options.t0, x)
-        values: dict[str, Any] = {
-            "t_end": options.t_end,
-            "goal": end,
-            "relative": self.relative,
-            "tolerance": np.maximum(options.absolute, SMALLEST_ATOL),
-            "longest_step": options.longest_step,
-            "first": options.first_step or 0.0,
-            "instant": instant(options.t0, options.t_end),
-        }
-        state: dict[str, Any] = {"x": x, "t": options.t0, "p": self.parameters, "sized": float(options.atol is None)}
-        return self.runner.memory(state | given(values))
+        end = self._hold(self.options.t0, x)
+        return self.runner.memory({"x": x, "p": self.parameters, **beginning(self.options, self.relative, end)})
 
     def _hold(self, t: float, x: Array) -> float:
         """Where the steps from t on end; of a controller, take its forces for this period."""
@@ -136,6 +130,20 @@ class AdaptiveIntegration(NativeIntegration):
         fastest = self.components[int(np.argmax(np.abs(rate) / scale))]
         h = self._number(memory, "tried")
         return f"{where}the step, {h:.3g} s, is below the resolution of the time; fastest is {fastest}"
+
+
+def beginning(options: RunOptions, relative: float, goal: float) -> dict[str, ArrayLike]:
+    """The registers with which a run begins, besides x and p.  goal: where its steps end first."""
+    values = {
+        "t_end": options.t_end,
+        "goal": goal,
+        "relative": relative,
+        "tolerance": np.maximum(options.absolute, SMALLEST_ATOL),
+        "longest_step": options.longest_step,
+        "first": options.first_step or 0.0,
+        "instant": instant(options.t0, options.t_end),
+    }
+    return {"t": options.t0, "sized": float(options.atol is None), **given(values)}
 
 
 def _lacking(runner: Runner, memory: Array, components: Sequence[str]) -> str:

@@ -33,7 +33,7 @@ def integration_of(
         segment = partial(ScipyIntegration, scipy_solver(problem, name, options.backend), between=between)
         return segment(options) if events is None else _watched(segment, options, events)
     method = METHODS[options.method]
-    program = step_program(problem, method, dense=method.adaptive and (between or options.times is not None))
+    program = step_program(problem, method, dense=method.adaptive and (between or options.between))
     run = NativeRun(compile_steps(program, options.backend), options, parameters, control=hold)
     return integration(run, every_step=between, events=events)
 

@@ -10,6 +10,7 @@ from cgraph import Graph
 from cgraph.extend import Call, Factor, If, Program, Runner, Statement, kept_by_first, runner
 
 from ...integrators import Method, Problem
+from ...integrators.jacobian_statements import prices
 from ...integrators.problem import constraint_rates
 from ...integrators.step_control import moved
 from ..estimates.state_sizes import StateKinds
@@ -51,6 +52,11 @@ class CompiledSteps:
     def factorizations(self) -> int:
         """LU factorizations in a trial of a step."""
         return sum(isinstance(statement, Factor) for statement in self.program.steps.statements())
+
+    @cached_property
+    def prices(self) -> tuple[float, float]:
+        """Of an evaluation of the Jacobian and of a factorization, in evaluations of the rate."""
+        return prices(self.program.steps, self.program.rate) if self.factorizations else (0.0, 0.0)
 
 
 @kept_by_first

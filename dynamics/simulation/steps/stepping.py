@@ -48,7 +48,8 @@ class Clock:
 class Integration(ABC):
     """One run. `blocks` makes the steps; the attributes say how far it has come.
 
-    jacobians, factorizations: evaluations of the Jacobian of the rate, LU factorizations of matrices.
+    jacobians, factorizations: evaluations of the Jacobian of the rate, LU factorizations of matrices; prices: of one of
+    each, in evaluations of the rate.
     status: empty while all is well, else why it stopped before the end.  largest: step [s].
     warnings: what speaks against the result, a sentence each.  event: the one that has ended it, in words.
     parameters: values of the rate's inputs that are not built in, as of the block that has come last.
@@ -60,7 +61,7 @@ class Integration(ABC):
     def __init__(self, components: Sequence[str]) -> None:
         self.components = components
         self.steps = self.rejected = self.evaluations = self.jacobians = self.factorizations = self.resets = 0
-        self.largest = 0.0
+        self.largest, self.prices = 0.0, (0.0, 0.0)
         self.status = ""
         self.warnings: list[str] = []
         self.event = self.stiff = self.slope = ""
@@ -111,7 +112,7 @@ class NativeIntegration(Integration):
         super().__init__(compiled.program.components)
         self.run, self.program, self.runner, self.options = run, compiled.program, compiled.runner, run.options
         self.parameters, self.control = list(run.parameters), run.control
-        self._passes, self._factored = FIRST_PASSES, compiled.factorizations
+        self._passes, self._factored, self.prices = FIRST_PASSES, compiled.factorizations, compiled.prices
         self._accepted = True
 
     @abstractmethod

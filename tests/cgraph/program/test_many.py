@@ -21,6 +21,7 @@ from cgraph.extend import (
     program_vjp,
     runner,
 )
+from cgraph.program.many import outliving
 from tests.cgraph.program.test_program_derivatives import LENGTHS, PASSES, START, RandomProgram
 from tests.slow import slow
 
@@ -44,6 +45,62 @@ def side_by_side(program: Program, values: dict[str, Array], feed: Array, backen
         for name in program.registers:
             assert np.array_equal(ready.read(alone, name), ready.read(together, name)[:, k], equal_nan=True), name
     return rows
+
+
+@pytest.mark.parametrize("seed", [*range(12), *slow(*range(12, 400))])
+def test_random_programs_in_lanes_run_each_to_its_own_stop(seed: int) -> None:
+    """The memories, passes and rows of lanes, in which others follow those that stop, are those of runs alone."""
+    pytest.importorskip("llvmlite")
+    s, n, count, clock = cg.variables("s n passed clock")
+    ends = {
+        "passed": count + 1.0,
+        "wish": s - 0.1,
+        "over": count + 1.0 >= n,
+        "clock": clock + 0.3 + 0.1 * cg.sin(count),
+    }
+    end = Call(cg.Graph([s, n, count, clock], ends), ("s", "n", "passed", "clock"), ("passed", "wish", "over", "clock"))
+    random, rng = RandomProgram(seed).program, np.random.default_rng(seed)
+    lengths = {**random.registers, "n": 1, "clock": 1, "wish": 1, "over": 1, "passed": 1}
+    record = [*random.record, "clock"]
+    program = Program(lengths, [*random.body, end], record, record_if="wish", stop="over")
+    ready, total = runner(program), 29
+    code = ready.lane_code("clock", ["x", "y", "z", "s", "passed"])
+    assert code is not None
+    values = {name: rng.uniform(-2.0, 2.0, (LENGTHS[name], total)) for name in START}
+    values |= {"passed": np.zeros((1, total)), "n": rng.integers(1, 15, (1, total)) * 1.0}
+    for lane, edge in EDGES.items():
+        values["x"][seed % 3, lane] = edge
+    start, marks = ready.memory(values, total).T.copy(), np.array([0.2, 0.5, 1.1, 1.2, 1.9, 2.0])
+    memories = np.zeros((total, code.size))
+    for name, place in code.numbers.items():
+        memories[:, place] = ready.read(start.T, name).T
+    passes, rows = np.zeros((total, 2), np.int64), np.full((total, len(marks), program.width), -7.0)
+    for most in (4, 3, 50):  # a run may be interrupted
+        which = np.flatnonzero(passes[:, 0] < values["n"][0])[::-1].copy()
+        code(memories, which, passes, most, rows, marks)
+    for k in range(total):
+        alone, mark = start[k].copy(), 0
+        found, done = ready.run(alone, 100)
+        assert done == passes[k, 0]
+        for name, place in code.numbers.items():
+            assert np.array_equal(memories[k, place], ready.read(alone, name), equal_nan=True), name
+        for row in found:
+            if mark < len(marks) and row[-1] >= marks[mark]:
+                assert np.array_equal(rows[k, mark], row, equal_nan=True)
+                rows[k, mark], mark = -7.0, int(np.searchsorted(marks, row[-1], side="right"))
+        assert passes[k, 1] == mark
+        assert (rows[k] == -7.0).all()
+
+
+def test_registers_that_nothing_reads_later_are_not_put_back() -> None:
+    a, b = cg.variables("a b")
+    halve, sums = cg.Graph([a], {"b": 0.5 * a}), cg.Graph([a, b], {"a": a + b})
+    inside = (Call(halve, ("a",), ("b",)), Call(sums, ("a", "b"), ("a",)))
+    program = Program({"a": 1, "b": 1, "test": 1}, [If("test", inside)], record=["a"])
+    assert outliving(program) == ["a", "test"]
+    assert "b before:1" in many(program).registers
+    assert "b before:1" not in many(program, kept=[]).registers
+    assert "b before:1" in many(program, kept=["b"]).registers
 
 
 @pytest.mark.filterwarnings("error")

@@ -1,0 +1,267 @@
+"""Trajectories by chosen steps in lanes: each is to the bit what it is alone, whatever its neighbors do."""
+
+import warnings
+from typing import Any
+
+import numpy as np
+import pytest
+from pytest import approx, mark
+
+import cgraph as cg
+import dynamics as dyn
+from dynamics.simulation.ensembles.lanes import FEW, fits_lanes
+from dynamics.simulation.ensembles.simulate_many import simulate_many
+from dynamics.simulation.steps.step_program import StepProgram
+from tests.dynamics.ensembles import same
+from tests.dynamics.models import oscillator, random_arm
+from tests.early_end import stops
+from tests.slow import slow
+
+COUNT = FEW + 5  # more than one vector, and not a whole number of them
+TIMES = [0.0, 0.11, 0.12, 0.5, 1.0]
+COMPARED = (0, 3, 8, COUNT - 1)
+TOP = np.diag([0.1, 0.2, 0.25])  # kg m^2
+ROUNDING = 1e-12  # of equal steps, whose lengths between rows are rounded otherwise alone
+LANES = ("dop853", "dopri5", "rodas", "taylor")
+
+
+def spring() -> dyn.System:
+    """A pendulum on a spring, pushed by a force in time, with parameters."""
+    return dyn.System(
+        lambda q, qd, t, p: 0.5 * (qd[0] ** 2 + (q[0] * qd[1]) ** 2) - p["k"] * (q[0] - 1.0) ** 2 + q[0] * cg.cos(q[1]),
+        ["r", "angle"],
+        parameters={"k": 5.0},
+        forces=lambda q, qd, t: [0.1 * cg.sin(t), 0.0],
+    )
+
+
+def lone() -> dyn.OdeSystem:
+    """A sine, an exponential and a power that have no company: of one point libm computes them."""
+
+    def rates(x: Any, t: Any, p: Any) -> list[Any]:
+        return [x[1], -p["g"] * cg.sin(x[0]) + 1e-2 * cg.exp(-x[1]) - 1e-3 * abs(x[2]) ** 1.3, x[0]]
+
+    return dyn.OdeSystem(rates, ["x", "y", "z"], {"g": 3.0})
+
+
+def starts(model: Any, seed: int) -> tuple[Any, Any]:
+    rng = np.random.default_rng(seed)
+    if isinstance(model, dyn.OdeSystem):
+        return rng.normal(size=(COUNT, 3)), None
+    n, nq = len(model.velocities), len(model.coordinates)
+    return rng.normal(size=(COUNT, nq)) + 1.0 * (nq > n), rng.normal(size=(COUNT, n))
+
+
+def require_lanes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let a trajectory that is run alone be seen."""
+    pytest.importorskip("llvmlite")
+
+    def alone(*arguments: Any) -> None:
+        raise AssertionError("a trajectory is run alone")
+
+    monkeypatch.setattr("dynamics.simulation.ensembles.task.integration", alone)
+
+
+def each_is_alone(model: Any, fan: dyn.Ensemble, q: Any, qd: Any, t_end: float, method: str, **options: Any) -> None:
+    """What they are one by one, and, unless parameters that differ are inputs, by `simulate`."""
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr("dynamics.simulation.ensembles.simulate_many.fits_lanes", lambda *_: False)
+        assert same(fan, simulate_many(model, q, qd, t_end, method, **options))
+    for k in () if options.pop("parameters", {}) else COMPARED:
+        one = dyn.simulate(model, q[k], None if qd is None else qd[k], t_end, method, **options)
+        assert np.array_equal(one.q, fan.q[k])
+        assert np.array_equal(one.qd, fan.qd[k])
+        for name in ("steps", "rejected", "nfev", "dt", "status", "message"):
+            assert getattr(fan.stats, name)[k] == getattr(one.stats, name), name
+
+
+MODELS: dict[str, Any] = {
+    "arm": random_arm(2),
+    "oscillator": oscillator(),
+    "spring": spring(),
+    "lone": lone(),
+    "ball": dyn.Mechanism([dyn.Body("top", dyn.Joint("ball"), mass=1.0, center=[0.1, 0.0, -0.3], inertia=TOP)]),
+}
+
+
+@mark.parametrize(
+    ("name", "method"),
+    [
+        ("arm", "dop853"),
+        ("spring", "dop853"),
+        ("lone", "dop853"),
+        ("ball", "dop853"),
+        ("spring", "dopri5"),
+        ("lone", "rodas"),
+        ("spring", "rodas"),
+        ("arm", "taylor"),
+        *slow(*[(name, method) for name in MODELS for method in LANES]),
+    ],
+)
+def test_each_has_the_bits_that_it_has_alone(name: str, method: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    model = MODELS[name]
+    q, qd = starts(model, 1)
+    vary = {"spring": "k", "lone": "g", "oscillator": "k"}.get(name)
+    parameters = {} if vary is None else {vary: np.linspace(1.0, 30.0, COUNT)}
+    with monkeypatch.context() as patched:
+        require_lanes(patched)
+        fan = simulate_many(model, q, qd, 1.0, method, t_eval=TIMES, parameters=parameters)
+    each_is_alone(model, fan, q, qd, 1.0, method, t_eval=TIMES, parameters=parameters)
+
+
+@mark.parametrize(
+    "options",
+    [
+        {"t_eval": [1.0]},
+        {"t_eval": [-1.0], "t_end": -1.0},
+        {"t_eval": [0.2, 0.2 + 1e-12, 0.3]},
+        {"t_eval": np.linspace(0.0, 1.0, 400)},
+        {"t_eval": [0.5], "rtol": 1e-6, "atol": 1e-7, "max_step": 0.05},
+        {"t_eval": [0.5, 1.0], "first_step": 1e-3},
+        {"t_eval": [0.5, 1.0], "form": "momentum"},
+        {"t_eval": [3.5, 4.0], "t0": 3.0, "t_end": 4.0},
+    ],
+)
+def test_options_are_those_of_a_run_alone(options: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
+    model = spring()
+    q, qd = starts(model, 2)
+    options = dict(options)
+    t_end = options.pop("t_end", 1.0)
+    with monkeypatch.context() as patched:
+        require_lanes(patched)
+        fan = simulate_many(model, q, qd, t_end, **options)
+    each_is_alone(model, fan, q, qd, t_end, "dop853", **options)
+    if "form" in options:
+        assert fan.p is not None
+        one = dyn.simulate(model, q[3], qd[3], t_end, **options)
+        assert np.array_equal(fan.p[3], np.asarray(one.p))
+
+
+@mark.parametrize("method", LANES)
+def test_workers_and_chunks_change_no_bit(method: str) -> None:
+    model = spring()
+    q, qd = starts(model, 3)
+    q[5], qd[7] = 1e3, 50.0  # steps that are much shorter than those of others
+    whole, *others = [
+        simulate_many(model, q, qd, 0.5, method, t_eval=TIMES[:4], **shares)
+        for shares in ({}, {"workers": 3}, {"chunk": 1}, {"chunk": 9, "workers": 2}, {"workers": map, "chunk": 20})
+    ]
+    assert all(same(whole, other) for other in others)
+
+
+def test_lanes_that_are_interrupted_go_on_with_the_same_bits(monkeypatch: pytest.MonkeyPatch) -> None:
+    model = random_arm(2)
+    q, qd = starts(model, 4)
+    whole = simulate_many(model, q, qd, 2.0, t_eval=[1.0, 2.0])
+    monkeypatch.setattr("dynamics.simulation.ensembles.lanes.PASSES", 3)
+    monkeypatch.setattr("dynamics.simulation.ensembles.task.BLOCK_TIME", 0.0)
+    assert same(whole, simulate_many(model, q, qd, 2.0, t_eval=[1.0, 2.0]))
+
+
+@stops
+@mark.parametrize("method", LANES)
+def test_one_that_fails_is_not_felt_and_says_what_it_says_alone(method: str) -> None:
+    """v' = v^2 leaves at t = 1 / v."""
+    model = dyn.System(
+        lambda q, qd, t: 0.5 * (qd[0] ** 2 + qd[1] ** 2) - 0.5 * q[0] ** 2,
+        ["calm", "wild"],
+        forces=lambda q, qd, t: [0.0, qd[1] ** 2],
+    )
+    q, qd = starts(model, 5)
+    qd[:, 1] = -1.0
+    calm = simulate_many(model, q, qd, 2.0, method, t_eval=np.linspace(0.0, 2.0, 21))
+    wild = {4: 1.0, 9: 2.0, COUNT - 1: 3.0}
+    for k, v in wild.items():
+        qd[k, 1] = v
+    fan = simulate_many(model, q, qd, 2.0, method, t_eval=np.linspace(0.0, 2.0, 21))
+    others = [k for k in range(COUNT) if k not in wild]
+    assert fan.stats.success.tolist() == [k in others for k in range(COUNT)]
+    assert (fan.q[others] == calm.q[others]).all()
+    assert (fan.qd[others] == calm.qd[others]).all()
+    for k, v in wild.items():
+        one = dyn.simulate(model, q[k], qd[k], 2.0, method, t_eval=np.linspace(0.0, 2.0, 21))
+        stats, rows = fan.stats, int((fan.t <= one.t[-1]).sum())
+        found = (stats.message[k], stats.steps[k], stats.nfev[k], stats.status[k])
+        assert found == (one.stats.message, one.stats.steps, one.stats.nfev, -1)
+        assert np.array_equal(fan.q[k, :rows], one.q[:rows])
+        assert np.isnan(fan.q[k, rows:]).all()
+        assert one.t[-1] == approx(1.0 / v, rel=1e-6)
+
+
+def test_a_stiff_one_is_warned_of_as_alone() -> None:
+    model = dyn.OdeSystem(lambda x, t, p: [x[1], -p["k"] * x[0] - (p["k"] + 1.0) * x[1]], ["x", "v"], {"k": 1.0})
+    k = np.full(COUNT, 2.0)
+    k[11] = 2000.0
+    with pytest.warns(dyn.SimulationWarning, match="1 of 37 trajectories has a warning: trajectory 11: the system is"):
+        fan = simulate_many(model, [1.0, 0.0], None, 2.0, "dopri5", t_eval=[2.0], parameters={"k": k})
+    assert [bool(texts) for texts in fan.stats.warnings] == [j == 11 for j in range(COUNT)]
+    with pytest.warns(dyn.SimulationWarning, match="the system is stiff"):
+        one = dyn.simulate(model, [1.0, 0.0], None, 2.0, "dopri5", t_eval=[2.0], parameters={"k": 2000.0})
+    assert np.array_equal(one.q, fan.q[11])
+
+
+@stops
+def test_as_many_steps_as_alone() -> None:
+    model = random_arm(2)
+    q, qd = starts(model, 6)
+    stats = dyn.simulate(model, q[0], qd[0], 1.0).stats
+    steps = stats.steps + stats.rejected
+    fan = simulate_many(model, q, qd, 1.0, t_eval=[0.01, 1.0], max_steps=steps)
+    assert fan.stats.success[0]
+    for k in COMPARED:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", dyn.SimulationWarning)
+            one = dyn.simulate(model, q[k], qd[k], 1.0, t_eval=[0.01, 1.0], max_steps=steps)
+        assert (fan.stats.message[k], fan.stats.steps[k]) == (one.stats.message, one.stats.steps)
+    assert not fan.stats.success.all()
+
+
+def test_what_cannot_go_in_lanes_goes_one_by_one() -> None:
+    from dynamics.integrators import METHODS, derive
+    from dynamics.simulation.run_options import RunOptions
+    from dynamics.simulation.steps.step_program import step_program
+
+    problem = derive(spring(), {"k": 5.0, "tau0": 0.0, "tau1": 0.0})
+
+    def program(method: str) -> StepProgram:
+        return step_program(problem, METHODS[method], dense=False)
+
+    fine = RunOptions(1.0)
+    assert fits_lanes(program("dop853"), fine, FEW)
+    assert not fits_lanes(program("dop853"), fine, FEW - 1)
+    assert not fits_lanes(program("radau"), RunOptions(1.0, "radau"), FEW)
+    assert not fits_lanes(program("rk4"), RunOptions(1.0, "rk4"), FEW)
+    assert not fits_lanes(program("dop853"), RunOptions(1.0, rtol=1e-16), FEW)
+    q, qd = starts(spring(), 7)
+    one_by_one = simulate_many(spring(), q, qd, 0.3, "radau", t_eval=[0.3])
+    each_is_alone(spring(), one_by_one, q, qd, 0.3, "radau", t_eval=[0.3])
+    in_python = simulate_many(spring(), q, qd, 0.05, t_eval=[0.05], backend="python")
+    each_is_alone(spring(), in_python, q, qd, 0.05, "dop853", t_eval=[0.05], backend="python")
+
+
+@mark.parametrize("times", [[1.0], [0.0, 0.5, 1.0], [0.25, 0.5, 0.75], None])
+@mark.parametrize("method", ["rk4", "verlet"])
+def test_equal_steps_are_the_same_with_an_estimate_and_without(method: str, times: Any) -> None:
+    model = random_arm(2)
+    q, qd = starts(model, 8)
+    options = {"dt": 0.02, "t_eval": times}
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", dyn.SimulationWarning)
+        beside = simulate_many(model, q, qd, 1.0, method, **options)
+    assert same(beside, simulate_many(model, q, qd, 1.0, method, estimate_error=False, **options))
+    assert same(beside, simulate_many(model, q, qd, 1.0, method, estimate_error=False, workers=2, chunk=10, **options))
+
+
+@stops
+def test_one_of_equal_steps_that_fails_says_what_it_says_alone() -> None:
+    model = dyn.OdeSystem(lambda x, t: [x[0] ** 2], ["x"])
+    x = np.full((COUNT, 1), -1.0)
+    x[7], x[20] = 1.0, 1e200
+    options = {"dt": 0.01, "t_eval": np.linspace(0.0, 2.0, 11), "estimate_error": False}
+    fan = simulate_many(model, x, None, 2.0, "rk4", **options)
+    assert fan.stats.success.tolist() == [k not in (7, 20) for k in range(COUNT)]
+    for k in (0, 7, 20):
+        one = dyn.simulate(model, x[k], None, 2.0, "rk4", **options)
+        rows = int((fan.t <= one.t[-1]).sum())
+        assert fan.q[k, :rows] == approx(one.q[:rows], rel=ROUNDING)
+        assert (fan.stats.message[k], fan.stats.steps[k]) == (one.stats.message, one.stats.steps)
