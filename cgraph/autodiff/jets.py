@@ -7,11 +7,11 @@ same for all k > 0, the rest, from those sums, which run over many nodes at once
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from typing import NamedTuple
 
-from ..core.builder import Builder
+from ..core.builder import Builder, folded
 from ..core.checks import check_name
 from ..core.graph import Graph
 from ..core.label import Label
@@ -51,6 +51,52 @@ class Jets(NamedTuple):
     sums: int
     safe: tuple[bool, ...]
     pieces: tuple[Node, ...]
+
+
+def convolution(left: Sequence[Node], right: Sequence[Node]) -> Node:
+    """The sum over 0 < j < k of left_j right_k-j, of k - 1 > 0 factors each: in two halves, of equal factors in one.
+
+    >>> import cgraph as cg
+    >>> from cgraph.extend import convolution
+    >>> a, b = cg.variables("a1 a2 a3"), cg.variables("b1 b2 b3")
+    >>> cg.latex(convolution(a, b)), cg.latex(convolution(a, a))
+    """
+    products = [a * b for a, b in zip(left, reversed(right), strict=True)]
+    if all(a is b for a, b in zip(left, right, strict=True)):
+        twice, middle = products[: len(products) // 2], products[len(products) // 2 :][: len(products) % 2]
+        return sum(middle, 2.0 * sum(twice[1:], twice[0])) if twice else middle[0]
+    halves = [sum(part[1:], part[0]) for part in (products[::2], products[1::2]) if part]
+    return sum(halves[1:], halves[0])
+
+
+def straight(made: Jets, order: int) -> Graph:
+    """All coefficients in one graph: (the rates (m), unit, zeros) -> coefficients 1 of x (m), 2, .. up to that order.
+
+    Of xdot = x, from x = 1:
+
+    >>> import cgraph as cg
+    >>> from cgraph.extend import jets, straight
+    >>> x = cg.variable("x")
+    >>> straight(jets(cg.Graph([x], {"rate": x})), 3).evaluate({"rate0": 1.0, "unit": 1.0})
+    {'0': 1.0, '1': 0.5, '2': 0.16666666666666666}
+    """
+    wanted, build, size = list(made.order.outputs.values()), Builder(), made.sums
+    m = (len(wanted) - 2 * size) // 2
+    inputs = [*made.order.inputs[: m + 1], *made.order.inputs[m + 2 : m + 2 + made.zeros]]
+    rates, unit, zeros = inputs[:m], inputs[m], inputs[m + 1 :]
+    left: list[list[Node]] = [[] for _ in range(size)]
+    right: list[list[Node]] = [[] for _ in range(size)]
+    coefficients: list[Node] = []
+    for k in range(1, order + 1):
+        with building(build):
+            sums = [convolution(a, b) if k > 1 else constant(0.0) for a, b in zip(left, right, strict=True)]
+        values = [*rates, unit, constant(float(k)), *zeros, *sums]
+        now = folded(wanted, build, dict(zip(made.order.inputs, values, strict=True)))
+        coefficients += now[:m]
+        rates = now[m : 2 * m]
+        for row, each in zip((*left, *right), now[2 * m :], strict=True):
+            row.append(each)
+    return Graph(inputs, {f"{i}": node for i, node in enumerate(coefficients)})
 
 
 ROUNDS = 100  # of partials of partials; those of the table come back to what is there after 2

@@ -1,5 +1,6 @@
 """Integrators: methods for xdot = f(x, t), as programs over the graphs of a model."""
 
+import math
 from collections.abc import Callable
 from functools import partial
 from importlib import import_module
@@ -47,8 +48,8 @@ def runge_kutta(tableau: Tableau) -> Method:
 def _later(file: str, name: str, *given: object) -> Callable[[Problem], Step]:
     """The step of a method, whose file is loaded when a problem first takes it."""
 
-    def step(problem: Problem) -> Step:
-        made: Step = getattr(import_module(f"{__name__}.{file}"), name)(*given, problem)
+    def step(problem: Problem, **chosen: int) -> Step:
+        made: Step = getattr(import_module(f"{__name__}.{file}"), name)(*given, problem, **chosen)
         return made
 
     return step
@@ -79,6 +80,11 @@ def _names_gauss(name: str) -> bool:
     return name in [f"gauss{2 * stages}" for stages in range(1, MOST_STAGES + 1)]
 
 
+def _taylor_order(rtol: float) -> int:
+    """Jorba and Zou's, 1 - log(rtol) / 2; the highest where nothing is asked for."""
+    return min(max(math.ceil(1.0 - 0.5 * math.log(rtol)), 3), TAYLOR_ORDER) if 0.0 < rtol < 1.0 else TAYLOR_ORDER
+
+
 METHODS: dict[str, Method] = Methods(
     {
         **{name: runge_kutta(tableau) for name, tableau in TABLEAUS.items()},
@@ -87,11 +93,12 @@ METHODS: dict[str, Method] = Methods(
         "radau": Method(5, _later("radau", "radau_step"), adaptive=True, degree=3),
         "taylor": Method(
             TAYLOR_ORDER,
-            _later("taylor", "taylor_step", TAYLOR_ORDER),
+            _later("taylor", "taylor_step"),
             adaptive=True,
             degree=TAYLOR_ORDER,
             finest=2.0**-52,
             starts=True,
+            order_at=_taylor_order,
         ),
         **{name: _symplectic(method) for name, method in PARTITIONED.items()},
         **{

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Call, Program, Statement
+from cgraph.extend import Call, Program, Statement, memo
 
 from .problem import Problem
 from .step import Step, arriving, rate_calls, with_registers
@@ -82,6 +83,11 @@ class Method:
     degree: int = HERMITE
     finest: float = ROUNDING
     starts: bool = False
+    order_at: Callable[[float], int] | None = None
+
+    def at(self, rtol: float) -> Method:
+        """The method for runs of a relative tolerance: of the order that this asks for."""
+        return self if self.order_at is None else _of_order(self, self.order_at(rtol))
 
     def program(self, problem: Problem, dense: bool) -> Program:
         """The steps of a run, one after another; dense: with dense output where they are chosen.
@@ -97,6 +103,12 @@ class Method:
 
     def __repr__(self) -> str:
         return f"<Method of order {self.order}, {'steps by error' if self.adaptive else 'equal steps'}>"
+
+
+@memo(32)
+def _of_order(method: Method, order: int) -> Method:
+    step = partial(method.step, order=order)
+    return replace(method, order=order, degree=order, step=step, order_at=None)
 
 
 def equal_registers(problem: Problem) -> dict[str, int]:

@@ -74,7 +74,7 @@ def scale(x: Node, x_new: Node, rtol: Node, atol: Node, leap: Node) -> Node:
     return atol + rtol * cg.maximum(abs(x), abs(x_new)) + leap * abs(x_new - x)
 
 
-def control(order: int, evaluations: int) -> Call:
+def control(order: int, evaluations: int, starts: bool) -> Call:
     """From the estimate of a trial: whether it is accepted, and the next step. A NaN is an error beyond measure.
 
     A step below the resolution of t, or of the run, is not accepted whatever its error: only one that ends the run may
@@ -91,9 +91,11 @@ def control(order: int, evaluations: int) -> Call:
     growth = cg.minimum(cg.maximum(growth, SMALLEST), cg.where(before, LARGEST, 1.0))  # no growth after a rejection
     shrink = cg.where(error < 1e300, cg.maximum(SAFETY * error ** (-1.0 / order), SMALLEST), 0.1)
     after = tried * cg.where(accepted, growth, shrink)
+    if starts:
+        after = cg.where(accepted, math.inf, tried * shrink)
     outputs = {
         "accepted": accepted,
-        "next": cg.where(accepted * (tried < wanted), cg.maximum(wanted, after), after),  # a step cut short says less
+        "next": after if starts else cg.where(accepted * (tried < wanted), cg.maximum(wanted, after), after),  # a step cut short says less
         "error_old": cg.where(accepted, error, old),
         "status": cg.where(accepted, cg.where(arrives, DONE, RUNNING), cg.where(able, RUNNING, TOO_SMALL)),
         "rejected": rejected + (1.0 - accepted),
@@ -102,13 +104,15 @@ def control(order: int, evaluations: int) -> Call:
     return Call(Graph(inputs, outputs), tuple(names), tuple(outputs))
 
 
-def accept_step(*after: Statement) -> If:
+def accept_step(*after: Statement, starts: bool) -> If:
     """An accepted step becomes the state; `after` is what the method does besides, with x still the old state."""
     kept = (copied("x", "x_old"), copied("t", "t_old"))
     h, longest, turned = cg.variables("h longest turned")
     lost = cg.minimum(cg.sqrt(turned), FORGOTTEN) * longest
     after_h = Graph([h, longest, turned], {"longest": cg.maximum(abs(h), longest - lost)})
     x, x_new, moved, wanted, still = cg.variables("x x_new moved next still")
+    if starts:
+        return If("accepted", (*kept, *after, copied("x_new", "x"), copied("t_new", "t")))
     way = Sum(Graph([x, x_new], {"way": abs(x_new - x)}), ("x", "x_new"), "moved")
     short = Graph([moved, wanted, still], {"next": cg.where(moved, wanted, cg.minimum(wanted, still))})
     remembered = Call(after_h, ("h", "longest", "turned"), ("longest",))
@@ -150,15 +154,13 @@ def chosen(step: Step, problem: Problem, *, dense: bool, degree: int, starts: bo
     if again:
         body.append(If("accepted", tuple(again)))
     body += [trial(), *step.body, *step.error]
-    body.append(control(step.estimate, rate_calls(problem, step.body, step.error)))
+    body.append(control(step.estimate, rate_calls(problem, step.body, step.error), starts))
     after: list[Statement] = []
     if dense:
         polynomial, more = (step.dense, step.dense_lengths) if step.dense else _hermite(problem)
         after += [*polynomial, *_counted(problem, polynomial)]
         lengths |= {**dict.fromkeys([f"dense{k + 1}" for k in range(degree)], problem.size), **more}
-    body.append(accept_step(*after, *step.kept, *step.handed))
-    if starts:
-        body.append(If("accepted", (Call(Graph([], {"next": math.inf}), (), ("next",)),)))
+    body.append(accept_step(*after, *step.kept, *step.handed, starts=starts))
     return Program(lengths, body, recorded(dense, degree), record_if="accepted", stop="status")
 
 
