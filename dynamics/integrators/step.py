@@ -91,7 +91,7 @@ class Step:
     failed: str = ""
     error: Sequence[Statement] = ()
     estimate: int = 0
-    handed: Sequence[Statement] = ()
+    handed: Sequence[Statement] | None = None
     dense: Sequence[Statement] = ()
     dense_lengths: Mapping[str, int] = field(default_factory=dict)
 

@@ -91,11 +91,9 @@ def control(order: int, evaluations: int, starts: bool) -> Call:
     growth = cg.minimum(cg.maximum(growth, SMALLEST), cg.where(before, LARGEST, 1.0))  # no growth after a rejection
     shrink = cg.where(error < 1e300, cg.maximum(SAFETY * error ** (-1.0 / order), SMALLEST), 0.1)
     after = tried * cg.where(accepted, growth, shrink)
-    if starts:
-        after = cg.where(accepted, math.inf, tried * shrink)
     outputs = {
         "accepted": accepted,
-        "next": after if starts else cg.where(accepted * (tried < wanted), cg.maximum(wanted, after), after),  # a step cut short says less
+        "next": tried * shrink if starts else cg.where(accepted * (tried < wanted), cg.maximum(wanted, after), after),  # a step cut short says less
         "error_old": cg.where(accepted, error, old),
         "status": cg.where(accepted, cg.where(arrives, DONE, RUNNING), cg.where(able, RUNNING, TOO_SMALL)),
         "rejected": rejected + (1.0 - accepted),
@@ -112,7 +110,8 @@ def accept_step(*after: Statement, starts: bool) -> If:
     after_h = Graph([h, longest, turned], {"longest": cg.maximum(abs(h), longest - lost)})
     x, x_new, moved, wanted, still = cg.variables("x x_new moved next still")
     if starts:
-        return If("accepted", (*kept, *after, copied("x_new", "x"), copied("t_new", "t")))
+        free = Call(Graph([], {"next": math.inf}), (), ("next",))
+        return If("accepted", (*kept, *after, copied("x_new", "x"), copied("t_new", "t"), free))
     way = Sum(Graph([x, x_new], {"way": abs(x_new - x)}), ("x", "x_new"), "moved")
     short = Graph([moved, wanted, still], {"next": cg.where(moved, wanted, cg.minimum(wanted, still))})
     remembered = Call(after_h, ("h", "longest", "turned"), ("longest",))
@@ -149,7 +148,7 @@ def chosen(step: Step, problem: Problem, *, dense: bool, degree: int, starts: bo
     """A trial of one step a pass. starts: whether the next step is at most what the derivatives at its start allow."""
     lengths = with_registers(step, registers(problem))
     rates, prepare = ([*part, *_counted(problem, part)] for part in (step.rates, step.prepare))
-    first, again = ([*step.start, *rates], prepare) if step.handed else (step.start, [*rates, *prepare])
+    first, again = ([*step.start, *rates], prepare) if step.handed is not None else (step.start, [*rates, *prepare])
     body: list[Statement] = [first_pass(*first)] if first else []
     if again:
         body.append(If("accepted", tuple(again)))
@@ -160,7 +159,7 @@ def chosen(step: Step, problem: Problem, *, dense: bool, degree: int, starts: bo
         polynomial, more = (step.dense, step.dense_lengths) if step.dense else _hermite(problem)
         after += [*polynomial, *_counted(problem, polynomial)]
         lengths |= {**dict.fromkeys([f"dense{k + 1}" for k in range(degree)], problem.size), **more}
-    body.append(accept_step(*after, *step.kept, *step.handed, starts=starts))
+    body.append(accept_step(*after, *step.kept, *(step.handed or ()), starts=starts))
     return Program(lengths, body, recorded(dense, degree), record_if="accepted", stop="status")
 
 

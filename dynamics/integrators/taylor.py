@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from collections.abc import Sequence
 
 import cgraph as cg
 from cgraph import Graph, Node
@@ -53,8 +54,8 @@ def taylor_step(problem: Problem, order: int = MOST) -> Step:
     unit, h = cg.variables("unit h")
     share = Call(function("h unit", s=h / unit), ("h", "unit"), ("s",))
     at_all = Call(function("unit h", unit=cg.where(unit, unit, h)), ("unit", "h"), ("unit",))  # where nothing is wished
-    lengths = dict.fromkeys([*_names("c", order), "rate", "rate_new", "rounding", "rounding_new", "slope", "atol"], m)
-    lengths |= dict.fromkeys(["zeros", "zeros_new"], graphs.zeros)
+    lengths = dict.fromkeys([*_names("c", order), "rate", "rounding", "rounding_new", "slope", "atol"], m)
+    lengths["zeros"] = graphs.zeros
     lengths |= dict.fromkeys(controls := ["unit", "last", "before", "next", "rtol", "s", "at_t"], 1)
     if not short:
         lengths |= {f"{side}{k}": graphs.sums for side in ("left", "right") for k in range(1, order + 1)}
@@ -63,14 +64,14 @@ def taylor_step(problem: Problem, order: int = MOST) -> Step:
     return Step(
         lengths,
         [share, _arrival(order)],
-        [_rates(graphs, "x", "t", ""), count(1)],
+        [_rates(graphs, "x", "t"), count(1)],
         [at_all, *(_at_once if short else _by_orders)(graphs, order), *_wish(order)],
         [copied("next", "unit")],
         kept=[copied("rounding_new", "rounding"), copied("h", "unit")],
         fixed=("rounding", "rounding_new", "next", "rtol", "atol", *controls),
-        error=[stage_time("at_t", 1.0), _rates(graphs, "x_new", "at_t", "_new"), count(1), *_checked(m, order)],
+        error=[stage_time("at_t", 1.0), _rates(graphs, "x_new", "at_t"), count(1), *_checked(m, order)],
         estimate=order,
-        handed=[copied(f"{name}_new", name) for name in ("rate", "zeros")],
+        handed=(),
         dense=[_dense(order)],
         dense_lengths=dict.fromkeys(_names("dense", order), m),
     )
@@ -80,9 +81,9 @@ def _names(name: str, order: int) -> list[str]:
     return [f"{name}{k}" for k in range(1, order + 1)]
 
 
-def _rates(graphs: Jets, x: str, t: str, suffix: str) -> Call:
+def _rates(graphs: Jets, x: str, t: str) -> Call:
     """The rates and coefficients 0 at a state."""
-    return Call(graphs.start, (x, t, "p"), (f"rate{suffix}", f"zeros{suffix}"))
+    return Call(graphs.start, (x, t, "p"), ("rate", "zeros"))
 
 
 @kept_by_first
@@ -131,12 +132,20 @@ def _wish(order: int) -> list[Statement]:
 def _arrival(order: int) -> Map:
     """x_new = x + sum of c_k s^k, with what rounding took off; slope = h times the polynomial's derivative there."""
     x, before, s, *c = cg.variables(["x", "rounding", "s", *_names("c", order)])
-    change, slope = c[-1], order * c[-1]
-    for k in range(order - 1, 0, -1):
-        change, slope = c[k - 1] + s * change, k * c[k - 1] + s * slope
-    total, rounding = compensated(x, s * change + before)
-    graph = Graph([x, before, s, *c], {"x": total, "rounding": rounding, "slope": s * slope})
+    total, rounding = compensated(x, s * _polynomial(c, s) + before)
+    slope = s * _polynomial([k * each for k, each in enumerate(c, 1)], s)
+    graph = Graph([x, before, s, *c], {"x": total, "rounding": rounding, "slope": slope})
     return Map(graph, ("x", "rounding", "s", *_names("c", order)), ("x_new", "rounding_new", "slope"))
+
+
+def _polynomial(c: Sequence[Node], s: Node) -> Node:
+    """The sum of c_k s^k, by Estrin: halves side by side, of half as many steps each time."""
+    terms, power = list(c), s
+    while len(terms) > 1:
+        pairs = zip(terms[::2], terms[1::2], strict=False)
+        terms = [low + power * high for low, high in pairs] + terms[len(terms) // 2 * 2 :]
+        power = power * power
+    return terms[0]
 
 
 def _checked(m: int, order: int) -> list[Statement]:
@@ -147,7 +156,7 @@ def _checked(m: int, order: int) -> list[Statement]:
     total, h, t = cg.variables("error h t")
     error = cg.where(cg.not_equal(t, t + h), cg.sqrt(total / m), math.inf)
     return [
-        Sum(Graph(inputs, {"y": part * part}), ("slope", "rate_new", "x", "x_new", "rtol", "atol", "h"), "error"),
+        Sum(Graph(inputs, {"y": part * part}), ("slope", "rate", "x", "x_new", "rtol", "atol", "h"), "error"),
         Call(Graph([total, h, t], {"error": error}), ("error", "h", "t"), ("error",)),
     ]
 
