@@ -143,6 +143,11 @@ class RunOptions:
         return self.scipy_solver is not None or METHODS[self.method].adaptive
 
     @property
+    def integrator(self) -> Method:
+        """The method, of `METHODS`, for this tolerance."""
+        return METHODS[self.method].at(self.relative)
+
+    @property
     def step(self) -> float:
         """The largest of equal steps [s]."""
         return STEP if self.dt is None else float(self.dt)

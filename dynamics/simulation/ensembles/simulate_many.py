@@ -141,7 +141,7 @@ def simulate_many(
     # Derive the equations as graphs, and write the steps of the method over them
     begin = time.perf_counter()
     problem = in_form(derive(model, start.bound), form)
-    program, watch = step_program(problem, METHODS[method], dense=True), event_program(problem, watched)
+    program, watch = step_program(problem, options.integrator, dense=True), event_program(problem, watched)
 
     # Share out the work: what a worker is sent, and the starts of chunks of trajectories
     grids = [] if watched else _grids(program, options, len(start.x))
