@@ -54,23 +54,31 @@ class Jets(NamedTuple):
 
 
 def convolution(left: Sequence[Node], right: Sequence[Node]) -> Node:
-    """The sum over 0 < j < k of left_j right_k-j, of k - 1 > 0 factors each: in two halves, of equal factors in one.
+    """The sum over 0 < j < k of left_j right_k-j, of k - 1 > 0 factors each.
+
+    Two halves are summed side by side; of equal factors on both sides, each product is taken once.
 
     >>> import cgraph as cg
     >>> from cgraph.extend import convolution
-    >>> a, b = cg.variables("a1 a2 a3"), cg.variables("b1 b2 b3")
-    >>> cg.latex(convolution(a, b)), cg.latex(convolution(a, a))
+    >>> left, right = cg.variables("a1 a2 a3"), cg.variables("b1 b2 b3")
+    >>> cg.latex(convolution(left, right))
+    'a_{1} \\\\, b_{3} + a_{3} \\\\, b_{1} + a_{2} \\\\, b_{2}'
     """
     products = [a * b for a, b in zip(left, reversed(right), strict=True)]
     if all(a is b for a, b in zip(left, right, strict=True)):
-        twice, middle = products[: len(products) // 2], products[len(products) // 2 :][: len(products) % 2]
-        return sum(middle, 2.0 * sum(twice[1:], twice[0])) if twice else middle[0]
-    halves = [sum(part[1:], part[0]) for part in (products[::2], products[1::2]) if part]
-    return sum(halves[1:], halves[0])
+        half = len(products) // 2
+        pairs = [2.0 * sum(products[1:half], products[0])] if half else []
+        parts = [*pairs, *products[half : len(products) - half]]
+    else:
+        parts = [sum(part[1:], part[0]) for part in (products[::2], products[1::2]) if part]
+    return sum(parts[1:], parts[0])
 
 
 def straight(made: Jets, order: int) -> Graph:
-    """All coefficients in one graph: (the rates (m), unit, zeros) -> coefficients 1 of x (m), 2, .. up to that order.
+    """All coefficients as one graph: (the rates (m), unit, zeros) -> coefficients 1 of x (m), 2, .., of that order.
+
+    It repeats `made.order`, folded: what is 0 or constant in some orders takes no operations there. Not of jets that are
+    `exact`.
 
     Of xdot = x, from x = 1:
 

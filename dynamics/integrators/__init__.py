@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from .jacobian_statements import jacobian_statements
 
 __getattr__, __dir__ = doors(__name__, __file__)
-TAYLOR_ORDER = 20  # of a tolerance of 2^-52
+TAYLOR_ORDER, LEAST_ORDER = 20, 3  # of a tolerance of 2^-52, and of large ones
 MOST_STAGES = 12  # of Gauss's methods: order 24, beyond which float64 gains nothing
 
 
@@ -45,11 +45,11 @@ def runge_kutta(tableau: Tableau) -> Method:
     return Method(tableau.order, step)
 
 
-def _later(file: str, name: str, *given: object) -> Callable[[Problem], Step]:
-    """The step of a method, whose file is loaded when a problem first takes it."""
+def _later(file: str, name: str, *given: object, **usual: int) -> Callable[..., Step]:
+    """The step of a method, whose file is loaded when a problem first takes it.  usual: unless others are chosen."""
 
     def step(problem: Problem, **chosen: int) -> Step:
-        made: Step = getattr(import_module(f"{__name__}.{file}"), name)(*given, problem, **chosen)
+        made: Step = getattr(import_module(f"{__name__}.{file}"), name)(*given, problem, **usual | chosen)
         return made
 
     return step
@@ -81,8 +81,9 @@ def _names_gauss(name: str) -> bool:
 
 
 def _taylor_order(rtol: float) -> int:
-    """Jorba and Zou's, 1 - log(rtol) / 2; the highest where nothing is asked for."""
-    return min(max(math.ceil(1.0 - 0.5 * math.log(rtol)), 3), TAYLOR_ORDER) if 0.0 < rtol < 1.0 else TAYLOR_ORDER
+    """Jorba and Zou's for a relative tolerance; the highest where it asks for nothing."""
+    wanted = 1.0 - 0.5 * math.log(rtol) if 0.0 < rtol < 1.0 else math.inf
+    return math.ceil(min(max(wanted, LEAST_ORDER), TAYLOR_ORDER))
 
 
 METHODS: dict[str, Method] = Methods(
@@ -93,7 +94,7 @@ METHODS: dict[str, Method] = Methods(
         "radau": Method(5, _later("radau", "radau_step"), adaptive=True, degree=3),
         "taylor": Method(
             TAYLOR_ORDER,
-            _later("taylor", "taylor_step"),
+            _later("taylor", "taylor_step", order=TAYLOR_ORDER),
             adaptive=True,
             degree=TAYLOR_ORDER,
             finest=2.0**-52,

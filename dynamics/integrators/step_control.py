@@ -80,7 +80,7 @@ def control(order: int, evaluations: int, starts: bool) -> Call:
     A step below the resolution of t, or of the run, is not accepted whatever its error: only one that ends the run may
     be so short.
 
-    order: of the step's size in the estimate.  evaluations: of the rate in a trial.
+    order: of the step's size in the estimate.  evaluations: of the rate in a trial.  starts: see `chosen`.
     """
     names = "error error_old tried t t_new end next max_step min_step rejected evaluations accepted".split()
     error, old, tried, t, t_new, end, wanted, max_step, min_step, rejected, done, before = inputs = cg.variables(names)
@@ -91,9 +91,10 @@ def control(order: int, evaluations: int, starts: bool) -> Call:
     growth = cg.minimum(cg.maximum(growth, SMALLEST), cg.where(before, LARGEST, 1.0))  # no growth after a rejection
     shrink = cg.where(error < 1e300, cg.maximum(SAFETY * error ** (-1.0 / order), SMALLEST), 0.1)
     after = tried * cg.where(accepted, growth, shrink)
+    after = cg.where(accepted * (tried < wanted), cg.maximum(wanted, after), after)  # a step cut short says less
     outputs = {
         "accepted": accepted,
-        "next": tried * shrink if starts else cg.where(accepted * (tried < wanted), cg.maximum(wanted, after), after),  # a step cut short says less
+        "next": tried * shrink if starts else after,
         "error_old": cg.where(accepted, error, old),
         "status": cg.where(accepted, cg.where(arrives, DONE, RUNNING), cg.where(able, RUNNING, TOO_SMALL)),
         "rejected": rejected + (1.0 - accepted),
@@ -103,20 +104,22 @@ def control(order: int, evaluations: int, starts: bool) -> Call:
 
 
 def accept_step(*after: Statement, starts: bool) -> If:
-    """An accepted step becomes the state; `after` is what the method does besides, with x still the old state."""
+    """An accepted step becomes the state; `after` is what the method does besides, with x still the old state.
+
+    starts: see `chosen`.
+    """
     kept = (copied("x", "x_old"), copied("t", "t_old"))
+    arrived = (copied("x_new", "x"), copied("t_new", "t"))
+    if starts:
+        return If("accepted", (*kept, *after, *arrived, Call(Graph([], {"next": math.inf}), (), ("next",))))
     h, longest, turned = cg.variables("h longest turned")
     lost = cg.minimum(cg.sqrt(turned), FORGOTTEN) * longest
     after_h = Graph([h, longest, turned], {"longest": cg.maximum(abs(h), longest - lost)})
     x, x_new, moved, wanted, still = cg.variables("x x_new moved next still")
-    if starts:
-        free = Call(Graph([], {"next": math.inf}), (), ("next",))
-        return If("accepted", (*kept, *after, copied("x_new", "x"), copied("t_new", "t"), free))
     way = Sum(Graph([x, x_new], {"way": abs(x_new - x)}), ("x", "x_new"), "moved")
     short = Graph([moved, wanted, still], {"next": cg.where(moved, wanted, cg.minimum(wanted, still))})
     remembered = Call(after_h, ("h", "longest", "turned"), ("longest",))
     steps = (way, Call(short, ("moved", "next", "still"), ("next",)), remembered)
-    arrived = (copied("x_new", "x"), copied("t_new", "t"))
     return If("accepted", (_turn(), *kept, *after, *steps, *arrived))
 
 
@@ -145,7 +148,10 @@ def first_pass(*statements: Statement) -> If:
 
 
 def chosen(step: Step, problem: Problem, *, dense: bool, degree: int, starts: bool) -> Program:
-    """A trial of one step a pass. starts: whether the next step is at most what the derivatives at its start allow."""
+    """A trial of one step a pass.
+
+    starts: whether the next step is at most what the derivatives at its start allow, whatever the one before was.
+    """
     lengths = with_registers(step, registers(problem))
     rates, prepare = ([*part, *_counted(problem, part)] for part in (step.rates, step.prepare))
     first, again = ([*step.start, *rates], prepare) if step.handed is not None else (step.start, [*rates, *prepare])

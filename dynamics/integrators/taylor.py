@@ -5,13 +5,13 @@ which the last two terms are as small as the tolerance. Coefficients are of the 
 that they neither overflow nor depend on the unit of time. What a step missed is seen at its end, where the derivative
 of the polynomial has to be the rate; coefficients 0 of the next step are computed there anyway.
 
-All orders are one graph where that is small enough to be compiled soon, else statements order by order.
+All coefficients are one graph where it is short: its values stay in registers, and its code is read from the nearest
+cache. Else a graph of one order is repeated, with sums of products over many nodes at a time.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from collections.abc import Sequence
 
 import cgraph as cg
@@ -36,42 +36,35 @@ from .problem import Problem
 from .step import Step
 from .step_control import count
 
-MOST = 20  # order: of a tolerance of 2^-52
-LEAST = 3
-STRAIGHT = 20_000  # products and sums of all orders as one graph: beyond, they take a second to compile
+SHORT = 10_000  # operations of all coefficients: the code of more does not fit the nearest cache, and is no faster
 CHECKED = 2.0**-46  # relative: rounding of the rates, below which a defect says nothing
 
 
-def taylor_order(rtol: float) -> int:
-    """The order for a tolerance; the highest where it asks for nothing."""
-    return min(max(math.ceil(1.0 - 0.5 * math.log(rtol)), LEAST), MOST) if 0.0 < rtol < 1.0 else MOST
-
-
-def taylor_step(problem: Problem, order: int = MOST) -> Step:
-    """The step of that order."""
-    m, graphs = problem.size, _jets(problem)
-    short = order * (len(graphs.order.nodes) + graphs.sums * order) <= STRAIGHT
+def taylor_step(problem: Problem, order: int) -> Step:
+    """The step of an order."""
+    m, graphs, c = problem.size, _jets(problem), _names("c", order)
+    if order * (len(graphs.order.nodes) + graphs.sums * order) <= SHORT:
+        series: list[Statement] = [Call(straight(graphs, order), ("rate", "unit", "zeros"), tuple(c))]
+        lengths: dict[str, int] = {}
+    else:
+        series, lengths = _by_orders(m, graphs, order)
     unit, h = cg.variables("unit h")
     share = Call(function("h unit", s=h / unit), ("h", "unit"), ("s",))
     at_all = Call(function("unit h", unit=cg.where(unit, unit, h)), ("unit", "h"), ("unit",))  # where nothing is wished
-    lengths = dict.fromkeys([*_names("c", order), "rate", "rounding", "rounding_new", "slope", "atol"], m)
-    lengths["zeros"] = graphs.zeros
-    lengths |= dict.fromkeys(controls := ["unit", "last", "before", "next", "rtol", "s", "at_t"], 1)
-    if not short:
-        lengths |= {f"{side}{k}": graphs.sums for side in ("left", "right") for k in range(1, order + 1)}
-        lengths |= dict.fromkeys(_names("order", order), 1)
-        lengths |= {"sums": graphs.sums, "none": graphs.sums, "rates0": m, "rates1": m}
+    controls = ["unit", "last", "before", "next", "rtol", "s", "at_t"]
+    lengths |= dict.fromkeys([*c, "rate", "rounding", "rounding_new", "slope", "atol"], m)
+    lengths |= {"zeros": graphs.zeros} | dict.fromkeys(controls, 1)
     return Step(
         lengths,
         [share, _arrival(order)],
         [_rates(graphs, "x", "t"), count(1)],
-        [at_all, *(_at_once if short else _by_orders)(graphs, order), *_wish(order)],
+        [at_all, *series, *_wish(order)],
         [copied("next", "unit")],
         kept=[copied("rounding_new", "rounding"), copied("h", "unit")],
-        fixed=("rounding", "rounding_new", "next", "rtol", "atol", *controls),
+        fixed=("rounding", "rounding_new", "atol", *controls),
         error=[stage_time("at_t", 1.0), _rates(graphs, "x_new", "at_t"), count(1), *_checked(m, order)],
         estimate=order,
-        handed=(),
+        handed=(),  # a trial that is not accepted leaves other rates behind, and coefficients, which go on
         dense=[_dense(order)],
         dense_lengths=dict.fromkeys(_names("dense", order), m),
     )
@@ -96,24 +89,20 @@ def _jets(problem: Problem) -> Jets:
         ) from None
 
 
-def _at_once(graphs: Jets, order: int) -> list[Statement]:
-    """All coefficients, as one graph."""
-    return [Call(straight(graphs, order), ("rate", "unit", "zeros"), tuple(_names("c", order)))]
-
-
-def _by_orders(graphs: Jets, order: int) -> list[Statement]:
-    """Coefficients one order after another, sums of products over many nodes at a time."""
-    numbers = Graph([], {f"order{k}": float(k) for k in range(1, order + 1)})
+def _by_orders(m: int, graphs: Jets, order: int) -> tuple[list[Statement], dict[str, int]]:
+    """Coefficients of one order after another, and the registers that it takes; `none` stays 0."""
+    numbers = Graph([], {name: float(k) for k, name in enumerate(_names("order", order), 1)})
     body: list[Statement] = [copied("rate", "rates0"), Call(numbers, (), tuple(numbers.outputs))]
+    lengths = dict.fromkeys([*_names("left", order), *_names("right", order), "sums", "none"], graphs.sums)
     for k in range(1, order + 1):
         if k > 1 and graphs.sums:
-            left, right = (_names(side, k - 1) for side in ("left", "right"))
-            factors = cg.variables([*left, *right])
+            sides = [*_names("left", k - 1), *_names("right", k - 1)]
+            factors = cg.variables(sides)
             total = Graph(factors, {"sum": convolution(factors[: k - 1], factors[k - 1 :])})
-            body.append(Map(total, (*left, *right), ("sums",)))
+            body.append(Map(total, tuple(sides), ("sums",)))
         inputs = (f"rates{(k - 1) % 2}", "unit", f"order{k}", "zeros", "sums" if k > 1 else "none")
         body.append(Call(graphs.order, inputs, (f"c{k}", f"rates{k % 2}", f"left{k}", f"right{k}")))
-    return body
+    return body, lengths | dict.fromkeys(("rates0", "rates1"), m) | dict.fromkeys(_names("order", order), 1)
 
 
 def _wish(order: int) -> list[Statement]:
@@ -125,8 +114,9 @@ def _wish(order: int) -> list[Statement]:
     share = cg.minimum(before ** (-0.5 / (order - 1.0)), (math.exp(4.0) * last) ** (-0.5 / order))
     h = abs(unit) * share * math.exp(-0.7 / (order - 1.0))
     graph = Graph(inputs, {"h": cg.where(cg.equal(h, h), cg.minimum(wanted, h), 0.0)})
-    sizes = [Sum(square, (f"c{order - k}", "x", "c1", "rtol", "atol"), each) for k, each in enumerate(("last", "before"))]
-    return [*sizes, Call(graph, ("last", "before", "unit", "next"), ("next",))]
+    sizes = {"last": order, "before": order - 1}
+    sums = [Sum(square, (f"c{k}", "x", "c1", "rtol", "atol"), name) for name, k in sizes.items()]
+    return [*sums, Call(graph, ("last", "before", "unit", "next"), ("next",))]
 
 
 def _arrival(order: int) -> Map:

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from cgraph.extend import Array, real_array, real_number
 
 from ..equations.states.initial_value import times_to_record
-from ..integrators import METHODS
+from ..integrators import METHODS, Method
 from ..integrators.step_control import RESOLUTION
 from .steps.equal_steps import step_count
 
