@@ -56,29 +56,31 @@ class Jets(NamedTuple):
 def convolution(left: Sequence[Node], right: Sequence[Node]) -> Node:
     """The sum over 0 < j < k of left_j right_k-j, of k - 1 > 0 factors each.
 
-    Two halves are summed side by side; of equal factors on both sides, each product is taken once.
+    What needs the coefficients just before comes last; of equal factors on both sides, each product is taken once.
 
     >>> import cgraph as cg
     >>> from cgraph.extend import convolution
     >>> left, right = cg.variables("a1 a2 a3"), cg.variables("b1 b2 b3")
-    >>> cg.latex(convolution(left, right))
-    'a_{1} \\\\, b_{3} + a_{3} \\\\, b_{1} + a_{2} \\\\, b_{2}'
+    >>> total = cg.Graph([*left, *right], {"sum": convolution(left, right)})
+    >>> total.evaluate({"a1": 1.0, "a2": 2.0, "a3": 3.0, "b1": 10.0, "b2": 100.0, "b3": 1000.0})
+    {'sum': 1230.0}
     """
     products = [a * b for a, b in zip(left, reversed(right), strict=True)]
     if all(a is b for a, b in zip(left, right, strict=True)):
         half = len(products) // 2
         pairs = [2.0 * sum(products[1:half], products[0])] if half else []
         parts = [*pairs, *products[half : len(products) - half]]
-    else:
-        parts = [sum(part[1:], part[0]) for part in (products[::2], products[1::2]) if part]
-    return sum(parts[1:], parts[0])
+        return sum(parts[1:], parts[0])
+    outwards = sorted(range(1, len(products) - 1), key=lambda j: abs(2 * j + 1 - len(products)))
+    early = [sum([products[j] for j in outwards[1:]], products[outwards[0]])] if outwards else []
+    return sum([*products[1:][-1:], *early], products[0])
 
 
 def straight(made: Jets, order: int) -> Graph:
     """All coefficients as one graph: (the rates (m), unit, zeros) -> coefficients 1 of x (m), 2, .., of that order.
 
-    It repeats `made.order`, folded: what is 0 or constant in some orders takes no operations there. Not of jets that are
-    `exact`.
+    It repeats `made.order`, folded: what is 0 or constant in some orders takes no operations there. Jets that
+    are `exact` have none.
 
     Of xdot = x, from x = 1:
 
@@ -163,6 +165,16 @@ class _Shared:
         return (op.name, *[repr(arg.value) if arg.op is CONSTANT else id(arg) for arg in args])
 
 
+def _scaled(node: Node) -> tuple[Node | float, Node] | None:
+    """A constant and what it multiplies, if a node is their product: it goes before a sum, which others then share."""
+    if node.op.name == "neg":
+        return -1.0, node.args[0]
+    if node.op.name == "mul" and CONSTANT in (node.args[0].op, node.args[1].op):
+        first, second = node.args
+        return (first, second) if first.op is CONSTANT else (second, first)
+    return None
+
+
 class _Jets:
     """The orders of a series, for the rules of the operations."""
 
@@ -234,6 +246,10 @@ class _Jets:
         return self._sum(a, b, "weighted")
 
     def _sum(self, a: Node, b: Node, kind: str) -> Node:
+        for x in (a, b):
+            if (scaled := _scaled(x)) is not None:
+                factor, inner = scaled
+                return factor * (self._sum(inner, b, kind) if x is a else self._sum(a, inner, kind))
         for node in (a, b):
             if node not in self.of:
                 self.waiting.append(node)
