@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 from ..core.graph import Graph
@@ -29,7 +30,7 @@ class Merged(NamedTuple):
 
     calls: Mapping[Node, Joined]
     products: Mapping[Node, Node]
-    sums: Mapping[Node, Sums]
+    sums: Mapping[Node, Sums] = MappingProxyType({})
 
 
 Step = Node | Joined | Sums
