@@ -58,7 +58,13 @@ if TYPE_CHECKING:
     )
     from .autodiff.hessian_solve import Order as Order, solve_nodes as solve_nodes, solve_tangents as solve_tangents
     from .autodiff.jacobian import hessian_nodes as hessian_nodes
-    from .autodiff.jets import Jets as Jets, NoSeriesError as NoSeriesError, jets as jets
+    from .autodiff.jets import (
+        Jets as Jets,
+        NoSeriesError as NoSeriesError,
+        convolution as convolution,
+        jets as jets,
+        straight as straight,
+    )
     from .autodiff.ldl_solve import ldl_elimination as ldl_elimination, ldl_solve as ldl_solve
     from .autodiff.symmetric_elimination import SingularError as SingularError
     from .core.builder import Builder as Builder, folded as folded

@@ -7,11 +7,11 @@ same for all k > 0, the rest, from those sums, which run over many nodes at once
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from typing import NamedTuple
 
-from ..core.builder import Builder
+from ..core.builder import Builder, folded
 from ..core.checks import check_name
 from ..core.graph import Graph
 from ..core.label import Label
@@ -51,6 +51,62 @@ class Jets(NamedTuple):
     sums: int
     safe: tuple[bool, ...]
     pieces: tuple[Node, ...]
+
+
+def convolution(left: Sequence[Node], right: Sequence[Node]) -> Node:
+    """The sum over 0 < j < k of left_j right_k-j, of k - 1 > 0 factors each.
+
+    What needs the coefficients just before comes last; of equal factors on both sides, each product is taken once.
+
+    >>> import cgraph as cg
+    >>> from cgraph.extend import convolution
+    >>> left, right = cg.variables("a1 a2 a3"), cg.variables("b1 b2 b3")
+    >>> total = cg.Graph([*left, *right], {"sum": convolution(left, right)})
+    >>> total.evaluate({"a1": 1.0, "a2": 2.0, "a3": 3.0, "b1": 10.0, "b2": 100.0, "b3": 1000.0})
+    {'sum': 1230.0}
+    """
+    products = [a * b for a, b in zip(left, reversed(right), strict=True)]
+    if all(a is b for a, b in zip(left, right, strict=True)):
+        half = len(products) // 2
+        pairs = [2.0 * sum(products[1:half], products[0])] if half else []
+        parts = [*pairs, *products[half : len(products) - half]]
+        return sum(parts[1:], parts[0])
+    outwards = sorted(range(1, len(products) - 1), key=lambda j: abs(2 * j + 1 - len(products)))
+    early = [sum([products[j] for j in outwards[1:]], products[outwards[0]])] if outwards else []
+    return sum([*products[1:][-1:], *early], products[0])
+
+
+def straight(made: Jets, order: int) -> Graph:
+    """All coefficients as one graph: (the rates (m), unit, zeros) -> coefficients 1 of x (m), 2, .., of that order.
+
+    It repeats `made.order`, folded: what is 0 or constant in some orders takes no operations there. Jets that
+    are `exact` have none.
+
+    Of xdot = x, from x = 1:
+
+    >>> import cgraph as cg
+    >>> from cgraph.extend import jets, straight
+    >>> x = cg.variable("x")
+    >>> straight(jets(cg.Graph([x], {"rate": x})), 3).evaluate({"rate0": 1.0, "unit": 1.0})
+    {'0': 1.0, '1': 0.5, '2': 0.16666666666666666}
+    """
+    wanted, build, size = list(made.order.outputs.values()), Builder(), made.sums
+    m = (len(wanted) - 2 * size) // 2
+    inputs = [*made.order.inputs[: m + 1], *made.order.inputs[m + 2 : m + 2 + made.zeros]]
+    rates, unit, zeros = inputs[:m], inputs[m], inputs[m + 1 :]
+    left: list[list[Node]] = [[] for _ in range(size)]
+    right: list[list[Node]] = [[] for _ in range(size)]
+    coefficients: list[Node] = []
+    for k in range(1, order + 1):
+        with building(build):
+            sums = [convolution(a, b) if k > 1 else constant(0.0) for a, b in zip(left, right, strict=True)]
+        values = [*rates, unit, constant(float(k)), *zeros, *sums]
+        now = folded(wanted, build, dict(zip(made.order.inputs, values, strict=True)))
+        coefficients += now[:m]
+        rates = now[m : 2 * m]
+        for row, each in zip((*left, *right), now[2 * m :], strict=True):
+            row.append(each)
+    return Graph(inputs, {f"{i}": node for i, node in enumerate(coefficients)})
 
 
 ROUNDS = 100  # of partials of partials; those of the table come back to what is there after 2
@@ -107,6 +163,16 @@ class _Shared:
 
     def _key(self, op: Row, args: tuple[Node, ...]) -> tuple[str | int, ...]:
         return (op.name, *[repr(arg.value) if arg.op is CONSTANT else id(arg) for arg in args])
+
+
+def _scaled(node: Node) -> tuple[Node | float, Node] | None:
+    """A constant and what it multiplies, if a node is their product: it goes before a sum, which others then share."""
+    if node.op.name == "neg":
+        return -1.0, node.args[0]
+    if node.op.name == "mul" and CONSTANT in (node.args[0].op, node.args[1].op):
+        first, second = node.args
+        return (first, second) if first.op is CONSTANT else (second, first)
+    return None
 
 
 class _Jets:
@@ -180,6 +246,10 @@ class _Jets:
         return self._sum(a, b, "weighted")
 
     def _sum(self, a: Node, b: Node, kind: str) -> Node:
+        for x in (a, b):
+            if (scaled := _scaled(x)) is not None:
+                factor, inner = scaled
+                return factor * (self._sum(inner, b, kind) if x is a else self._sum(a, inner, kind))
         for node in (a, b):
             if node not in self.of:
                 self.waiting.append(node)

@@ -9,9 +9,10 @@ from ..core.graph import Graph
 from ..core.node import CONSTANT, Node
 from ..operations.operation import OPS, columns
 from .arithmetic import REGISTERS, Arithmetic, bits, words_of
-from .parts import Parts, Step
-from .schedule import Joined, Merged, joined_calls, products_of, schedule
+from .parts import Parts
+from .schedule import Joined, Merged, Step, joined_calls, products_of, schedule
 from .vector_math import POLYNOMIAL, helpers
+from .vector_sums import Sums, Vectors, vector_sums
 
 TOGETHER = 4  # arguments in a joined call at one point: a vector of them is one register or two on every processor
 
@@ -154,25 +155,37 @@ def instructions(graph: Graph, arithmetic: Arithmetic, address: Address, name: s
         for row in outputs.get(step, ()) if isinstance(step, Node) else ():
             yield from [*address("y", f"%y{row}", row), f"  store {t} {r}, ptr %y{row}, align 8"]
 
-    products = products_of(graph) if arithmetic.fuses else {}
-    merged = Merged(_joined_calls(graph, arithmetic), products, _of_libm(graph, arithmetic))
+    merged = _merged(graph, arithmetic)
+    vectors = Vectors(merged.sums)
     steps = _results_behind_calls(schedule(graph, merged), merged.calls)
-    parts = Parts(steps, merged.calls, t, 8 * arithmetic.lanes, arithmetic.registers, leaf)
+    steps = {step: () if isinstance(step, Sums) else reads for step, reads in steps.items() if step not in merged.sums}
+    parts = Parts(steps, merged.calls, t, 8 * arithmetic.lanes, arithmetic.registers, leaf, vectors)
     written: list[list[str]] = [[]]
     for number, (step, reads) in enumerate(steps.items()):
         if number in parts.starts:
             written[-1] += parts.forget()
             written.append([])
+        if isinstance(step, Sums):
+            written[-1] += vectors.lines(step, f"%v{number}")
+            continue
         args, lines = parts.read(reads)
         if isinstance(step, Joined) or (step not in merged.calls and columns(step.op).calls_library):
             lines += parts.forget()
         r, more = _step(step, f"%v{number}", args, merged, arithmetic, words)
-        written[-1] += [*lines, *more, *parts.write(step, r), *store(step, r)]
+        kept = vectors.store(step, r) if isinstance(step, Node) else []
+        written[-1] += [*lines, *more, *kept, *parts.write(step, r), *store(step, r)]
     for node in outputs:
         if not node.args:
             r, lines = leaf(node, f"%leaf{outputs[node][0]}")
             written[-1] += [*lines, *store(node, r)]
     return Code(written, constants.start(), parts.places, constants.definitions())
+
+
+def _merged(graph: Graph, arithmetic: Arithmetic) -> Merged:
+    """What the arithmetic does in one step; sums side by side of one point, whose products are not rounded."""
+    products = products_of(graph) if arithmetic.fuses else {}
+    sums = vector_sums(graph, products) if arithmetic.lanes == 1 else {}
+    return Merged(_joined_calls(graph, arithmetic), products, _of_libm(graph, arithmetic), sums)
 
 
 class _Constants:
@@ -220,7 +233,7 @@ class _Constants:
 
 
 def _step(
-    step: Step, r: str, args: list[str], merged: Merged, arithmetic: Arithmetic, words: Mapping[str, str]
+    step: Node | Joined, r: str, args: list[str], merged: Merged, arithmetic: Arithmetic, words: Mapping[str, str]
 ) -> tuple[str, list[str]]:
     """The name of a step's value, r or the value that it is part of, and the lines that compute it.
 

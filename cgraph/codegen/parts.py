@@ -11,10 +11,10 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from heapq import heappop, heappush
 
 from ..core.node import Node
-from .schedule import Joined
+from .schedule import Joined, Step
+from .vector_sums import Vectors
 
 STEPS = 400  # in a function
-Step = Node | Joined
 
 
 class Parts:
@@ -22,7 +22,7 @@ class Parts:
 
     steps: what is computed, and what that reads.  calls: {node: the joined call that gives it}.  kind, size: of a
     value, in LLVM's language and in bytes.  registers: how many values have names at once.  leaf: (a constant or an
-    input, name) -> its name and the lines that make it so.
+    input, name) -> its name and the lines that make it so.  vectors: values that lie in memory besides.
 
     starts: the numbers of the steps with which a part begins, without the first.  places: how many values the memory
     %w has to hold; one that nothing needs any more leaves its place to others.
@@ -36,8 +36,9 @@ class Parts:
         size: int,
         registers: int,
         leaf: Callable[[Node, str], tuple[str, list[str]]],
+        vectors: Vectors,
     ) -> None:
-        self.kind, self.size, self.places = kind, size, 0
+        self.kind, self.size, self.places = kind, size, vectors.places
         self._leaf, self._registers = leaf, registers
         self.starts = _starts(steps, calls)
         self._uses: dict[Step, list[int]] = {}  # numbers of the steps that will need a value, the next one last
@@ -47,6 +48,7 @@ class Parts:
         self._names: dict[Step, str] = {}
         self._latest: list[tuple[int, int, Step]] = []  # heap by the next use, latest first; some outdated
         self._slots: dict[Step, int] = {}
+        self._fixed: dict[Node, int] = {node: slots[0] for node, slots in vectors.slots.items()}
         self._free: list[int] = []
         self._count = 0  # of names
 
@@ -103,7 +105,7 @@ class Parts:
 
     def _keep(self, step: Step) -> list[str]:
         """The lines that put a value into memory, if it is to be there and is not."""
-        if step in self._slots or (isinstance(step, Node) and not step.args):
+        if step in self._slots or step in self._fixed or (isinstance(step, Node) and not step.args):
             return []
         if not self._free:
             self._free.append(self.places)
@@ -117,7 +119,8 @@ class Parts:
         ]
 
     def _address(self, step: Step, name: str) -> list[str]:
-        return [f"  {name}.at = getelementptr {self.kind}, ptr %w, i64 {self._slots[step]}"]
+        slot = self._fixed[step] if isinstance(step, Node) and step in self._fixed else self._slots[step]
+        return [f"  {name}.at = getelementptr {self.kind}, ptr %w, i64 {slot}"]
 
 
 def _starts(steps: Iterable[Step], calls: Mapping[Node, Joined]) -> set[int]:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Set
+from types import MappingProxyType
 from typing import NamedTuple
 
 from ..core.graph import Graph
 from ..core.node import Node
 from ..operations.operation import columns
 from .vector_math import POLYNOMIAL
+from .vector_sums import Sums
 
 
 class Joined(NamedTuple):
@@ -24,14 +26,19 @@ class Merged(NamedTuple):
 
     calls: {node: the call that gives it}.  products: {sum or difference: its argument that it multiplies itself}.
     of_libm: nodes of a vector that each lane has from libm, though there is a polynomial.
+    sums: {sum of products: those that are added up with it}.
     """
 
     calls: Mapping[Node, Joined]
     products: Mapping[Node, Node]
     of_libm: Set[Node] = frozenset()
+    sums: Mapping[Node, Sums] = MappingProxyType({})
 
 
-def schedule(graph: Graph, merged: Merged) -> dict[Node | Joined, tuple[Node | Joined, ...]]:
+Step = Node | Joined | Sums
+
+
+def schedule(graph: Graph, merged: Merged) -> dict[Step, tuple[Step, ...]]:
     """Every operation once and what it reads, arguments first, and before the results of a joined call the call.
 
     Calls of library functions come as early as they can, since a call empties the registers and at first there is
@@ -42,10 +49,10 @@ def schedule(graph: Graph, merged: Merged) -> dict[Node | Joined, tuple[Node | J
     """
     depth = _depth(graph)
     early = [merged.calls.get(node, node) for node in graph.nodes if node.args and columns(node.op).calls_library]
-    order: dict[Node | Joined, tuple[Node | Joined, ...]] = {}
-    waiting: dict[Node | Joined, tuple[Node | Joined, ...]] = {}
+    order: dict[Step, tuple[Step, ...]] = {}
+    waiting: dict[Step, tuple[Step, ...]] = {}
     results = [node for node in graph.outputs.values() if node.args]
-    stack: list[Node | Joined] = [*reversed(results), *reversed(early)]
+    stack: list[Step] = [*reversed(results), *reversed(early)]
     while stack:
         step = stack[-1]
         if step in order:
@@ -63,19 +70,23 @@ def schedule(graph: Graph, merged: Merged) -> dict[Node | Joined, tuple[Node | J
     return order
 
 
-def _leaf(step: Node | Joined) -> bool:
+def _leaf(step: Step) -> bool:
     return isinstance(step, Node) and not step.args
 
 
-def needed(step: Node | Joined, merged: Merged) -> tuple[Node | Joined, ...]:
+def needed(step: Step, merged: Merged) -> tuple[Step, ...]:
     """Arguments of a step, or the joined call that gives the node; of a product that it takes in, the factors.
 
     In their place, as in a * b + c and in c - a * b.
     """
     if isinstance(step, Joined):
         return step.arguments
+    if isinstance(step, Sums):
+        return tuple(dict.fromkeys([node for pair in step.factors for side in pair for node in side]))
     if step in merged.calls:
         return (merged.calls[step],)
+    if step in merged.sums:
+        return (merged.sums[step],)
     if (product := merged.products.get(step)) is not None:
         first, second = step.args
         return (*product.args, second) if first is product else (first, *product.args)
@@ -94,9 +105,9 @@ def products_of(graph: Graph) -> dict[Node, Node]:
     }
 
 
-def _depth(graph: Graph) -> dict[Node | Joined, int]:
+def _depth(graph: Graph) -> dict[Step, int]:
     """Operations on the longest way from an input or a constant to a node."""
-    depth: dict[Node | Joined, int] = {}
+    depth: dict[Step, int] = {}
     for node in graph.nodes:
         depth[node] = 1 + max([depth[arg] for arg in node.args], default=-1)
     return depth

@@ -42,8 +42,10 @@ class Orders(Protocol):
 
 def mul(orders: Orders, y: Node, a: Node, b: Node) -> Node:
     """y = a * b."""
+    if a is b:
+        return orders.zero(2.0 * a) * _moving(orders.at(a)) + orders.sum(a, a)
     terms = [orders.zero(x) * each for x, each in _crossed(orders, a, b)]
-    return terms[0] if len(terms) == 1 else terms[0] + terms[1] + orders.sum(a, b)
+    return terms[0] if len(terms) == 1 else terms[0] + (terms[1] + orders.sum(a, b))
 
 
 def zero_safe_mul(orders: Orders, y: Node, a: Node, b: Node) -> Node:

@@ -1,5 +1,6 @@
 """Integrators: methods for xdot = f(x, t), as programs over the graphs of a model."""
 
+import math
 from collections.abc import Callable
 from functools import partial
 from importlib import import_module
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
     from .jacobian_statements import jacobian_statements
 
 __getattr__, __dir__ = doors(__name__, __file__)
-TAYLOR_ORDER = 20  # of a tolerance of 2^-52
+TAYLOR_ORDER, LEAST_ORDER = 20, 3  # of a tolerance of 2^-52, and of large ones
 MOST_STAGES = 12  # of Gauss's methods: order 24, beyond which float64 gains nothing
 
 
@@ -44,11 +45,11 @@ def runge_kutta(tableau: Tableau) -> Method:
     return Method(tableau.order, step)
 
 
-def _later(file: str, name: str, *given: object) -> Callable[[Problem], Step]:
-    """The step of a method, whose file is loaded when a problem first takes it."""
+def _later(file: str, name: str, *given: object, **usual: int) -> Callable[..., Step]:
+    """The step of a method, whose file is loaded when a problem first takes it.  usual: unless others are chosen."""
 
-    def step(problem: Problem) -> Step:
-        made: Step = getattr(import_module(f"{__name__}.{file}"), name)(*given, problem)
+    def step(problem: Problem, **chosen: int) -> Step:
+        made: Step = getattr(import_module(f"{__name__}.{file}"), name)(*given, problem, **usual | chosen)
         return made
 
     return step
@@ -79,6 +80,12 @@ def _names_gauss(name: str) -> bool:
     return name in [f"gauss{2 * stages}" for stages in range(1, MOST_STAGES + 1)]
 
 
+def _taylor_order(rtol: float) -> int:
+    """Jorba and Zou's for a relative tolerance; the highest where it asks for nothing."""
+    wanted = 1.0 - 0.5 * math.log(rtol) if 0.0 < rtol < 1.0 else math.inf
+    return math.ceil(min(max(wanted, LEAST_ORDER), TAYLOR_ORDER))
+
+
 METHODS: dict[str, Method] = Methods(
     {
         **{name: runge_kutta(tableau) for name, tableau in TABLEAUS.items()},
@@ -87,11 +94,12 @@ METHODS: dict[str, Method] = Methods(
         "radau": Method(5, _later("radau", "radau_step"), adaptive=True, degree=3),
         "taylor": Method(
             TAYLOR_ORDER,
-            _later("taylor", "taylor_step", TAYLOR_ORDER),
+            _later("taylor", "taylor_step", order=TAYLOR_ORDER),
             adaptive=True,
             degree=TAYLOR_ORDER,
             finest=2.0**-52,
             starts=True,
+            order_at=_taylor_order,
         ),
         **{name: _symplectic(method) for name, method in PARTITIONED.items()},
         **{

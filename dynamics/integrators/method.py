@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Call, Program, Statement
+from cgraph.extend import Call, Program, Statement, memo
 
 from .problem import Problem
 from .step import Step, arriving, rate_calls, with_registers
 from .step_control import HERMITE, chosen, first_pass, nonfinite
 
+KEPT = 32  # methods of an order
 ROUNDING = 16.0 * 2.0**-52  # of the sums of a step
 
 
@@ -41,6 +43,10 @@ class Method:
     starts : bool
         Whether steps need no search for the first, and no limit by the one before, since each is at most what the
         derivatives at its start allow: `prepare` makes `next` no larger.
+
+    order_at : callable, optional
+        Of a method whose order goes by the relative tolerance: the order for one, at most `order`. The step is then
+        step(problem, order=..).
 
     A run of equal steps makes one in a pass. Before each pass the registers hold
 
@@ -77,11 +83,21 @@ class Method:
     """
 
     order: int
-    step: Callable[[Problem], Step]
+    step: Callable[..., Step]
     adaptive: bool = False
     degree: int = HERMITE
     finest: float = ROUNDING
     starts: bool = False
+    order_at: Callable[[float], int] | None = None
+
+    def at(self, rtol: float) -> Method:
+        """The method for runs of a relative tolerance, of the order that this asks for.
+
+        >>> from dynamics.integrators import METHODS
+        >>> METHODS["taylor"].at(1e-9), METHODS["taylor"].at(1e-12)
+        (<Method of order 12, steps by error>, <Method of order 15, steps by error>)
+        """
+        return self if self.order_at is None else _of_order(self, self.order_at(rtol))
 
     def program(self, problem: Problem, dense: bool) -> Program:
         """The steps of a run, one after another; dense: with dense output where they are chosen.
@@ -97,6 +113,13 @@ class Method:
 
     def __repr__(self) -> str:
         return f"<Method of order {self.order}, {'steps by error' if self.adaptive else 'equal steps'}>"
+
+
+@memo(KEPT)
+def _of_order(method: Method, order: int) -> Method:
+    """The method of one order; the same object for the same, since problems keep programs by it."""
+    step = partial(method.step, order=order)
+    return replace(method, order=order, degree=order, step=step, order_at=None)
 
 
 def equal_registers(problem: Problem) -> dict[str, int]:

@@ -47,7 +47,8 @@ class Step:
     estimate : int, optional
         q, where the estimate falls as h^q.
     handed : sequence of Statement, optional
-        After an accepted step that was chosen, in place of `rates` before the next: the same from what `error` knows.
+        After an accepted step that was chosen, in place of `rates` before the next: the same from what `error` knows;
+        none, but not None, where `error` leaves it where `rates` does.
     dense : sequence of Statement, optional
         After an accepted step: registers dense1, dense2, .. (m), with x(t + s h) = x + sum_k dense_k s^k. Without it
         the cubic through states and rates at both ends.
@@ -91,7 +92,7 @@ class Step:
     failed: str = ""
     error: Sequence[Statement] = ()
     estimate: int = 0
-    handed: Sequence[Statement] = ()
+    handed: Sequence[Statement] | None = None
     dense: Sequence[Statement] = ()
     dense_lengths: Mapping[str, int] = field(default_factory=dict)
 

@@ -81,13 +81,13 @@ def scale(x: Node, x_new: Node, rtol: Node, atol: Node, leap: Node) -> Node:
     return atol + rtol * cg.maximum(abs(x), abs(x_new)) + leap * abs(x_new - x)
 
 
-def control(order: int, evaluations: int) -> Call:
+def control(order: int, evaluations: int, starts: bool) -> Call:
     """From the estimate of a trial: whether it is accepted, and the next step. A NaN is an error beyond measure.
 
     A step below the resolution of t, or of the run, is not accepted whatever its error: only one that ends the run may
     be so short.
 
-    order: of the step's size in the estimate.  evaluations: of the rate in a trial.
+    order: of the step's size in the estimate.  evaluations: of the rate in a trial.  starts: see `chosen`.
     """
     names = "error error_old tried t t_new end next max_step min_step rejected evaluations accepted".split()
     names += "search trials sized seen".split()
@@ -102,9 +102,10 @@ def control(order: int, evaluations: int) -> Call:
     growth = cg.minimum(cg.maximum(growth, SMALLEST), cg.where(before, LARGEST, 1.0))  # no growth after a rejection
     shrink = cg.where(error < 1e300, cg.maximum(SAFETY * error ** (-1.0 / order), SMALLEST), 0.1)
     after = tried * cg.where(accepted, growth, shrink)
+    after = cg.where(accepted * (tried < wanted), cg.maximum(wanted, after), after)  # a step cut short says less
     outputs = {
         "accepted": accepted,
-        "next": cg.where(accepted * (tried < wanted), cg.maximum(wanted, after), after),  # a step cut short says less
+        "next": tried * shrink if starts else after,
         "error_old": cg.where(accepted, error, old),
         "status": cg.where(accepted, cg.where(arrives, DONE, RUNNING), cg.where(able, RUNNING, TOO_SMALL)),
         "rejected": rejected + (1.0 - accepted),
@@ -116,9 +117,15 @@ def control(order: int, evaluations: int) -> Call:
     return Call(Graph(inputs, outputs), tuple(names), tuple(outputs))
 
 
-def accept_step(*after: Statement) -> If:
-    """An accepted step becomes the state; `after` is what the method does besides, with x still the old state."""
+def accept_step(*after: Statement, starts: bool) -> If:
+    """An accepted step becomes the state; `after` is what the method does besides, with x still the old state.
+
+    starts: see `chosen`.
+    """
     kept = (copied("x", "x_old"), copied("t", "t_old"))
+    arrived = (copied("x_new", "x"), copied("t_new", "t"))
+    if starts:
+        return If("accepted", (*kept, *after, *arrived, Call(Graph([], {"next": math.inf}), (), ("next",))))
     h, longest, turned = cg.variables("h longest turned")
     lost = cg.minimum(cg.sqrt(turned), FORGOTTEN) * longest
     after_h = Graph([h, longest, turned], {"longest": cg.maximum(abs(h), longest - lost)})
@@ -127,7 +134,6 @@ def accept_step(*after: Statement) -> If:
     short = Graph([moved, wanted, still], {"next": cg.where(moved, wanted, cg.minimum(wanted, still))})
     remembered = Call(after_h, ("h", "longest", "turned"), ("longest",))
     steps = (way, Call(short, ("moved", "next", "still"), ("next",)), remembered)
-    arrived = (copied("x_new", "x"), copied("t_new", "t"))
     return If("accepted", (_turn(), *kept, *after, *steps, *arrived))
 
 
@@ -156,25 +162,26 @@ def first_pass(*statements: Statement) -> If:
 
 
 def chosen(step: Step, problem: Problem, *, dense: bool, degree: int, starts: bool) -> Program:
-    """A trial of one step a pass. starts: whether the next step is at most what the derivatives at its start allow."""
+    """A trial of one step a pass.
+
+    starts: whether the next step is at most what the derivatives at its start allow, whatever the one before was.
+    """
     lengths = with_registers(step, registers(problem))
     rates, prepare = ([*part, *_counted(problem, part)] for part in (step.rates, step.prepare))
-    first, again = ([*step.start, *rates], prepare) if step.handed else (step.start, [*rates, *prepare])
+    first, again = ([*step.start, *rates], prepare) if step.handed is not None else (step.start, [*rates, *prepare])
     body = _forgotten(step)
     if first:
         body.append(first_pass(*first))
     if again:
         body.append(If("accepted", tuple(again)))
     body += [trial(), *step.body, *step.error]
-    body.append(control(step.estimate, rate_calls(problem, step.body, step.error)))
+    body.append(control(step.estimate, rate_calls(problem, step.body, step.error), starts))
     after: list[Statement] = []
     if dense:
         polynomial, more = (step.dense, step.dense_lengths) if step.dense else _hermite(problem)
         after.append(If("row", (*polynomial, *_counted(problem, polynomial))))
         lengths |= {**dict.fromkeys([f"dense{k + 1}" for k in range(degree)], problem.size), **more}
-    body.append(accept_step(*after, *step.kept, *step.handed))
-    if starts:
-        body.append(If("accepted", (Call(Graph([], {"next": math.inf}), (), ("next",)),)))
+    body.append(accept_step(*after, *step.kept, *(step.handed or ()), starts=starts))
     return Program(lengths, body, recorded(dense, degree), record_if="row", stop="status")
 
 
@@ -182,7 +189,7 @@ def _forgotten(step: Step) -> list[Statement]:
     """Before the first trial, what one step hands on to the next is 0: what it reads before it is sure to write it."""
     first: dict[str, None] = {}
     written: set[str] = set()
-    for each in (*step.start, *step.rates, *step.prepare, *step.body, *step.error, *step.kept, *step.handed):
+    for each in (*step.start, *step.rates, *step.prepare, *step.body, *step.error, *step.kept, *(step.handed or ())):
         reads, writes = effects([each])
         first |= {name: None for name in reads if name in step.lengths and name not in SHARED and name not in written}
         if not STATEMENTS[type(each)].bodies:  # which may run no time at all

@@ -4,15 +4,31 @@ Order and step follow Jorba and Zou, Experimental Mathematics 14 (2005) 99: orde
 which the last two terms are as small as the tolerance. Coefficients are of the time in units of the step before, so
 that they neither overflow nor depend on the unit of time. What a step missed is seen at its end, where the derivative
 of the polynomial has to be the rate; coefficients 0 of the next step are computed there anyway.
+
+All coefficients are one graph where it is short: its values stay in registers, and its code is read from the nearest
+cache. Else a graph of one order is repeated, with sums of products over many nodes at a time.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import cgraph as cg
-from cgraph import Graph
-from cgraph.extend import Call, If, Jets, Map, NoSeriesError, Statement, Sum, copied, jets
+from cgraph import Graph, Node
+from cgraph.extend import (
+    Call,
+    Jets,
+    Map,
+    NoSeriesError,
+    Statement,
+    Sum,
+    convolution,
+    copied,
+    jets,
+    kept_by_first,
+    straight,
+)
 
 from ..systems.arguments import TIME
 from .elementwise import compensated, function, stage_time
@@ -20,49 +36,50 @@ from .problem import Problem
 from .step import Step
 from .step_control import count
 
-LEAST = 3  # order
+SHORT = 10_000  # operations of all coefficients: the code of more does not fit the nearest cache, and is no faster
 CHECKED = 2.0**-46  # relative: rounding of the rates, below which a defect says nothing
 
 
-def taylor_step(order: int, problem: Problem) -> Step:
-    """The step, of at most that order."""
-    m, graphs = problem.size, _jets(problem)
-    orders = range(1, order + 1)
-    numbers = Graph([], {f"order{k}": float(k) for k in orders})
-    series: list[Statement] = [copied("rate", "rates0")]
-    for k in orders:
-        series += [If(f"takes{k}", tuple(_coefficients(k, graphs)))]
+def taylor_step(problem: Problem, order: int) -> Step:
+    """The step of an order."""
+    m, graphs, c = problem.size, _jets(problem), _names("c", order)
+    if order * (len(graphs.order.nodes) + graphs.sums * order) <= SHORT:
+        series: list[Statement] = [Call(straight(graphs, order), ("rate", "unit", "zeros"), tuple(c))]
+        lengths: dict[str, int] = {}
+    else:
+        series, lengths = _by_orders(m, graphs, order)
     unit, h = cg.variables("unit h")
     share = Call(function("h unit", s=h / unit), ("h", "unit"), ("s",))
     at_all = Call(function("unit h", unit=cg.where(unit, unit, h)), ("unit", "h"), ("unit",))  # where nothing is wished
-    names = [f"c{k}" for k in orders]
-    lengths = dict.fromkeys([*names, "rates0", "rates1", "rate", "rate_new", "rounding", "rounding_new", "slope"], m)
-    lengths |= {f"{side}{k}": graphs.sums for side in ("left", "right") for k in orders}
-    lengths |= {"sums": graphs.sums, "none": graphs.sums, "zeros": graphs.zeros, "zeros_new": graphs.zeros}
-    lengths |= {"next": 1, "rtol": 1, "atol": m}
-    controls = ["unit", "last", "before", "highest", *[f"{name}{k}" for name in ("order", "takes") for k in orders]]
-    lengths |= dict.fromkeys(["s", "at_t", *controls], 1)
+    controls = ["unit", "last", "before", "next", "rtol", "s", "at_t"]
+    lengths |= dict.fromkeys([*c, "rate", "rounding", "rounding_new", "slope", "atol"], m)
+    lengths |= {"zeros": graphs.zeros} | dict.fromkeys(controls, 1)
     return Step(
         lengths,
         [share, _arrival(order)],
-        [_rates(graphs, "x", "t", ""), count(1)],
-        [at_all, *series, _wish()],
-        [Call(numbers, (), tuple(numbers.outputs)), _orders(order), copied("next", "unit")],
+        [_rates(graphs, "x", "t"), count(1)],
+        [at_all, *series, *_wish(order)],
+        [copied("next", "unit")],
         kept=[copied("rounding_new", "rounding"), copied("h", "unit")],
-        fixed=("rounding", "rounding_new", "next", "rtol", "atol", *controls),
-        error=[stage_time("at_t", 1.0), _rates(graphs, "x_new", "at_t", "_new"), count(1), *_checked(m)],
+        fixed=("rounding", "rounding_new", "atol", *controls),
+        error=[stage_time("at_t", 1.0), _rates(graphs, "x_new", "at_t"), count(1), *_checked(m, order)],
         estimate=order,
-        handed=[copied(f"{name}_new", name) for name in ("rate", "zeros")],
+        handed=(),  # a trial that is not accepted leaves other rates behind, and coefficients, which go on
         dense=[_dense(order)],
-        dense_lengths={f"dense{k}": m for k in orders},
+        dense_lengths=dict.fromkeys(_names("dense", order), m),
     )
 
 
-def _rates(graphs: Jets, x: str, t: str, suffix: str) -> Call:
+def _names(name: str, order: int) -> list[str]:
+    return [f"{name}{k}" for k in range(1, order + 1)]
+
+
+def _rates(graphs: Jets, x: str, t: str) -> Call:
     """The rates and coefficients 0 at a state."""
-    return Call(graphs.start, (x, t, "p"), (f"rate{suffix}", f"zeros{suffix}"))
+    return Call(graphs.start, (x, t, "p"), ("rate", "zeros"))
 
 
+@kept_by_first
 def _jets(problem: Problem) -> Jets:
     try:
         return jets(problem.rate, TIME)
@@ -72,80 +89,73 @@ def _jets(problem: Problem) -> Jets:
         ) from None
 
 
-def _orders(order: int) -> Call:
-    """From rtol: the order, and which coefficients are computed; all of them where the tolerance asks for nothing."""
-    rtol = cg.variable("rtol")
-    wanted = 1.0 - 0.5 * cg.log(cg.maximum(rtol, 1e-300))
-    highest = cg.where(rtol < 1.0, cg.minimum(cg.maximum(wanted, float(LEAST)), float(order)), float(order))
-    takes = {f"takes{k}": cg.less(k - 1.0, highest) for k in range(1, order + 1)}
-    rounded = sum(takes.values(), cg.constant(0.0))
-    return Call(Graph([rtol], {**takes, "highest": rounded}), ("rtol",), (*takes, "highest"))
+def _by_orders(m: int, graphs: Jets, order: int) -> tuple[list[Statement], dict[str, int]]:
+    """Coefficients of one order after another, and the registers that it takes; `none` stays 0."""
+    numbers = Graph([], {name: float(k) for k, name in enumerate(_names("order", order), 1)})
+    body: list[Statement] = [copied("rate", "rates0"), Call(numbers, (), tuple(numbers.outputs))]
+    lengths = dict.fromkeys([*_names("left", order), *_names("right", order), "sums", "none"], graphs.sums)
+    for k in range(1, order + 1):
+        if k > 1 and graphs.sums:
+            sides = [*_names("left", k - 1), *_names("right", k - 1)]
+            factors = cg.variables(sides)
+            total = Graph(factors, {"sum": convolution(factors[: k - 1], factors[k - 1 :])})
+            body.append(Map(total, tuple(sides), ("sums",)))
+        inputs = (f"rates{(k - 1) % 2}", "unit", f"order{k}", "zeros", "sums" if k > 1 else "none")
+        body.append(Call(graphs.order, inputs, (f"c{k}", f"rates{k % 2}", f"left{k}", f"right{k}")))
+    return body, lengths | dict.fromkeys(("rates0", "rates1"), m) | dict.fromkeys(_names("order", order), 1)
 
 
-def _coefficients(k: int, graphs: Jets) -> list[Statement]:
-    """Coefficients k, and the size of the term k of the state in tolerances."""
-    body: list[Statement] = []
-    if k > 1 and graphs.sums:
-        pairs = [(f"left{j}", f"right{k - j}") for j in range(1, k)]
-        nodes = cg.variables([f"v{j}" for j in range(2 * len(pairs))])
-        products = [a * b for a, b in zip(nodes[::2], nodes[1::2], strict=True)]
-        halves = [sum(part[1:], part[0]) for part in (products[::2], products[1::2]) if part]
-        graph = Graph(nodes, {"sum": sum(halves[1:], halves[0])})
-        body.append(Map(graph, tuple([name for pair in pairs for name in pair]), ("sums",)))
-    inputs = (f"rates{(k - 1) % 2}", "unit", f"order{k}", "zeros", "sums" if k > 1 else "none")
-    body.append(Call(graphs.order, inputs, (f"c{k}", f"rates{k % 2}", f"left{k}", f"right{k}")))
-    return [*body, copied("last", "before"), Sum(_SQUARE, (f"c{k}", "x", "c1", "rtol", "atol"), "last")]
-
-
-def _square() -> Graph:
+def _wish(order: int) -> list[Statement]:
+    """Register `next`: at most the step at which the last two terms are within the tolerance."""
     c, x, first, rtol, atol = inputs = cg.variables("c x first rtol atol")
     part = c / (atol + rtol * cg.maximum(abs(x), abs(first)))  # what starts at 0 is as large as its first change
-    return Graph(inputs, {"y": part * part})
-
-
-_SQUARE = _square()
-
-
-def _wish() -> Call:
-    """Register `next`: at most the step at which the last two terms are within the tolerance."""
-    last, before, unit, order, wanted = inputs = cg.variables("last before unit highest next")
+    square = Graph(inputs, {"y": part * part})
+    last, before, unit, wanted = inputs = cg.variables("last before unit next")
     share = cg.minimum(before ** (-0.5 / (order - 1.0)), (math.exp(4.0) * last) ** (-0.5 / order))
-    h = abs(unit) * share * cg.exp(-0.7 / (order - 1.0))
-    names = ("last", "before", "unit", "highest", "next")
-    return Call(Graph(inputs, {"h": cg.where(cg.equal(h, h), cg.minimum(wanted, h), 0.0)}), names, ("next",))
+    h = abs(unit) * share * math.exp(-0.7 / (order - 1.0))
+    graph = Graph(inputs, {"h": cg.where(cg.equal(h, h), cg.minimum(wanted, h), 0.0)})
+    sizes = {"last": order, "before": order - 1}
+    sums = [Sum(square, (f"c{k}", "x", "c1", "rtol", "atol"), name) for name, k in sizes.items()]
+    return [*sums, Call(graph, ("last", "before", "unit", "next"), ("next",))]
 
 
 def _arrival(order: int) -> Map:
     """x_new = x + sum of c_k s^k, with what rounding took off; slope = h times the polynomial's derivative there."""
-    x, before, s, *c = cg.variables(["x", "rounding", "s", *(f"c{k}" for k in range(1, order + 1))])
-    change, slope = c[-1], order * c[-1]
-    for k in range(order - 1, 0, -1):
-        change, slope = c[k - 1] + s * change, k * c[k - 1] + s * slope
-    total, rounding = compensated(x, s * change + before)
-    graph = Graph([x, before, s, *c], {"x": total, "rounding": rounding, "slope": s * slope})
-    registers = ("x", "rounding", "s", *[f"c{k}" for k in range(1, order + 1)])
-    return Map(graph, registers, ("x_new", "rounding_new", "slope"))
+    x, before, s, *c = cg.variables(["x", "rounding", "s", *_names("c", order)])
+    total, rounding = compensated(x, s * _polynomial(c, s) + before)
+    slope = s * _polynomial([k * each for k, each in enumerate(c, 1)], s)
+    graph = Graph([x, before, s, *c], {"x": total, "rounding": rounding, "slope": slope})
+    return Map(graph, ("x", "rounding", "s", *_names("c", order)), ("x_new", "rounding_new", "slope"))
 
 
-def _checked(m: int) -> list[Statement]:
+def _polynomial(c: Sequence[Node], s: Node) -> Node:
+    """The sum of c_k s^k, by Estrin: halves side by side, of half as many steps each time."""
+    terms, power = list(c), s
+    while len(terms) > 1:
+        pairs = zip(terms[::2], terms[1::2], strict=False)
+        terms = [low + power * high for low, high in pairs] + terms[len(terms) // 2 * 2 :]
+        power = power * power
+    return terms[0]
+
+
+def _checked(m: int, order: int) -> list[Statement]:
     """Register `error`: what the step misses by its defect, the difference of rate and derivative at its end."""
-    slope, rate, x, x_new, rtol, atol, h, order = inputs = cg.variables("slope rate x x_new rtol atol h order")
+    slope, rate, x, x_new, rtol, atol, h = inputs = cg.variables("slope rate x x_new rtol atol h")
     scale = atol + cg.maximum(rtol, CHECKED) * cg.maximum(abs(x), abs(x_new)) + CHECKED * abs(slope)
     part = (slope - h * rate) / ((order + 1.0) * scale)
-    names = ("slope", "rate_new", "x", "x_new", "rtol", "atol", "h", "highest")
     total, h, t = cg.variables("error h t")
     error = cg.where(cg.not_equal(t, t + h), cg.sqrt(total / m), math.inf)
     return [
-        Sum(Graph(inputs, {"y": part * part}), names, "error"),
+        Sum(Graph(inputs, {"y": part * part}), ("slope", "rate", "x", "x_new", "rtol", "atol", "h"), "error"),
         Call(Graph([total, h, t], {"error": error}), ("error", "h", "t"), ("error",)),
     ]
 
 
 def _dense(order: int) -> Map:
     """dense_k = c_k s^k."""
-    s, *c = cg.variables(["s", *(f"c{k}" for k in range(1, order + 1))])
+    s, *c = cg.variables(["s", *_names("c", order)])
     outputs, power = {}, s
     for k, each in enumerate(c, start=1):
         outputs[f"dense{k}"] = each * power
         power = power * s
-    return Map(Graph([s, *c], outputs), ("s", *[f"c{k}" for k in range(1, order + 1)]), tuple(outputs))
+    return Map(Graph([s, *c], outputs), ("s", *_names("c", order)), tuple(outputs))

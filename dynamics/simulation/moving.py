@@ -15,7 +15,7 @@ from cgraph import Graph
 from cgraph.extend import Array
 
 from ..equations.states.initial_value import other_inputs, start_state
-from ..integrators import METHODS, derive, force, in_form, total_energy
+from ..integrators import derive, force, in_form, total_energy
 from ..systems.arguments import parameter_value
 from ..systems.model import Model, as_equations
 from .applied_forces import Tau, with_applied
@@ -77,7 +77,7 @@ class Moving:
         """A memory in which motions run."""
         from .steps.stepper import stepper  # without it a trajectory is all that is asked for
 
-        program = step_program(self.stepped, METHODS[options.method], dense=False)
+        program = step_program(self.stepped, options.integrator, dense=False)
         return stepper(compile_steps(program, options.backend), options, [0.0] * len(self.problem.parameters))
 
     def start(self, q: ArrayLike, qd: ArrayLike | None, t0: float, p: Sequence[float]) -> Array:

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from cgraph.extend import Array, real_array, real_number
 
 from ..equations.states.initial_value import times_to_record
-from ..integrators import METHODS
+from ..integrators import METHODS, Method
 from ..integrators.step_control import RESOLUTION
 from .steps.equal_steps import step_count
 
@@ -140,6 +140,11 @@ class RunOptions:
     def adaptive(self) -> bool:
         """Whether the method chooses its steps."""
         return self.scipy_solver is not None or METHODS[self.method].adaptive
+
+    @property
+    def integrator(self) -> Method:
+        """The method, of `METHODS`, for this tolerance."""
+        return METHODS[self.method].at(self.relative)
 
     @property
     def step(self) -> float:

@@ -144,7 +144,7 @@ def simulate_many(
     # Derive the equations as graphs, and write the steps of the method over them
     begin = time.perf_counter()
     problem = in_form(derive(model, start.bound), form)
-    program = step_program(problem, METHODS[method], dense=bool(watched) or options.between)
+    program = step_program(problem, options.integrator, dense=bool(watched) or options.between)
     watch = event_program(problem, watched)
 
     # Share out the work: what a worker is sent, and the starts of chunks of trajectories

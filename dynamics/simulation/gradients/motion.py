@@ -192,7 +192,7 @@ def motion_of(
     chosen_steps = run.adaptive or events
     motion = MotionRequest(
         equations,
-        METHODS[run.method],
+        run.integrator,
         start.x.T.copy(),
         () if chosen_steps else (equal_segment(run, None if rows is None else rows.shape[1]),),
         np.empty(0),  # of steps, before the segments are run

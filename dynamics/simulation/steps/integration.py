@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
-from ...integrators import METHODS, Problem
+from ...integrators import Problem
 from ..run_options import RunOptions
 from ..sampled_controller import Hold
 from .chosen_steps import AdaptiveIntegration
@@ -32,7 +32,7 @@ def integration_of(
 
         segment = partial(ScipyIntegration, scipy_solver(problem, name, options.backend), between=between)
         return segment(options) if events is None else _watched(segment, options, events)
-    method = METHODS[options.method]
+    method = options.integrator
     program = step_program(problem, method, dense=method.adaptive and (between or options.between))
     run = NativeRun(compile_steps(program, options.backend), options, parameters, control=hold)
     return integration(run, every_step=between, events=events)

@@ -14,6 +14,7 @@ import cgraph as cg
 import dynamics as dyn
 from cgraph.core.node import apply
 from cgraph.extend import OPS
+from dynamics.integrators import METHODS, taylor
 from tests.dynamics.planet import PERIHELION, planet, position
 
 ROUNDINGS = 2e-14  # of a few dozen steps
@@ -55,6 +56,33 @@ def test_the_order_follows_the_tolerance_and_the_time_has_no_unit() -> None:
             assert abs(run.q[-1] - [math.cos(10.0), -math.sin(10.0)]).max() < 10.0 * tolerance
             steps.append(run.stats.steps)
         assert max(steps) < 3 * min(steps)  # as in Jorba and Zou: a tighter tolerance takes a higher order
+
+
+@mark.parametrize("tolerance", [1e-6, 1e-12])
+def test_all_orders_at_once_and_one_after_another_are_the_same(
+    tolerance: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whether the coefficients are one graph, as of small systems, or a loop, steps and states agree to rounding."""
+    runs = []
+    for short in (taylor.SHORT, 0):
+        monkeypatch.setattr(taylor, "SHORT", short)
+        arm = dyn.planar_arm([1.0, 0.8], [1.0, 0.8])
+        runs.append(dyn.simulate(arm, [1.0, 0.5], [0.0, 0.3], 3.0, "taylor", rtol=tolerance, atol=tolerance))
+        cg.clear_caches()
+    one, other = runs
+    assert one.stats.steps == other.stats.steps
+    assert one.q == approx(other.q, abs=1e-11)
+    assert one.t == approx(other.t, rel=1e-11)
+
+
+def test_orders_follow_the_tolerance() -> None:
+    method = METHODS["taylor"]
+    assert [method.at(rtol).order for rtol in (0.5, 1e-6, 1e-9, 1e-12, 1e-15, 1e-30, 0.0, 10.0)] == [
+        *(3, 8, 12, 15),
+        *(19, 20, 20, 20),
+    ]
+    assert method.at(1e-9) is method.at(2e-9)  # so that a problem keeps one program for both
+    assert METHODS["dop853"].at(1e-9) is METHODS["dop853"]
 
 
 def test_what_the_series_at_the_start_does_not_show_is_seen_at_the_end_of_the_step() -> None:
