@@ -1,7 +1,9 @@
 """A prepared motion: to the bit what `simulate` gives, its end alone, and its steps one by one; from threads, too."""
 
+import _thread
 import math
 import pickle
+import threading
 import warnings
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -199,6 +201,17 @@ def test_threads_have_a_memory_each() -> None:
     with ThreadPoolExecutor(4) as pool:
         together = list(pool.map(lambda q: motion.end(q, [0.0, 0.0], SPAN).q.tolist(), starts))
     assert together == alone
+
+
+@mark.parametrize("method", ["dop853", "rk4"])
+def test_ctrl_c_ends_a_long_run(method: str) -> None:
+    motion = dyn.prepare(ARM, method, **options_of(method))
+    end = motion.end(*START, SPAN)
+    timer = threading.Timer(0.3, _thread.interrupt_main)
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        motion.end(*START, 1e7)
+    np.testing.assert_array_equal(motion.end(*START, SPAN).q, end.q)  # the memory is as good as before
 
 
 def test_it_goes_to_other_processes() -> None:
