@@ -148,16 +148,12 @@ def simulate_many(
     watch = event_program(problem, watched)
 
     # Share out the work: what a worker is sent, and the starts of chunks of trajectories
-    grids = [] if watched else _grids(program, options, len(start.x))
+    grids, lanes = ([], False) if watched else _side_by_side(program, options, len(start.x))
     sent = replace(options, t_eval=options.row_times) if watched else options
-    lanes = not watched and fits_lanes(program, options, len(start.x)) and (program.adaptive or len(grids) == 1)
-    looked_for = pickle.dumps(watch) if watched else b""
-    task = Task(pickled_steps(program), sent, count, tuple(grids), looked_for, lanes)
+    task = Task(pickled_steps(program), sent, count, tuple(grids), pickle.dumps(watch) if watched else b"", lanes)
     p = np.array([start.varied[name] for name in problem.parameters]).reshape(-1, len(start.x)).T.copy()
     x = converted(problem.momentum, t0, start.x, p)
-    largest = min(LONGEST, max(VECTOR, NUMBERS // (count * program.steps.width))) if lanes else LARGEST
-    chunk = min(chunk, largest) if chunk is not None and lanes else chunk
-    chunks = _chunks(x, p, chunk, team, largest, whole=bool(grids))
+    chunks = _chunks(x, p, chunk, team, count * program.steps.width if lanes else 0, whole=bool(grids))
 
     # Integrate, by whoever takes the chunks and compiles the steps
     whole = not_begun(0, np.empty((len(x), count, problem.size)), events=bool(watched))
@@ -245,9 +241,15 @@ def _check_room(x: Array, rows: int) -> None:
         )
 
 
+def _side_by_side(program: StepProgram, options: RunOptions, count: int) -> tuple[list[EqualSteps], bool]:
+    """The equal steps of trajectories side by side, and whether they go in lanes; neither of what goes one by one."""
+    grids = [] if program.adaptive else _grids(program, options, count)
+    return grids, fits_lanes(program, options, count) and (program.adaptive or len(grids) == 1)
+
+
 def _grids(program: StepProgram, options: RunOptions, count: int) -> list[EqualSteps]:
-    """The equal steps of trajectories side by side; empty where they have to go, or are done sooner, one by one."""
-    if program.adaptive or (count < VECTOR and iterates(program)):
+    """Equal steps; empty where trajectories have to go, or are done sooner, one by one."""
+    if count < VECTOR and iterates(program):
         return []
     grids = even_steps(options.instants, options.step)
     if options.times is None:  # every step is a row
@@ -255,8 +257,15 @@ def _grids(program: StepProgram, options: RunOptions, count: int) -> list[EqualS
     return grids if sum(grid.steps for grid in grids) <= options.max_steps else []
 
 
-def _chunks(x: Array, p: Array, chunk: int | None, workers: int | Map, largest: int, *, whole: bool) -> list[Chunk]:
-    """The starts in chunks; whole: of whole vectors, so that a trajectory has the same neighbors in any chunk."""
+def _chunks(x: Array, p: Array, chunk: int | None, workers: int | Map, rows: int, *, whole: bool) -> list[Chunk]:
+    """The starts in chunks.
+
+    rows: numbers in the rows of steps that a trajectory keeps in its lane, 0 where it is in none.
+    whole: of whole vectors, so that a trajectory has the same neighbors in any chunk.
+    """
+    largest = min(LONGEST, max(VECTOR, NUMBERS // rows)) if rows else LARGEST
+    if rows and chunk is not None:
+        chunk = min(chunk, largest)
     if chunk is None:
         chunk = min(largest, math.ceil(len(x) / (SHARES * (UNKNOWN if callable(workers) else workers))))
     width = math.ceil(chunk / VECTOR) * VECTOR if whole else int(chunk)
