@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from cgraph import Node
 from cgraph.extend import Array, require_whole
 
-from ...equations.states.initial_value import initial_values
+from ...equations.states.initial_value import InitialValues, initial_values
 from ...integrators import METHODS, Problem, derive, in_form
 from ...systems.model import Model
 from ..applied_forces import with_applied
@@ -151,8 +151,7 @@ def simulate_many(
     grids, lanes = ([], False) if watched else _side_by_side(program, options, len(start.x))
     sent = replace(options, t_eval=options.row_times) if watched else options
     task = Task(pickled_steps(program), sent, count, tuple(grids), pickle.dumps(watch) if watched else b"", lanes)
-    p = np.array([start.varied[name] for name in problem.parameters]).reshape(-1, len(start.x)).T.copy()
-    x = converted(problem.momentum, t0, start.x, p)
+    x, p = _stepped(problem, start, t0)
     chunks = _chunks(x, p, chunk, team, count * program.steps.width if lanes else 0, whole=bool(grids))
 
     # Integrate, by whoever takes the chunks and compiles the steps
@@ -164,6 +163,12 @@ def simulate_many(
     for text in _warnings(result.stats):
         warnings.warn(text, SimulationWarning, stacklevel=2)
     return result
+
+
+def _stepped(problem: Problem, start: InitialValues, t0: float) -> tuple[Array, Array]:
+    """The states (N, m) that the steps start from, and the parameters of the problem, (N, ..)."""
+    p = np.array([start.varied[name] for name in problem.parameters]).reshape(-1, len(start.x)).T.copy()
+    return converted(problem.momentum, t0, start.x, p), p
 
 
 def _row_count(options: RunOptions) -> int:
