@@ -213,7 +213,7 @@ CALLS = {
     ),
     "dyn.prepare": call(
         dyn.prepare, ARM, "rk4", max_step=None, rtol=None, atol=None, events=(), dense_output=False, tau=0.0,
-        first_step=None, form="velocity", **RUNS
+        first_step=None, form="velocity", varied=(), **RUNS
     ),
     "dyn.PreparedMotion.end": call(MOTION.end, [0.1], [0.0], 0.02, 0.0, parameters=None),
     "dyn.PreparedMotion.start": call(MOTION.start, [0.1], [0.0], 0.02, 0.0, parameters=None),

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 from numpy.typing import ArrayLike
 
-from cgraph.extend import require_choice, require_flag
+from cgraph.extend import require_choice, require_flag, require_sequence
 
 from ..equations.state_equation import FORMS
 from ..equations.states.initial_value import other_inputs
@@ -38,6 +38,7 @@ def prepare(
     backend: str = "auto",
     progress: bool | None = None,
     form: str = "velocity",
+    varied: str | Iterable[str] = (),
 ) -> PreparedMotion:
     """A model, a method and its options, fixed once for many motions.
 
@@ -47,6 +48,10 @@ def prepare(
         As of `simulate`, which is this and a call.
     backend, progress, form
         The same.
+    varied : str or iterable of str
+        Parameters of the model or of a controller whose values stay open, so that those of a call cost nothing. Values
+        of others are built into the machine code, as `simulate` does, and other ones compile anew. Not with a
+        SampledController, nor SciPy's solvers.
 
     Returns
     -------
@@ -74,4 +79,8 @@ def prepare(
     require_choice("form", form, FORMS)
     if not (callable(tau) or isinstance(tau, float | SampledController)):
         other_inputs(equations, tau)
-    return PreparedMotion(equations, options, tau, as_events(events), form, require_flag("dense_output", dense_output))
+    names = require_sequence("varied", [varied] if isinstance(varied, str) else varied, "names of parameters", str)
+    if names and (isinstance(tau, SampledController) or options.scipy_solver is not None):
+        raise ValueError(f"varied = {names} needs one of dyn.METHODS, and no SampledController, which holds its forces")
+    dense_output = require_flag("dense_output", dense_output)
+    return PreparedMotion(model, options, tau, as_events(events), form, dense_output, names)

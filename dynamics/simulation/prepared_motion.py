@@ -76,10 +76,17 @@ class PreparedMotion:
     """
 
     def __init__(
-        self, model: Model, options: RunOptions, tau: Tau, events: Sequence[Event], form: str, dense_output: bool
+        self,
+        model: Model,
+        options: RunOptions,
+        tau: Tau,
+        events: Sequence[Event],
+        form: str,
+        dense_output: bool,
+        varied: tuple[str, ...],
     ) -> None:
-        self._options, self._dense, self._events = options, dense_output, bool(events)
-        self._make = partial(Moving, model, tau, events, form)
+        self._options, self._dense, self._events, self._varied = options, dense_output, bool(events), varied
+        self._make = partial(Moving, model, tau, events, form, varied)
         self._known: dict[Any, Moving] = {}
 
     def __getstate__(self) -> dict[str, Any]:
@@ -146,8 +153,10 @@ class PreparedMotion:
                 raise MotionError(f"the motion did not reach t_end, {run.message}")
             return MotionEnd(float(run.t[-1]), run.q[-1], run.qd[-1])
         timely = type(t0) is float and type(t_end) is float and self._options.spans(t0, t_end)
+        if self._varied:
+            stepper.set_parameters(moving.values(parameters))
         if not (timely and moving.fits(q, qd) and stepper.begin_from(q, qd, t0, t_end)):  # see what is wrong
-            stepper.begin(self._start(moving, q, qd, t0, t_end), float(t0), float(t_end))
+            stepper.begin(self._start(moving, q, qd, t0, t_end, parameters), float(t0), float(t_end))
         stepper.to_end()
         if stepper.failed:
             raise MotionError(f"the motion did not reach t_end, {stepper.failed}")
@@ -202,8 +211,10 @@ class PreparedMotion:
                 "single steps are of motions without events, sampled controllers, max_steps and SciPy's solvers, in "
                 'form="velocity": call the motion, which gives its rows'
             )
-        x = self._start(moving, q, qd, t0, t0 + 1.0 if t_end is None else t_end)
-        return MotionSteps(moving.stepper(self._options), x, float(t0), t_end, moving.stepped.nq)
+        x = self._start(moving, q, qd, t0, t0 + 1.0 if t_end is None else t_end, parameters)
+        stepper = moving.stepper(self._options)
+        stepper.set_parameters(moving.values(parameters))
+        return MotionSteps(stepper, x, float(t0), t_end, moving.stepped.nq)
 
     def _steps(self, moving: Moving) -> bool:
         """Whether its steps are ours alone, with nothing done between them."""
@@ -228,13 +239,17 @@ class PreparedMotion:
             found = steppers.found = moving.stepper(options) if plain else None
         return found
 
-    def _start(self, moving: Moving, q: ArrayLike, qd: ArrayLike | None, t0: float, t_end: float) -> Array:
+    def _start(
+        self, moving: Moving, q: ArrayLike, qd: ArrayLike | None, t0: float, t_end: float, parameters: Any
+    ) -> Array:
         """The state (m,) in which a run starts, all arguments checked."""
         self._options.over(t0, t_end, None).check(moving.problem.states)
-        return moving.start(q, qd, t0)
+        return moving.start(q, qd, t0, moving.values(parameters))
 
     def _moving(self, parameters: Mapping[str, Any] | None) -> Moving:
-        """What moves with these parameter values, of the last few the same again."""
+        """What moves with these values of parameters that are built in, of the last few the same again."""
+        if self._varied and isinstance(parameters, Mapping):
+            parameters = {name: value for name, value in parameters.items() if name not in self._varied}
         key = None if parameters is None else _key(parameters)
         if (found := self._known.get(key)) is None:
             found = self._make(parameters)
@@ -252,36 +267,37 @@ class PreparedMotion:
     ) -> Trajectory:
         """The motion over the span of options."""
         moving = self._moving(parameters)
-        start = moving.start(q, qd, options.t0)
+        p = moving.values(parameters)
+        start, values = moving.start(q, qd, options.t0, p), p or 0.0
         options.check(moving.problem.states)
         options.check_room(len(start))
 
         # Write the steps of the method over the equations, and compile them; the states are (q, qd), or here (q, p)
         stepped, hold = moving.stepped, moving.applied.hold(options, moving.stepped)
         between = moving.events is not None or self._dense
-        made = partial(integration_of, stepped, events=moving.events, between=between)
-        run, x = made(options, hold=hold), converted(stepped.momentum, options.t0, start)
+        made = partial(integration_of, stepped, parameters=p, events=moving.events, between=between)
+        run, x = made(options, hold=hold), converted(stepped.momentum, options.t0, start, values)
 
         # Integrate, noting rows and events
         steps: list[StepBlock] | None = [] if self._dense else None
         stats, rows = _integrate(run, x, options, steps, made if hold is None else None)
 
         # Put the result together
-        if missed := unreached_momenta(stepped, *rows, start=(options.t0, start, x)):
+        if missed := unreached_momenta(stepped, *rows, values, start=(options.t0, start, x)):
             stats = replace(stats, warnings=(*stats.warnings, *missed))
         early = not stats.success and not stats.message.startswith(INTERRUPTED)
         for text in [*([f"the run {stats.message}"] if early else []), *stats.warnings]:
             warnings.warn(text, SimulationWarning, stacklevel=_level_of_caller())
         nq, names = stepped.nq, moving.model
-        times, states = rows[0], converted(stepped.velocities, *rows)
+        times, states = rows[0], converted(stepped.velocities, *rows, values)
         return Trajectory(
             times,
             states[:, :nq],
             states[:, nq:],
             stats,
-            run.crossings(nq),
-            moving.graphs,
-            None if steps is None else Solution(options.t0, x, steps, nq, stepped.velocities),
+            run.crossings(nq, values),
+            moving.graphs(p),
+            None if steps is None else Solution(options.t0, x, steps, nq, moving.velocities(p)),
             None if hold is None else hold.held,
             names.coordinates,
             names.velocities,

@@ -6,6 +6,7 @@ import math
 import os
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -135,7 +136,7 @@ class RunOptions:
         """The name of SciPy's solver; None for a method of `METHODS`."""
         return self.method.removeprefix(SCIPY) if self.method.startswith(SCIPY) else None
 
-    @property
+    @cached_property
     def adaptive(self) -> bool:
         """Whether the method chooses its steps."""
         return self.scipy_solver is not None or METHODS[self.method].adaptive

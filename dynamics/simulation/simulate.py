@@ -42,6 +42,8 @@ def simulate(
 ) -> Trajectory:
     """The motion of a system from (q, qd) at t0 to t_end.
 
+    It is `prepare` and a call: what moves a model again and again prepares it once.
+
     A step whose state is not finite, or that has to be smaller than the resolution of t, ends the run: the trajectory
     keeps what was computed before it, the state where it stopped is its last row, and `stats.message` and a
     `SimulationWarning` name the time and the coordinate. Ctrl-C does the same, without a warning.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from math import isfinite
@@ -15,9 +16,11 @@ from cgraph.extend import Array
 
 from ...integrators.step_control import RUNNING, TOO_SMALL
 from ..run_options import RunOptions
+from ..trajectory import SimulationWarning
 from .chosen_steps import AdaptiveIntegration
 from .equal_steps import EqualSteps, equal_steps
 from .first_step import given, instant
+from .flat_position import FlatPosition
 from .step_program import CompiledSteps
 from .stepping import BLOCK_TIME, FIRST_PASSES, FixedStepIntegration, NativeIntegration, NativeRun
 
@@ -40,6 +43,11 @@ class Stepper(ABC):
 
     registers: tuple[str, ...]  # that it reads and writes, of one number each
     stop: str  # the register by which passes end
+
+    def set_parameters(self, p: Sequence[float]) -> None:
+        """Values of the parameters in the runs that begin from here on."""
+        self._run.parameters = list(p)
+        self._run.runner.write(self._start, "p", self._run.parameters)
 
     @property
     def t(self) -> float:
@@ -97,7 +105,7 @@ class Stepper(ABC):
 class ChosenStepper(Stepper):
     """Steps chosen by error; a run that goes on after an end has steps as if that had been none, but for the last."""
 
-    registers = ("t", "end", "status", "anew", "row", *given({"t_end": 0, "goal": 0, "instant": 0}))
+    registers = ("t", "h", "end", "status", "anew", "row", *given({"t_end": 0, "goal": 0, "instant": 0}))
     stop = "status"
     _run: AdaptiveIntegration
 
@@ -106,6 +114,9 @@ class ChosenStepper(Stepper):
         numbers[at["t"]], numbers[at["start.t_end"]], numbers[at["start.goal"]] = t0, t_end, t_end
         if self._run.program.timed:
             numbers[at["start.instant"]] = instant(t0, t_end)
+        if self._run.flat.rows is not None:
+            self._run.flat = FlatPosition(self._run.program)
+            self._run.flat.begin(t0, self._x, self._run.parameters)
         self.failed = ""
 
     def until(self, t: float) -> None:
@@ -116,8 +127,7 @@ class ChosenStepper(Stepper):
     def to_end(self) -> None:
         """All steps."""
         self._passes()
-        if self._numbers[self._at["status"]] == TOO_SMALL:
-            self.failed = self._run.too_small(self._memory)
+        self._look()
 
     def step(self) -> None:
         """One step more on the way to t_end."""
@@ -126,8 +136,17 @@ class ChosenStepper(Stepper):
         self._advance(1)
         while numbers[row] <= 0.0 and numbers[status] == RUNNING:
             self._advance(1)
-        if numbers[status] == TOO_SMALL:
-            self.failed = self._run.too_small(self._memory)
+        self._look()
+
+    def _look(self) -> None:
+        """Whether it failed; and what to say of constraints."""
+        flat, p = self._run.flat, self._run.parameters
+        if flat.rows is not None:
+            row = np.array([[self.t, self._numbers[self._at["h"]], *self._x]])
+            for text in flat.look(row, self._run.runner.read(self._memory, "farthest")[0], p):
+                warnings.warn(text, SimulationWarning, stacklevel=5)
+        if self._numbers[self._at["status"]] == TOO_SMALL:
+            self.failed = self._run.too_small(self._memory) + flat.near(p)
 
     def _towards(self, t: float) -> None:
         numbers, at = self._numbers, self._at

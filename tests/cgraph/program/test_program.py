@@ -177,6 +177,38 @@ def test_record_if_and_stop(backend: str) -> None:
     assert never.run(never.memory({}), 6).rows.ravel().tolist() == [5.0, 6.0]
 
 
+def test_passes_go_on_in_a_memory_that_is_kept(backend: str) -> None:
+    k = cg.variable("k")
+    count = cg.Graph([k], {"k": k + 1.0, "done": (k + 1.0) >= 5.0})
+    run = runner(Program({"k": 1, "done": 1}, [Call(count, ("k",), ("k", "done"))], ["k"], stop="done"), backend)
+    memory = run.memory({"k": 1.0})
+    advance = run.advancing(memory)
+    advance(2)
+    assert run.read(memory, "k").tolist() == [3.0]
+    advance(100)
+    assert run.read(memory, "k").tolist() == [5.0]
+    with pytest.raises(cg.GraphError, match="a memory must be contiguous"):
+        run.advancing(memory[:1].astype(np.float32))
+    fed = runner(Program({"k": 1, "done": 1}, [Call(count, ("k",), ("k", "done"))], ["k"], feed=["k"]), backend)
+    with pytest.raises(cg.GraphError, match="takes no feed"):
+        fed.advancing(fed.memory({}))
+
+
+def test_products_of_an_exact_call_are_rounded_by_themselves(backend: str) -> None:
+    """What cancels is 0, also where the graph is called in both ways, and in a branch that seldom runs."""
+    nodes = cg.variables("a b c d")
+    graph = cg.Graph(nodes, {"e": nodes[0] * nodes[1] - nodes[2] * nodes[3]})
+    joined, exact = Call(graph, ("x",), ("fused",)), Call(graph, ("x",), ("exact",), exact=True)
+    registers, record = {"x": 4, "fused": 1, "exact": 1, "again": 1}, ["fused", "exact", "again"]
+    seldom = If("fused", (Call(graph, ("x",), ("again",), exact=True),), (exact,), seldom=True)
+    run = runner(Program(registers, [exact, joined, seldom], record), backend)
+    x = [0.1, 0.3, 0.3, 0.1]
+    fused, alone, again = run.run(run.memory({"x": x, "again": 7.0}), 1).rows[0].tolist()
+    assert alone == 0.0
+    assert abs(fused) < 1e-16
+    assert again == (0.0 if fused > 0.0 else 7.0)
+
+
 def test_a_run_goes_on_where_the_last_one_ended(backend: str) -> None:
     graph = spring()
     program = Program({"c": 2, "h": 1}, [Call(graph, ("c", "h"), ("c",))], record=["c"])

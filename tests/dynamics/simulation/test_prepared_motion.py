@@ -1,7 +1,9 @@
 """A prepared motion: to the bit what `simulate` gives, its end alone, and its steps one by one; from threads, too."""
 
+import _thread
 import math
 import pickle
+import threading
 import warnings
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
@@ -127,6 +129,19 @@ def test_whatever_is_fixed(options: dict[str, Any]) -> None:
     np.testing.assert_array_equal(end.qd, run.qd[-1])
 
 
+def test_a_linkage_goes_on_step_by_step() -> None:
+    def energy(q: Any, qd: Any, t: Any) -> Any:
+        return 0.5 * (qd[0] ** 2 + qd[1] ** 2) - 9.81 * q[1]
+
+    rod = dyn.System(energy, "x y", constraints=lambda q, t: {"rod": 0.5 * (q[0] ** 2 + q[1] ** 2 - 1.0)})
+    run = dyn.simulate(rod, [1.0, 0.0], [0.0, 0.0], 1.0)
+    going = dyn.prepare(rod).start([1.0, 0.0], [0.0, 0.0], 1.0)
+    for q in run.q[1:]:
+        going.step()
+        np.testing.assert_array_equal(going.q, q)
+    np.testing.assert_array_equal(dyn.prepare(rod).end([1.0, 0.0], [0.0, 0.0], 1.0).q, run.q[-1])
+
+
 def test_parameters_are_those_of_the_call() -> None:
     pendulum = dyn.System(
         lambda q, qd, t, p: 0.5 * qd[0] ** 2 - p["stiffness"] * q[0] ** 2, ["angle"], parameters={"stiffness": 1.0}
@@ -142,6 +157,43 @@ def test_parameters_are_those_of_the_call() -> None:
             motion.end([0.1], [0.0], 1.0, parameters=wrong)  # type: ignore[arg-type]
 
 
+@mark.parametrize(
+    "options", [{}, {"method": "rk4", "dt": 0.01, "estimate_error": False}, {"form": "momentum"}], ids=str
+)
+def test_varied_parameters_stay_open(options: dict[str, Any]) -> None:
+    pendulum = dyn.System(
+        lambda q, qd, t, p: 0.5 * p["inertia"] * qd[0] ** 2 - p["stiffness"] * q[0] ** 2,
+        ["angle"],
+        parameters={"stiffness": 1.0, "inertia": 1.0},
+    )
+
+    def servo(q: Any, qd: Any, t: Any, p: Any) -> Any:
+        return [-p["gain"] * qd[0]]
+
+    low = dyn.Event("low", lambda q, qd, t, p: q[0] - 0.01 * p["stiffness"])
+    motion = dyn.prepare(pendulum, varied=["stiffness", "gain"], tau=servo, **options)
+    watched = dyn.prepare(pendulum, varied=["stiffness", "gain"], tau=servo, events=low, dense_output=True, **options)
+    for k, gain in ((1.0, 0.1), (4.0, 0.2), (1.0, 0.1)):
+        parameters = {"stiffness": k, "gain": gain, "inertia": 2.0}
+        run = dyn.simulate(pendulum, [0.1], [0.0], 1.0, tau=servo, parameters=parameters, events=low, **options)
+        other = watched([0.1], [0.0], 1.0, parameters=parameters)
+        for name in ("q", "qd", "energy", "forces"):
+            np.testing.assert_allclose(getattr(other, name)[-1], getattr(run, name)[-1], rtol=WITHIN, err_msg=name)
+        np.testing.assert_allclose(other.events["low"].t, run.events["low"].t, rtol=WITHIN)
+        np.testing.assert_allclose(other.solution(0.5)[1], watched([0.1], [0.0], 0.5, parameters=parameters).qd[-1])
+        alone = motion([0.1], [0.0], 1.0, parameters=parameters)
+        np.testing.assert_array_equal(motion.end([0.1], [0.0], 1.0, parameters=parameters).q, alone.q[-1])
+    for wrong, sentence in (
+        ({"stiffness": 1.0}, "'gain' of the controller needs"),
+        ({"gain": math.nan}, "finite number"),
+    ):
+        for call in (motion, motion.end):
+            with pytest.raises(ValueError, match=sentence):
+                call([0.1], [0.0], 1.0, parameters=wrong)
+    with pytest.raises(ValueError, match="no parameter"):
+        dyn.prepare(pendulum, varied=["mass"]).end([0.1], [0.0], 1.0)
+
+
 def test_threads_have_a_memory_each() -> None:
     motion = dyn.prepare(ARM, "taylor")
     starts = [[0.1 * k, -0.05 * k] for k in range(1, 40)]
@@ -149,6 +201,17 @@ def test_threads_have_a_memory_each() -> None:
     with ThreadPoolExecutor(4) as pool:
         together = list(pool.map(lambda q: motion.end(q, [0.0, 0.0], SPAN).q.tolist(), starts))
     assert together == alone
+
+
+@mark.parametrize("method", ["dop853", "rk4"])
+def test_ctrl_c_ends_a_long_run(method: str) -> None:
+    motion = dyn.prepare(ARM, method, **options_of(method))
+    end = motion.end(*START, SPAN)
+    timer = threading.Timer(0.3, _thread.interrupt_main)
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        motion.end(*START, 1e7)
+    np.testing.assert_array_equal(motion.end(*START, SPAN).q, end.q)  # the memory is as good as before
 
 
 def test_it_goes_to_other_processes() -> None:
@@ -223,6 +286,9 @@ def test_what_is_fixed_is_checked_at_once() -> None:
         ({"max_steps": 0}, "max_steps"),
         ({"dense_output": 1}, "dense_output"),
         ({"events": 3}, "events must be"),
+        ({"varied": 3}, "varied must be a sequence of names"),
+        ({"varied": ["k"], "method": "scipy:BDF"}, "needs one of dyn.METHODS"),
+        ({"form": "speed"}, "form"),
     ]
     for options, sentence in refused:
         with pytest.raises((TypeError, ValueError), match=sentence):
