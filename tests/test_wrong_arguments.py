@@ -486,7 +486,8 @@ LEFT_OUT = """cg.recording_lines cg.clear_cache cg.clear_caches cg.Compiled.bind
     extend.kept_by_first extend.memo
     extend.ProgramVjp extend.Tape extend.Tape.run extend.Tape.recorded extend.run_passes extend.Linearization.adjoint
     extend.Linearization.beside extend.Linearization.forward extend.Linearization.tangent extend.require_length
-    extend.Runner.advancing extend.Runner.read extend.Runner.write extend.effects
+    extend.Runner.advancing extend.Runner.read extend.Runner.write extend.effects extend.LaneCode
+    extend.Runner.lane_code
     extend.Formulas.lines extend.Names.called extend.Names.formula extend.Names.inputs_of extend.Names.line
     extend.Names.meant extend.Names.short extend.Names.shown extend.Names.text"""
 

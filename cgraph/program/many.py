@@ -17,7 +17,7 @@ from .statements.control import FixedPoint, If, While
 from .statements.memory import Push
 
 
-def many(program: Program, kept: Iterable[str] | None = None) -> Program:
+def many(program: Program) -> Program:
     """The program with its branches and loops under masks, for memories side by side.
 
     What its `If` and `While` decide by is 1 where they apply and else 0, and what they write is put back where they do
@@ -25,9 +25,6 @@ def many(program: Program, kept: Iterable[str] | None = None) -> Program:
     run if any lane is positive, and a `While` as long as any is; a `FixedPoint` becomes a `While`, so that derivatives
     are taken before. Registers for masks, and for what is put back, stand after those of the program. `Runner.run_many`
     makes it.
-
-    kept: registers whose numbers matter after a pass, besides those that a pass reads before it sets them; none: all.
-    Others are put back only where something reads them.
 
     >>> import cgraph as cg
     >>> from cgraph.extend import Call, Program, While, many
@@ -39,14 +36,23 @@ def many(program: Program, kept: Iterable[str] | None = None) -> Program:
     """
     if not isinstance(program, Program):
         raise TypeError(f"program must be a Program, got {type(program).__name__}: {program!r:.60}")
+    return _masked(program, {})
+
+
+def many_keeping(program: Program, kept: Iterable[str]) -> Program:
+    """`many`, but what is neither kept nor outlives a pass is put back only where something reads it."""
+    after: dict[int, Set[str]] = {}
+    _live(program.body, {*kept, *outliving(program)}, after)
+    return _masked(program, after)
+
+
+def _masked(program: Program, after: Mapping[int, Set[str]]) -> Program:
+    """The program under masks.  after: see `Masked`."""
     if all([row_of(each).masked is None for each in program.statements()]):
         return program
     lengths, own = dict(program.registers), ":"
     while any([own in name for name in lengths]):
         own += ":"
-    after: dict[int, Set[str]] = {}
-    if kept is not None:
-        _live(program.body, {*kept, *outliving(program)}, after)
     masked = Masked(lengths, own=own, after=after)
     masked.run(program.body)
     return replace(program, registers=lengths, body=tuple(masked.statements))

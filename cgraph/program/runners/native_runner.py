@@ -170,7 +170,7 @@ class NativeRunner(Runner):
 
     def lane_code(self, clock: str, results: Sequence[str] = (), *, alike: bool = True) -> LaneCode | None:
         """Machine code of memories in lanes; see `Runner`."""
-        from ..many import many, outliving
+        from ..many import many_keeping, outliving
         from .batch_code import LaneCode, lane_ir
 
         if self.program.feed or any(row_of(each).beside is None for each in self.program.statements()):
@@ -180,7 +180,7 @@ class NativeRunner(Runner):
         first = {*outliving(self._fused), *results}
         kept = [name for name in lengths if name in first]
         beside = replace(self._fused, registers={name: lengths[name] for name in dict.fromkeys([*kept, *lengths])})
-        masked, size = fused(many(beside, kept), alike=alike), sum([lengths[name] for name in kept])
+        masked, size = fused(many_keeping(beside, kept), alike=alike), sum([lengths[name] for name in kept])
         with without_collection():
             text = lane_ir(masked, size, clock, arithmetic)
         return LaneCode(self._compiled(text.source), masked, kept, lanes, text.size)

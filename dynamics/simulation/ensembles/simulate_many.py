@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from cgraph import Node
 from cgraph.extend import Array, require_whole
 
-from ...equations.states.initial_value import initial_values
+from ...equations.states.initial_value import InitialValues, initial_values
 from ...integrators import METHODS, Problem, derive, in_form
 from ...systems.model import Model
 from ..applied_forces import with_applied
@@ -148,16 +148,11 @@ def simulate_many(
     watch = event_program(problem, watched)
 
     # Share out the work: what a worker is sent, and the starts of chunks of trajectories
-    grids = [] if watched else _grids(program, options, len(start.x))
+    grids, lanes = ([], False) if watched else _side_by_side(program, options, len(start.x))
     sent = replace(options, t_eval=options.row_times) if watched else options
-    lanes = not watched and fits_lanes(program, options, len(start.x)) and (program.adaptive or len(grids) == 1)
-    looked_for = pickle.dumps(watch) if watched else b""
-    task = Task(pickled_steps(program), sent, count, tuple(grids), looked_for, lanes)
-    p = np.array([start.varied[name] for name in problem.parameters]).reshape(-1, len(start.x)).T.copy()
-    x = converted(problem.momentum, t0, start.x, p)
-    largest = min(LONGEST, max(VECTOR, NUMBERS // (count * program.steps.width))) if lanes else LARGEST
-    chunk = min(chunk, largest) if chunk is not None and lanes else chunk
-    chunks = _chunks(x, p, chunk, team, largest, whole=bool(grids))
+    task = Task(pickled_steps(program), sent, count, tuple(grids), pickle.dumps(watch) if watched else b"", lanes)
+    x, p = _stepped(problem, start, t0)
+    chunks = _chunks(x, p, chunk, team, count * program.steps.width if lanes else 0, whole=bool(grids))
 
     # Integrate, by whoever takes the chunks and compiles the steps
     whole = not_begun(0, np.empty((len(x), count, problem.size)), events=bool(watched))
@@ -168,6 +163,12 @@ def simulate_many(
     for text in _warnings(result.stats):
         warnings.warn(text, SimulationWarning, stacklevel=2)
     return result
+
+
+def _stepped(problem: Problem, start: InitialValues, t0: float) -> tuple[Array, Array]:
+    """The states (N, m) that the steps start from, and the parameters of the problem, (N, ..)."""
+    p = np.array([start.varied[name] for name in problem.parameters]).reshape(-1, len(start.x)).T.copy()
+    return converted(problem.momentum, t0, start.x, p), p
 
 
 def _row_count(options: RunOptions) -> int:
@@ -245,9 +246,15 @@ def _check_room(x: Array, rows: int) -> None:
         )
 
 
+def _side_by_side(program: StepProgram, options: RunOptions, count: int) -> tuple[list[EqualSteps], bool]:
+    """The equal steps of trajectories side by side, and whether they go in lanes; neither of what goes one by one."""
+    grids = [] if program.adaptive else _grids(program, options, count)
+    return grids, fits_lanes(program, options, count) and (program.adaptive or len(grids) == 1)
+
+
 def _grids(program: StepProgram, options: RunOptions, count: int) -> list[EqualSteps]:
-    """The equal steps of trajectories side by side; empty where they have to go, or are done sooner, one by one."""
-    if program.adaptive or (count < VECTOR and iterates(program)):
+    """Equal steps; empty where trajectories have to go, or are done sooner, one by one."""
+    if count < VECTOR and iterates(program):
         return []
     grids = even_steps(options.instants, options.step)
     if options.times is None:  # every step is a row
@@ -255,8 +262,15 @@ def _grids(program: StepProgram, options: RunOptions, count: int) -> list[EqualS
     return grids if sum(grid.steps for grid in grids) <= options.max_steps else []
 
 
-def _chunks(x: Array, p: Array, chunk: int | None, workers: int | Map, largest: int, *, whole: bool) -> list[Chunk]:
-    """The starts in chunks; whole: of whole vectors, so that a trajectory has the same neighbors in any chunk."""
+def _chunks(x: Array, p: Array, chunk: int | None, workers: int | Map, rows: int, *, whole: bool) -> list[Chunk]:
+    """The starts in chunks.
+
+    rows: numbers in the rows of steps that a trajectory keeps in its lane, 0 where it is in none.
+    whole: of whole vectors, so that a trajectory has the same neighbors in any chunk.
+    """
+    largest = min(LONGEST, max(VECTOR, NUMBERS // rows)) if rows else LARGEST
+    if rows and chunk is not None:
+        chunk = min(chunk, largest)
     if chunk is None:
         chunk = min(largest, math.ceil(len(x) / (SHARES * (UNKNOWN if callable(workers) else workers))))
     width = math.ceil(chunk / VECTOR) * VECTOR if whole else int(chunk)

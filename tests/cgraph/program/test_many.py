@@ -21,7 +21,7 @@ from cgraph.extend import (
     program_vjp,
     runner,
 )
-from cgraph.program.many import outliving
+from cgraph.program.many import many_keeping, outliving
 from tests.cgraph.program.test_program_derivatives import LENGTHS, PASSES, START, RandomProgram
 from tests.slow import slow
 
@@ -99,8 +99,8 @@ def test_registers_that_nothing_reads_later_are_not_put_back() -> None:
     program = Program({"a": 1, "b": 1, "test": 1}, [If("test", inside)], record=["a"])
     assert outliving(program) == ["a", "test"]
     assert "b before:1" in many(program).registers
-    assert "b before:1" not in many(program, kept=[]).registers
-    assert "b before:1" in many(program, kept=["b"]).registers
+    assert "b before:1" not in many_keeping(program, []).registers
+    assert "b before:1" in many_keeping(program, ["b"]).registers
 
 
 @pytest.mark.filterwarnings("error")
