@@ -108,7 +108,7 @@ def test_motions_of_random_mechanisms(seed: int) -> None:
         {"method": "scipy:DOP853"},
         {"max_steps": 5},
     ],
-    ids=str,
+    ids=" ".join,
 )
 def test_whatever_is_fixed(options: dict[str, Any]) -> None:
     motion = dyn.prepare(ARM, **options)
