@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
 
 from ..core.graph import Graph
 from ..core.node import CONSTANT, Node
 from ..operations.operation import OPS, columns
+from ..operations.texts import LLVM_ONE_OR_ZERO, LLVM_WHERE
 from .arithmetic import REGISTERS, Arithmetic, bits, words_of
 from .parts import Parts
 from .schedule import Joined, Merged, Step, joined_calls, products_of, schedule
@@ -96,13 +97,18 @@ class Body(NamedTuple):
 
 
 def body(
-    graph: Graph, arithmetic: Arithmetic, address: Address, name: str, scope: Sequence[str], *, uniform: int = 0
+    graph: Graph,
+    arithmetic: Arithmetic,
+    address: Address,
+    name: str,
+    scope: Sequence[str],
+    **how: Any,
 ) -> Body:
     """The instructions that compute a graph in the function of that name, in functions of their own if it is long.
 
-    scope: what the addresses are made from, each with its type.  uniform: see `instructions`.
+    scope: what the addresses are made from, each with its type.  how: see `instructions`.
     """
-    code = instructions(graph, arithmetic, address, name, uniform)
+    code = instructions(graph, arithmetic, address, name, **how)
     memory = [f"  %w = alloca [{code.places} x {arithmetic.type}], align 64"] if code.places else []
     if len(code.parts) == 1:
         return Body([*memory, *code.start], code.parts[0], code.definitions)
@@ -130,10 +136,21 @@ class Code(NamedTuple):
     definitions: list[str]
 
 
-def instructions(graph: Graph, arithmetic: Arithmetic, address: Address, name: str, uniform: int = 0) -> Code:
+def instructions(
+    graph: Graph,
+    arithmetic: Arithmetic,
+    address: Address,
+    name: str,
+    *,
+    uniform: int = 0,
+    products: Mapping[Node, Node] | None = None,
+    last: Collection[int] = (),
+) -> Code:
     """Every operation in the order of `schedule`; an output is stored as soon as it is known.
 
-    uniform: so many inputs, the first, are single numbers in memory, the same for all lanes.
+    uniform: so many inputs, the first, are single numbers in memory, the same for all lanes.  products: where sums may
+    be rounded with one, {sum: its product}; by default `products_of` says.  last: rows of outputs that are stored when
+    all inputs have been read, since they lie where these do.
     """
     t, words = arithmetic.type, words_of(arithmetic)
     constants = _Constants(graph, arithmetic, name)
@@ -148,23 +165,31 @@ def instructions(graph: Graph, arithmetic: Arithmetic, address: Address, name: s
         return r, [*address("x", f"{r}.x", rows[node]), f"  {r} = load {t}, ptr {r}.x, align 8"]
 
     outputs: dict[Node, list[int]] = {}
+    ends: dict[int, Node] = {}
     for row, node in enumerate(graph.outputs.values()):
-        outputs.setdefault(node, []).append(row)
+        if row in last:
+            ends[row] = node
+        else:
+            outputs.setdefault(node, []).append(row)
 
-    def store(step: Step, r: str) -> Iterator[str]:
-        for row in outputs.get(step, ()) if isinstance(step, Node) else ():
+    def store(places: Iterable[int], r: str) -> Iterator[str]:
+        for row in places:
             yield from [*address("y", f"%y{row}", row), f"  store {t} {r}, ptr %y{row}, align 8"]
 
-    merged = _merged(graph, arithmetic)
+    merged = _merged(graph, arithmetic, products)
     vectors = Vectors(merged.sums)
     steps = _results_behind_calls(schedule(graph, merged), merged.calls)
     steps = {step: () if isinstance(step, Sums) else reads for step, reads in steps.items() if step not in merged.sums}
+    end = Joined((), tuple(ends.values()))
+    steps[end] = end.arguments
     parts = Parts(steps, merged.calls, t, 8 * arithmetic.lanes, arithmetic.registers, leaf, vectors)
     written: list[list[str]] = [[]]
     for number, (step, reads) in enumerate(steps.items()):
         if number in parts.starts:
             written[-1] += parts.forget()
             written.append([])
+        if step is end:
+            break
         if isinstance(step, Sums):
             written[-1] += vectors.lines(step, f"%v{number}")
             continue
@@ -172,20 +197,35 @@ def instructions(graph: Graph, arithmetic: Arithmetic, address: Address, name: s
         if isinstance(step, Joined) or (step not in merged.calls and columns(step.op).calls_library):
             lines += parts.forget()
         r, more = _step(step, f"%v{number}", args, merged, arithmetic, words)
+        places = outputs.get(step, []) if isinstance(step, Node) else []
         kept = vectors.store(step, r) if isinstance(step, Node) else []
-        written[-1] += [*lines, *more, *kept, *parts.write(step, r), *store(step, r)]
-    for node in outputs:
+        written[-1] += [*lines, *more, *kept, *parts.write(step, r), *store(places, r)]
+    for node, places in outputs.items():
         if not node.args:
-            r, lines = leaf(node, f"%leaf{outputs[node][0]}")
-            written[-1] += [*lines, *store(node, r)]
+            r, lines = leaf(node, f"%leaf{places[0]}")
+            written[-1] += [*lines, *store(places, r)]
+    written[-1] += _last_stores(ends, parts, store)
     return Code(written, constants.start(), parts.places, constants.definitions())
 
 
-def _merged(graph: Graph, arithmetic: Arithmetic) -> Merged:
+def _merged(graph: Graph, arithmetic: Arithmetic, products: Mapping[Node, Node] | None) -> Merged:
     """What the arithmetic does in one step; sums side by side of one point, whose products are not rounded."""
-    products = products_of(graph) if arithmetic.fuses else {}
+    products = (products_of(graph) if products is None else products) if arithmetic.fuses else {}
     sums = vector_sums(graph, products) if arithmetic.lanes == 1 else {}
     return Merged(_joined_calls(graph, arithmetic), products, _of_libm(graph, arithmetic), sums)
+
+
+def _last_stores(
+    ends: Mapping[int, Node], parts: Parts, store: Callable[[Iterable[int], str], Iterable[str]]
+) -> list[str]:
+    """The lines that store outputs, {row: node}, where inputs lie: these are read before any is overwritten."""
+    lines: list[str] = []
+    of_inputs: list[str] = []
+    for row, node in sorted(ends.items(), key=lambda end: bool(end[1].args)):
+        (r,), reads = parts.read([node])
+        lines += reads
+        (lines if node.args else of_inputs).extend(store([row], r))
+    return lines + of_inputs
 
 
 class _Constants:
@@ -247,9 +287,16 @@ def _step(
         return r, _product_and_sum(step, merged.products[step], r, args, arithmetic)
     t, kind = arithmetic.type, "each" if step in merged.of_libm else "lanes"
     call = f"@{f'{kind}{arithmetic.lanes}.' if arithmetic.lanes > 1 else ''}{columns(step.op).library}"
+    if columns(step.op).llvm == LLVM_WHERE and args[0].startswith("%v") and _compares(step.args[0]):
+        return r, [f"  {r} = select {words['b']} {args[0]}.is, {t} {args[1]}, {t} {args[2]}"]
     if columns(step.op).llvm:
         return r, [f"  {line.format(*args, r=r, call=call, **words)}" for line in columns(step.op).llvm]
     return r, [f"  {r} = call {t} {call}({', '.join(f'{t} {arg}' for arg in args)})"]
+
+
+def _compares(node: Node) -> bool:
+    """Whether a node is 1 or 0 by a comparison, whose name is that of the value with ".is"."""
+    return bool(node.args) and columns(node.op).llvm[-1:] == (LLVM_ONE_OR_ZERO,)
 
 
 def _product_and_sum(node: Node, product: Node, r: str, args: list[str], arithmetic: Arithmetic) -> list[str]:

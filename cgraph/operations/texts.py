@@ -14,17 +14,17 @@ LLVM_SIGN = (
     "{r}.down = select {b} {r}.below, {t} {minus}, {t} {r}.up",
     "{r} = select {b} {r}.nan, {t} {0}, {t} {r}.down",
 )
-LLVM_MINIMUM = (
-    "{r}.nan = fcmp uno {t} {0}, {zero}",
-    "{r}.less = fcmp ole {t} {0}, {1}",
-    "{r}.first = or {b} {r}.nan, {r}.less",
-    "{r} = select {b} {r}.first, {t} {0}, {t} {1}",
+LLVM_MINIMUM = (  # the first two lines are one instruction, which has the first argument of equal ones, and beside NaN
+    "{r}.second = fcmp olt {t} {1}, {0}",
+    "{r}.least = select {b} {r}.second, {t} {1}, {t} {0}",
+    "{r}.nan = fcmp uno {t} {1}, {zero}",
+    "{r} = select {b} {r}.nan, {t} {1}, {t} {r}.least",
 )
 LLVM_MAXIMUM = (
-    "{r}.nan = fcmp uno {t} {0}, {zero}",
-    "{r}.more = fcmp oge {t} {0}, {1}",
-    "{r}.first = or {b} {r}.nan, {r}.more",
-    "{r} = select {b} {r}.first, {t} {0}, {t} {1}",
+    "{r}.second = fcmp ogt {t} {1}, {0}",
+    "{r}.most = select {b} {r}.second, {t} {1}, {t} {0}",
+    "{r}.nan = fcmp uno {t} {1}, {zero}",
+    "{r} = select {b} {r}.nan, {t} {1}, {t} {r}.most",
 )
 LLVM_ZERO_SAFE_MUL = (
     "{r}.a = fcmp une {t} {0}, {zero}",
@@ -42,6 +42,7 @@ LLVM_LOGISTIC = (
     "{r}.bottom = fadd {f}{t} {r}.exp, {one}",
     "{r} = fdiv {f}{t} {r}.top, {r}.bottom",
 )
+LLVM_ONE_OR_ZERO = "{r} = select {b} {r}.is, {t} {one}, {t} {zero}"
 LLVM_WHERE = ("{r}.is = fcmp une {t} {0}, {zero}", "{r} = select {b} {r}.is, {t} {1}, {t} {2}")
 
 
@@ -57,7 +58,7 @@ def llvm_intrinsic(name: str) -> tuple[str, ...]:
 
 def llvm_comparison(condition: str) -> tuple[str, ...]:
     """1.0 where the condition of fcmp holds, else 0.0."""
-    return (f"{{r}}.is = fcmp {condition} {{t}} {{0}}, {{1}}", "{r} = select {b} {r}.is, {t} {one}, {t} {zero}")
+    return (f"{{r}}.is = fcmp {condition} {{t}} {{0}}, {{1}}", LLVM_ONE_OR_ZERO)
 
 
 C_POWER = """\

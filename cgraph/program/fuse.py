@@ -2,107 +2,136 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from ..codegen.schedule import products_of
 from ..core.graph import Graph
-from ..core.node import Node, variable
+from ..core.node import Node, constant, variable
+from ..core.row import Row
 from ..core.traversal import rebuild
-from ..operations.operation import columns
+from ..operations.operation import OPS, columns
 from .program import Program
 from .statement import Statement, row_of
-from .statements.call import Call, Map, elements
+from .statements.call import Call, Map, Sum, elements, products_in
 from .statements.control import If
 
-MOST = 1000  # operations of what is fused: it compiles in some tens of milliseconds, and a short run gains no more
+# Operations of one call: it compiles in some tens of milliseconds, and a short run gains no more.
+MOST = 1000
+# Operations by which the code of a graph that several statements call may grow. Beyond, as of the rate in the stages
+# of a step, a call of code that is there once takes no longer, and compiles sooner.
+COPIES = 100
+# Elements of a `Map` or `Sum` that becomes straight code, and operations of them all. In vectors fewer instructions do
+# more of them, but a vector of numbers that have just been written one by one waits until the last is in the cache.
+FEW, STRAIGHT = 8, 200
 
 
 def fused(program: Program, *, alike: bool = False) -> Program:
-    """The program with calls and maps that follow one another as one call where all of them are short.
+    """The program with short calls, maps and sums that follow one another as one call.
 
-    Long ones stay as they are: what they share, such as the rate in the stages of a step, is code that is there once.
-    Products are rounded where they were, so that results have the same bits wherever functions of the C library are
-    not joined with others.
+    Long ones stay as they are. What is computed alike is there once. Products are rounded where they were, so that
+    results have the same bits wherever functions of the C library are not joined with others.
     alike: whether functions of the C library are joined with those that they are joined with already, and no others.
     """
-    return replace(program, body=_fused(program, program.body, alike=alike))
+    uses = Counter([id(each.graph) for each in program.statements() if isinstance(each, Call)])
+    return replace(program, body=_fused(program, program.body, uses, alike=alike))
 
 
-def _fused(program: Program, statements: Sequence[Statement], *, alike: bool) -> tuple[Statement, ...]:
+def _fused(
+    program: Program, statements: Sequence[Statement], uses: Counter[int], *, alike: bool
+) -> tuple[Statement, ...]:
     done: list[Statement] = []
-    run: list[Call | Map] = []
+    run: list[Call | Map | Sum] = []
+    size = 0.0
     for statement in statements:
-        if isinstance(statement, Map) or (isinstance(statement, Call) and not statement.exact):
-            if alike and not _as_before([*run, statement]):
-                done += _one_call(program, run)
-                run = []
+        work = _work(statement, program, uses)
+        if alike and isinstance(statement, Map | Sum) and not _as_before([statement]):
+            work = math.inf
+        if size + work > MOST or (alike and not _as_before([*run, statement])):
+            done += _one_call(program, run)
+            run, size = [], 0.0
+        if isinstance(statement, Call | Map | Sum) and work <= MOST:
             run.append(statement)
+            size += work
             continue
-        done += _one_call(program, run)
-        run = []
         names = () if isinstance(statement, If) and statement.seldom else row_of(statement).bodies
-        bodies = {name: _fused(program, getattr(statement, name), alike=alike) for name in names}
-        if bodies:
-            statement = replace(statement, **bodies)  # type: ignore[type-var]
-        done.append(statement)
+        bodies = {name: _fused(program, getattr(statement, name), uses, alike=alike) for name in names}
+        done.append(replace(statement, **bodies) if bodies else statement)  # type: ignore[type-var]
     return (*done, *_one_call(program, run))
 
 
-def _as_before(run: Sequence[Call | Map]) -> bool:
-    """Whether functions that may be joined have no other company in one call than each in its own."""
-    joining = [each for each in run if any(columns(node.op).vector for node in each.graph.nodes)]
-    return not joining or (len(joining) == 1 and (len(run) == 1 or isinstance(joining[0], Call)))
+def _as_before(run: Sequence[Statement]) -> bool:
+    """Whether functions that may be joined have no other company in one call than in one that is there."""
+    straight = [each for each in run if isinstance(each, Call | Map | Sum)]
+    joining = [each for each in straight if any(columns(node.op).vector for node in each.graph.nodes)]
+    return not joining or (len(joining) == 1 and isinstance(joining[0], Call))
 
 
-def _one_call(program: Program, run: list[Call | Map]) -> list[Call | Map]:
-    """The statements as one, if they are short and no product that is overwritten would go into a sum."""
-    repeated = [1 if isinstance(each, Call) else elements(each, program.registers) for each in run]
-    size = sum([len(each.graph.nodes) * count for each, count in zip(run, repeated, strict=True)])
-    if len(run) < 2 or size > MOST:
+def _work(statement: Statement, program: Program, uses: Counter[int]) -> float:
+    """The operations of a statement, infinite where it stays as it is."""
+    if not isinstance(statement, Call | Map | Sum) or (isinstance(statement, Call) and statement.exact):
+        return math.inf
+    size = sum([1 for node in statement.graph.nodes if node.args])
+    if isinstance(statement, Call):
+        return size if (uses[id(statement.graph)] - 1) * size <= COPIES else math.inf
+    count = elements(statement, program.registers)
+    return size * count if count <= FEW and size * count <= STRAIGHT else math.inf
+
+
+def _one_call(program: Program, run: Sequence[Call | Map | Sum]) -> Sequence[Call | Map | Sum]:
+    """The statements as one."""
+    if not run or (len(run) == 1 and isinstance(run[0], Call)):
         return run
     registers = _Registers(program)
-    for statement, count in zip(run, repeated, strict=True):
-        if isinstance(statement, Call):
-            registers.call(statement)
-        elif count:
-            registers.map(statement, count)
-    whole = registers.statement()
-    return run if registers.overwritten.intersection(products_of(whole.graph).values()) else [whole]
+    for statement in run:
+        registers.follow(statement)
+    return [registers.statement()]
 
 
 class _Registers:
     """Values of registers while statements are followed."""
 
     def __init__(self, program: Program) -> None:
-        self.overwritten: set[Node] = set()
         self._lengths = program.registers
         self._read: dict[str, list[Node]] = {}  # {register that is read before it is written: its values}
         self._written: dict[str, list[Node]] = {}
+        self._known: dict[tuple[object, ...], Node] = {}  # {operation and arguments, or the digits of a constant: node}
+        self._products: dict[Node, Node] = {}  # {sum: the product that it is rounded with}
 
-    def call(self, call: Call) -> None:
-        """outputs = graph(inputs)."""
-        results = applied(call.graph, [value for name in call.inputs for value in self._values(name)])
-        for name in call.outputs:
-            self._write(name, [results.pop(0) for _ in range(self._lengths[name])])
-
-    def map(self, statement: Map, count: int) -> None:
-        """outputs[i] = graph(shared, inputs[i])."""
-        shared = [value for name in statement.shared for value in self._values(name)]
-        columns = [self._values(name) for name in statement.inputs]
-        rows = [
-            applied(statement.graph, [*shared, *[column[i if len(column) == count else 0] for column in columns]])
-            for i in range(count)
-        ]
-        for name, values in zip(statement.outputs, zip(*rows, strict=True), strict=True):
-            self._write(name, list(values))
+    def follow(self, statement: Call | Map | Sum) -> None:
+        """What the statement writes, computed from what there is."""
+        if isinstance(statement, Call):
+            given = [value for name in statement.inputs for value in self._values(name)]
+            values = self._applied(statement.graph, given, products_in(statement))
+        else:
+            rows, outputs = self._rows(statement), len(statement.graph.outputs)
+            if isinstance(statement, Map):
+                values = [row[k] for k in range(outputs) for row in rows]
+            else:
+                values = [self._constant(constant(0.0))] * outputs
+                for row in rows:
+                    values = [self._operation(OPS["add"], pair) for pair in zip(values, row, strict=True)]
+        for name in statement.outputs:
+            length = self._lengths[name]
+            self._written[name], values = values[:length], values[length:]
 
     def statement(self) -> Call:
         """All that was followed."""
         inputs = [value for values in self._read.values() for value in values]
         outputs = [value for values in self._written.values() for value in values]
         graph = Graph(inputs, {f"{k}": value for k, value in enumerate(outputs)})
-        return Call(graph, tuple(self._read), tuple(self._written))
+        products = None if self._products == products_of(graph) else self._products
+        return Call(graph, tuple(self._read), tuple(self._written), products)
+
+    def _rows(self, statement: Map | Sum) -> list[list[Node]]:
+        """The outputs for every element."""
+        count, products = elements(statement, self._lengths), products_of(statement.graph)
+        shared = [value for name in statement.shared for value in self._values(name)]
+        columns = [self._values(name) for name in statement.inputs]
+        points = [[*shared, *[column[i if len(column) == count else 0] for column in columns]] for i in range(count)]
+        return [self._applied(statement.graph, point, products) for point in points]
 
     def _values(self, name: str) -> list[Node]:
         if name in self._written:
@@ -112,9 +141,29 @@ class _Registers:
             self._read[name] = [variable(f"r{first + k}") for k in range(self._lengths[name])]
         return self._read[name]
 
-    def _write(self, name: str, values: list[Node]) -> None:
-        self.overwritten |= {*self._written.get(name, ())}
-        self._written[name] = values
+    def _applied(self, graph: Graph, values: Sequence[Node], products: Mapping[Node, Node]) -> list[Node]:
+        """The outputs of a graph at nodes."""
+        new = dict(zip(graph.inputs, values, strict=True))
+        for node in graph.nodes:
+            if node.args:
+                product = new[products[node]] if node in products else None
+                new[node] = self._operation(node.op, [new[arg] for arg in node.args], product)
+            elif node not in new:
+                new[node] = self._constant(node)
+        return [new[node] for node in graph.outputs.values()]
+
+    def _constant(self, node: Node) -> Node:
+        assert node.value is not None
+        return self._known.setdefault((node.value.hex(),), node)
+
+    def _operation(self, op: Row, args: Sequence[Node], product: Node | None = None) -> Node:
+        """The operation on these; product: the argument that it is rounded with."""
+        key = (op.name, *args, product)
+        if key not in self._known:
+            node = self._known[key] = Node(op, tuple(args))
+            if product is not None:
+                self._products[node] = product
+        return self._known[key]
 
 
 def applied(graph: Graph, values: Sequence[Node]) -> list[Node]:

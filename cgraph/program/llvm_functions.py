@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
 
 from ..codegen.arithmetic import Arithmetic, words_of
 from ..codegen.llvm_ir import Body, body, libm_functions
 from ..core.graph import Graph
+from ..core.node import Node
 
 Lengths = tuple[int, ...]  # of the registers that are a function's arguments
 
@@ -25,25 +27,40 @@ class Functions:
         self.quick = False
         self._names: dict[tuple[object, ...], str] = {}
 
-    def call(self, graph: Graph, inputs: Lengths, outputs: Lengths, *, exact: bool = False) -> str:
-        """y = graph(x), where the input registers end to end are x, and the output registers y.
+    def call(
+        self,
+        graph: Graph,
+        registers: Lengths,
+        reads: Sequence[int],
+        writes: Sequence[int],
+        products: Mapping[Node, Node] | None = None,
+        *,
+        exact: bool = False,
+    ) -> str:
+        """y = graph(x), where of its registers some, end to end, are x, and some y; a register may be both.
 
-        exact: no product is joined with a sum.
+        products: see `instructions`.  exact: no product is joined with a sum.
         """
-        t, scope = self.arithmetic.type, [*_pointers("in", inputs), *_pointers("out", outputs)]
-        arithmetic = self.arithmetic.unfused if exact else self.arithmetic
+        t, arithmetic = self.arithmetic.type, self.arithmetic.unfused if exact else self.arithmetic
+        places = [[f"{t}, ptr %in{k}, i64 {at}" for at in range(size)] for k, size in enumerate(registers)]
+        x, y = ([place for k in which for place in places[k]] for which in (reads, writes))
+        known = set(x)
+        again = {row for row, place in enumerate(y) if place in known}
 
         def lines() -> list[str]:
-            x, y = _end_to_end(t, "in", inputs), _end_to_end(t, "out", outputs)
-            written = self._body(graph, arithmetic, x, y, scope)
+            scope = _pointers("in", registers)
+            written = self._body(graph, arithmetic, x, y, scope, products=products, last=again)
             return [*written.start, *written.lines]
 
-        return self._define((id(graph), inputs, outputs, exact), "call", lines, len(inputs), len(outputs))
+        key = (id(graph), registers, tuple(reads), tuple(writes), exact)
+        return self._define(key, "call", lines, len(registers), 0)
 
-    def map(self, graph: Graph, inputs: Lengths, count: int, shared: Lengths = ()) -> str:
+    def map(self, graph: Graph, inputs: Lengths, count: int, shared: Lengths = (), apart: Sequence[bool] = ()) -> str:
         """y[i] = graph(shared, x[i]) for i = 0 .. count - 1; an input of another length holds one number for all i.
 
         Where it can, a vector of elements at a time; results beyond the last one go to the register's padding.
+        apart: the inputs whose numbers have just been written one by one, and so are read: one load of them all would
+        wait until they are in the cache.
         """
         first, inputs = len(shared), (*shared, *inputs)
         in_vectors = self.arithmetic.lanes == 1 and self.width > 1 and count > 1 and not libm_functions(graph)
@@ -52,7 +69,9 @@ class Functions:
             arithmetic.type,
             [k for k, length in enumerate(inputs) if in_vectors and k >= first and length != count],
         )
+        written = [first + k for k, each in enumerate(apart) if each and in_vectors and inputs[first + k] == count]
         scope = [*_pointers("in", inputs), *_pointers("out", graph.outputs), "i64 %i", *[f"ptr %same{k}" for k in same]]
+        scope += [f"ptr %vector{k}" for k in written]
 
         def lines() -> list[str]:
             spread = []  # a vector of equal numbers for each input that is the same for all elements
@@ -60,11 +79,24 @@ class Functions:
                 spread += [f"  %same{k} = alloca {t}, align 64", f"  %one{k} = load double, ptr %in{k}, align 8"]
                 spread += [*arithmetic.splat(f"%all{k}", f"%one{k}"), f"  store {t} %all{k}, ptr %same{k}, align 64"]
             x = self._elements(t, inputs, first, count, same)
+            gathered: list[str] = []
+            gather = f"gathered{min(count, arithmetic.lanes)}"
+            if written:
+                self.text(gather, lambda _: _gathered_text(t, gather, min(count, arithmetic.lanes)))
+            for k in written:
+                spread.append(f"  %vector{k} = alloca {t}, align 64")
+                gathered += [
+                    f"  %register{k} = getelementptr {t}, ptr %in{k}, i64 %i",
+                    f"  %gathered{k} = call {t} @{gather}(ptr %register{k})",
+                    f"  store {t} %gathered{k}, ptr %vector{k}, align 64",
+                ]
+                x[sum(shared) + k - first] = f"{t}, ptr %vector{k}, i64 0"
             y = [f"{t}, ptr %out{k}, i64 %i" for k in range(len(graph.outputs))]
-            written = self._body(graph, arithmetic, x, y, scope, sum(shared) if in_vectors else 0)
-            return [*spread, *_loop(written, [], -(-count // arithmetic.lanes) if in_vectors else count)]
+            body = self._body(graph, arithmetic, x, y, scope, uniform=sum(shared) if in_vectors else 0)
+            body = body._replace(lines=[*gathered, *body.lines])
+            return [*spread, *_loop(body, [], -(-count // arithmetic.lanes) if in_vectors else count)]
 
-        key = ("map", id(graph), inputs, count, first)
+        key = ("map", id(graph), inputs, count, first, tuple(written))
         return self._define(key, "map", lines, len(inputs), len(graph.outputs))
 
     def _elements(self, t: str, inputs: Lengths, shared: int, count: int, same: Sequence[int] = ()) -> list[str]:
@@ -94,7 +126,7 @@ class Functions:
             x = [*_end_to_end(self.arithmetic.type, "in", shared), *_end_to_end(t, "from", inputs, step)]
             y = _end_to_end(t, "to", outputs, step)
             results = [f"{t}, ptr %results, i64 {k}" for k in range(len(y))] if among else y
-            written = self._body(graph, arithmetic, x, results, scope, sum(shared) if in_vectors else 0)
+            written = self._body(graph, arithmetic, x, results, scope, uniform=sum(shared) if in_vectors else 0)
             here = [f"  %tile = udiv i64 %i, {step}", f"  %lane = urem i64 %i, {step}"] if step > 1 else []
             elements = [("from", k, size, f"%in{len(shared) + k}") for k, size in enumerate(inputs)]
             for name, k, size, register in (
@@ -116,32 +148,24 @@ class Functions:
         key = ("tiles", id(graph), shared, inputs, outputs, lanes, count, some)
         return self._define(key, "tiles", lines, len(shared) + len(inputs) + some, len(outputs))
 
-    def sum(self, graph: Graph, inputs: Lengths, count: int, shared: Lengths = (), outputs: Lengths = (1,)) -> str:
-        """y = sum over i = 0 .. count - 1 of graph(shared, x[i]), added up in this order from 0."""
-        t, first, inputs = self.arithmetic.type, len(shared), (*shared, *inputs)
-        totals = _end_to_end(t, "out", outputs)
-        terms = [f"%one{k}" if k else "%one" for k in range(len(totals))]
-        scope = [*_pointers("in", inputs), *[f"ptr {term}" for term in terms], "i64 %i"]
-
-        def lines() -> list[str]:
-            start, add = [], []
-            for k, (total, term) in enumerate(zip(totals, terms, strict=True)):
-                start += [f"  {term} = alloca {t}, align 64"]
-                start += [f"  %sum{k} = getelementptr {total}"]
-                start += [f"  store {t} {self.arithmetic.number(0.0)}, ptr %sum{k}, align 8"]
-                add += [  # y += graph(shared, x[i])
-                    f"  %so.far{k} = load {t}, ptr %sum{k}, align 8",
-                    f"  %here{k} = load {t}, ptr {term}, align 8",
-                    f"  %total{k} = fadd {t} %so.far{k}, %here{k}",
-                    f"  store {t} %total{k}, ptr %sum{k}, align 8",
-                ]
-            if not count:
-                return start
-            x, y = self._elements(t, inputs, first, count), [f"{t}, ptr {term}, i64 0" for term in terms]
-            return [*start, *_loop(self._body(graph, self.arithmetic, x, y, scope), add, count)]
-
-        key = ("sum", id(graph), inputs, count, first, outputs)
-        return self._define(key, "sum", lines, len(inputs), len(outputs))
+    def total(self, count: int) -> str:
+        """y = x[0] + .. + x[count - 1], added up in this order from 0."""
+        t = self.arithmetic.type
+        lines = ["  br label %each", "each:", "  %i = phi i64 [ 0, %start ], [ %next, %more ]"]
+        lines += [
+            f"  %sum = phi {t} [ {self.arithmetic.number(0.0)}, %start ], [ %total, %more ]",
+            f"  %going = icmp slt i64 %i, {count}",
+            "  br i1 %going, label %more, label %end",
+            "more:",
+            f"  %at = getelementptr {t}, ptr %in0, i64 %i",
+            f"  %here = load {t}, ptr %at, align 8",
+            f"  %total = fadd {t} %sum, %here",
+            "  %next = add i64 %i, 1",
+            "  br label %each",
+            "end:",
+            f"  store {t} %sum, ptr %out0, align 8",
+        ]
+        return self._define(("total", count), "total", lambda: lines, 1, 1)
 
     def take(self, table: Sequence[int], places: Sequence[int] = ()) -> str:
         """y[i] = x[table[i]], or y[places[i]]; where these are all, in order, they are left out."""
@@ -176,17 +200,18 @@ class Functions:
         x: Sequence[str],
         y: Sequence[str],
         scope: Sequence[str],
-        uniform: int = 0,
+        **how: Any,
     ) -> Body:
         """The body of the function that is being defined, those that it calls defined before.
 
-        x, y: where the inputs and outputs are: type, pointer, index.
+        x, y: where the inputs and outputs are: type, pointer, index.  how: see `instructions`.
         """
 
         def address(base: str, name: str, row: int) -> list[str]:
             return [f"  {name} = getelementptr {(x if base == 'x' else y)[row]}"]
 
-        written = body(graph, arithmetic, address, next(reversed(self._names.values())), scope, uniform=uniform)
+        name = next(reversed(self._names.values()))
+        written = body(graph, arithmetic, address, name, scope, **how)
         for line in written.definitions:
             quick = self.quick and line.startswith("define")
             self.definitions.append(line.replace("noinline {", "noinline optnone {") if quick else line)
@@ -253,6 +278,19 @@ def _among_text(arithmetic: Arithmetic, results: Sequence[str], targets: Sequenc
 def _end_to_end(t: str, name: str, lengths: Lengths, step: int = 1) -> list[str]:
     """Places of the numbers of registers, end to end, each so many numbers behind the one before."""
     return [f"{t}, ptr %{name}{k}, i64 {at * step}" for k, length in enumerate(lengths) for at in range(length)]
+
+
+def _gathered_text(t: str, name: str, size: int) -> list[str]:
+    """The function `name(x)`: the vector of x[0], .., x[size - 1], by a load for each, of which LLVM would make one."""
+    lines, vector = [f"define internal {t} @{name}(ptr %x) nounwind noinline {{"], "poison"
+    for lane in range(size):
+        lines += [
+            f"  %x{lane}.at = getelementptr double, ptr %x, i64 {lane}",
+            f"  %x{lane} = load volatile double, ptr %x{lane}.at, align 8",
+            f"  %vector{lane} = insertelement {t} {vector}, double %x{lane}, i32 {lane}",
+        ]
+        vector = f"%vector{lane}"
+    return [*lines, f"  ret {t} {vector}", "}"]
 
 
 def _pointers(name: str, registers: Iterable[object]) -> list[str]:

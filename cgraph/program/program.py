@@ -97,6 +97,6 @@ class Program:
 def whole_graph(program: Program, x: str) -> Graph | None:
     """The graph, if a pass is one call of it: of the register x, giving the record."""
     call = program.body[0] if len(program.body) == 1 else None
-    if isinstance(call, Call) and call.inputs == (x,) and call.outputs == tuple(program.record):
+    if isinstance(call, Call) and (call.inputs, call.outputs, call.products) == ((x,), tuple(program.record), None):
         return call.graph
     return None

@@ -13,7 +13,7 @@ class Writer:
 
     functions: those of the module, which statements call.  type, size: of a number in a register, in LLVM's language
     and in bytes.  pointers: {register: its address}.  written: lines of the statements so far.  scratch: allocations,
-    which stand once at the start.
+    which stand once at the start.  before: the statement that has been written last.
     """
 
     def __init__(self, registers: Registers, functions: Functions) -> None:
@@ -22,6 +22,7 @@ class Writer:
         self.pointers = {name: f"%r{number}" for number, name in enumerate(registers)}
         self.written: list[str] = []
         self.scratch: list[str] = []
+        self.before: Statement | None = None
         self._count = self._values = 0  # of statements so far, and of values, for names
 
     def run(self, statements: Sequence[Statement]) -> None:
@@ -31,6 +32,7 @@ class Writer:
             text = row_of(statement).text
             assert text is not None, "require_texts has been asked"
             text(statement, self)
+            self.before = statement
 
     def line(self, instruction: str) -> None:
         """An instruction without a value."""
@@ -98,13 +100,22 @@ class Writer:
         for k, output in enumerate(outputs):
             target, length = self.pointer(output), self.registers[output]
             if output in inputs:
-                scratch = f"%beside{self._count}.{k}"
-                self.scratch.append(f"  {scratch} = alloca {self.type}, i64 {length + self.functions.width}, align 64")
+                scratch = self.beside(f"beside{k}", length)
                 copies.append(copy_text(target, scratch, length * self.size))
                 target = scratch
             targets.append(target)
-        pointers = [*(self.pointer(register) for register in inputs), *targets]
-        self.written += [f"  call void @{name}({', '.join(f'ptr {pointer}' for pointer in pointers)})", *copies]
+        self.call(name, [*[self.pointer(register) for register in inputs], *targets])
+        self.written += copies
+
+    def call(self, name: str, pointers: Sequence[str]) -> None:
+        """Call a function of these addresses."""
+        self.line(f"call void @{name}({', '.join([f'ptr {pointer}' for pointer in pointers])})")
+
+    def beside(self, name: str, length: int) -> str:
+        """The address of scratch memory of this statement for so many numbers, and for vectors that reach beyond."""
+        pointer = f"%{name}.{self._count}"
+        self.scratch.append(f"  {pointer} = alloca {self.type}, i64 {length + self.functions.width}, align 64")
+        return pointer
 
     def lengths(self, names: Sequence[str]) -> Lengths:
         """Lengths of registers."""

@@ -7,12 +7,12 @@ from collections.abc import Sequence
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import Call, Map, Statement, Sum, copied
+from cgraph.extend import Call, If, Map, Statement, Sum, copied
 
 from .elementwise import advanced, compensated, stage_time, used, weighted
 from .problem import Problem
 from .step import Step
-from .step_control import SAFETY, SCALE, nonfinite, scale
+from .step_control import SAFETY, SCALE, count, nonfinite, scale
 from .tableau import Tableau, real_stability
 
 
@@ -26,19 +26,16 @@ def explicit_step(tableau: Tableau, problem: Problem) -> Step:
         body += _stage(problem, k, tableau.c[k], tableau.a[k], ("at", "at_t"))
     if not tableau.error:
         return Step(lengths, [*body, advanced("x_new", tableau.b)], rates)
-    last, extra = f"slope{stages}", len(tableau.extra)
-    degree, estimates = len(tableau.interpolant[0]), len(tableau.error)
-    lengths |= {last: m, "rounding": m, "rounding_new": m, "nonfinite_rate": 1, "rise": 1, "reach": 1}
-    lengths |= {f"sum{k}": 1 for k in range(estimates)}
-    error: list[Statement] = [stage_time("at_t", 1.0), Call(problem.rate, ("x_new", "at_t", "p"), (last,))]
-    error += [_squared(weights, f"sum{k}") for k, weights in enumerate(tableau.error)]
+    last, extra, degree = f"slope{stages}", len(tableau.extra), len(tableau.interpolant[0])
+    lengths |= {last: m, "rounding": m, "rounding_new": m, "rise": 1, "reach": 1, "nonfinite_rate": 1, "within": 1}
+    lengths |= {f"sum{k}": 1 for k in range(len(tableau.error))}
     return Step(
         lengths,
         [*body, _arrival(tableau.b)],
         rates,
         kept=[copied("rounding_new", "rounding")],
         fixed=("rounding", "rounding_new"),
-        error=[*error, nonfinite("nonfinite_rate", "x_new", last), _estimate(estimates, m)],
+        error=_error(tableau, problem, last),
         estimate=tableau.estimate,
         handed=[*_at_limit(tableau), copied(last, "slope0")],
         dense=_dense(tableau, problem),
@@ -50,8 +47,13 @@ def explicit_step(tableau: Tableau, problem: Problem) -> Step:
 
 def _stage(problem: Problem, k: int, c: float, weights: Sequence[float], at: tuple[str, str]) -> list[Statement]:
     """Register slope{k}, from registers x, t, h and the slopes before, at a state and a time that are kept in `at`."""
-    rate = Call(problem.rate, (*at, "p"), (f"slope{k}",))
-    return [advanced(at[0], weights), stage_time(at[1], c), rate]
+    return [advanced(at[0], weights), *_slope(problem, k, c, at)]
+
+
+def _slope(problem: Problem, k: int, c: float, at: tuple[str, str]) -> list[Statement]:
+    """Register slope{k} at a state and at t + c h, which a rate without t does not need."""
+    rate = Call(problem.rate, (at[0], at[1] if problem.timed else "t", "p"), (f"slope{k}",))
+    return [stage_time(at[1], c), rate] if problem.timed else [rate]
 
 
 def _arrival(weights: tuple[float, ...]) -> Map:
@@ -63,23 +65,39 @@ def _arrival(weights: tuple[float, ...]) -> Map:
     return Map(graph, ("x", "rounding", "h", *names), ("x_new", "rounding_new"))
 
 
-def _squared(weights: tuple[float, ...], target: str) -> Sum:
-    """Sum over the state of (h * (sum of weight * slope) / scale)^2."""
-    slopes, parts, names = used(weights, "slope")
-    *sizes, h = inputs = cg.variables((*SCALE, "h"))
-    part = h * weighted(slopes, parts) / scale(*sizes)
-    return Sum(Graph([*inputs, *slopes], {"y": part * part}), (*SCALE, "h", *names), target)
+def _error(tableau: Tableau, problem: Problem, last: str) -> list[Statement]:
+    """Register `error`, and the slope at the end: where no estimate needs it, of a step within the tolerance alone."""
+    m, stages, sums = problem.size, len(tableau.b), tuple([f"sum{k}" for k in range(len(tableau.error))])
+    slope = _slope(problem, stages, 1.0, ("x_new", "at_t"))
+    estimate = [_squares(tableau.error, sums), _estimate(sums, m)]
+    error, none = cg.variables("error nonfinite_rate")
+    checked = Call(Graph([error, none], {"error": error + none}), ("error", "nonfinite_rate"), ("error",))
+    finite = [nonfinite("nonfinite_rate", last), checked]
+    if any(weights[-1] for weights in tableau.error):
+        return [*slope, *estimate, *finite]
+    within = Call(Graph([error], {"within": error <= 1.0}), ("error",), ("within",))
+    return [*estimate, within, If("within", (*slope, count(1), *finite))]
 
 
-def _estimate(count: int, m: int) -> Call:
+def _squares(estimates: Sequence[Sequence[float]], targets: tuple[str, ...]) -> Sum:
+    """For each estimate the sum over the state of (h * (sum of weight * slope) / scale)^2; NaN if x_new is infinite."""
+    numbers = [k for k in range(len(estimates[0])) if any(weights[k] for weights in estimates)]
+    slopes, (*sizes, h) = cg.variables([f"s{k}" for k in numbers]), cg.variables((*SCALE, "h"))
+    size = scale(*sizes)
+    parts = [h * weighted(slopes, [weights[k] for k in numbers]) / size for weights in estimates]
+    finite = sizes[1] - sizes[1]
+    graph = Graph([*sizes, h, *slopes], {f"{k}": part * part + finite for k, part in enumerate(parts)})
+    return Sum(graph, (*SCALE, "h", *[f"slope{k}" for k in numbers]), targets)
+
+
+def _estimate(sums: tuple[str, ...], m: int) -> Call:
     """The root mean square; of two estimates, that of DOP853 (Hairer, Norsett and Wanner I, section II.10)."""
-    if count == 1:
-        total, none = cg.variables("sum0 nonfinite_rate")
-        return Call(Graph([total, none], {"error": cg.sqrt(total / m) + none}), ("sum0", "nonfinite_rate"), ("error",))
-    fifth, third, none = inputs = cg.variables("sum0 sum1 nonfinite_rate")
-    both = fifth + 0.01 * third
-    error = cg.where(cg.equal(both, 0.0), 0.0, cg.where(both < math.inf, fifth / cg.sqrt(both * m), both))
-    return Call(Graph(inputs, {"error": error + none}), ("sum0", "sum1", "nonfinite_rate"), ("error",))
+    first, *others = inputs = cg.variables(sums)
+    error = cg.sqrt(first / m)
+    for third in others:
+        both = first + 0.01 * third
+        error = cg.where(cg.equal(both, 0.0), 0.0, cg.where(both < math.inf, first / cg.sqrt(both * m), both))
+    return Call(Graph(inputs, {"error": error}), sums, ("error",))
 
 
 def _at_limit(tableau: Tableau) -> list[Statement]:

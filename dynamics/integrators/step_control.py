@@ -48,9 +48,8 @@ SMALLEST_ATOL = 2.0**-1022  # in place of 0: a state that is 0 and stays 0 has n
 def registers(problem: Problem) -> dict[str, int]:
     """What every program has."""
     names = "t h tried next max_step min_step end fresh rtol accepted status rejected error error_old"
-    names += (
-        " evaluations at_limit t_old t_new jump longest leap still moved turned anew search trials due sized seen row"
-    )
+    names += " evaluations at_limit t_old t_new jump longest leap still moved turned anew search trials due"
+    names += " sized seen row largest"
     m = problem.size
     states = dict.fromkeys(("x", "x_new", "x_old", "atol"), m)
     return {**states, "p": len(problem.parameters), **dict.fromkeys(names.split(), 1)}
@@ -81,35 +80,26 @@ def scale(x: Node, x_new: Node, rtol: Node, atol: Node, leap: Node) -> Node:
     return atol + rtol * cg.maximum(abs(x), abs(x_new)) + leap * abs(x_new - x)
 
 
-def control(order: int, evaluations: int, starts: bool) -> Call:
-    """From the estimate of a trial: whether it is accepted, and the next step. A NaN is an error beyond measure.
+def control(evaluations: int) -> Call:
+    """From the estimate of a trial: whether it is accepted. A NaN is an error beyond measure.
 
     A step below the resolution of t, or of the run, is not accepted whatever its error: only one that ends the run may
     be so short.
 
-    order: of the step's size in the estimate.  evaluations: of the rate in a trial.  starts: see `chosen`.
+    evaluations: of the rate in a trial.
     """
-    names = "error error_old tried t t_new end next max_step min_step rejected evaluations accepted".split()
-    names += "search trials sized seen".split()
-    error, old, tried, t, t_new, end, wanted, max_step, min_step, rejected, done, before, *rest = inputs = cg.variables(
-        names
-    )
+    names = "error t t_new end next max_step min_step rejected evaluations accepted search trials sized seen".split()
+    error, t, t_new, end, wanted, max_step, min_step, rejected, done, before, *rest = inputs = cg.variables(names)
     search, trials, sized, seen = rest
     arrives = cg.equal(t_new, end)
     able = cg.maximum(arrives, cg.minimum(wanted, max_step) > cg.maximum(min_step, RESOLUTION * abs(t)))
     accepted = able * (error <= 1.0)
-    growth = SAFETY * error ** -(1.0 / order - 0.75 * MEMORY) * cg.maximum(old, 1e-4) ** MEMORY
-    growth = cg.minimum(cg.maximum(growth, SMALLEST), cg.where(before, LARGEST, 1.0))  # no growth after a rejection
-    shrink = cg.where(error < 1e300, cg.maximum(SAFETY * error ** (-1.0 / order), SMALLEST), 0.1)
-    after = tried * cg.where(accepted, growth, shrink)
-    after = cg.where(accepted * (tried < wanted), cg.maximum(wanted, after), after)  # a step cut short says less
     outputs = {
         "accepted": accepted,
-        "next": tried * shrink if starts else after,
-        "error_old": cg.where(accepted, error, old),
         "status": cg.where(accepted, cg.where(arrives, DONE, RUNNING), cg.where(able, RUNNING, TOO_SMALL)),
         "rejected": rejected + (1.0 - accepted),
         "evaluations": done + float(evaluations),
+        "largest": cg.where(before, LARGEST, 1.0),  # no growth after a rejection
         "row": cg.where(search, 0.0, accepted),
         "trials": trials + 1.0,
         "due": sized * (trials + 1.0 >= seen),
@@ -117,15 +107,33 @@ def control(order: int, evaluations: int, starts: bool) -> Call:
     return Call(Graph(inputs, outputs), tuple(names), tuple(outputs))
 
 
-def accept_step(*after: Statement, starts: bool) -> If:
+def _grown(order: int) -> Call:
+    """The step after an accepted one. order: of the step's size in the estimate."""
+    names = ("error", "error_old", "tried", "next", "largest")
+    error, old, tried, wanted, largest = inputs = cg.variables(names)
+    growth = SAFETY * error ** -(1.0 / order - 0.75 * MEMORY) * cg.maximum(old, 1e-4) ** MEMORY
+    after = tried * cg.minimum(cg.maximum(growth, SMALLEST), largest)
+    after = cg.where(tried < wanted, cg.maximum(wanted, after), after)  # a step cut short says less
+    return Call(Graph(inputs, {"next": after, "error_old": error}), names, ("next", "error_old"))
+
+
+def _shrunk(order: int) -> Call:
+    """The step after a rejected one."""
+    error, tried = inputs = cg.variables("error tried")
+    shrink = cg.where(error < 1e300, cg.maximum(SAFETY * error ** (-1.0 / order), SMALLEST), 0.1)
+    return Call(Graph(inputs, {"next": tried * shrink}), ("error", "tried"), ("next",))
+
+
+def accept_step(order: int, *after: Statement, starts: bool) -> If:
     """An accepted step becomes the state; `after` is what the method does besides, with x still the old state.
 
-    starts: see `chosen`.
+    order: of the step's size in the estimate.  starts: see `chosen`.
     """
     kept = (copied("x", "x_old"), copied("t", "t_old"))
     arrived = (copied("x_new", "x"), copied("t_new", "t"))
     if starts:
-        return If("accepted", (*kept, *after, *arrived, Call(Graph([], {"next": math.inf}), (), ("next",))))
+        free = Call(Graph([], {"next": math.inf}), (), ("next",))
+        return If("accepted", (*kept, *after, *arrived, free), (_shrunk(order),))
     h, longest, turned = cg.variables("h longest turned")
     lost = cg.minimum(cg.sqrt(turned), FORGOTTEN) * longest
     after_h = Graph([h, longest, turned], {"longest": cg.maximum(abs(h), longest - lost)})
@@ -134,7 +142,7 @@ def accept_step(*after: Statement, starts: bool) -> If:
     short = Graph([moved, wanted, still], {"next": cg.where(moved, wanted, cg.minimum(wanted, still))})
     remembered = Call(after_h, ("h", "longest", "turned"), ("longest",))
     steps = (way, Call(short, ("moved", "next", "still"), ("next",)), remembered)
-    return If("accepted", (_turn(), *kept, *after, *steps, *arrived))
+    return If("accepted", (_grown(order), _turn(), *kept, *after, *steps, *arrived), (_shrunk(order),))
 
 
 def _turn() -> Sum:
@@ -175,13 +183,13 @@ def chosen(step: Step, problem: Problem, *, dense: bool, degree: int, starts: bo
     if again:
         body.append(If("accepted", tuple(again)))
     body += [trial(), *step.body, *step.error]
-    body.append(control(step.estimate, rate_calls(problem, step.body, step.error), starts))
+    body.append(control(rate_calls(problem, step.body, step.error)))
     after: list[Statement] = []
     if dense:
         polynomial, more = (step.dense, step.dense_lengths) if step.dense else _hermite(problem)
         after.append(If("row", (*polynomial, *_counted(problem, polynomial))))
         lengths |= {**dict.fromkeys([f"dense{k + 1}" for k in range(degree)], problem.size), **more}
-    body.append(accept_step(*after, *step.kept, *(step.handed or ()), starts=starts))
+    body.append(accept_step(step.estimate, *after, *step.kept, *(step.handed or ()), starts=starts))
     return Program(lengths, body, recorded(dense, degree), record_if="row", stop="status")
 
 

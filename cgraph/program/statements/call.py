@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ...codegen.schedule import products_of
 from ...core.checks import GraphError
 from ...core.evaluation import Array
 from ...core.graph import Graph
+from ...core.node import Node
 from ...writing.naming import variables
 from ..statement import (
     Execution,
@@ -45,6 +47,7 @@ class Call(Statement):
     graph: Graph
     inputs: Names
     outputs: Names
+    products: Mapping[Node, Node] | None = field(default=None, compare=False)  # of a fused one, see `products_in`
     exact: bool = field(default=False, kw_only=True)
 
 
@@ -89,6 +92,14 @@ class Sum(Statement):
         values = (graph, inputs, (outputs,) if isinstance(outputs, str) else outputs, shared)
         for name, value in zip(("graph", "inputs", "outputs", "shared"), values, strict=True):
             object.__setattr__(self, name, value)
+
+
+def products_in(call: Call) -> Mapping[Node, Node]:
+    """{sum or difference: its argument, a product that it is rounded with}, where arithmetic fuses them.
+
+    A call that was made of several statements has those of each.
+    """
+    return products_of(call.graph) if call.products is None else call.products
 
 
 def elements(statement: Map | Sum, lengths: Lengths) -> int:
@@ -248,23 +259,33 @@ def elements_beside(statement: Map | Sum, state: dict[str, Array], execution: Ex
 
 def call_text(call: Call, writer: Writer) -> None:
     """Write as machine code."""
-    lengths = writer.lengths(call.inputs), writer.lengths(call.outputs)
-    name = writer.functions.call(call.graph, *lengths, exact=call.exact)
-    writer.calls(name, call.inputs, call.outputs)
+    registers = list(dict.fromkeys((*call.inputs, *call.outputs)))
+    reads, writes = (tuple([registers.index(name) for name in names]) for names in (call.inputs, call.outputs))
+    name = writer.functions.call(call.graph, writer.lengths(registers), reads, writes, call.products, exact=call.exact)
+    writer.call(name, [writer.pointer(register) for register in registers])
 
 
 def map_text(statement: Map, writer: Writer) -> None:
     """Write as machine code, in vectors of elements."""
     if count := elements(statement, writer.registers):
-        shared = writer.lengths(statement.shared)
-        name = writer.functions.map(statement.graph, writer.lengths(statement.inputs), count, shared)
-        writer.calls(name, (*statement.shared, *statement.inputs), statement.outputs)
+        inputs = (*statement.shared, *statement.inputs)
+        writer.calls(_of_elements(statement, count, writer), inputs, statement.outputs)
 
 
 def sum_text(statement: Sum, writer: Writer) -> None:
-    """Write as machine code, added up in order."""
-    count, of = elements(statement, writer.registers), writer.lengths
-    name = writer.functions.sum(
-        statement.graph, of(statement.inputs), count, of(statement.shared), of(statement.outputs)
-    )
-    writer.calls(name, (*statement.shared, *statement.inputs), statement.outputs)
+    """Write as machine code: all terms, in vectors of elements, then added up in order."""
+    count = elements(statement, writer.registers)
+    terms = [writer.beside(f"terms{k}", count) for k in range(len(statement.graph.outputs))]
+    if count:
+        inputs = [writer.pointer(name) for name in (*statement.shared, *statement.inputs)]
+        writer.call(_of_elements(statement, count, writer), [*inputs, *terms])
+    totals = [writer.place(name, k) for name in statement.outputs for k in range(writer.registers[name])]
+    for term, total in zip(terms, totals, strict=True):
+        writer.call(writer.functions.total(count), [term, total])
+
+
+def _of_elements(statement: Map | Sum, count: int, writer: Writer) -> str:
+    """The function that runs the graph for every element."""
+    before, of = writer.before, writer.lengths
+    apart = [name in before.outputs for name in statement.inputs] if isinstance(before, Call) else []
+    return writer.functions.map(statement.graph, of(statement.inputs), count, of(statement.shared), apart)

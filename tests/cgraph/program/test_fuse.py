@@ -1,4 +1,4 @@
-"""Short statements as one call: the same bits, and what is long or would be rounded otherwise stays as it is."""
+"""Short statements as one call: the same bits; what is long, or called again and again, stays as it is."""
 
 import numpy as np
 import pytest
@@ -39,14 +39,16 @@ START = {"x": [0.3, -1.2, 2.0, 0.1, 0.2, -0.4], "h": 0.01, "again": 1.0}
 
 
 def called(program):
-    return sum(isinstance(each, Call | Map) for each in fuse.fused(program).statements())
+    return sum(isinstance(each, Call | Map | Sum) for each in program.statements())
 
 
+@pytest.mark.parametrize("copies", [0, 1000])
 @pytest.mark.parametrize("fma", [False, True])
-def test_a_fused_program_has_the_bits_of_its_statements(monkeypatch, fma):
+def test_a_fused_program_has_the_bits_of_its_statements(monkeypatch, fma, copies):
+    monkeypatch.setattr(fuse, "COPIES", copies)
     program = Program(LENGTHS, oscillators(), record=["x", "at", "energy", "again"])
     flat = Program(LENGTHS, [*oscillators()[0].body[:-2]], record=["x", "at", "energy"])
-    assert called(program) == 5 < sum(isinstance(each, Call | Map) for each in program.statements())
+    assert called(fuse.fused(program)) == (20 if copies == 0 else 4) < called(program)
 
     def results():
         run, many = (runner(each, "llvm", fma=fma) for each in (program, flat))
@@ -55,30 +57,74 @@ def test_a_fused_program_has_the_bits_of_its_statements(monkeypatch, fma):
 
     fused = results()
     monkeypatch.setattr(fuse, "MOST", 0)
-    assert called(program) == sum(isinstance(each, Call | Map) for each in program.statements())
+    assert called(fuse.fused(program)) == called(program)
     assert all(map(same, fused, results()))
     if not fma:
         slow = runner(program, "python", fma=False)
         assert same(slow.run(slow.memory(START), 20).rows, fused[0])
 
 
-def test_what_is_long_is_called(monkeypatch):
+def test_a_graph_that_is_called_again_and_again_is_there_once(monkeypatch):
     body = oscillators()[0].body
     program = Program(LENGTHS, body, record=["x"])
-    monkeypatch.setattr(fuse, "MOST", 50)
-    assert fuse.fused(program).body[:8] == body[:8]
+    monkeypatch.setattr(fuse, "COPIES", 0)
+    rates = [each for each in body if isinstance(each, Call) and each.graph is body[0].graph]
+    assert len(rates) == 4
+    assert [each for each in fuse.fused(program).body if each in rates] == rates
+
+
+def test_what_is_long_stays(monkeypatch):
+    body = oscillators()[0].body
+    program = Program(LENGTHS, body, record=["x"])
+    monkeypatch.setattr(fuse, "COPIES", 0)
+    monkeypatch.setattr(fuse, "STRAIGHT", 0)
+    assert [each for each in fuse.fused(program).body if isinstance(each, Map | Sum)] == [
+        each for each in body if isinstance(each, Map | Sum)
+    ]
 
 
 def test_an_overwritten_product_keeps_its_rounding():
-    """Fused, it would go into the sum that follows and be rounded with it."""
+    """Fused, it does not go into the sum that follows, where it would not be rounded."""
     a, b = cg.variables("a b")
     product = Call(cg.Graph([a], {"p": a * a}), ("x",), ("p",))
     rest = Call(cg.Graph([a, b], {"r": a - b}), ("p", "y"), ("p",))
     program = Program({"x": 1, "y": 1, "p": 1}, [product, rest], record=["p"])
-    assert fuse.fused(program).body == (product, rest)
+    assert len(fuse.fused(program).body) == 1
     run = runner(program, "llvm")
     x = 1.0 + 2.0**-30
     assert run.run(run.memory({"x": x, "y": x * x}), 1).rows.tolist() == [[0.0]]
+    whole = Program(program.registers, [Call(cg.Graph([a, b], {"r": a * a - b}), ("x", "y"), ("p",))], record=["p"])
+    run = runner(whole, "llvm")
+    assert run.run(run.memory({"x": x, "y": x * x}), 1).rows[0, 0] in (0.0, 2.0**-60)  # with fused products
+
+
+def test_a_call_may_write_what_it_reads():
+    """Each number is read before any is written, of registers that swap and of one that is read twice."""
+    a, b, c = cg.variables("a b c")
+    swap = Call(cg.Graph([a, b, c], {"first": b, "second": a + c}), ("x", "y", "x"), ("x", "y"))
+    run = runner(Program({"x": 1, "y": 1}, [swap], record=["x", "y"]), "llvm")
+    assert run.run(run.memory({"x": 3.0, "y": 5.0}), 2).rows.tolist() == [[5.0, 6.0], [6.0, 10.0]]
+
+
+@pytest.mark.parametrize("count", [3, 8, 13, 40])
+def test_a_map_behind_a_call_reads_what_it_wrote(count, monkeypatch):
+    """Whose numbers were written one by one, and whose vectors may end behind the last."""
+    monkeypatch.setattr(fuse, "STRAIGHT", 0)
+    monkeypatch.setattr(fuse, "MOST", 0)
+    x, y = cg.variables([f"x{k}" for k in range(count)]), cg.variables("a b")
+    turned = Call(cg.Graph(x, {f"{k}": 2.0 * node for k, node in enumerate(reversed(x))}), ("x",), ("y",))
+    program = Program(
+        {"x": count, "y": count, "z": count, "sum": 2},
+        [
+            turned,
+            Map(cg.Graph(y, {"z": y[0] + y[1]}), ("x", "y"), ("z",)),
+            Sum(cg.Graph(y, {"p": y[0] * y[1], "q": y[1]}), ("x", "z"), ("sum",)),
+        ],
+        record=["z", "sum"],
+    )
+    run, slow = runner(program, "llvm"), runner(program, "python")
+    start = {"x": np.arange(count) + 1.0}
+    assert same(run.run(run.memory(start), 1).rows, slow.run(slow.memory(start), 1).rows)
 
 
 def test_an_overwritten_product_that_no_sum_takes_is_fused():
