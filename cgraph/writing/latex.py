@@ -44,8 +44,10 @@ def latex(node: Node, *, names: Mapping[str, str] | None = None, lines: int = LI
     0.5 \, m \, {v}^{2}
     """
     if not isinstance(node, Node):
-        hint = "; of a graph, graph.latex()" if hasattr(node, "latex") else ""
-        raise TypeError(f"latex needs a node, got {type(node).__name__}: {node!r:.60}{hint}")
+        raise TypeError(
+            f"latex needs a node, got {type(node).__name__}: {node!r:.60}"
+            f"{'; of a graph, graph.latex()' if hasattr(node, 'latex') else ''}"
+        )
     found = Formulas(topological([node]), {}, LATEX, names).lines([node], lines)
     return found.equations[0][1] if len(found.equations) == 1 and not found.left_out else _block(found)
 
