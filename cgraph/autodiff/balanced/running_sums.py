@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
-from ..core.builder import Builder
-from ..core.graph import Graph
-from ..core.node import Node
-from ..core.scope import building
-from ..core.traversal import topological
-from ..util.require import require_graph
+from ...core.builder import Builder
+from ...core.graph import Graph
+from ...core.node import Node
+from ...core.scope import building
+from ...core.traversal import topological
+from ...util.require import require_graph
 
 LEAST = 16  # terms of a sum that is taken in blocks
 
