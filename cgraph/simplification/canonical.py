@@ -19,7 +19,7 @@ from ..core.row import Row
 from ..core.traversal import topological
 from ..operations.operation import OPS
 
-ROUNDING = 2.0**-48  # of the size of what a coefficient is summed from
+COEFFICIENT_ROUNDING = 2.0**-48  # of the size of what a coefficient is summed from
 MOST_TERMS, MOST_PRODUCTS, MOST_POWER, MOST_MULTIPLE = 64, 1024, 8, 4
 
 
@@ -174,7 +174,7 @@ class Canonical:
         known.add(size)
         for unit in sorted(known):
             ratio = size / unit
-            if ratio <= MOST_MULTIPLE + 0.5 and abs(ratio - round(ratio)) <= ROUNDING * ratio:
+            if ratio <= MOST_MULTIPLE + 0.5 and abs(ratio - round(ratio)) <= COEFFICIENT_ROUNDING * ratio:
                 return unit
         return size
 
@@ -275,7 +275,7 @@ def collected(terms: Iterable[tuple[Powers, Term]]) -> Sum:
 
 def without_zeros(a: Sum) -> Sum:
     """Without terms that are rounding alone."""
-    return {powers: term for powers, term in a.items() if abs(term.value) > ROUNDING * term.size}
+    return {powers: term for powers, term in a.items() if abs(term.value) > COEFFICIENT_ROUNDING * term.size}
 
 
 def key(a: Sum) -> frozenset[tuple[Powers, complex]]:

@@ -11,10 +11,10 @@ from ..core.node import CONSTANT, Node, apply, constant
 from ..core.scope import building
 from ..core.traversal import topological
 from ..util.explain_failure import explain_failure
-from .canonical import ROUNDING, Canonical, Powers, Sum, Term, added, number, replaced
+from .canonical import COEFFICIENT_ROUNDING, Canonical, Powers, Sum, Term, added, number, replaced
 from .rounding_growth import as_accurate
 
-LONGEST = 250  # nodes; beyond, sums of products would be too long to be of use
+LARGEST_REWRITTEN = 250  # nodes; beyond, sums of products would be too long to be of use
 NEW = 3  # operations that the cosine or sine of an angle counts as, where none of it stands in the graph
 
 Product = tuple[Powers, Term]
@@ -33,7 +33,7 @@ def shortened(nodes: Sequence[Node]) -> list[Node]:
     [<node cos>, <node mul>]
     """
     old = list(nodes)
-    if len(topological(old)) > LONGEST:
+    if len(topological(old)) > LARGEST_REWRITTEN:
         return old
     new = rewritten(old)
     usable = [as_accurate(before, after) for before, after in zip(old, new, strict=True)]
@@ -101,7 +101,7 @@ class _Writer:
             elif angles[0][1] > 0:  # the others are their conjugates
                 atoms = self.canonical.turning(tuple([(powers, k * unit) for (powers, unit), k in angles]))
                 for atom, part in zip(atoms, (term.value.real, -term.value.imag), strict=True):
-                    if abs(part) > ROUNDING * term.size:
+                    if abs(part) > COEFFICIENT_ROUNDING * term.size:
                         result[((atom, 1),)] = Term(2.0 * part, term.size, term.label)
         return result
 

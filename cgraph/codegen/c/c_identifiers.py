@@ -8,7 +8,7 @@ import re
 import unicodedata
 from collections.abc import Sequence
 
-LONGEST = 63  # characters of a name that every C compiler looks at
+LONGEST_NAME = 63  # characters of a name that every C compiler looks at
 _C = """auto break case char const continue default do double else enum extern float for goto if inline int long
     register restrict return short signed sizeof static struct switch typedef union unsigned void volatile while
     alignas alignof bool constexpr false nullptr static_assert thread_local true typeof typeof_unqual asm main"""
@@ -30,8 +30,8 @@ def check_function_name(name: str) -> None:
         raise TypeError(f"the name of a C function must be a string, got {type(name).__name__}: {name!r:.60}")
     if not re.fullmatch("[A-Za-z][A-Za-z0-9_]*", name):
         raise ValueError(f"the name of a C function must be a letter, then letters, digits and _, got {name!r:.60}")
-    if len(name) > LONGEST:
-        raise ValueError(f"the name of a C function may have {LONGEST} characters, got {len(name)}: {name:.60}")
+    if len(name) > LONGEST_NAME:
+        raise ValueError(f"the name of a C function may have {LONGEST_NAME} characters, got {len(name)}: {name:.60}")
     if name in _TAKEN or _MACROS.fullmatch(name) or _is_in_the_library(name):
         raise ValueError(f"the name of a C function must not be a word of C, C++ or their library, got {name!r}")
 
