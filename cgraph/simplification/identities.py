@@ -97,7 +97,7 @@ class _Writer:
         for wave, term in replaced(a, self.canonical.turns).items():  # of exp(i sum k angle)
             angles = sorted([(self.canonical.angles[z], k) for z, k in wave])
             if not angles:
-                result[()] = term
+                result[()] = term._replace(value=term.value.real)
             elif angles[0][1] > 0:  # the others are their conjugates
                 atoms = self.canonical.turning(tuple([(powers, k * unit) for (powers, unit), k in angles]))
                 for atom, part in zip(atoms, (term.value.real, -term.value.imag), strict=True):
