@@ -75,7 +75,11 @@ class Canonical:
             result = self._operation(node, [self._sums[arg] for arg in node.args]) if node.args else None
         except TooLongError:
             result = None
-        return self._function(node) if result is None or len(result) > MOST_TERMS else result
+        if result is None or len(result) > MOST_TERMS:
+            return self._function(node)
+        if not node.tags:
+            return result
+        return {powers: x._replace(label=x.label.with_tags_of(node.label)) for powers, x in result.items()}
 
     def _operation(self, node: Node, args: list[Sum]) -> Sum | None:
         match node.op.name:
