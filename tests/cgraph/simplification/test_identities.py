@@ -31,6 +31,7 @@ SHORTER: dict[str, tuple[Node, int]] = {  # expression: nodes that are enough
     "addition theorem": (cg.cos(X) * cg.cos(X + Y) + cg.sin(X) * cg.sin(X + Y), 2),
     "common factor": (A * X * cg.cos(Y) ** 2 + A * X * cg.sin(Y) ** 2 + A * Y, 5),
     "cosine of a difference": (A * cg.cos(X) * cg.cos(Y) + A * cg.sin(X) * cg.sin(Y) + 0.0 * cg.cos(X - Y), 6),
+    "common divisor": (X / Y + A / Y, 5),
     "cosine squared": (3.0 - 3.0 * cg.cos(X) ** 2, 5),
 }
 
