@@ -15,7 +15,7 @@ from .canonical import COEFFICIENT_ROUNDING, Canonical, Powers, Sum, Term, added
 from .rounding_growth import as_accurate
 
 LARGEST_REWRITTEN = 250  # nodes; beyond, sums of products would be too long to be of use
-NEW = 3  # operations that the cosine or sine of an angle counts as, where none of it stands in the graph
+NEW_ANGLE = 3  # operations that the cosine or sine of an angle counts as, where none of it stands in the graph
 
 Product = tuple[Powers, Term]
 
@@ -58,6 +58,8 @@ def rewritten(nodes: Sequence[Node]) -> list[Node]:
 
 
 class _Writer:
+    """The nodes of canonical sums."""
+
     def __init__(self, canonical: Canonical, set_label: Callable[[Label], None]) -> None:
         self.canonical, self.set_label = canonical, set_label
         self._nodes: dict[int, Node] = {}
@@ -87,7 +89,7 @@ class _Writer:
         waves = self._fourier(a)
         arguments = [self.canonical.made[atom][1] for powers in waves for atom, _ in powers]
         angles = {frozenset([(powers, x.value) for powers, x in u.items()]) for u in arguments if isinstance(u, dict)}
-        return waves if _length(waves) + NEW * len(angles - self.canonical.written) < _length(best) else best
+        return waves if _length(waves) + NEW_ANGLE * len(angles - self.canonical.written) < _length(best) else best
 
     def _fourier(self, a: Sum) -> Sum:
         """As a sum of sines and cosines of sums of angles; with negative powers as it is."""
@@ -135,12 +137,14 @@ class _Writer:
         return self._added(node, self._sum(outside)) if outside else node
 
     def _added(self, a: Node, b: Node) -> Node:
+        """a + b, of a negative one the difference."""
         self.set_label(WRITTEN)
         if b.op.name == "neg":
             return a - b.args[0]
         return b - a.args[0] if a.op.name == "neg" else a + b
 
     def _times(self, node: Node, factor: float, sign: int) -> Node:
+        """The node times a number, where the sign is 0, else times or over an atom."""
         self.set_label(WRITTEN)
         if sign == 0:
             return factor * node
@@ -149,6 +153,7 @@ class _Writer:
         return self._factor(int(factor)) * node if sign > 0 else node / self._factor(int(factor))
 
     def _product(self, powers: Powers, term: Term) -> Node:
+        """A product without its sign."""
         self.set_label(WRITTEN.with_tags_of(term.label))
         value, node = abs(term.value), self._powers([each for each in powers if each[1] > 0])
         node = constant(value) if node is None else node if value == 1.0 else value * node
