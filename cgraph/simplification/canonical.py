@@ -77,7 +77,7 @@ class Canonical:
             result = None
         if result is None or len(result) > MOST_TERMS:
             return self._function(node)
-        if not node.tags:
+        if not node.tags or node.op.name in ("add", "sub"):  # a sum may have the tags of all of its terms
             return result
         return {powers: x._replace(label=x.label.with_tags_of(node.label)) for powers, x in result.items()}
 
