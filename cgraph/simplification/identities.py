@@ -21,10 +21,11 @@ Product = tuple[Powers, Term]
 
 
 @explain_failure
-def shortened(nodes: Sequence[Node]) -> list[Node]:
+def shortened(nodes: Sequence[Node], below: int | None = None) -> list[Node]:
     """Nodes of the same values: written anew by identities where that is shorter and as accurate, else as they are.
 
     Together where that takes fewer nodes; else, of some, those that then depend on fewer variables.
+    below: of how many nodes a result has to be less; nodes stay where it is not.
 
     >>> import cgraph as cg
     >>> from cgraph.extend import shortened
@@ -36,12 +37,14 @@ def shortened(nodes: Sequence[Node]) -> list[Node]:
     if len(topological(old)) > LARGEST_REWRITTEN:
         return old
     new = rewritten(old)
-    usable = [as_accurate(before, after) for before, after in zip(old, new, strict=True)]
-    if all(usable) and len(topological(new)) < len(topological(old)):
+    pairs = list(zip(old, new, strict=True))
+    if below is not None and len(topological(new)) >= below:
+        return old
+    if len(topological(new)) < len(topological(old)) and all(as_accurate(before, after) for before, after in pairs):
         return new
     return [
-        after if fine and leaves([after]) < leaves([before]) else before
-        for before, after, fine in zip(old, new, usable, strict=True)
+        after if leaves([after]) < leaves([before]) and as_accurate(before, after) else before
+        for before, after in pairs
     ]
 
 
