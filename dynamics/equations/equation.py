@@ -18,7 +18,7 @@ from cgraph import Graph, Node, extend
 from ..systems.model import Model, as_system
 from ..systems.system import System
 
-LONGEST = 200  # nodes of a graph whose outputs are written anew
+LARGEST_REWRITTEN = 200  # nodes of a graph whose outputs are written anew
 WIDTH = 116  # letters of a line in a docstring
 COMMON = {  # parameters that mean the same in every function that has them
     "model": "model : Model\n    A system, a mechanism or a scene, with nq coordinates and n velocities.",
@@ -152,7 +152,7 @@ def shortened(system: System, derive: Callable[[System], Graph], *, mirrored: bo
     graphs = sorted([derive(form) for form in (system, system.shortened) if form is not None], key=_size)
     best = graphs[0]
     for graph in graphs:
-        if not mirrored and len(graph.nodes) <= LONGEST:
+        if not mirrored and len(graph.nodes) <= LARGEST_REWRITTEN:
             below = None if graph is graphs[0] else len(best.nodes)
             outputs = dict(zip(graph.outputs, extend.shortened(list(graph.outputs.values()), below), strict=True))
             best = min(best, cg.simplify(Graph(graph.inputs, outputs)), key=_size)

@@ -16,7 +16,7 @@ from ...systems.kinematics import ONE, ZERO
 from ...systems.model import Model, as_system
 from ...systems.system import System
 from ..bias_terms import bias_terms, state_rate
-from ..equation import LONGEST, Equation, Output, shortened
+from ..equation import LARGEST_REWRITTEN, Equation, Output, shortened
 from ..substitute import substitute
 
 EULER = "euler"  # tag of the embedded relations q = qd dt + q_old and qd = qdd dt + qd_old
@@ -179,7 +179,7 @@ def _smaller(system: System) -> tuple[str, Graph]:
     take 7 nodes each; so for large graphs, which take long, it is not asked.
     """
     by_velocities = newton_euler.__name__, _finished(system, newton_euler.__name__)
-    if system.body_terms is not None and len(by_velocities[1].nodes) > max(LONGEST, 10 * system.n):
+    if system.body_terms is not None and len(by_velocities[1].nodes) > max(LARGEST_REWRITTEN, 10 * system.n):
         return by_velocities
     by_state = chain_rule.__name__, _finished(system, chain_rule.__name__)
     return min(by_state, by_velocities, key=lambda pair: size(pair[1]))
