@@ -6,19 +6,30 @@ WORKERS ?= 2
 WORST ?= 15
 
 BIN = $(VENV)/bin
+LOCKED = .venv-locked/bin
 INSTALLED = $(VENV)/.installed-
 
 .DEFAULT_GOAL := help
 .NOTPARALLEL:  # two pips in one environment spoil it
-.PHONY: help venv paper test check coverage docs pictures bench clean
+.PHONY: help venv paper locked lock hooks test check coverage docs pictures bench clean
 
 help:  ## this list
-	@sed -n 's/^\([a-z]*\):.*## /\1	/p' Makefile | expand -t 8
+	@sed -n 's/^\([a-z]*\):.*## /\1	/p' Makefile | expand -t 10
 
 venv: $(INSTALLED)all,test,check  ## the virtual environment, with all that the library uses and what tests and checks need
 
 paper: $(INSTALLED)viz,mujoco  ## the paper's figures and tables, into OUT=paper
 	$(BIN)/cgraph paper --out "$(OUT)"
+
+locked: .venv-locked/.installed  ## the same, with the very packages of paper.lock, checked by their hashes
+	$(LOCKED)/python -m viz paper --out "$(OUT)"
+
+lock:  ## paper.lock anew, for all platforms, by uv (pip install uv)
+	uv pip compile pyproject.toml --extra viz --extra mujoco --universal --generate-hashes --python-version 3.11 \
+		--upgrade --quiet --custom-compile-command "make lock" --output-file paper.lock
+
+hooks: $(INSTALLED)test,check  ## `make check` before every commit, by pre-commit
+	$(BIN)/pre-commit install
 
 test: $(INSTALLED)test  ## the tests, on WORKERS=2 processes; ARGS="-k name" or a path narrows them
 	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal $(ARGS)
@@ -47,8 +58,8 @@ bench: $(INSTALLED)bench  ## the comparisons with other software
 	$(BIN)/cgraph report --compare orders,taylor,stiff,loops,energy --out build
 	$(BIN)/python -m pytest tests/dynamics/multibody/test_pinocchio.py -q
 
-clean:  ## remove .venv, paper and all else that the targets above make where nothing else is said
-	rm -rf .venv paper docs/_build build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .coverage
+clean:  ## remove the environments, paper and all else that the targets above make where nothing else is said
+	rm -rf .venv .venv-locked paper docs/_build build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .coverage
 
 # One stamp for each set of extras, so that a second run installs nothing. The environment is kept when
 # pyproject.toml changes; pip then brings it up to date.
@@ -59,4 +70,9 @@ $(INSTALLED)%: pyproject.toml | $(VENV)/.created
 
 $(VENV)/.created:
 	$(PYTHON) -m venv "$(VENV)"
+	@touch "$@"
+
+.venv-locked/.installed: paper.lock
+	$(PYTHON) -m venv --clear .venv-locked
+	@$(LOCKED)/python -m pip install --quiet --disable-pip-version-check --require-hashes --requirement paper.lock
 	@touch "$@"

@@ -412,7 +412,7 @@ CALLS |= {
     "extend.runner": call(extend.runner, PROGRAM, "python", fast=False, fma=True),
     "extend.scipy_module": call(extend.scipy_module, "integrate", "what"),
     "extend.share": call(extend.share, abs, range(3), 2),
-    "extend.shortened": call(extend.shortened, [X * Y]),
+    "extend.shortened": call(extend.shortened, [X * Y], None),
     "extend.solve_nodes": call(
         extend.solve_nodes, SQUARE, [X], [Y], None, at={SQUARE: Y}, multipliers=(), check=False, order="recursive"
     ),

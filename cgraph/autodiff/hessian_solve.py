@@ -131,7 +131,7 @@ def solve_nodes(
     equations = _solved(output, wrt, rhs, build, at or {}, multipliers, order)
     x = [equations.dots[node] for node in wrt]
     if order == "balanced":
-        from ..simplification.balanced_sums import balanced
+        from .balanced.running_sums import balanced
 
         x = balanced(x, build)
     if check:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import numbers
 from collections.abc import Callable
-from typing import Any, NoReturn
+from typing import Any, NoReturn, SupportsFloat
 
 import numpy as np
 
@@ -204,7 +204,7 @@ _constants: Interned[tuple[float, float], Node] = Interned()
 _variables: Interned[str, Node] = Interned()
 
 
-def constant(value: float) -> Node:
+def constant(value: SupportsFloat) -> Node:
     """The node of a number; equal numbers share one node, and 0.0 and -0.0 stay apart.
 
     Parameters

@@ -1,16 +1,16 @@
 """Canonical sums: nodes as sums of products of atoms, where identities such as sin^2 + cos^2 = 1 hold by form.
 
-An atom is a leaf, a function of canonical sums, or one of a pair (cosine, sine) of a base angle. Sines and cosines of
-sums and multiples of base angles are expanded by the addition theorems, and a square sin^2, sinh^2 or sqrt^2 is
-replaced by 1 - cos^2, cosh^2 - 1 or the radicand, so that equal functions of this kind have equal sums. In a product
-of two sums those without such atoms stay together: written out they would gain nothing and lose digits. A coefficient
+An atom is a leaf, a function of canonical sums, or the cosine or sine of a base angle. Identities are rules: a power of
+an atom, and the sum that stands for it. By sin^2 = 1 - cos^2, sinh^2 = cosh^2 - 1 and sqrt(x)^2 = x, and by the
+addition theorems for sums and multiples of base angles, equal functions of this kind have equal sums. In a product of
+two sums those without such atoms stay together: written out they would gain nothing and lose digits. A coefficient
 counts as zero where it is no more than rounding of the terms that it came from.
 """
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping, Sequence
+import cmath
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from ..core.label import UNLABELLED, Label
@@ -19,10 +19,7 @@ from ..core.row import Row
 from ..core.traversal import topological
 from ..operations.operation import OPS
 
-Powers = tuple[tuple[int, int], ...]  # (atom, power), in order of atoms
-Angle = tuple[Powers, float]  # a product, and what it is multiplied by
-Key = frozenset[tuple[Powers, float]]
-ROUNDING = 2.0**-48  # of the size of what a coefficient is summed from
+COEFFICIENT_ROUNDING = 2.0**-48  # of the size of what a coefficient is summed from
 MOST_TERMS, MOST_PRODUCTS, MOST_POWER, MOST_MULTIPLE = 64, 1024, 8, 4
 
 
@@ -33,214 +30,185 @@ class TooLongError(Exception):
 class Term(NamedTuple):
     """A coefficient, the sum of the sizes of what it came from, and what it means."""
 
-    value: float
+    value: complex
     size: float
-    label: Label
+    label: Label = UNLABELLED
 
 
+Powers = tuple[tuple[int, int], ...]  # (atom, power), in order of atoms
+Angle = tuple[Powers, float]  # a product, and what it is multiplied by
 Sum = dict[Powers, Term]
+Rules = Mapping[int, tuple[int, Sum]]  # {atom: (power, what stands for this power of it)}
 
 
 class Canonical:
     """Canonical sums of nodes, and the atoms that they are made of.
 
-    made: the operation and arguments of an atom, where it is no sine or cosine of a base angle: None and one node for
-    that node.  angles: {atom: (angle, whether it is the sine)}.  pairs: the atoms (cosine, sine) of each base angle.
-    squares: {atom: the square of it}.  written: angles whose sine or cosine stands in the graph.
+    made: {atom: its operation and arguments}; without an operation the node itself, and of a cosine or sine the sum
+    that its angle is.  rules: those by which sums are canonical.  turns: cosines and sines by z = exp(i angle).
+    angles: {z: base angle}.  written: angles whose cosine or sine stands in the graph.
     """
 
     def __init__(self, outputs: Sequence[Node]) -> None:
-        self.order = topological(outputs)
-        self.made: dict[int, tuple[Row | None, tuple[Node, ...]]] = {}
-        self.angles: dict[int, tuple[Angle, bool]] = {}
-        self.pairs: dict[Angle, tuple[int, int]] = {}
-        self.squares: dict[int, Sum] = {}
+        self.made: dict[int, tuple[Row | None, tuple[Node, ...] | Sum]] = {}
+        self.rules: dict[int, tuple[int, Sum]] = {}
+        self.turns: dict[int, tuple[int, Sum]] = {}
+        self.angles: dict[int, Angle] = {}
         self.written: set[frozenset[Angle]] = set()
         self._atoms: dict[object, int] = {}
-        self._leading: dict[int, float] = {}
-        self._units: dict[Powers, set[float]] = {}
-        self._units_used: dict[Angle, float] = {}
+        self._leading: dict[int, complex] = {}
+        self._sizes: dict[Powers, set[float]] = {}
         self._sums: dict[Node, Sum] = {}
-        self._sum_all()
-        if any([self._unit(*angle) != unit for angle, unit in self._units_used.items()]):
-            self._sum_all()  # now that it is known which multiples of an angle there are
-
-    def _sum_all(self) -> None:
-        for node in self.order:
-            self._sums[node] = self._sum(node)
+        self._multiples = False  # whether one angle is a multiple of another, which may come later
+        order = topological(outputs)
+        for first in (True, False):
+            for node in order if first or self._multiples else []:
+                self._sums[node] = self._sum(node)
 
     def __getitem__(self, node: Node) -> Sum:
         return self._sums[node]
 
     def _sum(self, node: Node) -> Sum:
-        if node.op is CONSTANT:
-            assert node.value is not None
-            return number(node.value, node.label) if math.isfinite(node.value) else self._leaf(node)
-        if not node.args:
-            return self._leaf(node)
-        args = [self._sums[arg] for arg in node.args]
+        if node.op is CONSTANT and cmath.isfinite(node.value or 0.0):
+            return number(node.value or 0.0, node.label)
         try:
-            result = self._operation(node, args)
+            result = self._operation(node, [self._sums[arg] for arg in node.args]) if node.args else None
         except TooLongError:
             result = None
         if result is None or len(result) > MOST_TERMS:
-            return self._function(node.op, node.args, node.label)
-        return result
+            return self._function(node)
+        if not node.tags or node.op.name in ("add", "sub"):  # a sum may have the tags of all of its terms
+            return result
+        return {powers: x._replace(label=x.label.with_tags_of(node.label)) for powers, x in result.items()}
 
     def _operation(self, node: Node, args: list[Sum]) -> Sum | None:
         match node.op.name:
             case "add":
-                return added(args[0], args[1], 1.0)
+                return added(*args)
             case "sub":
-                return added(args[0], args[1], -1.0)
+                return added(args[0], scaled(args[1], -1.0))
             case "neg":
                 return scaled(args[0], -1.0)
             case "mul":
-                return self.product(*self._factors(node))
+                return self.product(*(args if min(map(len, args)) <= 1 else map(self._factor, node.args)))
             case "div":
-                above = args[0] if self._paired(args[0]) else self._factor(node.args[0])
-                return self.product(above, self._inverse(node.args[1]))
+                return self.product(self._factor(node.args[0]), self._inverse(node.args[1]))
             case "pow" if _small_whole(node.args[1].value):
                 return self._power(node)
             case "sqrt":
-                return self._root(node)
+                return self._ruled(self._function(node), args[0])
             case "sin" | "cos":
                 return self._expanded(args[0])[node.op.name == "sin"]
             case "sinh" | "cosh":
-                return self._hyperbolic(node)
+                cosh, sinh = (self._function(node, OPS[name]) for name in ("cosh", "sinh"))
+                self._ruled(sinh, added(self.product(cosh, cosh), number(-1.0)))
+                return sinh if node.op.name == "sinh" else cosh
         return None
 
-    def product(self, a: Sum, b: Sum, *, squares: Mapping[int, Sum] | None = None) -> Sum:
-        """a b, with these squares replaced, by default all. Raises TooLongError."""
+    def product(self, a: Sum, b: Sum) -> Sum:
+        """a b. Raises TooLongError."""
         if len(a) * len(b) > MOST_PRODUCTS:
             raise TooLongError
-        squares = self.squares if squares is None else squares
-        result: Sum = {}
-        for left, x in a.items():
-            for right, y in b.items():
-                powers = dict(left)
-                for atom, power in right:
-                    powers[atom] = powers.get(atom, 0) + power
-                term = Term(x.value * y.value, x.size * y.size, x.label.with_tags_of(y.label))
-                accumulate(result, self._reduced(powers, term, squares))
-        return without_zeros(result)
+        return replaced(multiplied(a, b), self.rules)
 
-    def _reduced(self, powers: dict[int, int], term: Term, squares: Mapping[int, Sum]) -> Sum:
-        """One product with its squares replaced."""
-        square = next((atom for atom, power in powers.items() if power >= 2 and atom in squares), None)
-        if square is not None:
-            powers = {**powers, square: powers[square] - 2}
-        one = {tuple(sorted([(atom, power) for atom, power in powers.items() if power])): term}
-        return one if square is None else self.product(one, squares[square], squares=squares)
-
-    def _factors(self, node: Node) -> list[Sum]:
-        """The arguments of a product, a sum as one atom where writing it out would gain nothing."""
-        sums = [self._sums[arg] for arg in node.args]
-        if min(map(len, sums)) <= 1:
-            return sums
-        return [a if self._paired(a) else self._factor(arg) for a, arg in zip(sums, node.args, strict=True)]
-
-    def _paired(self, a: Sum) -> bool:
-        """Whether a sum has an atom that identities are about."""
-        return any([atom in self.squares or atom in self.angles for powers in a for atom, _ in powers])
+    def _ruled(self, a: Sum, square: Sum) -> Sum:
+        """The atom a, its square from now on as this sum."""
+        (((atom, _),),) = a
+        self.rules.setdefault(atom, (2, square))
+        return a
 
     def _factor(self, node: Node) -> Sum:
+        """The sum of a node where identities are about it; else one product."""
+        a = self._sums[node]
+        if len(a) <= 1 or any([atom in self.rules or atom in self.turns for powers in a for atom, _ in powers]):
+            return a
+        return self._one(node)
+
+    def _one(self, node: Node) -> Sum:
         """A node as a coefficient times a product; a sum is one atom, that of every multiple of it."""
         a = self._sums[node]
         if len(a) <= 1:
             return a
         leading = a[min(a)].value
-        atom = self._atom(("sum", key(scaled(a, 1.0 / leading))))
-        self.made.setdefault(atom, (None, (node,)))
+        atom = self._atom(("sum", key(scaled(a, 1.0 / leading))), None, (node,))
         factor = leading / self._leading.setdefault(atom, leading)
         return {((atom, 1),): Term(factor, abs(factor), node.label)}
 
     def _inverse(self, node: Node) -> Sum:
-        a = self._factor(node)
-        if not a:
-            raise TooLongError
-        ((powers, term),) = a.items()
-        inverse = 1.0 / term.value
-        if not math.isfinite(inverse):
-            raise TooLongError
-        return {tuple([(atom, -power) for atom, power in powers]): Term(inverse, abs(inverse), term.label)}
+        for powers, term in self._one(node).items():
+            if term.value and cmath.isfinite(inverse := 1.0 / term.value):
+                return {tuple([(atom, -power) for atom, power in powers]): Term(inverse, abs(inverse), term.label)}
+        raise TooLongError
 
     def _power(self, node: Node) -> Sum:
         base, power = node.args[0], int(node.args[1].value or 0.0)
-        a = self._inverse(base) if power < 0 else self._sums[base]
-        if len(a) > 1 and not self._paired(a):
-            a = self._factor(base)
+        a = self._inverse(base) if power < 0 else self._factor(base)
         result = number(1.0)
         for _ in range(abs(power)):
             result = self.product(result, a)
         return result
 
-    def _leaf(self, node: Node) -> Sum:
-        atom = self._atom(node)
-        self.made[atom] = (None, (node,))
-        return {((atom, 1),): Term(1.0, 1.0, node.label)}
-
-    def _function(self, op: Row, args: tuple[Node, ...], label: Label) -> Sum:
-        atom = self._atom((op.name, *[key(self._sums[arg]) for arg in args]))
-        self.made.setdefault(atom, (op, args))
-        return {((atom, 1),): Term(1.0, 1.0, label)}
-
-    def _root(self, node: Node) -> Sum:
-        result = self._function(node.op, node.args, node.label)
-        (((atom, _),),) = result
-        self.squares.setdefault(atom, self._sums[node.args[0]])
-        return result
-
-    def _hyperbolic(self, node: Node) -> Sum:
-        """cosh u or sinh u, with sinh^2 = cosh^2 - 1."""
-        sums = [self._function(OPS[name], node.args, node.label) for name in ("cosh", "sinh")]
-        (((atom, _),),) = sums[1]
-        self.squares.setdefault(atom, added(self.product(sums[0], sums[0]), number(1.0), -1.0))
-        return sums[node.op.name == "sinh"]
+    def _function(self, node: Node, op: Row | None = None) -> Sum:
+        """An operation, or a leaf, as an atom."""
+        op, leaf = op or node.op, not node.args
+        known = node if leaf else (op.name, *[key(self._sums[arg]) for arg in node.args])
+        atom = self._atom(known, None if leaf else op, (node,) if leaf else node.args)
+        return single(atom, node.label)
 
     def _expanded(self, argument: Sum) -> tuple[Sum, Sum]:
         """(cos u, sin u) of a sum u of multiples of base angles, by the addition theorems."""
         self.written.add(frozenset([(powers, abs(term.value)) for powers, term in argument.items()]))
-        cosine, sine = number(1.0), Sum()
+        turned = number(1.0), Sum()
         for powers, term in argument.items():
             size = abs(term.value)
-            self._units.setdefault(powers, set()).add(size)
-            unit = self._units_used[powers, size] = self._unit(powers, size)
-            c, s = self._multiple((powers, unit), round(size / unit), term.label)
-            if term.value < 0.0:
-                s = scaled(s, -1.0)
-            cosine, sine = self._turned((cosine, sine), (c, s))
-            if max(len(cosine), len(sine)) > MOST_TERMS:
+            unit = self._unit(powers, size)
+            cosine, sine = self._base((powers, unit), term.label)
+            if term.value.real < 0.0:
+                sine = scaled(sine, -1.0)
+            for _ in range(round(size / unit)):
+                turned = self._turned(turned, (cosine, sine))
+            if max(map(len, turned)) > MOST_TERMS:
                 raise TooLongError
-        return cosine, sine
+        return turned
 
     def _unit(self, powers: Powers, size: float) -> float:
-        """The smallest of the sizes that this one is a multiple of."""
-        for unit in sorted(self._units[powers]):
+        """The smallest known multiple of a product that this one is a multiple of."""
+        known = self._sizes.setdefault(powers, set())
+        self._multiples |= bool(known) and size not in known
+        known.add(size)
+        for unit in sorted(known):
             ratio = size / unit
-            if ratio <= MOST_MULTIPLE + 0.5 and abs(ratio - round(ratio)) <= ROUNDING * ratio:
+            if ratio <= MOST_MULTIPLE + 0.5 and abs(ratio - round(ratio)) <= COEFFICIENT_ROUNDING * ratio:
                 return unit
         return size
 
-    def _multiple(self, angle: Angle, count: int, label: Label) -> tuple[Sum, Sum]:
-        """(cos k a, sin k a) of a base angle a."""
-        cosine, sine = self.pairs.setdefault(angle, (self._atom(("cosine", angle)), self._atom(("sine", angle))))
-        self.angles |= {cosine: (angle, False), sine: (angle, True)}
-        one: tuple[Sum, Sum] = {((cosine, 1),): Term(1.0, 1.0, label)}, {((sine, 1),): Term(1.0, 1.0, label)}
-        self.squares.setdefault(sine, added(number(1.0), self.product(one[0], one[0]), -1.0))
-        turned = one
-        for _ in range(count - 1):
-            turned = self._turned(turned, one)
-        return turned
+    def _base(self, angle: Angle, label: Label) -> tuple[Sum, Sum]:
+        """(cos a, sin a) of a base angle a, with their rules."""
+        cos, sin = self.turning((angle,))
+        cosine, sine = (single(atom, label) for atom in (cos, sin))
+        if cos not in self.turns:
+            z = self._atoms.setdefault(("turn", angle), len(self._atoms))
+            self.angles[z] = angle
+            self._ruled(sine, added(number(1.0), scaled(multiplied(cosine, cosine), -1.0)))
+            self.turns[cos] = 1, {((z, 1),): Term(0.5, 0.5), ((z, -1),): Term(0.5, 0.5)}
+            self.turns[sin] = 1, {((z, 1),): Term(-0.5j, 0.5), ((z, -1),): Term(0.5j, 0.5)}
+        return cosine, sine
+
+    def turning(self, angles: tuple[Angle, ...]) -> tuple[int, int]:
+        """Atoms (cos u, sin u) of the sum u of angles."""
+        u = {powers: Term(size, abs(size)) for powers, size in angles}
+        return self._atom(("cos", angles), OPS["cos"], u), self._atom(("sin", angles), OPS["sin"], u)
 
     def _turned(self, a: tuple[Sum, Sum], b: tuple[Sum, Sum]) -> tuple[Sum, Sum]:
         """(cos, sin) of the sum of two angles, of theirs."""
         (cos_a, sin_a), (cos_b, sin_b) = a, b
-        cosine = added(self.product(cos_a, cos_b), self.product(sin_a, sin_b), -1.0)
-        return cosine, added(self.product(sin_a, cos_b), self.product(cos_a, sin_b), 1.0)
+        cosine = added(self.product(cos_a, cos_b), scaled(self.product(sin_a, sin_b), -1.0))
+        return cosine, added(self.product(sin_a, cos_b), self.product(cos_a, sin_b))
 
-    def _atom(self, what: object) -> int:
-        return self._atoms.setdefault(what, len(self._atoms))
+    def _atom(self, known: object, op: Row | None, args: tuple[Node, ...] | Sum) -> int:
+        atom = self._atoms.setdefault(known, len(self._atoms))
+        self.made.setdefault(atom, (op, args))
+        return atom
 
 
 def number(value: float, label: Label = UNLABELLED) -> Sum:
@@ -248,33 +216,73 @@ def number(value: float, label: Label = UNLABELLED) -> Sum:
     return {(): Term(value, abs(value), label)} if value else {}
 
 
-def added(a: Sum, b: Sum, sign: float) -> Sum:
-    """a + sign b."""
-    result = dict(a)
-    accumulate(result, scaled(b, sign))
-    return without_zeros(result)
+def single(atom: int, label: Label = UNLABELLED) -> Sum:
+    """The sum that is an atom."""
+    return {((atom, 1),): Term(1.0, 1.0, label)}
 
 
-def scaled(a: Sum, factor: float) -> Sum:
+def added(a: Sum, b: Sum) -> Sum:
+    """a + b."""
+    return without_zeros(collected([*a.items(), *b.items()]))
+
+
+def scaled(a: Sum, factor: complex) -> Sum:
     """factor a."""
     return {powers: Term(factor * x.value, abs(factor) * x.size, x.label) for powers, x in a.items()}
 
 
-def accumulate(total: Sum, more: Mapping[Powers, Term]) -> None:
-    """total += more; terms that cancel stay, with their size."""
-    for powers, term in more.items():
-        old = total.get(powers)
+def multiplied(a: Sum, b: Sum) -> Sum:
+    """a b, without any rule."""
+    return collected(
+        [
+            (joined(left, right), Term(x.value * y.value, x.size * y.size, x.label.with_tags_of(y.label)))
+            for left, x in a.items()
+            for right, y in b.items()
+        ]
+    )
+
+
+def replaced(a: Sum, rules: Rules) -> Sum:
+    """The sum with powers of atoms replaced by these rules, as long as one is left."""
+    while True:
+        left, terms = False, list[tuple[Powers, Term]]()
+        for powers, term in a.items():
+            atom = next((atom for atom, power in powers if atom in rules and power >= rules[atom][0]), None)
+            if atom is None:
+                terms.append((powers, term))
+            else:
+                left, (power, form) = True, rules[atom]
+                terms += multiplied({joined(powers, ((atom, -power),)): term}, form).items()
+        if not left:
+            return without_zeros(a)
+        a = collected(terms)
+
+
+def joined(left: Powers, right: Powers) -> Powers:
+    """The product of two products."""
+    powers = dict(left)
+    for atom, power in right:
+        powers[atom] = powers.get(atom, 0) + power
+    return tuple(sorted([(atom, power) for atom, power in powers.items() if power]))
+
+
+def collected(terms: Iterable[tuple[Powers, Term]]) -> Sum:
+    """The sum of terms; those that cancel stay, with their size."""
+    result: Sum = {}
+    for powers, term in terms:
+        old = result.get(powers)
         if old is not None:
             term = Term(old.value + term.value, old.size + term.size, old.label.union(term.label))
-        total[powers] = term
+        result[powers] = term
+    return result
 
 
 def without_zeros(a: Sum) -> Sum:
     """Without terms that are rounding alone."""
-    return {powers: term for powers, term in a.items() if abs(term.value) > ROUNDING * term.size}
+    return {powers: term for powers, term in a.items() if abs(term.value) > COEFFICIENT_ROUNDING * term.size}
 
 
-def key(a: Sum) -> Key:
+def key(a: Sum) -> frozenset[tuple[Powers, complex]]:
     """What two equal sums share."""
     return frozenset([(powers, term.value) for powers, term in a.items()])
 

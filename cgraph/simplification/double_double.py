@@ -1,7 +1,7 @@
 """Double-double: a graph whose arithmetic keeps twice the digits, by nodes for what rounding takes off.
 
 Every value is a pair hi + lo of numbers, lo at most about an ulp of hi: some 104 bits. The rules are the operations'
-own, in `core.op_double_double`; an operation without one takes the low parts of its arguments to first order.
+own, in `operations.double_double`; an operation without one takes the low parts of its arguments to first order.
 """
 
 from __future__ import annotations

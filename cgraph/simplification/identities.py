@@ -2,238 +2,30 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
 
 from ..core.builder import Builder
-from ..core.label import UNLABELLED, WRITTEN, Label
+from ..core.label import WRITTEN, Label
 from ..core.node import CONSTANT, Node, apply, constant
 from ..core.scope import building
 from ..core.traversal import topological
-from ..operations.operation import OPS
 from ..util.explain_failure import explain_failure
-from .canonical import ROUNDING, Angle, Canonical, Powers, Sum, Term, added, number
+from .canonical import COEFFICIENT_ROUNDING, Canonical, Powers, Sum, Term, added, number, replaced
 from .rounding_growth import as_accurate
 
-LONGEST = 250  # nodes; beyond, sums of products would be too long to be of use
+LARGEST_REWRITTEN = 250  # nodes; beyond, sums of products would be too long to be of use
+NEW_ANGLE = 3  # operations that the cosine or sine of an angle counts as, where none of it stands in the graph
 
-Factor = int | tuple[str, tuple[Angle, ...]]  # an atom, or the cosine or sine of a sum of angles
-Wave = tuple[tuple[Angle, int], ...]  # angles and how often they are added: exp(i sum k angle)
-
-
-class Product(NamedTuple):
-    """A coefficient times powers of factors."""
-
-    value: float
-    factors: dict[Factor, int]
-    label: Label
-
-
-def rewritten(nodes: Sequence[Node]) -> list[Node]:
-    """Nodes of the same values, written out as sums of products by identities, with common factors taken out.
-
-    sin^2 + cos^2 = 1, cosh^2 - sinh^2 = 1, the addition theorems, squares of roots, and all that cancels in a sum of
-    products are seen through; a node that is constant or zero by these comes out as a number. A node that would be too
-    long stays as a function of its arguments. The result can be longer than what it came from.
-    """
-    canonical = Canonical(nodes)
-    with building(Builder()) as set_label:
-        writer = _Writer(canonical, set_label)
-        return [writer.node(canonical[node]) for node in nodes]
-
-
-class _Writer:
-    def __init__(self, canonical: Canonical, set_label: Callable[[Label], None]) -> None:
-        self.canonical, self.set_label = canonical, set_label
-        self._nodes: dict[Factor, Node] = {}
-        self._expanded: dict[Powers, dict[Wave, complex]] = {}
-
-    def node(self, a: Sum) -> Node:
-        """The node of a sum."""
-        groups: dict[Powers, Sum] = {}
-        for powers, term in a.items():
-            plain = tuple([(atom, power) for atom, power in powers if atom not in self.canonical.angles])
-            turning = tuple([(atom, power) for atom, power in powers if atom in self.canonical.angles])
-            groups.setdefault(plain, {})[turning] = term
-        return self._sum(
-            [
-                product._replace(factors={**dict(plain), **product.factors})
-                for plain, turning in groups.items()
-                for product in self._shortest(turning)
-            ]
-        )
-
-    def _shortest(self, a: Sum) -> list[Product]:
-        """The shortest form of a polynomial in sines and cosines."""
-        best = self._flipped(a)
-        forms = [[Product(term.value, dict(powers), term.label) for powers, term in best.items()]]
-        if all(power > 0 for powers in a for _, power in powers):
-            forms.append(self._fourier(a))
-        return min(forms, key=self._cost)
-
-    def _cost(self, form: list[Product]) -> int:
-        new = {
-            factor
-            for product in form
-            for factor in product.factors
-            if isinstance(factor, tuple) and frozenset(factor[1]) not in self.canonical.written
-        }
-        return 3 * len(new) + sum([1 + sum(map(abs, product.factors.values())) for product in form])
-
-    def _flipped(self, a: Sum) -> Sum:
-        """With cos^2 = 1 - sin^2 at the angles where that is shorter."""
-        for cosine, sine in self.canonical.pairs.values():
-            square = added(number(1.0), {((sine, 2),): Term(1.0, 1.0, UNLABELLED)}, -1.0)
-            other = self.canonical.product(a, number(1.0), squares={cosine: square})
-            if _length(other) < _length(a):
-                a = other
-        return a
-
-    def _fourier(self, a: Sum) -> list[Product]:
-        """As a sum of sines and cosines of sums of angles."""
-        waves: dict[Wave, tuple[complex, float, Label]] = {}
-        for powers, term in a.items():
-            for wave, part in self._waves(powers).items():
-                value = term.value * part
-                old, size, label = waves.get(wave, (0j, 0.0, term.label))
-                waves[wave] = old + value, size + abs(value), label.union(term.label)
-        products = []
-        for wave, (value, size, label) in waves.items():
-            if wave and wave[0][1] < 0:
-                continue  # the conjugate of another
-            weight = 2.0 if wave else 1.0
-            angles = tuple([((powers, abs(k) * unit), k < 0) for (powers, unit), k in wave])
-            for function, part in (("cos", value.real), ("sin", -value.imag)):
-                if abs(part) > ROUNDING * size:
-                    factors: dict[Factor, int] = {(function, _signed(angles)): 1} if wave else {}
-                    products.append(Product(weight * part, factors, label))
-        return products
-
-    def _waves(self, powers: Powers) -> dict[Wave, complex]:
-        """A product of sines and cosines as a sum of exp(i wave)."""
-        if powers not in self._expanded:
-            parts: dict[Wave, complex] = {(): 1.0 + 0.0j}
-            for atom, power in powers:
-                angle, sine = self.canonical.angles[atom]
-                for _ in range(power):
-                    turned: dict[Wave, complex] = {}
-                    for wave, value in parts.items():
-                        for sign in (1, -1):
-                            shifted = dict(wave)
-                            shifted[angle] = shifted.get(angle, 0) + sign
-                            name = tuple(sorted([(each, k) for each, k in shifted.items() if k]))
-                            turned[name] = turned.get(name, 0.0) + value * (-0.5j * sign if sine else 0.5)
-                    parts = turned
-            self._expanded[powers] = parts
-        return self._expanded[powers]
-
-    def _sum(self, products: list[Product]) -> Node:
-        """Products added up, the factor that most of them share taken out first."""
-        if not products:
-            return constant(0.0)
-        if len(products) == 1:
-            return self._product(products[0])
-        uses: Counter[tuple[Factor, int]] = Counter()
-        sizes: Counter[float] = Counter()
-        for product in products:
-            uses.update([(factor, 1 if power > 0 else -1) for factor, power in product.factors.items()])
-            sizes[abs(product.value)] += 1
-        factor, shared = max(uses.items(), key=lambda item: item[1], default=((0, 1), 0))
-        size, alike = max(sizes.items(), key=lambda item: (item[0] != 1.0) * item[1])
-        if shared >= 2 and shared >= (alike if size != 1.0 else 0):
-            name, sign = factor
-            inside = [product for product in products if product.factors.get(name, 0) * sign > 0]
-            outside = [product for product in products if product.factors.get(name, 0) * sign <= 0]
-            rest = [product._replace(factors=_divided(product.factors, name, sign)) for product in inside]
-            return self._total(self._times(self._sum(rest), name, sign), outside)
-        if alike >= 2 and size != 1.0:
-            inside = [product for product in products if abs(product.value) == size]
-            outside = [product for product in products if abs(product.value) != size]
-            rest = [product._replace(value=math.copysign(1.0, product.value)) for product in inside]
-            return self._total(size * self._sum(rest), outside)
-        positive = [product for product in products if product.value > 0.0]
-        negative = [product._replace(value=-product.value) for product in products if product.value < 0.0]
-        total = None
-        for product in positive:
-            node = self._product(product)
-            total = node if total is None else self._untagged(total) + node
-        for product in negative:
-            node = self._product(product)
-            total = -node if total is None else self._untagged(total) - node
-        assert total is not None
-        return total
-
-    def _total(self, node: Node, others: list[Product]) -> Node:
-        if not others:
-            return node
-        rest = self._untagged(self._sum(others))
-        if rest.op.name == "neg":
-            return node - rest.args[0]
-        return rest - node.args[0] if node.op.name == "neg" else node + rest
-
-    def _untagged(self, node: Node) -> Node:
-        """The node as it is, those to come with the tags of their arguments."""
-        self.set_label(WRITTEN)
-        return node
-
-    def _times(self, node: Node, factor: Factor, sign: int) -> Node:
-        self.set_label(WRITTEN)
-        if node.op.name == "neg":
-            return -self._times(node.args[0], factor, sign)
-        return self._factor(factor) * node if sign > 0 else node / self._factor(factor)
-
-    def _product(self, product: Product) -> Node:
-        above = {factor: power for factor, power in product.factors.items() if power > 0}
-        below = [factor for factor, power in product.factors.items() for _ in range(-power)]
-        self.set_label(WRITTEN.with_tags_of(product.label))
-        value, node = abs(product.value), self._powers(above)
-        node = constant(value) if node is None else node if value == 1.0 else value * node
-        for factor in below:
-            node = node / self._factor(factor)
-        return -node if product.value < 0.0 else node
-
-    def _powers(self, powers: Mapping[Factor, int]) -> Node | None:
-        """The product of powers, squares as squares of a product."""
-        half = (
-            self._powers({factor: power // 2 for factor, power in powers.items() if power > 1})
-            if any([power > 1 for power in powers.values()])
-            else None
-        )
-        node = None if half is None else half * half
-        for factor, power in powers.items():
-            if power % 2:
-                node = self._factor(factor) if node is None else node * self._factor(factor)
-        return node
-
-    def _factor(self, factor: Factor) -> Node:
-        if factor not in self._nodes:
-            self._nodes[factor] = self._made(factor)
-        return self._nodes[factor]
-
-    def _made(self, factor: Factor) -> Node:
-        if isinstance(factor, tuple):
-            name, angles = factor
-            return apply(OPS[name], self.node(_argument(angles)))
-        if factor in self.canonical.angles:
-            angle, sine = self.canonical.angles[factor]
-            return apply(OPS["sin" if sine else "cos"], self.node(_argument((angle,))))
-        op, args = self.canonical.made[factor]
-        nodes = [self._argument(arg) if arg.args else arg for arg in args]
-        return nodes[0] if op is None else apply(op, *nodes)
-
-    def _argument(self, node: Node) -> Node:
-        """An argument, as it stands unless it depends on less when it is written anew: sums may lose digits."""
-        new = self.node(self.canonical[node])
-        return new if leaves([new]) < leaves([node]) else node
+Product = tuple[Powers, Term]
 
 
 @explain_failure
-def shortened(nodes: Sequence[Node]) -> list[Node]:
+def shortened(nodes: Sequence[Node], below: int | None = None) -> list[Node]:
     """Nodes of the same values: written anew by identities where that is shorter and as accurate, else as they are.
 
     Together where that takes fewer nodes; else, of some, those that then depend on fewer variables.
+    below: of how many nodes a result has to be less; nodes stay where it is not.
 
     >>> import cgraph as cg
     >>> from cgraph.extend import shortened
@@ -242,33 +34,163 @@ def shortened(nodes: Sequence[Node]) -> list[Node]:
     [<node cos>, <node mul>]
     """
     old = list(nodes)
-    if len(topological(old)) > LONGEST:
+    if len(topological(old)) > LARGEST_REWRITTEN:
         return old
     new = rewritten(old)
-    usable = [as_accurate(before, after) for before, after in zip(old, new, strict=True)]
-    if all(usable) and len(topological(new)) < len(topological(old)):
+    pairs = list(zip(old, new, strict=True))
+    if below is not None and len(topological(new)) >= below:
+        return old
+    if len(topological(new)) < len(topological(old)) and all(as_accurate(before, after) for before, after in pairs):
         return new
     return [
-        after if fine and leaves([after]) < leaves([before]) else before
-        for before, after, fine in zip(old, new, usable, strict=True)
+        after if leaves([after]) < leaves([before]) and as_accurate(before, after) else before
+        for before, after in pairs
     ]
+
+
+def rewritten(nodes: Sequence[Node]) -> list[Node]:
+    """Nodes of the same values, written out as sums of products by identities, with common factors taken out.
+
+    A node that is constant or zero by the rules of `canonical` comes out as a number. A node that would be too long
+    stays as a function of its arguments. The result can be longer than what it came from.
+    """
+    canonical = Canonical(nodes)
+    with building(Builder()) as set_label:
+        writer = _Writer(canonical, set_label)
+        return [writer.node(canonical[node]) for node in nodes]
+
+
+class _Writer:
+    """The nodes of canonical sums."""
+
+    def __init__(self, canonical: Canonical, set_label: Callable[[Label], None]) -> None:
+        self.canonical, self.set_label = canonical, set_label
+        self._nodes: dict[int, Node] = {}
+
+    def node(self, a: Sum) -> Node:
+        """The node of a sum."""
+        groups: dict[Powers, Sum] = {}
+        for powers, term in a.items():
+            plain = tuple([each for each in powers if each[0] not in self.canonical.turns])
+            turning = tuple([each for each in powers if each[0] in self.canonical.turns])
+            groups.setdefault(plain, {})[turning] = term
+        return self._sum(
+            [
+                (plain + turning, term)
+                for plain, part in groups.items()
+                for turning, term in self._shortest(part).items()
+            ]
+        )
+
+    def _shortest(self, a: Sum) -> Sum:
+        """The shortest form of a polynomial in sines and cosines: with cos^2 or sin^2, or of sums of angles."""
+        best = a
+        for angle in self.canonical.angles.values():  # cos^2 = 1 - sin^2 where that is shorter
+            cosine, sine = self.canonical.turning((angle,))
+            square = added(number(1.0), {((sine, 2),): Term(-1.0, 1.0)})
+            best = min(best, replaced(best, {cosine: (2, square)}), key=_length)
+        waves = self._fourier(a)
+        arguments = [self.canonical.made[atom][1] for powers in waves for atom, _ in powers]
+        angles = {frozenset([(powers, x.value) for powers, x in u.items()]) for u in arguments if isinstance(u, dict)}
+        return waves if _length(waves) + NEW_ANGLE * len(angles - self.canonical.written) < _length(best) else best
+
+    def _fourier(self, a: Sum) -> Sum:
+        """As a sum of sines and cosines of sums of angles; with negative powers as it is."""
+        if any([power < 0 for powers in a for _, power in powers]):
+            return a
+        result: Sum = {}
+        for wave, term in replaced(a, self.canonical.turns).items():  # of exp(i sum k angle)
+            angles = sorted([(self.canonical.angles[z], k) for z, k in wave])
+            if not angles:
+                result[()] = term._replace(value=term.value.real)
+            elif angles[0][1] > 0:  # the others are their conjugates
+                atoms = self.canonical.turning(tuple([(powers, k * unit) for (powers, unit), k in angles]))
+                for atom, part in zip(atoms, (term.value.real, -term.value.imag), strict=True):
+                    if abs(part) > COEFFICIENT_ROUNDING * term.size:
+                        result[((atom, 1),)] = Term(2.0 * part, term.size, term.label)
+        return result
+
+    def _sum(self, products: list[Product]) -> Node:
+        """Products added up, the factor or number that most of them share taken out first."""
+        uses: Counter[tuple[float, int]] = Counter()
+        for powers, _ in products:
+            uses.update([(atom, 1 if power > 0 else -1) for atom, power in powers])
+        uses.update([(size, 0) for _, term in products if (size := abs(term.value)) != 1.0])
+        (shared, sign), count = max(uses.items(), key=lambda item: item[1], default=((1.0, 0), 0))
+        if count < 2:
+            total = None
+            for powers, term in sorted(products, key=lambda product: product[1].value.real < 0.0):
+                node, negative = self._product(powers, term), term.value.real < 0.0
+                if total is None:
+                    total = -node if negative else node
+                else:
+                    self.set_label(WRITTEN)  # those to come have the tags of their arguments
+                    total = total - node if negative else total + node
+            return constant(0.0) if total is None else total
+        inside, outside = [], []
+        for powers, term in products:
+            if sign == 0 and abs(term.value) == shared:
+                inside.append((powers, term._replace(value=term.value / shared)))
+            elif dict(powers).get(int(shared), 0) * sign > 0:
+                left = [(atom, power - sign * (atom == shared)) for atom, power in powers]
+                inside.append((tuple([each for each in left if each[1]]), term))
+            else:
+                outside.append((powers, term))
+        node = self._times(self._sum(inside), shared, sign)
+        return self._added(node, self._sum(outside)) if outside else node
+
+    def _added(self, a: Node, b: Node) -> Node:
+        """a + b, of a negative one the difference."""
+        self.set_label(WRITTEN)
+        if b.op.name == "neg":
+            return a - b.args[0]
+        return b - a.args[0] if a.op.name == "neg" else a + b
+
+    def _times(self, node: Node, factor: float, sign: int) -> Node:
+        """The node times a number, where the sign is 0, else times or over an atom."""
+        self.set_label(WRITTEN)
+        if sign == 0:
+            return factor * node
+        if node.op.name == "neg":
+            return -self._times(node.args[0], factor, sign)
+        return self._factor(int(factor)) * node if sign > 0 else node / self._factor(int(factor))
+
+    def _product(self, powers: Powers, term: Term) -> Node:
+        """A product without its sign."""
+        self.set_label(WRITTEN.with_tags_of(term.label))
+        value, node = abs(term.value), self._powers([each for each in powers if each[1] > 0])
+        node = constant(value) if node is None else node if value == 1.0 else value * node
+        for atom, power in powers:
+            for _ in range(-power):
+                node = node / self._factor(atom)
+        return node
+
+    def _powers(self, powers: Powers | list[tuple[int, int]]) -> Node | None:
+        """The product of powers, squares as squares of a product."""
+        squares = [(atom, power // 2) for atom, power in powers if power > 1]
+        half = self._powers(squares) if squares else None
+        node = None if half is None else half * half
+        for atom, power in powers:
+            if power % 2:
+                node = self._factor(atom) if node is None else node * self._factor(atom)
+        return node
+
+    def _factor(self, atom: int) -> Node:
+        if atom not in self._nodes:
+            op, args = self.canonical.made[atom]
+            nodes = [self.node(args)] if isinstance(args, dict) else [self._argument(arg) for arg in args]
+            self._nodes[atom] = nodes[0] if op is None else apply(op, *nodes)
+        return self._nodes[atom]
+
+    def _argument(self, node: Node) -> Node:
+        """An argument, as it stands unless it depends on less when it is written anew: sums may lose digits."""
+        new = self.node(self.canonical[node]) if node.args else node
+        return new if leaves([new]) < leaves([node]) else node
 
 
 def leaves(nodes: Sequence[Node]) -> set[Node]:
     """The variables that nodes depend on."""
     return {node for node in topological(nodes) if not node.args and node.op is not CONSTANT}
-
-
-def _argument(angles: Sequence[Angle]) -> Sum:
-    return {powers: Term(size, abs(size), UNLABELLED) for powers, size in angles}
-
-
-def _signed(angles: Sequence[tuple[Angle, bool]]) -> tuple[Angle, ...]:
-    return tuple([(powers, -size if negative else size) for (powers, size), negative in angles])
-
-
-def _divided(factors: dict[Factor, int], factor: Factor, sign: int) -> dict[Factor, int]:
-    return {each: power for each, power in {**factors, factor: factors[factor] - sign}.items() if power}
 
 
 def _length(a: Sum) -> int:

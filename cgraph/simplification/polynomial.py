@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import reduce
 
 from ..core.checks import GraphError
 from ..core.node import CONSTANT, Node
 from ..core.traversal import topological
 from ..util.explain_failure import explain_failure
+from .canonical import Sum, added, multiplied, number, scaled, single, without_zeros
 
 Monomial = tuple[tuple[str, int], ...]  # (name, power), sorted by name
 Polynomial = dict[Monomial, float]  # coefficients; terms that cancel are gone
@@ -26,19 +28,17 @@ def expand(node: Node, atoms: Mapping[Node, str] | None = None) -> Polynomial:
     >>> expand((a - b) * (a + b))
     {(('a', 2),): 1.0, (('b', 2),): -1.0}
     """
-    atoms = atoms or {}
-    value: dict[Node, Polynomial] = {}
-    for inner in topological([node]):
-        if inner in atoms:
-            value[inner] = {((atoms[inner], 1),): 1.0}
-        elif inner.op is CONSTANT:
-            assert inner.value is not None
-            value[inner] = {(): inner.value} if inner.value else {}
-        elif not inner.args:
-            value[inner] = {((str(inner.name), 1),): 1.0}
-        else:
-            value[inner] = _operation(inner, [value[arg] for arg in inner.args])
-    return value[node]
+    order, atoms = topological([node]), atoms or {}
+    symbols = {inner: atoms.get(inner, inner.name) for inner in order if inner in atoms or not inner.args}
+    names = sorted({name for name in symbols.values() if name})
+    sums: dict[Node, Sum] = {}
+    for inner in order:
+        name = symbols.get(inner)
+        sums[inner] = single(names.index(name)) if name else _operation(inner, [sums[arg] for arg in inner.args])
+    return {
+        tuple([(names[atom], power) for atom, power in powers]): term.value.real
+        for powers, term in without_zeros(sums[node]).items()
+    }
 
 
 @explain_failure
@@ -62,39 +62,18 @@ def format_polynomial(terms: Polynomial) -> str:
     return text or "0"
 
 
-def _operation(node: Node, args: list[Polynomial]) -> Polynomial:
+def _operation(node: Node, args: list[Sum]) -> Sum:
+    if node.op is CONSTANT:
+        return number(node.value or 0.0)
     match node.op.name:
         case "add":
-            return _sum(args[0], args[1], 1.0)
+            return added(*args)
         case "sub":
-            return _sum(args[0], args[1], -1.0)
+            return added(args[0], scaled(args[1], -1.0))
         case "neg":
-            return {monomial: -c for monomial, c in args[0].items()}
+            return scaled(args[0], -1.0)
         case "mul":
-            return _product(*args)
+            return multiplied(*args)
         case "pow" if (power := node.args[1].value) is not None and power >= 0 and power == int(power):
-            result: Polynomial = {(): 1.0}
-            for _ in range(int(power)):
-                result = _product(result, args[0])
-            return result
+            return reduce(multiplied, [args[0]] * int(power), number(1.0))
     raise GraphError(f"only sums, products and whole powers can be expanded, got {node.op.name}")
-
-
-def _sum(a: Polynomial, b: Polynomial, sign: float) -> Polynomial:
-    result = dict(a)
-    for monomial, coefficient in b.items():
-        total = result.pop(monomial, 0.0) + sign * coefficient
-        if total:
-            result[monomial] = total
-    return result
-
-
-def _product(a: Polynomial, b: Polynomial) -> Polynomial:
-    result: Polynomial = {}
-    for left, x in a.items():
-        for right, y in b.items():
-            powers = dict(left)
-            for name, power in right:
-                powers[name] = powers.get(name, 0) + power
-            result = _sum(result, {tuple(sorted(powers.items())): x * y}, 1.0)
-    return result

@@ -13,8 +13,8 @@ from ..core.traversal import topological
 from ..operations.operation import OPS, columns
 from ..util.require import require_graph, require_mapping
 
-UNIT = 2.0**-30  # in place of 2^-53: errors that double precision can show
-MORE = 8.0  # times the error, that another form may have
+ERROR_UNIT = 2.0**-30  # in place of 2^-53: errors that double precision can show
+MORE_ERROR = 8.0  # times the error, that another form may have
 
 
 def as_accurate(old: Node, new: Node) -> bool:
@@ -28,7 +28,7 @@ def as_accurate(old: Node, new: Node) -> bool:
     value, before, after = values[old], errors[old], others[new]
     with np.errstate(all="ignore"):
         usable = np.isfinite(value) & np.isfinite(before)
-        worse = ~(after <= MORE * np.maximum(before, UNIT * np.abs(value)))  # what is not finite is worse
+        worse = ~(after <= MORE_ERROR * np.maximum(before, ERROR_UNIT * np.abs(value)))  # what is not finite is worse
     return not np.any(usable & worse)
 
 
@@ -41,7 +41,7 @@ def _points(count: int) -> Array:
 
 
 def error_bounds(
-    nodes: Sequence[Node], values: Mapping[str, Value], unit: float = UNIT, of_inputs: float = 0.0
+    nodes: Sequence[Node], values: Mapping[str, Value], unit: float = ERROR_UNIT, of_inputs: float = 0.0
 ) -> tuple[dict[Node, Value], dict[Node, Value]]:
     """Values of nodes, arguments first, and bounds of their errors to first order, with roundings to a part of `unit`.
 
@@ -84,7 +84,7 @@ def rounding_spread(graph: Graph, values: Mapping[str, float], sizes: Mapping[st
     require_mapping("values", values, "name: number")
     known_sizes = {} if sizes is None else require_mapping("sizes", sizes, "name: number")
     rng = np.random.default_rng(0)
-    factors = 1.0 + UNIT * rng.choice([-1.0, 1.0], size=(_SIGNS, 2 * _POINTS))
+    factors = 1.0 + ERROR_UNIT * rng.choice([-1.0, 1.0], size=(_SIGNS, 2 * _POINTS))
     factors[:, :_POINTS] = 1.0
     samples: dict[str, Value] = {
         name: known_sizes.get(name, 1.0) * np.tile(rng.normal(size=_POINTS), 2) for name in graph.input_names
@@ -104,4 +104,4 @@ def rounding_spread(graph: Graph, values: Mapping[str, float], sizes: Mapping[st
         exact, moved = found[:, :_POINTS], found[:, _POINTS:]
         spread = np.abs(moved - exact).max(axis=0) / np.abs(exact).max(axis=0)
     usable = spread[np.isfinite(spread)]
-    return float(usable.mean()) / UNIT if len(usable) else np.inf
+    return float(usable.mean()) / ERROR_UNIT if len(usable) else np.inf

@@ -108,7 +108,7 @@ def require_texts(what: str, value: object) -> Mapping[str, str]:
     Traceback (most recent call last):
     TypeError: names must be a mapping {name: text}, got int for 'q0': 1
     """
-    texts: Mapping[str, str] = {} if value is None else require_mapping(what, value, "name: text")
+    texts: Mapping[str, Any] = {} if value is None else require_mapping(what, value, "name: text")
     for name, text in texts.items():
         if not isinstance(text, str):
             given = f"{type(text).__name__} for {name!r:.60}: {text!r:.60}"

@@ -1,15 +1,29 @@
-"""Formulas of nodes and graphs as LaTeX."""
+"""LaTeX: formulas of nodes and graphs; an operation's formula is its row's MathML, told in other words."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from xml.etree import ElementTree
 
 from ..core.node import Node
 from ..core.traversal import topological
-from .formulas import LINES, Formulas, Lines, Notation
-from .latex_texts import literal, name_texts, number_text, operation_text
+from ..operations.operation import FUNCTION, LEAF, PRODUCT, SUM, Op
+from ..util.caches import OPERATIONS, memo
+from .formulas import LINES, Formulas, Lines, Notation, Text
 
-LATEX = Notation(name_texts, number_text, operation_text, "v_{{{}}}".format)
+_GREEK = frozenset(
+    "alpha beta gamma delta epsilon zeta eta theta kappa lambda mu nu xi pi rho sigma tau phi chi psi omega".split()
+)
+_RATES = {"qd": r"\dot{q}", "qdd": r"\ddot{q}"}  # as the graphs of mechanics call the rates of a coordinate q
+_ENDINGS = {"dot": r"\dot{{{}}}", "bar": r"\bar{{{}}}"}  # of a tangent and of a cotangent
+_SIGNS = {"·": r"\cdot", "−": "-", "≤": r"\leq", "≠": r"\neq", "⌊": r"\lfloor", "⌋": r"\rfloor",
+          "⌈": r"\lceil", "⌉": r"\rceil"}  # fmt: skip
+_FUNCTIONS = {name: f"\\{name}" for name in "sin cos tan sinh cosh tanh exp".split()}
+_FUNCTIONS |= {"log": r"\ln", "asin": r"\arcsin", "acos": r"\arccos", "atan": r"\arctan"}
+_FUNCTIONS |= {"minimum": r"\min", "maximum": r"\max"}
+_KNOWN = ("log", "min", "max")  # functions of LaTeX that rows name
+_SPECIAL = {"\\": r"\backslash ", "^": r"\hat{}", "~": r"\sim "} | {sign: f"\\{sign}" for sign in "#$%&_{}"}
 
 
 def latex(node: Node, *, names: Mapping[str, str] | None = None, lines: int = LINES) -> str:
@@ -44,8 +58,10 @@ def latex(node: Node, *, names: Mapping[str, str] | None = None, lines: int = LI
     0.5 \, m \, {v}^{2}
     """
     if not isinstance(node, Node):
-        hint = "; of a graph, graph.latex()" if hasattr(node, "latex") else ""
-        raise TypeError(f"latex needs a node, got {type(node).__name__}: {node!r:.60}{hint}")
+        raise TypeError(
+            f"latex needs a node, got {type(node).__name__}: {node!r:.60}"
+            f"{'; of a graph, graph.latex()' if hasattr(node, 'latex') else ''}"
+        )
     found = Formulas(topological([node]), {}, LATEX, names).lines([node], lines)
     return found.equations[0][1] if len(found.equations) == 1 and not found.left_out else _block(found)
 
@@ -62,3 +78,107 @@ def _block(lines: Lines) -> str:
         total = len(lines.left_out) + len(lines.equations)
         rows.append(f"& {literal(f'left out: {len(lines.left_out)} of {total} lines, of ')}{few}")
     return "\\begin{aligned}\n" + " \\\\\n".join(rows) + "\n\\end{aligned}"
+
+
+def literal(text: str) -> str:
+    """Any text as one upright word."""
+    return rf"\mathrm{{{''.join([_SPECIAL.get(sign, sign) for sign in text]).replace(' ', '~')}}}"
+
+
+def name_texts(names: Iterable[str]) -> dict[str, str]:
+    """Names in LaTeX, {name: text}; two that would look the same are written as they are."""
+    texts = {name: _name(name) for name in names}
+    seen: dict[str, int] = {}
+    for text in texts.values():
+        seen[text] = seen.get(text, 0) + 1
+    return {name: text if seen[text] == 1 else literal(name) for name, text in texts.items()}
+
+
+def _name(name: str) -> str:
+    r"""q0 is q_{0}, qd.knee is \dot{q}_{knee}, M_0_1 is M_{0,1}, and p0_dot is \dot{p}_{0}."""
+    kind, dot, called = name.partition(".")
+    if dot and re.fullmatch(r"[A-Za-z]+(_[A-Za-z]+)*", kind) and called:
+        text, index = _name(kind), called if len(called) == 1 or called.isdigit() else literal(called)
+        return f"{text[:-1]},{index}}}" if "_{" in text else f"{text}_{{{index}}}"
+    match = re.fullmatch(r"([A-Za-z]+)(\d*)((?:_[A-Za-z0-9]+)*)", name)
+    if match is None:
+        return literal(name)
+    word, digits, rest = match.groups()
+    text = word if len(word) == 1 else _RATES.get(word) or (f"\\{word}" if word in _GREEK else literal(word))
+    below = [digits] if digits else []
+    for part in re.findall(r"[A-Za-z0-9]+", rest):
+        if part in _ENDINGS:
+            text = _ENDINGS[part].format(text)
+        else:
+            below.append(part if part.isdigit() or len(part) == 1 else literal(part))
+    return f"{text}_{{{','.join(below)}}}" if below else text
+
+
+def number_text(value: float) -> Text:
+    """A number with all its digits."""
+    digits, _, power = f"{value!r}".removesuffix(".0").partition("e")
+    if digits.lstrip("-") in ("inf", "nan"):
+        return digits.replace("inf", r"\infty ").replace("nan", r"\mathrm{nan}"), LEAF if value > 0 else SUM
+    text = rf"{digits} \cdot 10^{{{int(power)}}}" if power else digits
+    return text, SUM if value < 0.0 else PRODUCT if power else LEAF
+
+
+def operation_text(op: Op, args: Sequence[Text]) -> Text:
+    """An operation on arguments, those that bind less than their places ask for in parentheses."""
+    if op.mathml is None:
+        function = _FUNCTIONS.get(op.name) or rf"\operatorname{{{op.name.replace('_', chr(92) + '_')}}}"
+        return f"{function}{_fenced(', '.join([text for text, _ in args]))}", FUNCTION
+    inside = [
+        _fenced(text) if binds < least else text for (text, binds), least in zip(args, op.mathml.least, strict=True)
+    ]
+    text = _template(op)(inside)
+    return re.sub(r"\\cdot (?=[^0-9\-.])", r"\\, ", text), op.mathml.binding
+
+
+def _fenced(text: str) -> str:
+    return rf"\left({text}\right)"
+
+
+@memo(OPERATIONS)
+def _template(op: Op) -> Callable[[Sequence[str]], str]:
+    """The function that puts arguments into an operation's formula."""
+    mathml = "" if op.mathml is None else op.mathml.text
+    try:
+        root = ElementTree.fromstring(f"<mrow>{mathml}</mrow>")  # noqa: S314 (the table's own text)
+    except ElementTree.ParseError as error:
+        raise ValueError(f"the MathML {mathml!r} of an operation is not well formed: {error}") from None
+    text = re.sub(r"@(\d)@", r"{\1}", _element(root).replace("{", "{{").replace("}", "}}"))
+    return lambda args: text.format(*args).strip()
+
+
+def _element(element: ElementTree.Element) -> str:
+    """The LaTeX of an element, an argument's place written @0@."""
+    inside = element.text or ""
+    parts = [part for child in element for part in (_element(child), _places(child.tail)) if part]
+    if element.tag in ("msup", "msub", "mfrac", "mroot"):  # two parts, one of which may be text between elements
+        parts = [part for part in (*re.findall(r"@\d@", _places(inside)), *parts) if part]
+        parts = [each for part in parts for each in (re.findall(r"@\d@", part) if part.startswith("@") else [part])]
+        first, second = parts
+        forms: Mapping[str, str] = {
+            "msup": f"{{{first}}}^{{{second}}}",
+            "msub": f"{first}_{{{second}}}",
+            "mfrac": rf"\frac{{{first}}}{{{second}}}",
+            "mroot": rf"\sqrt[{second}]{{{first}}}",
+        }
+        return forms[element.tag]
+    text = _places(inside) + "".join(parts)
+    if element.tag == "msqrt":
+        return rf"\sqrt{{{text}}}"
+    if element.tag == "mo":
+        sign = _SIGNS.get(inside, inside)
+        return sign if inside in "()|" else f" {sign} "
+    if element.tag == "mi" and len(inside) > 1:
+        return rf"\{inside}" if inside in _KNOWN else literal(inside)
+    return text
+
+
+def _places(text: str | None) -> str:
+    return re.sub(r"{(\d)}", r"@\1@", text or "")
+
+
+LATEX = Notation(name_texts, number_text, operation_text, "v_{{{}}}".format)

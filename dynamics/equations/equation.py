@@ -147,15 +147,16 @@ def shortened(system: System, derive: Callable[[System], Graph], *, mirrored: bo
 
     mirrored: whether outputs are the same up to their sign, which to be to the last bit they must not be written anew.
     """
-    graph = derive(system)
     if system.body_terms is not None:  # they write their energy as short as it is
-        return graph
-    if system.shortened is not None:
-        graph = min(graph, derive(system.shortened), key=_size)
-    if mirrored or len(graph.nodes) > LARGEST_REWRITTEN:
-        return graph
-    outputs = dict(zip(graph.outputs, extend.shortened(list(graph.outputs.values())), strict=True))
-    return min(graph, cg.simplify(Graph(graph.inputs, outputs)), key=_size)
+        return derive(system)
+    graphs = sorted([derive(form) for form in (system, system.shortened) if form is not None], key=_size)
+    best = graphs[0]
+    for graph in graphs:
+        if not mirrored and len(graph.nodes) <= LARGEST_REWRITTEN:
+            below = None if graph is graphs[0] else len(best.nodes)
+            outputs = dict(zip(graph.outputs, extend.shortened(list(graph.outputs.values()), below), strict=True))
+            best = min(best, cg.simplify(Graph(graph.inputs, outputs)), key=_size)
+    return best
 
 
 def _size(graph: Graph) -> int:

@@ -8,7 +8,6 @@ import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from numbers import Integral
 from pathlib import Path
 from typing import Any
 
@@ -143,7 +142,7 @@ MOST_LINKS = 100_000  # of a chain; its equations take some kilobytes a link
 
 def chain(n: int = 10) -> Scene:
     """A chain of n equal rods, 1 kg and 1 m in all, let go at 45 degrees."""
-    if not isinstance(n, Integral) or n < 1:
+    if not isinstance(n, (int, np.integer)) or n < 1:
         raise ValueError(f"a chain needs at least one link, got {n!r:.60}")
     if n > MOST_LINKS:
         raise ValueError(f"a chain of {n} links is more than can be derived here, {MOST_LINKS}; see `planar_arm`")

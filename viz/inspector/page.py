@@ -144,11 +144,9 @@ def _versions(graph: Graph | Sequence[Version], about: str, marked: frozenset[No
     """The versions to switch among, checked; a graph alone is one."""
     if isinstance(graph, Graph):
         return [Version("graph", graph, about, marked)]
-    if (
-        isinstance(graph, str)
-        or not isinstance(graph, Sequence)
-        or not all(isinstance(each, Version) for each in graph)
-    ):
+    given: object = graph
+    listed = isinstance(given, Sequence) and not isinstance(given, str)
+    if not listed or not all(isinstance(each, Version) for each in graph):
         require_graph("page", graph)
     if marked:
         raise ValueError("with versions, give each its own marked nodes")

@@ -8,7 +8,7 @@ import re
 import unicodedata
 from collections.abc import Sequence
 
-LONGEST = 63  # characters of a name that every C compiler looks at
+LONGEST_NAME = 63  # characters of a name that every C compiler looks at
 _C = """auto break case char const continue default do double else enum extern float for goto if inline int long
     register restrict return short signed sizeof static struct switch typedef union unsigned void volatile while
     alignas alignof bool constexpr false nullptr static_assert thread_local true typeof typeof_unqual asm main"""
@@ -16,15 +16,12 @@ _CPP = """and and_eq bitand bitor catch char8_t char16_t char32_t class co_await
     const_cast consteval constinit decltype delete dynamic_cast explicit export friend mutable namespace new noexcept
     not not_eq operator or or_eq private protected public reinterpret_cast requires static_cast template this throw
     try typeid typename using virtual wchar_t xor xor_eq"""
-_MATH = """acos asin atan atan2 cos sin tan acosh asinh atanh cosh sinh tanh exp exp2 expm1 frexp ilogb ldexp log log10
-    log1p log2 logb modf scalbn scalbln cbrt fabs hypot pow sqrt erf erfc lgamma tgamma ceil floor nearbyint rint
-    lrint llrint round lround llround trunc fmod remainder remquo copysign nan nextafter nexttoward fdim fmax fmin
-    fma fpclassify isfinite isinf isnan isnormal signbit isgreater isgreaterequal isless islessequal islessgreater
-    isunordered j0 j1 jn y0 y1 yn gamma"""  # the last line: beside the standard, on many systems
 _HEADERS = """assert complex ctype errno fenv inttypes iso646 limits locale math setjmp signal stdarg stdbool stddef
     stdint stdio stdlib string tgmath time wchar wctype"""
-_MACROS = re.compile(r"[A-Z0-9_]+|\w+_t|(atomic|va)_\w*|(PRI|SCN)\w*")  # and types
-_TAKEN = frozenset(f"{_C} {_CPP} {_MATH} {_HEADERS}".split())
+_MACROS = re.compile(  # and types
+    r"[A-Z0-9_]+|\w+_t|(atomic|va)_\w*|(PRI|SCN)\w*|is(finite|normal|unordered|less|greater)\w*|fpclassify|signbit"
+)
+_TAKEN = frozenset(f"{_C} {_CPP} {_HEADERS}".split())
 
 
 def check_function_name(name: str) -> None:
@@ -33,15 +30,15 @@ def check_function_name(name: str) -> None:
         raise TypeError(f"the name of a C function must be a string, got {type(name).__name__}: {name!r:.60}")
     if not re.fullmatch("[A-Za-z][A-Za-z0-9_]*", name):
         raise ValueError(f"the name of a C function must be a letter, then letters, digits and _, got {name!r:.60}")
-    if len(name) > LONGEST:
-        raise ValueError(f"the name of a C function may have {LONGEST} characters, got {len(name)}: {name:.60}")
+    if len(name) > LONGEST_NAME:
+        raise ValueError(f"the name of a C function may have {LONGEST_NAME} characters, got {len(name)}: {name:.60}")
     if name in _TAKEN or _MACROS.fullmatch(name) or _is_in_the_library(name):
         raise ValueError(f"the name of a C function must not be a word of C, C++ or their library, got {name!r}")
 
 
 def _is_in_the_library(name: str) -> bool:
     """Whether the C library of this system has the name, which the program would take from it in silence."""
-    return hasattr(ctypes.CDLL("msvcrt" if os.name == "nt" else None), name)
+    return hasattr(ctypes.CDLL("ucrtbase" if os.name == "nt" else None), name)
 
 
 def distinct(names: Sequence[str]) -> list[str]:

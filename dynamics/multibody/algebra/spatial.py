@@ -79,7 +79,8 @@ def _sizes(array: Array) -> Array:
     """Absolute values, 0 for nodes."""
     if array.dtype != object:
         return np.abs(array)
-    return np.array([0.0 if isinstance(each, Node) else abs(each) for each in array.flat]).reshape(array.shape)
+    sizes: Array = np.frompyfunc(lambda each: 0.0 if isinstance(each, Node) else abs(each), 1, 1)(array).astype(float)
+    return sizes
 
 
 def added(a: Array, b: Array) -> Array:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
-from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -100,7 +99,7 @@ def tree(
         _check_sequence("links", links)
     n = len(parents)
     for i, parent in enumerate(parents):
-        if not isinstance(parent, Integral) or not -1 <= parent < n:
+        if not isinstance(parent, (int, np.integer)) or not -1 <= parent < n:
             raise MechanismError(f"parents must be indices from -1 to {n - 1}, got {parent!r:.60} for link {i + 1}")
     given = (
         [_rod(axis, parent) for axis, parent in zip(_axes(axes, n), parents, strict=True)] if links is None else links

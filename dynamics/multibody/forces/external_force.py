@@ -6,6 +6,7 @@ import math
 import numbers
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -75,6 +76,7 @@ def check_force(force: Force, bodies: Container[str]) -> None:
     vector(f"{where}: at", force.at)
     if force.frame not in FRAMES:
         raise MechanismError(f"{where}: frame must be one of {', '.join(FRAMES)}, got {force.frame!r}")
+    given: Any
     for what, given in (("value", force.value), ("torque", force.torque)):
         if isinstance(given, str | Node) or not isinstance(given, Sequence | np.ndarray) or len(given) != 3:
             raise MechanismError(f"{where}: {what} must have three components, got {given!r:.80}")

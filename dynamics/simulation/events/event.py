@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from numbers import Integral
 from typing import Any
+
+import numpy as np
 
 from cgraph import Node
 from cgraph.extend import check_name
@@ -79,7 +80,7 @@ class Event:
                 f"{self.name!r:.40}, {self.value!r:.40} and {self.terminal!r:.40}"
             )
         check_name("an event", self.name)
-        if not isinstance(self.direction, Integral) or self.direction not in (-1, 0, 1):
+        if not isinstance(self.direction, (int, np.integer)) or self.direction not in (-1, 0, 1):
             raise ValueError(f"event {self.name!r}: direction must be 1, -1 or 0, got {self.direction!r}")
         if self.reset is not None and not _is_function(self.reset):
             raise TypeError(f"event {self.name!r}: reset must be a function, got {self.reset!r:.40}")

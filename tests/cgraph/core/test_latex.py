@@ -10,7 +10,7 @@ from hypothesis import given, strategies as st
 
 import cgraph as cg
 from cgraph.extend import OPS
-from cgraph.writing.latex_texts import name_texts
+from cgraph.writing.latex import name_texts
 
 mathtext = pytest.importorskip("matplotlib.mathtext")
 A, B, C = cg.variables("a b c")

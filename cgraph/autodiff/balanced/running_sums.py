@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from typing import NamedTuple
 
-from ..core.builder import Builder
-from ..core.graph import Graph
-from ..core.node import Node
-from ..core.scope import building
-from ..core.traversal import topological
-from ..util.require import require_graph
+from ...core.builder import Builder
+from ...core.graph import Graph
+from ...core.node import Node
+from ...core.scope import building
+from ...core.traversal import topological
+from ...util.require import require_graph
 
-LEAST = 16  # terms of a sum that is taken in blocks
+LEAST_TERMS = 16  # terms of a sum that is taken in blocks
 
 
 class Block(NamedTuple):
@@ -80,7 +80,7 @@ def balanced(nodes: Collection[Node], build: Builder) -> list[Node]:
 
 
 def _running(order: Sequence[Node]) -> dict[Node, int]:
-    """{sum: which of its arguments is the sum that it continues}, of sums of LEAST terms or more."""
+    """{sum: which of its arguments is the sum that it continues}, of sums of LEAST_TERMS terms or more."""
     before: dict[Node, int] = {}
     terms: dict[Node, int] = {}
     for node in order:
@@ -92,7 +92,7 @@ def _running(order: Sequence[Node]) -> dict[Node, int]:
     for node in reversed(order):
         if node in before and (start := node.args[before[node]]) in longest:
             longest[start] = max(longest[start], longest[node])
-    return {node: k for node, k in before.items() if longest[node] >= LEAST}
+    return {node: k for node, k in before.items() if longest[node] >= LEAST_TERMS}
 
 
 def _with_term(node: Node, before: int, blocks: dict[Node, list[Block]], new: dict[Node, Node]) -> list[Block]:
