@@ -29,7 +29,7 @@ from .cold_start import cold_starts
 from .measurement import ErrorMetrics, Tried, in_turns
 from .named_tasks import load
 from .trajectory_peers import EPSILON, Cvodes, Heyoka
-from .trajectory_runs import Ours, Outcome, Scipy, Solver, problem_of
+from .trajectory_runs import Ours, Outcome, Run, Scipy, Solver, problem_of
 from .work_precision import error_metrics, work_precision
 
 FIXED = tuple([name for name, method in METHODS.items() if not method.adaptive])
@@ -211,9 +211,9 @@ class SolveIvp(Solver):
         super().__init__("solve_ivp", "SciPy's solve_ivp, DOP853", task, smallest)
         self.rate, self.solve = rate, solve_ivp()
 
-    def ready(self, knob: float) -> Callable[[], Outcome]:
+    def ready(self, knob: float) -> Run:
         """The run with that knob, everything before it done: what is timed."""
-        return lambda: self._run(knob)[0]
+        return Run(lambda: self._run(knob)[0])
 
     def rows(self, knob: float) -> Array:
         """The states at the task's times, (T, m); NaN from where it stopped."""
