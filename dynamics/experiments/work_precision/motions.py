@@ -20,7 +20,6 @@ from cgraph.extend import Array
 from ...integrators import METHODS, Problem
 from ...multiprecision import Reference
 from ...peers import UnavailableError
-from ...simulation.trajectory import SimulationWarning
 from ..accuracy_task import AccuracyTask
 from ..text_table import WIDTH, Footnotes, digits, table
 from .measurement import OURS, PEERS, EndMetrics, Entry, ErrorMetrics, Tried, group, in_turns, sweep
@@ -186,7 +185,7 @@ def _swept(solver: Solver, metrics: EndMetrics, limit: float, say: Callable[[str
     say(f"{solver.task.name} to {solver.task.t_end:g} s: {solver.name}")
     knobs = STEPS if solver.kind != CHOSEN else COARSER if group(solver.name) == HEYOKA else LADDER
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", SimulationWarning)
+        warnings.simplefilter("ignore")
         return sweep(solver, metrics, limit if solver.ours else PATIENCE * limit, knobs)
 
 
@@ -209,7 +208,7 @@ def _fill(rows: Sequence[Row], entries: Sequence[Entry], turns: int) -> None:
     """Time the runs that decide, and note the cheapest of each group, or why there is none."""
     deciding = {id(each): each for row in rows for entry in entries for each in _about(entry.tried, row.error)}
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", SimulationWarning)
+        warnings.simplefilter("ignore")
         in_turns(list(deciding.values()), turns)
     for row in rows:
         for entry in entries:
