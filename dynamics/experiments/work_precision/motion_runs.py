@@ -29,8 +29,8 @@ def run_to_end(
     def read(found: Any) -> tuple[Array, Stats]:
         return np.concatenate([found.q[-1], found.qd[-1]]), found.stats
 
-    start, options = (task.q, task.qd or None), {"rtol": rtol, "t_eval": [task.t_end], "progress": False}
-    return partial(simulate, task.model, *start, task.t_end, method, **options), read
+    options: dict[str, Any] = {"rtol": rtol, "t_eval": [task.t_end], "progress": False}
+    return partial(simulate, task.model, task.q, task.qd or None, task.t_end, method, **options), read
 
 
 class Motion(Solver):
@@ -76,8 +76,9 @@ class Many(Solver):
 
         def read(found: Any) -> Outcome:
             ends, stats = np.hstack([found.q[:, -1], found.qd[:, -1]]), found.stats
-            counts = [int(np.mean(each)) for each in (stats.steps, stats.rejected, stats.nfev)]
-            return Outcome(ends, *counts, status="" if stats.success.all() else "some stopped before the end")
+            steps, rejected, evaluations = (int(np.mean(each)) for each in (stats.steps, stats.rejected, stats.nfev))
+            status = "" if stats.success.all() else "some stopped before the end"
+            return Outcome(ends, steps, rejected, evaluations, status)
 
         return Run(partial(simulate_many, self.task.model, q, velocities, self.task.t_end, self.name, **options), read)
 
