@@ -35,6 +35,11 @@ def table(header: Sequence[str], rows: Sequence[Sequence[Cell]], left: Iterable[
     return [gap.join(parts).rstrip() for block in blocks for parts in zip(first, *block, strict=True)]
 
 
+def titled(title: str, header: Sequence[str], rows: Iterable[Sequence[Cell]], left: Iterable[int] = (0,)) -> str:
+    """A table under its title."""
+    return "\n".join([title, *table(header, list(rows), left)])
+
+
 def _column(head: str, cells: Sequence[tuple[str, str]], flush_left: bool) -> list[str]:
     """Cells of one width under a head that stands over the numbers."""
     after = max([len(right) for _, right in cells], default=0)

@@ -6,7 +6,7 @@ import gc
 import math
 import statistics
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any, Protocol
 
@@ -21,6 +21,7 @@ from ...multiprecision import Reference
 from ...simulation.run_options import SCIPY
 from ...systems.model import as_system
 from ..accuracy_task import INTERVALS, AccuracyTask
+from ..clock import spent
 from ..paper_numbers import exponent
 from ..text_table import csv_text
 from .cold_start import ColdStart
@@ -296,12 +297,12 @@ def sweep(solver: Solver, metrics: EndMetrics, limit: float, knobs: Sequence[flo
         except Exception as error:  # noqa: BLE001 (whatever a peer's own code raises is a line in the report)
             kind = "" if isinstance(error, ValueError) else f"{type(error).__name__}: "
             status = kind + " ".join(str(error).split())[:200]
-        spent = time.process_time() - begin
+        took = time.process_time() - begin
         if not status and not math.isfinite(error_at_end := metrics.at_end(outcome.x)):
             status = "is not finite"
         entry.stopped = status
         if status:
-            if entry.tried or spent > limit:  # a coarse knob may fail, and a finer one not
+            if entry.tried or took > limit:  # a coarse knob may fail, and a finer one not
                 break
             continue
         entry.tried.append(Tried(knob, run, outcome, error_at_end))
@@ -310,7 +311,7 @@ def sweep(solver: Solver, metrics: EndMetrics, limit: float, knobs: Sequence[flo
         if stalled >= STALLED and best < FLOOR:
             entry.stopped = "rounding"
             break
-        if spent > limit:
+        if took > limit:
             entry.stopped = f"run time above {limit:g} s"
             break
     else:
@@ -321,7 +322,9 @@ def sweep(solver: Solver, metrics: EndMetrics, limit: float, knobs: Sequence[flo
 def in_turns(tried: Sequence[Tried], turns: int) -> None:
     """Time every run in turns, so that all share the machine's moods; short runs several times a turn."""
     gc.disable()
-    read = min([_clocks(_nothing)[1] for _ in range(CLOCKS)])  # what the reading of the clocks takes of the processor
+    read = min(
+        [spent(_nothing).processor for _ in range(CLOCKS)]
+    )  # what the reading of the clocks takes of the processor
     try:
         for _ in range(turns):
             for each in tried:
@@ -330,20 +333,12 @@ def in_turns(tried: Sequence[Tried], turns: int) -> None:
                 left = CHUNK
                 while left > 0.0:
                     each.run.rewind()
-                    spent, worked = _clocks(each.run.run)
-                    each.seconds.append(spent)
-                    each.processor.append(max(worked - read, 0.0))
-                    left -= spent
+                    taken = spent(each.run.run)
+                    each.seconds.append(taken.seconds)
+                    each.processor.append(max(taken.processor - read, 0.0))
+                    left -= taken.seconds
     finally:
         gc.enable()
-
-
-def _clocks(run: Callable[[], object]) -> tuple[float, float]:
-    """Seconds of a run, by the clock and of the processor."""
-    worked, begin = time.process_time(), time.perf_counter()
-    run()
-    spent = time.perf_counter() - begin
-    return spent, time.process_time() - worked
 
 
 def _nothing() -> None:
