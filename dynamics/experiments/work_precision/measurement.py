@@ -8,7 +8,7 @@ import statistics
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
-from typing import Any, Protocol
+from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 
@@ -25,11 +25,12 @@ from ..clock import spent
 from ..paper_numbers import exponent
 from ..text_table import csv_text
 from .cold_start import ColdStart
-from .trajectory_runs import CHOSEN, EQUAL, Outcome, Run, Solver
+from .trajectory_runs import CHOSEN, EQUAL, EndSolver, Outcome, Run, Solver
 
 OURS = "ours"
 # How the names of peers' solvers begin.
 PEERS = {"MuJoCo": "MuJoCo", "SciPy": SCIPY, "heyoka": "heyoka", "CasADi": "CVODES", "diffrax": "diffrax"}
+AnySolver = TypeVar("AnySolver", bound=EndSolver)
 TARGETS = (1e-3, 1e-6, 1e-9, 1e-12)
 
 
@@ -235,14 +236,14 @@ class Tried:
 
 
 @dataclass
-class Entry:
+class Entry(Generic[AnySolver]):
     """A solver with its knobs."""
 
-    solver: Solver
+    solver: AnySolver
     tried: list[Tried] = field(default_factory=list)
     stopped: str = ""
 
-    def curve(self, metrics: ErrorMetrics, problem: Problem) -> Curve:
+    def curve(self: Entry[Solver], metrics: ErrorMetrics, problem: Problem) -> Curve:
         """Curve of the report."""
         solver = self.solver
         points = tuple([_point(solver, each, metrics) for each in self.tried])
@@ -282,7 +283,9 @@ def _point(solver: Solver, tried: Tried, metrics: ErrorMetrics) -> Point:
     )
 
 
-def sweep(solver: Solver, metrics: EndMetrics, limit: float, knobs: Sequence[float] | None = None) -> Entry:
+def sweep(
+    solver: AnySolver, metrics: EndMetrics, limit: float, knobs: Sequence[float] | None = None
+) -> Entry[AnySolver]:
     """From coarse to fine: each knob once, until it takes too long or is no longer better."""
     entry = Entry(solver)
     best, stalled = math.inf, 0

@@ -18,7 +18,7 @@ from ...simulation.simulate import simulate
 from ...simulation.trajectory import Stats
 from ..accuracy_task import AccuracyTask
 from .trajectory_peers import MOST_STEPS, Heyoka
-from .trajectory_runs import Outcome, Run, Solver
+from .trajectory_runs import EndSolver, Outcome, Run
 
 
 def run_to_end(
@@ -33,7 +33,7 @@ def run_to_end(
     return partial(simulate, task.model, task.q, task.qd or None, task.t_end, method, **options), read
 
 
-class Motion(Solver):
+class Motion(EndSolver):
     """One of our methods, called for the end alone."""
 
     ours = True
@@ -52,14 +52,8 @@ class Motion(Solver):
 
         return Run(run, read)
 
-    def rows(self, knob: float) -> Array:
-        """The states at the task's times, (T, m)."""
-        run = simulate(self.task.model, self.task.q, self.task.qd or None, self.task.t_end, self.name, rtol=knob,
-                       t_eval=self.task.times, progress=False)  # fmt: skip
-        return np.hstack([run.q, run.qd])
 
-
-class Many(Solver):
+class Many(EndSolver):
     """One of our methods on an ensemble, by `simulate_many` in one thread."""
 
     ours = True
@@ -82,12 +76,8 @@ class Many(Solver):
 
         return Run(partial(simulate_many, self.task.model, q, velocities, self.task.t_end, self.name, **options), read)
 
-    def rows(self, knob: float) -> Array:
-        """The ends."""
-        return self.ready(knob)().x
 
-
-class HeyokaBatch(Solver):
+class HeyokaBatch(EndSolver):
     """heyoka's batch mode on an ensemble: as many motions at once as vectors have lanes, each with its own steps."""
 
     def __init__(self, task: AccuracyTask, starts: Array, single: Heyoka) -> None:
@@ -115,10 +105,6 @@ class HeyokaBatch(Solver):
             return counts
 
         return Run(run, lambda found: Outcome(ends[: len(self.starts)].copy(), int(np.mean(found))))
-
-    def rows(self, knob: float) -> Array:
-        """The ends."""
-        return self.ready(knob)().x
 
 
 @dataclass(frozen=True)

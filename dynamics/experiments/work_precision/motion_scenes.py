@@ -103,7 +103,7 @@ def van_der_pol() -> AccuracyTask:
 def stiff_chain() -> AccuracyTask:
     """Four rods that swing as one: the first hinge is free, springs and dampers hold the others straight."""
     arm = planar_arm([0.25] * 4, [0.25] * 4)
-    held = [replace(each, joint=replace(each.joint, stiffness=1e4, damping=1e2)) for each in arm.bodies[1:4]]
+    held = [replace(each, joint=replace(each.joint, stiffness=1e4, damping=2e1)) for each in arm.bodies[1:4]]
     model = Mechanism([arm.bodies[0], *held, *arm.bodies[4:]], arm.gravity)
     about = "four rods, three hinges with stiff springs and dampers"
     return AccuracyTask("stiff chain", about, model, (1.0, 0, 0, 0), (0.0,) * 4, 200.0, stiff=True, method=None)

@@ -26,7 +26,7 @@ from .measurement import OURS, PEERS, EndMetrics, Entry, ErrorMetrics, Tried, gr
 from .motion_runs import HeyokaBatch, Many, ManyEnds, Motion
 from .motion_scenes import MOTIONS, QUICK, TIMES, exact_end, sizes
 from .trajectory_peers import Heyoka, offers
-from .trajectory_runs import CHOSEN, Solver, problem_of
+from .trajectory_runs import CHOSEN, EndSolver, problem_of
 from .work_precision import PATIENCE
 
 HEYOKA = "heyoka"
@@ -161,9 +161,9 @@ def _rows(
 
 def _solvers(
     task: AccuracyTask, smallest: float, problem: Problem, peers: Sequence[str], absent: dict[str, Missed]
-) -> list[Solver]:
+) -> list[EndSolver]:
     """Ours, then the peers' that are installed and take this motion; why others do not goes to `absent`."""
-    solvers: list[Solver] = [Motion(name, task, smallest) for name in methods(task.stiff)]
+    solvers: list[EndSolver] = [Motion(name, task, smallest) for name in methods(task.stiff)]
     for name, make in offers(task, smallest, problem, "auto").items():
         if group(name) in peers and (group(name) == HEYOKA or name.endswith(ASKED[task.stiff])):
             try:
@@ -180,7 +180,7 @@ def methods(stiff: bool) -> list[str]:
     return [name for name, method in METHODS.items() if method.adaptive and (stiff or name not in STIFF)]
 
 
-def _swept(solver: Solver, metrics: EndMetrics, limit: float, say: Callable[[str], None]) -> Entry:
+def _swept(solver: EndSolver, metrics: EndMetrics, limit: float, say: Callable[[str], None]) -> Entry[EndSolver]:
     """The runs of a solver on its ladder. What a run says of itself is not printed."""
     say(f"{solver.task.name} to {solver.task.t_end:g} s: {solver.name}")
     knobs = STEPS if solver.kind != CHOSEN else COARSER if group(solver.name) == HEYOKA else LADDER
@@ -189,7 +189,7 @@ def _swept(solver: Solver, metrics: EndMetrics, limit: float, say: Callable[[str
         return sweep(solver, metrics, limit if solver.ours else PATIENCE * limit, knobs)
 
 
-def doubted(entries: Sequence[Entry], error: float, size: Array) -> str:
+def doubted(entries: Sequence[Entry[EndSolver]], error: float, size: Array) -> str:
     """Why the exact end may be none: ours and a peer agree far better with each other than with it; or nothing."""
     finest = [(entry.solver, min(entry.tried, key=lambda each: each.error)) for entry in entries if entry.tried]
     for one, ours in finest:
@@ -204,7 +204,7 @@ def doubted(entries: Sequence[Entry], error: float, size: Array) -> str:
     return ""
 
 
-def _fill(rows: Sequence[Row], entries: Sequence[Entry], turns: int) -> None:
+def _fill(rows: Sequence[Row], entries: Sequence[Entry[EndSolver]], turns: int) -> None:
     """Time the runs that decide, and note the cheapest of each group, or why there is none."""
     deciding = {id(each): each for row in rows for entry in entries for each in _about(entry.tried, row.error)}
     with warnings.catch_warnings():
@@ -229,7 +229,7 @@ def _about(tried: Sequence[Tried], error: float) -> list[Tried]:
     return [] if first is None else list(tried[max(0, first - 1) : first + 1])
 
 
-def cost(entry: Entry, error: float, count: int) -> Cell | None:
+def cost(entry: Entry[EndSolver], error: float, count: int) -> Cell | None:
     """Cost of the error, between the two runs about it; of the coarsest run where that is good enough already."""
     about = _about(entry.tried, error)
     if not about:
@@ -249,7 +249,7 @@ def cost(entry: Entry, error: float, count: int) -> Cell | None:
 
 def _ensemble(
     task: AccuracyTask,
-    solvers: Sequence[Solver],
+    solvers: Sequence[EndSolver],
     once: Sequence[Row],
     count: int,
     turns: int,
@@ -264,7 +264,7 @@ def _ensemble(
     size, moved = np.array(task.size), len(task.q) if task.qd else 0
     starts = np.tile(task.start, (n, 1))
     starts[:, moved:] += ASIDE * size[moved:] * np.random.default_rng(0).uniform(-1.0, 1.0, (n, len(size) - moved))
-    many: list[Solver] = [Many(name, task, starts) for name in methods(task.stiff)]
+    many: list[EndSolver] = [Many(name, task, starts) for name in methods(task.stiff)]
     many += [HeyokaBatch(task, starts, each) for each in solvers if isinstance(each, Heyoka)][:1]
     tightest = Many("radau" if task.stiff else "taylor", task, starts).ready(TIGHTEST)()
     metrics = ManyEnds(tightest.x, np.where(size > 0.0, size, 1.0))

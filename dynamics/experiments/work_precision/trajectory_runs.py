@@ -58,8 +58,8 @@ class Run:
         return self.read(self.run())
 
 
-class Solver(ABC):
-    """A way to integrate one task.
+class EndSolver(ABC):
+    """A way to compute the end of one task.
 
     kind: `EQUAL`, where the knob is the number of steps, or `CHOSEN`, where it is the relative tolerance.
     order: of its error, as declared; None where that is no fixed number.
@@ -74,7 +74,7 @@ class Solver(ABC):
         self.name, self.about, self.task, self.smallest = name, about, task, smallest
         self.start = np.array(task.start)
 
-    def until(self, t_end: float) -> Solver:
+    def until(self, t_end: float) -> EndSolver:
         """The same to another end, with what is compiled already."""
         other = copy.copy(self)
         other.task = replace(self.task, t_end=t_end)
@@ -84,6 +84,14 @@ class Solver(ABC):
     def ready(self, knob: float) -> Run:
         """Run with that knob, everything before it done. Raises for a knob that cannot be had."""
 
+    def absolute(self, knob: float) -> float:
+        """The absolute tolerance that goes with a relative one: as small a part of the smallest state."""
+        return knob * self.smallest
+
+
+class Solver(EndSolver):
+    """A way to integrate one task, which tells the states on the way, too."""
+
     @abstractmethod
     def rows(self, knob: float) -> Array:
         """The states at the task's times, (T, m); NaN from where it stopped."""
@@ -91,10 +99,6 @@ class Solver(ABC):
     def rates(self, x: Array) -> Array | None:
         """Rates of the states, (T, m), at states (T, m); None where they are computed by our graph."""
         return None
-
-    def absolute(self, knob: float) -> float:
-        """The absolute tolerance that goes with a relative one: as small a part of the smallest state."""
-        return knob * self.smallest
 
 
 def problem_of(task: AccuracyTask) -> Problem:
