@@ -225,12 +225,13 @@ class ErrorMetrics:
 
 @dataclass
 class Tried:
-    """One knob of a solver, and what was timed of it: by the clock, and of the processor."""
+    """One knob of a solver, and what was timed of it: by the clock, of the processor, and `once`, of its first run."""
 
     knob: float
     run: Run
     outcome: Outcome
     error: float
+    once: float = math.nan
     seconds: list[float] = field(default_factory=list)
     processor: list[float] = field(default_factory=list)
 
@@ -308,7 +309,7 @@ def sweep(
             if entry.tried or took > limit:  # a coarse knob may fail, and a finer one not
                 break
             continue
-        entry.tried.append(Tried(knob, run, outcome, error_at_end))
+        entry.tried.append(Tried(knob, run, outcome, error_at_end, took))
         stalled = 0 if error_at_end < 0.5 * best else stalled + 1
         best = min(best, error_at_end)
         if stalled >= STALLED and best < FLOOR:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -19,6 +19,8 @@ from ...simulation.trajectory import Stats
 from ..accuracy_task import AccuracyTask
 from .trajectory_peers import MOST_STEPS, Heyoka
 from .trajectory_runs import EndSolver, Outcome, Run
+
+COMPILES, FEW = 1e-6, 8  # of the length, and motions of a run that only compiles
 
 
 def run_to_end(
@@ -44,6 +46,7 @@ class Motion(EndSolver):
 
     def ready(self, knob: float) -> Run:
         """The run with that tolerance."""
+        run_to_end(replace(self.task, t_end=COMPILES * self.task.t_end), self.name, knob)[0]()
         run, end = run_to_end(self.task, self.name, knob)
 
         def read(found: Any) -> Outcome:
@@ -74,7 +77,10 @@ class Many(EndSolver):
             status = "" if stats.success.all() else "some stopped before the end"
             return Outcome(ends, steps, rejected, evaluations, status)
 
-        return Run(partial(simulate_many, self.task.model, q, velocities, self.task.t_end, self.name, **options), read)
+        run = partial(simulate_many, self.task.model, method=self.name)
+        few, short = slice(0, FEW), COMPILES * self.task.t_end
+        run(q=q[few], qd=None if velocities is None else qd[few], t_end=short, **(options | {"t_eval": [short]}))
+        return Run(partial(run, q=q, qd=velocities, t_end=self.task.t_end, **options), read)
 
 
 class HeyokaBatch(EndSolver):

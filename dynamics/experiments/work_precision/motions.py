@@ -37,13 +37,14 @@ STIFF = ("rodas", "radau")  # methods that only stiff equations are given to
 ASKED = {False: ("DOP853", "Adams", "Dopri8", "RK4"), True: ("LSODA", "Radau", "BDF", "Kvaerno5")}  # of peers, by stiff
 TURNS, LIMIT = 9, 3.0  # turns of each run; s of a run, after which no finer tolerance is tried
 COUNT = 4096  # motions of an ensemble, fewer where one motion is long
-LONG = 2.0  # s of all motions of an ensemble together, by the fastest way to compute one
+LONG = 0.5  # s of all motions of an ensemble together, by the fastest way to compute one
 ASIDE = 1e-2  # how far the starts of an ensemble lie apart, in sizes
 LADDER = tuple([10.0**-k for k in range(2, 16)])
 TIGHTEST, SMALLEST = 1e-15, 1e-18  # tolerance of the ends of an ensemble; error of none
 ENSEMBLE, FEWEST = 10.0, 16  # s: the longest motion of an ensemble; and its fewest motions
 COARSER = tuple([10.0**-k for k in range(3, 15, 2)] + [2.0**-52])  # each is compiled anew
 STEPS = tuple([2.0**k for k in range(24)])  # of MuJoCo
+HOPELESS = 4.0  # times the first run of another of its group: what takes longer is not timed
 ROUNDING = 1e-13  # an error that is no cause to doubt
 TOGETHER = 1.0 / 30.0  # of their errors: ends of two solvers that agree so much better than with the exact one
 
@@ -206,10 +207,18 @@ def doubted(entries: Sequence[Entry[EndSolver]], error: float, size: Array) -> s
 
 def _fill(rows: Sequence[Row], entries: Sequence[Entry[EndSolver]], turns: int) -> None:
     """Time the runs that decide, and note the cheapest of each group, or why there is none."""
-    deciding = {id(each): each for row in rows for entry in entries for each in _about(entry.tried, row.error)}
+    runs: dict[int, Tried] = {}
+    for row in rows:
+        asked: dict[str, list[list[Tried]]] = {}
+        for entry in entries:
+            if about := _about(entry.tried, row.error):
+                asked.setdefault(group(entry.solver.name), []).append(about)
+        for each in asked.values():
+            most = HOPELESS * min(about[-1].once for about in each)
+            runs |= {id(one): one for about in each if about[-1].once <= most for one in about}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        in_turns(list(deciding.values()), turns)
+        in_turns(list(runs.values()), turns)
     for row in rows:
         for entry in entries:
             name = group(entry.solver.name)
@@ -232,7 +241,7 @@ def _about(tried: Sequence[Tried], error: float) -> list[Tried]:
 def cost(entry: Entry[EndSolver], error: float, count: int) -> Cell | None:
     """Cost of the error, between the two runs about it; of the coarsest run where that is good enough already."""
     about = _about(entry.tried, error)
-    if not about:
+    if not (about and about[-1].seconds and about[0].seconds):
         return None
     coarse, fine = about[0], about[-1]
     values = [[min(each.seconds), min(each.processor), each.knob] for each in (coarse, fine)]
@@ -268,9 +277,9 @@ def _ensemble(
     many += [HeyokaBatch(task, starts, each) for each in solvers if isinstance(each, Heyoka)][:1]
     tightest = Many("radau" if task.stiff else "taylor", task, starts).ready(TIGHTEST)()
     metrics = ManyEnds(tightest.x, np.where(size > 0.0, size, 1.0))
-    entries = [_swept(solver, metrics, 2.0 * LONG, say) for solver in many]
+    entries = [_swept(solver, metrics, 4.0 * LONG, say) for solver in many]
     rows = [Row(task.name, task.t_end, row.error, n) for row in once]
-    _fill(rows, entries, min(turns, 3))
+    _fill(rows, entries, min(turns, 2))
     yield from rows
 
 
