@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -26,13 +26,15 @@ COMPILES, FEW = 1e-6, 8  # of the length, and motions of a run that only compile
 def run_to_end(
     task: AccuracyTask, method: str, rtol: float
 ) -> tuple[Callable[[], Any], Callable[[Any], tuple[Array, Stats]]]:
-    """A motion of ours made ready, and what reads its end and statistics: the one place that says how we are called."""
+    """A motion of ours, compiled, and what reads its end and statistics: the one place that says how we are called."""
+    options: dict[str, Any] = {"method": method, "rtol": rtol, "progress": False}
+    run, short = partial(simulate, task.model, task.q, task.qd or None, **options), COMPILES * task.t_end
+    run(t_end=short, t_eval=[short])
 
     def read(found: Any) -> tuple[Array, Stats]:
         return np.concatenate([found.q[-1], found.qd[-1]]), found.stats
 
-    options: dict[str, Any] = {"rtol": rtol, "t_eval": [task.t_end], "progress": False}
-    return partial(simulate, task.model, task.q, task.qd or None, task.t_end, method, **options), read
+    return partial(run, t_end=task.t_end, t_eval=[task.t_end]), read
 
 
 class Motion(EndSolver):
@@ -46,7 +48,6 @@ class Motion(EndSolver):
 
     def ready(self, knob: float) -> Run:
         """The run with that tolerance."""
-        run_to_end(replace(self.task, t_end=COMPILES * self.task.t_end), self.name, knob)[0]()
         run, end = run_to_end(self.task, self.name, knob)
 
         def read(found: Any) -> Outcome:

@@ -74,7 +74,8 @@ def test_a_wrong_exact_end_is_noticed() -> None:
 
 def test_a_cost_is_interpolated_between_the_runs_about_an_error() -> None:
     def tried(knob: float, error: float, seconds: float) -> Tried:
-        return Tried(knob, Run(lambda: None), Outcome(np.zeros(1), 7), error, [seconds, 9.0], [seconds / 2, 9.0])
+        run, outcome = Run(lambda: None), Outcome(np.zeros(1), 7)
+        return Tried(knob, run, outcome, error, seconds=[seconds, 9.0], processor=[seconds / 2, 9.0])
 
     entry = Entry(Motion("dop853", MOTIONS[NAME](), 1.0), [tried(1e-4, 1e-5, 1.0), tried(1e-6, 1e-9, 4.0)])
     between = cost(entry, 1e-7, 1)
