@@ -21,7 +21,7 @@ from ...multiprecision import Reference
 from ...simulation.run_options import SCIPY
 from ...systems.model import as_system
 from ..accuracy_task import INTERVALS, AccuracyTask
-from ..clock import spent
+from ..clock import Spent, spent
 from ..paper_numbers import exponent
 from ..text_table import csv_text
 from .cold_start import ColdStart
@@ -231,7 +231,7 @@ class Tried:
     run: Run
     outcome: Outcome
     error: float
-    once: float = math.nan
+    once: Spent[Any] | None = None
     seconds: list[float] = field(default_factory=list)
     processor: list[float] = field(default_factory=list)
 
@@ -295,8 +295,10 @@ def sweep(
         begin = time.process_time()
         try:
             run = solver.ready(knob)
+            run.rewind()
             begin = time.process_time()
-            outcome = run()
+            once = spent(run.run)
+            outcome = run.read(once.made)
             status = outcome.status
         except Exception as error:  # noqa: BLE001 (whatever a peer's own code raises is a line in the report)
             kind = "" if isinstance(error, ValueError) else f"{type(error).__name__}: "
@@ -309,7 +311,7 @@ def sweep(
             if entry.tried or took > limit:  # a coarse knob may fail, and a finer one not
                 break
             continue
-        entry.tried.append(Tried(knob, run, outcome, error_at_end, took))
+        entry.tried.append(Tried(knob, run, outcome, error_at_end, once))
         stalled = 0 if error_at_end < 0.5 * best else stalled + 1
         best = min(best, error_at_end)
         if stalled >= STALLED and best < FLOOR:

@@ -44,6 +44,7 @@ TIGHTEST, SMALLEST = 1e-15, 1e-18  # tolerance of the ends of an ensemble; error
 ENSEMBLE, FEWEST = 10.0, 16  # s: the longest motion of an ensemble; and its fewest motions
 COARSER = tuple([10.0**-k for k in range(3, 15, 2)] + [2.0**-52])  # each is compiled anew
 STEPS = tuple([2.0**k for k in range(24)])  # of MuJoCo
+SLOW = 0.2  # s of the processor: the first run of what takes so long is its time
 HOPELESS = 4.0  # times the first run of another of its group: what takes longer is not timed
 ROUNDING = 1e-13  # an error that is no cause to doubt
 TOGETHER = 1.0 / 30.0  # of their errors: ends of two solvers that agree so much better than with the exact one
@@ -214,18 +215,24 @@ def _fill(rows: Sequence[Row], entries: Sequence[Entry[EndSolver]], turns: int) 
             if about := _about(entry.tried, row.error):
                 asked.setdefault(group(entry.solver.name), []).append(about)
         for each in asked.values():
-            most = HOPELESS * min(about[-1].once for about in each)
-            runs |= {id(one): one for about in each if about[-1].once <= most for one in about}
+            first = [about[-1].once.processor if about[-1].once else math.inf for about in each]
+            chosen = [about for about, once in zip(each, first, strict=True) if once <= HOPELESS * min(first)]
+            runs |= {id(one): one for about in chosen for one in about}
+    for one in runs.values():
+        if one.once and one.once.processor > SLOW and not one.seconds:
+            one.seconds.append(one.once.seconds)
+            one.processor.append(one.once.processor)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        in_turns(list(runs.values()), turns)
+        in_turns([one for one in runs.values() if not one.seconds], turns)
     for row in rows:
         for entry in entries:
             name = group(entry.solver.name)
             cell = cost(entry, row.error, row.count)
             if cell is None:
-                best = min([each.error for each in entry.tried], default=None)
-                row.missed.setdefault(name, Missed(entry.stopped, best))
+                best, known = min([each.error for each in entry.tried], default=None), row.missed.get(name)
+                if known is None or (best is not None and (known.best is None or best < known.best)):
+                    row.missed[name] = Missed(entry.stopped, best)
             elif name not in row.cells or cell.processor < row.cells[name].processor:
                 row.cells[name] = cell
         for name in row.cells:
