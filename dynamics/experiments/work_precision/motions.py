@@ -27,7 +27,7 @@ from .motion_runs import HeyokaBatch, Many, ManyEnds, Motion
 from .motion_scenes import MOTIONS, QUICK, TIMES, exact_end, sizes
 from .trajectory_peers import Heyoka, offers
 from .trajectory_runs import CHOSEN, EndSolver, problem_of
-from .work_precision import PATIENCE
+from .work_precision import PATIENCE, check_names
 
 HEYOKA = "heyoka"
 DUEL = (OURS, HEYOKA)  # whose ratio is told
@@ -116,9 +116,7 @@ def motions(
     count: motions of the ensemble, at the last time up to 10 s; 0 for none.  exact: ends in place of those known.
     Raises ValueError for an unknown name and for numbers that are not positive.
     """
-    for what, names, known in (("motion", scenes, MOTIONS), ("peer", peers, PEERS)):
-        if unknown := [name for name in names if name not in known]:
-            raise ValueError(f"there is no {what} {unknown[0]!r}; there are {', '.join(known)}")
+    check_names(("motion", scenes, MOTIONS), ("peer", peers, PEERS))
     for what, values in (("times", times), ("errors", errors)):
         if not (values and all([value > 0.0 and math.isfinite(value) for value in values])):
             raise ValueError(f"{what} must be positive and finite, got {values!r}")
