@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -39,16 +38,9 @@ def double_pendulum() -> AccuracyTask:
 
 def triple_fall() -> AccuracyTask:
     """Three rods let go almost level: chaotic."""
-    arm = planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7])
-    return AccuracyTask(
-        "triple fall",
-        "three rods let go almost level: chaotic",
-        arm,
-        (math.pi / 2, 0, 0),
-        (0.0,) * 3,
-        200.0,
-        method=None,
-    )
+    # Exactly level, heyoka's first step is ten times too long at orders 12, 16 and 20, and a loss that tells nothing.
+    model, q = planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7]), (1.5, 0.2, -0.1)
+    return AccuracyTask("triple fall", "three rods let go almost level", model, q, (0.0,) * 3, 200.0, method=None)
 
 
 def henon_heiles() -> AccuracyTask:

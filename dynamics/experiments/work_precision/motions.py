@@ -190,17 +190,19 @@ def _swept(solver: EndSolver, metrics: EndMetrics, limit: float, say: Callable[[
 
 
 def doubted(entries: Sequence[Entry[EndSolver]], error: float, size: Array) -> str:
-    """Why the exact end may be none: ours and a peer agree far better with each other than with it; or nothing."""
+    """Why the exact end may be none: three solvers, ours and peers, agree far better with each other; or nothing."""
     finest = [(entry.solver, min(entry.tried, key=lambda each: each.error)) for entry in entries if entry.tried]
     for one, ours in finest:
-        for other, theirs in finest:
-            if not one.ours or other.ours:
-                continue
-            apart = float(np.max(np.abs(ours.outcome.x - theirs.outcome.x) / size))
-            least = min(ours.error, theirs.error)
-            if least > ROUNDING and max(apart, error) < TOGETHER * least:
-                both = f"{one.name} and {other.name} end {apart:.0e} apart"
-                return f"the exact end is doubted: {both}, {ours.error:.0e} and {theirs.error:.0e} from it"
+        if not one.ours or ours.error < ROUNDING or error > TOGETHER * ours.error:
+            continue
+        apart = {
+            other: float(np.max(np.abs(ours.outcome.x - theirs.outcome.x) / size)) / min(ours.error, theirs.error)
+            for other, theirs in finest
+        }
+        near = [other for other, share in apart.items() if share < TOGETHER]
+        if len(near) >= min(3, len(finest)) and not all(other.ours for other in near):
+            names = ", ".join([other.name for other in near])
+            return f"the exact end is doubted: {names} agree with each other and are {ours.error:.0e} from it"
     return ""
 
 

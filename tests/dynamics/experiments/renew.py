@@ -19,7 +19,7 @@ from dynamics.experiments.stability import case_runs, cases
 from dynamics.experiments.trust import trust as answers
 from dynamics.experiments.trust.random_motions import random_motion
 from dynamics.experiments.work_precision import motion_scenes
-from dynamics.experiments.work_precision.trajectory_peers import COMPACT, heyoka_equations
+from dynamics.experiments.work_precision.trajectory_peers import heyoka_equations
 from dynamics.experiments.work_precision.trajectory_runs import problem_of
 from dynamics.multiprecision import Reference
 from dynamics.peers.heyoka import heyoka
@@ -85,11 +85,11 @@ def _ends_by_heyoka(task: AccuracyTask, size: Array) -> Iterator[dict[str, Any]]
     """heyoka's taylor_adaptive: two runs, the second with a thousand times the tolerance, tell the error."""
     hy = heyoka()
     kind, digits = (np.longdouble, 20) if task.stiff else (hy.real128, 34)
-    equations, compact = heyoka_equations(hy, problem_of(task), kind), len(problem_of(task).rate.nodes) > COMPACT
+    equations = heyoka_equations(hy, problem_of(task), kind)
     states: list[list[Any]] = []
     for tolerance in (kind(10.0) ** (3 - digits), kind(10.0) ** (6 - digits)):
         x = np.array([kind(each) for each in task.start], dtype=kind)
-        run = hy.taylor_adaptive(equations, x, tol=tolerance, fp_type=kind, compact_mode=compact)
+        run = hy.taylor_adaptive(equations, x, tol=tolerance, fp_type=kind, compact_mode=True)
         found = []
         for t in motion_scenes.TIMES:
             run.propagate_until(kind(t))
