@@ -282,7 +282,9 @@ def _ensemble(
     starts[:, moved:] += ASIDE * size[moved:] * np.random.default_rng(0).uniform(-1.0, 1.0, (n, len(size) - moved))
     many: list[EndSolver] = [Many(name, task, starts) for name in methods(task.stiff)]
     many += [HeyokaBatch(task, starts, each) for each in solvers if isinstance(each, Heyoka)][:1]
-    tightest = Many("radau" if task.stiff else "taylor", task, starts).ready(TIGHTEST)()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        tightest = Many("radau" if task.stiff else "taylor", task, starts).ready(TIGHTEST)()
     metrics = ManyEnds(tightest.x, np.where(size > 0.0, size, 1.0))
     entries = [_swept(solver, metrics, 4.0 * LONG, say) for solver in many]
     rows = [Row(task.name, task.t_end, row.error, n) for row in once]
