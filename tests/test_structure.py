@@ -42,6 +42,7 @@ OPTIONAL = {
 }
 
 FILE, CLASS, FUNCTION = 400, 200, 60  # lines at most; of a class and of a function without docstrings
+LABORATORY = tuple([f"dynamics.{room}" for room in ("experiments", "peers", "verification", "multiprecision")])
 MODULES = 200  # of ours, which a first run of `simulate` loads at most
 LONGER: dict[str, str] = {}  # {file, or file::name: why it may be longer}
 MODELS = {"Model", "System", "OdeSystem", "Mechanism", "PlanarArm", "Scene"}  # nobody asks which of them it has
@@ -233,6 +234,7 @@ def test_a_simulation_loads_what_it_uses() -> None:
     assert "dynamics.simulation.simulate" in names
     assert not any(name.startswith("cgraph.autodiff.balanced") for name in names)  # an order that is asked for
     assert len(names) <= MODULES
+    assert [name for name in names if name.startswith(LABORATORY)] == []
 
 
 def test_importing_a_package_loads_numpy_and_the_standard_library(tmp_path: Path) -> None:

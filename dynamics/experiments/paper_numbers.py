@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from ..scenes.scenes import Scene, spring_mass, triple_pendulum
 from ..simulation.simulate import simulate
 from ..simulation.trajectory import Trajectory
 from ..systems.model import Model, as_system
+from .clock import in_turns, spent
 
 STEPS = tuple(10.0 ** (-k / 2) for k in range(4, 13))  # s, 1e-2 to 1e-6
 
@@ -198,13 +199,8 @@ def node_scaling(
 def _microseconds(graph: cg.Graph, repeats: int = 7) -> float:
     function = cg.compile(graph, "python").values
     x = np.random.default_rng(0).normal(size=len(graph.inputs)).tolist()
-    best = float("inf")
-    for _ in range(repeats):
-        start = time.perf_counter()
-        for _ in range(10):
-            function(x)
-        best = min(best, (time.perf_counter() - start) / 10)
-    return best * 1e6
+    tens = [spent(lambda: [function(x) for _ in range(10)]) for _ in range(repeats)]
+    return min(each.seconds for each in tens) / 10.0 * 1e6
 
 
 # The paper's Table 1: mean and standard deviation over 1000 evaluations, in ms.
@@ -249,16 +245,11 @@ def table_1(evaluations: int = 1000, seed: int = 0) -> list[Row]:
     }
     timings: dict[str, dict[str, Timing]] = {name: {} for name in graphs}
     for way, functions in runs.items():
-        taken = np.empty((len(graphs), evaluations))
         for name, function in functions.items():
             function(states[name][0])  # warm
-        for k in range(evaluations):
-            for row, (name, function) in enumerate(functions.items()):
-                start = time.perf_counter()
-                function(states[name][k])
-                taken[row, k] = time.perf_counter() - start
-        for row, name in enumerate(functions):
-            timings[name][way] = timing(taken[row])
+        each_state = {name: partial(next, map(function, states[name])) for name, function in functions.items()}
+        for name, taken in in_turns(each_state, evaluations).items():
+            timings[name][way] = timing(np.array([each.seconds for each in taken]))
     return [Row(name, graph.counts(), timings[name]) for name, graph in graphs.items()]
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+import string
 from collections.abc import Iterable, Sequence
 
 WIDTH = 120  # characters of a terminal
@@ -32,6 +33,11 @@ def table(header: Sequence[str], rows: Sequence[Sequence[Cell]], left: Iterable[
             blocks.append([])
         blocks[-1].append(column)
     return [gap.join(parts).rstrip() for block in blocks for parts in zip(first, *block, strict=True)]
+
+
+def titled(title: str, header: Sequence[str], rows: Iterable[Sequence[Cell]], left: Iterable[int] = (0,)) -> str:
+    """A table under its title."""
+    return "\n".join([title, *table(header, list(rows), left)])
 
 
 def _column(head: str, cells: Sequence[tuple[str, str]], flush_left: bool) -> list[str]:
@@ -62,3 +68,18 @@ def digits(value: float, count: int) -> str:
 def number(value: float) -> str:
     """The number with two significant digits, with an exponent where it is small or large."""
     return f"{value:.1e}" if value and not 0.01 <= abs(value) < 1000.0 else f"{value:.2g}"
+
+
+class Footnotes:
+    """Letters for the reasons why cells are empty, and the lines below a table that say them."""
+
+    def __init__(self) -> None:
+        self._letters: dict[str, str] = {}
+
+    def mark(self, reason: str) -> str:
+        """Letter of a reason."""
+        return self._letters.setdefault(reason, string.ascii_lowercase[min(len(self._letters), 25)])
+
+    def lines(self) -> list[str]:
+        """A line for each reason."""
+        return [f"{letter}: {reason}" for reason, letter in self._letters.items()]

@@ -14,7 +14,6 @@ import numpy as np
 
 from cgraph.extend import Array, kept_by_first
 
-from .ours import rate_graph, task_graph
 from .peer import (
     BATCH,
     DERIVATIVES,
@@ -28,6 +27,7 @@ from .peer import (
     required,
     rk4_step,
 )
+from .task_graphs import rate_graph, task_graph
 from .translate import lagrangian, quasi_velocities, translated
 
 if TYPE_CHECKING:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from types import ModuleType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,16 +20,22 @@ SHORT = 10  # coordinates; beyond, a solve written out takes longer to compile t
 NAMES = {f"a{name}": f"arc{name}" for name in ("sin", "cos", "tan")} | {"atan2": "arctan2"}
 
 
+def double_precision() -> ModuleType:
+    """The module, on the CPU, in float64, calls waited for. Raises ImportError naming the extra without it."""
+    jax = required("jax", "JAX")
+    jax.config.update("jax_platforms", "cpu")
+    jax.config.update("jax_enable_x64", True)
+    jax.config.update("jax_cpu_enable_async_dispatch", False)  # a queue and a thread more than one core needs
+    return jax
+
+
 class JaxPeer(Peer):
     """JAX: `jit`, `vmap` for batches, `lax.scan` for loops."""
 
     def __init__(self, case: PeerModel) -> None:
         super().__init__(case)
-        jax = required("jax", "JAX")
-        jax.config.update("jax_platforms", "cpu")
-        jax.config.update("jax_enable_x64", True)
-        jax.config.update("jax_cpu_enable_async_dispatch", False)  # a queue and a thread more than one core needs
-        self.jax, self.np = jax, jax.numpy
+        self.jax = double_precision()
+        self.np = self.jax.numpy
 
     def _energy(self, q: JaxArray, qd: JaxArray) -> JaxArray:
         return lagrangian(self.case, q, qd, self.np, NAMES)[0]

@@ -7,16 +7,7 @@ import numpy as np
 from cgraph.extend import Array
 
 from ..io.mujoco_twin import MujocoTwin, joint_order, rollout
-from ..multibody.trees.mechanism import Mechanism, as_mechanism
 from .peer import DT, PASSES, Peer, PeerModel, TimedTask, UnavailableError
-
-
-def bodies(case: PeerModel) -> Mechanism:
-    """The bodies of the case's model. Raises UnavailableError for a bare Lagrangian."""
-    mechanism = as_mechanism(case.model)
-    if mechanism is None:
-        raise UnavailableError("takes rigid bodies, not a Lagrangian")
-    return mechanism
 
 
 class MujocoPeer(Peer):
@@ -24,7 +15,7 @@ class MujocoPeer(Peer):
 
     def __init__(self, case: PeerModel) -> None:
         super().__init__(case)
-        mechanism = bodies(case)
+        mechanism = case.bodies
         self.twin = MujocoTwin(mechanism, timestep=DT)
         self.mujoco, model = self.twin.mujoco, self.twin.model
         for unused in ("CONSTRAINT", "SENSOR", "ACTUATION", "WARMSTART"):

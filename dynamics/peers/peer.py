@@ -19,7 +19,7 @@ from cgraph.extend import Array, install, topological
 
 from ..equations.state_equation import normalization
 from ..integrators.tableau import RK4
-from ..multibody.trees.mechanism import as_mechanism
+from ..multibody.trees.mechanism import Mechanism, as_mechanism
 from ..systems.arguments import TIME
 from ..systems.model import Model, as_system
 from ..systems.system import System
@@ -57,6 +57,14 @@ class PeerModel:
         self.nq, self.n = self.system.nq, self.system.n
         if TIME in [str(node.name) for node in self.system.extra_inputs]:
             raise ValueError(f"{name} depends on time, and the bench compares systems that do not")
+
+    @property
+    def bodies(self) -> Mechanism:
+        """The bodies of the model. Raises UnavailableError for a bare Lagrangian."""
+        mechanism = as_mechanism(self.model)
+        if mechanism is None:
+            raise UnavailableError("takes rigid bodies, not a Lagrangian")
+        return mechanism
 
     def bound(self, graph: Graph) -> Graph:
         """The graph with its parameters at the system's values."""

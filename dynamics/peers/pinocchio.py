@@ -14,7 +14,6 @@ from ..multibody.bodies.body import WORLD
 from ..multibody.bodies.joint_coordinates import per_velocity, places
 from ..multibody.loops import Loop
 from ..multibody.trees.mechanism import Mechanism
-from .mujoco import bodies
 from .peer import BATCH, DERIVATIVES, Peer, PeerModel, TimedTask, UnavailableError, rk4_step
 from .pinocchio_model import PinocchioModel, pinocchio
 
@@ -32,7 +31,7 @@ class PinocchioPeer(Peer):
     def __init__(self, case: PeerModel) -> None:
         super().__init__(case)
         self.pinocchio = pinocchio()
-        mechanism = bodies(case)
+        mechanism = case.bodies
         self.loops = mechanism.loops
         self.of = PinocchioModel(mechanism)
         self.twin = self.of.model

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from dynamics.experiments.speed.bench_figures import FIGURES
     from dynamics.experiments.stability import stability
     from dynamics.experiments.text_table import table
-    from dynamics.experiments.work_precision import named_tasks, work_precision
+    from dynamics.experiments.work_precision import motions, named_tasks, work_precision
     from dynamics.experiments.work_precision.cold_start import STARTS
     from dynamics.experiments.work_precision.comparisons import COMPARISONS
     from dynamics.experiments.work_precision.measurement import PEERS, to_csv

@@ -15,7 +15,7 @@ from ...multibody.trees.mechanism import Mechanism
 from ...peers.mujoco import MujocoPeer
 from ...peers.peer import PeerModel
 from ...peers.pinocchio import PinocchioPeer
-from ..text_table import table
+from ..text_table import titled
 
 LINKS, STATES = 10, 100
 QUANTITIES = {"tau": inverse_dynamics, "qdd": forward_dynamics, "M": mass_matrix, "bias": bias}
@@ -36,7 +36,7 @@ def agreement(links: int = LINKS, count: int = STATES) -> Iterator[str]:
             except ImportError as missing:
                 yield f"{title}: not measured, {missing}"
                 break
-            yield "\n".join([title, *table(["links", *QUANTITIES], rows, left=())])
+            yield titled(title, ["links", *QUANTITIES], rows, left=())
 
 
 def random_arm(n: int, mass_model: str) -> Mechanism:

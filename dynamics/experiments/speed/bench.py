@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import statistics
-import string
 import textwrap
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -17,7 +16,7 @@ from cgraph.extend import Array, install
 from ...multibody.trees.mechanism import as_mechanism
 from ...peers import PEERS, PeerModel
 from ...peers.peer import MODES, MOTIONS, TASKS
-from ..text_table import WIDTH, digits, table
+from ..text_table import WIDTH, Footnotes, digits, table
 from .bench_scenes import QUICK, SCENES, load
 from .worker import Load, Prepared, Worker
 
@@ -279,14 +278,13 @@ def agrees(cell: Cell) -> bool:
 def _table(rows: Sequence[Row], read: Callable[[Row], dict[str, tuple[str, str]]], nodes: bool = False) -> list[str]:
     """Lines of a table; blocks of columns under each other where they do not fit, then its footnotes."""
     cells = {row.scene: read(row) for row in rows}
-    notes: dict[str, str] = {}  # reason: letter
+    notes = Footnotes()
     shown = [peer for peer in PEERS if any(peer in cells[row.scene] for row in rows)]
     unseen: dict[str, str] = {}  # peer: reason, where it is the same for all
     for row in rows:
         for peer, reason in row.skipped.items():
             if peer in shown:
-                letter = notes.setdefault(reason, string.ascii_lowercase[min(len(notes), 25)])
-                cells[row.scene][peer] = "-", letter
+                cells[row.scene][peer] = "-", notes.mark(reason)
             else:
                 unseen[peer] = reason
     head = ["scene", *(["nodes"] if nodes else []), *shown]
@@ -295,8 +293,7 @@ def _table(rows: Sequence[Row], read: Callable[[Row], dict[str, tuple[str, str]]
     lines = table(
         head, [[scene, *of_ours[scene], *[of.get(peer, "") for peer in shown]] for scene, of in cells.items()]
     )
-    lines += [f"{letter}: {reason}" for reason, letter in notes.items()]
-    return lines + [f"without {peer}: {reason}" for peer, reason in unseen.items()]
+    return lines + notes.lines() + [f"without {peer}: {reason}" for peer, reason in unseen.items()]
 
 
 def _spread(rows: Sequence[Row]) -> list[str]:

@@ -19,7 +19,7 @@ from ...multibody.loops import Loop
 from ...multibody.trees.mechanism import Mechanism
 from ...peers.peer import TimedTask
 from ...peers.pinocchio import constraint_dynamics
-from ..text_table import table
+from ..text_table import titled
 from .worker import repetitions, timed
 
 SIZES, LENGTH = (3, 10, 40), 0.8  # links, m each
@@ -84,7 +84,7 @@ def closed_chains(repeats: int = REPEATS) -> Iterator[str]:
         nodes = len(forward_dynamics(held).nodes)
         rows.append([str(links), str(nodes), f"{spent['ours']:.2f}", *ratios])
     header = ["links", "nodes", "ours", "constraintDynamics", "ratio", "connect", "ratio"]
-    yield "\n".join(["chains pinned at the tip; microseconds a call", *table(header, rows)])
+    yield titled("chains pinned at the tip; microseconds a call", header, rows)
 
 
 def _check(links: int, one: TimedTask, other: TimedTask) -> None:

@@ -20,8 +20,9 @@ from ...peers.jax import JaxPeer
 from ...peers.mujoco import MujocoPeer
 from ...peers.peer import AnyState, PeerModel, rk4_step
 from ...simulation.ensembles.simulate_many import simulate_many
+from ..clock import in_turns
 from ..machine import load
-from ..text_table import table
+from ..text_table import titled
 from .worker import single_core
 
 SCENE = "triple_pendulum"
@@ -105,19 +106,12 @@ def _measured(count: int, repeats: int) -> Iterator[str]:
             continue
         ends[name], runs[name] = run(), run
         yield f"first run of {name}, compiling included: {time.process_time() - begin:.3g} s of CPU"
-    cpu: dict[str, list[float]] = {name: [] for name in runs}
-    clock: dict[str, list[float]] = {name: [] for name in runs}
-    for _ in range(repeats):
-        for name, run in runs.items():
-            worked, begin = time.process_time(), time.perf_counter()
-            run()
-            cpu[name].append((time.process_time() - worked) / len(ends[name]) * 1e6)
-            clock[name].append((time.perf_counter() - begin) / len(ends[name]) * 1e6)
-    rows = []
-    for name, times in cpu.items():
-        typical, first = np.median(times), np.median(cpu["simulate_many"])
+    rows, first = [], None
+    for name, taken in in_turns(runs, repeats).items():
+        cpu, clock = (1e6 / len(ends[name]) * np.array([each[k] for each in taken]) for k in (1, 0))
+        first = first or np.median(cpu)
         apart = np.abs(ends[name] - ends["simulate_many"][: len(ends[name])]).max(axis=1)
-        cells = [typical, min(times), max(times), np.median(clock[name]), typical / first]
+        cells = [np.median(cpu), min(cpu), max(cpu), np.median(clock), np.median(cpu) / first]
         differences = [f"{np.median(apart):.1e}", f"{apart.max():.1e}"]
         rows.append([name, *[f"{each:.1f}" for each in cells], *differences])
     header = [
@@ -130,4 +124,4 @@ def _measured(count: int, repeats: int) -> Iterator[str]:
         "ends differ by",
         "at most",
     ]
-    yield "\n".join([f"{count} trajectories, peers {few}; load of the machine {load()}", *table(header, rows)])
+    yield titled(f"{count} trajectories, peers {few}; load of the machine {load()}", header, rows)

@@ -10,7 +10,6 @@ ArithmeticError where torques do not agree, and where detaching and attaching ag
 from __future__ import annotations
 
 import statistics
-import time
 from collections.abc import Callable, Iterator
 
 import numpy as np
@@ -25,7 +24,8 @@ from ...multibody.algebra.spatial import rotation
 from ...multibody.bodies.body import Body, Joint
 from ...multibody.quantities.recursive_inverse_dynamics import RecursiveInverseDynamics
 from ...multibody.trees.mechanism import Mechanism
-from ..text_table import table
+from ..clock import spent
+from ..text_table import titled
 from .bench_scenes import turned_arm
 
 Torque = Callable[[Array], Array]  # of q, where qd = q / 2 and qdd = -q
@@ -114,13 +114,6 @@ def changes(base: Mechanism, version: int) -> dict[str, tuple[Callable[[], Mecha
     }
 
 
-def timed(work: Callable[[], Array]) -> tuple[float, Array]:
-    """Milliseconds, and the result."""
-    begin = time.perf_counter()
-    result = work()
-    return 1e3 * (time.perf_counter() - begin), result
-
-
 def check(what: str, torques: Array, expected: Array, largest: float) -> None:
     """Raise ArithmeticError where torques differ by more, relative to the largest."""
     off = float(np.abs(torques - expected).max() / np.abs(expected).max())
@@ -136,10 +129,9 @@ def reconfiguration(links: int = LINKS, repeats: int = REPEATS) -> Iterator[str]
     again = base.detach(name).attach(base.subtree(name))
     if cg.structure_hash(inverse_dynamics(again)) != cg.structure_hash(inverse_dynamics(base)):
         raise ArithmeticError("a body that was detached and attached again gives another graph")
-    rows = [_row(base, kind, repeats) for kind in changes(base, 0)]
     header = ["change", "kernels", "shortest", "full rebuild", "shortest", "ratio", "MuJoCo", "shortest", "ratio"]
     title = f"arm of {links} hinges; milliseconds to the first torque, medians"
-    yield "\n".join([title, *table(header, rows)])
+    yield titled(title, header, [_row(base, kind, repeats) for kind in changes(base, 0)])
 
 
 def _row(base: Mechanism, kind: str, repeats: int) -> list[str]:
@@ -147,12 +139,13 @@ def _row(base: Mechanism, kind: str, repeats: int) -> list[str]:
     for version in range(repeats):
         change, n = changes(base, version)[kind]
         q = np.linspace(-0.5, 0.5, n)
-        spent, torques = timed(lambda: by_kernels(change())(q))  # noqa: B023 (called in this turn of the loop)
-        times["kernels"].append(spent)
+        taken = spent(lambda: by_kernels(change())(q))  # noqa: B023 (called in this turn of the loop)
+        torques = taken.made
+        times["kernels"].append(1e3 * taken.seconds)
         if version < REBUILDS:
-            spent, expected = timed(lambda: by_rebuild(change())(q))  # noqa: B023
-            times["rebuild"].append(spent)
-            check(f"{kind}, rebuilt", torques, expected, AGREE)
+            taken = spent(lambda: by_rebuild(change())(q))  # noqa: B023
+            times["rebuild"].append(1e3 * taken.seconds)
+            check(f"{kind}, rebuilt", torques, taken.made, AGREE)
         times["mujoco"] += _mujoco_times(base, kind, version, q, torques)
     shown = {who: [f"{statistics.median(ms):.2f}", f"{min(ms):.2f}"] if ms else ["-", "-"] for who, ms in times.items()}
     ratio = {who: f"{min(times['kernels']) / min(ms):.2g}" if ms else "-" for who, ms in times.items()}
@@ -174,6 +167,6 @@ def _mujoco_times(base: Mechanism, kind: str, version: int, q: Array, expected: 
         getattr(twin, kind)()
         return twin.torque(q)
 
-    spent, torques = timed(work)
-    check(f"{kind}, MuJoCo", torques, expected, AGREE_MUJOCO)
-    return [spent]
+    taken = spent(work)
+    check(f"{kind}, MuJoCo", taken.made, expected, AGREE_MUJOCO)
+    return [1e3 * taken.seconds]

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import statistics
 import sys
-import time
 from collections.abc import Callable, Iterator
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,8 +18,9 @@ from ...multibody.builders.planar_arm import planar_arm
 from ...multibody.trees.mechanism import Mechanism
 from ...multiprecision.chain_equations import accelerations
 from ...systems.model import as_system
+from ..clock import Made, spent
 from ..machine import run_fresh
-from ..text_table import digits, table
+from ..text_table import digits, table, titled
 from .bench_scenes import turned_arm
 
 BUILT, REPEATS = (3, 20), 7  # links of the arms of `build_time`, and builds of each
@@ -35,10 +35,8 @@ Seconds of the processor from the model to a first result, every chain in a proc
 graph, code: forward dynamics as a graph, and compiled.  Jacobian: by q, qd and tau, of the compiled function.
 A and B: `linearize_many`, 6 n^2 entries.  a body, an entry: in ms, of graph and code, the Jacobian, and A and B."""
 
-Made = TypeVar("Made")
 
-
-class Spent(NamedTuple):
+class Stage(NamedTuple):
     """Seconds by the clock and of the processor, and the peak of memory [MB] afterwards, 0 on Windows."""
 
     clock: float
@@ -46,18 +44,14 @@ class Spent(NamedTuple):
     peak: float
 
 
-class Stages:
-    """Runs one stage after another.  spent: what each has taken, by name."""
-
-    def __init__(self) -> None:
-        self.spent: dict[str, Spent] = {}
+class Stages(dict[str, Stage]):
+    """What each stage has taken, by name; a call runs the next one."""
 
     def __call__(self, name: str, function: Callable[[], Made]) -> Made:
         """Run a stage, its cost noted under that name."""
-        begin, worked = time.perf_counter(), time.process_time()
-        result = function()
-        self.spent[name] = Spent(time.perf_counter() - begin, time.process_time() - worked, _peak())
-        return result
+        taken = spent(function)
+        self[name] = Stage(taken.seconds, taken.processor, _peak())
+        return taken.made
 
 
 def _peak() -> float:
@@ -81,22 +75,24 @@ def build_time(links: int | None = None, repeats: int = REPEATS) -> Iterator[str
     """Median, fastest and slowest build of forward dynamics, and its size. links: of an arm of this length alone."""
     rows = []
     for n in BUILT if links is None else (links,):
-        stages, masses, lengths = Stages(), [1.0 - 0.3 * i / n for i in range(n)], [1.1 - 0.4 * i / n for i in range(n)]
-        for turn in range(repeats):  # an arm anew each time: its Lagrangian is kept
-            graph = stages(str(turn), lambda: forward_dynamics(planar_arm(masses, lengths, damping=0.1)))  # noqa: B023
-        seconds = [each.clock for each in stages.spent.values()]
+        masses, lengths = [1.0 - 0.3 * i / n for i in range(n)], [1.1 - 0.4 * i / n for i in range(n)]
+        builds = [  # of an arm anew each time: its Lagrangian is kept
+            spent(lambda: forward_dynamics(planar_arm(masses, lengths, damping=0.1)))  # noqa: B023
+            for _ in range(repeats)
+        ]
+        seconds, graph = [each.seconds for each in builds], builds[-1].made
         times = [f"{1e3 * each:.1f} ms" for each in (statistics.median(seconds), min(seconds), max(seconds))]
         rows.append([str(n), *times, str(len(graph.nodes)), str(len(graph.edges))])
     header = ["links", "median", "fastest", "slowest", "nodes", "edges"]
     title = "forward dynamics of a planar arm, from its Lagrangian to the simplified graph"
-    yield "\n".join([title, *table(header, rows, left=())])
+    yield titled(title, header, rows, left=())
 
 
 def compile_time(links: int | None = None) -> Iterator[str]:
     """A row a chain: time until forward dynamics and its derivatives have a result.  links: of this length alone."""
     sizes = COMPILED if links is None else (links,)
     rows = [[kind, str(n), *_fresh("compile_cost", kind, n).split()] for kind in MODELS for n in sizes]
-    yield "\n".join([TITLE, *table(COLUMNS, rows, left=(0,))])
+    yield titled(TITLE, COLUMNS, rows)
 
 
 def long_chains(links: int = LINKS) -> Iterator[str]:
@@ -132,7 +128,7 @@ def compile_cost(kind: str, n: int) -> None:
     function = stages("code", called)
     stages("Jacobian", lambda: function.jacobian(x))
     stages("A and B", lambda: linearize_many(model, *[part[None] for part in np.split(x, 3)]))
-    derived, compiled, jacobian, matrices = [each.processor for each in stages.spent.values()]
+    derived, compiled, jacobian, matrices = [each.processor for each in stages.values()]
     each = 1e3 * (derived + compiled) / n, 1e3 * jacobian / n, 1e3 * matrices / (6 * n * n)
     shown = [derived, compiled, each[0], jacobian, each[1], matrices, each[2]]
     sys.stdout.write(" ".join([str(len(graph.nodes)), *[digits(value, 2) for value in shown]]))
@@ -150,7 +146,7 @@ def cost(kind: str, n: int) -> None:
     run = stages("compile", lambda: cg.compile(graph))
     compiled = stages("first call", lambda: run(x))
     stages("second call", lambda: run(x))
-    rows = [[name, f"{s.clock:.3f} s", f"{s.processor:.3f} s", f"{s.peak:.0f} MB"] for name, s in stages.spent.items()]
+    rows = [[name, f"{s.clock:.3f} s", f"{s.processor:.3f} s", f"{s.peak:.0f} MB"] for name, s in stages.items()]
     apart = np.abs(evaluated - compiled).max() / np.abs(evaluated).max()
     size = f"{len(graph.nodes)} nodes, {len(graph.nodes) / n:.0f} a link; compiled and evaluated differ by {apart:.1e}"
     sys.stdout.write("\n".join([*table(["stage", "clock", "processor", "peak"], rows), size]))

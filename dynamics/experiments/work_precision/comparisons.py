@@ -24,12 +24,12 @@ from ...simulation.simulate import simulate
 from ...simulation.steps.scipy_solvers import solve_ivp
 from ..accuracy_task import AccuracyTask
 from ..stability.energy_drift import SYMPLECTIC, drift
-from ..text_table import table
+from ..text_table import table, titled
 from .cold_start import cold_starts
 from .measurement import ErrorMetrics, Tried, in_turns
 from .named_tasks import load
 from .trajectory_peers import EPSILON, Cvodes, Heyoka
-from .trajectory_runs import Ours, Outcome, Scipy, Solver, problem_of
+from .trajectory_runs import Ours, Outcome, Run, Scipy, Solver, problem_of
 from .work_precision import error_metrics, work_precision
 
 FIXED = tuple([name for name, method in METHODS.items() if not method.adaptive])
@@ -109,7 +109,7 @@ class Comparison:
             counts = ["-" if count is None else str(count) for count in (out.steps, out.evaluations)]
             rows.append([name, *times, *counts])
         title = f"error at most {self.error:g} at t = {self.subject.task.t_end:g} s"
-        return "\n".join([title, *table(header, rows), *self.refused])
+        return "\n".join([titled(title, header, rows), *self.refused])
 
 
 def tolerances(first: float, last: float, per_decade: int = 4) -> list[float]:
@@ -129,7 +129,7 @@ def orders(folder: str) -> Iterator[str]:
             if curve.fitted is not None and curve.order is not None:
                 fitted, apart = f"{curve.fitted:.4f}", f"{curve.fitted - curve.order:+.4f}"
             rows.append([curve.name, str(curve.order), fitted, apart])
-        yield "\n".join([f"fitted orders, {name}", *table(["", "declared", "fitted", "difference"], rows)])
+        yield titled(f"fitted orders, {name}", ["", "declared", "fitted", "difference"], rows)
 
 
 def taylor(folder: str) -> Iterator[str]:
@@ -150,7 +150,7 @@ def taylor(folder: str) -> Iterator[str]:
     ours = next(each.seconds for each in starts if each.name == "ours")
     rows = [[s.name, f"{s.seconds:.3f}", f"{s.median:.3f}", f"{s.seconds / ours:.2f}", s.status] for s in starts]
     title = "cold start: model to end of first run, nothing compiled; heyoka at its default tolerance [s]"
-    yield "\n".join([title, *table(["", "shortest", "median", "times ours", "status"], rows, left=(0, 4))])
+    yield titled(title, ["", "shortest", "median", "times ours", "status"], rows, left=(0, 4))
 
 
 def stiff(folder: str) -> Iterator[str]:
@@ -211,9 +211,9 @@ class SolveIvp(Solver):
         super().__init__("solve_ivp", "SciPy's solve_ivp, DOP853", task, smallest)
         self.rate, self.solve = rate, solve_ivp()
 
-    def ready(self, knob: float) -> Callable[[], Outcome]:
+    def ready(self, knob: float) -> Run:
         """The run with that knob, everything before it done: what is timed."""
-        return lambda: self._run(knob)[0]
+        return Run(lambda: self._run(knob)[0])
 
     def rows(self, knob: float) -> Array:
         """The states at the task's times, (T, m); NaN from where it stopped."""

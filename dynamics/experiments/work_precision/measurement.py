@@ -6,9 +6,9 @@ import gc
 import math
 import statistics
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 
@@ -21,13 +21,16 @@ from ...multiprecision import Reference
 from ...simulation.run_options import SCIPY
 from ...systems.model import as_system
 from ..accuracy_task import INTERVALS, AccuracyTask
+from ..clock import Spent, spent
 from ..paper_numbers import exponent
 from ..text_table import csv_text
 from .cold_start import ColdStart
-from .trajectory_runs import CHOSEN, EQUAL, Outcome, Solver
+from .trajectory_runs import CHOSEN, EQUAL, EndSolver, Outcome, Run, Solver
 
 OURS = "ours"
-PEERS = {"MuJoCo": "MuJoCo", "SciPy": SCIPY, "heyoka": "heyoka", "CasADi": "CVODES"}  # how their solvers' names begin
+# How the names of peers' solvers begin.
+PEERS = {"MuJoCo": "MuJoCo", "SciPy": SCIPY, "heyoka": "heyoka", "CasADi": "CVODES", "diffrax": "diffrax"}
+AnySolver = TypeVar("AnySolver", bound=EndSolver)
 TARGETS = (1e-3, 1e-6, 1e-9, 1e-12)
 
 
@@ -133,7 +136,12 @@ def targets(curves: Sequence[Curve], errors: Sequence[float] = TARGETS) -> list[
 
 def group_of(curve: Curve) -> str:
     """Ours, or the peer that a solver belongs to."""
-    return OURS if curve.ours else next(peer for peer, begin in PEERS.items() if curve.name.startswith(begin))
+    return OURS if curve.ours else group(curve.name)
+
+
+def group(name: str) -> str:
+    """The peer that a solver of this name belongs to; ours for none."""
+    return next((peer for peer, begin in PEERS.items() if name.startswith(begin)), OURS)
 
 
 def _fastest(curves: Sequence[Curve], error: float) -> tuple[Curve, Point] | None:
@@ -166,11 +174,19 @@ def _plain(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
+CLOCKS = 200  # readings of the clocks, of which the quickest tells what they take
 CHUNK = 5e-3  # s, of runs that are timed in one turn
 WORST, FLOOR = 1e-1, 5e-12  # errors between which an order is fitted: above is no order yet, below is rounding
 FITTED = 3  # points of equal steps, the finest between those bounds: the coarser are no order yet
 ENOUGH = 0.5  # s of timed runs of a knob, after which three runs are enough
 STALLED = 2  # knobs in a row without a smaller error, after which no finer one is tried
+
+
+class EndMetrics(Protocol):
+    """What tells the error of an end."""
+
+    def at_end(self, x: Array) -> float:
+        """The error of a state at t_end."""
 
 
 class ErrorMetrics:
@@ -209,24 +225,26 @@ class ErrorMetrics:
 
 @dataclass
 class Tried:
-    """One knob of a solver, and what was timed of it."""
+    """One knob of a solver, and what was timed of it: by the clock, of the processor, and `once`, of its first run."""
 
     knob: float
-    run: Callable[[], Outcome]
+    run: Run
     outcome: Outcome
     error: float
+    once: Spent[Any] | None = None
     seconds: list[float] = field(default_factory=list)
+    processor: list[float] = field(default_factory=list)
 
 
 @dataclass
-class Entry:
+class Entry(Generic[AnySolver]):
     """A solver with its knobs."""
 
-    solver: Solver
+    solver: AnySolver
     tried: list[Tried] = field(default_factory=list)
     stopped: str = ""
 
-    def curve(self, metrics: ErrorMetrics, problem: Problem) -> Curve:
+    def curve(self: Entry[Solver], metrics: ErrorMetrics, problem: Problem) -> Curve:
         """Curve of the report."""
         solver = self.solver
         points = tuple([_point(solver, each, metrics) for each in self.tried])
@@ -266,36 +284,40 @@ def _point(solver: Solver, tried: Tried, metrics: ErrorMetrics) -> Point:
     )
 
 
-def sweep(solver: Solver, metrics: ErrorMetrics, limit: float) -> Entry:
+def sweep(
+    solver: AnySolver, metrics: EndMetrics, limit: float, knobs: Sequence[float] | None = None
+) -> Entry[AnySolver]:
     """From coarse to fine: each knob once, until it takes too long or is no longer better."""
     entry = Entry(solver)
     best, stalled = math.inf, 0
-    knobs = solver.tolerances if solver.kind == CHOSEN else [float(INTERVALS * 2**k) for k in range(24)]
-    for knob in knobs:
-        begin = time.perf_counter()
+    usual = solver.tolerances if solver.kind == CHOSEN else [float(INTERVALS * 2**k) for k in range(24)]
+    for knob in usual if knobs is None else knobs:
+        begin = time.process_time()
         try:
             run = solver.ready(knob)
-            begin = time.perf_counter()
-            outcome = run()
+            run.rewind()
+            begin = time.process_time()
+            once = spent(run.run)
+            outcome = run.read(once.made)
             status = outcome.status
         except Exception as error:  # noqa: BLE001 (whatever a peer's own code raises is a line in the report)
             kind = "" if isinstance(error, ValueError) else f"{type(error).__name__}: "
             status = kind + " ".join(str(error).split())[:200]
-        spent = time.perf_counter() - begin
+        took = time.process_time() - begin
         if not status and not math.isfinite(error_at_end := metrics.at_end(outcome.x)):
             status = "is not finite"
         entry.stopped = status
         if status:
-            if entry.tried or spent > limit:  # a coarse knob may fail, and a finer one not
+            if entry.tried or took > limit:  # a coarse knob may fail, and a finer one not
                 break
             continue
-        entry.tried.append(Tried(knob, run, outcome, error_at_end))
+        entry.tried.append(Tried(knob, run, outcome, error_at_end, once))
         stalled = 0 if error_at_end < 0.5 * best else stalled + 1
         best = min(best, error_at_end)
         if stalled >= STALLED and best < FLOOR:
             entry.stopped = "rounding"
             break
-        if spent > limit:
+        if took > limit:
             entry.stopped = f"run time above {limit:g} s"
             break
     else:
@@ -306,6 +328,9 @@ def sweep(solver: Solver, metrics: ErrorMetrics, limit: float) -> Entry:
 def in_turns(tried: Sequence[Tried], turns: int) -> None:
     """Time every run in turns, so that all share the machine's moods; short runs several times a turn."""
     gc.disable()
+    read = min(
+        [spent(_nothing).processor for _ in range(CLOCKS)]
+    )  # what the reading of the clocks takes of the processor
     try:
         for _ in range(turns):
             for each in tried:
@@ -313,13 +338,17 @@ def in_turns(tried: Sequence[Tried], turns: int) -> None:
                     continue
                 left = CHUNK
                 while left > 0.0:
-                    begin = time.perf_counter()
-                    each.run()
-                    spent = time.perf_counter() - begin
-                    each.seconds.append(spent)
-                    left -= spent
+                    each.run.rewind()
+                    taken = spent(each.run.run)
+                    each.seconds.append(taken.seconds)
+                    each.processor.append(max(taken.processor - read, 0.0))
+                    left -= taken.seconds
     finally:
         gc.enable()
+
+
+def _nothing() -> None:
+    """A run of no length."""
 
 
 def fitted_order(steps: Sequence[float], errors: Sequence[float], finest: int | None = None) -> float | None:

@@ -1,4 +1,4 @@
-"""Solvers of other software: MuJoCo's integrators, heyoka's Taylor series, CVODES through CasADi."""
+"""Solvers of other software: MuJoCo's integrators, heyoka's Taylor series, CVODES through CasADi, diffrax."""
 
 from __future__ import annotations
 
@@ -17,20 +17,24 @@ from ...io.mujoco_twin import rollout
 from ...peers import PeerModel, UnavailableError
 from ...peers.casadi import NAMES as CASADI_NAMES, casadi
 from ...peers.heyoka import expressions, heyoka
+from ...peers.jax import NAMES as JAX_NAMES, double_precision
 from ...peers.mujoco import MujocoPeer
+from ...peers.peer import required
 from ...peers.translate import translated
 from ...simulation.run_options import SCIPY, SCIPY_SOLVERS
 from ...systems.arguments import TIME
 from ..accuracy_task import INTERVALS, AccuracyTask
-from .trajectory_runs import EQUAL, Outcome, Scipy, Solver
+from .trajectory_runs import EQUAL, Outcome, Run, Scipy, Solver
 
 if TYPE_CHECKING:
-    from casadi import SX, Function
+    from casadi import DM, SX, Function
     from heyoka import expression, taylor_adaptive
 
 EPSILON = 2.0**-52
 COMPACT = 300  # nodes of the rate; beyond, heyoka's code written out takes minutes to compile
-MOST_STEPS = 100_000  # steps of heyoka and of CVODES
+MOST_STEPS = 100_000  # steps of heyoka, of CVODES and of diffrax
+JITTED = 1000  # nodes of the rate for XLA
+DIFFRAX = ("Dopri8", "Kvaerno5")  # the second for stiff equations
 MUJOCO = {"Euler": 1, "RK4": 4, "implicit": 1, "implicitfast": 1}  # with the orders of their errors
 CVODES: dict[str, dict[str, Any]] = {
     "BDF": {},
@@ -53,15 +57,10 @@ class Mujoco(Solver):
         self.model.opt.integrator = getattr(self.peer.mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}")
         self.begin = self.peer.starts(self.start[None])
 
-    def ready(self, knob: float) -> Callable[[], Outcome]:
+    def ready(self, knob: float) -> Run:
         """The run with that knob, everything before it done: what is timed."""
         states, run = self._states(int(knob))
-
-        def whole() -> Outcome:
-            run()
-            return Outcome(states[0, -1, self.peer.taken], int(knob))
-
-        return whole
+        return Run(run, lambda _: Outcome(states[0, -1, self.peer.taken], int(knob)))
 
     def rows(self, knob: float) -> Array:
         """The states at the task's times, (T, m); NaN from where it stopped."""
@@ -114,23 +113,23 @@ class Heyoka(Solver):
                 self.system, self.start.tolist(), compact_mode=self.compact, **options
             )
         integrator = self._made[knob]
-        integrator.time = 0.0
-        integrator.state[:] = self.start
+        self._rewind(integrator)
         return integrator
 
-    def ready(self, knob: float) -> Callable[[], Outcome]:
+    def _rewind(self, integrator: taylor_adaptive) -> None:
+        integrator.time = 0.0
+        integrator.state[:] = self.start
+
+    def ready(self, knob: float) -> Run:
         """The run with that knob, everything before it done: what is timed."""
         integrator = self.integrator(knob)
-        t_end, limit = self.task.t_end, self.heyoka.taylor_outcome.time_limit
+        propagate, limit = integrator.propagate_until, self.heyoka.taylor_outcome.time_limit
 
-        def run() -> Outcome:
-            integrator.time = 0.0
-            integrator.state[:] = self.start
-            outcome, _, _, steps, *_ = integrator.propagate_until(t_end, max_steps=MOST_STEPS)
-            status = "" if outcome == limit else f"stopped after {steps} steps"
-            return Outcome(integrator.state.copy(), steps, None, None, status)
+        def read(found: tuple[Any, ...]) -> Outcome:
+            status = "" if found[0] == limit else f"stopped after {found[3]} steps"
+            return Outcome(integrator.state.copy(), found[3], None, None, status)
 
-        return run
+        return Run(partial(propagate, self.task.t_end, max_steps=MOST_STEPS), read, partial(self._rewind, integrator))
 
     def rows(self, knob: float) -> Array:
         """The states at the task's times, (T, m); NaN from where it stopped."""
@@ -172,16 +171,15 @@ class Cvodes(Solver):
         }
         return self.casadi.integrator("run", "cvodes", self.equations, 0.0, list(times), options | self.options)
 
-    def ready(self, knob: float) -> Callable[[], Outcome]:
+    def ready(self, knob: float) -> Run:
         """The run with that knob, everything before it done: what is timed."""
-        function, start = self._function(knob, [self.task.t_end]), self.start.tolist()
+        function = self._function(knob, [self.task.t_end])
 
-        def run() -> Outcome:
-            state = np.array(function(x0=start)["xf"]).ravel()
+        def read(found: dict[str, DM]) -> Outcome:
             stats = function.stats()
-            return Outcome(state, stats["nsteps"], stats["netfails"], stats["nfevals"])
+            return Outcome(np.array(found["xf"]).ravel(), stats["nsteps"], stats["netfails"], stats["nfevals"])
 
-        return run
+        return Run(partial(function, x0=self.start.tolist()), read)
 
     def rows(self, knob: float) -> Array:
         """The states at the task's times, (T, m); NaN from where it stopped."""
@@ -196,12 +194,80 @@ class Cvodes(Solver):
         return np.array([np.array(rate(row, 0.0)).ravel() for row in x])
 
 
-def heyoka_equations(hy: ModuleType, problem: Problem) -> list[tuple[expression, expression]]:
-    """Our rate as heyoka's pairs of variable and expression. Raises UnavailableError for an operation it has not."""
+class Diffrax(Solver):
+    """One of diffrax's solvers on our equations, node for node, jitted in double precision."""
+
+    tolerances = tuple([10.0**-k for k in range(3, 15)])
+
+    def __init__(self, solver: str, task: AccuracyTask, smallest: float, problem: Problem) -> None:
+        super().__init__(f"diffrax {solver}", "diffrax's solver on our equations, jitted", task, smallest)
+        if len(problem.rate.nodes) > JITTED:
+            raise UnavailableError(f"XLA takes minutes for more than {JITTED} nodes")
+        diffrax, jax = required("diffrax", "diffrax"), double_precision()
+        graph, method, numpy = problem.rate, getattr(diffrax, solver)(), jax.numpy
+
+        def rate(t: object, x: object, _: object) -> object:
+            env = dict(zip(graph.inputs, [*x, t], strict=True))  # type: ignore[misc]
+            values = translated(graph.nodes, env, numpy, JAX_NAMES)
+            return numpy.stack([numpy.asarray(values[node], dtype=float) for node in graph.outputs.values()])
+
+        term = diffrax.ODETerm(rate)
+
+        def end(x: object, t_end: float, rtol: float, atol: float) -> tuple[object, ...]:
+            found = diffrax.diffeqsolve(
+                term,
+                method,
+                0.0,
+                t_end,
+                None,
+                x,
+                saveat=diffrax.SaveAt(t1=True),
+                stepsize_controller=diffrax.PIDController(rtol=rtol, atol=atol),
+                max_steps=MOST_STEPS,
+                throw=False,
+            )
+            return found.ys[-1], found.stats["num_accepted_steps"], found.result == diffrax.RESULTS.successful
+
+        self._end, self._x = jax.jit(end), numpy.asarray(self.start)
+
+    def ready(self, knob: float) -> Run:
+        """The run with that knob, everything before it done: what is timed."""
+        arguments = self._x, self.task.t_end, knob, self.absolute(knob)
+
+        def run() -> tuple[object, ...]:
+            found: tuple[Any, ...] = self._end(*arguments)
+            found[0].block_until_ready()
+            return found
+
+        run()  # compiles
+
+        def read(found: tuple[Any, ...]) -> Outcome:
+            state, steps, good = found
+            return Outcome(np.asarray(state), int(steps), None, None, "" if good else f"stopped after {steps} steps")
+
+        return Run(run, read)
+
+    def rows(self, knob: float) -> Array:
+        """The states at the task's times, (T, m), a run to each."""
+        ends = [self.until(t).ready(knob)().x for t in self.task.times if t > 0.0]
+        return np.array([*[self.start] * (self.task.times[0] == 0.0), *ends])
+
+
+def heyoka_equations(
+    hy: ModuleType, problem: Problem, kind: Callable[[float], Any] = float
+) -> list[tuple[expression, expression]]:
+    """Our rate as heyoka's pairs of variable and expression. Raises UnavailableError for an operation it has not.
+
+    kind: of the constants, which heyoka multiplies with each other where it can.
+    """
     graph = problem.rate
+
+    def number(value: float) -> expression:
+        return hy.expression(kind(value))
+
     env = {node: hy.time if node.name == TIME else hy.make_vars(f"x_{node.name}") for node in graph.inputs}
     functions = SimpleNamespace(**vars(hy), where=hy.select, hypot=lambda a, b: hy.sqrt(a * a + b * b))
-    values = translated(graph.nodes, env, functions, number=hy.expression)
+    values = translated(graph.nodes, env, functions, number=number)
     states = [env[node] for node in graph.inputs[: problem.size]]
     return list(zip(states, [hy.expression(values[rate]) for rate in graph.outputs.values()], strict=True))
 
@@ -235,4 +301,6 @@ def offers(task: AccuracyTask, smallest: float, problem: Problem, backend: str) 
     makers["heyoka Taylor"] = partial(Heyoka, task, smallest, problem)
     for kind in CVODES:
         makers[f"CVODES {kind}"] = partial(Cvodes, kind, task, smallest, problem)
+    for solver in DIFFRAX:
+        makers[f"diffrax {solver}"] = partial(Diffrax, solver, task, smallest, problem)
     return makers

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import copy
 import math
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -38,8 +40,26 @@ class Outcome(NamedTuple):
     status: str = ""
 
 
-class Solver(ABC):
-    """A way to integrate one task.
+def _nothing() -> None:
+    """Nothing to do."""
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run made ready: `run` is what is timed; before it `rewind` goes back to the start, `read` tells its outcome."""
+
+    run: Callable[[], Any]
+    read: Callable[[Any], Outcome] = lambda outcome: outcome
+    rewind: Callable[[], object] = _nothing
+
+    def __call__(self) -> Outcome:
+        """Outcome of the run."""
+        self.rewind()
+        return self.read(self.run())
+
+
+class EndSolver(ABC):
+    """A way to compute the end of one task.
 
     kind: `EQUAL`, where the knob is the number of steps, or `CHOSEN`, where it is the relative tolerance.
     order: of its error, as declared; None where that is no fixed number.
@@ -54,9 +74,23 @@ class Solver(ABC):
         self.name, self.about, self.task, self.smallest = name, about, task, smallest
         self.start = np.array(task.start)
 
+    def until(self, t_end: float) -> EndSolver:
+        """The same to another end, with what is compiled already."""
+        other = copy.copy(self)
+        other.task = replace(self.task, t_end=t_end)
+        return other
+
     @abstractmethod
-    def ready(self, knob: float) -> Callable[[], Outcome]:
-        """Run with that knob, everything before it done: what is timed. Raises for a knob that cannot be had."""
+    def ready(self, knob: float) -> Run:
+        """Run with that knob, everything before it done. Raises for a knob that cannot be had."""
+
+    def absolute(self, knob: float) -> float:
+        """The absolute tolerance that goes with a relative one: as small a part of the smallest state."""
+        return knob * self.smallest
+
+
+class Solver(EndSolver):
+    """A way to integrate one task, which tells the states on the way, too."""
 
     @abstractmethod
     def rows(self, knob: float) -> Array:
@@ -65,10 +99,6 @@ class Solver(ABC):
     def rates(self, x: Array) -> Array | None:
         """Rates of the states, (T, m), at states (T, m); None where they are computed by our graph."""
         return None
-
-    def absolute(self, knob: float) -> float:
-        """The absolute tolerance that goes with a relative one: as small a part of the smallest state."""
-        return knob * self.smallest
 
 
 def problem_of(task: AccuracyTask) -> Problem:
@@ -131,12 +161,12 @@ class Ours(Solver):
             return RunOptions(t_end, self.name, rtol=knob, atol=self.absolute(knob), t_eval=times)
         return RunOptions(t_end, self.name, dt=t_end / knob, t_eval=times, max_steps=max_steps)
 
-    def ready(self, knob: float) -> Callable[[], Outcome]:
+    def ready(self, knob: float) -> Run:
         """The run to t_end, without dense output."""
         if self.kind == EQUAL and self._at_least(knob) > LONGEST_RUN:  # one that does not look at the clock on its way
-            return lambda: Outcome(self.start, status=f"would take longer than {LONGEST_RUN:g} s")
+            return Run(lambda: Outcome(self.start, status=f"would take longer than {LONGEST_RUN:g} s"))
         compiled, options = self._plain, self._options(knob, [self.task.t_end])
-        return lambda: finished(integration(NativeRun(compiled, options)), self.start)
+        return Run(lambda: finished(integration(NativeRun(compiled, options)), self.start))
 
     def _at_least(self, knob: float) -> float:
         """Seconds that so many equal steps take, by the first few of them."""
@@ -166,10 +196,10 @@ class Scipy(Solver):
     def _options(self, knob: float, times: Sequence[float] | None) -> RunOptions:
         return RunOptions(self.task.t_end, self.name, rtol=knob, atol=self.absolute(knob), t_eval=times)
 
-    def ready(self, knob: float) -> Callable[[], Outcome]:
+    def ready(self, knob: float) -> Run:
         """The run to t_end, which records its steps alone."""
         solver, options = self._solver, self._options(knob, None)
-        return lambda: finished(ScipyIntegration(solver, options), self.start)._replace(rejected=None)
+        return Run(lambda: finished(ScipyIntegration(solver, options), self.start)._replace(rejected=None))
 
     def rows(self, knob: float) -> Array:
         """The states at the task's times, (T, m); NaN from where it stopped."""

@@ -59,7 +59,7 @@ def work_precision(
     spent = time.perf_counter() - begin
     problem = problem_of(task)
     absent: dict[str, str] = {}
-    entries: list[Entry] = []
+    entries: list[Entry[Solver]] = []
     for solver in _solvers(task, metrics.smallest, problem, methods, peers, backend, absent):
         say(f"{name}: {solver.name}")
         entry = sweep(solver, metrics, limit if solver.ours else PATIENCE * limit)

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shutil
+import time
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -10,6 +12,7 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
+from dynamics.experiments.clock import in_turns, spent
 from dynamics.experiments.speed import closed_chains, ensembles, reconfiguration, stages
 from dynamics.experiments.speed.agreement import QUANTITIES, differences, random_arm
 from dynamics.experiments.speed.bench_figures import FIGURES
@@ -78,6 +81,15 @@ def test_the_cost_of_a_chain_is_told_by_stage(capsys: pytest.CaptureFixture[str]
     lines = capsys.readouterr().out.splitlines()
     assert [line.split("  ")[0] for line in lines[2:5]] == ["Lagrangian", "forward dynamics", "evaluate"]
     assert lines[-1].startswith(f"{len(dyn.forward_dynamics(turned_arm(3)).nodes)} nodes")
+
+
+def test_runs_take_turns_on_both_clocks() -> None:
+    order: list[str] = []
+    taken = in_turns({name: partial(order.append, name) for name in "ab"}, 3)
+    assert order == ["a", "b"] * 3
+    assert all(each.seconds > 0.0 and each.processor >= 0.0 for each in [*taken["a"], *taken["b"]])
+    assert spent(lambda: sum(range(10**6))).made == 499999500000
+    assert spent(lambda: time.sleep(0.05)).seconds > 2.0 * spent(lambda: time.sleep(0.05)).processor
 
 
 def test_closed_chains_are_timed_and_agree(monkeypatch: pytest.MonkeyPatch) -> None:

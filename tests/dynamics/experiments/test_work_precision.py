@@ -36,6 +36,7 @@ from dynamics.experiments.work_precision.trajectory_runs import (
     EQUAL,
     Ours,
     Outcome,
+    Run,
     Scipy,
     Solver,
     problem_of,
@@ -322,7 +323,7 @@ class Broken(Solver):
                 return Outcome(np.array([math.nan, 0.0]))
             return Outcome(np.array([math.cos(T_END), -math.sin(T_END)]) + knob, 1)
 
-        return run
+        return Run(run)
 
     def rows(self, knob: float) -> Any:
         if knob == 1e-2:
