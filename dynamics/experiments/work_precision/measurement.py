@@ -292,7 +292,7 @@ def sweep(
     best, stalled = math.inf, 0
     usual = solver.tolerances if solver.kind == CHOSEN else [float(INTERVALS * 2**k) for k in range(24)]
     for knob in usual if knobs is None else knobs:
-        begin = time.process_time()
+        begin, once = time.process_time(), None
         try:
             run = solver.ready(knob)
             run.rewind()
@@ -303,7 +303,7 @@ def sweep(
         except Exception as error:  # noqa: BLE001 (whatever a peer's own code raises is a line in the report)
             kind = "" if isinstance(error, ValueError) else f"{type(error).__name__}: "
             status = kind + " ".join(str(error).split())[:200]
-        took = time.process_time() - begin
+        took = time.process_time() - begin if once is None else once.processor
         if not status and not math.isfinite(error_at_end := metrics.at_end(outcome.x)):
             status = "is not finite"
         entry.stopped = status
