@@ -14,7 +14,7 @@ from cgraph.extend import Array
 from ...integrators import METHODS
 from ...peers.heyoka import heyoka
 from ...simulation.ensembles.simulate_many import simulate_many
-from ...simulation.simulate import simulate
+from ...simulation.prepare import prepare
 from ...simulation.trajectory import Stats
 from ..accuracy_task import AccuracyTask
 from .trajectory_peers import MOST_STEPS, Heyoka
@@ -27,14 +27,14 @@ def run_to_end(
     task: AccuracyTask, method: str, rtol: float
 ) -> tuple[Callable[[], Any], Callable[[Any], tuple[Array, Stats]]]:
     """A motion of ours, compiled, and what reads its end and statistics: the one place that says how we are called."""
-    options: dict[str, Any] = {"method": method, "rtol": rtol, "progress": False}
-    run, short = partial(simulate, task.model, task.q, task.qd or None, **options), COMPILES * task.t_end
-    run(t_end=short, t_eval=[short])
+    motion = prepare(task.model, method, rtol=rtol, progress=False)
+    q, qd = np.array(task.q), np.array(task.qd) if task.qd else None
+    motion.end(q, qd, COMPILES * task.t_end)
 
     def read(found: Any) -> tuple[Array, Stats]:
-        return np.concatenate([found.q[-1], found.qd[-1]]), found.stats
+        return np.concatenate([found.q, found.qd]), motion(q, qd, task.t_end, t_eval=[task.t_end]).stats
 
-    return partial(run, t_end=task.t_end, t_eval=[task.t_end]), read
+    return partial(motion.end, q, qd, task.t_end), read
 
 
 class Motion(EndSolver):
