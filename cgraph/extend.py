@@ -121,7 +121,7 @@ if TYPE_CHECKING:
     )
     from .util.caches import kept_by_first as kept_by_first, memo as memo
     from .util.doors import doors as doors
-    from .util.extras import install as install
+    from .util.extras import install as install, scipy_module as scipy_module
     from .util.html_text import html_lines as html_lines, html_table as html_table, picture as picture
     from .util.json_type import Json as Json
     from .util.real_arrays import is_finite as is_finite, real_array as real_array, real_number as real_number
@@ -135,7 +135,6 @@ if TYPE_CHECKING:
         require_texts as require_texts,
         require_whole as require_whole,
     )
-    from .util.scipy_modules import scipy_module as scipy_module
     from .util.threads import share as share, thread_count as thread_count
     from .util.words import counted as counted, nearest as nearest, or_nearest as or_nearest
     from .writing.formulas import Formulas as Formulas, Notation as Notation

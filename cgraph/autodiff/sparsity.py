@@ -16,8 +16,8 @@ from ..core.node import Node, as_node, variable
 from ..core.row import Row
 from ..core.scope import building
 from ..util.caches import OPERATIONS, memo
+from ..util.extras import scipy_module
 from ..util.require import require_graph
-from ..util.scipy_modules import scipy_module
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array

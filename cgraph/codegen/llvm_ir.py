@@ -164,13 +164,7 @@ def instructions(
             return r, [*address("x", f"{r}.x", rows[node]), one, *arithmetic.splat(r, f"{r}.one")]
         return r, [*address("x", f"{r}.x", rows[node]), f"  {r} = load {t}, ptr {r}.x, align 8"]
 
-    outputs: dict[Node, list[int]] = {}
-    ends: dict[int, Node] = {}
-    for row, node in enumerate(graph.outputs.values()):
-        if row in last:
-            ends[row] = node
-        else:
-            outputs.setdefault(node, []).append(row)
+    outputs, ends = _places_of_outputs(graph, last)
 
     def store(places: Iterable[int], r: str) -> Iterator[str]:
         for row in places:
@@ -206,6 +200,18 @@ def instructions(
             written[-1] += [*lines, *store(places, r)]
     written[-1] += _last_stores(ends, parts, store)
     return Code(written, constants.start(), parts.places, constants.definitions())
+
+
+def _places_of_outputs(graph: Graph, last: Collection[int]) -> tuple[dict[Node, list[int]], dict[int, Node]]:
+    """Rows of outputs, {node: its rows}, and {row: node} of those that are stored at the end."""
+    outputs: dict[Node, list[int]] = {}
+    ends: dict[int, Node] = {}
+    for row, node in enumerate(graph.outputs.values()):
+        if row in last:
+            ends[row] = node
+        else:
+            outputs.setdefault(node, []).append(row)
+    return outputs, ends
 
 
 def _merged(graph: Graph, arithmetic: Arithmetic, products: Mapping[Node, Node] | None) -> Merged:

@@ -1,4 +1,11 @@
-"""The extras of the distribution: what the errors about missing packages say."""
+"""The extras of the distribution: what errors about missing packages say, and SciPy, which is imported here alone."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from types import ModuleType
+
+from .require import require_choice
 
 
 def install(extra: str) -> str:
@@ -11,3 +18,17 @@ def install(extra: str) -> str:
     "in a checkout of cgraph, pip install '.[viz]'"
     """
     return f"in a checkout of cgraph, pip install '.[{extra}]'"
+
+
+def scipy_module(name: str, what: str) -> ModuleType:
+    """SciPy's module `integrate` or `sparse`. Raises ImportError, saying that `what` needs SciPy, where there is none.
+
+    >>> from cgraph.extend import scipy_module
+    >>> scipy_module("integrate", "method 'scipy:BDF'").__name__
+    'scipy.integrate'
+    """
+    require_choice("name", name, ("integrate", "sparse"))
+    try:
+        return import_module(f"scipy.{name}")
+    except ImportError:
+        raise ImportError(f"{what} needs SciPy: {install('scipy')}") from None

@@ -15,7 +15,7 @@ from ..row_values import values_of
 from ..run_options import RunOptions
 from .dense_output import StepBlock
 from .first_step import TOLERANCE, given, instant
-from .flat_position import FlatPosition
+from .flat_position import CREEP, FlatPosition
 from .stepping import NativeIntegration, NativeRun, nonfinite
 
 HELD, SHARE = 100, 0.25  # steps at the stability limit, of all, from which on a run is called stiff
@@ -41,7 +41,8 @@ class AdaptiveIntegration(NativeIntegration):
                 self.status = self.too_many(at, self.options.max_steps) + self.flat.near(self.parameters)
                 return
             tolerance = self.runner.read(memory, TOLERANCE).copy()
-            rows, _ = self._advance(memory, int(min(left, 2**31)), whole=False)
+            most = left if self.flat.rows is None else min(left, CREEP)
+            rows, _ = self._advance(memory, int(min(most, 2**31)), whole=False)
             status = self._number(memory, "status")
             self._count(len(rows), int(self._number(memory, "rejected")))
             if "jacobians" in self.runner.program.registers:  # a method that keeps them counts by itself
