@@ -203,6 +203,7 @@ def test_threads_have_a_memory_each() -> None:
     assert together == alone
 
 
+@mark.usefixtures("ctrl_c")
 @mark.parametrize("method", ["dop853", "rk4"])
 def test_ctrl_c_ends_a_long_run(method: str) -> None:
     motion = dyn.prepare(ARM, method, **options_of(method))
