@@ -382,6 +382,8 @@ CALLS |= {
     "extend.check_writable": call(extend.check_writable, "file"),
     "extend.compressed_jacobian": call(extend.compressed_jacobian, GRAPH, None),
     "extend.jets": call(extend.jets, GRAPH, "t", exact=False),
+    "extend.straight": call(extend.straight, extend.jets(GRAPH), 2),
+    "extend.convolution": call(extend.convolution, [X], [X]),
     "extend.cotangents": call(extend.cotangents, {X * Y: ONE}, [X, Y], None, fixed=(), through={}, zero_wins=False),
     "extend.expand": call(extend.expand, X * Y, {X: "a"}),
     "extend.folded": call(extend.folded, [X * Y], extend.Builder(), {X: Y}),

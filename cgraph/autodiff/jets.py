@@ -22,7 +22,7 @@ from ..operations.operation import columns
 from ..operations.series import by_partials
 from ..operations.table import equal, where
 from ..simplification.simplify import simplify
-from ..util.require import require_flag, require_graph
+from ..util.require import require_flag, require_graph, require_sequence, require_whole
 from ..writing.naming import variables
 
 
@@ -65,7 +65,10 @@ def convolution(left: Sequence[Node], right: Sequence[Node]) -> Node:
     >>> total.evaluate({"a1": 1.0, "a2": 2.0, "a3": 3.0, "b1": 10.0, "b2": 100.0, "b3": 1000.0})
     {'sum': 1230.0}
     """
-    products = [a * b for a, b in zip(left, reversed(right), strict=True)]
+    left, right = require_sequence("left", left, "nodes", Node), require_sequence("right", right, "nodes", Node)
+    if not len(left) == len(right) > 0:
+        raise ValueError(f"left and right must have as many nodes, at least one, got {len(left)} and {len(right)}")
+    products: list[Node] = [a * b for a, b in zip(left, reversed(right), strict=True)]
     if all(a is b for a, b in zip(left, right, strict=True)):
         half = len(products) // 2
         pairs = [2.0 * sum(products[1:half], products[0])] if half else []
@@ -90,6 +93,9 @@ def straight(made: Jets, order: int) -> Graph:
     >>> straight(jets(cg.Graph([x], {"rate": x})), 3).evaluate({"rate0": 1.0, "unit": 1.0})
     {'0': 1.0, '1': 0.5, '2': 0.16666666666666666}
     """
+    if not isinstance(made, Jets):
+        raise TypeError(f"straight needs the jets of a graph, got {type(made).__name__}: {made!r:.40}")
+    order = require_whole("order", order, least=1)
     wanted, build, size = list(made.order.outputs.values()), Builder(), made.sums
     m = (len(wanted) - 2 * size) // 2
     inputs = [*made.order.inputs[: m + 1], *made.order.inputs[m + 2 : m + 2 + made.zeros]]

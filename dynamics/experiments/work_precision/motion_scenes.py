@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 import cgraph as cg
-from cgraph.extend import Array, memo
+from cgraph.extend import Array
 
 from ...multibody.builders.planar_arm import planar_arm
 from ...multibody.trees.mechanism import Mechanism
@@ -115,14 +115,9 @@ MOTIONS: dict[str, Callable[[], AccuracyTask]] = {
 QUICK = ("double pendulum", "kepler 0.9", "van der Pol 100")
 
 
-@memo(1)
-def _known() -> dict[str, Any]:
-    return dict(json.loads(FILE.read_text(encoding="utf-8")))
-
-
 def _entry(name: str) -> dict[str, Any]:
     """What the file has of a motion. Raises ValueError where it is of another start."""
-    task, entry = MOTIONS[name](), _known()[name]
+    task, entry = MOTIONS[name](), json.loads(FILE.read_text(encoding="utf-8"))[name]
     if entry["start"] != task.identity["start"]:
         raise ValueError(f"the exact ends of {name!r} are of another start; compute them again")
     return dict(entry)

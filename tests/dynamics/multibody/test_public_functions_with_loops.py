@@ -71,6 +71,7 @@ HELD: dict[str, Callable[[], tuple[Array, Array]]] = {
     "consistent_state": moved,
     "attach_with_impact": caught,
     "simulate": lambda: ended(dyn.simulate(MODEL, Q, QD, 0.1)),
+    "prepare": lambda: ended(dyn.prepare(MODEL)(Q, QD, 0.1)),
     "simulate_many": lambda: ended(dyn.simulate_many(MODEL, [Q], [QD], 0.1, t_eval=[0.1])),
     "sensitivities": lambda: columns(dyn.sensitivities(MODEL, Q, QD, 0.1, wrt=["tau"])),
     "reference": lambda: tuple(np.split(dyn.reference(MODEL, Q, QD, [0.01], digits=15).x[-1], 2)),
