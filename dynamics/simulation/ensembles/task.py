@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import pickle
 import threading
+import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -33,6 +34,7 @@ WORK = 2**21  # nodes computed in a block: half a millisecond for each vector
 NUMBERS = 2**22  # in the rows of a block
 SEEN = 4  # steps that one of the longest of runs beside stands for
 KEPT = 8  # programs that a process keeps ready
+MAKING = 0.5  # s; lanes take about so long to be made
 
 
 @dataclass(frozen=True)
@@ -270,7 +272,8 @@ class Task:
         """Run the chunk into rows (k, T, m), to its end, or until soon after Ctrl-C or `stopped`: see the part."""
         part = not_begun(chunk.first, rows, events=bool(self.events))
         with np.errstate(all="ignore"):
-            if self.lanes and self._in_lanes(chunk, part, stopped):
+            done = 0 if self.grids or not self.lanes else self._before_lanes(chunk, part, stopped)
+            if done == len(chunk.x) or (self.lanes and self._in_lanes(chunk, part, done, stopped)):
                 return part
             if self.grids:
                 self._side_by_side(chunk, part, stopped)
@@ -297,8 +300,23 @@ class Task:
         except (KeyboardInterrupt, StoppedError):
             run.interrupt()
 
-    def _in_lanes(self, chunk: Chunk, part: Part, stopped: Callable[[], bool]) -> bool:
-        """Whether that can be: else nothing is done. Runs that do not reach their end are made again, alone."""
+    def _before_lanes(self, chunk: Chunk, part: Part, stopped: Callable[[], bool]) -> int:
+        """How many trajectories are done one by one first: until that took as long as lanes take to be made, about.
+
+        Of a few, or of short ones, that is all. The results are the same.
+        """
+        alone = _alone(self.pickled, self.options.backend)
+        begin, done = time.perf_counter(), 0
+        if alone.seconds < MAKING:
+            done = self._one_by_one(chunk, part, range(len(chunk.x)), stopped, MAKING - alone.seconds)
+            alone.seconds += time.perf_counter() - begin
+        return done
+
+    def _in_lanes(self, chunk: Chunk, part: Part, first: int, stopped: Callable[[], bool]) -> bool:
+        """Whether that can be, from the first on: else nothing is done.
+
+        Runs that do not reach their end are made again, alone.
+        """
         with _lock:
             lanes = _lanes(self.pickled, self.options.backend)
         if lanes is None:
@@ -307,7 +325,7 @@ class Task:
         if self.grids:
             run = EqualInLanes(lanes, self.options, chunk.x, chunk.p, self.grids[0])
         else:
-            run = ChosenInLanes(lanes, self.options, chunk.x, chunk.p)
+            run = ChosenInLanes(lanes, self.options, chunk.x[first:], chunk.p[first:])
         interrupted = False
         try:
             while run.advance(BLOCK_TIME):
@@ -315,21 +333,27 @@ class Task:
                     raise StoppedError
         except (KeyboardInterrupt, StoppedError):
             interrupted = True
-        whole, columns = run.result(part.rows)
+        whole, columns = run.result(part.rows[first:])
         done, others = np.flatnonzero(whole), np.flatnonzero(~whole).tolist()
-        part.runs.reached(done, **{name: values[done] for name, values in columns.items()})
+        part.runs.reached(first + done, **{name: values[done] for name, values in columns.items()})
         if not interrupted:
-            self._one_by_one(chunk, part, others, stopped)
+            self._one_by_one(chunk, part, [first + k for k in others], stopped)
         for k in others if interrupted else ():
-            part.runs.messages[k] = f"{INTERRUPTED}{run.reached(k)}"
+            part.runs.messages[first + k] = f"{INTERRUPTED}{run.reached(k)}"
         return True
 
-    def _one_by_one(self, chunk: Chunk, part: Part, which: Iterable[int], stopped: Callable[[], bool]) -> None:
+    def _one_by_one(
+        self, chunk: Chunk, part: Part, which: Iterable[int], stopped: Callable[[], bool], seconds: float = math.inf
+    ) -> int:
+        """How many of these were run, or given up for Ctrl-C: no more once they took so long [s]."""
         with _lock:
             compiled = _compiled(self.pickled, self.options.backend)
         events = _event_program(self.events) if self.events else None
-        whole = True
+        whole, begin, count = True, time.perf_counter(), 0
         for k in which:
+            if whole and time.perf_counter() - begin > seconds:
+                break
+            count += 1
             if not whole:
                 part.rows[k] = np.nan
                 continue
@@ -342,6 +366,13 @@ class Task:
             states = recorder.table()[1]
             part.rows[k, : len(states)], part.rows[k, len(states) :] = states, np.nan
             whole = not part.runs.messages[k].startswith(INTERRUPTED)
+        return count
+
+
+class Alone:
+    """Seconds that the trajectories of a program have taken one by one."""
+
+    seconds = 0.0
 
 
 _lock = threading.Lock()  # threads that come at the same time wait for one to make the code
@@ -355,6 +386,11 @@ def _vector_code(pickled: bytes, backend: str) -> VectorCode:
 @memo(KEPT)
 def _compiled(pickled: bytes, backend: str) -> CompiledSteps:
     return compile_steps(pickle.loads(pickled), backend)  # noqa: S301  # it came with the task itself
+
+
+@memo(KEPT)
+def _alone(pickled: bytes, backend: str) -> Alone:
+    return Alone()
 
 
 @memo(KEPT)

@@ -9,6 +9,7 @@ from pytest import approx, mark
 
 import cgraph as cg
 import dynamics as dyn
+from dynamics.simulation.ensembles import task
 from dynamics.simulation.ensembles.lanes import FEW, fits_lanes
 from dynamics.simulation.ensembles.simulate_many import simulate_many
 from dynamics.simulation.steps.step_program import StepProgram
@@ -23,6 +24,12 @@ COMPARED = (0, 3, 8, COUNT - 1)
 TOP = np.diag([0.1, 0.2, 0.25])  # kg m^2
 ROUNDING = 1e-12  # of equal steps, whose lengths between rows are rounded otherwise alone
 LANES = ("dop853", "dopri5", "rodas", "taylor")
+
+
+@pytest.fixture(autouse=True)
+def _lanes_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No trajectory goes alone first."""
+    monkeypatch.setattr(task, "MAKING", 0.0)
 
 
 def spring() -> dyn.System:
@@ -265,3 +272,18 @@ def test_one_of_equal_steps_that_fails_says_what_it_says_alone() -> None:
         rows = int((fan.t <= one.t[-1]).sum())
         assert fan.q[k, :rows] == approx(one.q[:rows], rel=ROUNDING)
         assert (fan.stats.message[k], fan.stats.steps[k]) == (one.stats.message, one.stats.steps)
+
+
+@mark.parametrize("seconds", [1e-4, 1e9])  # after one trajectory alone, or never
+def test_lanes_are_made_once_trajectories_alone_took_as_long(monkeypatch: pytest.MonkeyPatch, seconds: float) -> None:
+    model, rng = random_arm(2), np.random.default_rng(5)
+    q, qd = rng.normal(size=(2, COUNT, 2))
+    arguments = (model, q, qd, 1.0, "dop853")
+    in_lanes = simulate_many(*arguments, t_eval=TIMES)
+    cg.clear_caches()
+    made: list[bytes] = []
+    make = task._lanes
+    monkeypatch.setattr(task, "_lanes", lambda pickled, backend: made.append(pickled) or make(pickled, backend))
+    monkeypatch.setattr(task, "MAKING", seconds)
+    assert same(in_lanes, simulate_many(*arguments, t_eval=TIMES))
+    assert bool(made) == (seconds < 1.0)
