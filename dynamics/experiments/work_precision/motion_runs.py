@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
@@ -14,13 +15,14 @@ from cgraph.extend import Array
 from ...integrators import METHODS
 from ...peers.heyoka import heyoka
 from ...simulation.ensembles.simulate_many import simulate_many
+from ...simulation.ensembles.task import MAKING
 from ...simulation.prepare import prepare
 from ...simulation.trajectory import Stats
 from ..accuracy_task import AccuracyTask
 from .trajectory_peers import MOST_STEPS, Heyoka
 from .trajectory_runs import EndSolver, Outcome, Run
 
-COMPILES, FEW = 1e-6, 8  # of the length, and motions of a run that only compiles
+COMPILES = 1e-6  # of the length, in a run that only compiles
 
 
 def run_to_end(
@@ -78,10 +80,11 @@ class Many(EndSolver):
             status = "" if stats.success.all() else "some stopped before the end"
             return Outcome(ends, steps, rejected, evaluations, status)
 
-        run = partial(simulate_many, self.task.model, method=self.name)
-        few, short = slice(0, FEW), COMPILES * self.task.t_end
-        run(q=q[few], qd=None if velocities is None else qd[few], t_end=short, **(options | {"t_eval": [short]}))
-        return Run(partial(run, q=q, qd=velocities, t_end=self.task.t_end, **options), read)
+        run = partial(simulate_many, self.task.model, q, velocities, method=self.name)
+        short, begin = COMPILES * self.task.t_end, time.perf_counter()
+        while time.perf_counter() - begin < 2.0 * MAKING:  # trajectories go alone before lanes are made
+            run(t_end=short, **(options | {"t_eval": [short]}))
+        return Run(partial(run, t_end=self.task.t_end, **options), read)
 
 
 class HeyokaBatch(EndSolver):
