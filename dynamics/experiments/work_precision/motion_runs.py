@@ -14,6 +14,7 @@ from cgraph.extend import Array
 
 from ...integrators import METHODS
 from ...peers.heyoka import heyoka
+from ...simulation.ensembles.lanes import FEW
 from ...simulation.ensembles.simulate_many import simulate_many
 from ...simulation.ensembles.task import MAKING
 from ...simulation.prepare import prepare
@@ -82,7 +83,8 @@ class Many(EndSolver):
 
         run = partial(simulate_many, self.task.model, q, velocities, method=self.name)
         short, begin = COMPILES * self.task.t_end, time.perf_counter()
-        while time.perf_counter() - begin < 2.0 * MAKING:  # trajectories go alone before lanes are made
+        run(t_end=short, **(options | {"t_eval": [short]}))
+        while len(q) >= FEW and time.perf_counter() - begin < 2.0 * MAKING:  # alone before lanes are made
             run(t_end=short, **(options | {"t_eval": [short]}))
         return Run(partial(run, t_end=self.task.t_end, **options), read)
 

@@ -305,18 +305,13 @@ class Task:
 
         Of a few, or of short ones, that is all. The results are the same.
         """
-        alone = _alone(self.pickled, self.options.backend)
-        begin, done = time.perf_counter(), 0
-        if alone.seconds < MAKING:
-            done = self._one_by_one(chunk, part, range(len(chunk.x)), stopped, MAKING - alone.seconds)
-            alone.seconds += time.perf_counter() - begin
+        alone, begin = _alone(self.pickled, self.options.backend), time.perf_counter()
+        done = self._one_by_one(chunk, part, range(len(chunk.x)), stopped, MAKING - alone.seconds)
+        alone.seconds += time.perf_counter() - begin
         return done
 
     def _in_lanes(self, chunk: Chunk, part: Part, first: int, stopped: Callable[[], bool]) -> bool:
-        """Whether that can be, from the first on: else nothing is done.
-
-        Runs that do not reach their end are made again, alone.
-        """
+        """Whether that can be, from the first on: else nothing is done. Runs that end early are made again, alone."""
         with _lock:
             lanes = _lanes(self.pickled, self.options.backend)
         if lanes is None:
@@ -349,9 +344,9 @@ class Task:
         with _lock:
             compiled = _compiled(self.pickled, self.options.backend)
         events = _event_program(self.events) if self.events else None
-        whole, begin, count = True, time.perf_counter(), 0
+        whole, end, count = True, time.perf_counter() + seconds, 0
         for k in which:
-            if whole and time.perf_counter() - begin > seconds:
+            if whole and time.perf_counter() >= end:
                 break
             count += 1
             if not whole:
