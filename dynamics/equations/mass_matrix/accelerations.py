@@ -26,6 +26,7 @@ WORTH = 0.9  # of the recursive graph's nodes, at most, for the dense one: elimi
 BY_ENERGY = "dense by energy"  # with the Hessian of L, also where bodies give an M of fewer nodes
 TURN = 10  # products that a sine takes as long as, about
 DRAWN = 64  # states at which accelerations are looked at for their size
+LITTLE = 0.01  # of the torques by which bodies are accelerated as by their weight
 GROWTH = 3.0  # times the rounding of the safest graph, at most, at sample points
 
 
@@ -92,8 +93,8 @@ def accelerations(system: System, method: str = "auto", check: bool = False) -> 
 def _smallest(system: System, graphs: Sequence[Graph], worth: float) -> Graph:
     """Smallest of graphs, the safest first, whose roundings carry little further than those of the first.
 
-    They are compared in motion, at rest with torques, and at rest without: where masses differ by decades, speeds and
-    torques can hide the digits that are lost of the accelerations by weight alone.
+    They are compared in motion and at rest: where masses differ by decades, speeds and torques can hide the digits that
+    are lost of the accelerations by weight alone.
     worth: of the nodes of the one before, at most, for the last.
     """
     chosen, limits = graphs[0], None
@@ -110,10 +111,10 @@ def _smallest(system: System, graphs: Sequence[Graph], worth: float) -> Graph:
 
 
 def _regimes(system: System, accelerations: Graph) -> list[dict[str, float]]:
-    """Sizes of samples and of outputs: in motion, at rest with torques, and at rest by weight alone."""
+    """Sizes of samples and of outputs: in motion, and at rest with little torque, where weight counts if any."""
     moving = _sizes(system, accelerations)
-    driven = moving | {f"qd{i}": 0.0 for i in range(system.n)}
-    return [moving, driven, driven | {f"tau{i}": 0.0 for i in range(system.n)}]
+    torques = {f"tau{i}": LITTLE * moving.get(f"tau{i}", 1.0) for i in range(system.n)}
+    return [moving, moving | {f"qd{i}": 0.0 for i in range(system.n)} | torques]
 
 
 def _sizes(system: System, accelerations: Graph) -> dict[str, float]:
