@@ -44,10 +44,10 @@ def prepare(
 
     Parameters
     ----------
-    model, method, dt, max_step, rtol, atol, events, dense_output, tau, first_step, max_steps, estimate_error
+    model, method, dt, max_step, rtol, atol, events, dense_output, tau, first_step, max_steps
         As of `simulate`, which is this and a call.
-    backend, progress, form
-        The same.
+    estimate_error, backend, progress, form
+        As of `simulate`, too.
     varied : str or iterable of str
         Parameters of the model or of a controller whose values stay open, so that those of a call cost nothing. Values
         of others are built into the machine code, as `simulate` does, and other ones compile anew. Not with a

@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike
 
 from cgraph.extend import Array
 
-from ..integrators import METHODS
 from ..systems.model import Model
 from .applied_forces import Tau
 from .events.event import Event
@@ -234,7 +233,7 @@ class PreparedMotion:
             found: Stepper | None = steppers.found
         except AttributeError:
             options = self._options
-            rounded = options.adaptive and self._steps(moving) and options.relative < METHODS[options.method].finest
+            rounded = options.adaptive and self._steps(moving) and options.relative < options.integrator.finest
             plain = self._steps(moving) and not options.estimated and not rounded and moving.problem.projection is None
             found = steppers.found = moving.stepper(options) if plain else None
         return found
