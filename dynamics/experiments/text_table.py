@@ -7,6 +7,7 @@ import io
 import math
 import string
 from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
 WIDTH = 120  # characters of a terminal
 GAPS = ("  ", " ")  # between columns: the second where the first is too wide
@@ -35,9 +36,20 @@ def table(header: Sequence[str], rows: Sequence[Sequence[Cell]], left: Iterable[
     return [gap.join(parts).rstrip() for block in blocks for parts in zip(first, *block, strict=True)]
 
 
-def titled(title: str, header: Sequence[str], rows: Iterable[Sequence[Cell]], left: Iterable[int] = (0,)) -> str:
-    """A table under its title."""
-    return "\n".join([title, *table(header, list(rows), left)])
+class Table(NamedTuple):
+    """A table under its title, as text or as plain data.  left: the columns of texts."""
+
+    title: str
+    header: Sequence[str]
+    rows: Sequence[Sequence[str]]
+    left: Iterable[int] = (0,)
+
+    def __str__(self) -> str:
+        return "\n".join([*filter(None, [self.title]), *table(self.header, self.rows, self.left)])
+
+    def to_dict(self) -> dict[str, object]:
+        """For JSON."""
+        return {"title": self.title, "header": list(self.header), "rows": [list(row) for row in self.rows]}
 
 
 def _column(head: str, cells: Sequence[tuple[str, str]], flush_left: bool) -> list[str]:
@@ -83,3 +95,10 @@ class Footnotes:
     def lines(self) -> list[str]:
         """A line for each reason."""
         return [f"{letter}: {reason}" for reason, letter in self._letters.items()]
+
+
+def check_names(*choices: tuple[str, Iterable[str], Iterable[str]]) -> None:
+    """Raise ValueError for a name that is not known; choices: of (what they name, names, those known)."""
+    for what, names, known in choices:
+        if unknown := [name for name in names if name not in known]:
+            raise ValueError(f"there is no {what} {unknown[0]!r}; there are {', '.join(known)}")

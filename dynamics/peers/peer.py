@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from importlib import import_module
@@ -104,6 +104,7 @@ class PeerModel:
 
 
 AnyState = TypeVar("AnyState")
+Made = TypeVar("Made")
 
 
 def rk4_step(rate: Callable[[AnyState], AnyState], x: AnyState, dt: float = DT) -> AnyState:
@@ -140,6 +141,23 @@ def required(module: str, name: str) -> ModuleType:
         return import_module(module)
     except ImportError as error:
         raise ImportError(f"{name} is not installed: {install('bench')}") from error
+
+
+def made(
+    makers: Mapping[str, Callable[[], Made]], absent: dict[str, str], *refusals: type[Exception]
+) -> dict[str, Made]:
+    """What can be made, by name; to `absent` goes why the others cannot: not installed, or not for this model.
+
+    refusals: other errors by which a maker says so.
+    """
+    ready = {}
+    errors: tuple[type[Exception], ...] = (ImportError, UnavailableError, *refusals)
+    for name, make in makers.items():
+        try:
+            ready[name] = make()
+        except errors as error:
+            absent[name] = " ".join(str(error).split())[:200]
+    return ready
 
 
 @dataclass(frozen=True)

@@ -16,13 +16,11 @@ if TYPE_CHECKING:
         form_agreement,
         form_sizes,
     )
-    from dynamics.experiments import pruning
-    from dynamics.experiments.machine import machine
+    from dynamics.experiments.benches import BENCHES, SPEED, Bench
     from dynamics.experiments.speed import bench as speed
-    from dynamics.experiments.speed.bench import tables
-    from dynamics.experiments.speed.bench_figures import FIGURES
     from dynamics.experiments.stability import stability
     from dynamics.experiments.text_table import table
+    from dynamics.experiments.timing import machine
     from dynamics.experiments.work_precision import motions, named_tasks, work_precision
     from dynamics.experiments.work_precision.cold_start import STARTS
     from dynamics.experiments.work_precision.comparisons import COMPARISONS

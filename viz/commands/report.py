@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import shutil
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -220,7 +220,7 @@ def _pruning(options: argparse.Namespace) -> None:
     for name in options.scenes:
         scene = dyn.scenes.load(name, **reading(options))
         effects = [each for each in dyn.EFFECTS if each not in without]
-        content = library.pruning.report(scene, effects=effects, lock=_bodies(scene, lock))
+        content = pruning_content(scene, effects, _bodies(scene, lock))
         found.append(content)
         if options.out is not None:
             document = library.pruning_page.document(content)
@@ -230,6 +230,33 @@ def _pruning(options: argparse.Namespace) -> None:
                      for each in content["graphs"]]  # fmt: skip
             lines.append(f"{[*written][-1]}: {', '.join(sizes)}")
     answer(unless_json(options, found, "\n".join(lines)), files, folder=options.out)
+
+
+def pruning_content(
+    scene: dyn.scenes.Scene, effects: Iterable[str], lock: Mapping[str, float] | None = None
+) -> dict[str, Any]:
+    """Report of `prune` on a scene's inverse and forward dynamics, for JSON.  effects, lock: as of `prune`."""
+    kept, graphs = tuple(effects), []
+    for title, equations in (("inverse dynamics", dyn.inverse_dynamics), ("forward dynamics", dyn.forward_dynamics)):
+        pruned = dyn.prune(scene, equations, effects=kept, lock=lock)
+        graphs.append({"equations": title, **_account(pruned)})
+    described = {"name": scene.name, "about": scene.about, "left_out": list(scene.left_out)}
+    return {**described, "effects": list(kept), "graphs": graphs}
+
+
+def _account(pruned: dyn.PruneResult) -> dict[str, Any]:
+    full, left = pruned.full.counts(), pruned.graph.counts()
+    sizes: dict[str, Any] = {
+        name: {size: getattr(counts, size) for size in ("nodes", "edges", "depth")}
+        for name, counts in (("full", full), ("pruned", left))
+    }
+    rows = {"left_out": pruned.omitted, "absent": pruned.absent, "remains": pruned.remains}
+    told = {
+        name: [{what: getattr(each, what) for what in ("what", "why", "nodes", "edges")} for each in terms]
+        for name, terms in rows.items()
+    }
+    tags = sorted({*full.by_tag, *left.by_tag})
+    return sizes | told | {"by_tag": {tag: [full.by_tag.get(tag, 0), left.by_tag.get(tag, 0)] for tag in tags}}
 
 
 def _bodies(scene: dyn.scenes.Scene, lock: dict[str, float]) -> dict[str, float]:

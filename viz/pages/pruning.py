@@ -7,7 +7,7 @@ from typing import Any
 
 from .document import Block, Document, Paragraph, Section, Table, left_out
 
-Content = Mapping[str, Any]  # what `dynamics.experiments.pruning.report` gives
+Content = Mapping[str, Any]  # what `cgraph report --pruning --json` gives
 HEADER = ["", "why", "nodes", "edges"]
 
 

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from cgraph.extend import Json
-from dynamics import scenes
-from dynamics.experiments.paper_numbers import free_fall, largest_differences, mujoco_free_fall
+from cgraph.extend import Array, Json
+from dynamics import Trajectory, scenes, simulate
+from dynamics.io.mujoco_twin import MujocoTwin
+from dynamics.multibody.trees.mechanism import require_mechanism
 
 from ..pages.document import Block, Paragraph, Table
 from ..plots import plot
@@ -18,28 +19,33 @@ SNAPSHOTS = 6
 def figures4_and_5() -> Part:
     """Figures 4 and 5: the three-link arm in free fall, by our graph and by MuJoCo."""
     scene = scenes.load("triple_pendulum")
-    run = free_fall(scene)
+    run = simulate(scene, scene.q, scene.qd, scene.t_end, "rk4", dt=1e-3)
+    if not run.stats.success:
+        raise RuntimeError(f"the fall of {scene.name} is not whole: it {run.stats.message}")
+    positions = require_mechanism(scene, "a fall").joint_positions(run.q)
     instants = np.linspace(0.0, scene.t_end, SNAPSHOTS)
-    ours = plot.snapshots(run.trajectory.t, run.positions, instants.tolist())
+    ours = plot.snapshots(run.t, positions, instants.tolist())
     start = ", ".join(f"{angle:.4g}" for angle in scene.q)
     caption4 = (
         "Figure 4. The three-link arm in free fall by RK4 on the equations of motion from its own graph, with the way of "
         f"each joint. Start at rest at q = ({start}) rad, dt = 1e-3 s."
     )
     blocks: list[Block] = [plotted("fig4", ours, caption4)]
-    data: dict[str, Json] = {"q_end": run.trajectory.q[-1].tolist()}
+    data: dict[str, Json] = {"q_end": run.q[-1].tolist()}
     try:
-        other = mujoco_free_fall(run)
+        twin = MujocoTwin(scene.model, scene.t_end / (len(run.t) - 1))
     except ImportError as error:
         blocks.append(Paragraph(f"Figure 5 is missing on this machine. {error}", warning=True))
         return Part("fall", "Figures 4 and 5: the fall", blocks, data | {"mujoco": None})
 
-    theirs = plot.snapshots(run.trajectory.t, run.positions, instants.tolist(), dots=other.positions)
+    version = str(twin.mujoco.__version__)
+    q, _ = twin.trajectory(np.array(scene.q), np.array(scene.qd), len(run.t) - 1)
+    theirs = plot.snapshots(run.t, positions, instants.tolist(), dots=twin.arm_positions(q))
     caption5 = (
-        f"Figure 5. The same arm in MuJoCo {other.version} (RK4, same step), as dots, over ours, as lines: joints at the "
+        f"Figure 5. The same arm in MuJoCo {version} (RK4, same step), as dots, over ours, as lines: joints at the "
         "same instants, and their ways."
     )
-    differences = largest_differences(run, other)
+    differences = _largest_differences(run, q)
     header = ("up to t [s]", "largest |difference in q| [rad]")
     rows = [(f"{t:.2f}", f"{difference:.2e}") for t, difference in differences]
     blocks += [
@@ -50,5 +56,12 @@ def figures4_and_5() -> Part:
             "ours from a Lagrangian by automatic differentiation, MuJoCo's from its composite-rigid-body algorithm."
         ),
     ]
-    data |= {"mujoco": other.version, "largest_difference": differences[-1][1]}
+    data |= {"mujoco": version, "largest_difference": differences[-1][1]}
     return Part("fall", "Figures 4 and 5: the fall", blocks, data)
+
+
+def _largest_differences(run: Trajectory, q: Array, windows: int = 6) -> list[tuple[float, float]]:
+    """(t, largest |difference in q| up to t [rad]) at the ends of equal stretches of time."""
+    difference = np.abs(run.q - q).max(axis=1)
+    ends = np.linspace(0, len(difference) - 1, windows + 1).astype(int)[1:]
+    return [(float(run.t[k]), float(difference[: k + 1].max())) for k in ends]

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
-from cgraph.extend import format_polynomial
-from dynamics import formulation_sizes, scenes
+from cgraph import Graph
+from cgraph.extend import Polynomial, expand, format_polynomial
+from dynamics import formulation_sizes, inverse_dynamics, momentum_rate, scenes
 from dynamics.equations.formulations.formulation_sizes import INERTIAL_TERM, blamed, formulation_size
-from dynamics.experiments.paper_numbers import PAPER, equation3, torque_terms
 
 from .. import theme
 from ..graph_drawing.dot import plain_drawing
@@ -18,6 +18,41 @@ from ..pages.formulations import TITLES, WHY_FEWER, size_table
 from .part import Part, drawn
 
 EQUATION = "Lagrange's equation, τ = dp/dt − ∂L/∂θ"
+
+
+# The paper's right-hand side, I qdd - k (qdd dt^2 + 2 qd dt + q_old), as coefficients.
+PAPER: Polynomial = {
+    (("I", 1), ("qdd0", 1)): 1.0,
+    (("dt", 2), ("k", 1), ("qdd0", 1)): -1.0,
+    (("dt", 1), ("k", 1), ("qd0", 1)): -2.0,
+    (("k", 1), ("q0_old", 1)): -1.0,
+}
+
+
+@dataclass(frozen=True)
+class Equation:
+    """One formulation's d/dt dL/dqd for L = I qd^2/2 - k q^2/2, term by term."""
+
+    formulation: str
+    terms: Polynomial
+
+    def __str__(self) -> str:
+        return format_polynomial(self.terms)
+
+
+def equation3(formulation: str) -> Equation:
+    """The terms of the graph of that formulation; qd0 stands for the embedded velocity qdd0 dt + qd0_old."""
+    return Equation(formulation, _terms(momentum_rate(scenes.load("spring_mass"), formulation)))
+
+
+def torque_terms(formulation: str) -> Polynomial:
+    """The terms of the whole torque, d/dt dL/dqd - dL/dq, of that formulation."""
+    return _terms(inverse_dynamics(scenes.load("spring_mass"), formulation))
+
+
+def _terms(graph: Graph) -> Polynomial:
+    velocity = {node: "qd0" for node in graph.nodes if node.args and node.name == "qd0"}
+    return expand(graph.only_output(), velocity)
 
 
 def equations() -> Part:

@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -16,13 +17,14 @@ from cgraph.extend import Array, install
 from ...multibody.trees.mechanism import as_mechanism
 from ...peers import PEERS, PeerModel
 from ...peers.peer import MODES, MOTIONS, TASKS
-from ..text_table import WIDTH, Footnotes, digits, table
-from .bench_scenes import QUICK, SCENES, load
+from ..text_table import WIDTH, Footnotes, check_names, digits, table
+from .bench_scenes import SCENES, load
 from .worker import Load, Prepared, Worker
 
 OURS = "ours"
 AGREES = 1e-8  # largest relative difference that passes without a flag: rounding on a long chain, and no more
 FEWEST, LONG = 3, 5.0  # turns of a peer that takes longer than so many seconds for all of its turns
+QUICK: dict[str, Any] = {"scenes": ("planar 3", "planar 7", "arm 7"), "repeats": 5, "budget": 20.0}
 CONTAINS = {"rk4": "forward", "gradient": "motion"}  # who is late with the second is not asked for the first
 
 
@@ -74,9 +76,7 @@ def bench(
     say: takes lines of progress.
     Raises ValueError for an unknown name, a budget that is not positive, and where there is nothing to measure.
     """
-    for what, names, known in (("task", tasks, TASKS), ("mode", modes, MODES), ("peer", peers, PEERS)):
-        if unknown := [name for name in names if name not in known]:
-            raise ValueError(f"there is no {what} {unknown[0]!r}; the {what}s are {', '.join(known)}")
+    check_names(("task", tasks, TASKS), ("mode", modes, MODES), ("peer", peers, PEERS))
     if not budget > 0.0:
         raise ValueError(f"the budget must be positive, got {budget!r} s")
     loads: dict[str, Load] = {name: partial(load, name, **(reading or {})) for name in scenes}
@@ -202,8 +202,7 @@ class WorkerPool:
             worker.end()
 
 
-__all__ = ["AGREES", "MODES", "OURS", "PEERS", "QUICK", "SCENES", "TASKS", "Cell", "Row", "bench"]
-
+__all__ = ["MODES", "PEERS", "SCENES", "TASKS", "Cell", "Row", "bench", "tables"]
 
 HOW = f"{install('bench')}; PyTorch by itself"  # to install what is missing
 

@@ -10,6 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
+from cgraph.extend import Array
+
 from ... import scenes
 from ...multibody.algebra.spatial import rotation
 from ...multibody.bodies.body import WORLD, Body, Joint
@@ -43,17 +45,17 @@ def free_tree(n: int) -> Mechanism:
 
 
 def _body(i: int, parent: str, rng: np.random.Generator) -> Body:
+    turn = rotation(np.array([1.0, 0.0, 0.0]), (0.0, math.pi / 2, -math.pi / 2)[i % 3])
+    joint = Joint("revolute", position=(0.1, 0.0, 0.3) if i else (0.0, 0.0, 0.0), orientation=turn, damping=0.1)
+    return Body(f"link{i + 1}", joint, parent, *inertial_numbers(rng))
+
+
+def inertial_numbers(rng: np.random.Generator) -> tuple[float, Array, Array]:
+    """Mass [kg], center [m] and inertia [kg m^2] of a body without symmetry."""
     mixed = rng.normal(size=(3, 3))
     second = 0.05 * mixed @ mixed.T + 0.01 * np.eye(3)  # of mass; any such matrix is a body's
-    turn = rotation(np.array([1.0, 0.0, 0.0]), (0.0, math.pi / 2, -math.pi / 2)[i % 3])
-    return Body(
-        f"link{i + 1}",
-        Joint("revolute", position=(0.1, 0.0, 0.3) if i else (0.0, 0.0, 0.0), orientation=turn, damping=0.1),
-        parent,
-        mass=float(rng.uniform(1.0, 2.0)),
-        center=0.1 * rng.normal(size=3),
-        inertia=np.trace(second) * np.eye(3) - second,
-    )
+    mass, center = float(rng.uniform(1.0, 2.0)), 0.1 * rng.normal(size=3)
+    return mass, center, np.trace(second) * np.eye(3) - second
 
 
 def _at_rest(name: str, n: int, build: Callable[[int], Mechanism]) -> Scene:
@@ -76,7 +78,6 @@ _MODELS: dict[str, Callable[[int], Mechanism]] = {
 SCENES: dict[str, Callable[[], Scene]] = {
     name: partial(_at_rest, name, int(name.split()[1]), build) for name, build in _MODELS.items()
 }
-QUICK = ("planar 3", "planar 7", "arm 7")
 
 
 def load(name: str, **reading: bool) -> Scene:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import statistics
 from collections.abc import Callable, Iterator
+from functools import partial
 
 import numpy as np
 
@@ -24,8 +25,9 @@ from ...multibody.algebra.spatial import rotation
 from ...multibody.bodies.body import Body, Joint
 from ...multibody.quantities.recursive_inverse_dynamics import RecursiveInverseDynamics
 from ...multibody.trees.mechanism import Mechanism
-from ..clock import spent
-from ..text_table import titled
+from ...peers.peer import made
+from ..text_table import Table
+from ..timing import relative_difference, spent
 from .bench_scenes import turned_arm
 
 Torque = Callable[[Array], Array]  # of q, where qd = q / 2 and qdd = -q
@@ -116,12 +118,11 @@ def changes(base: Mechanism, version: int) -> dict[str, tuple[Callable[[], Mecha
 
 def check(what: str, torques: Array, expected: Array, largest: float) -> None:
     """Raise ArithmeticError where torques differ by more, relative to the largest."""
-    off = float(np.abs(torques - expected).max() / np.abs(expected).max())
-    if not off <= largest:
+    if not (off := relative_difference(torques, expected)) <= largest:
         raise ArithmeticError(f"{what}: torques differ by {off:.1e} of the largest; rounding is at most {largest:g}")
 
 
-def reconfiguration(links: int = LINKS, repeats: int = REPEATS) -> Iterator[str]:
+def reconfiguration(links: int = LINKS, repeats: int = REPEATS) -> Iterator[Table | str]:
     """The table: milliseconds to the first torque, and ratios of shortest times."""
     base = turned_arm(links)
     by_kernels(base)(np.zeros(links))  # the kernels are there
@@ -131,34 +132,38 @@ def reconfiguration(links: int = LINKS, repeats: int = REPEATS) -> Iterator[str]
         raise ArithmeticError("a body that was detached and attached again gives another graph")
     header = ["change", "kernels", "shortest", "full rebuild", "shortest", "ratio", "MuJoCo", "shortest", "ratio"]
     title = f"arm of {links} hinges; milliseconds to the first torque, medians"
-    yield titled(title, header, [_row(base, kind, repeats) for kind in changes(base, 0)])
+    absent: dict[str, str] = {}
+    yield Table(title, header, [_row(base, kind, repeats, absent) for kind in changes(base, 0)])
+    yield from [f"{name} is not measured: {missing}" for name, missing in absent.items()]
 
 
-def _row(base: Mechanism, kind: str, repeats: int) -> list[str]:
-    times: dict[str, list[float]] = {"kernels": [], "rebuild": [], "mujoco": []}
+def _row(base: Mechanism, kind: str, repeats: int, absent: dict[str, str]) -> list[str]:
+    times: dict[str, list[float]] = {"kernels": [], "rebuild": [], "MuJoCo": []}
     for version in range(repeats):
         change, n = changes(base, version)[kind]
-        q = np.linspace(-0.5, 0.5, n)
-        taken = spent(lambda: by_kernels(change())(q))  # noqa: B023 (called in this turn of the loop)
-        torques = taken.made
-        times["kernels"].append(1e3 * taken.seconds)
+        q, expected = np.linspace(-0.5, 0.5, n), np.empty(0)
+        ways: dict[str, Callable[[], Array]] = {"kernels": lambda: by_kernels(change())(q)}  # noqa: B023 (in this turn)
         if version < REBUILDS:
-            taken = spent(lambda: by_rebuild(change())(q))  # noqa: B023
-            times["rebuild"].append(1e3 * taken.seconds)
-            check(f"{kind}, rebuilt", torques, taken.made, AGREE)
-        times["mujoco"] += _mujoco_times(base, kind, version, q, torques)
-    shown = {who: [f"{statistics.median(ms):.2f}", f"{min(ms):.2f}"] if ms else ["-", "-"] for who, ms in times.items()}
-    ratio = {who: f"{min(times['kernels']) / min(ms):.2g}" if ms else "-" for who, ms in times.items()}
-    others = [cell for who in ("rebuild", "mujoco") for cell in (*shown[who], ratio[who])]
-    return [kind, *shown["kernels"], *others]
+            ways["rebuild"] = lambda: by_rebuild(change())(q)  # noqa: B023
+        for who, way in (ways | made({"MuJoCo": partial(_by_mujoco, base, kind, version, q)}, absent)).items():
+            taken = spent(way)
+            times[who].append(1e3 * taken.seconds)
+            if who == "kernels":
+                expected = taken.made
+            else:
+                check(f"{kind}, {who}", taken.made, expected, AGREE if who == "rebuild" else AGREE_MUJOCO)
+    least = {who: min(ms) for who, ms in times.items() if ms}
+    cells = [kind]
+    for who, ms in times.items():
+        cells += [f"{statistics.median(ms):.2f}", f"{least[who]:.2f}"] if ms else ["-", "-"]
+        if who != "kernels":
+            cells.append(f"{least['kernels'] / least[who]:.2g}" if ms else "-")
+    return cells
 
 
-def _mujoco_times(base: Mechanism, kind: str, version: int, q: Array, expected: Array) -> list[float]:
-    """Milliseconds of its edit, compilation and inverse dynamics; nothing where it is not installed."""
-    try:
-        twin = ByMujoco(base, version)
-    except ImportError:
-        return []
+def _by_mujoco(base: Mechanism, kind: str, version: int, q: Array) -> Callable[[], Array]:
+    """MuJoCo's edit, compilation and inverse dynamics, made ready. Raises ImportError without MuJoCo."""
+    twin = ByMujoco(base, version)
     if kind == "unlock":
         twin.lock()
         twin.torque(q[:-1])
@@ -167,6 +172,4 @@ def _mujoco_times(base: Mechanism, kind: str, version: int, q: Array, expected: 
         getattr(twin, kind)()
         return twin.torque(q)
 
-    taken = spent(work)
-    check(f"{kind}, MuJoCo", taken.made, expected, AGREE_MUJOCO)
-    return [1e3 * taken.seconds]
+    return work

@@ -5,7 +5,7 @@ from __future__ import annotations
 import statistics
 import sys
 from collections.abc import Callable, Iterator
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -18,9 +18,8 @@ from ...multibody.builders.planar_arm import planar_arm
 from ...multibody.trees.mechanism import Mechanism
 from ...multiprecision.chain_equations import accelerations
 from ...systems.model import as_system
-from ..clock import Made, spent
-from ..machine import run_fresh
-from ..text_table import digits, table, titled
+from ..text_table import Table, digits
+from ..timing import Made, relative_difference, run_fresh, spent
 from .bench_scenes import turned_arm
 
 BUILT, REPEATS = (3, 20), 7  # links of the arms of `build_time`, and builds of each
@@ -36,21 +35,13 @@ graph, code: forward dynamics as a graph, and compiled.  Jacobian: by q, qd and 
 A and B: `linearize_many`, 6 n^2 entries.  a body, an entry: in ms, of graph and code, the Jacobian, and A and B."""
 
 
-class Stage(NamedTuple):
-    """Seconds by the clock and of the processor, and the peak of memory [MB] afterwards, 0 on Windows."""
-
-    clock: float
-    processor: float
-    peak: float
-
-
-class Stages(dict[str, Stage]):
-    """What each stage has taken, by name; a call runs the next one."""
+class Stages(dict[str, tuple[float, float, float]]):
+    """Seconds by the clock and of the processor, and the peak of memory [MB], 0 on Windows, of each stage by name."""
 
     def __call__(self, name: str, function: Callable[[], Made]) -> Made:
-        """Run a stage, its cost noted under that name."""
+        """Run the next stage, its cost noted under that name."""
         taken = spent(function)
-        self[name] = Stage(taken.seconds, taken.processor, _peak())
+        self[name] = taken.seconds, taken.processor, _peak()
         return taken.made
 
 
@@ -71,7 +62,7 @@ def planar(n: int) -> Mechanism:
 MODELS: dict[str, Callable[[int], Mechanism]] = {"planar": planar, "3D": turned_arm}
 
 
-def build_time(links: int | None = None, repeats: int = REPEATS) -> Iterator[str]:
+def build_time(links: int | None = None, repeats: int = REPEATS) -> Iterator[Table]:
     """Median, fastest and slowest build of forward dynamics, and its size. links: of an arm of this length alone."""
     rows = []
     for n in BUILT if links is None else (links,):
@@ -83,38 +74,39 @@ def build_time(links: int | None = None, repeats: int = REPEATS) -> Iterator[str
         seconds, graph = [each.seconds for each in builds], builds[-1].made
         times = [f"{1e3 * each:.1f} ms" for each in (statistics.median(seconds), min(seconds), max(seconds))]
         rows.append([str(n), *times, str(len(graph.nodes)), str(len(graph.edges))])
-    header = ["links", "median", "fastest", "slowest", "nodes", "edges"]
     title = "forward dynamics of a planar arm, from its Lagrangian to the simplified graph"
-    yield titled(title, header, rows, left=())
+    yield Table(title, ["links", "median", "fastest", "slowest", "nodes", "edges"], rows, ())
 
 
-def compile_time(links: int | None = None) -> Iterator[str]:
+def compile_time(links: int | None = None) -> Iterator[Table]:
     """A row a chain: time until forward dynamics and its derivatives have a result.  links: of this length alone."""
     sizes = COMPILED if links is None else (links,)
-    rows = [[kind, str(n), *_fresh("compile_cost", kind, n).split()] for kind in MODELS for n in sizes]
-    yield titled(TITLE, COLUMNS, rows)
+    rows = [[kind, str(n), *_fresh("compile_cost", kind, n)] for kind in MODELS for n in sizes]
+    yield Table(TITLE, COLUMNS, rows)
 
 
-def long_chains(links: int = LINKS) -> Iterator[str]:
+def long_chains(links: int = LINKS) -> Iterator[Table | str]:
     """Cost of chains of so many links, each in a process of its own; then accuracy, which needs python-flint."""
     for kind in MODELS:
-        yield f"{kind} chain of {links} links\n{_fresh('cost', kind, links).rstrip()}"
+        *rows, size = _fresh("cost", kind, links)
+        yield Table(f"{kind} chain of {links} links", ["stage", "clock", "processor", "peak"], rows)
+        yield size
     for kind, n in SIZES:
         for spread in (np.pi, 0.1):
             errors = ",  ".join(f"{name} {error:.1e}" for name, error in accuracy(kind, n, spread).items())
             yield f"largest relative error, {kind} {n} links, |q| < {spread:4.2f}:  {errors}"
 
 
-def _fresh(function: str, kind: str, n: int) -> str:
-    """Output of a function below on a chain, in a process of its own."""
-    done = run_fresh(__name__, f"{function}({kind!r}, {n})")
-    if done.returncode:
-        raise RuntimeError(f"{kind} chain of {n} links: {done.stderr.strip()[-200:]}")
-    return done.stdout
+def _fresh(function: str, kind: str, n: int) -> Any:
+    """What a function below says of a chain, in a process of its own."""
+    try:
+        return run_fresh(__name__, function, kind, n)
+    except RuntimeError as error:
+        raise RuntimeError(f"{kind} chain of {n} links: {error}") from None
 
 
-def compile_cost(kind: str, n: int) -> None:
-    """Write one chain's numbers of `compile_time`."""
+def compile_cost(kind: str, n: int) -> list[str]:
+    """One chain's cells of `compile_time`."""
     model, stages = MODELS[kind](n), Stages()
     cg.compile(cg.Graph([cg.variable("x")], {"y": cg.variable("x")}))([0.0])  # LLVM is loaded
     graph = stages("graph", lambda: forward_dynamics(model))
@@ -128,28 +120,30 @@ def compile_cost(kind: str, n: int) -> None:
     function = stages("code", called)
     stages("Jacobian", lambda: function.jacobian(x))
     stages("A and B", lambda: linearize_many(model, *[part[None] for part in np.split(x, 3)]))
-    derived, compiled, jacobian, matrices = [each.processor for each in stages.values()]
+    derived, compiled, jacobian, matrices = [processor for _, processor, _ in stages.values()]
     each = 1e3 * (derived + compiled) / n, 1e3 * jacobian / n, 1e3 * matrices / (6 * n * n)
     shown = [derived, compiled, each[0], jacobian, each[1], matrices, each[2]]
-    sys.stdout.write(" ".join([str(len(graph.nodes)), *[digits(value, 2) for value in shown]]))
+    return [str(len(graph.nodes)), *[digits(value, 2) for value in shown]]
 
 
-def cost(kind: str, n: int) -> None:
-    """Write the time on the clock, that of the processor, and the peak memory after the stages of one chain."""
+def cost(kind: str, n: int) -> list[list[str] | str]:
+    """Time on the clock, that of the processor, and the peak memory after the stages of one chain; then its size."""
     model, stages = MODELS[kind](n), Stages()
     stages("numpy and the library, imported", lambda: None)
     stages("Lagrangian", lambda: as_system(model).lagrangian)
     graph = stages("forward dynamics", lambda: forward_dynamics(model))
     x = np.random.default_rng(n).normal(size=len(graph.inputs))
-    values = dict(zip(graph.input_names, x.tolist(), strict=True))
-    evaluated = np.array(list(stages("evaluate", lambda: graph.evaluate(values)).values()))
+    at = dict(zip(graph.input_names, x.tolist(), strict=True))
+    evaluated = np.array(list(stages("evaluate", lambda: graph.evaluate(at)).values()))
     run = stages("compile", lambda: cg.compile(graph))
     compiled = stages("first call", lambda: run(x))
     stages("second call", lambda: run(x))
-    rows = [[name, f"{s.clock:.3f} s", f"{s.processor:.3f} s", f"{s.peak:.0f} MB"] for name, s in stages.items()]
-    apart = np.abs(evaluated - compiled).max() / np.abs(evaluated).max()
-    size = f"{len(graph.nodes)} nodes, {len(graph.nodes) / n:.0f} a link; compiled and evaluated differ by {apart:.1e}"
-    sys.stdout.write("\n".join([*table(["stage", "clock", "processor", "peak"], rows), size]))
+    rows: list[list[str] | str] = [
+        [name, f"{clock:.3f} s", f"{processor:.3f} s", f"{peak:.0f} MB"]
+        for name, (clock, processor, peak) in stages.items()
+    ]
+    apart, count = relative_difference(compiled, evaluated), len(graph.nodes)
+    return [*rows, f"{count} nodes, {count / n:.0f} a link; compiled and evaluated differ by {apart:.1e}"]
 
 
 def accuracy(kind: str, n: int, spread: float) -> dict[str, float]:
@@ -176,7 +170,7 @@ def accuracy(kind: str, n: int, spread: float) -> dict[str, float]:
                 "LDL of the same, floats": np.array(ldl_elimination(m.tolist(), rhs.tolist())[0]),
             }
         for name, x in solved.items():
-            worst[name] = max(worst.get(name, 0.0), float(np.abs(x - exact).max() / np.abs(exact).max()))
+            worst[name] = max(worst.get(name, 0.0), relative_difference(x, exact))
     return worst
 
 

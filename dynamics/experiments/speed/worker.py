@@ -5,8 +5,6 @@ A peer that takes too long or falls over is ended with its process; the others g
 
 from __future__ import annotations
 
-import gc
-import math
 import multiprocessing
 import os
 import signal
@@ -23,19 +21,13 @@ from typing import Any
 from cgraph.extend import Array
 
 from ...multibody.trees.mechanism import MechanismWarning
-from ...peers import PEERS, PeerModel, TimedTask, UnavailableError
+from ...peers import PEERS, PeerModel, UnavailableError
 from ...peers.peer import EVALUATIONS
 from ...scenes import Scene
+from ..timing import repetitions, single_core, timed
 
 Load = Callable[[], Scene]  # makes the model anew in the worker; lambdas do not travel
-CHUNK = 2e-3  # s, at least, of runs that are timed together
 GRACE = 1.0  # s for a process that has left its pipe to end
-_ONE_CORE = {
-    "OMP_NUM_THREADS": "1",
-    "OPENBLAS_NUM_THREADS": "1",
-    "XLA_FLAGS": "--xla_cpu_multi_thread_eigen=false",
-    "TF_CPP_MIN_LOG_LEVEL": "3",
-}
 
 
 @dataclass(frozen=True)
@@ -127,7 +119,7 @@ def _serve(pipe: Connection, load: Load, name: str) -> None:
         with suppress(Exception):  # loading a package is no part of making a task; what is wrong shows again there
             kind.load()
             import_module(kind.package)
-        tasks: dict[tuple[str, str], tuple[TimedTask, int]] = {}
+        tasks: dict[tuple[str, str], tuple[Callable[[], object], int]] = {}
         case, peer = PeerModel(name, load()), None
         while True:
             asked = pipe.recv()
@@ -140,34 +132,12 @@ def _serve(pipe: Connection, load: Load, name: str) -> None:
                 task = peer.prepare(*asked)
                 result = task.run()
                 seconds = time.perf_counter() - start
-                tasks[asked] = task, repetitions(task)
+                tasks[asked] = task.run, repetitions(task.run)
                 pipe.send(Prepared(seconds, task.result(result), task.size))
             except UnavailableError as error:
                 pipe.send(Refused(str(error)))
             except Exception as error:  # noqa: BLE001 (whatever a peer's own code raises is a line in the report)
                 pipe.send(Refused(f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"))
-
-
-def repetitions(task: TimedTask) -> int:
-    """Number of runs that make a measurable time."""
-    start = time.perf_counter()
-    task.run()
-    once = time.perf_counter() - start
-    return max(1, math.ceil(CHUNK / once)) if once < CHUNK else 1
-
-
-def timed(task: TimedTask, repetitions: int) -> float:
-    """Seconds for a run."""
-    run = task.run
-    gc.disable()
-    try:
-        run()  # other processes have had the caches since
-        start = time.perf_counter()
-        for _ in range(repetitions):
-            run()
-        return (time.perf_counter() - start) / repetitions
-    finally:
-        gc.enable()
 
 
 @contextmanager
@@ -182,23 +152,3 @@ def _interrupts_held() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-@contextmanager
-def single_core() -> Iterator[None]:
-    """This process and those started within run on one core, the same for all, and start no threads to share it."""
-    before = {name: os.environ.get(name) for name in _ONE_CORE}
-    os.environ.update(_ONE_CORE)
-    cores = os.sched_getaffinity(0) if hasattr(os, "sched_getaffinity") else set()
-    try:
-        if cores:
-            os.sched_setaffinity(0, {max(cores)})
-        yield
-    finally:
-        if cores:
-            os.sched_setaffinity(0, cores)
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value

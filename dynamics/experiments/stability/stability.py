@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from ...multiprecision.flint_numbers import flint
-from ..machine import load, machine
 from ..text_table import GAPS, WIDTH, csv_text, number, table
+from ..timing import load, machine
 from . import case_runs, energy_drift, single_evaluations
 from .case_result import CaseResult, Measurement
 

@@ -24,6 +24,7 @@ from ...simulation.ensembles.simulate_many import simulate_many
 from ...simulation.events.event import Event
 from ...simulation.simulate import simulate
 from ...systems.system import System
+from ..text_table import Table
 from .trust import COUNT, RIGHT, SAID, SILENT, SLACK, Verdict, counted, trust
 
 CASCADES = 100
@@ -197,14 +198,14 @@ def _error(balls: Balls, q: Array, qd: Array) -> float:
     )
 
 
-def cascades(count: int = CASCADES) -> Iterator[str]:
+def cascades(count: int = CASCADES) -> Iterator[Table | str]:
     """The verdicts on so many cascades by all methods, and in words those that are not right."""
     judged = [judge_balls(number, method) for method in (None, *METHODS) for number in range(count)]
     title = f"{count} cascades of 2 to 5 equal balls, by exact fractions; excess: error over {TOLERANCE:g}"
     yield from counted(title, judged, {"largest excess": lambda chosen, ends: f"{max(ends, default=math.nan):.2g}"})
 
 
-def with_cascades(count: int = COUNT) -> Iterator[str]:
+def with_cascades(count: int = COUNT) -> Iterator[Table | str]:
     """The verdicts of `trust`, and those on cascades."""
     yield from trust(count)
     yield from cascades(min(count, CASCADES))

@@ -10,8 +10,8 @@ import numpy as np
 
 from cgraph.extend import Array
 
-from ..text_table import table
-from ..work_precision.measurement import Tried, in_turns
+from ..text_table import Table
+from ..work_precision.measurement import Tried, time_in_turns
 from ..work_precision.trajectory_peers import EPSILON, Heyoka
 from ..work_precision.trajectory_runs import Ours, Solver, problem_of
 from .random_motions import LAGRANGIANS, random_task
@@ -48,9 +48,9 @@ def duel(number: int) -> Duel | None:
         if outcome.status:
             return Duel(task.name, (math.nan, math.nan), (math.nan, math.nan), f"{solver.name}: {outcome.status}")
         tried.append(Tried(0.0, run, outcome, _error(truth, outcome.x)))
-    in_turns(tried, TURNS)
+    time_in_turns(tried, TURNS)
     first, second = tried
-    return Duel(task.name, (first.error, second.error), (min(first.seconds), min(second.seconds)))
+    return Duel(task.name, (first.error, second.error), (first.seconds, second.seconds))
 
 
 def _error(truth: Answer, x: Array) -> float:
@@ -59,15 +59,15 @@ def _error(truth: Answer, x: Array) -> float:
     return float(np.max(np.abs(truth.end.deviation(x[None])[0]) / np.where(size > 0.0, size, 1.0)))
 
 
-def tightest(count: int = LAGRANGIANS) -> Iterator[str]:
+def tightest(count: int = LAGRANGIANS) -> Iterator[Table | str]:
     """Errors and times as ratios to heyoka's, by family and in all."""
     duels = [result for number in range(count) if (result := duel(number)) is not None]
     fought = [each for each in duels if not each.status]
-    yield f"{METHOD} at a relative tolerance of {EPSILON:.2g} over heyoka at its default, {len(fought)} motions"
+    title = f"{METHOD} at a relative tolerance of {EPSILON:.2g} over heyoka at its default, {len(fought)} motions"
     names = list(dict.fromkeys([_family(each) for each in fought]))
     rows = [_row(name, [each for each in fought if _family(each) == name]) for name in names]
     rows.append(_row("all", fought))
-    yield "\n".join(table(["family", "motions", "error ratio", "largest", "time ratio", "largest"], rows))
+    yield Table(title, ["family", "motions", "error ratio", "largest", "time ratio", "largest"], rows)
     yield from [f"{each.name}: {each.status}" for each in duels if each.status]
 
 

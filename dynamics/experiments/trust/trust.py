@@ -22,7 +22,7 @@ from ...simulation.simulate import simulate
 from ...simulation.steps.scipy_solvers import solve_ivp
 from ...simulation.trajectory import Trajectory
 from ..accuracy_task import AccuracyTask
-from ..text_table import table
+from ..text_table import Table
 from ..work_precision.trajectory_runs import problem_of
 from .random_motions import EACH, LAGRANGIANS, STARTS, jump, random_motion
 
@@ -159,7 +159,7 @@ def verdicts(
             yield judge(number, method)
 
 
-def trust(count: int = COUNT) -> Iterator[str]:
+def trust(count: int = COUNT) -> Iterator[Table | str]:
     """The verdicts counted by method, and in words those that are not right."""
     right = f"right to {SLACK:g}, where forces jump to {JUMPS:g}"
     title = f"{count} random motions, default arguments; excess: error over rtol times growth, {right}"
@@ -173,7 +173,7 @@ def trust(count: int = COUNT) -> Iterator[str]:
 
 def counted(
     title: str, judged: Sequence[Verdict], figures: Mapping[str, Callable[[Sequence[Verdict], list[float]], str]]
-) -> Iterator[str]:
+) -> Iterator[Table | str]:
     """A title, the verdicts and figures by method, and in words the verdicts that are not right.
 
     figures: {head of a column: text of the verdicts of a method, and of the excesses of their ends}.
@@ -185,8 +185,7 @@ def counted(
         ends = [each.excess for each in chosen if each.excess == each.excess]
         texts = [figure(chosen, ends) for figure in figures.values()]
         rows.append([method, *[str(counts[verdict]) for verdict in (RIGHT, SAID, SILENT)], *texts])
-    yield title
-    yield "\n".join(table(["method", RIGHT, SAID, SILENT, *figures], rows))
+    yield Table(title, ["method", RIGHT, SAID, SILENT, *figures], rows)
     for each in judged:
         if each.verdict != RIGHT:
             yield f"{each.verdict}: {each.name}, {each.method}: excess {each.excess:.3g}; {each.words}"

@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-import json
 import math
 import statistics
-import subprocess
-import sys
-import time
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from importlib import import_module
@@ -22,7 +17,7 @@ from ...peers.heyoka import heyoka, leave_cache
 from ...simulation.run_options import SCIPY
 from ...simulation.simulate import simulate
 from ..accuracy_task import AccuracyTask
-from ..machine import run_fresh
+from ..timing import run_fresh, spent
 from .named_tasks import load
 from .trajectory_peers import MOST_STEPS, casadi_equations, heyoka_derivatives, heyoka_equations
 from .trajectory_runs import problem_of
@@ -137,15 +132,13 @@ def cold_starts(
                 continue
             if not turn:
                 say(f"{name}: cold start, {each}")
-            request = {"which": each, "name": name, "options": options}
-            if not turn and STARTS[each].primed:
-                _in_a_process(request, budget)
-            answer = _in_a_process(request, budget)
-            if isinstance(answer, str):
-                status[each] = answer
-            else:
+            try:
+                for _ in range(1 + (STARTS[each].primed and not turn)):
+                    answer = run_fresh(__name__, "child", each, name, options, timeout=budget)
                 times[each].append(answer["seconds"])
                 loading[each] = answer["loading"]
+            except RuntimeError as error:
+                status[each] = str(error)
     return [
         ColdStart(
             name,
@@ -160,28 +153,9 @@ def cold_starts(
     ]
 
 
-def _in_a_process(request: dict[str, Any], budget: float) -> dict[str, float] | str:
-    """Answer of `child`, or the reason why there is none."""
-    try:
-        done = run_fresh(__name__, "child()", json.dumps(request), budget)
-    except subprocess.TimeoutExpired:
-        return f"not ready within {budget:g} s"
-    with suppress(ValueError, IndexError):
-        answer: dict[str, float] = json.loads(done.stdout.splitlines()[-1])
-        return answer
-    lines = done.stderr.strip().splitlines()
-    return (lines[-1] if lines else f"its process ended with status {done.returncode}")[:200]
-
-
-def child() -> None:
-    """The process's side: what to start comes on standard input, how long it took goes to standard output."""
-    request = json.loads(sys.stdin.read())
-    start = STARTS[request["which"]]
-    begin = time.perf_counter()
-    for package in start.packages:
-        import_module(package)
-    loading = time.perf_counter() - begin
-    task = load(request["name"], **request["options"])
-    begin = time.perf_counter()
-    start.run(task)
-    sys.stdout.write(json.dumps({"seconds": time.perf_counter() - begin, "loading": loading}))
+def child(which: str, name: str, options: dict[str, Any]) -> dict[str, float]:
+    """The process's side: how long the start took, and its packages to load."""
+    start = STARTS[which]
+    loading = spent(lambda: [import_module(package) for package in start.packages]).seconds
+    task = load(name, **options)
+    return {"seconds": spent(lambda: start.run(task)).seconds, "loading": loading}

@@ -9,7 +9,6 @@ import math
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,46 +18,23 @@ from cgraph.extend import Array
 from ...equations.energies import energy as energy_graph
 from ...integrators import METHODS, Problem
 from ...multibody.builders.planar_arm import planar_arm
-from ...peers import UnavailableError
+from ...peers.peer import made
 from ...simulation.simulate import simulate
 from ...simulation.steps.scipy_solvers import solve_ivp
 from ..accuracy_task import AccuracyTask
 from ..stability.energy_drift import SYMPLECTIC, drift
-from ..text_table import table, titled
+from ..text_table import Table, table
 from .cold_start import cold_starts
-from .measurement import ErrorMetrics, Tried, in_turns
-from .named_tasks import load
+from .measurement import Tried, attempt, time_in_turns
 from .trajectory_peers import EPSILON, Cvodes, Heyoka
-from .trajectory_runs import Ours, Outcome, Run, Scipy, Solver, problem_of
-from .work_precision import error_metrics, work_precision
+from .trajectory_runs import Ours, Outcome, Run, Scipy, Solver
+from .work_precision import Subject, subject, work_precision
 
 FIXED = tuple([name for name, method in METHODS.items() if not method.adaptive])
 MASSES = LENGTHS = np.array([1.0, 0.8, 0.7])  # kg, m: the rods of the scene triple_pendulum
 DAMPING, GRAVITY = 0.1, 9.81  # N m s, m/s^2: of the same
 TURNS = 15
 STEPS, STEP, STARTS = 10**6, 0.01, 12  # of `energy`: steps, their length [s], and starts
-
-
-class Subject(NamedTuple):
-    """A task made ready: the size of its smallest state, its equations, and what measures errors."""
-
-    task: AccuracyTask
-    smallest: float
-    problem: Problem
-    metrics: ErrorMetrics
-
-    @property
-    def title(self) -> str:
-        """Title: the motion, and the error of its reference."""
-        exact, until = self.metrics.exact, f"{self.task.name}, to t = {self.task.t_end:g} s"
-        return f"{until}. Exact motion: {exact.how}; its error {exact.error:.0e}"
-
-
-def subject(name: str, folder: str, **options: Any) -> Subject:
-    """The task of that name.  folder: where exact motions are kept."""
-    task = load(name, **options)
-    metrics = error_metrics(task, folder=folder)
-    return Subject(task, metrics.smallest, problem_of(task), metrics)
 
 
 @dataclass
@@ -78,38 +54,32 @@ class Comparison:
     def add(self, name: str, make: Callable[..., Solver], knobs: Iterable[float], most: int | None = None) -> None:
         """A solver made of (task, smallest, problem), at knobs from coarse to fine, until `most` are good."""
         runs = self.tried[name] = []
-        try:
-            solver = make(*self.subject[:3])
-        except (ImportError, UnavailableError) as missing:
-            self.refused.append(f"{name}: {missing}")
-            return
-        for knob in knobs:
-            try:
-                run = solver.ready(knob)
-                outcome = run()
-            except Exception as refusal:  # noqa: BLE001 (another's refusal is a line)
-                self.refused.append(f"{name} at {knob:.0e}: {' '.join(str(refusal).split())[:100]}")
-                continue
-            off = self.subject.metrics.at_end(outcome.x)
-            if not outcome.status and off <= self.error:
-                runs.append(Tried(knob, run, outcome, off))
-            if len(runs) == most:
-                break
+        absent: dict[str, str] = {}
+        for solver in made({name: lambda: make(*self.subject[:3])}, absent).values():
+            for knob in knobs:
+                tried, why, _ = attempt(solver, self.subject.metrics, knob)
+                if tried is None:
+                    self.refused.append(f"{name} at {knob:.0e}: {why[:100]}")
+                elif tried.error <= self.error:
+                    runs.append(tried)
+                if len(runs) == most:
+                    break
+        self.refused += [f"{name}: {missing}" for missing in absent.values()]
 
     def text(self) -> str:
         """The fastest run of every solver, by time; times are also relative to the fastest of ours."""
-        in_turns([each for runs in self.tried.values() for each in runs], TURNS)
-        best = {name: min(runs, key=lambda each: min(each.seconds)) for name, runs in self.tried.items() if runs}
-        ours = min([min(each.seconds) for name, each in best.items() if name in METHODS], default=math.nan)
+        time_in_turns([each for runs in self.tried.values() for each in runs], TURNS)
+        best = {name: min(runs, key=lambda each: each.seconds) for name, runs in self.tried.items() if runs}
+        ours = min([each.seconds for name, each in best.items() if name in METHODS], default=math.nan)
         header = ["", "ms", "times ours", "error", "knob", "steps", "evaluations"]
         rows = []
-        for name, each in sorted(best.items(), key=lambda item: min(item[1].seconds)):
-            seconds, out = min(each.seconds), each.outcome
+        for name, each in sorted(best.items(), key=lambda item: item[1].seconds):
+            seconds, out = each.seconds, each.outcome
             times = [f"{1e3 * seconds:.3f}", f"{seconds / ours:.2f}", f"{each.error:.1e}", f"{each.knob:.1e}"]
             counts = ["-" if count is None else str(count) for count in (out.steps, out.evaluations)]
             rows.append([name, *times, *counts])
         title = f"error at most {self.error:g} at t = {self.subject.task.t_end:g} s"
-        return "\n".join([titled(title, header, rows), *self.refused])
+        return "\n".join([str(Table(title, header, rows)), *self.refused])
 
 
 def tolerances(first: float, last: float, per_decade: int = 4) -> list[float]:
@@ -129,7 +99,7 @@ def orders(folder: str) -> Iterator[str]:
             if curve.fitted is not None and curve.order is not None:
                 fitted, apart = f"{curve.fitted:.4f}", f"{curve.fitted - curve.order:+.4f}"
             rows.append([curve.name, str(curve.order), fitted, apart])
-        yield titled(f"fitted orders, {name}", ["", "declared", "fitted", "difference"], rows)
+        yield str(Table(f"fitted orders, {name}", ["", "declared", "fitted", "difference"], rows))
 
 
 def taylor(folder: str) -> Iterator[str]:
@@ -150,7 +120,7 @@ def taylor(folder: str) -> Iterator[str]:
     ours = next(each.seconds for each in starts if each.name == "ours")
     rows = [[s.name, f"{s.seconds:.3f}", f"{s.median:.3f}", f"{s.seconds / ours:.2f}", s.status] for s in starts]
     title = "cold start: model to end of first run, nothing compiled; heyoka at its default tolerance [s]"
-    yield titled(title, ["", "shortest", "median", "times ours", "status"], rows, left=(0, 4))
+    yield str(Table(title, ["", "shortest", "median", "times ours", "status"], rows, left=(0, 4)))
 
 
 def stiff(folder: str) -> Iterator[str]:

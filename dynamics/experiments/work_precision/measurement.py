@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import gc
 import math
 import statistics
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, field
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
@@ -21,9 +20,8 @@ from ...multiprecision import Reference
 from ...simulation.run_options import SCIPY
 from ...systems.model import as_system
 from ..accuracy_task import INTERVALS, AccuracyTask
-from ..clock import Spent, spent
-from ..paper_numbers import exponent
 from ..text_table import csv_text
+from ..timing import Spent, exponent, in_turns, spent
 from .cold_start import ColdStart
 from .trajectory_runs import CHOSEN, EQUAL, EndSolver, Outcome, Run, Solver
 
@@ -174,7 +172,6 @@ def _plain(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-CLOCKS = 200  # readings of the clocks, of which the quickest tells what they take
 CHUNK = 5e-3  # s, of runs that are timed in one turn
 WORST, FLOOR = 1e-1, 5e-12  # errors between which an order is fitted: above is no order yet, below is rounding
 FITTED = 3  # points of equal steps, the finest between those bounds: the coarser are no order yet
@@ -223,17 +220,19 @@ class ErrorMetrics:
         return float(np.max(np.abs(values["E"] - values["E"][0]))) / turned
 
 
-@dataclass
-class Tried:
-    """One knob of a solver, and what was timed of it: by the clock, of the processor, and `once`, of its first run."""
+class Tried(NamedTuple):
+    """One knob of a solver: its run, which is timed in turns, and what the first run took."""
 
     knob: float
     run: Run
     outcome: Outcome
     error: float
     once: Spent[Any] | None = None
-    seconds: list[float] = field(default_factory=list)
-    processor: list[float] = field(default_factory=list)
+
+    @property
+    def seconds(self) -> float:
+        """Shortest of the turns by the clock."""
+        return min(self.run.seconds)
 
 
 @dataclass
@@ -273,8 +272,8 @@ def _point(solver: Solver, tried: Tried, metrics: ErrorMetrics) -> Point:
     return Point(
         tried.knob,
         metrics.task.t_end / outcome.steps if outcome.steps else None,
-        min(tried.seconds),
-        statistics.median(tried.seconds),
+        tried.seconds,
+        statistics.median(tried.run.seconds),
         outcome.steps,
         outcome.rejected,
         outcome.evaluations,
@@ -292,28 +291,14 @@ def sweep(
     best, stalled = math.inf, 0
     usual = solver.tolerances if solver.kind == CHOSEN else [float(INTERVALS * 2**k) for k in range(24)]
     for knob in usual if knobs is None else knobs:
-        begin, once = time.process_time(), None
-        try:
-            run = solver.ready(knob)
-            run.rewind()
-            begin = time.process_time()
-            once = spent(run.run)
-            outcome = run.read(once.made)
-            status = outcome.status
-        except Exception as error:  # noqa: BLE001 (whatever a peer's own code raises is a line in the report)
-            kind = "" if isinstance(error, ValueError) else f"{type(error).__name__}: "
-            status = kind + " ".join(str(error).split())[:200]
-        took = time.process_time() - begin if once is None else once.processor
-        if not status and not math.isfinite(error_at_end := metrics.at_end(outcome.x)):
-            status = "is not finite"
-        entry.stopped = status
-        if status:
+        tried, entry.stopped, took = attempt(solver, metrics, knob)
+        if tried is None:
             if entry.tried or took > limit:  # a coarse knob may fail, and a finer one not
                 break
             continue
-        entry.tried.append(Tried(knob, run, outcome, error_at_end, once))
-        stalled = 0 if error_at_end < 0.5 * best else stalled + 1
-        best = min(best, error_at_end)
+        entry.tried.append(tried)
+        stalled = 0 if tried.error < 0.5 * best else stalled + 1
+        best = min(best, tried.error)
         if stalled >= STALLED and best < FLOOR:
             entry.stopped = "rounding"
             break
@@ -325,30 +310,29 @@ def sweep(
     return entry
 
 
-def in_turns(tried: Sequence[Tried], turns: int) -> None:
-    """Time every run in turns, so that all share the machine's moods; short runs several times a turn."""
-    gc.disable()
-    read = min(
-        [spent(_nothing).processor for _ in range(CLOCKS)]
-    )  # what the reading of the clocks takes of the processor
+def attempt(solver: EndSolver, metrics: EndMetrics, knob: float) -> tuple[Tried | None, str, float]:
+    """The first run with that knob, or why there is none; and the seconds of the processor that it took."""
+    begin = time.process_time()
     try:
-        for _ in range(turns):
-            for each in tried:
-                if len(each.seconds) >= 3 and sum(each.seconds) > ENOUGH:
-                    continue
-                left = CHUNK
-                while left > 0.0:
-                    each.run.rewind()
-                    taken = spent(each.run.run)
-                    each.seconds.append(taken.seconds)
-                    each.processor.append(max(taken.processor - read, 0.0))
-                    left -= taken.seconds
-    finally:
-        gc.enable()
+        run = solver.ready(knob)
+        run.rewind()
+        begin = time.process_time()
+        once = spent(run.run)
+        outcome = run.read(once.made)
+    except Exception as error:  # noqa: BLE001 (whatever a peer's own code raises is a line in the report)
+        kind = "" if isinstance(error, ValueError) else f"{type(error).__name__}: "
+        return None, kind + " ".join(str(error).split())[:200], time.process_time() - begin
+    if outcome.status:
+        return None, outcome.status, once.processor
+    error_at_end = metrics.at_end(outcome.x)
+    if not math.isfinite(error_at_end):
+        return None, "is not finite", once.processor
+    return Tried(knob, run, outcome, error_at_end, once), "", once.processor
 
 
-def _nothing() -> None:
-    """A run of no length."""
+def time_in_turns(tried: Iterable[Tried], turns: int) -> None:
+    """Time every run in turns; short runs several times a turn, long ones three times in all."""
+    in_turns([each.run for each in tried], turns, CHUNK, ENOUGH)
 
 
 def fitted_order(steps: Sequence[float], errors: Sequence[float], finest: int | None = None) -> float | None:

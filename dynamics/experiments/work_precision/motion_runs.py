@@ -57,7 +57,7 @@ class Motion(EndSolver):
             x, stats = end(found)
             return Outcome(x, stats.steps, stats.rejected, stats.nfev, "" if stats.success else stats.message)
 
-        return Run(run, read)
+        return Run(run, read=read)
 
 
 class Many(EndSolver):
@@ -86,7 +86,7 @@ class Many(EndSolver):
         run(t_end=short, **(options | {"t_eval": [short]}))
         while len(q) >= FEW and time.perf_counter() - begin < 2.0 * MAKING:  # alone before lanes are made
             run(t_end=short, **(options | {"t_eval": [short]}))
-        return Run(partial(run, t_end=self.task.t_end, **options), read)
+        return Run(partial(run, t_end=self.task.t_end, **options), read=read)
 
 
 class HeyokaBatch(EndSolver):
@@ -116,7 +116,7 @@ class HeyokaBatch(EndSolver):
                 counts[k] = integrator.propagate_res[0][3]
             return counts
 
-        return Run(run, lambda found: Outcome(ends[: len(self.starts)].copy(), int(np.mean(found))))
+        return Run(run, read=lambda found: Outcome(ends[: len(self.starts)].copy(), int(np.mean(found))))
 
 
 @dataclass(frozen=True)

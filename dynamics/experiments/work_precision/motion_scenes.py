@@ -112,7 +112,6 @@ MOTIONS: dict[str, Callable[[], AccuracyTask]] = {
     "van der Pol 100": van_der_pol,
     "stiff chain": stiff_chain,
 }
-QUICK = ("double pendulum", "kepler 0.9", "van der Pol 100")
 
 
 def _entry(name: str) -> dict[str, Any]:

@@ -12,6 +12,7 @@ import textwrap
 import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -19,15 +20,15 @@ from cgraph.extend import Array
 
 from ...integrators import METHODS, Problem
 from ...multiprecision import Reference
-from ...peers import UnavailableError
+from ...peers.peer import made
 from ..accuracy_task import AccuracyTask
-from ..text_table import WIDTH, Footnotes, digits, table
-from .measurement import OURS, PEERS, EndMetrics, Entry, ErrorMetrics, Tried, group, in_turns, sweep
+from ..text_table import WIDTH, Footnotes, check_names, digits, table
+from .measurement import OURS, PEERS, EndMetrics, Entry, ErrorMetrics, Tried, group, sweep, time_in_turns
 from .motion_runs import HeyokaBatch, Many, ManyEnds, Motion
-from .motion_scenes import MOTIONS, QUICK, TIMES, exact_end, sizes
+from .motion_scenes import MOTIONS, TIMES, exact_end, sizes
 from .trajectory_peers import Heyoka, offers
 from .trajectory_runs import CHOSEN, EndSolver, problem_of
-from .work_precision import PATIENCE, check_names
+from .work_precision import PATIENCE
 
 HEYOKA = "heyoka"
 DUEL = (OURS, HEYOKA)  # whose ratio is told
@@ -39,6 +40,13 @@ TURNS, LIMIT = 9, 3.0  # turns of each run; s of a run, after which no finer tol
 COUNT = 4096  # motions of an ensemble, fewer where one motion is long
 LONG = 0.5  # s of all motions of an ensemble together, by the fastest way to compute one
 ASIDE = 1e-2  # how far the starts of an ensemble lie apart, in sizes
+QUICK: dict[str, Any] = {
+    "scenes": ("double pendulum", "kepler 0.9", "van der Pol 100"),
+    "times": TIMES[:2],
+    "repeats": 3,
+    "limit": 0.3,
+    "count": 256,
+}
 LADDER = tuple([10.0**-k for k in range(2, 16)])
 TIGHTEST, SMALLEST = 1e-15, 1e-18  # tolerance of the ends of an ensemble; error of none
 ENSEMBLE, FEWEST = 10.0, 16  # s: the longest motion of an ensemble; and its fewest motions
@@ -103,7 +111,7 @@ def motions(
     errors: Sequence[float] = ERRORS,
     peers: Sequence[str] = tuple(PEERS),
     *,
-    turns: int = TURNS,
+    repeats: int = TURNS,
     limit: float = LIMIT,
     count: int = COUNT,
     exact: Mapping[tuple[str, float], Reference] | None = None,
@@ -112,7 +120,7 @@ def motions(
     """Rows, scene by scene, as they are measured: of one motion to each of the times, then of an ensemble.
 
     scenes: of `MOTIONS`.  times [s], errors: of the rows.  peers: those asked; what is not installed is left out, and
-    `say` tells it.  turns: of each run.  limit: seconds of a run, after which no finer tolerance is tried.
+    `say` tells it.  repeats: turns of each run.  limit: seconds of a run, after which no finer tolerance is tried.
     count: motions of the ensemble, at the last time up to 10 s; 0 for none.  exact: ends in place of those known.
     Raises ValueError for an unknown name and for numbers that are not positive.
     """
@@ -120,7 +128,7 @@ def motions(
     for what, values in (("times", times), ("errors", errors)):
         if not (values and all([value > 0.0 and math.isfinite(value) for value in values])):
             raise ValueError(f"{what} must be positive and finite, got {values!r}")
-    return _rows(scenes, sorted(times), sorted(errors, reverse=True), peers, turns, limit, count, exact or {}, say)
+    return _rows(scenes, sorted(times), sorted(errors, reverse=True), peers, repeats, limit, count, exact or {}, say)
 
 
 def _rows(
@@ -163,16 +171,15 @@ def _solvers(
     task: AccuracyTask, smallest: float, problem: Problem, peers: Sequence[str], absent: dict[str, Missed]
 ) -> list[EndSolver]:
     """Ours, then the peers' that are installed and take this motion; why others do not goes to `absent`."""
-    solvers: list[EndSolver] = [Motion(name, task, smallest) for name in methods(task.stiff)]
-    for name, make in offers(task, smallest, problem, "auto").items():
-        if group(name) in peers and (group(name) == HEYOKA or name.endswith(ASKED[task.stiff])):
-            try:
-                solvers.append(make())
-            except ImportError as error:
-                absent[group(name)] = Missed(str(error))
-            except (UnavailableError, ValueError, TypeError) as error:
-                absent[group(name)] = Missed(" ".join(str(error).split())[:200])
-    return solvers
+    asked = {
+        name: make
+        for name, make in offers(task, smallest, problem, "auto").items()
+        if group(name) in peers and (group(name) == HEYOKA or name.endswith(ASKED[task.stiff]))
+    }
+    refused: dict[str, str] = {}
+    theirs = made(asked, refused, ValueError, TypeError)
+    absent |= {group(name): Missed(why) for name, why in refused.items()}
+    return [*[Motion(name, task, smallest) for name in methods(task.stiff)], *theirs.values()]
 
 
 def methods(stiff: bool) -> list[str]:
@@ -219,12 +226,12 @@ def _fill(rows: Sequence[Row], entries: Sequence[Entry[EndSolver]], turns: int) 
             chosen = [about for about, once in zip(each, first, strict=True) if once <= HOPELESS * min(first)]
             runs |= {id(one): one for about in chosen for one in about}
     for one in runs.values():
-        if one.once and one.once.processor > SLOW and not one.seconds:
-            one.seconds.append(one.once.seconds)
-            one.processor.append(one.once.processor)
+        if one.once and one.once.processor > SLOW and not one.run.seconds:
+            one.run.seconds.append(one.once.seconds)
+            one.run.processor.append(one.once.processor)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        in_turns([one for one in runs.values() if not one.seconds], turns)
+        time_in_turns([one for one in runs.values() if not one.run.seconds], turns)
     for row in rows:
         for entry in entries:
             name = group(entry.solver.name)
@@ -248,10 +255,10 @@ def _about(tried: Sequence[Tried], error: float) -> list[Tried]:
 def cost(entry: Entry[EndSolver], error: float, count: int) -> Cell | None:
     """Cost of the error, between the two runs about it; of the coarsest run where that is good enough already."""
     about = _about(entry.tried, error)
-    if not (about and about[-1].seconds and about[0].seconds):
+    if not (about and about[-1].run.seconds and about[0].run.seconds):
         return None
     coarse, fine = about[0], about[-1]
-    values = [[min(each.seconds), min(each.processor), each.knob] for each in (coarse, fine)]
+    values = [[each.seconds, min(each.run.processor), each.knob] for each in (coarse, fine)]
     share = 1.0
     if fine.error < error < coarse.error < math.inf:
         share = math.log(coarse.error / error) / math.log(coarse.error / max(fine.error, SMALLEST))
@@ -356,4 +363,4 @@ def _loss(row: Row) -> str:
     return f"< {row.scene}, {row.error:.0e}: {'; '.join(counts)}"
 
 
-__all__ = ["ERRORS", "MOTIONS", "PEERS", "QUICK", "TIMES", "Cell", "Row", "motions", "tables"]
+__all__ = ["ERRORS", "MOTIONS", "PEERS", "TIMES", "Cell", "Row", "motions", "tables"]

@@ -60,7 +60,7 @@ class Mujoco(Solver):
     def ready(self, knob: float) -> Run:
         """The run with that knob, everything before it done: what is timed."""
         states, run = self._states(int(knob))
-        return Run(run, lambda _: Outcome(states[0, -1, self.peer.taken], int(knob)))
+        return Run(run, read=lambda _: Outcome(states[0, -1, self.peer.taken], int(knob)))
 
     def rows(self, knob: float) -> Array:
         """The states at the task's times, (T, m); NaN from where it stopped."""
@@ -129,7 +129,8 @@ class Heyoka(Solver):
             status = "" if found[0] == limit else f"stopped after {found[3]} steps"
             return Outcome(integrator.state.copy(), found[3], None, None, status)
 
-        return Run(partial(propagate, self.task.t_end, max_steps=MOST_STEPS), read, partial(self._rewind, integrator))
+        run = partial(propagate, self.task.t_end, max_steps=MOST_STEPS)
+        return Run(run, partial(self._rewind, integrator), read=read)
 
     def rows(self, knob: float) -> Array:
         """The states at the task's times, (T, m); NaN from where it stopped."""
@@ -179,7 +180,7 @@ class Cvodes(Solver):
             stats = function.stats()
             return Outcome(np.array(found["xf"]).ravel(), stats["nsteps"], stats["netfails"], stats["nfevals"])
 
-        return Run(partial(function, x0=self.start.tolist()), read)
+        return Run(partial(function, x0=self.start.tolist()), read=read)
 
     def rows(self, knob: float) -> Array:
         """The states at the task's times, (T, m); NaN from where it stopped."""
@@ -245,7 +246,7 @@ class Diffrax(Solver):
             state, steps, good = found
             return Outcome(np.asarray(state), int(steps), None, None, "" if good else f"stopped after {steps} steps")
 
-        return Run(run, read)
+        return Run(run, read=read)
 
     def rows(self, knob: float) -> Array:
         """The states at the task's times, (T, m), a run to each."""

@@ -24,6 +24,7 @@ from ...simulation.steps.scipy_solvers import ScipyIntegration, scipy_solver
 from ...simulation.steps.step_program import CompiledSteps, compile_steps, step_program
 from ...simulation.steps.stepping import Integration, NativeRun
 from ..accuracy_task import AccuracyTask
+from ..timing import Timed
 
 EQUAL, CHOSEN = "equal steps", "chosen steps"
 TRIAL = 4096  # steps that tell how long many more take
@@ -40,17 +41,11 @@ class Outcome(NamedTuple):
     status: str = ""
 
 
-def _nothing() -> None:
-    """Nothing to do."""
+@dataclass
+class Run(Timed):
+    """A run made ready, and timed; `read` tells its outcome."""
 
-
-@dataclass(frozen=True)
-class Run:
-    """A run made ready: `run` is what is timed; before it `rewind` goes back to the start, `read` tells its outcome."""
-
-    run: Callable[[], Any]
     read: Callable[[Any], Outcome] = lambda outcome: outcome
-    rewind: Callable[[], object] = _nothing
 
     def __call__(self) -> Outcome:
         """Outcome of the run."""

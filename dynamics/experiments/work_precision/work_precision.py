@@ -2,24 +2,52 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from ...integrators import METHODS, Problem
-from ...multiprecision import Reference
-from ...peers import UnavailableError
+from ...peers.peer import made
 from ..accuracy_task import AccuracyTask
-from ..machine import load as load_of_machine, machine
+from ..text_table import check_names
+from ..timing import load as load_of_machine, machine, spent
 from .cold_start import STARTS, cold_starts
-from .measurement import PEERS, Entry, ErrorMetrics, WorkPrecision, in_turns, sweep
+from .measurement import PEERS, Entry, ErrorMetrics, WorkPrecision, sweep, time_in_turns
 from .named_tasks import load
 from .trajectory_peers import offers
 from .trajectory_runs import EQUAL, Ours, Solver, problem_of
 
 LIMIT = 0.3  # s; no finer knob is tried after a run of this length
 PATIENCE = 3.0  # times as long for the others, most of which need more time for the same error
+
+
+class Subject(NamedTuple):
+    """A task made ready: the size of its smallest state, its equations, and what measures errors."""
+
+    task: AccuracyTask
+    smallest: float
+    problem: Problem
+    metrics: ErrorMetrics
+
+    @property
+    def title(self) -> str:
+        """Title: the motion, and the error of its reference."""
+        exact, until = self.metrics.exact, f"{self.task.name}, to t = {self.task.t_end:g} s"
+        return f"{until}. Exact motion: {exact.how}; its error {exact.error:.0e}"
+
+
+def subject(name: str, folder: str | Path | None = None, digits: int | None = None, **options: Any) -> Subject:
+    """The task of that name.  folder: where exact motions are kept.  options: as of `named_tasks.load`.
+
+    Raises ValueError where no exact motion is known.
+    """
+    task = load(name, **options)
+    exact = task.solution(task.times, folder, digits)
+    if exact is None:
+        raise ValueError(f"no solution of {task.name!r} is known to compare with")
+    metrics = ErrorMetrics(task, exact)
+    return Subject(task, metrics.smallest, problem_of(task), metrics)
 
 
 def work_precision(
@@ -52,83 +80,51 @@ def work_precision(
     check_names(("method", methods, METHODS), ("peer", peers, PEERS), ("cold start", cold, STARTS))
     if turns < 1 or not limit > 0.0:
         raise ValueError(f"turns must be at least 1 and limit positive, got {turns!r} and {limit!r} s")
-    task = load(name, **(options or {}))
-    begin, before = time.perf_counter(), load_of_machine()
+    before = load_of_machine()
     say(f"{name}: exact motion")
-    metrics = error_metrics(task, digits, folder)
-    spent = time.perf_counter() - begin
-    problem = problem_of(task)
-    absent: dict[str, str] = {}
+    readied = spent(lambda: subject(name, folder, digits, **(options or {})))
+    at, absent = readied.made, dict[str, str]()
     entries: list[Entry[Solver]] = []
-    for solver in _solvers(task, metrics.smallest, problem, methods, peers, backend, absent):
+    for solver in _solvers(at, methods, peers, backend, absent):
         say(f"{name}: {solver.name}")
-        entry = sweep(solver, metrics, limit if solver.ours else PATIENCE * limit)
+        entry = sweep(solver, at.metrics, limit if solver.ours else PATIENCE * limit)
         if entry.tried:
             entries.append(entry)
         else:
             absent[solver.name] = entry.stopped
     say(f"{name}: {turns} turns")
-    in_turns([tried for entry in entries for tried in entry.tried], turns)
-    curves = tuple([entry.curve(metrics, problem) for entry in entries])
+    time_in_turns([tried for entry in entries for tried in entry.tried], turns)
+    curves = tuple([entry.curve(at.metrics, at.problem) for entry in entries])
     started = cold_starts(name, options or {}, cold, turns=cold_turns, budget=budget, say=say) if cold else []
-    load_now, described = load_of_machine(), _described(task, problem, metrics.exact)
-    measured: dict[str, Any] = {"curves": curves, "cold": tuple(started), "absent": absent, "reference_seconds": spent}
-    return WorkPrecision(**described, **measured, machine=machine(), load=(before, load_now))
-
-
-def _described(task: AccuracyTask, problem: Problem, exact: Reference) -> dict[str, Any]:
-    """Facts of the report on the task and its exact motion."""
     fields = ("name", "about", "t_end", "conservative", "stiff", "left_out")
-    return {name: getattr(task, name) for name in fields} | {
-        "states": problem.size,
-        "nodes": len(problem.rate.nodes),
-        "relative_to": "own" if task.decades else "given" if task.size else "largest",
-        "times": tuple(task.times),
-        "reference": exact.how,
-        "reference_error": exact.error,
-    }
-
-
-def check_names(*choices: tuple[str, Iterable[str], Iterable[str]]) -> None:
-    """Raise ValueError for a name that is not known; choices: of (what they name, names, those known)."""
-    for what, names, known in choices:
-        if unknown := [name for name in names if name not in known]:
-            raise ValueError(f"there is no {what} {unknown[0]!r}; there are {', '.join(known)}")
-
-
-def error_metrics(task: AccuracyTask, digits: int | None = None, folder: str | Path | None = None) -> ErrorMetrics:
-    """The task's exact motion, and errors against it. Raises ValueError where no such motion is known."""
-    exact = task.solution(task.times, folder, digits)
-    if exact is None:
-        raise ValueError(f"no solution of {task.name!r} is known to compare with")
-    return ErrorMetrics(task, exact)
+    return WorkPrecision(
+        **{field: getattr(at.task, field) for field in fields},
+        states=at.problem.size,
+        nodes=len(at.problem.rate.nodes),
+        relative_to="own" if at.task.decades else "given" if at.task.size else "largest",
+        times=tuple(at.task.times),
+        reference=at.metrics.exact.how,
+        reference_error=at.metrics.exact.error,
+        reference_seconds=readied.seconds,
+        machine=machine(),
+        load=(before, load_of_machine()),
+        curves=curves,
+        cold=tuple(started),
+        absent=absent,
+    )
 
 
 def _solvers(
-    task: AccuracyTask,
-    smallest: float,
-    problem: Problem,
-    methods: Sequence[str],
-    peers: Sequence[str],
-    backend: str,
-    absent: dict[str, str],
-) -> Iterable[Solver]:
+    at: Subject, methods: Sequence[str], peers: Sequence[str], backend: str, absent: dict[str, str]
+) -> list[Solver]:
     """Solvers that can be made; reasons why others cannot go to `absent`."""
     makers: dict[str, Callable[[], Solver]] = {
-        method: lambda method=method: Ours(method, task, smallest, problem, backend)  # type: ignore[misc]
-        for method in METHODS
-        if method in methods
+        method: partial(Ours, method, *at[:3], backend) for method in METHODS if method in methods
     }
     begins = tuple([PEERS[peer] for peer in peers])
-    makers |= {name: make for name, make in offers(task, smallest, problem, backend).items() if name.startswith(begins)}
-    for name, make in makers.items():
-        try:
-            solver = make()
-            if solver.kind == EQUAL and task.decades:
-                absent[name] = "equal steps cannot span this many powers of ten"
-                continue
-            yield solver
-        except ImportError as error:
-            absent[name] = f"not installed ({error})"
-        except (UnavailableError, ValueError, TypeError) as error:
-            absent[name] = " ".join(str(error).split())[:200]
+    makers |= {name: make for name, make in offers(*at[:3], backend).items() if name.startswith(begins)}
+    solvers = made(makers, absent, ValueError, TypeError)
+    if at.task.decades:
+        equal = [name for name, solver in solvers.items() if solver.kind == EQUAL]
+        absent |= dict.fromkeys(equal, "equal steps cannot span this many powers of ten")
+    return [solver for name, solver in solvers.items() if name not in absent]

@@ -13,12 +13,12 @@ import cgraph as cg
 import dynamics as dyn
 from cgraph.extend import ldl_elimination
 from dynamics.equations.linearization import linearize_many
-from dynamics.experiments.machine import machine
 from dynamics.experiments.speed import bench as module
 from dynamics.experiments.speed.bench import MODES, PEERS, TASKS, Cell, Row, WorkerPool, bench, tables
 from dynamics.experiments.speed.bench_scenes import SCENES, free_tree, load
 from dynamics.experiments.speed.worker import Prepared, Refused, Worker
 from dynamics.experiments.text_table import digits
+from dynamics.experiments.timing import machine
 from dynamics.io.mujoco_twin import MujocoTwin
 from dynamics.peers import PeerModel, UnavailableError, ours
 from dynamics.peers.ours import with_inertial_parameters
@@ -471,13 +471,3 @@ def test_the_bench_sets_ours_beside_its_peers(capsys):
         assert one["difference"] <= module.AGREES
     nodes = len(dyn.forward_dynamics(SCENES["planar 3"]()).nodes)
     assert call["cells"]["ours"]["size"] == nodes
-
-
-def test_a_run_that_is_interrupted_prints_what_it_has(capsys, monkeypatch):
-    def rows(*_, **__):
-        yield row("planar 3", ours=cell(0.2, 0.0))
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("dynamics.experiments.speed.bench.bench", rows)
-    assert cli.main(["bench"]) == 130
-    assert "planar 3  0.200" in capsys.readouterr().out

@@ -9,8 +9,9 @@ import pytest
 
 import cgraph as cg
 from dynamics.experiments.work_precision import comparisons
-from dynamics.experiments.work_precision.comparisons import Comparison, SolveIvp, Subject, numpy_rate, subject
+from dynamics.experiments.work_precision.comparisons import Comparison, SolveIvp, numpy_rate
 from dynamics.experiments.work_precision.trajectory_runs import Ours, Outcome, Solver
+from dynamics.experiments.work_precision.work_precision import Subject, subject
 
 ERROR = 1e-6
 ROUNDING = 1e-12  # of rates written by hand, beside those of the graph

@@ -28,7 +28,7 @@ NAME, T_END = "Henon and Heiles", TIMES[0]
 @pytest.fixture(scope="module")
 def rows() -> list[Row]:
     pytest.importorskip("scipy")
-    return list(motions([NAME], [T_END], (1e-6, 1e-9), ["SciPy", "MuJoCo"], turns=1, count=20))
+    return list(motions([NAME], [T_END], (1e-6, 1e-9), ["SciPy", "MuJoCo"], repeats=1, count=20))
 
 
 def test_a_motion_and_its_ensemble_have_rows_of_every_error(rows: list[Row]) -> None:
@@ -52,10 +52,16 @@ def test_the_tables_show_them(rows: list[Row]) -> None:
     assert "\n< " not in text
 
 
-def test_a_row_that_heyoka_wins_is_marked_with_its_counts() -> None:
+def lost() -> Row:
+    """A row that heyoka wins."""
     ours, theirs = Cell("dop853", 2e-3, 2e-3, 1e-9, 10, 121), Cell("heyoka Taylor", 1e-3, 1e-3, 1e-9, 4, None)
-    row = Row(NAME, 1.0, 1e-9, 1, {OURS: ours, "heyoka": theirs}, {"SciPy": Missed("too slow", 3e-8)})
-    lines = tables([row, replace(row, error=1e-12, cells={OURS: ours}, missed={"heyoka": Missed("gone")})]).splitlines()
+    return Row(NAME, 1.0, 1e-9, 1, {OURS: ours, "heyoka": theirs}, {"SciPy": Missed("too slow", 3e-8)})
+
+
+def test_a_row_that_heyoka_wins_is_marked_with_its_counts() -> None:
+    row = lost()
+    left = replace(row, error=1e-12, cells={OURS: row.cells[OURS]}, missed={"heyoka": Missed("gone")})
+    lines = tables([row, left]).splitlines()
     assert row.ratio == 0.5
     assert "(3e-08)" in lines[-4]
     assert lines[-4].split()[4:9] == ["2.00", "<", "2.00", "dop853", "1.00"]
@@ -67,15 +73,15 @@ def test_a_wrong_exact_end_is_noticed() -> None:
     end = exact_end(NAME, T_END)
     assert isinstance(end, Reference)
     wrong = replace(end, decimal=(tuple([f"{float(value) + 1e-7:.17g}" for value in end.decimal[0]]),))
-    row, *_ = motions([NAME], [T_END], [1e-6], ["SciPy"], turns=1, count=0, exact={(NAME, T_END): wrong})
+    row, *_ = motions([NAME], [T_END], [1e-6], ["SciPy"], repeats=1, count=0, exact={(NAME, T_END): wrong})
     assert "the exact end is doubted" in row.doubt
     assert f"! {NAME}: {row.doubt}" in tables([row]).splitlines()
 
 
 def test_a_cost_is_interpolated_between_the_runs_about_an_error() -> None:
     def tried(knob: float, error: float, seconds: float) -> Tried:
-        run, outcome = Run(lambda: None), Outcome(np.zeros(1), 7)
-        return Tried(knob, run, outcome, error, seconds=[seconds, 9.0], processor=[seconds / 2, 9.0])
+        run, outcome = Run(lambda: None, seconds=[seconds, 9.0], processor=[seconds / 2, 9.0]), Outcome(np.zeros(1), 7)
+        return Tried(knob, run, outcome, error)
 
     entry = Entry(Motion("dop853", MOTIONS[NAME](), 1.0), [tried(1e-4, 1e-5, 1.0), tried(1e-6, 1e-9, 4.0)])
     between = cost(entry, 1e-7, 1)

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 import dynamics as dyn
-from dynamics.experiments.speed.operation_counts import (
+from dynamics.experiments.speed.counts import (
     QUANTITIES,
     ROBOTS,
     models,
@@ -59,7 +59,7 @@ def test_no_row_of_the_page_grows(what: str, name: str) -> None:
 
 def test_the_page_has_every_row() -> None:
     assert set(ROWS) == {(what, name) for what in QUANTITIES for name in MODELS}
-    printed = [block.splitlines()[-1].split() for block in operation_counts(3)]
+    printed = [str(each).splitlines()[-1].split() for each in operation_counts(3) if each]
     assert [line[:2] for line in printed] == [["planar", "3"]] * len(QUANTITIES)
     for what, (_, _, *numbers) in zip(QUANTITIES, printed, strict=True):
         assert all(int(now) <= said for now, said in zip(numbers, ROWS[what, "planar 3"], strict=True))

@@ -337,7 +337,7 @@ def test_a_solver_that_fails_keeps_its_good_points_and_a_reason() -> None:
     assert [each.knob for each in entry.tried] == [1e-2, 1e-3]
     assert entry.stopped == "is not finite"
     assert entry.tried[0].error == approx(1e-2, rel=1e-2)
-    measurement.in_turns(entry.tried, 1)
+    measurement.time_in_turns(entry.tried, 1)
     for each in entry.curve(metrics, problem_of(found)).points:
         assert each.largest == math.inf
         assert each.drift is None

@@ -12,12 +12,12 @@ import pytest
 
 import dynamics as dyn
 from cgraph.extend import write_files
-from dynamics.experiments.paper_numbers import EmbeddingError, timing
 from tests.tolerances import SOLVED
 from viz import theme
 from viz.graph_drawing.render import RenderError
 from viz.paper import paper as module
-from viz.paper.embedding import _panels
+from viz.paper.embedding import EmbeddingError, _panels
+from viz.paper.timing import timing
 
 FIGURES = ("fig1", "fig2", "fig3", "fig4", "fig5", "fig6", "fig7a", "fig7b", "fig7c", "law", "scaling")
 

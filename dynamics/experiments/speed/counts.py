@@ -1,15 +1,17 @@
-"""Operation counts: products, sums and divisions of the equations of robots and chains, beside published formulas.
+"""Counts: nodes of forward dynamics with an idea left out, and operations of robots beside published ones. No times.
+
+A variant is another way to write or to solve the same equations, through the public functions.
 
 Robots are rows of modified Denavit-Hartenberg numbers, every body with ten general inertial numbers, gravity along the
-first axis, no friction. Sines and cosines are counted apart. Exact, no times. Formulas are those of R. Featherstone,
-"Rigid Body Dynamics Algorithms" (2008), tables 6.6 and 10.1, equation 10.3.
+first axis, no friction. Sines and cosines are counted apart. Formulas are those of R. Featherstone, "Rigid Body
+Dynamics Algorithms" (2008), tables 6.6 and 10.1, equation 10.3.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -18,11 +20,78 @@ from cgraph import Graph
 
 from ...equations.equations_of_motion import forward_dynamics, mass_matrix
 from ...equations.formulations.formulations import inverse_dynamics
+from ...equations.mass_matrix.accelerations import accelerations
 from ...multibody.algebra.spatial import rotation
 from ...multibody.bodies.body import WORLD, Body, Joint
-from ...multibody.builders.planar_arm import planar_arm
+from ...multibody.builders.planar_arm import planar_arm, planar_links
 from ...multibody.trees.mechanism import Mechanism
-from ..text_table import table
+from ...systems.system import System
+from ..stability.single_evaluations import by_centers
+from ..text_table import Table
+from ..timing import exponent
+from .bench_scenes import binary_tree, chain, inertial_numbers, turned_arm
+
+LARGEST_COUNTED = 200  # coordinates
+CHAINS: dict[str, Callable[[int], Mechanism]] = {
+    f"planar {n}": lambda n: chain(0.9, 0.7, n) for n in (3, 10, 20, 50, 100, LARGEST_COUNTED)
+}
+COUNTED: dict[str, Callable[[int], Mechanism]] = CHAINS | {
+    "arm 7": turned_arm,
+    "arm 30": turned_arm,
+    "tree 15": binary_tree,
+}
+FITTED_FROM = 10  # links; below, the fixed part of the graph bends the curve
+
+
+@dataclass(frozen=True)
+class Variant:
+    """Forward dynamics of a mechanism in another way.  largest: coordinates up to which that takes bearable time."""
+
+    graph: Callable[[Mechanism], Graph]
+    largest: int = LARGEST_COUNTED
+    planar: bool = False  # for planar arms alone
+
+
+def from_lagrangian(model: Mechanism) -> Graph:
+    """The bias by differentiating L, where bodies give it by Newton-Euler."""
+    system = model.system
+    partials = system.partial_lagrangians
+    plain = System(lambda q, qd, t: partials, system.coordinates, damping=system.damping)
+    return accelerations(plain, "recursive")
+
+
+def of_centers(model: Mechanism) -> Graph:
+    """A planar arm with the velocities of the centers of mass: K = m v.v / 2 + I w^2 / 2, and its bias from L."""
+    links, gravity, system = planar_links(model), -float(np.asarray(model.gravity)[2]), model.system
+    other = System(lambda q, qd, t: by_centers(q, qd, links, gravity), system.coordinates, damping=system.damping)
+    return accelerations(other, "recursive")
+
+
+VARIANTS = {
+    "every idea": Variant(lambda model: forward_dynamics(model, "recursive")),
+    "bias from the Lagrangian": Variant(from_lagrangian),
+    "energy by the center's velocity": Variant(of_centers, planar=True),
+    "dense": Variant(lambda model: forward_dynamics(model, "dense"), 15),
+}
+
+
+def node_counts(links: int = LARGEST_COUNTED) -> Iterator[Table]:
+    """The table of counts: of every idea in nodes, of the others relative to it. links: of the largest model."""
+    sizes = {name: int(name.split()[1]) for name in COUNTED if int(name.split()[1]) <= links}
+    rows = []
+    base: dict[str, int] = {}
+    for name, variant in VARIANTS.items():
+        chosen = [
+            model for model in sizes if sizes[model] <= variant.largest and (model in CHAINS or not variant.planar)
+        ]
+        nodes = {model: len(variant.graph(COUNTED[model](sizes[model])).nodes) for model in chosen}
+        base = base or nodes
+        cells = {model: f"{k}" if base is nodes else f"{k / base[model] - 1.0:+.1%}" for model, k in nodes.items()}
+        fitted = {sizes[model]: k for model, k in nodes.items() if model in CHAINS and sizes[model] >= FITTED_FROM}
+        slope = f"{exponent(list(fitted), list(fitted.values())):.3f}" if len(fitted) > 1 else ""
+        rows.append([name, *[cells.get(model, "") for model in sizes], slope])
+    yield Table("", ["nodes of forward dynamics", *sizes, "exponent, n >= 10"], rows)
+
 
 Row = tuple[float, float, float] | tuple[float, float, float, str]  # alpha [degrees], a, d [m]; "prismatic"
 SLIDE = "prismatic"
@@ -103,11 +172,7 @@ def robot(rows: Sequence[Row]) -> Mechanism:
         turn = rotation(np.array([1.0, 0.0, 0.0]), math.radians(alpha))
         place = np.array([a, 0.0, 0.0]) + d * turn[:, 2]
         joint = Joint(str(kind[0]) if kind else "revolute", (0.0, 0.0, 1.0), place, turn)
-        mixed = rng.normal(size=(3, 3))
-        second = 0.05 * mixed @ mixed.T + 0.01 * np.eye(3)
-        mass, center = float(rng.uniform(1.0, 2.0)), 0.1 * rng.normal(size=3)
-        inertia = np.trace(second) * np.eye(3) - second
-        bodies.append(Body(f"link {i + 1}", joint, bodies[-1].name if bodies else WORLD, mass, center, inertia))
+        bodies.append(Body(f"link {i + 1}", joint, bodies[-1].name if bodies else WORLD, *inertial_numbers(rng)))
     return Mechanism(bodies, (0.0, 0.0, -9.81))
 
 
@@ -141,7 +206,7 @@ def published(what: str, name: str, n: int) -> str:
     return f"{QUANTITIES[what][1](n)}" if name.startswith("general") else ""
 
 
-def operation_counts(links: int = LARGEST) -> Iterator[str]:
+def operation_counts(links: int = LARGEST) -> Iterator[Table | str]:
     """A table for each quantity. links: of the largest model."""
     for what, (equations, _) in QUANTITIES.items():
         rows = []
@@ -153,4 +218,5 @@ def operation_counts(links: int = LARGEST) -> Iterator[str]:
                 row.append(f"{operations(inverse_dynamics(model, 'chain_rule')).total}")
             rows.append(row)
         header = [what, "all", "products", "sums", "divisions", "sin, cos", "depth", "base", "published"]
-        yield "\n".join(table([*header, *["chain rule"] * (equations is inverse_dynamics)], rows)) + "\n"
+        yield Table("", [*header, *["chain rule"] * (equations is inverse_dynamics)], rows)
+        yield ""
