@@ -54,24 +54,20 @@ def sizes_of(mechanism: Mechanism) -> Sizes:
     return Sizes(TINY * max(float(body.mass) for body in mechanism.bodies), inertia)
 
 
+def _as_it_is(part: Any, *_: Sizes) -> Any:
+    return part
+
+
 class Term(NamedTuple):
     """A term of the equations, and how both sides are made alike in it.
 
-    body, rest: the change to each body of a mechanism, and to the rest of it.
     theirs: the change to MuJoCo's model of a file.
+    body, rest: the change to each body of a mechanism, and to the rest of it.
     """
 
-    body: Callable[[Body, Sizes], Body]
-    rest: Callable[[Mechanism], Mechanism]
-    theirs: Callable[[MjModel, Sizes], None]
-
-
-def _same(body: Body, sizes: Sizes) -> Body:
-    return body
-
-
-def _all(mechanism: Mechanism) -> Mechanism:
-    return mechanism
+    theirs: Callable[[MjModel, Sizes], object]
+    body: Callable[[Body, Sizes], Body] = _as_it_is
+    rest: Callable[[Mechanism], Mechanism] = _as_it_is
 
 
 def _joint(**changes: Any) -> Callable[[Body, Sizes], Body]:
@@ -83,38 +79,25 @@ def _zeroed(*fields: str) -> Callable[[MjModel, Sizes], None]:
 
     def change(mj: MjModel, sizes: Sizes) -> None:
         for name in fields:
-            if hasattr(mj, name):
-                getattr(mj, name)[...] = 0.0
+            of = mj.opt if hasattr(mj.opt, name) else mj
+            if hasattr(of, name):
+                setattr(of, name, 0.0 * getattr(of, name))
 
     return change
 
 
-def _still(mechanism: Mechanism) -> Mechanism:
-    return replace(mechanism, gravity=(0.0, 0.0, 0.0))
+def _heavy(value: str, field: str, count: int) -> Term:
+    """A stand-in of `Sizes` for a number of all bodies that have mass."""
 
+    def body(body: Body, sizes: Sizes) -> Body:
+        stand_in = getattr(sizes, field)
+        changes: dict[str, Any] = {field: (stand_in,) * count if count > 1 else stand_in}
+        return replace(body, **changes) if float(body.mass) > sizes.mass else body
 
-def _floating(mj: MjModel, sizes: Sizes) -> None:
-    mj.opt.gravity[:] = 0.0
+    def theirs(mj: MjModel, sizes: Sizes) -> None:
+        getattr(mj, value)[mj.body_mass > sizes.mass] = getattr(sizes, field)
 
-
-def _alike(body: Body, sizes: Sizes) -> Body:
-    return replace(body, inertia=(sizes.inertia,) * 3) if float(body.mass) > sizes.mass else body
-
-
-def _alike_there(mj: MjModel, sizes: Sizes) -> None:
-    mj.body_inertia[mj.body_mass > sizes.mass] = sizes.inertia
-
-
-def _weightless(body: Body, sizes: Sizes) -> Body:
-    return replace(body, mass=sizes.mass) if float(body.mass) > sizes.mass else body
-
-
-def _weightless_there(mj: MjModel, sizes: Sizes) -> None:
-    mj.body_mass[mj.body_mass > sizes.mass] = sizes.mass
-
-
-def _thin(mj: MjModel, sizes: Sizes) -> None:
-    mj.opt.density = mj.opt.viscosity = 0.0
+    return Term(theirs, body)
 
 
 def _unbound(mj: MjModel, sizes: Sizes) -> None:
@@ -122,15 +105,15 @@ def _unbound(mj: MjModel, sizes: Sizes) -> None:
 
 
 TERMS: dict[str, Term] = {
-    "damping": Term(_joint(damping=0.0), _all, _zeroed("dof_damping", "dof_dampingpoly")),
-    "joint springs": Term(_joint(stiffness=0.0), _all, _zeroed("jnt_stiffness", "jnt_stiffnesspoly")),
-    "armature": Term(_joint(armature=0.0), _all, _zeroed("dof_armature")),
-    "gravity": Term(_same, _still, _floating),
-    "inertia about the centers of mass": Term(_alike, _all, _alike_there),
-    "mass and its place": Term(_weightless, _all, _weightless_there),
-    "tendons": Term(_same, _all, _zeroed("tendon_stiffness", "tendon_damping", "tendon_armature")),
-    "equality constraints": Term(_same, _all, _unbound),
-    "fluid": Term(_same, _all, _thin),
+    "damping": Term(_zeroed("dof_damping", "dof_dampingpoly"), _joint(damping=0.0)),
+    "joint springs": Term(_zeroed("jnt_stiffness", "jnt_stiffnesspoly"), _joint(stiffness=0.0)),
+    "armature": Term(_zeroed("dof_armature"), _joint(armature=0.0)),
+    "gravity": Term(_zeroed("gravity"), rest=lambda mechanism: replace(mechanism, gravity=(0.0, 0.0, 0.0))),
+    "inertia about the centers of mass": _heavy("body_inertia", "inertia", 3),
+    "mass and its place": _heavy("body_mass", "mass", 1),
+    "tendons": Term(_zeroed("tendon_stiffness", "tendon_damping", "tendon_armature")),
+    "equality constraints": Term(_unbound),
+    "fluid": Term(_zeroed("density", "viscosity")),
 }
 
 

@@ -143,6 +143,11 @@ def equations_of(
     return graph, f"inverse dynamics, {options.formulation.replace('_', ' ')}"
 
 
+def listed(text: str) -> tuple[str, ...]:
+    """Names between commas, for argparse."""
+    return tuple(filter(None, text.split(",")))
+
+
 def whole(text: str) -> int:
     """A whole number, at least 0, for argparse."""
     if not (text.isascii() and text.isdecimal()):

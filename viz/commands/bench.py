@@ -8,7 +8,7 @@ from dataclasses import asdict
 from typing import Any
 
 from . import library
-from .arguments import IN_PYTHON, READING, positive, reading, reads_files, say, whole
+from .arguments import IN_PYTHON, READING, listed, positive, reading, reads_files, say, whole
 from .command import Command
 
 LISTS = ("tasks", "modes", "peers")
@@ -40,7 +40,7 @@ def add(parser: Command) -> None:
     reads_files(parser)
     for what in LISTS:
         more = "; of motions: {motion_peers}" if what == "peers" else ""
-        parser.add_argument(f"--{what}", type=_names, metavar="A,B", help=f"only these of {{{what}}}{more}")
+        parser.add_argument(f"--{what}", type=listed, metavar="A,B", help=f"only these of {{{what}}}{more}")
     for what, unit in (("times", "lengths [s]"), ("errors", "true errors")):
         parser.add_argument(f"--{what}", type=positives, metavar="A,B", help=f"of motions: {unit}")
     parser.add_argument("--quick", action="store_true", help="fewer turns and, unless named, {quick_scenes} alone")
@@ -63,10 +63,6 @@ def _figures() -> list[str]:
 
 def _dashed(names: tuple[str, ...]) -> str:
     return ", ".join([f"--{name}" for name in names])
-
-
-def _names(text: str) -> tuple[str, ...]:
-    return tuple(text.split(",")) if text else ()
 
 
 def positives(text: str) -> tuple[float, ...]:

@@ -15,7 +15,19 @@ import dynamics as dyn
 from cgraph import extend
 
 from . import library
-from .arguments import IN_PYTHON, READING, answer, number, positive, reading, reads_files, say, start, unless_json
+from .arguments import (
+    IN_PYTHON,
+    READING,
+    answer,
+    listed,
+    number,
+    positive,
+    reading,
+    reads_files,
+    say,
+    start,
+    unless_json,
+)
 from .command import Command
 
 CURVES, STABILITY, PRUNING, COMPARE = "a report of run times", "--stability", "--pruning", "--compare"
@@ -60,20 +72,21 @@ def add(parser: Command) -> None:
     parser.add_argument(
         "--start", type=start, metavar="A=1,B=2", help="instead of the scene's own: by names, or all numbers"
     )
-    parser.add_argument("--methods", metavar="A,B", help="only these of {methods}")
-    parser.add_argument("--peers", metavar="A,B", help="only these of {peers}; '' for none")
+    parser.add_argument("--methods", type=listed, metavar="A,B", help="only these of {methods}")
+    parser.add_argument("--peers", type=listed, metavar="A,B", help="only these of {peers}; '' for none")
     parser.add_argument("--quick", action="store_true", help="fewer turns, shorter runs, and no cold starts")
     parser.add_argument(
         "--budget", type=positive, metavar="S", help=f"seconds that a cold start may take (default: {BUDGET:g})"
     )
     parser.add_argument(
         "--compare",
+        type=listed,
         metavar="A,B",
         help="instead: print comparisons at equal error, of {comparisons}; minutes, and no scene",
     )
     parser.add_argument("--json", action="store_true", help="print as JSON")
     parser.add_argument("--pruning", action="store_true", help="instead: what the scene's graphs hold and leave out")
-    parser.add_argument("--without", metavar="A,B", help="with --pruning: leave out {effects}")
+    parser.add_argument("--without", type=listed, metavar="A,B", help="with --pruning: leave out {effects}")
     parser.add_argument(
         "--lock", type=_locked, action="append", metavar="BODY=AT", help="with --pruning: lock a joint there [rad or m]"
     )
@@ -130,12 +143,11 @@ def _exact_motions(out: Path | None) -> Iterator[tuple[Path, Callable[[], dict[P
 
 def _comparisons(options: argparse.Namespace) -> None:
     """Print comparisons as they are measured; exact motions are kept where reports keep theirs."""
-    names = [name for name in options.compare.split(",") if name]
-    if unknown := [name for name in names if name not in library.COMPARISONS]:
+    if unknown := [name for name in options.compare if name not in library.COMPARISONS]:
         raise ValueError(f"comparisons are {', '.join(library.COMPARISONS)}, got {unknown[0]!r}")
     print(library.machine())
     with _exact_motions(options.out) as (folder, new):
-        for name in names or library.COMPARISONS:
+        for name in options.compare or library.COMPARISONS:
             for text in library.COMPARISONS[name](str(folder)):
                 print(f"\n{text}", flush=True)
         answer("", new(), folder=options.out)
@@ -147,7 +159,7 @@ def _curves(options: argparse.Namespace) -> None:
     if len(named) < len(options.scenes):
         raise ValueError(f"each scene needs a name of its own for its files, got {', '.join(options.scenes)}")
     chosen = {"t_end": options.t_end, "start": options.start, "reading": reading(options)}
-    peers = tuple(library.PEERS) if options.peers is None else tuple(filter(None, options.peers.split(",")))
+    peers = tuple(library.PEERS) if options.peers is None else options.peers
     if options.out is not None:
         library.check_can_plot()
     with _exact_motions(options.out) as (folder, new):
@@ -163,7 +175,7 @@ def _measured(
     for name in options.scenes:
         report = library.work_precision.work_precision(
             name,
-            methods=options.methods.split(",") if options.methods else tuple(dyn.METHODS),
+            methods=options.methods or tuple(dyn.METHODS),
             peers=peers,
             turns=3 if options.quick else 9,
             limit=0.03 if options.quick else library.work_precision.LIMIT,
@@ -209,7 +221,7 @@ def _stability(options: argparse.Namespace) -> int:
 
 def _pruning(options: argparse.Namespace) -> None:
     """Write a page for each scene."""
-    without = [each for each in (options.without or "").split(",") if each]
+    without = options.without or ()
     if unknown := [each for each in without if each not in dyn.EFFECTS]:
         raise ValueError(f"effects are {', '.join(dyn.EFFECTS)}, got {unknown[0]!r}")
     locked = options.lock or []
