@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import statistics
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -85,13 +85,13 @@ def compile_time(links: int | None = None) -> Iterator[Table]:
     yield Table(TITLE, COLUMNS, rows)
 
 
-def long_chains(links: int = LINKS) -> Iterator[Table | str]:
+def long_chains(links: int = LINKS, sizes: Sequence[tuple[str, int]] = SIZES) -> Iterator[Table | str]:
     """Cost of chains of so many links, each in a process of its own; then accuracy, which needs python-flint."""
     for kind in MODELS:
         *rows, size = _fresh("cost", kind, links)
         yield Table(f"{kind} chain of {links} links", ["stage", "clock", "processor", "peak"], rows)
         yield size
-    for kind, n in SIZES:
+    for kind, n in sizes:
         for spread in (np.pi, 0.1):
             errors = ",  ".join(f"{name} {error:.1e}" for name, error in accuracy(kind, n, spread).items())
             yield f"largest relative error, {kind} {n} links, |q| < {spread:4.2f}:  {errors}"

@@ -60,16 +60,16 @@ SMALLEST: dict[str, tuple[dict[str, Any], list[str], tuple[str, ...]]] = {
     "reconfiguration": ({"links": 4, "repeats": 1}, ["detach", "attach", "lock", "unlock"], ("mujoco",)),
     "trust": ({"count": 2}, ["default"], ()),
     "tightest": ({"count": 1}, ["potential", "all"], ("heyoka",)),
-    "closed-chains": ({"repeats": 1}, ["3", "10", "40"], ("pinocchio", "mujoco")),
-    "long-chains": ({"links": 3}, [], ()),
+    "closed-chains": ({"repeats": 1, "sizes": (3,)}, ["3"], ("pinocchio", "mujoco")),
+    "long-chains": ({"links": 3, "sizes": (("planar", 3),)}, [], ()),
 }
-SLOW = ("trust", "compile", "closed-chains", "long-chains")  # of many methods, processes or links
+SLOW = ("trust", "compile", "long-chains")  # by many methods, or in processes of their own
 
 
 def test_every_bench_has_its_smallest_run() -> None:
     assert list(SMALLEST) == list(BENCHES)
     for name, (chosen, _, _) in SMALLEST.items():
-        assert set(chosen) <= {"scenes", *BENCHES[name].takes}
+        assert set(chosen) <= {"scenes", "sizes", *BENCHES[name].takes}
 
 
 @pytest.mark.parametrize("name", [*[name for name in SMALLEST if name not in SLOW], *slow(*SLOW)])
@@ -237,13 +237,6 @@ def test_a_process_of_its_own_answers_or_says_why_not(
         run_fresh(module, function, *arguments, timeout=timeout)
 
 
-def test_closed_chains_are_timed_and_agree() -> None:
-    found, *_ = beside_peers.closed_chains(1, (3,))
-    assert not isinstance(found, str)
-    assert found.rows[0][:2] == ["3", "257"]
-    assert float(found.rows[0][2]) > 0.0
-
-
 def test_torques_after_a_change_of_structure_have_to_agree() -> None:
     with pytest.raises(ArithmeticError, match="lock: torques differ by"):
         reconfiguration.check("lock", np.array([1.0]), np.array([1.1]), 1e-10)
@@ -253,8 +246,9 @@ def test_the_build_is_of_the_graph_and_counts_are_of_it() -> None:
     (built,) = stages.build_time(3, 1)
     graph = dyn.forward_dynamics(dyn.planar_arm([1.0, 0.9, 0.8], [1.1, 1.1 - 0.4 / 3, 1.1 - 0.8 / 3], damping=0.1))
     assert built.rows[0][-2:] == [str(len(graph.nodes)), str(len(graph.edges))]
-    (counted,) = BENCHES["counts"].run(links=3)
+    (counted,), (closed, *_) = BENCHES["counts"].run(links=3), BENCHES["closed-chains"].run(repeats=1, sizes=(3,))
     assert counted.rows[0][1] == str(len(dyn.forward_dynamics(_planar(), "recursive").nodes))
+    assert closed.rows[0][:2] == ["3", "257"]
 
 
 # Tables

@@ -11,6 +11,7 @@ import cgraph as cg
 import dynamics as dyn
 from dynamics.experiments.stability import single_evaluations
 from dynamics.multibody.builders.planar_arm import arm_of_links, planar_links
+from dynamics.multiprecision.chain_equations import torques
 from tests.dynamics.lagrange_by_mpmath import floats, lagrange
 from tests.dynamics.models import Array
 
@@ -29,37 +30,10 @@ def random_arm(n: int) -> tuple[dyn.Mechanism, Array, Array, Array]:
 def test_exact_torques_are_those_of_lagranges_equation(n: int) -> None:
     """By differences of L itself in 80 digits: another formula, other arithmetic."""
     importorskip("flint")
-    from dynamics.multiprecision.chain_equations import torques
-
     arm, q, qd, qdd = random_arm(n)
     expected = lagrange(arm, {"q": q, "qd": qd, "qdd": qdd})
     found = torques(arm, q, qd, qdd).high
     assert np.max(np.abs(found - floats(expected.tau))) < EXACT * expected.largest
-
-
-@mark.parametrize("n", [1, 2, 5, 20])
-def test_exact_accelerations_give_the_torques_back(n: int) -> None:
-    importorskip("flint")
-    from dynamics.multiprecision.chain_equations import accelerations, torques
-
-    arm, q, qd, tau = random_arm(n)
-    qdd = accelerations(arm, q, qd, tau)
-    back = torques(arm, q, qd, qdd.high)
-    size = np.max(np.abs(torques(arm, q, qd, 2.0 * qdd.high).high - back.high))  # M qdd
-    assert np.max(np.abs(back.high - tau)) < 1e-15 * n * size
-    assert np.max(np.abs(qdd.low)) <= np.spacing(np.max(np.abs(qdd.high)))
-
-
-def test_digits_are_added_until_the_result_has_enough() -> None:
-    """Masses 24 decades apart, for which the first attempt cannot do."""
-    importorskip("flint")
-    from dynamics.multiprecision.chain_equations import accelerations, torques
-
-    _, q, qd, tau = random_arm(6)
-    arm = dyn.planar_arm([1e-24] * 5 + [1.0], [1.0] * 6)
-    qdd = accelerations(arm, q, qd, tau)
-    assert np.isfinite(qdd.high).all()
-    assert np.isfinite(torques(arm, q, qd, qdd.high).high).all()
 
 
 @mark.parametrize("task", single_evaluations.TASKS)

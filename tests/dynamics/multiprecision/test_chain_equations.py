@@ -45,10 +45,12 @@ def assert_near(pair: Pair, exact: mpf) -> None:
 
 @pytest.mark.parametrize("n", [1, 2, 7])
 def test_newton_euler_in_space_and_closed_formulas_of_the_plane_agree_in_all_digits(n: int) -> None:
-    """Lengths of 1e-6 and 1e6 m in turn, for which the first attempt cannot do, among them."""
+    """Lengths of 1e-6 and 1e6 m in turn, and masses 24 decades apart, for which the first attempt cannot do, too."""
     rng = np.random.default_rng(n)
-    for lengths in (rng.uniform(0.5, 1.5, n), 10.0 ** (6.0 * (-1.0) ** np.arange(n))):
-        arm = dyn.planar_arm(rng.uniform(0.5, 1.5, n).tolist(), lengths.tolist(), damping=0.1)
+    ordinary = rng.uniform(0.5, 1.5, (2, n))
+    far, light = 10.0 ** (6.0 * (-1.0) ** np.arange(n)), np.array([*[1e-24] * (n - 1), 1.0])
+    for masses, lengths in (ordinary, (ordinary[0], far), (light, ordinary[1])):
+        arm = dyn.planar_arm(masses.tolist(), lengths.tolist(), damping=0.1)
         state = rng.uniform(-3.0, 3.0, n), rng.normal(size=n), rng.normal(size=n)
         for ours, theirs in (
             (torques, planar_arm_equations.torques),

@@ -16,6 +16,9 @@ import cgraph as cg
 import dynamics as dyn
 from dynamics.equations.state_equation import state_equation, state_inputs
 from dynamics.experiments.stability import cases
+from dynamics.experiments.work_precision.named_tasks import load
+from dynamics.experiments.work_precision.trajectory_peers import heyoka_equations
+from dynamics.experiments.work_precision.trajectory_runs import problem_of
 from dynamics.multiprecision import REFERENCE_METHODS, Reference, ReferenceFailedError, closed_forms, reference
 from dynamics.multiprecision.flint_numbers import working
 from dynamics.systems.ode_system import OdeSystem
@@ -302,38 +305,21 @@ def test_wrong_input_is_named(changed: dict[str, Any], words: str) -> None:
         reference(**{"model": PENDULUM, "q": [1.0], "qd": [0.0], "t_eval": [1.0]} | changed)
 
 
-def heyoka_end(model: Any, start: list[float], t_end: float) -> list[str]:
-    """The state by heyoka's Taylor integrator in quadruple precision, from the same graph: series of its own."""
-    hy = pytest.importorskip("heyoka")
-    if not hasattr(hy, "real128"):
-        pytest.skip("this heyoka has no quadruple precision")
-    graph, names, real = state_equation(model), state_inputs(model).states, hy.real128
-    env = {}
-    for node in graph.nodes:
-        if node.op.name == "variable":
-            env[node] = hy.make_vars(node.name) if node.name in names else hy.expression(real(0.0))
-        elif node.op.name == "constant":
-            env[node] = hy.expression(real(node.value))
-        else:
-            function = node.op.operator or getattr(hy, node.op.name)
-            env[node] = function(*[env[arg] for arg in node.args])
-    equations = [(hy.make_vars(name), env[node]) for name, node in zip(names, graph.outputs.values(), strict=True)]
-    run = hy.taylor_adaptive(
-        equations, [real(each) for each in start], fp_type=real, tol=real(1e-33), compact_mode=True
-    )
-    run.propagate_until(real(t_end))
-    return [str(each) for each in run.state]
-
-
 QUADRUPLE = 1e-29  # 33 digits, and what rounding adds up to over the steps
 
 
 def test_heyoka_has_the_same_triple_pendulum_to_29_digits() -> None:
-    scene = dyn.scenes.load("triple_pendulum")
-    start = [*scene.q, *scene.qd]
-    expected = heyoka_end(scene, start, 0.5)
-    found = reference(scene, scene.q, scene.qd, [0.5], digits=29)
-    assert apart(found, Reference((0.5,), (tuple(expected),), QUADRUPLE, "")) < QUADRUPLE
+    """By its Taylor integrator in quadruple precision, from the same graph: series of its own."""
+    hy = pytest.importorskip("heyoka")
+    if not hasattr(hy, "real128"):
+        pytest.skip("this heyoka has no quadruple precision")
+    task, real = load("triple_pendulum"), hy.real128
+    start = [real(each) for each in task.start]
+    equations = heyoka_equations(hy, problem_of(task), real)
+    run = hy.taylor_adaptive(equations, start, fp_type=real, tol=real(1e-33), compact_mode=True)
+    run.propagate_until(real(0.5))
+    found = reference(task, task.q, task.qd, [0.5], digits=29)
+    assert apart(found, Reference((0.5,), (tuple([str(each) for each in run.state]),), QUADRUPLE, "")) < QUADRUPLE
 
 
 @mark.slow

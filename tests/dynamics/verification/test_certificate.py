@@ -7,6 +7,8 @@ import math
 import re
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
+from typing import Any
 
 import numpy as np
 import pytest
@@ -30,6 +32,7 @@ from tests.dynamics.models import MODELS
 from tests.dynamics.multibody.test_rolling import disk
 from tests.dynamics.tilted_linkages import random_linkage
 from tests.dynamics.units import Units, in_units
+from tests.each_row import each_row
 from viz import cli
 
 FEW = 5  # states
@@ -39,14 +42,13 @@ def failed(found: Certificate) -> dict[str, str]:
     return {each.equation: each.note for each in found.residuals if not each.passed}
 
 
-@pytest.mark.parametrize("name", dyn.scenes.names())
-def test_every_scene_passes(name: str) -> None:
-    assert failed(certify(dyn.scenes.load(name), FEW)) == {}
+PASSING = {name: partial(dyn.scenes.load, name) for name in dyn.scenes.names()} | MODELS
+PASSING |= {"welded": lambda: FAMILIES["welded"](5)}
 
 
-@pytest.mark.parametrize("make", [*MODELS.values(), lambda: FAMILIES["welded"](5)], ids=[*MODELS, "welded"])
-def test_every_kind_of_model_passes(make) -> None:
-    found = certify(make(), FEW, speed=0.5)
+@each_row("name", PASSING)
+def test_every_scene_and_every_kind_of_model_passes(name: str) -> None:
+    found = certify(PASSING[name](), FEW, speed=1.0 if name in dyn.scenes.names() else 0.5)
     assert failed(found) == {}
     assert len(found.residuals) >= 10
     assert str(found).count("ok  ") == len(found.residuals)
@@ -210,34 +212,28 @@ def test_nan_fails() -> None:
     assert not Residual("x", math.nan, ROUNDING).passed
 
 
-def twins() -> dict[str, tuple[str, str]]:
-    """What is changed in MuJoCo's model of a mechanism, and what is said of it."""
-    return {
-        r'armature="': ('armature="1', "armature"),
-        r'damping="': ('damping="1', "damping"),
-        r'stiffness="': ('stiffness="1', "joint springs"),
-        r'mass="': ('mass="1', "mass and its place"),
-        r'gravity="': ('gravity="1', "gravity"),
-        r'integrator="RK4"': ('density="1000"', "fluid"),
-    }
+# What is changed in MuJoCo's model of a mechanism, the mass of its bodies, and what is said of it.
+TWINS = [
+    (('armature="', 'armature="1'), 1.0, "armature"),
+    (('damping="', 'damping="1'), 1.0, "damping"),
+    (('stiffness="', 'stiffness="1'), 1.0, "joint springs"),
+    (('mass="', 'mass="1'), 1.0, "mass and its place"),
+    (('mass="', 'mass="1'), 1e-11, "mass and its place"),  # as light as MuJoCo can hold
+    (('gravity="', 'gravity="1'), 1.0, "gravity"),
+    (('integrator="RK4"', 'density="1000"'), 1.0, "fluid"),
+    (('armature="', 'armature="1', 'damping="', 'damping="1'), 1.0, "damping and armature"),
+]
 
 
-@pytest.mark.parametrize(("what", "mass"), [*[(each, 1.0) for each in twins()], (r'mass="', 1e-11)])
-def test_the_term_that_a_twin_differs_in_is_named(what: str, mass: float) -> None:
-    """However light the bodies are, down to what MuJoCo can hold."""
+@each_row(("changes", "mass", "terms"), TWINS)
+def test_the_terms_that_a_twin_differs_in_are_named(changes: tuple[str, ...], mass: float, terms: str) -> None:
     pytest.importorskip("mujoco")
     mechanism = in_units(FAMILIES["mixed"](2), Units(mass=mass))
-    changed, term = twins()[what]
-    found = failed(certify(mechanism, FEW, twin=to_mjcf(mechanism).replace(what, changed, 1)))
-    assert found == {"inverse dynamics = MuJoCo's": f"they agree without {term}"}
-
-
-def test_two_terms_are_named_together() -> None:
-    pytest.importorskip("mujoco")
-    mechanism = FAMILIES["mixed"](2)
-    text = to_mjcf(mechanism).replace('armature="', 'armature="1', 1).replace('damping="', 'damping="1', 1)
+    text = to_mjcf(mechanism)
+    for old, new in zip(changes[::2], changes[1::2], strict=True):
+        text = text.replace(old, new, 1)
     found = failed(certify(mechanism, FEW, twin=text))
-    assert found == {"inverse dynamics = MuJoCo's": "they agree without damping and armature"}
+    assert found == {"inverse dynamics = MuJoCo's": f"they agree without {terms}"}
 
 
 def test_rods_are_told_from_capsules_by_their_inertia() -> None:
@@ -252,26 +248,28 @@ def test_rods_are_told_from_capsules_by_their_inertia() -> None:
     assert found == {"inverse dynamics = MuJoCo's": "they agree without inertia about the centers of mass"}
 
 
-@pytest.mark.parametrize(
-    ("twin", "said"),
+TWO_LINKS = dyn.planar_arm([1.0, 1.0], [1.0, 1.0])
+OF_ONE = to_mjcf(dyn.planar_arm([1.0], [1.0]))
+
+
+@each_row(
+    ("model", "given", "said"),
     [
-        (to_mjcf(dyn.planar_arm([1.0], [1.0])), "the twin has 1 degrees of freedom, the model 2"),
-        ("/nowhere/arm.xml", "there is no file '/nowhere/arm.xml'"),
-        ("garbage", "there is no file 'garbage'"),
-        ("<mujoco><garbage/></mujoco>", "MuJoCo cannot read the given text"),
-        (7, "a model is a path or XML text, and of MJCF an MjModel, too, got int"),
+        (TWO_LINKS, {"twin": OF_ONE}, "the twin has 1 degrees of freedom, the model 2"),
+        (TWO_LINKS, {"twin": "/nowhere/arm.xml"}, "there is no file '/nowhere/arm.xml'"),
+        (TWO_LINKS, {"twin": "garbage"}, "there is no file 'garbage'"),
+        (TWO_LINKS, {"twin": "<mujoco><garbage/></mujoco>"}, "MuJoCo cannot read the given text"),
+        (TWO_LINKS, {"twin": 7}, "a model is a path or XML text, and of MJCF an MjModel, too, got int"),
+        (dyn.scenes.load("spring_mass"), {"twin": OF_ONE}, "a twin is compared with rigid bodies"),
+        (TWO_LINKS, {"seed": -1}, "seed must be a whole number from 0, got -1"),
+        (TWO_LINKS, {"states": 0}, "states must be a whole number from 1, got"),
+        (TWO_LINKS, {"states": -1}, "states must be a whole number from 1, got"),
     ],
 )
-def test_a_twin_that_cannot_be_compared_is_an_error(twin, said: str) -> None:
+def test_what_cannot_be_certified_is_an_error(model: dyn.Model, given: dict[str, Any], said: str) -> None:
     pytest.importorskip("mujoco")
     with pytest.raises(ValueError, match=re.escape(said)):
-        certify(dyn.planar_arm([1.0, 1.0], [1.0, 1.0]), FEW, twin=twin)
-
-
-def test_a_twin_needs_rigid_bodies() -> None:
-    pytest.importorskip("mujoco")
-    with pytest.raises(ValueError, match="a twin is compared with rigid bodies"):
-        certify(dyn.scenes.load("spring_mass"), FEW, twin=to_mjcf(dyn.planar_arm([1.0], [1.0])))
+        certify(model, **given)
 
 
 def test_a_urdf_file_is_a_twin(tmp_path) -> None:
@@ -294,23 +292,6 @@ def test_a_twin_may_have_its_joints_in_another_order() -> None:
     link = {"joint": joint, "mass": 1.0, "center": (0.0, 0.1, -0.5), "inertia": (0.2, 0.2, 0.1)}
     mechanism = dyn.tree([-1, 0, 0, 1, 2, 1], [link] * 6)
     assert failed(certify(mechanism, FEW, twin=dyn.to_urdf(mechanism))) == {}
-
-
-def test_a_seed_is_not_negative() -> None:
-    with pytest.raises(ValueError, match="seed must be a whole number from 0, got -1"):
-        certify(dyn.scenes.load("spring_mass"), FEW, -1)
-
-
-@pytest.mark.filterwarnings("ignore:.*left out:dynamics.MechanismWarning")
-def test_the_command_finds_what_was_left_out(tmp_path, capsys: pytest.CaptureFixture[str]) -> None:
-    pytest.importorskip("mujoco")
-    model = tmp_path / "model.xml"
-    model.write_text(
-        '<mujoco><worldbody><body name="a"><joint type="free" stiffness="1"/><geom size="0.1" pos="0.2 0 0"/>'
-        "</body></worldbody></mujoco>"
-    )
-    assert cli.main(["certify", str(model), "--ignore", "--states", "3"]) == 1
-    assert "they agree without joint springs" in capsys.readouterr().out
 
 
 def test_the_command_translates_what_mujoco_cannot_read(tmp_path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -349,12 +330,6 @@ def test_forces_on_bodies_are_not_asked_of_peers() -> None:
     assert failed(certify(pushed, FEW)) == {}
 
 
-@pytest.mark.parametrize("states", [0, -1])
-def test_a_certificate_needs_states(states: int) -> None:
-    with pytest.raises(ValueError, match="states must be a whole number from 1, got"):
-        certify(dyn.scenes.load("spring_mass"), states)
-
-
 def test_the_command_prints_a_certificate(capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["certify", "spring_mass", "--states", "3"]) == 0
     assert "dM/dt - 2 C is skew" in capsys.readouterr().out
@@ -365,14 +340,19 @@ def test_the_command_prints_a_certificate(capsys: pytest.CaptureFixture[str]) ->
 
 
 @pytest.mark.filterwarnings("always::dynamics.MechanismWarning")
-def test_the_command_fails_with_the_residual(tmp_path, capsys: pytest.CaptureFixture[str]) -> None:
+@each_row(
+    ("option", "joint", "term"),
+    [
+        ("", 'type="free" stiffness="1"', "joint springs"),
+        ('<option density="1000"/>', 'name="j" axis="0 1 0"', "fluid"),
+    ],
+)
+def test_the_command_finds_what_was_left_out(option: str, joint: str, term: str, tmp_path: Any, capsys: Any) -> None:
     pytest.importorskip("mujoco")
+    body = f'<body name="a"><joint {joint}/><geom size="0.1" pos="0.2 0 0"/></body>'
     model = tmp_path / "model.xml"
-    model.write_text(
-        '<mujoco><option density="1000"/><worldbody><body name="a"><joint name="j" axis="0 1 0"/>'
-        '<geom size="0.1" pos="0.2 0 0"/></body></worldbody></mujoco>'
-    )
+    model.write_text(f"<mujoco>{option}<worldbody>{body}</worldbody></mujoco>")
     assert cli.main(["certify", str(model), "--ignore", "--states", "3"]) == 1
     printed = capsys.readouterr()
-    assert "(they agree without fluid)" in printed.out
+    assert f"(they agree without {term})" in printed.out
     assert printed.err.endswith("cgraph: model: 1 residual(s) exceed their bound: inverse dynamics = MuJoCo's\n")
