@@ -117,7 +117,7 @@ def reference(
     if folder is None:
         return solve()
     name = key(graph, start.states, x, times, values, method, digits)
-    return Store(Path(folder)).get(name, times, len(x), solve)
+    return _kept(Path(folder) / f"{name}.json", times, len(x), solve)
 
 
 def _converged(
@@ -187,22 +187,13 @@ def key(
     return hashlib.sha256(json.dumps(content).encode()).hexdigest()
 
 
-class Store:
-    """Solutions in a folder, which is created on demand. Several programs may use it at once."""
-
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-
-    def get(self, name: str, times: Sequence[float], width: int, solve: Callable[[], Reference]) -> Reference:
-        """The solution of that name, at these times with so many states; computed and kept when it is not there."""
-        path = self.folder / f"{name}.json"
-        kept = _read(path, times, width)
-        if kept is not None:
-            return kept
-        solution = solve()
-        self.folder.mkdir(parents=True, exist_ok=True)
-        atomic_write(path, json.dumps(_signed(solution)))  # a reader sees all of it or nothing
-        return solution
+def _kept(path: Path, times: Sequence[float], width: int, solve: Callable[[], Reference]) -> Reference:
+    """The solution in a file, at these times with so many states; computed and kept when it is not there."""
+    if (found := _read(path, times, width)) is None:
+        found = solve()
+        path.parent.mkdir(parents=True, exist_ok=True)
+        atomic_write(path, json.dumps(_signed(found)))  # a reader sees all of it or nothing; several may write
+    return found
 
 
 def _signed(solution: Reference) -> dict[str, object]:

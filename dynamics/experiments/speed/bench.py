@@ -88,45 +88,36 @@ def bench(
     asked = {
         task: [mode for mode in MODES if mode in modes and (task, mode) in ours] for task in TASKS if task in tasks
     }
-    if not any([modes and _has(case, task) for case in cases.values() for task, modes in asked.items()]):
+    if all([not wished or _missing(case, task) for case in cases.values() for task, wished in asked.items()]):
         raise ValueError(
             f"there is nothing to measure of {', '.join(asked)} in the modes {', '.join(modes)} on {', '.join(cases)}; "
-            f"motions and gradients are called, and not of models with quaternions"
+            f"motions and gradients are called, and not of models with quaternions, or of inertial numbers without bodies"
         )
-    return _rows(cases, loads, asked, wanted, repeats, budget, say)
+
+    def rows() -> Iterator[Row]:
+        for scene, case in cases.items():
+            late: dict[str, dict[str, str]] = {}
+            for task, wished in asked.items():
+                if missing := _missing(case, task):
+                    say(f"{scene}, {task}: {missing}")
+                    continue
+                late[task] = dict(late.get(CONTAINS.get(task, ""), {}))
+                pool = WorkerPool(loads[scene], wanted, budget, late[task])
+                try:
+                    for mode in wished:
+                        say(f"{scene}, {task}, {mode}")
+                        yield _row(case, task, mode, pool, repeats)
+                finally:
+                    pool.end()
+
+    return rows()
 
 
-def _has(case: PeerModel, task: str) -> bool:
-    """Whether there is such a task of the model."""
-    return task not in MOTIONS or case.nq == case.n
-
-
-def _rows(
-    cases: dict[str, PeerModel],
-    loads: dict[str, Load],
-    asked: dict[str, list[str]],
-    peers: list[str],
-    repeats: int,
-    budget: float,
-    say: Callable[[str], None],
-) -> Iterator[Row]:
-    for scene, case in cases.items():
-        late: dict[str, dict[str, str]] = {}
-        for task, modes in asked.items():
-            if not _has(case, task):
-                say(f"{scene}, {task}: not of quaternions")
-                continue
-            if task == "inertial-gradient" and as_mechanism(case.model) is None:
-                say(f"{scene}, {task}: not without bodies")
-                continue
-            late[task] = dict(late.get(CONTAINS.get(task, ""), {}))
-            pool = WorkerPool(loads[scene], peers, budget, late[task])
-            try:
-                for mode in modes:
-                    say(f"{scene}, {task}, {mode}")
-                    yield _row(case, task, mode, pool, repeats)
-            finally:
-                pool.end()
+def _missing(case: PeerModel, task: str) -> str:
+    """Reason why there is no such task of the model, or nothing."""
+    if task in MOTIONS and case.nq != case.n:
+        return "not of quaternions"
+    return "not without bodies" if task == "inertial-gradient" and as_mechanism(case.model) is None else ""
 
 
 def _row(case: PeerModel, task: str, mode: str, pool: WorkerPool, repeats: int) -> Row:

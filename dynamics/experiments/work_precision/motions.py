@@ -128,43 +128,34 @@ def motions(
     for what, values in (("times", times), ("errors", errors)):
         if not (values and all([value > 0.0 and math.isfinite(value) for value in values])):
             raise ValueError(f"{what} must be positive and finite, got {values!r}")
-    return _rows(scenes, sorted(times), sorted(errors, reverse=True), peers, repeats, limit, count, exact or {}, say)
+    wanted = sorted(errors, reverse=True)
 
+    def measured() -> Iterator[Row]:
+        for name in scenes:
+            size = sizes(name)
+            task = replace(MOTIONS[name](), name=name, t_end=max(times), size=tuple(size.tolist()))
+            problem = problem_of(task)
+            absent: dict[str, Missed] = {}
+            solvers = _solvers(task, float(size[size > 0.0].min()), problem, peers, absent)
+            once: list[Row] = []
+            for t_end in sorted(times):
+                end = (exact or {}).get((name, t_end)) or exact_end(name, t_end)
+                if isinstance(end, str):
+                    yield from [Row(name, t_end, error, missed={OURS: Missed(end)}) for error in wanted]
+                    continue
+                metrics = ErrorMetrics(replace(task, t_end=t_end), end)
+                solvers = [solver.until(t_end) for solver in solvers]
+                entries = [_swept(solver, metrics, limit, say) for solver in solvers]
+                doubt = doubted(entries, end.error, metrics.scales[0])
+                rows = [Row(name, t_end, error, missed=dict(absent), doubt=doubt) for error in wanted]
+                _fill(rows, entries, repeats)
+                yield from rows
+                if t_end <= ENSEMBLE:
+                    once = rows
+            if count and once:
+                yield from _ensemble(replace(task, t_end=once[0].t_end), solvers, once, count, repeats, say)
 
-def _rows(
-    scenes: Sequence[str],
-    times: Sequence[float],
-    errors: Sequence[float],
-    peers: Sequence[str],
-    turns: int,
-    limit: float,
-    count: int,
-    exact: Mapping[tuple[str, float], Reference],
-    say: Callable[[str], None],
-) -> Iterator[Row]:
-    for name in scenes:
-        size = sizes(name)
-        task = replace(MOTIONS[name](), name=name, t_end=max(times), size=tuple(size.tolist()))
-        problem = problem_of(task)
-        absent: dict[str, Missed] = {}
-        solvers = _solvers(task, float(size[size > 0.0].min()), problem, peers, absent)
-        once: list[Row] = []
-        for t_end in times:
-            end = exact.get((name, t_end)) or exact_end(name, t_end)
-            if isinstance(end, str):
-                yield from [Row(name, t_end, error, missed={OURS: Missed(end)}) for error in errors]
-                continue
-            metrics = ErrorMetrics(replace(task, t_end=t_end), end)
-            solvers = [solver.until(t_end) for solver in solvers]
-            entries = [_swept(solver, metrics, limit, say) for solver in solvers]
-            doubt = doubted(entries, end.error, metrics.scales[0])
-            rows = [Row(name, t_end, error, missed=dict(absent), doubt=doubt) for error in errors]
-            _fill(rows, entries, turns)
-            yield from rows
-            if t_end <= ENSEMBLE:
-                once = rows
-        if count and once:
-            yield from _ensemble(replace(task, t_end=once[0].t_end), solvers, once, count, turns, say)
+    return measured()
 
 
 def _solvers(

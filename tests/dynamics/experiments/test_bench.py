@@ -11,7 +11,6 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
-from cgraph.extend import ldl_elimination
 from dynamics.equations.linearization import linearize_many
 from dynamics.experiments.speed import bench as module
 from dynamics.experiments.speed.bench import MODES, PEERS, TASKS, Cell, Row, WorkerPool, bench, tables
@@ -32,7 +31,6 @@ DIFFERENCES = (
     1e-8  # of quotients of differences, with steps of 5e-4: their rounding is 1e-12, what they leave out 1e-10
 )
 SCALAR = 1e-12  # relative: one coordinate, a few operations
-DENSE = 1e-10  # relative: a solve of six rows, well conditioned
 PATIENT = 1e3  # s: a budget that a loaded machine does not exceed; a test has a limit of its own
 
 
@@ -316,14 +314,6 @@ def test_a_system_that_depends_on_time_is_refused():
     driven = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 + t * q[0], coordinates=["x"])
     with pytest.raises(ValueError, match="depends on time"):
         PeerModel("driven", driven)
-
-
-def test_the_dense_solve_finds_what_numpy_finds():
-    rng = np.random.default_rng(0)
-    a = rng.normal(size=(6, 6))
-    a = a @ a.T + np.eye(6)
-    b = rng.normal(size=6)
-    assert np.array(ldl_elimination(a, b)[0]) == pytest.approx(np.linalg.solve(a, b), rel=DENSE)
 
 
 def test_a_worker_that_is_late_is_ended_and_not_asked_for_what_contains_the_same():

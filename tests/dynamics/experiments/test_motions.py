@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-import math
 from dataclasses import replace
 from typing import Any
 
@@ -11,16 +9,14 @@ import numpy as np
 import pytest
 from pytest import approx, raises
 
-from dynamics.experiments.accuracy_task import AccuracyTask
 from dynamics.experiments.work_precision.measurement import OURS, Entry, Tried
 from dynamics.experiments.work_precision.motion_runs import HeyokaBatch, Many, Motion
 from dynamics.experiments.work_precision.motion_scenes import MOTIONS, TIMES, exact_end, sizes
 from dynamics.experiments.work_precision.motions import ERRORS, Cell, Missed, Row, cost, motions, tables
-from dynamics.experiments.work_precision.trajectory_peers import Diffrax, Heyoka
+from dynamics.experiments.work_precision.trajectory_peers import Heyoka
 from dynamics.experiments.work_precision.trajectory_runs import Outcome, Run, problem_of
 from dynamics.multiprecision import Reference
 from tests.each_row import each_row
-from viz import cli
 
 NAME, T_END = "Henon and Heiles", TIMES[0]
 
@@ -109,27 +105,14 @@ def test_exact_ends_are_those_of_the_motions(name: str) -> None:
     assert len(ERRORS) == 3
 
 
-def _peer(kind: Any, task: AccuracyTask) -> Any:
-    return kind(task, 1.0, problem_of(task))
-
-
 def test_heyoka_batches_end_where_ours_do() -> None:
     pytest.importorskip("heyoka")
     task = replace(MOTIONS[NAME](), t_end=1.0)
     starts = np.array(task.start) + 0.01 * np.random.default_rng(0).normal(size=(11, 4))  # no whole number of vectors
-    theirs = HeyokaBatch(task, starts, _peer(Heyoka, task)).ready(1e-15)()
+    theirs = HeyokaBatch(task, starts, Heyoka(task, 1.0, problem_of(task))).ready(1e-15)()
     ours = Many("dop853", task, starts).ready(1e-13)()
     assert theirs.x == approx(ours.x, rel=1e-11, abs=1e-11)
     assert theirs.steps
-
-
-def test_diffrax_gets_our_equations() -> None:
-    pytest.importorskip("diffrax")
-    task = replace(MOTIONS[NAME](), t_end=1.0)
-    ours = Motion("dop853", task, 1.0).ready(1e-13)()
-    for solver in ("Dopri8", "Kvaerno5"):
-        found = Diffrax(solver, task, 1.0, problem_of(task)).ready(1e-9)()
-        assert found.x == approx(ours.x, rel=1e-7, abs=1e-7)
 
 
 @pytest.mark.parametrize(
@@ -144,13 +127,3 @@ def test_diffrax_gets_our_equations() -> None:
 def test_mistakes(arguments: dict[str, Any], said: str) -> None:
     with raises(ValueError, match=said):
         motions(**arguments)
-
-
-def test_the_command_prints_rows(capsys: pytest.CaptureFixture[str]) -> None:
-    pytest.importorskip("scipy")
-    options = ["--quick", "--json", "--times", "0.01", "--errors", "1e-6", "--peers", "SciPy", "--count", "1"]
-    assert cli.main(["bench", "motions", NAME, *options]) == 0
-    content = json.loads(capsys.readouterr().out)
-    assert content["complete"]
-    assert [row["scene"] for row in content["rows"]] == [NAME]
-    assert math.isfinite(content["rows"][0]["cells"]["ours"]["seconds"])

@@ -30,14 +30,13 @@ from dynamics.experiments.work_precision.measurement import (
     to_csv,
 )
 from dynamics.experiments.work_precision.named_tasks import load, names
-from dynamics.experiments.work_precision.trajectory_peers import EPSILON, Cvodes, Heyoka, Mujoco, heyoka_derivatives
+from dynamics.experiments.work_precision.trajectory_peers import EPSILON, Mujoco, heyoka_derivatives, offers
 from dynamics.experiments.work_precision.trajectory_runs import (
     CHOSEN,
     EQUAL,
     Ours,
     Outcome,
     Run,
-    Scipy,
     Solver,
     problem_of,
 )
@@ -261,27 +260,32 @@ def test_the_error_of_a_model_is_told_apart(arm: tuple[AccuracyTask, ErrorMetric
     assert difference < SAME_RATES if damping == 0.1 else 1e-3 < difference < 10.0
 
 
-def test_cvodes_gets_our_equations(arm: tuple[AccuracyTask, ErrorMetrics, float]) -> None:
-    pytest.importorskip("casadi")
-    found, metrics, smallest = arm
-    for kind in ("BDF", "Adams"):
-        theirs = Cvodes(kind, found, smallest, problem_of(found))
-        assert metrics.at_end(theirs.ready(1e-9)().x) < 1e-9 * THOUSANDFOLD
-        assert float(metrics.errors(theirs.rows(1e-9)).max()) < 1e-9 * THOUSANDFOLD
-        entry = Entry(theirs).curve(metrics, problem_of(found))
-        assert entry.model_error is not None
-        assert entry.model_error < SAME_RATES
+SOLVERS = [  # name, package, task and its length, knob, and the error that comes of it
+    ("scipy:DOP853", "scipy", "spring_mass", T_END, 1e-7, 1e-7 * THOUSANDFOLD),
+    ("scipy:LSODA", "scipy", "spring_mass", T_END, 1e-7, 1e-7 * THOUSANDFOLD),
+    ("scipy:Radau", "scipy", "spring_mass", T_END, 1e-7, 1e-7 * THOUSANDFOLD),
+    ("CVODES BDF", "casadi", "triple_pendulum", 1.0, 1e-9, 1e-9 * THOUSANDFOLD),
+    ("CVODES Adams", "casadi", "triple_pendulum", 1.0, 1e-9, 1e-9 * THOUSANDFOLD),
+    ("heyoka Taylor", "heyoka", "spring_mass", T_END, EPSILON, LAST_BITS),
+    ("heyoka Taylor", "heyoka", "spring_mass", T_END, 1e-4, 1e-2),
+    ("diffrax Dopri8", "diffrax", "spring_mass", T_END, 1e-9, 1e-9 * THOUSANDFOLD),
+    ("diffrax Kvaerno5", "diffrax", "spring_mass", T_END, 1e-9, 1e-9 * THOUSANDFOLD),
+]
 
 
-def test_heyoka_gets_our_equations() -> None:
-    pytest.importorskip("heyoka")
-    found, metrics, smallest = task("spring_mass")
-    theirs = Heyoka(found, smallest, problem_of(found))
-    assert metrics.at_end(theirs.ready(EPSILON)().x) < LAST_BITS
-    assert metrics.at_end(theirs.ready(1e-4)().x) < 1e-2
-    assert float(metrics.errors(theirs.rows(EPSILON)).max()) < LAST_BITS
-    x = np.array([[0.3, -0.7], [1.0, 2.0]])
-    assert theirs.rates(x) == approx(np.array([[-0.7, -0.3], [2.0, -1.0]]))
+@pytest.mark.parametrize(("name", "package", "scene", "t_end", "knob", "error"), SOLVERS)
+def test_a_solver_of_others_gets_our_equations(
+    name: str, package: str, scene: str, t_end: float, knob: float, error: float
+) -> None:
+    pytest.importorskip(package)
+    found, metrics, smallest = task(scene, t_end=t_end)
+    theirs = offers(found, smallest, problem_of(found), "auto")[name]()
+    outcome = theirs.ready(knob)()
+    assert metrics.at_end(outcome.x) < error
+    assert float(metrics.errors(theirs.rows(knob)).max()) < error
+    difference = Entry(theirs).curve(metrics, problem_of(found)).model_error
+    assert difference is None if package in ("scipy", "diffrax") else difference is not None and difference < SAME_RATES
+    assert (outcome.rejected is None) is (package != "casadi")  # the others do not tell
 
 
 def test_heyokas_derivatives_leave_its_cache_as_it_is() -> None:
@@ -298,16 +302,6 @@ def test_heyokas_derivatives_leave_its_cache_as_it_is() -> None:
             assert state.get_diskcache_enabled() is enabled
     finally:
         state.set_diskcache_enabled(before)
-
-
-def test_scipy_runs_on_our_rate() -> None:
-    pytest.importorskip("scipy")
-    found, metrics, smallest = task("spring_mass")
-    for solver in ("DOP853", "LSODA", "Radau"):
-        theirs = Scipy(solver, found, smallest, problem_of(found))
-        assert metrics.at_end(theirs.ready(1e-7)().x) < 1e-7 * THOUSANDFOLD
-        assert theirs.ready(1e-7)().rejected is None  # it does not tell
-        assert float(metrics.errors(theirs.rows(1e-7)).max()) < 1e-7 * THOUSANDFOLD
 
 
 class Broken(Solver):

@@ -190,7 +190,7 @@ def test_an_interrupted_report_leaves_no_file(tmp_path: Path, monkeypatch: pytes
     def interrupt(*_: Any) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("dynamics.experiments.work_precision.work_precision.in_turns", interrupt)
+    monkeypatch.setattr("dynamics.experiments.work_precision.work_precision.time_in_turns", interrupt)
     assert cli.main([*MEASURED, "--out", str(tmp_path / "r")]) == 130
     left = [path for path in tmp_path.rglob("*") if path.is_file()]
     assert left == []
@@ -201,8 +201,13 @@ def test_a_folder_that_cannot_be_filled_is_found_before_the_work(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, arguments: list[str]
 ) -> None:
     worked = []
-    for name in ("work_precision.work_precision.work_precision", "stability.stability.run", "pruning.report"):
-        monkeypatch.setattr(f"dynamics.experiments.{name}", lambda *_, **__: worked.append("worked"))
+    experiments = "dynamics.experiments"
+    for name in (
+        f"{experiments}.work_precision.work_precision.work_precision",
+        f"{experiments}.stability.stability.run",
+        "viz.commands.report.pruning_content",
+    ):
+        monkeypatch.setattr(name, lambda *_, **__: worked.append("worked"))
     (tmp_path / "file").write_text("in the way")
     assert cli.main(["report", *arguments, "--out", str(tmp_path / "file" / "new")]) == 2
     error = capsys.readouterr().err
