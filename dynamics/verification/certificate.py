@@ -30,15 +30,13 @@ from ..systems.model import Model, as_system
 from ..systems.system import System
 from . import peer_agreement as agreement
 from .held_states import Held, new_rows, random_states
-from .residual import DIFFERENCES, POSITIVE, ROUNDING, Certificate, Residual, worst
+from .residual import DIFFERENCES, POSITIVE, Certificate, Residual, rounded, worst
 
 if TYPE_CHECKING:
     from ..io.load import Source
 
 
 STEP = 1e-3  # of differences, in units of the coordinates
-
-
 MOST_STATES = 1_000_000  # of a certificate, some of whose matrices are kept for all states
 
 
@@ -197,6 +195,11 @@ class _Checks:
         return self.value(forward_dynamics(self.system))
 
     @cached_property
+    def _driven(self) -> Array:
+        """Size of the terms of M qdd + bias."""
+        return (np.abs(self.inertia) @ np.abs(self.accelerations)[..., None])[..., 0] + np.abs(self.bias)
+
+    @cached_property
     def held_by(self) -> Array:
         """Forces of the constraints, one by one, (N, n, m)."""
         return self.held.matrix * self._solved[:, None, self.system.n :]
@@ -224,17 +227,14 @@ class _Checks:
         qd = self.at["qd"]
         terms = np.abs(matrix) @ np.abs(qd)[..., None]
         force = (matrix @ qd[..., None])[..., 0]
-        yield Residual(
-            "coriolis: C qd + gravity = bias",
-            worst(force + self.gravity - self.bias, terms[..., 0] + np.abs(self.gravity)),
-            ROUNDING,
-        )
+        off, size = force + self.gravity - self.bias, terms[..., 0] + np.abs(self.gravity)
+        yield rounded("coriolis: C qd + gravity = bias", off, size)
         if self.moves and not self.timed:
             rate = self.matrix(self.rate(mass_matrix(self.system)))
             skew = rate - 2.0 * matrix
             # What does not change at a state is a sum of products that cancel: only others show how large these are.
             terms = np.broadcast_to((np.abs(rate) + np.abs(matrix)).max(axis=0), rate.shape)
-            yield Residual("coriolis: dM/dt - 2 C is skew", worst(skew + np.swapaxes(skew, 1, 2), terms), ROUNDING)
+            yield rounded("coriolis: dM/dt - 2 C is skew", skew + np.swapaxes(skew, 1, 2), terms)
         yield self._sum("motion: torques by motion add up to tau", torque_by_joint_motion(self.system))
 
     def _mass_matrix(self) -> Iterator[Residual]:
@@ -242,12 +242,8 @@ class _Checks:
         still = self.value(self.inverse, qdd=None)
         columns = np.stack([self.value(self.inverse, qdd=unit) - still for unit in np.eye(n)], axis=-1)
         terms = np.abs(columns) + np.abs(still)[..., None]
-        yield Residual(
-            "M: symmetric, as columns of inverse dynamics",
-            worst(columns - np.swapaxes(columns, 1, 2), terms),
-            ROUNDING,
-        )
-        yield Residual("M: d2L/dqd2 = columns of inverse dynamics", worst(columns - self.inertia, terms), ROUNDING)
+        yield rounded("M: symmetric, as columns of inverse dynamics", columns - np.swapaxes(columns, 1, 2), terms)
+        yield rounded("M: d2L/dqd2 = columns of inverse dynamics", columns - self.inertia, terms)
         if not self.moves:
             return
         sizes = np.linalg.eigvalsh(balanced(self.admitted))
@@ -263,14 +259,14 @@ class _Checks:
         """Bodies state their bias by Newton and Euler; the chain rule asks nothing but the Lagrangian."""
         still, pushed = self.value(inverse_dynamics(self.system, "chain_rule"), qdd=None), self.pushed
         equation = "bias = inverse dynamics at qdd = 0, without damping and forces"
-        return Residual(equation, worst(self.bias - still - pushed, np.abs(still) + np.abs(pushed)), ROUNDING)
+        return rounded(equation, self.bias - still - pushed, np.abs(still) + np.abs(pushed))
 
     def _forward(self) -> Residual:
         tau, qdd = self.at["tau"], self.accelerations
-        terms = (np.abs(self.inertia) @ np.abs(qdd)[..., None])[..., 0] + np.abs(self.bias) + np.abs(tau)
+        terms = self._driven + np.abs(tau)
         equation = "inverse dynamics of forward dynamics = tau" + " + J^T lambda" * self.held.any
         held, terms = self.held_by.sum(axis=-1), terms + np.abs(self.held_by).sum(axis=-1)
-        return Residual(equation, worst(self.value(self.inverse, qdd=qdd) - tau - held, terms), ROUNDING)
+        return rounded(equation, self.value(self.inverse, qdd=qdd) - tau - held, terms)
 
     def _power(self) -> Residual:
         system, qd, tau, qdd = self.system, self.at["qd"], self.at["tau"], self.accelerations
@@ -282,26 +278,22 @@ class _Checks:
             (slope,) = cotangents({system.lagrangian: ONE}, [system.t])
             power = np.concatenate([power, -self.value(self.graph({"dL/dt": slope}))], axis=-1)
             equation += " - dL/dt"
-        terms = np.abs(qd) * (
-            np.abs(self.held_by).sum(axis=-1)
-            + (np.abs(self.inertia) @ np.abs(qdd)[..., None])[..., 0]
-            + np.abs(self.bias)
-        )
+        terms = np.abs(qd) * (np.abs(self.held_by).sum(axis=-1) + self._driven)
         total = np.abs(power).sum(axis=-1) + terms.sum(axis=-1)
-        return Residual(equation, worst((gained - power.sum(axis=-1))[:, None], total[:, None]), ROUNDING)
+        return rounded(equation, (gained - power.sum(axis=-1))[:, None], total[:, None])
 
     def _energy(self) -> Residual:
         qd = self.at["qd"]
         slopes = self.value(cg.gradient(energy(self.system), self.system.qd))
         momenta = self.inertia @ qd[..., None]
         terms = np.abs(self.inertia) @ np.abs(qd)[..., None]
-        return Residual("energy: dE/dqd = M qd", worst(slopes - momenta[..., 0], terms[..., 0]), ROUNDING)
+        return rounded("energy: dE/dqd = M qd", slopes - momenta[..., 0], terms[..., 0])
 
     def _sum(self, equation: str, table: TorqueTable) -> Residual:
         cells = self.value(table.graph).reshape(-1, len(table.rows), len(table.columns))
         axis = 1 + table.sum_axis
         tau = self.value(self.inverse)
-        return Residual(equation, worst(cells.sum(axis=axis) - tau, np.abs(cells).sum(axis=axis)), ROUNDING)
+        return rounded(equation, cells.sum(axis=axis) - tau, np.abs(cells).sum(axis=axis))
 
     def _adjoint(self) -> Residual:
         """u . (J v) by forward mode and (J^T u) . v by reverse mode, J = d tau / d(q, qd, qdd)."""
@@ -317,9 +309,7 @@ class _Checks:
         bars = cotangents(seeds, state, Builder())
         pulled = self.value(self.graph({str(i): bar for i, bar in enumerate(bars)}))
         terms = np.abs(pushed * u).sum(axis=-1) + np.abs(pulled * v).sum(axis=-1)
-        return Residual(
-            "AD: u . (J v) = (J^T u) . v for tau", worst((pushed @ u - pulled @ v)[:, None], terms[:, None]), ROUNDING
-        )
+        return rounded("AD: u . (J v) = (J^T u) . v for tau", (pushed @ u - pulled @ v)[:, None], terms[:, None])
 
     def _differences(self, equation: str, graph: Graph) -> Residual:
         """Catches what no comparison of derivatives with derivatives can: a rule of differentiation that is wrong."""
@@ -374,7 +364,7 @@ def derivative_residuals(
     entries = value(inverse_dynamics_derivatives(system))[:, n:].reshape(-1, 3, n, n)
     terms = np.swapaxes(entries, 1, 2).reshape(-1, n, 3 * n) * line[: 3 * n]
     equation = "derivatives: dtau/dq, dtau/dqd and M along a line = AD of inverse dynamics"
-    yield Residual(equation, worst(terms.sum(axis=-1) - pushed, np.abs(terms).sum(axis=-1)), ROUNDING)
+    yield rounded(equation, terms.sum(axis=-1) - pushed, np.abs(terms).sum(axis=-1))
     clear = new_rows >= CLEAR
     if not clear.any():
         return
@@ -388,5 +378,6 @@ def derivative_residuals(
     missed = (inertia @ (terms.sum(axis=-1) - pushed)[..., None])[..., 0]
     sizes = (np.abs(inertia) @ np.abs(terms).sum(axis=-1)[..., None])[..., 0] + slopes
     sizes = sizes[clear] / new_rows[clear, None] ** 2
-    equation = "derivatives: A and B of the linearization along a line = AD of forward dynamics"
-    yield Residual(equation, worst(missed[clear], sizes), ROUNDING)
+    yield rounded(
+        "derivatives: A and B of the linearization along a line = AD of forward dynamics", missed[clear], sizes
+    )

@@ -17,7 +17,7 @@ from ..equations.states.consistent_state import nearest_state
 from ..systems.constraints import ConstraintError
 from ..systems.kinematics import ONE, ZERO
 from ..systems.system import System
-from .residual import ROUNDING, Residual, worst
+from .residual import Residual, rounded
 
 TRIALS = 20  # for a state that constraints let be, and at which their rank is clear
 DEPENDENT = 1e-9  # of the largest singular value of J, its columns scaled to kinetic energy: rows that say nothing
@@ -122,8 +122,7 @@ class Held:
         scaled = np.linalg.pinv(inertia / size / np.swapaxes(size, 1, 2), hermitian=True)  # singular without mass
         cancelled = np.abs(np.swapaxes(self.matrix / size, 1, 2)) @ np.abs(scaled) @ (forces[..., None] / size)
         terms = np.abs(change) + np.abs(pushed).sum(axis=-1) + cancelled[..., 0]
-        equation = "constraints: J qdd + (dz/dt at qdd = 0) = 0, all rows"
-        return Residual(equation, worst(change + pushed.sum(axis=-1), terms), ROUNDING)
+        return rounded("constraints: J qdd + (dz/dt at qdd = 0) = 0, all rows", change + pushed.sum(axis=-1), terms)
 
 
 def _sizes(inertia: Array) -> Array:

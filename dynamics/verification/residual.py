@@ -40,6 +40,11 @@ class Residual:
         return self.value <= self.bound.value
 
 
+def rounded(equation: str, difference: Array, terms: Array) -> Residual:
+    """An equation that holds but for rounding: the difference of its sides, and the terms that it is relative to."""
+    return Residual(equation, worst(difference, terms), ROUNDING)
+
+
 @dataclass(frozen=True)
 class Certificate:
     """Equations of a model's graphs held at random states, as `certify` makes it.

@@ -91,7 +91,7 @@ def bench(
     if all([not wished or _missing(case, task) for case in cases.values() for task, wished in asked.items()]):
         raise ValueError(
             f"there is nothing to measure of {', '.join(asked)} in the modes {', '.join(modes)} on {', '.join(cases)}; "
-            f"motions and gradients are called, and not of models with quaternions, or of inertial numbers without bodies"
+            f"motions and gradients are called, and not of models with quaternions, or without bodies"
         )
 
     def rows() -> Iterator[Row]:
