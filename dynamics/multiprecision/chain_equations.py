@@ -29,6 +29,12 @@ class Pair(NamedTuple):
     high: Array
     low: Array
 
+    @classmethod
+    def of(cls, numbers: Sequence[Number]) -> Pair:
+        """The midpoints of numbers at the working precision."""
+        high = [float(value.mid()) for value in numbers]
+        return cls(np.array(high), np.array([float((x - h).mid()) for x, h in zip(numbers, high, strict=True)]))
+
     def deviation(self, x: Array) -> Array:
         """x - this, exact to the last bits of x."""
         return (x - self.high) - self.low
@@ -36,32 +42,40 @@ class Pair(NamedTuple):
 
 def torques(chain: Mechanism, q: Array, qd: Array, qdd: Array) -> Pair:
     """tau [N m] of a chain for accelerations qdd, (n,). Raises ImportError without python-flint."""
-    return _bounded(chain, q, qd, qdd, lambda matrix, right, alpha: matrix * alpha - right)
+
+    def solved(number: Maker) -> list[Number]:
+        matrix, right = _equations(number, chain, q, qd)
+        found: list[Number] = (matrix * _column(number, qdd) - right).entries()
+        return found
+
+    return bounded(solved)
 
 
 def accelerations(chain: Mechanism, q: Array, qd: Array, tau: Array) -> Pair:
     """qdd [rad/s^2] of a chain under torques tau, (n,). Raises ImportError without python-flint."""
-    return _bounded(chain, q, qd, tau, lambda matrix, right, torque: matrix.solve(torque + right))
+
+    def solved(number: Maker) -> list[Number]:
+        matrix, right = _equations(number, chain, q, qd)
+        found: list[Number] = matrix.solve(_column(number, tau) + right).entries()
+        return found
+
+    return bounded(solved)
 
 
-def _bounded(
-    chain: Mechanism, q: Array, qd: Array, third: Array, solved: Callable[[arb_mat, arb_mat, arb_mat], arb_mat]
-) -> Pair:
+def bounded(solved: Callable[[Maker], Sequence[Number]]) -> Pair:
     """The numbers, computed with so many digits that the bound on their error is at most LOST."""
     digits = DIGITS
     while digits <= MOST_DIGITS:
         with working(digits) as number:
             try:
-                x = solved(*_equations(number, chain, q, qd), _column(number, third)).entries()
+                x = solved(number)
             except ZeroDivisionError:  # flint: the matrix cannot be told from a singular one
                 x = []
             largest = max([abs(float(value.mid())) for value in x], default=math.nan)
             if x and max(float(value.rad()) for value in x) <= LOST * largest:
-                high = [float(value.mid()) for value in x]
-                low = [float((value - h).mid()) for value, h in zip(x, high, strict=True)]
-                return Pair(np.array(high), np.array(low))
+                return Pair.of(x)
         digits *= 2
-    raise ArithmeticError(f"{MOST_DIGITS} digits are not enough for a chain of {len(chain.moving)} links")
+    raise ArithmeticError(f"{MOST_DIGITS} digits are not enough for these equations")
 
 
 def _equations(number: Maker, chain: Mechanism, q: Array, qd: Array) -> tuple[arb_mat, arb_mat]:

@@ -10,7 +10,6 @@ and damping acts in the joints.
 from __future__ import annotations
 
 import itertools
-import math
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
@@ -19,85 +18,84 @@ import numpy as np
 from cgraph.extend import Array
 from dynamics.multibody.builders.planar_arm import planar_links
 from dynamics.multibody.trees.mechanism import Mechanism
-from dynamics.multiprecision.chain_equations import Pair
-from dynamics.multiprecision.flint_numbers import Number, flint, working
+from dynamics.multiprecision.chain_equations import Pair, bounded
+from dynamics.multiprecision.flint_numbers import Number, flint
 
 Vector = list[Number]
-DIGITS = 60  # of the first attempt; twice as many until `LOST` is met
-MOST = 2000
-LOST = 1e-50  # the largest bound on the error, relative to the largest component
+Maker = Callable[[object], Number]
+
+
+class Link(NamedTuple):
+    """Numbers of a link: kg, m, m, kg m^2 about its center."""
+
+    mass: float
+    length: float
+    center: float
+    inertia: float
 
 
 def torques(arm: Mechanism, q: Array, qd: Array, qdd: Array) -> Pair:
-    """tau [N m] of a planar arm for accelerations qdd, (n,). Raises ImportError without python-flint."""
+    """tau [N m] of a planar arm for accelerations qdd, (n,)."""
 
-    def solved(terms: _Equations, number: Callable[[object], Number]) -> Vector:
+    def solved(number: Maker) -> Vector:
+        matrix, right = _terms(number, planar_links(arm), _gravity(arm), q, qd)
         alpha = _running(number, qdd)
-        force = [_dot(row, alpha) - right for row, right in zip(terms.matrix, terms.right, strict=True)]
+        force = [_dot(row, alpha) - given for row, given in zip(matrix, right, strict=True)]
         above = list(itertools.accumulate(reversed(force)))[::-1]
-        return [f + c for f, c in zip(above, terms.damping, strict=True)]
+        return [f + number(c) * number(v) for f, c, v in zip(above, arm.system.damping, qd.tolist(), strict=True)]
 
-    return _bounded(arm, q, qd, solved)
+    return bounded(solved)
 
 
 def accelerations(arm: Mechanism, q: Array, qd: Array, tau: Array) -> Pair:
-    """qdd [rad/s^2] of a planar arm under torques tau, (n,). Raises ImportError without python-flint."""
+    """qdd [rad/s^2] of a planar arm under torques tau, (n,)."""
+    return accelerations_of(planar_links(arm), _gravity(arm), q, qd, tau, arm.system.damping)
 
-    def solved(terms: _Equations, number: Callable[[object], Number]) -> Vector:
-        torque = [number(value) - c for value, c in zip(tau.tolist(), terms.damping, strict=True)]
-        beyond = [*torque[1:], number(0)]
-        right = [[a - b + r] for a, b, r in zip(torque, beyond, terms.right, strict=True)]
-        matrix = flint().arb_mat(terms.matrix)
-        alpha = matrix.solve(flint().arb_mat(right))
-        column = [alpha[i, 0] for i in range(len(right))]
+
+def accelerations_of(
+    links: Sequence[Link],
+    gravity: float,
+    q: Array,
+    qd: Array,
+    tau: Array,
+    damping: Sequence[float],
+    armature: float = 0.0,
+) -> Pair:
+    """The same of links by their numbers.  armature: of the rotor of each joint [kg m^2]."""
+
+    def solved(number: Maker) -> Vector:
+        matrix, right = _terms(number, links, gravity, q, qd)
+        rows = zip(tau.tolist(), damping, qd.tolist(), strict=True)
+        torque = [number(f) - number(c) * number(v) for f, c, v in rows]
+        right = [[a - b + r] for a, b, r in zip(torque, [*torque[1:], number(0)], right, strict=True)]
+        for i in range(len(links)):  # armature (theta_i - theta_(i-1))'' on link i, and its reaction on the one before
+            matrix[i][i] += number(armature) * (2 if i + 1 < len(links) else 1)
+            if i:
+                matrix[i][i - 1] -= number(armature)
+                matrix[i - 1][i] -= number(armature)
+        column = flint().arb_mat(matrix).solve(flint().arb_mat(right)).entries()
         return [a - b for a, b in zip(column, [number(0), *column], strict=False)]
 
-    return _bounded(arm, q, qd, solved)
+    return bounded(solved)
 
 
-class _Equations(NamedTuple):
-    """The equations matrix theta'' = Q + right, and the torques that damping takes in the joints."""
-
-    matrix: list[Vector]
-    right: Vector
-    damping: Vector
+def _gravity(arm: Mechanism) -> float:
+    return -float(np.asarray(arm.gravity)[2])
 
 
-def _bounded(
-    arm: Mechanism, q: Array, qd: Array, solved: Callable[[_Equations, Callable[[object], Number]], Vector]
-) -> Pair:
-    """The numbers, computed with so many digits that the bound on their error is at most LOST."""
-    digits = DIGITS
-    while digits <= MOST:
-        with working(digits) as number:
-            try:
-                x = solved(_terms(number, arm, q, qd), number)
-            except ZeroDivisionError:  # flint: the matrix cannot be told from a singular one
-                x = []
-            largest = max([abs(float(value.mid())) for value in x], default=math.nan)
-            if x and max(float(value.rad()) for value in x) <= LOST * largest:
-                high = [float(value.mid()) for value in x]
-                low = [float((value - h).mid()) for value, h in zip(x, high, strict=True)]
-                return Pair(np.array(high), np.array(low))
-        digits *= 2
-    raise ArithmeticError(f"{MOST} digits are not enough for an arm of {len(arm.moving)} links")
-
-
-def _terms(number: Callable[[object], Number], arm: Mechanism, q: Array, qd: Array) -> _Equations:
-    n = len(arm.moving)
-    gravity = number(np.asarray(arm.gravity)[2])
+def _terms(number: Maker, links: Sequence[Link], gravity: float, q: Array, qd: Array) -> tuple[list[Vector], Vector]:
+    """The equations matrix theta'' = Q + right."""
+    n = len(links)
     theta, omega = _running(number, q), _running(number, qd)
     mass, length, center, inertia = (
         [number(value) for value in row]
-        for row in zip(
-            *[(link.mass, link.length, link.center, link.inertia) for link in planar_links(arm)], strict=True
-        )
+        for row in zip(*[(link.mass, link.length, link.center, link.inertia) for link in links], strict=True)
     )
     beyond = [*list(itertools.accumulate(reversed(mass)))[::-1][1:], number(0)]  # mass carried at the far end
     first = [m * c + b * s for m, c, b, s in zip(mass, center, beyond, length, strict=True)]
     sin, cos = [angle.sin() for angle in theta], [angle.cos() for angle in theta]
     matrix = [[number(0)] * n for _ in range(n)]
-    right = [gravity * f * s for f, s in zip(first, sin, strict=True)]
+    right = [-number(gravity) * f * s for f, s in zip(first, sin, strict=True)]
     for i in range(n):
         matrix[i][i] = mass[i] * center[i] ** 2 + beyond[i] * length[i] ** 2 + inertia[i]
         for j in range(i):
@@ -106,8 +104,7 @@ def _terms(number: Callable[[object], Number], arm: Mechanism, q: Array, qd: Arr
             turn = a * (sin[i] * cos[j] - cos[i] * sin[j])
             right[i] = right[i] - turn * omega[j] ** 2
             right[j] = right[j] + turn * omega[i] ** 2
-    damping = [number(c) * number(v) for c, v in zip(arm.system.damping, qd.tolist(), strict=True)]
-    return _Equations(matrix, right, damping)
+    return matrix, right
 
 
 def _running(number: Callable[[object], Number], values: Array) -> Vector:

@@ -277,13 +277,8 @@ def exact(points: Array) -> Pair:
     """Sine and cosine, (2, N)."""
     with working(DIGITS) as number:
         at = [number(x) for x in points.tolist()]
-        rows = [[x.sin() for x in at], [x.cos() for x in at]]
-        high = [[float(each.mid()) for each in row] for row in rows]
-        low = [
-            [float((each - near).mid()) for each, near in zip(row, nearest, strict=True)]
-            for row, nearest in zip(rows, high, strict=True)
-        ]
-    return Pair(np.array(high), np.array(low))
+        sines, cosines = Pair.of([x.sin() for x in at]), Pair.of([x.cos() for x in at])
+    return Pair(np.array([sines.high, cosines.high]), np.array([sines.low, cosines.low]))
 
 
 def ulps(values: Array, known: Pair) -> float:

@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from mpmath import mp
 from pytest import approx, mark, param, raises
 
 from dynamics.equations.state_equation import state_equation, state_inputs
@@ -17,6 +16,7 @@ from dynamics.multiprecision import reference
 from tests import high_precision
 from tests.dynamics.experiments import sensitivity
 from tests.dynamics.models import Array
+from tests.dynamics.planar_arm_equations import Link, accelerations_of
 from tests.dynamics.split_state import split_state
 from tests.each_row import each_row
 from tests.slow import slow
@@ -55,40 +55,14 @@ def bodies(
     inertia: Sequence[float] | None = None,
     armature: float = 0.0,
 ) -> Rate:
-    """A planar chain in absolute angles: A_ij = a_ij cos(phi_i - phi_j) with constants a, the textbook's form.
-
-    a_ij is what all bodies from the outer of the two on carry. Rods unless centre and inertia are given.
-    """
-    n = len(masses)
-    with mp.workdps(40):
-        m, length = [mp.mpf(each) for each in masses], [mp.mpf(each) for each in lengths]
-        c = [each / 2 for each in length] if center is None else [mp.mpf(each) for each in center]
-        moment = [a * b * b / 12 for a, b in zip(m, length, strict=True)] if inertia is None else list(inertia)
-        beyond = [mp.fsum(m[i + 1 :]) for i in range(n)]  # the mass that hangs on a body's far end
-        first = [m[i] * c[i] + beyond[i] * length[i] for i in range(n)]
-
-    def a(i: int, j: int) -> mp.mpf:
-        if i == j:
-            return moment[i] + m[i] * c[i] ** 2 + beyond[i] * length[i] ** 2
-        return first[max(i, j)] * length[min(i, j)]
+    """A planar chain by its closed formulas, in sixty digits. Rods unless centers and inertias are given."""
+    n, none = len(masses), np.zeros(len(masses))
+    c = [each / 2 for each in lengths] if center is None else center
+    moment = [m * b * b / 12 for m, b in zip(masses, lengths, strict=True)] if inertia is None else inertia
+    links = [Link(*numbers) for numbers in zip(masses, lengths, c, moment, strict=True)]
 
     def rate(x: Array, t: float) -> list[float]:
-        with mp.workdps(40):
-            q, qd = [mp.mpf(each) for each in x[:n]], [mp.mpf(each) for each in x[n:]]
-            phi, omega = [mp.fsum(q[: i + 1]) for i in range(n)], [mp.fsum(qd[: i + 1]) for i in range(n)]
-            matrix, force = mp.matrix(n), mp.matrix(n, 1)
-            for i in range(n):
-                turning = mp.fsum(a(i, j) * mp.sin(phi[i] - phi[j]) * omega[j] ** 2 for j in range(n))
-                force[i] = -turning - gravity * first[i] * mp.sin(phi[i])
-                for j in range(n):
-                    matrix[i, j] = a(i, j) * mp.cos(phi[i] - phi[j])
-                # a rotor on each joint: armature (phi_i - phi_(i-1))'' on body i, and its reaction on the one before
-                matrix[i, i] += armature * (2 if i + 1 < n else 1)
-                if i:
-                    matrix[i, i - 1] -= armature
-                    matrix[i - 1, i] -= armature
-            bend = mp.lu_solve(matrix, force)
-            return [*x[n:], *[float(bend[i] - (bend[i - 1] if i else 0)) for i in range(n)]]
+        return [*x[n:], *accelerations_of(links, gravity, x[:n], x[n:], none, none.tolist(), armature).high]
 
     return rate
 
