@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from dynamics.experiments.work_precision import motions, named_tasks, work_precision
     from dynamics.experiments.work_precision.cold_start import STARTS
     from dynamics.experiments.work_precision.comparisons import COMPARISONS
-    from dynamics.experiments.work_precision.measurement import PEERS, to_csv
+    from dynamics.experiments.work_precision.measurement import PEERS
+    from dynamics.experiments.work_precision.work_precision import to_csv
     from dynamics.integrators import TABLEAUS
     from dynamics.io.load import compiled
     from dynamics.scenes.start import Start, moving_start, rest_text, with_start

@@ -1,12 +1,11 @@
-"""Measurement of solvers: their errors against the exact motion, and run times in turns; and the report of them."""
+"""Measurement of solvers: their errors against the exact motion, from coarse to fine, and run times in turns."""
 
 from __future__ import annotations
 
 import math
-import statistics
 import time
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 
 import numpy as np
@@ -15,126 +14,18 @@ from cgraph import Graph
 from cgraph.extend import Array
 
 from ...equations.energies import energy
-from ...integrators import Problem
 from ...multiprecision import Reference
 from ...simulation.run_options import SCIPY
 from ...systems.model import as_system
 from ..accuracy_task import INTERVALS, AccuracyTask
-from ..text_table import csv_text
-from ..timing import Spent, exponent, in_turns, spent
-from .cold_start import ColdStart
-from .trajectory_runs import CHOSEN, EQUAL, EndSolver, Outcome, Run, Solver
+from ..timing import Spent, in_turns, spent
+from .trajectory_runs import CHOSEN, EndSolver, Outcome, Run
 
 OURS = "ours"
 # How the names of peers' solvers begin.
 PEERS = {"MuJoCo": "MuJoCo", "SciPy": SCIPY, "heyoka": "heyoka", "CasADi": "CVODES", "diffrax": "diffrax"}
+PATIENCE = 3.0  # times as long for the others, most of which need more time for the same error
 AnySolver = TypeVar("AnySolver", bound=EndSolver)
-TARGETS = (1e-3, 1e-6, 1e-9, 1e-12)
-
-
-@dataclass(frozen=True)
-class Point:
-    """One knob of one solver.  None: not told by the solver.
-
-    knob: the number of equal steps, or the relative tolerance.  step: t_end over the accepted steps [s].
-    seconds, median: the shortest and the median of the timed runs.
-    error: of the state at t_end; largest: over all times; see `AccuracyTask.scales`.
-    drift: largest change of energy, over the largest kinetic energy of the motion; of a conservative system.
-    """
-
-    knob: float
-    step: float | None
-    seconds: float
-    median: float
-    steps: int | None
-    rejected: int | None
-    evaluations: int | None
-    error: float
-    largest: float
-    drift: float | None
-
-
-@dataclass(frozen=True)
-class Curve:
-    """One solver.  kind: "equal steps" or "chosen steps".  order: declared.  fitted: see `fitted_order`.
-
-    model_error: largest difference of its rates from ours along the motion, relative to the largest rate of the same
-    state; None where the rates are ours.
-    stopped: why there is no finer point.
-    """
-
-    name: str
-    about: str
-    ours: bool
-    kind: str
-    order: int | None
-    fitted: float | None
-    model_error: float | None
-    stopped: str
-    points: tuple[Point, ...]
-
-
-@dataclass(frozen=True)
-class WorkPrecision:
-    """The report of one task.  absent: {solver: why it is not there}.  load: of the machine, at start and end."""
-
-    name: str
-    about: str
-    states: int
-    t_end: float
-    nodes: int  # of the rate's graph
-    conservative: bool
-    stiff: bool
-    relative_to: str  # errors: "largest", "given" sizes, or the "own" value of the state at that time
-    times: tuple[float, ...]
-    reference: str  # how the exact motion was computed
-    reference_error: float
-    reference_seconds: float
-    machine: str
-    load: tuple[float | None, float | None]
-    curves: tuple[Curve, ...]
-    cold: tuple[ColdStart, ...]
-    absent: dict[str, str] = field(default_factory=dict)
-    left_out: tuple[str, ...] = ()
-
-    def to_dict(self) -> dict[str, Any]:
-        """All of it as plain data for JSON; None in place of what is no number."""
-        plain: dict[str, Any] = _plain(asdict(self) | {"targets": [asdict(each) for each in targets(self.curves)]})
-        return plain
-
-
-@dataclass(frozen=True)
-class Target:
-    """The fastest of ours, and of a peer, with at most this error at t_end.  ratio: to the fastest of ours."""
-
-    error: float
-    group: str
-    name: str
-    knob: float
-    seconds: float
-    ratio: float | None
-
-
-def targets(curves: Sequence[Curve], errors: Sequence[float] = TARGETS) -> list[Target]:
-    """For each error, ours first."""
-    fastest_runs = []
-    for error in errors:
-        ours = None
-        for group in (OURS, *PEERS):
-            fastest = _fastest([each for each in curves if group_of(each) == group], error)
-            if fastest is None:
-                continue
-            curve, point = fastest
-            if group == OURS:
-                ours = point.seconds
-            ratio = None if ours is None else point.seconds / ours
-            fastest_runs.append(Target(error, group, curve.name, point.knob, point.seconds, ratio))
-    return fastest_runs
-
-
-def group_of(curve: Curve) -> str:
-    """Ours, or the peer that a solver belongs to."""
-    return OURS if curve.ours else group(curve.name)
 
 
 def group(name: str) -> str:
@@ -142,39 +33,8 @@ def group(name: str) -> str:
     return next((peer for peer, begin in PEERS.items() if name.startswith(begin)), OURS)
 
 
-def _fastest(curves: Sequence[Curve], error: float) -> tuple[Curve, Point] | None:
-    met = [(curve, point) for curve in curves for point in curve.points if point.error <= error]
-    return min(met, key=lambda each: each[1].seconds, default=None)
-
-
-COLUMNS = (
-    *("solver", "kind", "declared_order", "fitted_order", "knob", "step", "seconds", "median_seconds", "steps"),
-    *("rejected", "evaluations", "error_at_end", "largest_error", "energy_drift", "model_error"),
-)
-
-
-def to_csv(report: WorkPrecision) -> str:
-    """The points of a report as CSV, a line each; an empty cell is what is not known."""
-    rows = []
-    for curve in report.curves:
-        for p in curve.points:
-            first = (curve.name, curve.kind, curve.order, curve.fitted, p.knob, p.step, p.seconds, p.median)
-            rest = (p.steps, p.rejected, p.evaluations, p.error, p.largest, p.drift, curve.model_error)
-            rows.append([*first, *rest])
-    return csv_text(COLUMNS, rows)
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {name: _plain(each) for name, each in value.items()}
-    if isinstance(value, list | tuple):
-        return [_plain(each) for each in value]
-    return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
 CHUNK = 5e-3  # s, of runs that are timed in one turn
-WORST, FLOOR = 1e-1, 5e-12  # errors between which an order is fitted: above is no order yet, below is rounding
-FITTED = 3  # points of equal steps, the finest between those bounds: the coarser are no order yet
+FLOOR = 5e-12  # an error that is rounding
 ENOUGH = 0.5  # s of timed runs of a knob, after which three runs are enough
 STALLED = 2  # knobs in a row without a smaller error, after which no finer one is tried
 
@@ -243,45 +103,6 @@ class Entry(Generic[AnySolver]):
     tried: list[Tried] = field(default_factory=list)
     stopped: str = ""
 
-    def curve(self: Entry[Solver], metrics: ErrorMetrics, problem: Problem) -> Curve:
-        """Curve of the report."""
-        solver = self.solver
-        points = tuple([_point(solver, each, metrics) for each in self.tried])
-        theirs = solver.rates(metrics.exact.x)
-        difference = None
-        if theirs is not None:
-            names, x = problem.rate.input_names, metrics.exact.x
-            inputs: dict[str, float | Array] = dict.fromkeys(names, 0.0) | dict(zip(names, x.T, strict=False))
-            ours = np.array(np.broadcast_arrays(*problem.rate.evaluate(inputs).values(), x[:, 0])[:-1]).T
-            largest = np.max(np.abs(ours), axis=0)
-            difference = float(np.max(np.abs(theirs - ours) / np.where(largest > 0.0, largest, 1.0)))
-        fitted = None if solver.order is None else _fitted(solver.kind, points)
-        about = solver.name, solver.about, solver.ours, solver.kind, solver.order
-        return Curve(*about, fitted, difference, self.stopped, points)
-
-
-def _point(solver: Solver, tried: Tried, metrics: ErrorMetrics) -> Point:
-    outcome = tried.outcome
-    with np.errstate(all="ignore"):
-        try:
-            rows = solver.rows(tried.knob)
-        except Exception:  # noqa: BLE001 (a peer may fail at these instants where it did not at the end alone)
-            rows = np.full(metrics.exact.x.shape, math.nan)
-        largest = float(np.max(metrics.errors(rows)))
-        drift = metrics.drift(rows) if math.isfinite(largest) else None
-    return Point(
-        tried.knob,
-        metrics.task.t_end / outcome.steps if outcome.steps else None,
-        tried.seconds,
-        statistics.median(tried.run.seconds),
-        outcome.steps,
-        outcome.rejected,
-        outcome.evaluations,
-        tried.error,
-        max(largest, tried.error),
-        drift,
-    )
-
 
 def sweep(
     solver: AnySolver, metrics: EndMetrics, limit: float, knobs: Sequence[float] | None = None
@@ -333,21 +154,3 @@ def attempt(solver: EndSolver, metrics: EndMetrics, knob: float) -> tuple[Tried 
 def time_in_turns(tried: Iterable[Tried], turns: int) -> None:
     """Time every run in turns; short runs several times a turn, long ones three times in all."""
     in_turns([each.run for each in tried], turns, CHUNK, ENOUGH)
-
-
-def fitted_order(steps: Sequence[float], errors: Sequence[float], finest: int | None = None) -> float | None:
-    """The exponent of the error in the step, over the points above rounding, or the finest of them; None below three.
-
-    steps: [s], positive.
-    """
-    kept = sorted({(h, e) for h, e in zip(steps, errors, strict=True) if FLOOR < e < WORST})[:finest]
-    return exponent(*zip(*kept, strict=True)) if len(kept) >= 3 else None
-
-
-def _fitted(kind: str, points: Sequence[Point]) -> float | None:
-    """Fitted order by the largest error; of chosen steps, whose dense output has another order, by that at the end."""
-    told = [each for each in points if each.step]
-    steps = [each.step or 0.0 for each in told]
-    if kind == EQUAL:
-        return fitted_order(steps, [each.largest for each in told], FITTED)
-    return fitted_order(steps, [each.error for each in told])

@@ -23,12 +23,11 @@ from ...multiprecision import Reference
 from ...peers.peer import made
 from ..accuracy_task import AccuracyTask
 from ..text_table import WIDTH, Footnotes, check_names, digits, table
-from .measurement import OURS, PEERS, EndMetrics, Entry, ErrorMetrics, Tried, group, sweep, time_in_turns
+from .measurement import OURS, PATIENCE, PEERS, EndMetrics, Entry, ErrorMetrics, Tried, group, sweep, time_in_turns
 from .motion_runs import HeyokaBatch, Many, ManyEnds, Motion
 from .motion_scenes import MOTIONS, TIMES, exact_end, sizes
 from .trajectory_peers import Heyoka, offers
 from .trajectory_runs import CHOSEN, EndSolver, problem_of
-from .work_precision import PATIENCE
 
 HEYOKA = "heyoka"
 DUEL = (OURS, HEYOKA)  # whose ratio is told

@@ -1,25 +1,224 @@
-"""Work and precision: run time beside error of every integrator on one task, ours and others', in one run."""
+"""Work and precision: a report of run time beside error of every integrator on one task, ours and others'."""
 
 from __future__ import annotations
 
+import math
+import statistics
 from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
+
+from cgraph.extend import Array
+
 from ...integrators import METHODS, Problem
 from ...peers.peer import made
 from ..accuracy_task import AccuracyTask
-from ..text_table import check_names
-from ..timing import load as load_of_machine, machine, spent
-from .cold_start import STARTS, cold_starts
-from .measurement import PEERS, Entry, ErrorMetrics, WorkPrecision, sweep, time_in_turns
+from ..text_table import check_names, csv_text
+from ..timing import exponent, load as load_of_machine, machine, spent
+from .cold_start import STARTS, ColdStart, cold_starts
+from .measurement import FLOOR, OURS, PATIENCE, PEERS, Entry, ErrorMetrics, Tried, group, sweep, time_in_turns
 from .named_tasks import load
 from .trajectory_peers import offers
 from .trajectory_runs import EQUAL, Ours, Solver, problem_of
 
 LIMIT = 0.3  # s; no finer knob is tried after a run of this length
-PATIENCE = 3.0  # times as long for the others, most of which need more time for the same error
+
+
+TARGETS = (1e-3, 1e-6, 1e-9, 1e-12)
+WORST = 1e-1  # the largest error from which an order is fitted: above is none yet, below `FLOOR` is rounding
+FITTED = 3  # points of equal steps, the finest between those bounds: the coarser are no order yet
+
+
+@dataclass(frozen=True)
+class Point:
+    """One knob of one solver.  None: not told by the solver.
+
+    knob: the number of equal steps, or the relative tolerance.  step: t_end over the accepted steps [s].
+    seconds, median: the shortest and the median of the timed runs.
+    error: of the state at t_end; largest: over all times; see `AccuracyTask.scales`.
+    drift: largest change of energy, over the largest kinetic energy of the motion; of a conservative system.
+    """
+
+    knob: float
+    step: float | None
+    seconds: float
+    median: float
+    steps: int | None
+    rejected: int | None
+    evaluations: int | None
+    error: float
+    largest: float
+    drift: float | None
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One solver.  kind: "equal steps" or "chosen steps".  order: declared.  fitted: see `fitted_order`.
+
+    model_error: largest difference of its rates from ours along the motion, relative to the largest rate of the same
+    state; None where the rates are ours.
+    stopped: why there is no finer point.
+    """
+
+    name: str
+    about: str
+    ours: bool
+    kind: str
+    order: int | None
+    fitted: float | None
+    model_error: float | None
+    stopped: str
+    points: tuple[Point, ...]
+
+
+@dataclass(frozen=True)
+class WorkPrecision:
+    """The report of one task.  absent: {solver: why it is not there}.  load: of the machine, at start and end."""
+
+    name: str
+    about: str
+    states: int
+    t_end: float
+    nodes: int  # of the rate's graph
+    conservative: bool
+    stiff: bool
+    relative_to: str  # errors: "largest", "given" sizes, or the "own" value of the state at that time
+    times: tuple[float, ...]
+    reference: str  # how the exact motion was computed
+    reference_error: float
+    reference_seconds: float
+    machine: str
+    load: tuple[float | None, float | None]
+    curves: tuple[Curve, ...]
+    cold: tuple[ColdStart, ...]
+    absent: dict[str, str] = field(default_factory=dict)
+    left_out: tuple[str, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """All of it as plain data for JSON; None in place of what is no number."""
+        plain: dict[str, Any] = _plain(asdict(self) | {"targets": [asdict(each) for each in targets(self.curves)]})
+        return plain
+
+
+@dataclass(frozen=True)
+class Target:
+    """The fastest of ours, and of a peer, with at most this error at t_end.  ratio: to the fastest of ours."""
+
+    error: float
+    group: str
+    name: str
+    knob: float
+    seconds: float
+    ratio: float | None
+
+
+def targets(curves: Sequence[Curve], errors: Sequence[float] = TARGETS) -> list[Target]:
+    """For each error, ours first."""
+    fastest_runs = []
+    for error in errors:
+        ours = None
+        for who in (OURS, *PEERS):
+            fastest = _fastest([each for each in curves if group(each.name) == who], error)
+            if fastest is None:
+                continue
+            curve, point = fastest
+            if who == OURS:
+                ours = point.seconds
+            ratio = None if ours is None else point.seconds / ours
+            fastest_runs.append(Target(error, who, curve.name, point.knob, point.seconds, ratio))
+    return fastest_runs
+
+
+def _fastest(curves: Sequence[Curve], error: float) -> tuple[Curve, Point] | None:
+    met = [(curve, point) for curve in curves for point in curve.points if point.error <= error]
+    return min(met, key=lambda each: each[1].seconds, default=None)
+
+
+COLUMNS = (
+    *("solver", "kind", "declared_order", "fitted_order", "knob", "step", "seconds", "median_seconds", "steps"),
+    *("rejected", "evaluations", "error_at_end", "largest_error", "energy_drift", "model_error"),
+)
+
+
+def to_csv(report: WorkPrecision) -> str:
+    """The points of a report as CSV, a line each; an empty cell is what is not known."""
+    rows = []
+    for curve in report.curves:
+        for p in curve.points:
+            first = (curve.name, curve.kind, curve.order, curve.fitted, p.knob, p.step, p.seconds, p.median)
+            rest = (p.steps, p.rejected, p.evaluations, p.error, p.largest, p.drift, curve.model_error)
+            rows.append([*first, *rest])
+    return csv_text(COLUMNS, rows)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {name: _plain(each) for name, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(each) for each in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def curve(entry: Entry[Solver], metrics: ErrorMetrics, problem: Problem) -> Curve:
+    """Curve of the report."""
+    solver = entry.solver
+    points = tuple([_point(solver, each, metrics) for each in entry.tried])
+    theirs = solver.rates(metrics.exact.x)
+    difference = None
+    if theirs is not None:
+        names, x = problem.rate.input_names, metrics.exact.x
+        inputs: dict[str, float | Array] = dict.fromkeys(names, 0.0) | dict(zip(names, x.T, strict=False))
+        ours = np.array(np.broadcast_arrays(*problem.rate.evaluate(inputs).values(), x[:, 0])[:-1]).T
+        largest = np.max(np.abs(ours), axis=0)
+        difference = float(np.max(np.abs(theirs - ours) / np.where(largest > 0.0, largest, 1.0)))
+    fitted = None if solver.order is None else _fitted(solver.kind, points)
+    about = solver.name, solver.about, solver.ours, solver.kind, solver.order
+    return Curve(*about, fitted, difference, entry.stopped, points)
+
+
+def _point(solver: Solver, tried: Tried, metrics: ErrorMetrics) -> Point:
+    outcome = tried.outcome
+    with np.errstate(all="ignore"):
+        try:
+            rows = solver.rows(tried.knob)
+        except Exception:  # noqa: BLE001 (a peer may fail at these instants where it did not at the end alone)
+            rows = np.full(metrics.exact.x.shape, math.nan)
+        largest = float(np.max(metrics.errors(rows)))
+        drift = metrics.drift(rows) if math.isfinite(largest) else None
+    return Point(
+        tried.knob,
+        metrics.task.t_end / outcome.steps if outcome.steps else None,
+        tried.seconds,
+        statistics.median(tried.run.seconds),
+        outcome.steps,
+        outcome.rejected,
+        outcome.evaluations,
+        tried.error,
+        max(largest, tried.error),
+        drift,
+    )
+
+
+def fitted_order(steps: Sequence[float], errors: Sequence[float], finest: int | None = None) -> float | None:
+    """The exponent of the error in the step, over the points above rounding, or the finest of them; None below three.
+
+    steps: [s], positive.
+    """
+    kept = sorted({(h, e) for h, e in zip(steps, errors, strict=True) if FLOOR < e < WORST})[:finest]
+    return exponent(*zip(*kept, strict=True)) if len(kept) >= 3 else None
+
+
+def _fitted(kind: str, points: Sequence[Point]) -> float | None:
+    """Fitted order by the largest error; of chosen steps, whose dense output has another order, by that at the end."""
+    told = [each for each in points if each.step]
+    steps = [each.step or 0.0 for each in told]
+    if kind == EQUAL:
+        return fitted_order(steps, [each.largest for each in told], FITTED)
+    return fitted_order(steps, [each.error for each in told])
 
 
 class Subject(NamedTuple):
@@ -94,7 +293,7 @@ def work_precision(
             absent[solver.name] = entry.stopped
     say(f"{name}: {turns} turns")
     time_in_turns([tried for entry in entries for tried in entry.tried], turns)
-    curves = tuple([entry.curve(at.metrics, at.problem) for entry in entries])
+    curves = tuple([curve(entry, at.metrics, at.problem) for entry in entries])
     started = cold_starts(name, options or {}, cold, turns=cold_turns, budget=budget, say=say) if cold else []
     fields = ("name", "about", "t_end", "conservative", "stiff", "left_out")
     return WorkPrecision(

@@ -9,9 +9,9 @@ import numpy as np
 from pytest import approx, mark, param, raises
 
 from dynamics.equations.state_equation import state_equation, state_inputs
+from dynamics.experiments.accuracy_task import StabilityCase
 from dynamics.experiments.stability import cases
 from dynamics.experiments.stability.cases import chains, rotation, stiff
-from dynamics.experiments.stability.cases.case import StabilityCase
 from dynamics.multiprecision import reference
 from tests import high_precision
 from tests.dynamics.experiments import sensitivity

@@ -18,17 +18,7 @@ import dynamics as dyn
 from dynamics.experiments.accuracy_task import INTERVALS, AccuracyTask
 from dynamics.experiments.work_precision import measurement
 from dynamics.experiments.work_precision.cold_start import cold_starts
-from dynamics.experiments.work_precision.measurement import (
-    FLOOR,
-    Curve,
-    Entry,
-    ErrorMetrics,
-    Point,
-    WorkPrecision,
-    fitted_order,
-    targets,
-    to_csv,
-)
+from dynamics.experiments.work_precision.measurement import FLOOR, Entry, ErrorMetrics
 from dynamics.experiments.work_precision.named_tasks import load, names
 from dynamics.experiments.work_precision.trajectory_peers import EPSILON, Mujoco, heyoka_derivatives, offers
 from dynamics.experiments.work_precision.trajectory_runs import (
@@ -40,7 +30,16 @@ from dynamics.experiments.work_precision.trajectory_runs import (
     Solver,
     problem_of,
 )
-from dynamics.experiments.work_precision.work_precision import work_precision
+from dynamics.experiments.work_precision.work_precision import (
+    Curve,
+    Point,
+    WorkPrecision,
+    curve as curve_of,
+    fitted_order,
+    targets,
+    to_csv,
+    work_precision,
+)
 from dynamics.integrators import METHODS
 from dynamics.multiprecision import Reference
 from tests.each_row import each_row
@@ -231,7 +230,7 @@ def test_mujoco_s_order_of_the_joints_is_undone() -> None:
     assert list(theirs.peer.order) != [0, 1, 2, 3]
     assert metrics.at_end(theirs.ready(512)().x) < 1e-8
     assert float(metrics.errors(theirs.rows(512)).max()) < 1e-8
-    difference = Entry(theirs).curve(metrics, problem_of(found)).model_error
+    difference = curve_of(Entry(theirs), metrics, problem_of(found)).model_error
     assert difference is not None
     assert difference < 1e-10  # rounding, of a mass matrix of thin rods
 
@@ -255,7 +254,7 @@ def test_the_error_of_a_model_is_told_apart(arm: tuple[AccuracyTask, ErrorMetric
     theirs = Mujoco("RK4", found, smallest)
     theirs.model.dof_damping[:] = damping
     entry = Entry(theirs)
-    difference = entry.curve(metrics, problem_of(found)).model_error
+    difference = curve_of(entry, metrics, problem_of(found)).model_error
     assert difference is not None
     assert difference < SAME_RATES if damping == 0.1 else 1e-3 < difference < 10.0
 
@@ -283,7 +282,7 @@ def test_a_solver_of_others_gets_our_equations(
     outcome = theirs.ready(knob)()
     assert metrics.at_end(outcome.x) < error
     assert float(metrics.errors(theirs.rows(knob)).max()) < error
-    difference = Entry(theirs).curve(metrics, problem_of(found)).model_error
+    difference = curve_of(Entry(theirs), metrics, problem_of(found)).model_error
     assert difference is None if package in ("scipy", "diffrax") else difference is not None and difference < SAME_RATES
     assert (outcome.rejected is None) is (package != "casadi")  # the others do not tell
 
@@ -332,7 +331,7 @@ def test_a_solver_that_fails_keeps_its_good_points_and_a_reason() -> None:
     assert entry.stopped == "is not finite"
     assert entry.tried[0].error == approx(1e-2, rel=1e-2)
     measurement.time_in_turns(entry.tried, 1)
-    for each in entry.curve(metrics, problem_of(found)).points:
+    for each in curve_of(entry, metrics, problem_of(found)).points:
         assert each.largest == math.inf
         assert each.drift is None
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from cgraph.extend import memo
 
+from ...accuracy_task import RTOL, Criterion, StabilityCase
 from . import chains, extremes, fields, orbits, rotation, stiff
-from .case import RTOL, Criterion, StabilityCase
 
 __all__ = ["RTOL", "Criterion", "StabilityCase", "load", "names", "table"]
 

@@ -12,7 +12,7 @@ from ....multibody.builders.planar_arm import planar_arm
 from ....multibody.trees.mechanism import Body, Joint, Mechanism
 from ....multiprecision import closed_forms
 from ....systems.system import System
-from .case import GROWN, RTOL, SLACK, Criterion, StabilityCase, conserved, energy_criterion
+from ...accuracy_task import GROWN, RTOL, SLACK, Criterion, StabilityCase, conserved, energy_criterion
 
 GRAVITY = 9.81  # m/s^2
 UNIT = 2.0**-53  # rounding of float64

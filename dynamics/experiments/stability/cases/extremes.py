@@ -8,7 +8,7 @@ import cgraph as cg
 
 from ....multiprecision import closed_forms
 from ....systems.system import System
-from .case import RTOL, SLACK, Criterion, StabilityCase, conserved, energy_criterion
+from ...accuracy_task import RTOL, SLACK, Criterion, StabilityCase, conserved, energy_criterion
 
 STIFFNESS = 9.81  # 1/s^2, gravity over length
 TINY = 5e-324  # the smallest positive float64

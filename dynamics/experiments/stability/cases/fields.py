@@ -10,7 +10,7 @@ import cgraph as cg
 from ....multiprecision import closed_forms
 from ....systems.ode_system import OdeSystem
 from ....systems.system import System
-from .case import RTOL, SLACK, Criterion, StabilityCase, conserved, energy_criterion, error_criterion
+from ...accuracy_task import RTOL, SLACK, Criterion, StabilityCase, conserved, energy_criterion, error_criterion
 
 GRAVITY = 9.81  # m/s^2
 

@@ -9,7 +9,7 @@ import cgraph as cg
 
 from ....multiprecision import closed_forms
 from ....systems.system import System
-from .case import RTOL, SLACK, Criterion, StabilityCase, conserved, energy_criterion
+from ...accuracy_task import RTOL, SLACK, Criterion, StabilityCase, conserved, energy_criterion
 
 
 def _lagrangian(q: Sequence[cg.Node], qd: Sequence[cg.Node], t: cg.Node) -> list[cg.Node]:

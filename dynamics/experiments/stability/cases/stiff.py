@@ -11,7 +11,15 @@ from ....multiprecision import Reference, closed_forms
 from ....multiprecision.solution import from_text
 from ....systems.ode_system import OdeSystem
 from ....systems.system import System
-from .case import ATOL, Criterion, StabilityCase, conserved, conserved_states, energy_criterion, error_criterion
+from ...accuracy_task import (
+    ATOL,
+    Criterion,
+    StabilityCase,
+    conserved,
+    conserved_states,
+    energy_criterion,
+    error_criterion,
+)
 
 GRAVITY = 9.81  # m/s^2
 RATIO = 10.0  # of damping to the critical one
