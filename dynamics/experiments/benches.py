@@ -82,7 +82,7 @@ BENCHES = {
     ),
     "tightest": Bench(
         "random Lagrangians as exactly as float64 has them, beside heyoka",
-        "trust.tightest.tightest",
+        "trust.trust.tightest",
         ("count", "json"),
     ),
     "closed-chains": Bench(
