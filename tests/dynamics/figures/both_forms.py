@@ -7,8 +7,8 @@ python -m tests.dynamics.figures.both_forms linearizations   nodes and times of 
 from __future__ import annotations
 
 import sys
-import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -21,11 +21,12 @@ from dynamics.equations.momentum.hamiltonian import hamilton_equations, velociti
 from dynamics.equations.state_equation import state_equation
 from dynamics.experiments.speed.bench_scenes import SCENES, chain
 from dynamics.experiments.text_table import digits, table
+from dynamics.experiments.timing import Timed, in_turns
 from dynamics.systems.model import Model, as_system
 
 ROUNDS = 15  # of all forms in turn; the fastest counts
 SECONDS = 0.02  # of a round
-CALLS = 200  # between two looks at the clock, which take as long as ten of the shortest
+CALLS = 200  # between two looks at the clock
 POINTS = 4096  # of a batch
 STEP, PASSES = 1e-6, 5000  # s, of the steps of a loop, and how many: what is done before the first is not measured
 COMPILED = 50_000  # nodes of a linearization; of more only the count, machine code would take minutes
@@ -125,18 +126,17 @@ def rows(this: Figure, name: str, rounds: int = ROUNDS) -> list[tuple[str, ...]]
     return lines
 
 
+def _called(run: Callable[[], object], times: int) -> None:
+    for _ in range(times):
+        run()
+
+
 def least_seconds(ways: list[Way], rounds: int) -> list[float]:
     """Seconds of processor time an evaluation takes, the least of some rounds, all in turn."""
-    best = [np.inf] * len(ways)
-    for _ in range(rounds):
-        for k, (run, count) in enumerate(ways):
-            calls, begin = 0, time.process_time()
-            while (taken := time.process_time() - begin) < SECONDS:
-                for _ in range(CALLS if count == 1 else 1):
-                    run()
-                calls += CALLS if count == 1 else 1
-            best[k] = min(best[k], taken / (calls * count))
-    return best
+    calls = [CALLS if count == 1 else 1 for _, count in ways]
+    runs = [Timed(partial(_called, run, n)) for (run, _), n in zip(ways, calls, strict=True)]
+    in_turns(runs, rounds, SECONDS)
+    return [min(each.processor) / (n * count) for each, n, (_, count) in zip(runs, calls, ways, strict=True)]
 
 
 if __name__ == "__main__":

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pytest import approx
 
 import cgraph as cg
 import dynamics as dyn
@@ -23,7 +24,7 @@ from dynamics.io.write_mjcf import to_mjcf
 from dynamics.systems.constraints import Constraints
 from dynamics.verification import certificate
 from dynamics.verification.certificate import certify
-from dynamics.verification.held_states import new_rows, random_states
+from dynamics.verification.held_states import Held, new_rows, random_states
 from dynamics.verification.residual import ROUNDING, Certificate, Residual
 from tests.dynamics.equations.test_constraints import moving_wall, pulleys, sleigh
 from tests.dynamics.linkages import bar, four_bar, peaucellier
@@ -356,3 +357,26 @@ def test_the_command_finds_what_was_left_out(option: str, joint: str, term: str,
     printed = capsys.readouterr()
     assert f"(they agree without {term})" in printed.out
     assert printed.err.endswith("cgraph: model: 1 residual(s) exceed their bound: inverse dynamics = MuJoCo's\n")
+
+
+@each_row("unit", [1e-12, 1e-3, 1.0, 1e6])
+def test_the_admitted_motions_of_any_units_are_scaled_to_their_kinetic_energy(unit: float) -> None:
+    """By the diagonal of M: what is left has the eigenvalues of M beside it, of the motions that a row admits."""
+    masses = np.array([2.0, 3.0 * unit, 0.5])
+
+    def energy(q: Any, qd: Any, t: Any) -> Any:
+        return 0.5 * sum(m * x * x for m, x in zip(masses.tolist(), qd, strict=True))
+
+    def row(q: Any, qd: Any, t: Any) -> Any:
+        return {"joined": qd[0] - 0.7 * qd[1]}
+
+    def value(graph: cg.Graph) -> np.ndarray:
+        return np.array([[*graph.evaluate(dict.fromkeys(graph.input_names, 0.3)).values()]])
+
+    size = np.sqrt(masses)
+    inertia = np.outer(size, size) * [[1.0, 0.5, 0.1], [0.5, 1.0, -0.3], [0.1, -0.3, 1.0]]
+    basis = np.array([[0.7, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    whole, diagonal = (basis.T @ each @ basis for each in (inertia, np.diag(masses)))
+    expected = np.sort(np.linalg.eigvals(np.linalg.solve(diagonal, whole)))
+    held = Held(dyn.System(energy, "x y z", velocity_constraints=row), value)
+    assert np.linalg.eigvalsh(held.admitted(inertia[None])[0]) == approx(expected, rel=1e-12)
