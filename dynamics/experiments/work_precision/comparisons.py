@@ -57,11 +57,11 @@ class Comparison:
         absent: dict[str, str] = {}
         for solver in made({name: lambda: make(*self.subject[:3])}, absent).values():
             for knob in knobs:
-                tried, why, _ = attempt(solver, self.subject.metrics, knob)
-                if tried is None:
-                    self.refused.append(f"{name} at {knob:.0e}: {why[:100]}")
-                elif tried.error <= self.error:
-                    runs.append(tried)
+                found = attempt(solver, self.subject.metrics, knob)
+                if found.raised:
+                    self.refused.append(f"{name} at {knob:.0e}: {found.why[:100]}")
+                elif found.tried is not None and found.tried.error <= self.error:
+                    runs.append(found.tried)
                 if len(runs) == most:
                     break
         self.refused += [f"{name}: {missing}" for missing in absent.values()]
