@@ -26,6 +26,7 @@ from ..stability.energy_drift import SYMPLECTIC, drift
 from ..text_table import Table, table
 from .cold_start import cold_starts
 from .measurement import Tried, attempt, time_in_turns
+from .named_tasks import load
 from .trajectory_peers import EPSILON, Cvodes, Heyoka
 from .trajectory_runs import Ours, Outcome, Run, Scipy, Solver
 from .work_precision import Subject, subject, work_precision
@@ -104,7 +105,7 @@ def orders(folder: str) -> Iterator[str]:
 
 def taylor(folder: str) -> Iterator[str]:
     """The damped triple pendulum to 10 s, beside heyoka's Taylor integrator and CVODES, at 1e-12; and cold starts."""
-    at = subject("triple_pendulum", folder, t_end=10.0)
+    at = subject(load("triple_pendulum", t_end=10.0), folder)
     yield at.title
     race = Comparison(at, 1e-12)
     race.ours(("dop853", "dopri5", "rodas", "radau"), tolerances(1e-10, 1e-14))
@@ -125,7 +126,7 @@ def taylor(folder: str) -> Iterator[str]:
 
 def stiff(folder: str) -> Iterator[str]:
     """Steps of stiff methods against RK4 on a stiff spring; Robertson and Van der Pol against SciPy's solvers."""
-    at, methods = subject("spring pendulum 1e8", folder), ("rodas", "radau")
+    at, methods = subject(load("spring pendulum 1e8"), folder), ("rodas", "radau")
     race = Comparison(at, 1e-6)
     yield at.title
     few, many = 2**14, 2**21  # too few, and enough
@@ -143,7 +144,7 @@ def stiff(folder: str) -> Iterator[str]:
     race.add("scipy:Radau", partial(Scipy, "Radau"), tolerances(1e-3, 1e-9, 2))
     yield race.text()
     for name in ("van der pol 1e6", "robertson"):
-        at = subject(name, folder)
+        at = subject(load(name), folder)
         yield at.title
         for error in (1e-4, 1e-6, 1e-8):
             race = Comparison(at, error)
@@ -197,7 +198,7 @@ class SolveIvp(Solver):
 
 def loops(folder: str) -> Iterator[str]:
     """Our dop853 in its native loop against SciPy's solve_ivp with DOP853, at equal error."""
-    at = subject("triple_pendulum", folder, t_end=10.0)
+    at = subject(load("triple_pendulum", t_end=10.0), folder)
     yield at.title
     compiled, python, plain = cg.compile(at.problem.rate), cg.compile(at.problem.rate, "python"), numpy_rate()
     x = np.array([0.3, -0.5, 0.7, 1.0, -2.0, 0.5])

@@ -236,12 +236,11 @@ class Subject(NamedTuple):
         return f"{until}. Exact motion: {exact.how}; its error {exact.error:.0e}"
 
 
-def subject(name: str, folder: str | Path | None = None, digits: int | None = None, **options: Any) -> Subject:
-    """The task of that name.  folder: where exact motions are kept.  options: as of `named_tasks.load`.
+def subject(task: AccuracyTask, folder: str | Path | None = None, digits: int | None = None) -> Subject:
+    """The task made ready.  folder: where exact motions are kept.  digits: of it (default: the task's).
 
     Raises ValueError where no exact motion is known.
     """
-    task = load(name, **options)
     exact = task.solution(task.times, folder, digits)
     if exact is None:
         raise ValueError(f"no solution of {task.name!r} is known to compare with")
@@ -279,9 +278,9 @@ def work_precision(
     check_names(("method", methods, METHODS), ("peer", peers, PEERS), ("cold start", cold, STARTS))
     if turns < 1 or not limit > 0.0:
         raise ValueError(f"turns must be at least 1 and limit positive, got {turns!r} and {limit!r} s")
-    before = load_of_machine()
+    task, before = load(name, **(options or {})), load_of_machine()
     say(f"{name}: exact motion")
-    readied = spent(lambda: subject(name, folder, digits, **(options or {})))
+    readied = spent(lambda: subject(task, folder, digits))
     at, absent = readied.made, dict[str, str]()
     entries: list[Entry[Solver]] = []
     for solver in _solvers(at, methods, peers, backend, absent):

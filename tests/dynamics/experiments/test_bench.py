@@ -361,6 +361,7 @@ def test_what_a_peer_s_own_code_raises_is_a_reason():
         ({"budget": 0.0}, "the budget must be positive, got 0.0 s"),
         ({"scenes": ["free 35"], "tasks": ["motion"]}, "nothing to measure of motion in the modes .* on free 35"),
         ({"scenes": ["planar 3"], "tasks": ["gradient"], "modes": ["batch"]}, "nothing to measure of gradient"),
+        ({"scenes": ["spring_mass"], "tasks": ["inertial-gradient"]}, "nothing to measure of .* without bodies"),
     ],
 )
 def test_a_wrong_choice_is_told_before_anything_is_measured(choice, said):

@@ -10,6 +10,7 @@ import pytest
 import cgraph as cg
 from dynamics.experiments.work_precision import comparisons
 from dynamics.experiments.work_precision.comparisons import Comparison, SolveIvp, numpy_rate
+from dynamics.experiments.work_precision.named_tasks import load
 from dynamics.experiments.work_precision.trajectory_runs import Ours, Outcome, Solver
 from dynamics.experiments.work_precision.work_precision import Subject, subject
 
@@ -20,7 +21,7 @@ ROUNDING = 1e-12  # of rates written by hand, beside those of the graph
 @pytest.fixture(scope="module")
 def spring(tmp_path_factory: pytest.TempPathFactory) -> Subject:
     pytest.importorskip("flint")
-    return subject("spring_mass", str(tmp_path_factory.mktemp("exact")), t_end=3.0)
+    return subject(load("spring_mass", t_end=3.0), tmp_path_factory.mktemp("exact"))
 
 
 class Refusing(Solver):
@@ -69,7 +70,7 @@ def test_solve_ivp_gets_the_rate_it_is_given(spring: Subject) -> None:
 
 def test_rates_written_in_numpy_are_those_of_the_graph(tmp_path: Any) -> None:
     pytest.importorskip("flint")
-    at = subject("triple_pendulum", str(tmp_path), t_end=0.1)
+    at = subject(load("triple_pendulum", t_end=0.1), tmp_path)
     compiled, rate = cg.compile(at.problem.rate, "python"), numpy_rate()
     for x in np.random.default_rng(1).normal(size=(5, 6)):
         expected = np.array(compiled.values([*x.tolist(), 0.0]))
