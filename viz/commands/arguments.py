@@ -7,6 +7,7 @@ import json
 import math
 import sys
 import warnings
+import webbrowser
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -73,10 +74,28 @@ def unless_json(options: argparse.Namespace, data: object, text: object) -> str:
     return json.dumps(data, indent=1) if options.json else str(text)
 
 
-def answer(text: str, files: Mapping[Path, str | bytes] | None = None, *, folder: Path | None = None) -> None:
+def writes_a_page(command: argparse.ArgumentParser) -> None:
+    """The arguments `--out` and `--open`; `answer_page` writes and opens."""
+    command.add_argument("--out", type=Path, required=True, help="file to write: .html")
+    may_open(command)
+
+
+def may_open(command: argparse.ArgumentParser) -> None:
+    """The argument `--open`, which shows a page."""
+    command.add_argument("--open", action="store_true", help="open the page in the browser once it is written")
+
+
+def answer_page(options: argparse.Namespace, text: str, page: str) -> None:
+    """The end of a command that writes a page: its file, what it prints, and the browser if `--open` asks for it."""
+    answer(text, {options.out: page}, show=options.out if options.open else None)
+
+
+def answer(
+    text: str, files: Mapping[Path, str | bytes] | None = None, *, folder: Path | None = None, show: Path | None = None
+) -> None:
     """The end of a command: its files, all or none, and what it prints. No signal comes in between.
 
-    folder: made for the files where it is missing.
+    folder: made for the files where it is missing.  show: the page to open in the browser.
     """
     settled()
     places = {} if folder is None else {folder: None} | {path.parent: None for path in files or {}}
@@ -92,6 +111,8 @@ def answer(text: str, files: Mapping[Path, str | bytes] | None = None, *, folder
         raise
     if text:
         print(text)
+    if show is not None and not webbrowser.open(show.resolve().as_uri()):
+        say(f"warning: no browser was found that opens {show}")
 
 
 @contextmanager
