@@ -49,7 +49,11 @@ def takes_a_scene(command: Command, default: str | None = None) -> None:
 
 def reads_files(command: argparse.ArgumentParser) -> None:
     """The arguments that say how a model file is read, `READING`."""
-    command.add_argument("--ignore", action="store_true", help="leave out what of a model file cannot be modeled")
+    command.add_argument(
+        "--ignore",
+        action="store_true",
+        help="leave out the elements of a model file that cgraph cannot model, and name them",
+    )
     command.add_argument("--floating", action="store_true", help="let the root link of a URDF file move freely")
 
 
