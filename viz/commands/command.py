@@ -56,6 +56,7 @@ COMMANDS = {
     "bench": "our speed beside what is installed: CasADi, Pinocchio, MuJoCo, heyoka, JAX, SymPy, PyTorch",
     "report": "error beside run time of every integrator, ours and others', as pages",
     "scenes": "the scenes, with the size of their graphs",
+    "equations": "the Lagrangian, momenta and torques of a scene as formulas; status 1 for a wrong formulation",
     "draw": "draw the graph of a scene's equations (SVG, PNG or DOT) or list it (TXT)",
     "code": "write a scene's equations as C, WebAssembly or Python",
     "certify": "equations that a scene's graphs must fulfil, and agreement with peers; status 1 if any fails",
