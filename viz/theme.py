@@ -71,8 +71,8 @@ ROLES = {
 }
 MOTION_WORDS = {  # what roles are in equations of motion that are solved, of accelerations or momenta
     "primal": "primal: as written, or stated by bodies",
-    "adjoint": "adjoint: slopes of L, elimination inwards",
-    "tangent": "tangent: solved, back out",
+    "adjoint": "adjoint: derivatives of L, elimination from the tips inwards",
+    "tangent": "tangent: accelerations, from the base outwards",
 }
 OUTPUT = Paint("output", WHITE, BLACK)
 COLLAPSED = Paint("collapsed part", tint(GRAY, 0.25), LINE)

@@ -111,7 +111,7 @@ class Node:
 
     def __float__(self) -> float:
         if self.value is None:
-            raise TypeError(f"{self!r} has no value before it is evaluated; evaluate it in a cg.Graph")
+            raise TypeError(f"{self!r} has no value before it is evaluated; for math.cos and the like there is cg.cos")
         return self.value
 
     def __copy__(self) -> Node:

@@ -158,7 +158,6 @@ def test_what_the_system_says_has_no_number(monkeypatch, capsys):
 @each_row(
     ("arguments", "said"),
     [
-        ("", ""),
         ("paint", ""),
         ("draw", ""),
         ("draw chain --out x.dot --formulation f", ""),
@@ -470,3 +469,33 @@ def test_a_disk_that_is_full_leaves_nothing_half(tmp_path, monkeypatch, capsys, 
     assert printed.out == ""
     assert "No space left on device" in printed.err
     assert not [*tmp_path.rglob("*")]
+
+
+def test_without_arguments_the_commands_are_listed(capsys):
+    with pytest.raises(SystemExit) as ended:
+        cli.main([])
+    assert ended.value.code == 0
+    shown = capsys.readouterr().out
+    assert [name for name in COMMANDS if f"\n    {name}" not in shown] == []
+
+
+@each_row("typed, meant", [("simulat", "'simulate'"), ("Draw", "'draw'"), ("xyzzy", "it has paper, bench")])
+def test_a_command_that_there_is_not_is_told_with_the_nearest(capsys, typed, meant):
+    with pytest.raises(SystemExit) as ended:
+        cli.main([typed])
+    assert ended.value.code == 2
+    assert f"there is no command '{typed}'" in (said := capsys.readouterr().err)
+    assert meant in said
+
+
+def test_a_page_opens_in_the_browser_once_it_is_written(tmp_path, monkeypatch):
+    browser, opened, page = tmp_path / "browser.py", tmp_path / "opened", tmp_path / "page.html"
+    browser.write_text(f"import sys, pathlib; pathlib.Path({str(opened)!r}).write_text(sys.argv[1])")
+    monkeypatch.setenv("BROWSER", f"{sys.executable} {browser} %s")
+    assert run("type", "--out", str(page), "--open").returncode == 0
+    assert opened.read_text() == page.resolve().as_uri()
+    monkeypatch.setenv("BROWSER", f"{tmp_path / 'nothing'} %s")
+    monkeypatch.setenv("PATH", str(tmp_path))
+    answer = run("type", "--out", str(page), "--open")
+    assert (answer.returncode, page.exists()) == (0, True)
+    assert "no browser was found" in answer.stderr

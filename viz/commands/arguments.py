@@ -7,6 +7,7 @@ import json
 import math
 import sys
 import warnings
+import webbrowser
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -48,7 +49,11 @@ def takes_a_scene(command: Command, default: str | None = None) -> None:
 
 def reads_files(command: argparse.ArgumentParser) -> None:
     """The arguments that say how a model file is read, `READING`."""
-    command.add_argument("--ignore", action="store_true", help="leave out what of a model file cannot be modeled")
+    command.add_argument(
+        "--ignore",
+        action="store_true",
+        help="leave out the elements of a model file that cgraph cannot model, and name them",
+    )
     command.add_argument("--floating", action="store_true", help="let the root link of a URDF file move freely")
 
 
@@ -73,10 +78,28 @@ def unless_json(options: argparse.Namespace, data: object, text: object) -> str:
     return json.dumps(data, indent=1) if options.json else str(text)
 
 
-def answer(text: str, files: Mapping[Path, str | bytes] | None = None, *, folder: Path | None = None) -> None:
+def writes_a_page(command: argparse.ArgumentParser) -> None:
+    """The arguments `--out` and `--open`; `answer_page` writes and opens."""
+    command.add_argument("--out", type=Path, required=True, help="file to write: .html")
+    may_open(command)
+
+
+def may_open(command: argparse.ArgumentParser) -> None:
+    """The argument `--open`, which shows a page."""
+    command.add_argument("--open", action="store_true", help="open the page in the browser once it is written")
+
+
+def answer_page(options: argparse.Namespace, text: str, page: str) -> None:
+    """The end of a command that writes a page: its file, what it prints, and the browser if `--open` asks for it."""
+    answer(text, {options.out: page}, show=options.out if options.open else None)
+
+
+def answer(
+    text: str, files: Mapping[Path, str | bytes] | None = None, *, folder: Path | None = None, show: Path | None = None
+) -> None:
     """The end of a command: its files, all or none, and what it prints. No signal comes in between.
 
-    folder: made for the files where it is missing.
+    folder: made for the files where it is missing.  show: the page to open in the browser.
     """
     settled()
     places = {} if folder is None else {folder: None} | {path.parent: None for path in files or {}}
@@ -92,6 +115,8 @@ def answer(text: str, files: Mapping[Path, str | bytes] | None = None, *, folder
         raise
     if text:
         print(text)
+    if show is not None and not webbrowser.open(show.resolve().as_uri()):
+        say(f"warning: no browser was found that opens {show}")
 
 
 @contextmanager

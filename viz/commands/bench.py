@@ -49,7 +49,7 @@ def add(parser: Command) -> None:
     )
     parser.add_argument("--json", action="store_true", help="print as JSON")
     for name, about in NUMBERS.items():
-        parser.add_argument(f"--{name}", type=whole, metavar="N", help=f"of a figure: {about}")
+        parser.add_argument(f"--{name}", type=whole, metavar="N", help=f"{about}, for the figures that take it")
     parser.set_defaults(run=run, words="what")
 
 

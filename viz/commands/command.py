@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Callable, Iterable, Sequence
 from importlib import import_module
 from typing import Any
 
 from cgraph import __version__
+from cgraph.extend import or_nearest
 
 
 class Command(argparse.ArgumentParser):
@@ -54,6 +56,7 @@ COMMANDS = {
     "bench": "our speed beside what is installed: CasADi, Pinocchio, MuJoCo, heyoka, JAX, SymPy, PyTorch",
     "report": "error beside run time of every integrator, ours and others', as pages",
     "scenes": "the scenes, with the size of their graphs",
+    "equations": "the Lagrangian, momenta and torques of a scene as formulas; status 1 for a wrong formulation",
     "draw": "draw the graph of a scene's equations (SVG, PNG or DOT) or list it (TXT)",
     "code": "write a scene's equations as C, WebAssembly or Python",
     "certify": "equations that a scene's graphs must fulfil, and agreement with peers; status 1 if any fails",
@@ -91,15 +94,20 @@ def complete() -> dict[str, Command]:
 
 
 def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
-    """The options that arguments stand for. Wrong ones end in SystemExit with status 2, after the usage.
+    """The options that arguments stand for; without any, the help. Wrong ones end in SystemExit with status 2.
 
     argparse takes the words of a list from one place; of those that an option parts (`a --quick b`) the rest follow.
     """
     whole, _ = parsers()
-    options, rest = whole.parse_known_args(arguments)
+    words = sys.argv[1:] if arguments is None else list(arguments)
+    if not words:
+        words = ["--help"]
+    elif not words[0].startswith("-") and words[0] not in COMMANDS:
+        whole.error(f"there is no command {words[0]!r}: {or_nearest(words[0], list(COMMANDS))}")
+    options, rest = whole.parse_known_args(words)
     if rest:
-        words = getattr(options, getattr(options, "words", ""), None)
-        if words is None or any([each.startswith("-") for each in rest]):
+        several = getattr(options, getattr(options, "words", ""), None)
+        if several is None or any([each.startswith("-") for each in rest]):
             whole.error(f"unrecognized arguments: {' '.join(rest)}")
-        words.extend(rest)
+        several.extend(rest)
     return options

@@ -3,12 +3,21 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 from cgraph import extend
 
 from . import library
-from .arguments import MOMENTUM_FORM, answer, positive, say, started, takes_a_scene, takes_a_start, unless_json
+from .arguments import (
+    MOMENTUM_FORM,
+    answer_page,
+    positive,
+    say,
+    started,
+    takes_a_scene,
+    takes_a_start,
+    unless_json,
+    writes_a_page,
+)
 from .command import Command
 
 LONGEST_MOTION = 1000.0  # s: seconds of work for an arm of ten links
@@ -17,7 +26,7 @@ LONGEST_MOTION = 1000.0  # s: seconds of work for an arm of ten links
 def add(parser: Command) -> None:
     """The command's arguments."""
     takes_a_scene(parser)
-    parser.add_argument("--out", type=Path, required=True, help="file to write: .html")
+    writes_a_page(parser)
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--forward", action="store_true", help="forward dynamics, in place of the three formulations")
     which.add_argument("--momentum", action="store_true", help=f"{MOMENTUM_FORM}, in place of them")
@@ -55,5 +64,5 @@ def run(options: argparse.Namespace) -> int:
     size = len(text.encode())
     counts = ", ".join(f"{name} {extend.counted(version['nodes'], 'node')}" for name, version in sizes.items())
     data = {"scene": scene.name, "bytes": size, "stopped": content.stopped, "versions": sizes}
-    answer(unless_json(options, data, f"{options.out}: {counts}; {size / 1e6:.2f} MB"), {options.out: text})
+    answer_page(options, unless_json(options, data, f"{options.out}: {counts}; {size / 1e6:.2f} MB"), text)
     return 1 if content.stopped else 0

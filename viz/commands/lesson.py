@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 from . import library
-from .arguments import answer, say, scene_of, takes_a_scene
+from .arguments import answer_page, say, scene_of, takes_a_scene, writes_a_page
 from .command import Command
 
 DEFAULT = "spring_mass"
@@ -15,7 +14,7 @@ DEFAULT = "spring_mass"
 def add(parser: Command) -> None:
     """The command's arguments."""
     takes_a_scene(parser, default=DEFAULT)
-    parser.add_argument("--out", type=Path, required=True, help="file to write: .html")
+    writes_a_page(parser)
     parser.set_defaults(run=run)
 
 
@@ -25,7 +24,8 @@ def run(options: argparse.Namespace) -> None:
     scene = scene_of(options)
     say(f"{scene.name}: deriving the equations and answers of {len(library.SCREENS)} screens")
     text = library.lesson(scene)
-    answer(
+    answer_page(
+        options,
         f"{options.out}: {len(library.SCREENS)} screens on {scene.name}; {len(text.encode()) / 1e3:.0f} kB",
-        {options.out: text},
+        text,
     )

@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from ..lessons.lesson import SCREENS, lesson
     from ..models.animate import animate, frames
     from ..models.driven_motion import driven
+    from ..models.equations import equation_graphs, equations_latex, equations_text
     from ..models.inspect import inspection_page
     from ..models.inspection import FRAMES, inspection
     from ..models.live import live_page

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 from . import library
-from .arguments import answer, say, started, takes_a_scene, takes_a_start
+from .arguments import answer_page, say, started, takes_a_scene, takes_a_start, writes_a_page
 from .command import Command
 
 
@@ -14,7 +13,7 @@ def add(parser: Command) -> None:
     """The command's arguments."""
     takes_a_scene(parser)
     takes_a_start(parser)
-    parser.add_argument("--out", type=Path, required=True, help="file to write: .html")
+    writes_a_page(parser)
     parser.set_defaults(run=run)
 
 
@@ -24,4 +23,4 @@ def run(options: argparse.Namespace) -> None:
     scene, _ = started(options)
     say(f"{scene.name}: deriving what moves and what is shown")
     text = library.live_page(scene)
-    answer(f"{options.out}: {len(text.encode()) / 1e3:.0f} kB", {options.out: text})
+    answer_page(options, f"{options.out}: {len(text.encode()) / 1e3:.0f} kB", text)

@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 
 from . import library
-from .arguments import answer, say
+from .arguments import answer, may_open, say
 from .command import Command
 
 
@@ -15,6 +15,7 @@ def add(parser: Command) -> None:
     """The command's arguments."""
     parser.add_argument("--out", type=Path, default=Path("paper"), help="folder to fill (default: paper)")
     parser.add_argument("--quick", action="store_true", help="times of fewer evaluations, and shorter chains")
+    may_open(parser)
     parser.add_argument("--json", action="store_true", help="print the figures as JSON on standard output")
     parser.set_defaults(run=run)
 
@@ -22,5 +23,6 @@ def add(parser: Command) -> None:
 def run(options: argparse.Namespace) -> None:
     """Write the folder."""
     files, data = library.paper(options.out, say, quick=options.quick)
-    page = f"All of it on one page: {options.out / 'index.html'}"
-    answer(json.dumps(data, indent=1) if options.json else page, files, folder=options.out)
+    page = options.out / "index.html"
+    said = json.dumps(data, indent=1) if options.json else f"All of it on one page: {page}"
+    answer(said, files, folder=options.out, show=page if options.open else None)

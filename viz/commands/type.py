@@ -6,13 +6,13 @@ import argparse
 from pathlib import Path
 
 from . import library
-from .arguments import answer
+from .arguments import answer_page, writes_a_page
 from .command import Command
 
 
 def add(parser: Command) -> None:
     """The command's arguments."""
-    parser.add_argument("--out", type=Path, required=True, help="file to write: .html")
+    writes_a_page(parser)
     parser.add_argument("--text", type=Path, metavar="FILE", help="what the box holds at first, by default an example")
     parser.set_defaults(run=run)
 
@@ -22,4 +22,4 @@ def run(options: argparse.Namespace) -> None:
     library.html_target("--out", options.out)
     text = None if options.text is None else options.text.read_text(encoding="utf-8")
     page = library.typed_page(text)
-    answer(f"{options.out}: a box for a Lagrangian; {len(page.encode()) / 1e6:.2f} MB", {options.out: page})
+    answer_page(options, f"{options.out}: a box for a Lagrangian; {len(page.encode()) / 1e6:.2f} MB", page)

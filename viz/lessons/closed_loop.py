@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from html import escape
 
+import numpy as np
+
 from cgraph import Node
 from dynamics import System, forward_dynamics, gravity_force
 
 from ..pages.document import Table
 from .subject import SHOWN, Screen, Subject, number
+
+ROUNDING = 1e-12  # of the largest weight: a force that is rounding
 
 
 def closed_loop(subject: Subject) -> Screen:
@@ -21,11 +25,14 @@ def closed_loop(subject: Subject) -> Screen:
     still = {f"qd{i}": 0.0 for i in range(subject.system.n)}
     free = subject.evaluate(free_graph, **still)
     answer = dict(zip(held_graph.outputs, subject.evaluate(held_graph, **still).tolist(), strict=True))
-    multipliers = [answer[name] for name in names]
+    weights = subject.evaluate(gravity_force(subject.system))
+    rounding = ROUNDING * float(np.abs(weights).max(initial=0.0))
+    multipliers = [answer[name] if abs(answer[name]) > rounding else 0.0 for name in names]
     first = multipliers[0]
     weight = f"<b>{escape(shown[0])}</b>"
-    static = 0.0 if own else float(subject.evaluate(gravity_force(subject.system))[-1])
+    static = 0.0 if own or abs(weights[-1]) <= rounding else float(weights[-1])
     choices, right = _choices(first, static)
+    many = subject.system.n > 1 and not own
     rows = [[joint, number(a), number(answer[f"qdd{i}"])]
             for i, (joint, a) in enumerate(zip(subject.joints[:SHOWN], free.tolist(), strict=False))]  # fmt: skip
     sliders = [] if own else subject.sliders()
@@ -43,19 +50,20 @@ def closed_loop(subject: Subject) -> Screen:
         3,
         ("<p>This system has constraints: rows z(q, q̇) that stay zero." if own else
          f"<p>We clamp <b>{escape(subject.joints[-1])}</b>: a row z = q̇ that stays zero, the simplest of all loops.") +
-        " Nobody knows beforehand with which force. So the force becomes an unknown, the <b>multiplier</b> λ, beside the "
+        " The force that does this is not known beforehand. So it becomes an unknown, the <b>multiplier</b> λ, beside the "
         "accelerations: M q̈ − Jᵀλ = τ − b and J q̈ = −J̇ q̇. As many equations as unknowns, one elimination.</p>",
-        f"At rest, let go, without motors: what does {weight} have to give at this very instant?",
+        f"The system is at rest, without motors, and is let go. How large is the force λ of {weight} at that instant?",
         choices,
         right,
-        f"<p>λ = {number(first)}: as much as it takes so that the row stays zero, no more. It does no work, for along what "
-        "is still allowed to move, J q̇ = 0.</p>"
+        f"<p>λ = {number(first)}: what it takes to keep the row at zero. It does no work, because J q̇ = 0 along every "
+        "motion that is still possible.</p>"
         + Table("Accelerations at rest", ["joint", "free", "held"], rows).html()
         + Table("Multipliers", ["row", "λ"], [[a, number(b)] for a, b in zip(shown, multipliers, strict=True)][:SHOWN]).html(),
-        "Find a place where the clamp has nothing to do. Is it where nothing moves at all?"
+        "Find a position where the clamp carries no load. Would the system stay at rest there without it?"
         if sliders else "Accelerations without and with the rows, at rest.",
         play,
-        f"λ = {number(first)}. Where others are free to swing, it differs from the torque that holds the same place still.",
+        f"λ = {number(first)}."
+        + (" While the other joints swing, it differs from the torque that holds the same place still." if many else ""),
     )  # fmt: skip
 
 

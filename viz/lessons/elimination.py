@@ -31,24 +31,31 @@ def elimination(subject: Subject) -> Screen:
         "Elimination from tip to base",
         4,
         f"<p>Accelerations come from M q̈ = τ − b. The entry M<sub>11</sub> = {number(locked)} is the inertia that "
-        f"<b>{first}</b> feels while all other joints are <em>locked</em>. Elimination takes one joint after the other "
-        f"out of the equations, <b>{tip}</b> first. What is left on the diagonal, the <b>pivot</b> of {first}, is the "
-        "inertia that it feels while all others swing <em>freely</em>.</p>",
-        f"How large is that pivot, beside {number(locked)} with all others locked?",
+        + (
+            f"<b>{first}</b> feels while all other joints are <em>locked</em>. Elimination takes one joint after the other "
+            f"out of the equations, <b>{tip}</b> first. What is left on the diagonal, the <b>pivot</b> of {first}, is the "
+            "inertia that it feels while all others swing <em>freely</em>.</p>"
+            if n > 1
+            else f"<b>{first}</b> feels. Elimination takes one joint after the other out of the equations, and what is left "
+            "on the diagonal is its <b>pivot</b>. Here there is one coordinate alone.</p>"
+        ),
+        f"How large is that pivot, beside M<sub>11</sub> = {number(locked)}?",
         ("as large", "smaller", "larger"),
         0 if same else 1,
         "<p>"
         + (
-            "<b>A.</b> Nothing that swings takes load off this joint here."
+            "<b>A.</b> There is no other joint that could give way."
+            if n == 1
+            else "<b>A.</b> No other joint gives way when this one is accelerated, at this state."
             if same
-            else "<b>B.</b> What swings gives way."
+            else "<b>B.</b> The joints that swing freely give way, and so less inertia is felt."
         )
         + " Each pivot is M<sub>ii</sub> less a square: D<sub>i</sub> = M<sub>ii</sub> − Σ<sub>k</sub> "
         "L<sub>ki</sub>² D<sub>k</sub>. From the tip to the base, a joint has to know the joints beyond it alone, as the "
         "articulated bodies of robotics do. cgraph does this on the graph of L itself: accelerations of this system "
         f"take {size} nodes.</p>"
         + Table("Inertia felt at a joint", ["joint", "all others locked", "pivot"], rows).html(),
-        "Take out joint after joint, from the tip. Orange: the pivot. Then bend the system and start again.",
+        "Take out joint after joint, from the tip. Orange: the pivot. Then move the joints and start again.",
         play if n <= 2 * SHOWN else None,
         f"The pivot is {number(free)}. A door with a second door hinged to it is easier to push than one with both in line "
         "and welded.",

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import warnings
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,10 +16,10 @@ from ..pages.document import Table
 from ..pages.operations import graph_data
 from .subject import Screen, Subject, number
 
-FACTORS = (2, 4, 16)
-STEPS, FINE = 100, 16  # of the coarse motion, and how many of the reference's there are in one
+FACTORS = (2, 4, 16)  # by which the error of a method of order 1, 2 or 4 shrinks
+STEPS, FINE = (100, 30, 10), 16  # of the coarse motion, and how many of the reference's there are in one
 LONGEST_MOTION, HALVINGS = 1.0, 20  # s, of the motion whose order is measured, and how often it is halved
-ROUNDING = 1e-13  # of some hundred steps: an error that says nothing about a method
+ROUNDING = 1e-12  # of the largest coordinate: an error that says nothing about a method
 SMALL = 1e-5  # of the largest coordinate: an error that has not grown beyond its order
 
 
@@ -31,13 +33,9 @@ def energy_and_step(subject: Subject) -> Screen:
     rate, total = state_equation(subject.system), energy(subject.system)
     forces = (*subject.system.damping, *subject.system.forces)
     braked = any([getattr(each, "value", each) != 0.0 for each in forces])
-    t_end, errors = _measured(subject)
-    told = (
-        f"Measured here: a factor of {number(errors[1] / errors[2])}."
-        if errors[2] > ROUNDING * max(1.0, float(np.abs(subject.q).max()))
-        else "This system moves so evenly that both are rounding."
-    )
-    rows = [[f"{t_end / (factor * STEPS):.3g}", number(error)] for factor, error in errors.items()]
+    measured = _measured(subject)
+    t_end, steps = measured.t_end, measured.steps
+    rows = [[f"{t_end / (factor * steps):.3g}", number(error)] for factor, error in measured.errors.items()]
     play = subject.play(
         "energy",
         {"rate": rate},
@@ -55,13 +53,11 @@ def energy_and_step(subject: Subject) -> Screen:
         "<p>Now the system moves on its own, step by step. Euler's method follows the slope at the start of a step; the "
         "classical Runge-Kutta method, rk4, weighs four slopes. Where nothing brakes, energy must stay what it is, so its "
         f"change is an error that everybody can see.{_BRAKED if braked else ''}</p>",
-        f"rk4 takes {STEPS} steps to t = {number(t_end)} s. We halve the step. The error of where "
+        f"rk4 takes {steps} steps to t = {number(t_end)} s. We halve the step. The error of where "
         "everything is then becomes smaller by a factor of about …",
-        tuple([str(factor) for factor in FACTORS]),
-        FACTORS.index(16),
-        "<p>The slopes of rk4 are weighed so that all terms of the error up to dt⁴ cancel. So half the step leaves about a "
-        f"sixteenth of the error, a tenth of the step a ten-thousandth. {told} "
-        "Euler's error is only halved.</p>"
+        (*map(str, FACTORS), "none of these"),
+        measured.answer,
+        f"<p>{measured.words} Euler's error is only halved.</p>"
         + Table("rk4: largest error of a coordinate", ["dt [s]", "at the end"], rows).html(),
         "Move the number of steps. Orange: Euler's energy over time; blue: that of rk4; dashed: that of rk4 with very small steps.",
         play,
@@ -69,20 +65,60 @@ def energy_and_step(subject: Subject) -> Screen:
     )
 
 
-def _measured(subject: Subject) -> tuple[float, dict[int, float]]:
-    """A time over which the coarse motion's error is small, so that its order shows; and errors {1: .., 2: ..}.
+class Measured(NamedTuple):
+    """Errors of rk4 at the end of a motion, {1: by `steps` steps, 2: by twice as many}, and what rounding makes of them."""
 
+    t_end: float
+    steps: int
+    errors: dict[int, float]
+    rounding: float
+
+    @property
+    def answer(self) -> int:
+        """The place of the measured factor among `FACTORS`; the one after the last where it is none of them."""
+        if self.errors[2] <= self.rounding:
+            return len(FACTORS)
+        powers = [abs(math.log2(self.errors[1] / self.errors[2] / factor)) for factor in FACTORS]
+        return powers.index(min(powers)) if min(powers) < 0.5 else len(FACTORS)
+
+    @property
+    def words(self) -> str:
+        """What is behind the answer."""
+        order = (
+            "The slopes of rk4 are weighed so that all terms of the error up to dt⁴ cancel. So half the step leaves about a "
+            "sixteenth of the error, a tenth of the step a ten-thousandth."
+        )
+        if self.errors[1] <= self.rounding:
+            return f"rk4 is exact for this motion: what is left is rounding. For most motions it is not. {order}"
+        if self.errors[2] <= self.rounding:
+            return f"At half the step nothing but rounding is left, so there is no factor to be measured. {order}"
+        factor = f"Measured here: a factor of {number(self.errors[1] / self.errors[2])}."
+        usual = FACTORS[self.answer] == 16 if self.answer < len(FACTORS) else False
+        return f"{order} {factor}" if usual else f"{factor} Where the rate is smooth one would expect 16. {order}"
+
+
+def _measured(subject: Subject) -> Measured:
+    """Errors of a motion and of steps for which the error has not grown beyond its order, nor drowned in rounding.
+
+    Where there is no such motion, the last one whose error is small.
     Raises RuntimeError for a motion that has none.
     """
-    t_end = min(subject.scene.t_end, LONGEST_MOTION)
+    t_end, last = min(subject.scene.t_end, LONGEST_MOTION), None
     for _ in range(HALVINGS):
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", SimulationWarning)  # that the error is large is what is looked for
-            exact, coarse, finer = (_end(subject, t_end, factor * STEPS) for factor in (FINE, 1, 2))
-        if exact is not None and coarse is not None and finer is not None:
+        for steps in STEPS:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", SimulationWarning)  # that the error is large is what is looked for
+                exact, coarse, finer = (_end(subject, t_end, factor * steps) for factor in (FINE, 1, 2))
+            if exact is None or coarse is None or finer is None:
+                continue
+            size = max(float(np.abs(exact).max()), float(np.abs(subject.q).max()))
             errors = {1: float(np.abs(coarse - exact).max()), 2: float(np.abs(finer - exact).max())}
-            if errors[1] <= SMALL * float(np.abs(exact).max()):
-                return t_end, errors
+            if errors[1] <= SMALL * size:
+                last = Measured(t_end, steps, errors, ROUNDING * size)
+                if errors[2] > last.rounding:
+                    return last
+        if last is not None:
+            return last
         t_end /= 2.0
     raise RuntimeError(f"{subject.scene.name} moves too fast for a lesson: rk4 misses it within {2.0 * t_end:g} s")
 

@@ -74,12 +74,12 @@ def _after_a_step(subject: Subject, wrong: Graph, dt: float) -> np.ndarray:
 
 def _story(subject: Subject) -> str:
     return (
-        "<p>The Lagrangian, motion minus what is stored:</p>"
+        "<p>The Lagrangian, kinetic minus potential energy:</p>"
         + equations(lagrangian_graph(subject.system), subject.names)
         + "<p>Lagrange's equation asks for the torque <b>τ = dp/dt − ∂L/∂q</b> with the momentum p = ∂L/∂q̇. Its first "
         "term dp/dt is the <b>inertial term</b>. But nothing in a graph of L is called “time”. So somebody writes into "
         "the graph what a simulation does, q̇ = q̈ dt + q̇<sub>old</sub> and <b>q = q̇ dt + q<sub>old</sub></b>, and "
-        "differentiates by dt. The books call that “by definition”.</p>"
+        "differentiates by dt. The paper calls that the differentiation “by definition”.</p>"
     )
 
 

@@ -37,8 +37,8 @@ def sweeps(subject: Subject) -> Screen:
         0,
         "<p><b>A.</b> Backward, every node hands its slope on to what it was made of, and what is used twice adds up. "
         "So one sweep arrives at all inputs at once. A second sweep, forward along (q̇, q̈), then gives all of dp/dt, "
-        f"without writing out one ∂p/∂q: the whole torque takes {whole} nodes so, and {literal} nodes with every "
-        "gradient written out. q and q̇ stayed two knobs: no dt, no earlier state.</p>",
+        f"and no ∂p/∂q is ever written out. The whole torque takes {whole} nodes; with every gradient written out it "
+        f"takes {literal}. q and q̇ stay two separate inputs: there is no dt and no earlier state.</p>",
         "Step through both sweeps: values come from top to bottom, slopes from bottom to top."
         + (f" Of {len(graph.nodes)} nodes the last {ROWS} are shown." if len(graph.nodes) > ROWS else ""),
         {"kind": "sweeps", "rows": _rows(subject, graph)},

@@ -42,8 +42,9 @@ def torque_parts(subject: Subject) -> Screen:
         "why-this-torque",
         "Why this torque?",
         3,
-        f"<p>The system moves: {state}. The torque at a joint, or the force where it slides, has three parts. One accelerates mass and vanishes with q̈. "
-        "One comes from the velocities alone: what turns is carried around a bend. One is there even at rest.</p>",
+        f"<p>The system moves: {state}. The torque at a joint, or the force where it slides, has three parts: "
+        "inertia, which vanishes with q̈; centrifugal and Coriolis terms, which vanish with q̇; and weight and springs, "
+        "which remain at rest.</p>",
         f"Which part is the largest at <b>{name}</b> in this state?",
         PARTS,
         int(sizes.argmax()),

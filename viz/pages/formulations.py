@@ -19,8 +19,8 @@ TITLES = {
 }
 COLORS = {TITLES[name]: color for name, color in theme.FORMULATIONS.items()}
 WHY_FEWER = (
-    "The torque counts fewer nodes as mistakes than its inertial term: −∂L/∂q stands in it by right, and what −∂L/∂q "
-    "needs is there by right, too. Besides, the momentum p is an output of the inertial term alone."
+    "The torque has fewer spurious nodes than its inertial term, because −∂L/∂q and all that it needs belong to the "
+    "torque anyway. Besides, the momentum p is an output of the inertial term alone."
 )
 
 

@@ -100,7 +100,7 @@ def embedding(links: Sequence[int] = LINKS) -> Part:
         Paragraph(
             "Kinetic only is exact for one joint, where K does not depend on q, and wrong for a real arm under this plain "
             "embedding. It is exact again if the momentum is taken before the relation is embedded. The paper calls its "
-            "kinetic-only method accurate on three links; its program is not public, so which of the two it is is not known."
+            "kinetic-only method accurate on three links. Its program is not public: it may have done either."
         ),
     ]
     data = {

@@ -1,0 +1,37 @@
+"""`cgraph equations`: the Lagrangian, the momenta and the torques of a scene as formulas, in text or LaTeX."""
+
+from __future__ import annotations
+
+import argparse
+
+from . import library
+from .arguments import FORMULATIONS, MOMENTUM_FORM, answer, counting, scene_of, takes_a_scene, verdict_of
+from .command import Command
+
+
+def add(parser: Command) -> None:
+    """The command's arguments."""
+    takes_a_scene(parser)
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument(
+        "--formulation", default="chain_rule", choices=FORMULATIONS, help="of the torque (default: chain_rule)"
+    )
+    which.add_argument("--momentum", action="store_true", help=f"{MOMENTUM_FORM}, in place of the torque")
+    parser.add_argument("--lines", type=counting, default=40, metavar="N", help="of each block, at most (default: 40)")
+    parser.add_argument("--latex", action="store_true", help="print as LaTeX")
+    parser.set_defaults(run=run, forward=False)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Print the equations, and of a formulation the verdict; 1 where it is not the torque of the chain rule."""
+    scene = scene_of(options)
+    graphs = library.equation_graphs(scene, formulation=options.formulation, momenta=options.momentum)
+    written = library.equations_latex if options.latex else library.equations_text
+    text = written(scene, graphs, options.lines)
+    verdict = verdict_of(options, scene)
+    differs = verdict is not None and verdict.differs
+    if differs:
+        remark = "\n".join([f"% {line}" if options.latex else line for line in str(verdict).splitlines()])
+        text = f"{text}\n\n{remark}"
+    answer(text)
+    return 1 if differs else 0
