@@ -50,6 +50,13 @@ def lanes_of(program: StepProgram, backend: str) -> Lanes | None:
     return None if code is None else Lanes(program, code)
 
 
+@kept_by_first
+def iterates(program: StepProgram) -> bool:
+    """Whether steps turn as often as numbers say, so that lanes wait for one another."""
+    kinds = FixedPoint if program.adaptive else FixedPoint | While  # what looks for a first step hardly ever turns
+    return any(isinstance(each, kinds) for each in program.steps.statements())
+
+
 def fits_lanes(program: StepProgram, options: RunOptions, count: int) -> bool:
     """Whether so many trajectories of a run without events go in lanes.
 
@@ -57,8 +64,7 @@ def fits_lanes(program: StepProgram, options: RunOptions, count: int) -> bool:
     for one another; with constraints, near whose flat positions a run is watched step by step; and tolerances below the
     rounding of a step, of which a warning tells. Equal steps whose error is estimated go side by side, all at once.
     """
-    kinds = FixedPoint if program.adaptive else FixedPoint | While  # what looks for a first step hardly ever turns
-    if count < FEW or any(isinstance(each, kinds) for each in program.steps.statements()):
+    if count < FEW or iterates(program):
         return False
     if not program.adaptive:
         return not options.estimated

@@ -30,8 +30,8 @@ from ..steps.equal_steps import EqualSteps, even_steps, step_count
 from ..steps.step_program import StepProgram, step_program
 from ..trajectory import SimulationWarning
 from .ensemble import Ensemble, EnsembleStats
-from .lanes import fits_lanes
-from .task import Chunk, Part, Task, iterates, not_begun
+from .lanes import fits_lanes, iterates
+from .task import Chunk, Part, Task, not_begun
 from .workers import Map, Workers, checked, finished
 
 VECTOR = 8  # lanes, or a multiple of them, of every processor: a chunk of trajectories side by side is whole vectors

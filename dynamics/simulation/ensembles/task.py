@@ -14,7 +14,7 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import Array, Call, FixedPoint, If, Runner, While, kept_by_first, runner
+from cgraph.extend import Array, Call, If, Runner, kept_by_first, runner
 
 from ..estimates.error_estimate import ErrorEstimates, Estimator
 from ..estimates.runs_beside import Course, States
@@ -35,7 +35,7 @@ from ..steps.stepping import (
     failed_step,
 )
 from .ensemble import RunTable
-from .lanes import ChosenInLanes, EqualInLanes, InLanes, lanes_of
+from .lanes import ChosenInLanes, EqualInLanes, InLanes, iterates, lanes_of
 
 WORK = 2**21  # nodes computed in a block: half a millisecond for each vector
 NUMBERS = 2**22  # in the rows of a block
@@ -106,11 +106,6 @@ def vector_code(program: StepProgram, backend: str) -> VectorCode:
         if each is not None:
             each.run_many(np.zeros((each.size, 0)), 0)  # the code for vectors is compiled at its first use
     return code
-
-
-def iterates(program: StepProgram) -> bool:
-    """Whether steps turn as often as numbers say, so that lanes wait for one another."""
-    return any(isinstance(each, While | FixedPoint) for each in program.steps.statements())
 
 
 _NONFINITE = cg.variable("nonfinite")
