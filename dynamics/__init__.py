@@ -72,8 +72,7 @@ if TYPE_CHECKING:
     from .simulation.gradients.sensitivities import Sensitivities, sensitivities
     from .simulation.motion_steps import MotionSteps
     from .simulation.outcome import MotionError
-    from .simulation.prepare import prepare
-    from .simulation.prepared_motion import MotionEnd, PreparedMotion
+    from .simulation.prepared_motion import MotionEnd, PreparedMotion, prepare
     from .simulation.sampled_controller import HeldForces, SampledController
     from .simulation.simulate import simulate
     from .simulation.trajectory import Crossings, SimulationWarning, Stats, Trajectory

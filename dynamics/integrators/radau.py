@@ -21,7 +21,7 @@ from .elementwise import combined, end_to_end, identity, stage_time, weighted
 from .jacobian_statements import jacobian_statements
 from .problem import Problem
 from .step import Step
-from .step_control import SCALE, measured, nonfinite, scale
+from .step_control import SCALE, count, measured, nonfinite, scale
 from .tableau import Row
 
 _R6 = math.sqrt(6.0)
@@ -71,10 +71,10 @@ def radau_step(problem: Problem) -> Step:
     z, w, f = (tuple([f"{name}{k}" for k in range(3)]) for name in ("Z", "W", "F"))
     powers = tuple([f"power{k + 1}" for k in range(3)])
     slopes, on_the_way = jacobian_statements(problem)
-    factor = [*_matrices(m), copied("h", "h_factored"), _once_more("factorizations", 2.0)]
+    factor = [*_matrices(m), copied("h", "h_factored"), count(2, "factorizations")]
     body: list[Statement] = [
         _renewed(),
-        If("renewed", (*slopes, _once_more("jacobians"))),
+        If("renewed", (*slopes, count(1, "jacobians"))),
         _sizes(problem),
         _factored(),
         If("factored", tuple(factor)),
@@ -103,12 +103,6 @@ def radau_step(problem: Problem) -> Step:
         estimate=4,
         dense=[combined(_POWERS, z, ("dense1", "dense2", "dense3"))],
     )
-
-
-def _once_more(name: str, more: float = 1.0) -> Call:
-    """A count in a register."""
-    done = cg.variable("done")
-    return Call(Graph([done], {"done": done + more}), (name,), (name,))
 
 
 def _nothing_kept() -> Call:

@@ -10,8 +10,9 @@ dense1, ..
 
 A run begins with `anew` at 1, and goes on to a trial once it is set out, see `simulation.steps.first_step`: registers
 that a step hands on to the next are 0 then. `search` is positive while a first step is looked for: a trial then is none
-of the run, and not `recorded`. `trials` counts those of the run, and `due` is 1 after one by which sizes that make up
-atol are to be looked at, if it is `sized` by them: after 32, and then after twice as many.
+of the run, and not `recorded`. `trials` counts those of the run, of whose steps `longest_made` is the longest; `due` is
+1 after one by which sizes that make up atol are to be looked at, if it is `sized` by them: after 32, and then after
+twice as many.
 
 Where a force jumps, steps can only shrink. `jump` is the share of the `longest` of the last steps in which it may be
 missed, 0 where the caller has given atol: what its mean rate would make in that time counts into the `scale` of a
@@ -49,7 +50,7 @@ def registers(problem: Problem) -> dict[str, int]:
     """What every program has."""
     names = "t h tried next max_step min_step end fresh rtol accepted status rejected error error_old"
     names += " evaluations at_limit t_old t_new jump longest leap still moved turned anew search trials due"
-    names += " sized seen row largest"
+    names += " sized seen row largest longest_made"
     m = problem.size
     states = dict.fromkeys(("x", "x_new", "x_old", "atol"), m)
     return {**states, "p": len(problem.parameters), **dict.fromkeys(names.split(), 1)}
@@ -89,18 +90,21 @@ def control(evaluations: int) -> Call:
     evaluations: of the rate in a trial.
     """
     names = "error t t_new end next max_step min_step rejected evaluations accepted search trials sized seen".split()
+    names += ["h", "longest_made"]
     error, t, t_new, end, wanted, max_step, min_step, rejected, done, before, *rest = inputs = cg.variables(names)
-    search, trials, sized, seen = rest
+    search, trials, sized, seen, h, made = rest
     arrives = cg.equal(t_new, end)
     able = cg.maximum(arrives, cg.minimum(wanted, max_step) > cg.maximum(min_step, RESOLUTION * abs(t)))
     accepted = able * (error <= 1.0)
+    row = cg.where(search, 0.0, accepted)
     outputs = {
         "accepted": accepted,
         "status": cg.where(accepted, cg.where(arrives, DONE, RUNNING), cg.where(able, RUNNING, TOO_SMALL)),
         "rejected": rejected + (1.0 - accepted),
         "evaluations": done + float(evaluations),
         "largest": cg.where(before, LARGEST, 1.0),  # no growth after a rejection
-        "row": cg.where(search, 0.0, accepted),
+        "row": row,
+        "longest_made": cg.where(row, cg.maximum(made, abs(h)), made),
         "trials": trials + 1.0,
         "due": sized * (trials + 1.0 >= seen),
     }
@@ -158,10 +162,9 @@ def _turn() -> Sum:
     return Sum(Graph([h, t, t_old, x, x_new, x_old], {"square": share * share}), names, "turned")
 
 
-def count(evaluations: int) -> Call:
-    """That many evaluations more."""
-    done = cg.variable("evaluations")
-    return Call(Graph([done], {"sum": done + float(evaluations)}), ("evaluations",), ("evaluations",))
+def count(more: int, register: str = "evaluations") -> Call:
+    """That many more in a register."""
+    return Call(function("done", sum=cg.variable("done") + float(more)), (register,), (register,))
 
 
 def first_pass(*statements: Statement) -> If:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+import warnings
 
 from cgraph.extend import Array, real_number
 
 from .outcome import MotionError
-from .steps.stepper import Stepper
+from .steps.stepping import NativeIntegration
+from .trajectory import SimulationWarning
 
 
 class MotionSteps:
@@ -37,25 +39,25 @@ class MotionSteps:
     1.0 [-0.077]
     """
 
-    def __init__(self, stepper: Stepper, x: Array, t0: float, t_end: float | None, nq: int) -> None:
-        self._stepper, self._nq, self._t_end = stepper, nq, None if t_end is None else float(t_end)
-        self._x, self._begun, self._direction = x, False, 0.0
-        stepper.begin(x, t0, t0 + 1.0 if t_end is None else t_end)
+    def __init__(self, run: NativeIntegration, x: Array, t0: float, t_end: float | None) -> None:
+        self._run, self._x, self._t_end = run, x, None if t_end is None else float(t_end)
+        self._begun, self._direction = False, 0.0
+        run.begin(x, t0, t0 + 1.0 if t_end is None else t_end)
 
     @property
     def t(self) -> float:
         """Where the motion is [s]."""
-        return self._stepper.t
+        return self._run.t
 
     @property
     def q(self) -> Array:
         """Coordinates, (nq,)."""
-        return self._stepper.state[: self._nq]
+        return self._run.q.copy()
 
     @property
     def qd(self) -> Array:
         """Velocities, (n,)."""
-        return self._stepper.state[self._nq :]
+        return self._run.qd.copy()
 
     def step(self) -> None:
         """One step more on the way to t_end.
@@ -71,7 +73,7 @@ class MotionSteps:
             where = "was started without one" if self._t_end is None else f"is there, at t = {self.t:g} s"
             raise ValueError(f"a step goes on to t_end, and the motion {where}: propagate_until(t) goes on to a time")
         self._go(self._t_end)
-        self._stepper.step()
+        self._run.step()
         self._judge()
 
     def propagate_until(self, t: float) -> None:
@@ -93,7 +95,7 @@ class MotionSteps:
         if t == self.t:
             return
         self._go(t)
-        self._stepper.until(t)
+        self._run.until(t)
         self._judge()
 
     def _go(self, t: float) -> None:
@@ -102,9 +104,12 @@ class MotionSteps:
         if self._direction * (t - self.t) < 0.0:
             raise ValueError(f"the motion is at t = {self.t:g} s and does not go back to t = {t:g} s: start it anew")
         if not self._begun:
-            self._stepper.begin(self._x, self.t, t if self._t_end is None else self._t_end)
+            self._run.begin(self._x, self.t, t if self._t_end is None else self._t_end)
             self._direction, self._begun = math.copysign(1.0, t - self.t), True
 
     def _judge(self) -> None:
-        if failed := self._stepper.failed:
-            raise MotionError(f"the motion {failed}")
+        for text in self._run.warnings:
+            warnings.warn(text, SimulationWarning, stacklevel=3)
+        self._run.warnings.clear()
+        if self._run.status:
+            raise MotionError(f"the motion {self._run.status}")

@@ -1,39 +1,97 @@
-"""Moving: what moves in the runs of a motion, its equations and events, with the numbers of its parameters."""
+"""Moving: what moves in the runs of a motion, its applied force, equations and events, with numbers of parameters."""
 
 from __future__ import annotations
 
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import Any, TypeAlias
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 import cgraph as cg
-from cgraph import Graph
-from cgraph.extend import Array
+from cgraph import Graph, Node
+from cgraph.extend import Array, kept_by_first
 
+from ..equations.state_equation import state_inputs
 from ..equations.states.initial_value import other_inputs, start_state
-from ..integrators import derive, force, in_form, total_energy
+from ..integrators import Problem, derive, force, in_form, quantity_inputs, total_energy
 from ..systems.arguments import parameter_value
-from ..systems.model import Model, as_equations
-from .applied_forces import Tau, with_applied
-from .events.event import Event
-from .events.event_program import EventProgram, event_program
+from ..systems.controller import with_closed_form
+from ..systems.model import Equations, Model, as_equations
+from .events.event import Event, EventProgram, event_program
 from .run_options import RunOptions
-from .steps.step_program import compile_steps, step_program
+from .sampled_controller import Hold, SampledController
 
-if TYPE_CHECKING:
-    from .steps.stepper import Stepper
+Constant: TypeAlias = float | Sequence[float]
+Tau: TypeAlias = Constant | Callable[..., Sequence[Node | float]] | SampledController
 
-FLOAT = np.dtype(np.float64)
+
+@dataclass(frozen=True)
+class Applied:
+    """The applied force of a run of a model, which has the forces of a controller in closed form.
+
+    constant: force besides.  nodes: tau, of the state, t, tau0, .. and parameters; None of a first-order system.
+    controller: a sampled one.
+    """
+
+    model: Equations
+    constant: Any
+    nodes: Sequence[Node] | None
+    controller: SampledController | None = None
+
+    def bound(self, numbers: Mapping[str, float]) -> dict[str, float]:
+        """The inputs of the state equation that are built into a run; of a sampled controller without tau0, .."""
+        varied = () if self.controller is None else state_inputs(self.model).applied
+        return {name: value for name, value in numbers.items() if name not in varied}
+
+    def hold(self, options: RunOptions, problem: Problem) -> Hold | None:
+        """The forces that a sampled controller is to hold along steps of a problem.
+
+        Raises ValueError for a run that it cannot control.
+        """
+        if self.controller is None:
+            return None
+        if options.scipy_solver is not None:
+            raise ValueError(f"method {options.method!r} does not end its steps with periods: take one of dyn.METHODS")
+        if options.direction < 0.0:
+            raise ValueError("a SampledController holds what it has seen, so that t_end has to be later than t0")
+        observed = None if problem.velocities is None else _compiled(problem.velocities, options.backend)
+        return Hold(self.controller, self.model.velocities, problem.nq, options.t0, observed)
+
+    def graph(self, problem: Problem) -> Graph:
+        """tau as a graph over the states, t and parameters of a problem of the model."""
+        assert self.nodes is not None
+        outputs = {f"tau{k}": node for k, node in enumerate(self.nodes)}
+        return problem.bind(problem.states, Graph(quantity_inputs(problem), outputs))
+
+
+@kept_by_first
+def _compiled(velocities: Graph, backend: str) -> cg.Compiled:
+    """The velocities of momenta, for a controller."""
+    return cg.compile(velocities, backend)
+
+
+def with_applied(model: Model, tau: Any, parameters: Mapping[str, Any] | None) -> tuple[Equations, Applied]:
+    """The system that moves, with a controller in closed form, and what is applied to it.
+
+    parameters: of the run; those that the model does not have are the controller's.
+    """
+    moving = as_equations(model)
+    if isinstance(tau, SampledController):
+        if moving.system is None:
+            raise TypeError("a controller gives forces, and none act on a system of first order")
+        return moving, Applied(moving, 0.0, moving.system.tau, tau)
+    moving, constant, forces = with_closed_form(moving, tau, parameters)
+    return moving, Applied(moving, constant, forces)
 
 
 class Moving:
     """What moves in the runs of a motion with these parameters: the equations, bound to numbers, and the events.
 
     varied: parameters whose values stay open.  p: values of the inputs of the problem that are not built in.
+    plain: whether any finite q and qd of the right shapes are a start as they are.
     """
 
     def __init__(
@@ -55,11 +113,8 @@ class Moving:
         self.problem = derive(self.model, self.applied.bound(built_in))
         self.stepped, self._varied = in_form(self.problem, form), bool(varied)
         self.events: EventProgram | None = event_program(self.stepped, events) if events else None
-        self.steppers = threading.local()
-        system, nq, m = self.model.system, self.problem.nq, self.problem.size
-        plain = self.problem.normalization is None and (system is None or not len(system.constraints))
-        self._nq = nq
-        self._shapes = ((nq,) if plain else None, None if system is None else (m - nq,))  # of q and qd
+        self.kept = threading.local()  # the run of each thread, one after another
+        self.plain = self.problem.normalization is None and self.problem.projection is None
 
     def values(self, parameters: Mapping[str, Any] | None) -> list[float]:
         """p with these values of parameters that are varied."""
@@ -72,13 +127,6 @@ class Moving:
         if given and self.model.system is not None:
             self.model.system.require_values(values)
         return [values[name] for name in self.problem.parameters]
-
-    def stepper(self, options: RunOptions) -> Stepper:
-        """A memory in which motions run."""
-        from .steps.stepper import stepper  # without it a trajectory is all that is asked for
-
-        program = step_program(self.stepped, options.integrator, dense=False)
-        return stepper(compile_steps(program, options.backend), options, [0.0] * len(self.problem.parameters))
 
     def start(self, q: ArrayLike, qd: ArrayLike | None, t0: float, p: Sequence[float]) -> Array:
         """The state (m,) of q and qd in which a run starts."""
@@ -98,20 +146,6 @@ class Moving:
     @cached_property
     def _graphs(self) -> RunGraphs:
         return RunGraphs(self, {})
-
-    def halves(self, x: Array) -> tuple[Array, Array]:
-        """q and qd of a state (m,)."""
-        return x[: self._nq], x[self._nq :]
-
-    def fits(self, q: ArrayLike, qd: ArrayLike | None) -> bool:
-        """Whether q and qd are arrays that need nothing but to be finite."""
-        shapes = self._shapes
-        return (
-            type(q) is np.ndarray
-            and q.dtype == FLOAT
-            and q.shape == shapes[0]
-            and (qd is shapes[1] or (type(qd) is np.ndarray and qd.dtype == FLOAT and qd.shape == shapes[1]))
-        )
 
 
 class RunGraphs(Mapping[str, Graph]):

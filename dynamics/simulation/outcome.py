@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-import math
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
 
 from cgraph.extend import Array, counted
 
-from .estimates.error_estimate import ErrorEstimate, RunEstimate
-from .run_options import RunOptions
+from .estimates.error_estimate import RunEstimate
+from .run_options import SMALL, TABLES, RunOptions, room
 from .steps.dense_output import StepBlock
 from .steps.stepping import Integration, StoppedError
 from .trajectory import Stats
@@ -48,7 +47,7 @@ class Recorder:
         self.times, self.direction = times, direction
         self.last, self._last_state = t0, x  # how far the run has come [s]
         at_start = int(times is None or times[0] == t0)
-        self._parts = [(np.full(at_start, t0), np.tile(x, (at_start, 1)))]  # times and states
+        self._parts = [(np.array([t0])[:at_start], np.array([x])[:at_start])]  # times and states
         self._next = at_start  # of `times`
         self.size = 0  # bytes
 
@@ -84,57 +83,73 @@ class Recorder:
 def outcome(
     run: Integration,
     x: Array,
-    recorder: Recorder,
     options: RunOptions,
-    blocks: Iterable[StepBlock] | None = None,
     again: Callable[[RunOptions], Integration] | None = None,
-) -> Stats:
-    """The statistics of a run from x (m,) to t_end, an event, a failure or Ctrl-C, with its rows in the recorder.
+    steps: list[StepBlock] | None = None,
+    report: Callable[[float], None] | None = None,
+) -> tuple[Stats, Recorder]:
+    """How a run from x (m,) to t_end, an event, a failure or Ctrl-C goes, and its rows.
 
-    blocks: those of the run, if somebody else is to see them.  again: the same run by other options, see `advise`.
+    again: the same run by other options, see `advise`.  steps: receives all steps, with their dense output.
+    report: is told how far the run is [s]; the rows then may fill the memory.
     """
-    begin, error, estimate = time.perf_counter(), None, RunEstimate(run, x, options)
+    recorder = Recorder(x, options.times, options.t0, options.direction)
+    begin, estimate = time.perf_counter(), RunEstimate(run, x, options)
+    error, at_end = None, None
+    doubts: tuple[str, ...] = ()
     try:
         with np.errstate(all="ignore"):
-            for block in run.blocks(x) if blocks is None else blocks:
+            for block in run.blocks(x) if report is None else _noted(run, x, recorder, options, steps, report):
                 recorder.add(block)
                 estimate.add(block)
-            error = None if run.status else estimate.result()
+            if not run.status:
+                error, at_end, doubts = estimate.result()
     except (KeyboardInterrupt, StoppedError):
         run.status = f"{INTERRUPTED} after t = {recorder.last:.6g} s"
     seconds = time.perf_counter() - begin - estimate.seconds
     advise(run, recorder.last, options, x, again)
-    counts = (run.steps, run.rejected, run.evaluations, run.largest, seconds)
-    of_matrices = (run.jacobians, run.factorizations, *run.prices)
-    return ended(options.method, counts, run.status, run.event, of_matrices, run.warnings, error)
-
-
-def ended(
-    method: str,
-    counts: tuple[int, int, int, float, float],
-    status: str,
-    event: str = "",
-    of_matrices: tuple[int, int, float, float] = (0, 0, 0.0, 0.0),
-    said: Sequence[str] = (),
-    error: ErrorEstimate | None = None,
-) -> Stats:
-    """How a run went.  counts: steps to seconds of `Stats`.  of_matrices: njev, nlu and their costs.
-
-    status, event: why it stopped early, or what ended it.  said: what speaks against it besides its error.
-    """
-    known = error if error is not None and not math.isnan(error.largest) else None  # else nothing could be compared
-    return Stats(
-        method,
-        *counts,
-        not status,
-        status or event or REACHED,
-        -1 if status else int(bool(event)),
-        *of_matrices[:2],
-        known and known.largest,
-        known and known.last,
-        (*said, known.warning) if known and known.warning else tuple(said),
-        *of_matrices[2:],
+    stats = Stats(
+        options.method,
+        run.steps,
+        run.rejected,
+        run.evaluations,
+        run.largest,
+        seconds,
+        not run.status,
+        run.status or run.event or REACHED,
+        -1 if run.status else int(bool(run.event)),
+        run.jacobians,
+        run.factorizations,
+        error,
+        at_end,
+        (*run.warnings, *doubts),
+        *run.prices,
     )
+    return stats, recorder
+
+
+def _noted(
+    run: Integration,
+    x: Array,
+    recorder: Recorder,
+    options: RunOptions,
+    steps: list[StepBlock] | None,
+    report: Callable[[float], None],
+) -> Iterator[StepBlock]:
+    """The blocks of a run, until rows and steps fill the memory."""
+    kept, most = 0, SMALL
+    for block in run.blocks(x):
+        if steps is not None:
+            steps.append(block if block.dense is not None else run.with_dense(block))
+            kept += steps[-1].nbytes
+        yield block if steps is None else steps[-1]
+        if recorder.size + kept > most:
+            most = room() / TABLES if most == SMALL else most
+            if recorder.size + kept > most:
+                last = f"{recorder.last:.6g} s"
+                run.status = f"stopped at t = {last}: the rows fill the memory; t_eval records fewer"
+                return
+        report(abs(float(block.t[-1]) - options.t0))
 
 
 def advise(

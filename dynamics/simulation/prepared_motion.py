@@ -1,36 +1,39 @@
-"""PreparedMotion: a model, a method and options fixed once, for motions from many starts, in stages."""
+"""Prepared motions: a model, a method and options fixed once, for motions from many starts; and how they are."""
 
 from __future__ import annotations
 
 import math
 import sys
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import Array
+from cgraph.extend import Array, require_choice, require_flag, require_sequence
 
-from ..systems.model import Model
-from .applied_forces import Tau
-from .events.event import Event
-from .moving import Moving
-from .outcome import INTERRUPTED, REACHED, MotionError, Recorder, outcome
+from ..equations.state_equation import FORMS
+from ..equations.states.initial_value import other_inputs
+from ..systems.model import Model, as_equations
+from .events.event import Event, as_events
+from .moving import Moving, Tau
+from .outcome import INTERRUPTED, REACHED, MotionError, outcome
 from .progress_bar import Progress
 from .row_values import converted, unreached_momenta
-from .run_options import SMALL, TABLES, RunOptions, room
+from .run_options import METHOD, RunOptions
+from .sampled_controller import SampledController
 from .steps.dense_output import StepBlock
 from .steps.integration import integration_of
-from .steps.stepping import Integration
-from .trajectory import SimulationWarning, Solution, Stats, Trajectory
+from .steps.stepping import NativeIntegration
+from .trajectory import SimulationWarning, Solution, Trajectory
 
 if TYPE_CHECKING:
     from .motion_steps import MotionSteps
-    from .steps.stepper import Stepper
 
+ANY = 1.0  # s: the span of options, in place of which each run has its own
 KEPT = 16  # sets of parameter values, whose equations a motion keeps
 
 
@@ -145,21 +148,22 @@ class PreparedMotion:
         array([0.367879])
         """
         moving = self._moving(parameters)
-        stepper = self._stepper(moving)
-        if stepper is None:
+        alone = self._alone(moving)
+        if alone is None:
             run = self._run(q, qd, self._options.over(t0, t_end, [t_end]), parameters)
             if not run.success:
                 raise MotionError(f"the motion did not reach t_end, {run.message}")
             return MotionEnd(float(run.t[-1]), run.q[-1], run.qd[-1])
         timely = type(t0) is float and type(t_end) is float and self._options.spans(t0, t_end)
         if self._varied:
-            stepper.set_parameters(moving.values(parameters))
-        if not (timely and moving.fits(q, qd) and stepper.begin_from(q, qd, t0, t_end)):  # see what is wrong
-            stepper.begin(self._start(moving, q, qd, t0, t_end, parameters), float(t0), float(t_end))
-        stepper.to_end()
-        if stepper.failed:
-            raise MotionError(f"the motion did not reach t_end, {stepper.failed}")
-        return MotionEnd(stepper.t, *moving.halves(stepper.state))
+            alone.set_parameters(moving.values(parameters))
+        plain = timely and moving.plain and type(q) is np.ndarray and (qd is None or type(qd) is np.ndarray)
+        if not (plain and alone.begins(q, qd, t0, t_end)):  # see what is wrong
+            alone.begin(self._start(moving, q, qd, t0, t_end, parameters), float(t0), float(t_end))
+        alone.to_end()
+        if alone.status:
+            raise MotionError(f"the motion did not reach t_end, {alone.status}")
+        return MotionEnd(float(t_end), alone.q.copy(), alone.qd.copy())
 
     def start(
         self,
@@ -211,9 +215,9 @@ class PreparedMotion:
                 'form="velocity": call the motion, which gives its rows'
             )
         x = self._start(moving, q, qd, t0, t0 + 1.0 if t_end is None else t_end, parameters)
-        stepper = moving.stepper(self._options)
-        stepper.set_parameters(moving.values(parameters))
-        return MotionSteps(stepper, x, float(t0), t_end, moving.stepped.nq)
+        run = self._native(moving)
+        run.set_parameters(moving.values(parameters))
+        return MotionSteps(run, x, float(t0), t_end)
 
     def _steps(self, moving: Moving) -> bool:
         """Whether its steps are ours alone, with nothing done between them."""
@@ -226,16 +230,22 @@ class PreparedMotion:
             or options.max_steps < math.inf
         )
 
-    def _stepper(self, moving: Moving) -> Stepper | None:
-        """That of this thread; None where an end needs more than steps."""
-        steppers = moving.steppers
+    def _native(self, moving: Moving) -> NativeIntegration:
+        """A memory in which motions run by steps alone."""
+        zeros = [0.0] * len(moving.problem.parameters)
+        run = integration_of(moving.stepped, self._options, zeros, events=None, between=False)
+        assert isinstance(run, NativeIntegration)
+        return run
+
+    def _alone(self, moving: Moving) -> NativeIntegration | None:
+        """The memory of this thread; None where an end needs more than steps."""
         try:
-            found: Stepper | None = steppers.found
+            found: NativeIntegration | None = moving.kept.run
         except AttributeError:
             options = self._options
             rounded = options.adaptive and self._steps(moving) and options.relative < options.integrator.finest
             plain = self._steps(moving) and not options.estimated and not rounded and moving.problem.projection is None
-            found = steppers.found = moving.stepper(options) if plain else None
+            found = moving.kept.run = self._native(moving) if plain else None
         return found
 
     def _start(
@@ -279,7 +289,11 @@ class PreparedMotion:
 
         # Integrate, noting rows and events
         steps: list[StepBlock] | None = [] if self._dense else None
-        stats, rows = _integrate(run, x, options, steps, made if hold is None else None)
+        with Progress("simulate", options.length, options.progress) as report:
+            stats, recorder = outcome(run, x, options, made if hold is None else None, steps, report)
+        if stats.message != REACHED:  # where it ended is its last row, also between the times of t_eval
+            recorder.add_last()
+        rows = recorder.table()
 
         # Put the result together
         if missed := unreached_momenta(stepped, *rows, values, start=(options.t0, start, x)):
@@ -304,6 +318,71 @@ class PreparedMotion:
         )
 
 
+def prepare(
+    model: Model,
+    method: str = METHOD,
+    *,
+    dt: float | None = None,
+    max_step: float | None = None,
+    rtol: float | None = None,
+    atol: ArrayLike | None = None,
+    events: Event | Iterable[Event] = (),
+    dense_output: bool = False,
+    tau: Tau = 0.0,
+    first_step: float | None = None,
+    max_steps: float = math.inf,
+    estimate_error: bool | None = None,
+    backend: str = "auto",
+    progress: bool | None = None,
+    form: str = "velocity",
+    varied: str | Iterable[str] = (),
+) -> PreparedMotion:
+    """A model, a method and its options, fixed once for many motions.
+
+    Parameters
+    ----------
+    model, method, dt, max_step, rtol, atol, events, dense_output, tau, first_step, max_steps
+        As of `simulate`, which is this and a call.
+    estimate_error, backend, progress, form
+        As of `simulate`, too.
+    varied : str or iterable of str
+        Parameters of the model or of a controller whose values stay open, so that those of a call cost nothing. Values
+        of others are built into the machine code, as `simulate` does, and other ones compile anew. Not with a
+        SampledController, nor SciPy's solvers.
+
+    Returns
+    -------
+    PreparedMotion
+        `motion(q, qd, t_end)` gives the trajectory of `simulate`, `motion.end(q, qd, t_end)` its end alone, at the
+        price of its steps and some microseconds, and `motion.start(q, qd)` the motion step by step.
+
+    Raises
+    ------
+    TypeError, ValueError
+        As `simulate`, for what is fixed here; what belongs to a start or to parameters is checked with these.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> motion = dyn.prepare(dyn.planar_arm([1.0, 0.8], [1.0, 0.8]), "dop853", rtol=1e-10)
+    >>> ends = [motion.end([angle, 0.0], [0.0, 0.0], t_end=0.5).q.round(3).tolist() for angle in (0.1, 0.2)]
+    >>> ends
+    [[0.005, 0.039], [0.011, 0.077]]
+    """
+    options = RunOptions(
+        ANY, method, dt, max_step, rtol, atol, None, first_step, max_steps, backend, progress, 0.0, estimate_error
+    )
+    equations = as_equations(model)
+    require_choice("form", form, FORMS)
+    if not (callable(tau) or isinstance(tau, float | SampledController)):
+        other_inputs(equations, tau)
+    names = require_sequence("varied", [varied] if isinstance(varied, str) else varied, "names of parameters", str)
+    if names and (isinstance(tau, SampledController) or options.scipy_solver is not None):
+        raise ValueError(f"varied = {names} needs one of dyn.METHODS, and no SampledController, which holds its forces")
+    dense_output = require_flag("dense_output", dense_output)
+    return PreparedMotion(model, options, tau, as_events(events), form, dense_output, names)
+
+
 def _level_of_caller() -> int:
     """Where in the stack, above who asks, these files were called from."""
     level, frame = 1, sys._getframe(1)
@@ -318,38 +397,3 @@ def _key(parameters: Mapping[str, Any]) -> Any:
         return tuple([(name, type(value), float(value).hex()) for name, value in parameters.items()])
     except (TypeError, ValueError, OverflowError, AttributeError):
         return object()
-
-
-def _integrate(
-    run: Integration,
-    x: Array,
-    options: RunOptions,
-    steps: list[StepBlock] | None,
-    again: Callable[[RunOptions], Integration] | None,
-) -> tuple[Stats, tuple[Array, Array]]:
-    """How a run from x goes, and its rows, times and states.  steps: see `_noted`.  again: see `outcome`."""
-    recorder = Recorder(x, options.times, options.t0, options.direction)
-    stats = outcome(run, x, recorder, options, _noted(run, x, recorder, options, steps), again)
-    if stats.message != REACHED:  # where it ended is its last row, also between the times of t_eval
-        recorder.add_last()
-    return stats, recorder.table()
-
-
-def _noted(
-    run: Integration, x: Array, recorder: Recorder, options: RunOptions, steps: list[StepBlock] | None
-) -> Iterator[StepBlock]:
-    """The blocks of a run, until rows and steps fill the memory.  steps: receives them, with their dense output."""
-    kept, most = 0, SMALL
-    with Progress("simulate", options.length, options.progress) as report:
-        for block in run.blocks(x):
-            if steps is not None:
-                steps.append(block if block.dense is not None else run.with_dense(block))
-                kept += steps[-1].nbytes
-            yield block if steps is None else steps[-1]
-            if recorder.size + kept > most:
-                most = room() / TABLES if most == SMALL else most
-                if recorder.size + kept > most:
-                    last = f"{recorder.last:.6g} s"
-                    run.status = f"stopped at t = {last}: the rows fill the memory; t_eval records fewer"
-                    return
-            report(abs(float(block.t[-1]) - options.t0))

@@ -102,8 +102,8 @@ class RunOptions:
 
     def spans(self, t0: float, t_end: float) -> bool:
         """Whether a run may go from t0 to t_end."""
-        least = 0.0 if self.adaptive else RESOLUTION * max(abs(t0), abs(t_end))
-        return math.isfinite(t_end - t0) and t0 != t_end and self.step >= least
+        moves = self.adaptive or self.step >= RESOLUTION * max(abs(t0), abs(t_end))
+        return moves and t0 != t_end and math.isfinite(t_end - t0)
 
     def _check_tolerances(self) -> None:
         rtol, atol = real_number("rtol", self.relative), np.asarray(self.absolute)
@@ -221,12 +221,7 @@ class RunOptions:
         if self.adaptive or self.t_eval is not None:
             return
         steps = step_count(self.t_end - self.t0, self.step)
-        size = 8 * TABLES * steps * m
-        if size > SMALL and size > (free := room()):
-            raise MemoryError(
-                f"{steps} steps of {m} numbers take {size / 2**30:.3g} GiB, and {free / 2**30:.3g} GiB are "
-                "free: record fewer times (t_eval)"
-            )
+        require_room(8 * TABLES * steps * m, f"{steps} steps of {m} numbers", "record fewer times (t_eval)")
 
 
 def span(t0: float, t_end: float, t_eval: ArrayLike | None) -> dict[str, Any]:
@@ -263,6 +258,12 @@ def time_span(t_end: float | None, t0: float, t_span: ArrayLike | None) -> tuple
     if span.shape != (2,):
         raise ValueError(f"t_span must be two times, (t0, t_end), got shape {span.shape}")
     return float(span[0]), float(span[1])
+
+
+def require_room(size: float, what: str, instead: str) -> None:
+    """Raises MemoryError where results of so many bytes would not fit, with what to do instead."""
+    if size > SMALL and size > (free := room()):
+        raise MemoryError(f"{what} take {size / 2**30:.3g} GiB, and {free / 2**30:.3g} GiB are free: {instead}")
 
 
 def room() -> float:

@@ -8,9 +8,9 @@ from collections.abc import Iterable, Mapping
 from numpy.typing import ArrayLike
 
 from ..systems.model import Model
-from .applied_forces import Tau
 from .events.event import Event
-from .prepare import prepare
+from .moving import Tau
+from .prepared_motion import prepare
 from .run_options import METHOD, time_span
 from .trajectory import Trajectory
 

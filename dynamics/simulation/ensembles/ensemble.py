@@ -86,6 +86,12 @@ class RunTable:
             column[k] = getattr(stats, name)
         self.messages[k], self.warnings[k] = stats.message, stats.warnings
 
+    def stopped(self, k: int, message: str, **columns: float) -> None:
+        """Row k, of a run that stopped early."""
+        for name, value in columns.items():
+            self.columns[name][k] = value
+        self.messages[k] = message
+
     def reached(self, which: Counts, **columns: Any) -> None:
         """The rows `which`, of runs that reached their end."""
         for name, values in {**columns, "success": True, "status": 0}.items():

@@ -6,27 +6,27 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import Array, Call, FixedPoint, LaneCode, While, runner
+from cgraph.extend import Array, Call, FixedPoint, LaneCode, While, kept_by_first, runner
 
 from ...integrators.step_control import DONE
+from ..estimates.state_sizes import Flags
 from ..run_options import RunOptions
-from ..steps.chosen_steps import HELD, beginning
 from ..steps.dense_output import StepBlock
 from ..steps.equal_steps import EqualSteps
+from ..steps.first_step import TOLERANCE
+from ..steps.integration import HELD, beginning, over, tolerance
 from ..steps.step_program import StepProgram
-
-Flags = np.ndarray[Any, np.dtype[np.bool_]]
 
 FEW = 32  # trajectories: fewer are done one by one before the machine code of lanes is made
 PASSES = 64  # of the first block, before it is known how long one takes
-RESULTS = ("status", "t", "trials", "rejected", "evaluations", "at_limit", "lanes.largest")
+RESULTS = ("status", "t", "trials", "rejected", "evaluations", "at_limit", "longest_made")
 
 
 class Lanes(NamedTuple):
@@ -36,19 +36,25 @@ class Lanes(NamedTuple):
     code: LaneCode
 
 
+@kept_by_first
 def lanes_of(program: StepProgram, backend: str) -> Lanes | None:
     """The lanes of a program; None in Python, and where a statement has no vectors."""
     if not program.adaptive:  # sines are those of vectors, as beside an estimate of the error
         code = runner(program.steps, backend).lane_code("count", ("t", "evaluations", "nonfinite"), alike=False)
         return None if code is None else Lanes(program, code)
-    names = ("lanes.toward", "t", "h", "row", "lanes.largest")
-    toward, t, h, row, largest = inputs = cg.variables([f"{k}" for k in range(len(names))])
-    ends = {"clock": toward * t, "largest": cg.where(row, cg.maximum(largest, abs(h)), largest)}
-    kept = Call(Graph(inputs, ends), names, ("lanes.clock", "lanes.largest"))
-    lengths = {**program.steps.registers, **dict.fromkeys(("lanes.toward", "lanes.clock", "lanes.largest"), 1)}
-    steps = replace(program.steps, registers=lengths, body=[*program.steps.body, kept])
+    toward, t = inputs = cg.variables("toward t")
+    clock = Call(Graph(inputs, {"clock": toward * t}), ("lanes.toward", "t"), ("lanes.clock",))
+    lengths = {**program.steps.registers, "lanes.toward": 1, "lanes.clock": 1}
+    steps = replace(program.steps, registers=lengths, body=[*program.steps.body, clock])
     code = runner(steps, backend).lane_code("lanes.clock", RESULTS)
     return None if code is None else Lanes(program, code)
+
+
+@kept_by_first
+def iterates(program: StepProgram) -> bool:
+    """Whether steps turn as often as numbers say, so that lanes wait for one another."""
+    kinds = FixedPoint if program.adaptive else FixedPoint | While  # what looks for a first step hardly ever turns
+    return any(isinstance(each, kinds) for each in program.steps.statements())
 
 
 def fits_lanes(program: StepProgram, options: RunOptions, count: int) -> bool:
@@ -58,8 +64,7 @@ def fits_lanes(program: StepProgram, options: RunOptions, count: int) -> bool:
     for one another; with constraints, near whose flat positions a run is watched step by step; and tolerances below the
     rounding of a step, of which a warning tells. Equal steps whose error is estimated go side by side, all at once.
     """
-    kinds = FixedPoint if program.adaptive else FixedPoint | While  # what looks for a first step hardly ever turns
-    if count < FEW or any(isinstance(each, kinds) for each in program.steps.statements()):
+    if count < FEW or iterates(program):
         return False
     if not program.adaptive:
         return not options.estimated
@@ -171,9 +176,9 @@ class ChosenInLanes(InLanes):
 
     def __init__(self, lanes: Lanes, options: RunOptions, x: Array, p: Array) -> None:
         first = int(options.row_times[0] == options.t0)  # the first row that a step makes
-        start = beginning(options, max(options.relative, lanes.program.finest), options.t_end)
-        start |= {"x": x, "p": p, "lanes.toward": options.direction}
-        super().__init__(lanes, options, x, options.direction * options.row_times[first:], start)
+        start = beginning(options, max(options.relative, lanes.program.finest)) | over(options.t0, options.t_end)
+        states = {"x": x, "p": p, TOLERANCE: tolerance(options), "lanes.toward": options.direction}
+        super().__init__(lanes, options, x, options.direction * options.row_times[first:], start | states)
 
     def _left(self) -> float:
         return self.options.max_steps - float(self.read("trials")[self._which].max())
@@ -186,7 +191,7 @@ class ChosenInLanes(InLanes):
         return _both(self.read("status") == DONE, self.read("at_limit") < HELD)
 
     def _columns(self) -> dict[str, Array]:
-        rejected, longest = self.read("rejected"), np.minimum(self.read("lanes.largest"), self.options.longest_step)
+        rejected, longest = self.read("rejected"), np.minimum(self.read("longest_made"), self.options.longest_step)
         steps = self.read("trials") - rejected
         return {"steps": steps, "rejected": rejected, "nfev": self.read("evaluations"), "dt": longest}
 

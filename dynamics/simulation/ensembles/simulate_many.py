@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import pickle
 import time
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -19,27 +18,27 @@ from cgraph.extend import Array, require_whole
 from ...equations.states.initial_value import InitialValues, initial_values
 from ...integrators import METHODS, Problem, derive, in_form
 from ...systems.model import Model
-from ..applied_forces import with_applied
-from ..events.event import Event, as_events
+from ..events.event import Event, EventProgram, as_events, event_program
 from ..events.event_log import split_crossings
-from ..events.event_program import EventProgram, event_program
+from ..moving import with_applied
 from ..outcome import INTERRUPTED
 from ..progress_bar import Progress
 from ..row_values import converted, unreached_momenta
-from ..run_options import METHOD, SMALL, RunOptions, room, time_span
+from ..run_options import METHOD, RunOptions, require_room, time_span
 from ..sampled_controller import SampledController
 from ..steps.equal_steps import EqualSteps, even_steps, step_count
-from ..steps.step_program import StepProgram, pickled_steps, step_program
+from ..steps.step_program import StepProgram, step_program
 from ..trajectory import SimulationWarning
 from .ensemble import Ensemble, EnsembleStats
-from .lanes import fits_lanes
-from .task import Chunk, Part, Task, iterates, not_begun
+from .lanes import fits_lanes, iterates
+from .task import Chunk, Part, Task, not_begun
 from .workers import Map, Workers, checked, finished
 
 VECTOR = 8  # lanes, or a multiple of them, of every processor: a chunk of trajectories side by side is whole vectors
 LARGEST = 256  # trajectories in a chunk, unless asked for
 LONGEST = 4096  # of those in lanes, of which a chunk's rows of steps have no more than ..
 NUMBERS = 2**22  # .. so many numbers
+SHORT = 2**20  # equal steps of all trajectories, which take some hundredths of a second: a chunk for each worker
 SHARES = 4  # chunks for each worker, so that workers of unlike speed finish together
 UNKNOWN = 16  # workers behind a map, which does not say
 
@@ -138,8 +137,7 @@ def simulate_many(
     model, applied = with_applied(model, tau, parameters)
     start = initial_values(model, q, qd, applied.constant, parameters, t0)
     options.check(start.states)
-    count = _row_count(options)
-    _check_room(start.x, count)
+    count = _row_count(options, *start.x.shape)
 
     # Derive the equations as graphs, and write the steps of the method over them
     begin = time.perf_counter()
@@ -150,9 +148,9 @@ def simulate_many(
     # Share out the work: what a worker is sent, and the starts of chunks of trajectories
     grids, lanes = ([], False) if watched else _side_by_side(program, options, len(start.x))
     sent = replace(options, t_eval=options.row_times) if watched else options
-    task = Task(pickled_steps(program), sent, count, tuple(grids), pickle.dumps(watch) if watched else b"", lanes)
+    task = Task(program, sent, count, tuple(grids), watch if watched else None, lanes)
     x, p = _stepped(problem, start, t0)
-    chunks = _chunks(x, p, chunk, team, count * program.steps.width if lanes else 0, whole=bool(grids))
+    chunks = _chunks(x, p, chunk, team, count * program.steps.width if lanes else 0, grids)
 
     # Integrate, by whoever takes the chunks and compiles the steps
     whole = not_begun(0, np.empty((len(x), count, problem.size)), events=bool(watched))
@@ -171,16 +169,21 @@ def _stepped(problem: Problem, start: InitialValues, t0: float) -> tuple[Array, 
     return converted(problem.momentum, t0, start.x, p), p
 
 
-def _row_count(options: RunOptions) -> int:
-    """Rows of a trajectory, T. Raises ValueError where trajectories would not have the same."""
-    if options.times is not None:
-        return len(options.times)
-    if options.adaptive:
+def _row_count(options: RunOptions, many: int, m: int) -> int:
+    """Rows of a trajectory, T, of so many of m numbers.
+
+    Raises ValueError where trajectories would not have the same, MemoryError where all would not fit.
+    """
+    if options.times is None and options.adaptive:
         raise ValueError(
             f"{options.method!r} chooses the steps of each trajectory: t_eval must say which times to record, "
             "or method='rk4' make equal steps"
         )
-    return step_count(options.t_end - options.t0, options.step) + 1
+    times, length = options.times, options.t_end - options.t0
+    count = step_count(length, options.step) + 1 if times is None else len(times)
+    what = f"{many} trajectories of {count} rows of {m} numbers"
+    require_room(8 * many * count * m, what, "record fewer times (t_eval) or simulate fewer at once")
+    return count
 
 
 def _ensemble(
@@ -236,16 +239,6 @@ def _check(method: str, chunk: int | None, tau: object) -> None:
         )
 
 
-def _check_room(x: Array, rows: int) -> None:
-    """Raises MemoryError where so many rows for every start (N, m) would not fit."""
-    size = 8 * len(x) * rows * x.shape[1]
-    if size > SMALL and size > (free := room()):
-        raise MemoryError(
-            f"{len(x)} trajectories of {rows} rows of {x.shape[1]} numbers take {size / 2**30:.3g} GiB, and "
-            f"{free / 2**30:.3g} GiB are free: record fewer times (t_eval) or simulate fewer at once"
-        )
-
-
 def _side_by_side(program: StepProgram, options: RunOptions, count: int) -> tuple[list[EqualSteps], bool]:
     """The equal steps of trajectories side by side, and whether they go in lanes; neither of what goes one by one."""
     grids = [] if program.adaptive else _grids(program, options, count)
@@ -262,18 +255,22 @@ def _grids(program: StepProgram, options: RunOptions, count: int) -> list[EqualS
     return grids if sum(grid.steps for grid in grids) <= options.max_steps else []
 
 
-def _chunks(x: Array, p: Array, chunk: int | None, workers: int | Map, rows: int, *, whole: bool) -> list[Chunk]:
+def _chunks(
+    x: Array, p: Array, chunk: int | None, workers: int | Map, rows: int, grids: Sequence[EqualSteps]
+) -> list[Chunk]:
     """The starts in chunks.
 
     rows: numbers in the rows of steps that a trajectory keeps in its lane, 0 where it is in none.
-    whole: of whole vectors, so that a trajectory has the same neighbors in any chunk.
+    grids: of trajectories side by side, whose chunks are of whole vectors, so that each has the same neighbors in any.
     """
     largest = min(LONGEST, max(VECTOR, NUMBERS // rows)) if rows else LARGEST
     if rows and chunk is not None:
         chunk = min(chunk, largest)
     if chunk is None:
-        chunk = min(largest, math.ceil(len(x) / (SHARES * (UNKNOWN if callable(workers) else workers))))
-    width = math.ceil(chunk / VECTOR) * VECTOR if whole else int(chunk)
+        short = rows and grids and len(x) * grids[0].steps <= SHORT
+        shares = 1 if short else SHARES
+        chunk = min(largest, math.ceil(len(x) / (shares * (UNKNOWN if callable(workers) else workers))))
+    width = math.ceil(chunk / VECTOR) * VECTOR if grids else int(chunk)
     return [Chunk(k, x[k : k + width], p[k : k + width]) for k in range(0, len(x), width)]
 
 

@@ -3,37 +3,43 @@
 from __future__ import annotations
 
 import math
-import pickle
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import Array, Call, FixedPoint, If, Runner, While, memo, runner
+from cgraph.extend import Array, Call, If, Runner, kept_by_first, runner
 
-from ..estimates.error_estimate import ErrorEstimate, Estimator
+from ..estimates.error_estimate import ErrorEstimates, Estimator
 from ..estimates.runs_beside import Course, States
+from ..events.event import EventProgram
 from ..events.event_log import Happening, WatchedIntegration
-from ..events.event_program import EventProgram
-from ..outcome import INTERRUPTED, Recorder, ended, outcome
+from ..outcome import INTERRUPTED, outcome
 from ..run_options import RunOptions
 from ..steps.equal_steps import EqualSteps, equal_steps
 from ..steps.integration import integration
-from ..steps.step_program import CompiledSteps, StepProgram, compile_steps
-from ..steps.stepping import BLOCK_TIME, NativeRun, StoppedError, begin_equal, failed_step
+from ..steps.step_program import StepProgram, compile_steps
+from ..steps.stepping import (
+    BLOCK_TIME,
+    Integration,
+    NativeIntegration,
+    NativeRun,
+    StoppedError,
+    begin_equal,
+    failed_step,
+)
 from .ensemble import RunTable
-from .lanes import ChosenInLanes, EqualInLanes, InLanes, Lanes, lanes_of
+from .lanes import ChosenInLanes, EqualInLanes, InLanes, iterates, lanes_of
 
 WORK = 2**21  # nodes computed in a block: half a millisecond for each vector
 NUMBERS = 2**22  # in the rows of a block
 SEEN = 4  # steps that one of the longest of runs beside stands for
-KEPT = 8  # programs that a process keeps ready
 MAKING = 0.5  # s; lanes take about so long to be made
 
 
@@ -82,6 +88,7 @@ class VectorCode(NamedTuple):
     stops: bool
 
 
+@kept_by_first
 def vector_code(program: StepProgram, backend: str) -> VectorCode:
     """The steps of a program, without its `stop`: lanes that go on do not stop for one that failed."""
     steps = replace(program.steps, stop=None)
@@ -99,11 +106,6 @@ def vector_code(program: StepProgram, backend: str) -> VectorCode:
         if each is not None:
             each.run_many(np.zeros((each.size, 0)), 0)  # the code for vectors is compiled at its first use
     return code
-
-
-def iterates(program: StepProgram) -> bool:
-    """Whether steps turn as often as numbers say, so that lanes wait for one another."""
-    return any(isinstance(each, While | FixedPoint) for each in program.steps.statements())
 
 
 _NONFINITE = cg.variable("nonfinite")
@@ -172,7 +174,7 @@ class VectorizedIntegration:
         self.estimator, self._seen = estimator, SEEN if even and estimator and not estimator.every else 1
         count, total = part.rows.shape[:2]
         self._memories = _start_memories(code, chunk.x, chunk.p)
-        self._live, self._method = np.ones(count, dtype=bool), options.method
+        self._live = np.ones(count, dtype=bool)
         self._good = np.full(count, total)  # rows that count
         self._done, self._longest, self._reached = 0, 0.0, options.t0  # steps; s, a step; s, the time of the last block
         self._at = int(options.times is None or options.times[0] == options.t0)  # row
@@ -214,20 +216,21 @@ class VectorizedIntegration:
         self._good[self._live] = self._at
         self.end(f"{INTERRUPTED} after t = {self._reached:.6g} s")
 
-    def end(self, status: str = "", errors: Sequence[ErrorEstimate] = ()) -> None:
+    def end(self, status: str = "", errors: ErrorEstimates | None = None) -> None:
         """Those that have not failed end, at their end or for a reason.  errors: of all, if they are estimated."""
-        evaluations, live = self.runner.read(self._memories, "evaluations")[0], np.flatnonzero(self._live)
-        if status or errors:
+        evaluations = self.runner.read(self._memories, "evaluations")[0]
+        live, runs = np.flatnonzero(self._live), self.part.runs
+        columns: dict[str, Any] = {}
+        if errors is not None:
+            columns = {"error": errors.largest[live], "error_at_end": errors.last[live]}
             for k in live.tolist():
-                self._note(k, self._done, int(evaluations[k]), status, errors[k] if errors else None)
-        else:
-            self.part.runs.reached(live, steps=self._done, nfev=evaluations[live], dt=self._longest)
+                runs.warnings[k] = tuple(filter(None, [errors.warnings[k]]))
+        for k in live.tolist() if status else ():
+            runs.stopped(k, status, steps=self._done, nfev=int(evaluations[k]), dt=self._longest)
+        if not status:
+            runs.reached(live, steps=self._done, nfev=evaluations[live], dt=self._longest, **columns)
         for k in np.flatnonzero(self._good < self.part.rows.shape[1]).tolist():
             self.part.rows[k, self._good[k] :] = np.nan
-
-    def _note(self, k: int, steps: int, evaluations: int, status: str, error: ErrorEstimate | None = None) -> None:
-        counts = (steps, 0, evaluations, self._longest, 0.0)
-        self.part.runs.set(k, ended(self._method, counts, status, error=error))
 
     def _fail(self, k: int, memory: Array, steps: int) -> int:
         """Note the step of a block of so many, begun with this memory, (size, 1), at which trajectory k failed.
@@ -246,7 +249,7 @@ class VectorizedIntegration:
         first, last = (read(each, "evaluations")[0, 0] for each in (begun, memory))
         evaluations = first + (done + 1) * (last - first) / (done + 1 if self.code.stops else steps)
         status = failed_step(self.program.components, times[done], before, states[done], int(singular))
-        self._note(k, self._done + done, int(evaluations), status)
+        self.part.runs.stopped(k, status, steps=self._done + done, nfev=int(evaluations), dt=self._longest)
         return done
 
 
@@ -254,11 +257,11 @@ class VectorizedIntegration:
 class Task:
     """The function that runs chunks. It goes to other processes as it is, and is compiled there once."""
 
-    pickled: bytes  # a StepProgram; that it is the same as another's is seen without reading it
+    program: StepProgram
     options: RunOptions
     count: int  # of the rows of a trajectory
     grids: tuple[EqualSteps, ...]  # of trajectories side by side; empty: one after another
-    events: bytes = b""  # an EventProgram; nothing without events
+    events: EventProgram | None = None
     lanes: bool = False  # whether trajectories go in lanes, where the program can
 
     def __call__(self, chunk: Chunk) -> Part:
@@ -270,7 +273,7 @@ class Task:
 
     def run(self, chunk: Chunk, rows: Array, stopped: Callable[[], bool]) -> Part:
         """Run the chunk into rows (k, T, m), to its end, or until soon after Ctrl-C or `stopped`: see the part."""
-        part = not_begun(chunk.first, rows, events=bool(self.events))
+        part = not_begun(chunk.first, rows, events=self.events is not None)
         with np.errstate(all="ignore"):
             done = 0 if self.grids or not self.lanes else self._before_lanes(chunk, part, stopped)
             if done == len(chunk.x) or (self.lanes and self._in_lanes(chunk, part, done, stopped)):
@@ -283,7 +286,7 @@ class Task:
 
     def _side_by_side(self, chunk: Chunk, part: Part, stopped: Callable[[], bool]) -> None:
         with _lock:
-            code = _vector_code(self.pickled, self.options.backend)
+            code = vector_code(self.program, self.options.backend)
         estimator = None
         if self.options.estimated:
             estimator = Estimator(code.program, self.options, chunk.p, partial(beside, code), sparse=True)
@@ -296,7 +299,7 @@ class Task:
                     if stopped():
                         raise StoppedError
                     run.advance(*block)
-            run.end(errors=estimator.estimates() if estimator else [])
+            run.end(errors=estimator.estimates() if estimator else None)
         except (KeyboardInterrupt, StoppedError):
             run.interrupt()
 
@@ -305,7 +308,7 @@ class Task:
 
         Of a few, or of short ones, that is all. The results are the same.
         """
-        alone, begin = _alone(self.pickled, self.options.backend), time.perf_counter()
+        alone, begin = _alone(self.program, self.options.backend), time.perf_counter()
         done = self._one_by_one(chunk, part, range(len(chunk.x)), stopped, MAKING - alone.seconds)
         alone.seconds += time.perf_counter() - begin
         return done
@@ -313,7 +316,7 @@ class Task:
     def _in_lanes(self, chunk: Chunk, part: Part, first: int, stopped: Callable[[], bool]) -> bool:
         """Whether that can be, from the first on: else nothing is done. Runs that end early are made again, alone."""
         with _lock:
-            lanes = _lanes(self.pickled, self.options.backend)
+            lanes = lanes_of(self.program, self.options.backend)
         if lanes is None:
             return False
         run: InLanes
@@ -342,8 +345,8 @@ class Task:
     ) -> int:
         """How many of these were run, or given up for Ctrl-C: no more once they took so long [s]."""
         with _lock:
-            compiled = _compiled(self.pickled, self.options.backend)
-        events = _event_program(self.events) if self.events else None
+            compiled = compile_steps(self.program, self.options.backend)
+        run: Integration | None = None
         whole, end, count = True, time.perf_counter() + seconds, 0
         for k in which:
             if whole and time.perf_counter() >= end:
@@ -352,10 +355,13 @@ class Task:
             if not whole:
                 part.rows[k] = np.nan
                 continue
-            x = chunk.x[k]
-            run = integration(NativeRun(compiled, self.options, chunk.p[k].tolist(), stopped), events=events)
-            recorder = Recorder(x, self.options.times, self.options.t0, self.options.direction)
-            part.runs.set(k, outcome(run, x, recorder, self.options))
+            x, p = chunk.x[k], chunk.p[k].tolist()
+            if isinstance(run, NativeIntegration):
+                run.set_parameters(p)
+            else:
+                run = integration(NativeRun(compiled, self.options, p, stopped), events=self.events)
+            stats, recorder = outcome(run, x, self.options)
+            part.runs.set(k, stats)
             if isinstance(run, WatchedIntegration):
                 part.happened[k] = run.log.happened
             states = recorder.table()[1]
@@ -370,30 +376,9 @@ class Alone:
     seconds = 0.0
 
 
-_lock = threading.Lock()  # threads that come at the same time wait for one to make the code
-
-
-@memo(KEPT)
-def _vector_code(pickled: bytes, backend: str) -> VectorCode:
-    return vector_code(pickle.loads(pickled), backend)  # noqa: S301  # it came with the task itself
-
-
-@memo(KEPT)
-def _compiled(pickled: bytes, backend: str) -> CompiledSteps:
-    return compile_steps(pickle.loads(pickled), backend)  # noqa: S301  # it came with the task itself
-
-
-@memo(KEPT)
-def _alone(pickled: bytes, backend: str) -> Alone:
+@kept_by_first
+def _alone(program: StepProgram, backend: str) -> Alone:
     return Alone()
 
 
-@memo(KEPT)
-def _lanes(pickled: bytes, backend: str) -> Lanes | None:
-    return lanes_of(pickle.loads(pickled), backend)  # noqa: S301  # it came with the task itself
-
-
-@memo(KEPT)
-def _event_program(pickled: bytes) -> EventProgram:
-    program: EventProgram = pickle.loads(pickled)  # noqa: S301  # it came with the task itself
-    return program
+_lock = threading.Lock()  # threads that come at the same time wait for one to make the code

@@ -35,12 +35,15 @@ TOGETHER = 512  # states that are compared at once
 UNKNOWN = "the error is unknown"
 
 
-class ErrorEstimate(NamedTuple):
-    """Of one run: the largest error and that at the end, relative to the sizes of components."""
+class ErrorEstimates(NamedTuple):
+    """Of k runs: the largest errors and those at the end, relative to the sizes of components, (k,); NaN if unknown.
 
-    largest: float
-    last: float
-    warning: str  # where more was asked for
+    warnings: where more was asked for, a sentence each, else empty.
+    """
+
+    largest: Array
+    last: Array
+    warnings: list[str]
 
 
 @dataclass
@@ -187,12 +190,12 @@ class Estimator:
             for difference in self._differences[self._beside.index(beside) :]:
                 difference.lose(beside.t)
 
-    def estimates(self) -> list[ErrorEstimate]:
+    def estimates(self) -> ErrorEstimates:
         """Of each run, and whether it is as good as it was asked to be; NaN where nothing could be compared."""
         self._compare()
-        first = self._differences[0]
+        first, count = self._differences[0], len(self._size)
         if not first.compared and np.isnan(first.lost).all():
-            return [ErrorEstimate(math.nan, math.nan, "")] * len(self._size)
+            return ErrorEstimates(np.full(count, math.nan), np.full(count, math.nan), [""] * count)
         scale = self.program.kinds.scale(self._size)
         least = UNIT * math.sqrt(self._steps)
         largest, last = (
@@ -206,9 +209,8 @@ class Estimator:
         largest[self._turning > resolved] = last[self._turning > resolved] = math.inf
         options = self.options
         allowed = options.absolute + options.relative * scale
-        result = []
-        for k in range(len(scale)):
-            said = ""
+        warnings = [""] * count
+        for k in np.flatnonzero(~(largest * scale <= allowed).all(axis=1) | ~np.isnan(first.lost)).tolist():
             if self._turning[k] > resolved:
                 said = (
                     f"{UNKNOWN}: a sine or cosine of the equations turns at {self._turning[k]:.3g} rad/s, and steps of "
@@ -219,8 +221,11 @@ class Estimator:
                 said = f"{UNKNOWN}: beside it a run of other steps stops, or takes another course, at {at}"
             else:
                 said = off_by(largest[k], scale[k], allowed[k], self.program.components)
-            result.append(ErrorEstimate(float(largest[k].max()), float(last[k].max()), said and self._sentence(said)))
-        return result
+            warnings[k] = (
+                f"{said}; rtol = {options.relative:g} allows less: take a dt shorter than {options.step:g} s, or "
+                "method='dop853', which chooses its steps"
+            )
+        return ErrorEstimates(largest.max(axis=1), last.max(axis=1), warnings)
 
     def _errors(self, changes: Sequence[Array]) -> Array:
         """Of each component, (k, m), from differences between the first run and the second, and that and the third.
@@ -237,13 +242,6 @@ class Estimator:
         measured = np.where(np.isfinite(measured), np.clip(measured, least, ratio), least)
         errors = np.where(first <= LAWLESS, first * share * (ratio - 1.0) / (measured - 1.0), first)
         return np.where(self._bent[:, None], first, errors)
-
-    def _sentence(self, what: str) -> str:
-        options = self.options
-        return (
-            f"{what}; rtol = {options.relative:g} allows less: take a dt shorter than {options.step:g} s, or "
-            "method='dop853', which chooses its steps"
-        )
 
 
 class RunEstimate:
@@ -287,12 +285,16 @@ class RunEstimate:
             self._estimator.restart(block.x_old[:1], segment.stretch, np.array([segment.parameters]))
         self._estimator.add(States(block.t, block.x[None], 0 if controlled else self._run.resets))
 
-    def result(self) -> ErrorEstimate | None:
-        """After the last step; None where there was none."""
+    def result(self) -> tuple[float | None, float | None, tuple[str, ...]]:
+        """After the last step: the largest error and that at the end, None if unknown, and what to say of them."""
+        if self._estimator is None:
+            return None, None, ()
         begin = time.perf_counter()
-        error = None if self._estimator is None else self._estimator.estimates()[0]
+        (largest,), (last,), (warning,) = self._estimator.estimates()
         self.seconds += time.perf_counter() - begin
-        return error
+        if math.isnan(largest):  # nothing could be compared
+            return None, None, ()
+        return float(largest), float(last), (warning,) if warning else ()
 
     def _beside(self, course: Course, x: Array, p: Array) -> Iterator[States]:
         """The states of a run on another course."""

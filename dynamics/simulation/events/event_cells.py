@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from cgraph.extend import Array
 
+from ..estimates.state_sizes import Flags
 from ..steps.dense_output import Indices, StepBlock
-from .event_program import WatchedEvent
-
-Flags = np.ndarray[Any, np.dtype[np.bool_]]
+from .event import WatchedEvent
 
 CELLS = 8  # of a step before the first split, so that it is looked at sixteen times at least
 NODES = 0.5 - 0.5 * np.cos(np.pi * np.arange(CELLS + 1) / CELLS)  # not evenly spaced: no oscillation hides between them

@@ -11,8 +11,9 @@ import numpy as np
 
 from cgraph.extend import Array
 
+from ..estimates.state_sizes import Flags
 from ..steps.dense_output import Indices
-from .event_cells import Cells, Flags, WatchedSteps, event_cells
+from .event_cells import Cells, WatchedSteps, event_cells
 
 PARTS, AT_ONCE = 32, 8192  # into which a cell is divided again and again, and those of all cells together
 WHILE = 2.0**-20  # of a step

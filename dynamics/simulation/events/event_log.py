@@ -14,15 +14,16 @@ from numpy.typing import ArrayLike
 from cgraph.extend import Array
 
 from ...integrators.step_control import RESOLUTION
+from ..estimates.state_sizes import Flags
 from ..row_values import converted
 from ..run_options import RunOptions
 from ..steps.dense_output import UNIT, StepBlock
 from ..steps.equal_steps import EqualSteps
 from ..steps.stepping import FixedStepIntegration, Integration
 from ..trajectory import Crossings
-from .event_cells import MOST_CELLS, Flags, WatchedSteps
+from .event import EventProgram
+from .event_cells import MOST_CELLS, WatchedSteps
 from .event_location import Crossing, Side, crossings
-from .event_program import EventProgram
 
 STEPS = 512  # looked at together
 ROUNDED = 3.0  # times a state, until it is read: at both ends of a step and between

@@ -17,8 +17,8 @@ from cgraph.extend import Array, Builder, kept_by_first, memo, topological
 from ...integrators import Problem, quantity
 from ...systems.model import Model
 from ...systems.system import System
-from ..applied_forces import Constant
 from ..events.event import Event, as_events
+from ..moving import Constant
 from ..trajectory import SimulationWarning
 from .doubts import doubts
 from .motion import START, TORQUE, VELOCITY, MotionRequest, motion_of

@@ -17,9 +17,8 @@ from ...equations.state_equation import state_inputs
 from ...equations.states.initial_value import initial_values
 from ...integrators import METHODS, Method, Problem, derive, in_form
 from ...systems.model import Model
-from ..applied_forces import with_applied
-from ..events.event import Event
-from ..events.event_program import event_program
+from ..events.event import Event, event_program
+from ..moving import with_applied
 from ..outcome import MotionError, Recorder, advise
 from ..row_values import converted, unreached_momenta
 from ..run_options import METHOD, RunOptions, time_span

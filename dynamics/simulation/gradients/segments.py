@@ -17,8 +17,7 @@ import cgraph as cg
 from cgraph import Graph
 from cgraph.extend import Array, kept_by_first
 
-from ..events.event import Event
-from ..events.event_program import WatchedEvent, event_program
+from ..events.event import Event, WatchedEvent, event_program
 from ..outcome import MotionError
 from ..row_values import values_of
 from .motion import TORQUE, MotionRequest, Segment

@@ -28,14 +28,13 @@ class FlatPosition:
 
     def __init__(self, program: StepProgram) -> None:
         self.rows, self.nq, self.components = program.rows, program.nq, program.components
-        self.lengths = np.array(program.kinds.lengths[self.nq :])
-        self.sizes, self.least = np.zeros(0), 0.0
-        self._mark, self._ends, self._far = (0, 0.0), np.zeros((0, 0)), False
+        self.lengths, self.least = program.kinds.lengths[self.nq :], 0.0
+        self._mark, self._far = (0, 0.0), False
 
     def begin(self, t: float, x: Array, parameters: Sequence[float]) -> None:
         """Compare with the start."""
         if self.rows is not None:
-            self.sizes = np.zeros(len(self.rows.outputs))
+            self.sizes, self._ends = np.zeros(len(self.rows.outputs)), np.zeros((0, 0))
             self.least, self._mark = self._singular(t, x, parameters)[0], (0, t)
 
     def look(self, rows: Array, way: float, parameters: Sequence[float]) -> list[str]:
@@ -90,7 +89,7 @@ class FlatPosition:
         """J, (m, n), from the rates of the rows, which are linear in the velocities."""
         assert self.rows is not None
         n = len(x) - self.nq
-        velocities = np.concatenate([np.diag(1.0 / self.lengths), np.zeros((n, 1))], axis=1)
+        velocities = np.concatenate([np.diag(1.0 / np.array(self.lengths)), np.zeros((n, 1))], axis=1)
         inputs = [*x[: self.nq].tolist(), *velocities, t, *parameters]
         values = values_of(self.rows, inputs, n + 1)
         return np.asarray(values[:, :-1] - values[:, -1:])

@@ -1,20 +1,227 @@
-"""The integration of a problem by a method, and of a compiled program of steps, equal or chosen ones."""
+"""Integration by steps chosen by error, what a user should know of the steps; and that of a problem by any method."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import TYPE_CHECKING
 
+import numpy as np
+from numpy.typing import ArrayLike
+
+from cgraph.extend import Array, Runner
+
 from ...integrators import Problem
+from ...integrators.step_control import DONE, RUNNING, SMALLEST_ATOL, TOO_SMALL
+from ..row_values import values_of
 from ..run_options import RunOptions
 from ..sampled_controller import Hold
-from .chosen_steps import AdaptiveIntegration
+from .dense_output import StepBlock
+from .first_step import TOLERANCE, given, instant
+from .flat_position import CREEP, FlatPosition
 from .step_program import compile_steps, step_program
-from .stepping import FixedStepIntegration, Integration, NativeRun
+from .stepping import FixedStepIntegration, Integration, NativeIntegration, NativeRun, nonfinite
 
 if TYPE_CHECKING:
-    from ..events.event_program import EventProgram
+    from ..events.event import EventProgram
+
+HELD, SHARE = 100, 0.25  # steps at the stability limit, of all, from which on a run is called stiff
+
+
+class AdaptiveIntegration(NativeIntegration):
+    """Steps chosen by the method, of which the last of a block may be recorded alone.
+
+    A run that goes on after an end has steps as if that had been none, but for the last.
+    """
+
+    def __init__(self, run: NativeRun, *, every_step: bool = True) -> None:
+        options, program = run.options, run.compiled.program
+        self.relative = max(options.relative, program.finest)
+        super().__init__(run, beginning(options, self.relative))
+        self.runner.write(self._start, TOLERANCE, tolerance(options))
+        self._tolerance, self.flat = self.runner.read(self._memory, TOLERANCE), FlatPosition(program)
+        self._recorded = every_step or options.relative < self.relative or self.flat.rows is not None  # to be looked at
+
+    def restart(self) -> None:
+        """Nothing of a run is done."""
+        super().restart()
+        self._below_rounding = False
+
+    def blocks(self, x: Array) -> Iterator[StepBlock]:
+        """The steps from x (m,) on, some at a time."""
+        options = self.options
+        self.restart()
+        self.begin(x, options.t0, options.t_end)
+        while True:
+            left = options.max_steps - self._number("trials")
+            if left <= 0:
+                self.status = self.too_many(self.t, options.max_steps) + self.flat.near(self.parameters)
+                return
+            absolute = self._tolerance.copy()
+            most = int(min(left, 2**31 if self.flat.rows is None else CREEP))
+            rows = self._advance(most)[0] if self._recorded else self._last(most)
+            status = self._number("status")
+            self._count()
+            if len(rows):
+                self._look(rows, absolute)
+                yield self._block(rows)
+            self.status = self.flat.creeping(status == RUNNING, self.steps, self.largest, rows, self.parameters)
+            if self.status:
+                return
+            self._judge()
+            if status == TOO_SMALL or (status == DONE and not self._next_period()):
+                return
+
+    def _last(self, most: int) -> Array:
+        """Some passes, at most so many: the row of the last step, if there is one."""
+        self._piece(most)
+        if self._number("longest_made") == 0.0:
+            return np.empty((0, 2 + len(self.x)))
+        return np.array([[self.t, self.t - self._number("t_old"), *self.x.tolist()]])
+
+    def _count(self, steps: int = 0) -> None:
+        self.rejected = int(self._number("rejected"))
+        self.steps = int(self._number("trials")) - self.rejected if self._number("longest_made") else 0
+        self.largest = min(self._number("longest_made"), self.options.longest_step)
+        super()._count(steps)
+
+    def _begin(self, t0: float, t_end: float) -> None:
+        numbers, at = self._numbers, self._at
+        numbers[at["t"]], numbers[at[END]] = self._t0, numbers[at[GOAL]] = t0, t_end
+        if self.control is not None:
+            numbers[at[GOAL]] = self._hold(self.control, t0, t_end)
+        if self.program.timed:
+            numbers[at[INSTANT]] = instant(t0, t_end)
+        if self.flat.rows is not None:
+            self.flat = FlatPosition(self.program)
+            self.flat.begin(t0, self.x, self.parameters)
+
+    def until(self, t: float) -> None:
+        """Steps to t, the last of which ends there."""
+        self._towards(t)
+        self.to_end()
+
+    def to_end(self) -> None:
+        """All steps."""
+        self._go()
+        if self._numbers[self._stop] != DONE or self.flat.rows is not None:
+            self._see()
+
+    def step(self) -> None:
+        """One step more on the way to t_end."""
+        numbers, row, status = self._numbers, self._at["row"], self._at["status"]
+        self._towards(numbers[self._at[END]])
+        self._go(1)
+        while numbers[row] <= 0.0 and numbers[status] == RUNNING:
+            self._go(1)
+        self._see()
+
+    def _towards(self, t: float) -> None:
+        self._numbers[self._at[GOAL if self._number("anew") else "end"]] = t
+        self._set(status=RUNNING)
+
+    def _see(self) -> None:
+        """What to say of unrecorded steps."""
+        if self.flat.rows is not None:
+            self._see_constraints(np.array([[self.t, self._number("h"), *self.x]]))
+        self._judge()
+
+    def _judge(self) -> None:
+        if self._numbers[self._stop] == TOO_SMALL:
+            self.status = self.too_small() + self.flat.near(self.parameters)
+
+    def _hold(self, control: Hold, t: float, t_end: float) -> float:
+        """Where the period of control from t on ends, for which its forces are taken."""
+        self.parameters = control.at(t, self.x)
+        self.runner.write(self._memory, "p", self.parameters)
+        return next(control.ends(t, t_end))
+
+    def _next_period(self) -> bool:
+        """Whether the run is not over yet; the memory is then at the start of the next period of a controller."""
+        if self.control is None or self.t == self.options.t_end:
+            return False
+        wanted = self._number("next")
+        wanted = wanted if math.isfinite(wanted) else self.options.length  # Taylor's method chooses it by itself
+        self._set(end=self._hold(self.control, self.t, self.options.t_end), next=wanted, fresh=1.0, status=RUNNING)
+        return True
+
+    def _block(self, rows: Array) -> StepBlock:
+        m = self.program.size
+        t, h, x = rows[:, 0], rows[:, 1], rows[:, 2 : 2 + m]
+        if not self.program.dense:
+            return StepBlock(t, x, t - h, h, np.full_like(x, math.nan), None)
+        t_old, x_old, dense = rows[:, 2 + m], rows[:, 3 + m : 3 + 2 * m], rows[:, 3 + 2 * m :]
+        return StepBlock(t, x, t_old, h, x_old, dense.reshape(len(t), -1, m), self.program.normalization)
+
+    def _look(self, rows: Array, absolute: Array) -> None:
+        """Note once what a user should know of these steps: stiffness, and tolerances below rounding."""
+        options, held = self.options, int(self._number("at_limit"))
+        if held >= HELD and held >= SHARE * self.steps and not self.stiff:
+            t, h = rows[-1, :2]
+            self.stiff = (
+                f"the system is stiff: at t = {t:.6g} s the step, {abs(h):.3g} s, is held at the stability limit of "
+                f"method {options.method!r}, not by its tolerance"
+            )
+            self.warnings.append(self.stiff)
+        if self.flat.rows is not None:
+            self._see_constraints(rows)
+        if options.relative < self.relative and not self._below_rounding:
+            size = np.abs(rows[:, 2 : 2 + self.program.size])
+            short = (absolute + options.relative * size < self.relative * size).any(axis=0)
+            if short.any():
+                self._below_rounding = True
+                self.warnings.append(
+                    f"rtol = {options.relative:g} with the atol of {self.components[int(np.argmax(short))]} is below "
+                    f"the rounding of a step: raised to {self.relative:.3g}"
+                )
+
+    def _see_constraints(self, rows: Array) -> None:
+        self.warnings += self.flat.look(rows, self._number("farthest"), self.parameters)
+
+    def too_small(self) -> str:
+        """Why a run stopped whose step became too small."""
+        t, x = self.t, self.x
+        where = f"stopped at t = {t:.6g} s: "
+        rate = values_of(self.program.rate, [*x.tolist(), t, *self.parameters])
+        if not np.isfinite(rate).all():
+            first = self.components[int(np.flatnonzero(~np.isfinite(rate))[0])]
+            return f"{where}the rate of {first} is not finite{' at the start' if t == self._t0 else ''}"
+        self.slope = _lacking(self.runner, self._memory, self.components)
+        if self.slope:
+            return f"{where}{self.slope} is not finite, and method {self.options.method!r} takes it"
+        if reason := nonfinite(self.components, self.runner.read(self._memory, "x_new")):
+            return f"{where}{reason}, however small"
+        scale = self._tolerance + self.relative * np.abs(x)
+        fastest = self.components[int(np.argmax(np.abs(rate) / scale))]
+        h = self._number("tried")
+        return f"{where}the step, {h:.3g} s, is below the resolution of the time; fastest is {fastest}"
+
+
+def beginning(options: RunOptions, relative: float) -> dict[str, float]:
+    """The registers of one number with which a run begins, besides its span."""
+    limits = {"relative": relative, "longest_step": options.longest_step, "first": options.first_step or 0.0}
+    return {"sized": float(options.atol is None), **given(limits)}
+
+
+def over(t0: float, t_end: float) -> dict[str, float]:
+    """The registers of a span."""
+    return {"t": t0, **given({"t_end": t_end, "goal": t_end, "instant": instant(t0, t_end)})}
+
+
+def tolerance(options: RunOptions) -> ArrayLike:
+    """Register `TOLERANCE` at the start."""
+    return np.maximum(options.absolute, SMALLEST_ATOL)
+
+
+def _lacking(runner: Runner, memory: Array, components: Sequence[str]) -> str:
+    """The first derivative of the rate that a method takes and that is not finite; empty if all are."""
+    lengths = runner.program.registers
+    for register, by in (("time_slope", ["the time"]), ("jacobian", components)):
+        if lengths.get(register) and len(bad := np.flatnonzero(~np.isfinite(runner.read(memory, register)))):
+            row, column = divmod(int(bad[0]), len(by))
+            return f"the derivative of the rate of {components[row]} by {by[column]}"
+    return ""
 
 
 def integration_of(
@@ -39,13 +246,14 @@ def integration_of(
 
 
 def integration(run: NativeRun, *, every_step: bool = False, events: EventProgram | None = None) -> Integration:
-    """A run, before its first step.  every_step: of equal steps, keep those between times of t_eval too."""
+    """A run, before its first step.  every_step: keep also those between times of t_eval."""
     options = run.options
+    every_step = every_step or options.times is None
     if events is not None:
         return _watched(lambda segment: integration(run._replace(options=segment), every_step=True), options, events)
     if run.compiled.program.adaptive:
-        return AdaptiveIntegration(run)
-    return FixedStepIntegration(run, every_step=every_step or options.times is None or options.estimated)
+        return AdaptiveIntegration(run, every_step=every_step or options.between)
+    return FixedStepIntegration(run, every_step=every_step or options.estimated)
 
 
 def _watched(segment: Callable[[RunOptions], Integration], options: RunOptions, events: EventProgram) -> Integration:
@@ -53,3 +261,6 @@ def _watched(segment: Callable[[RunOptions], Integration], options: RunOptions, 
     from ..events.event_log import WatchedIntegration
 
     return WatchedIntegration(segment, options, events)
+
+
+END, GOAL, INSTANT = [*over(0.0, 1.0)][1:4]  # names of registers

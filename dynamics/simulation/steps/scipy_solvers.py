@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -20,7 +21,7 @@ from ..estimates.state_sizes import StateKinds
 from ..run_options import SCIPY, RunOptions
 from .dense_output import StepBlock, normalized
 from .step_program import between, state_kinds
-from .stepping import BLOCK_TIME, Clock, Integration, nonfinite
+from .stepping import BLOCK_TIME, Integration, nonfinite
 
 IMPLICIT = ("Radau", "BDF", "LSODA")
 DEGREES = {"RK45": 4, "DOP853": 7, "Radau": 3, "BDF": 5, "LSODA": 12}  # at most, of the dense output
@@ -84,15 +85,15 @@ class ScipyIntegration(Integration):
         solver = self._started(x)
         self._largest = np.abs(x)
         rows: list[_Step] = []
-        clock = Clock()
+        begin = time.perf_counter()
         while solver is not None and solver.status == "running" and not self.status:
             if self.steps >= self.options.max_steps:
                 self.status = self.too_many(solver.t, self.options.max_steps)
             elif self._stepped(solver) and solver.t != solver.t_old:
                 rows.append(self._step(solver, rows[-1].x if rows else x))
-            if rows and clock.passed(BLOCK_TIME):
+            if rows and time.perf_counter() - begin >= BLOCK_TIME:
                 yield self._block(rows)
-                x, rows = rows[-1].x, []
+                x, rows, begin = rows[-1].x, [], time.perf_counter()
         if rows:
             yield self._block(rows)
 

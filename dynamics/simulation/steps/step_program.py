@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import pickle
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
+from typing import Any
+
+import numpy as np
 
 from cgraph import Graph
-from cgraph.extend import Call, Factor, If, Program, Runner, Statement, kept_by_first, runner
+from cgraph.extend import Call, Factor, If, Program, Runner, Statement, kept_by_first, memo, runner
 
 from ...integrators import Method, Problem
 from ...integrators.jacobian_statements import prices
@@ -15,6 +18,8 @@ from ...integrators.problem import constraint_rates
 from ...integrators.step_control import moved
 from ..estimates.state_sizes import StateKinds
 from .first_step import with_first_step
+
+KEPT = 8  # programs from elsewhere that a process keeps ready
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +45,9 @@ class StepProgram:
         """Numbers in a state."""
         return len(self.components)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _arrived, (_pickled(self),)
+
 
 @dataclass(frozen=True, eq=False)
 class CompiledSteps:
@@ -47,6 +55,13 @@ class CompiledSteps:
 
     program: StepProgram
     runner: Runner
+
+    @cached_property
+    def places(self) -> dict[str, int]:
+        """Where in a memory the registers of one number are."""
+        numbers = np.arange(float(self.runner.size))
+        single = [name for name, length in self.program.steps.registers.items() if length == 1]
+        return {name: int(self.runner.read(numbers, name)[0]) for name in single}
 
     @cached_property
     def factorizations(self) -> int:
@@ -135,9 +150,15 @@ def between(problem: Problem) -> Graph | None:
 
 
 @kept_by_first
-def pickled_steps(program: StepProgram) -> bytes:
+def _pickled(program: StepProgram) -> bytes:
     """The steps as other processes are sent them."""
-    return pickle.dumps(program)
+    return pickle.dumps([getattr(program, each.name) for each in fields(program)])
+
+
+@memo(KEPT)
+def _arrived(pickled: bytes) -> StepProgram:
+    """The steps in another process: what comes again is the same, with what is compiled of it."""
+    return StepProgram(*pickle.loads(pickled))  # noqa: S301  # it came with the task itself
 
 
 @kept_by_first

@@ -1,19 +1,21 @@
-"""Integrations: from a start to an end, a block of steps at a time; by equal steps."""
+"""Integrations: from a start to an end, a block of steps at a time or unrecorded; by equal steps."""
 
 from __future__ import annotations
 
 import math
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph.extend import Array, Runner
 
+from ...integrators.step_control import RUNNING
 from ..run_options import RunOptions
 from ..sampled_controller import Hold
 from ..trajectory import Crossings
@@ -30,21 +32,6 @@ class StoppedError(Exception):
     """Nobody waits for the rest of the run any more."""
 
 
-class Clock:
-    """A stopwatch for work that is done at most once in a while."""
-
-    def __init__(self) -> None:
-        self._last = time.perf_counter()
-
-    def passed(self, seconds: float) -> bool:
-        """True at most once in `seconds` of wall time."""
-        now = time.perf_counter()
-        if now - self._last < seconds:
-            return False
-        self._last = now
-        return True
-
-
 class Integration(ABC):
     """One run. `blocks` makes the steps; the attributes say how far it has come.
 
@@ -58,14 +45,20 @@ class Integration(ABC):
     slope: that of the rate, in words, which is not finite where the run stopped, and which the method needs.
     """
 
+    prices = (0.0, 0.0)
+
     def __init__(self, components: Sequence[str]) -> None:
         self.components = components
+        self.parameters: list[float] = []
+        self.restart()
+
+    def restart(self) -> None:
+        """Nothing of a run is done."""
         self.steps = self.rejected = self.evaluations = self.jacobians = self.factorizations = self.resets = 0
-        self.largest, self.prices = 0.0, (0.0, 0.0)
+        self.largest = 0.0
         self.status = ""
         self.warnings: list[str] = []
         self.event = self.stiff = self.slope = ""
-        self.parameters: list[float] = []
 
     @property
     def segment(self) -> Integration:
@@ -105,61 +98,142 @@ class NativeRun(NamedTuple):
 
 
 class NativeIntegration(Integration):
-    """A run of one of our methods."""
+    """Runs of one of our methods, one after another in a memory that is kept; one thread at a time.
 
-    def __init__(self, run: NativeRun) -> None:
+    A run is recorded, by `blocks`, or goes on unrecorded: from `begin` by `step`, `until` an instant, or `to_end`.
+    x: the state, (m,), in the memory, whose halves are q and qd.
+    """
+
+    def __init__(self, run: NativeRun, start: Mapping[str, float]) -> None:
+        """start: registers of one number before a run, besides its span."""
         compiled = run.compiled
         super().__init__(compiled.program.components)
         self.run, self.program, self.runner, self.options = run, compiled.program, compiled.runner, run.options
-        self.parameters, self.control = list(run.parameters), run.control
+        self.control = run.control
         self._passes, self._factored, self.prices = FIRST_PASSES, compiled.factorizations, compiled.prices
-        self._accepted = True
+        self._stop = compiled.places[str(self.runner.program.stop)]
+        self._start, self._memory, self._at = np.zeros(self.runner.size), np.zeros(self.runner.size), compiled.places
+        self._numbers: Any = self._memory.data  # whose items are read and written faster
+        self._zero: Any = self._start.data
+        for name, value in start.items():
+            self._start[self._at[name]] = value
+        if run.control is None:
+            self.set_parameters(run.parameters)
+        self.x = self.runner.read(self._memory, "x")
+        self.q, self.qd = self.x[: self.program.nq], self.x[self.program.nq :]
+        self._halves: Any = (self.q.data, self.qd.data)
+
+    @property
+    def t(self) -> float:
+        """Where the run is [s]."""
+        return self._number("t")
+
+    def set_parameters(self, p: Sequence[float]) -> None:
+        """Values of the parameters in the runs that begin from here on."""
+        self.parameters = list(p)
+        self.runner.write(self._start, "p", self.parameters)
+
+    def begin(self, x: Array, t0: float, t_end: float) -> None:
+        """Start anew, from x (m,) at t0, on the way to t_end."""
+        self._numbers[:], self.status = self._zero, ""
+        self.x[:] = x
+        self._begin(t0, t_end)
+
+    def begins(self, q: object, qd: object, t0: float, t_end: float) -> bool:
+        """Start anew from q and qd, if they are arrays of float64 that fit and finite. qd: None where q is all."""
+        self._numbers[:], self.status = self._zero, ""
+        try:  # which compares shapes and types, quicker than to look at them first
+            self._halves[0][:] = q
+            if len(self.qd):
+                self._halves[1][:] = qd
+            elif qd is not None:
+                return False
+        except (TypeError, ValueError, NotImplementedError, BufferError):
+            return False
+        self._begin(t0, t_end)
+        return math.isfinite(self.x.dot(self.x))
 
     @abstractmethod
-    def memory(self, x: Array) -> Array:
-        """The memory before the first step from x (m,)."""
+    def _begin(self, t0: float, t_end: float) -> None: ...
 
-    def _count(self, steps: int, rejected: int = 0) -> None:
-        """So many steps more.  rejected: trials that were not accepted, in all.
+    @abstractmethod
+    def to_end(self) -> None:
+        """After `begin`, all steps; `status` says why they do not come to t_end."""
+
+    @abstractmethod
+    def until(self, t: float) -> None:
+        """Steps to t, the last of which ends there; `status` says why they do not come there."""
+
+    @abstractmethod
+    def step(self) -> None:
+        """One step more on the way to t_end."""
+
+    @cached_property
+    def _unrecorded(self) -> Callable[[int], None]:
+        return self.runner.advancing(self._memory)
+
+    def _go(self, most: int = 2**62) -> None:
+        """So many passes, or until the program stops, in pieces of bounded time: Ctrl-C ends them in between."""
+        self._unrecorded(min(FIRST_PASSES, most))
+        most -= FIRST_PASSES
+        while most > 0 and self._numbers[self._stop] == RUNNING:
+            most -= self._piece(most)
+
+    def _piece(self, most: int) -> int:
+        """How many passes were made, unrecorded, at most so many or until the program stops."""
+        if self.run.stopped():
+            raise StoppedError
+        passes, begin = min(self._passes, most), time.perf_counter()
+        self._unrecorded(passes)
+        if passes == self._passes and self._numbers[self._stop] == RUNNING:
+            self._pace(passes, begin)
+        return passes
+
+    def _advance(self, most: int, *, whole: bool = False) -> tuple[Array, int]:
+        """Some passes, at most so many: their rows (the last alone, with `whole`), and how many."""
+        if self.run.stopped():
+            raise StoppedError
+        passes, begin = min(self._passes, most), time.perf_counter()
+        rows, done = self.runner.run(self._memory, passes, passes if whole else 1)
+        if done == self._passes:
+            self._pace(passes, begin)
+        return rows, done
+
+    def _pace(self, passes: int, begin: float) -> None:
+        """How many passes may go together, since so many took until now."""
+        self._passes = max(1, int(passes * min(4.0, BLOCK_TIME / max(time.perf_counter() - begin, 1e-9))))
+
+    def _count(self, steps: int) -> None:
+        """So many steps more.
 
         The Jacobian is evaluated for every state that steps are tried from, and factored in every trial.
         """
-        self.steps, self.rejected = self.steps + steps, rejected
-        if self._factored:
-            self.jacobians = self.steps + (not self._accepted)
+        self.steps, self.evaluations = self.steps + steps, int(self._number("evaluations"))
+        if "jacobians" in self._at:  # a method that keeps them counts by itself
+            self.jacobians, self.factorizations = int(self._number("jacobians")), int(self._number("factorizations"))
+        elif self._factored:
+            self.jacobians = self.steps + (self.program.adaptive and not self._number("accepted"))
             self.factorizations = self._factored * (self.steps + self.rejected)
 
-    def _run(self, memory: Array, passes: int, every: int = 1) -> tuple[Array, int]:
-        if self.run.stopped():
-            raise StoppedError
-        return self.runner.run(memory, passes, every)
+    def _number(self, name: str) -> float:
+        return float(self._numbers[self._at[name]])
 
-    def _advance(self, memory: Array, most: int, whole: bool) -> tuple[Array, int]:
-        """Some passes, at most so many: their rows (the last alone, with `whole`), and how many."""
-        passes = min(self._passes, most)
-        begin = time.perf_counter()
-        rows, done = self._run(memory, passes, passes if whole else 1)
-        spent = time.perf_counter() - begin
-        if self.program.adaptive:
-            self._accepted = self._number(memory, "accepted") != 0.0
-        if done == self._passes:
-            self._passes = max(1, int(passes * min(4.0, BLOCK_TIME / max(spent, 1e-9))))
-        return rows, done
-
-    def _number(self, memory: Array, name: str) -> float:
-        return float(self.runner.read(memory, name)[0])
+    def _set(self, **values: float) -> None:
+        for name, value in values.items():
+            self._numbers[self._at[name]] = value
 
 
 class FixedStepIntegration(NativeIntegration):
     """Equal steps between the instants, at most dt. Every step is in a block, or of a block the last alone.
 
     stretches: its steps, those of the options unless others are given.  stretch: the one that it is in.
+    Unrecorded, steps from a start or an end to the next end have one length.
     """
 
     def __init__(
         self, run: NativeRun, *, every_step: bool = True, stretches: Sequence[EqualSteps] | None = None
     ) -> None:
-        super().__init__(run)
+        super().__init__(run, {"fresh": 1.0} if "fresh" in run.compiled.places else {})
         self.every_step, options = every_step, run.options
         if stretches is None:
             instants = options.instants if run.control is None else run.control.instants(options.instants)
@@ -174,50 +248,79 @@ class FixedStepIntegration(NativeIntegration):
 
     def blocks(self, x: Array) -> Iterator[StepBlock]:
         """The steps from x (m,) on, some at a time."""
-        memory = self.memory(x)
+        self.restart()
+        self.begin(x, self.options.t0, self.options.t_end)
         for stretch in self.stretches:
-            self.stretch = stretch
-            begin_equal(self.runner, memory, stretch.begin, stretch.h)
+            self._enter(stretch)
             if self.control is not None:
-                self.parameters = self.control.at(stretch.begin, self.runner.read(memory, "x"))
-                self.runner.write(memory, "p", self.parameters)
-            yield from self._equal_steps(memory, stretch)
+                self.parameters = self.control.at(stretch.begin, self.x)
+                self.runner.write(self._memory, "p", self.parameters)
+            yield from self._recorded(stretch)
             if self.status:
                 return
 
-    def memory(self, x: Array) -> Array:
-        """The memory before the first step."""
-        start: dict[str, float | Array | list[float]] = {"x": x}
-        if self.control is None:
-            start["p"] = self.parameters
-        if "fresh" in self.runner.program.registers:
-            start["fresh"] = 1.0
-        return self.runner.memory(start)
+    def _begin(self, t0: float, t_end: float) -> None:
+        self._set(t=t0)
+        self._t_end, self._left = t_end, 0
 
-    def _equal_steps(self, memory: Array, stretch: EqualSteps) -> Iterator[StepBlock]:
-        """The steps of a stretch from a memory on."""
-        m, most, left = self.program.size, self.options.max_steps, stretch.steps
-        while left:
+    def _enter(self, stretch: EqualSteps) -> None:
+        self.stretch, self._left = stretch, stretch.steps
+        self._set(start=stretch.begin, t=stretch.begin, count=0.0, h=stretch.h)
+
+    def until(self, t: float) -> None:
+        """Steps to t, the last of which ends there."""
+        self._enter(equal_steps([self.t, t], self.options.step)[0])
+        self._steps(self._left)
+        self._left = 0
+
+    def to_end(self) -> None:
+        """All steps."""
+        self.until(self._t_end)
+
+    def step(self) -> None:
+        """One step more on the way to t_end."""
+        if not self._left:
+            self._enter(equal_steps([self.t, self._t_end], self.options.step)[0])
+        self._steps(1)
+
+    def _steps(self, steps: int) -> None:
+        """So many steps of the stretch, unrecorded; those before one that fails, for the state before it."""
+        before = self._memory.copy()
+        self._go(steps)
+        self._left -= steps
+        if self._number("nonfinite"):
+            done = int(self._number("count") - before[self._at["count"]])
+            self._memory[:] = before
+            self._go(done - 1)
+            before[:] = self._memory
+            self._go(1)
+            self.status = self.failure(self.runner.read(before, "x"))
+            self._memory[:] = before
+        elif not self._left:
+            self._set(t=self.stretch.end)
+
+    def _recorded(self, stretch: EqualSteps) -> Iterator[StepBlock]:
+        """The steps of a stretch, recorded."""
+        m, most = self.program.size, self.options.max_steps
+        while self._left:
             if self.steps >= most:
-                self.status = self.too_many(self._number(memory, "t"), most)
+                self.status = self.too_many(self.t, most)
                 return
-            before = memory.copy()
-            rows, done = self._advance(memory, int(min(left, most - self.steps)), whole=not self.every_step)
-            left -= done
-            failed = self._number(memory, "nonfinite") != 0.0
+            before, t_old, x_old = self._memory.copy(), self.t, self.x.copy()
+            rows, done = self._advance(int(min(self._left, most - self.steps)), whole=not self.every_step)
+            self._left -= done
+            failed = self._number("nonfinite") != 0.0
             self._count(done - failed)
-            self.evaluations = int(self._number(memory, "evaluations"))
-            t_old, x_old = self._number(before, "t"), self.runner.read(before, "x").copy()
             if failed:
-                rows = rows[:-1] if self.every_step else self._run(before, done - 1, max(1, done - 1))[0]
+                rows = rows[:-1] if self.every_step else self.runner.run(before, done - 1, max(1, done - 1))[0]
             if len(rows):
                 self.largest = max(self.largest, min(abs(stretch.h), self.options.step))
-                if not left and not failed:
+                if not self._left and not failed:
                     rows[-1, 0] = stretch.end
                 block = _block(rows[:, 0], rows[:, 1 : 1 + m], t_old, x_old)
                 yield block._replace(normalization=self.program.normalization)
             if failed:
-                self.status = self.failure(memory, rows[-1, 1 : 1 + m] if len(rows) else x_old)
+                self.status = self.failure(rows[-1, 1 : 1 + m] if len(rows) else x_old)
                 return
 
     def with_dense(self, block: StepBlock) -> StepBlock:
@@ -225,10 +328,10 @@ class FixedStepIntegration(NativeIntegration):
         runner, shares = self.runner, inside_nodes(self.program.order)
         states = np.empty((len(shares), len(block.t), self.program.size))
         if len(shares):
-            memory = runner.memory({"p": self.parameters})
-            if "fresh" in runner.program.registers:
-                runner.write(memory, "fresh", 1.0)
-            start, call = memory.copy(), runner.bind(memory, np.empty((1, runner.program.width)))
+            start = self._start.copy()
+            runner.write(start, "p", self.parameters)
+            memory = start.copy()
+            call = runner.bind(memory, np.empty((1, runner.program.width)))
             x, t, begin, h = (runner.read(memory, name) for name in ("x", "t", "start", "h"))
             for k, row in np.ndindex(states.shape[:2]):
                 memory[:] = start
@@ -242,11 +345,10 @@ class FixedStepIntegration(NativeIntegration):
                 states[k, row] = x
         return with_hermite(block, self.program.rate, self.parameters, states)
 
-    def failure(self, memory: Array, before: Array) -> str:
+    def failure(self, before: Array) -> str:
         """Why the step from a state (m,) failed."""
-        singular = self._number(memory, "singular") if "singular" in self.runner.program.registers else 0.0
-        after = self.runner.read(memory, "x")
-        return failed_step(self.components, self._number(memory, "t"), before, after, int(singular))
+        singular = self._number("singular") if "singular" in self._at else 0.0
+        return failed_step(self.components, self.t, before, self.x, int(singular))
 
 
 def failed_step(components: Sequence[str], t: float, before: Array, x: Array, singular: int) -> str:

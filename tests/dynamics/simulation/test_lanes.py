@@ -281,9 +281,9 @@ def test_lanes_are_made_once_trajectories_alone_took_as_long(monkeypatch: pytest
     arguments = (model, q, qd, 1.0, "dop853")
     in_lanes = simulate_many(*arguments, t_eval=TIMES)
     cg.clear_caches()
-    made: list[bytes] = []
-    make = task._lanes
-    monkeypatch.setattr(task, "_lanes", lambda pickled, backend: made.append(pickled) or make(pickled, backend))
+    made: list[StepProgram] = []
+    make = task.lanes_of
+    monkeypatch.setattr(task, "lanes_of", lambda program, backend: made.append(program) or make(program, backend))
     monkeypatch.setattr(task, "MAKING", seconds)
     assert same(in_lanes, simulate_many(*arguments, t_eval=TIMES))
     assert bool(made) == (seconds < 1.0)

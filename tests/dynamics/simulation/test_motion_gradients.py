@@ -16,9 +16,8 @@ from dynamics.equations.states.consistent_state import nearest_state
 from dynamics.experiments.speed import bench_scenes
 from dynamics.integrators import METHODS, Tableau, derive, runge_kutta
 from dynamics.simulation.gradients import motion_run
-from dynamics.simulation.gradients.motion_equations import motion_equations, sharing
+from dynamics.simulation.gradients.motion_equations import motion_equations, rate_pullback, sharing
 from dynamics.simulation.gradients.motion_programs import motion_programs
-from dynamics.simulation.gradients.rate_pullback import rate_pullback
 from dynamics.systems.system import System
 from tests.dynamics.mechanisms import random_mechanism
 from tests.dynamics.models import driven_pendulum, magnetic, random_arm, relativistic

@@ -129,6 +129,38 @@ def test_whatever_is_fixed(options: dict[str, Any]) -> None:
     np.testing.assert_array_equal(end.qd, run.qd[-1])
 
 
+@mark.parametrize("method", ADAPTIVE)
+@mark.parametrize(
+    "options",
+    [
+        {},
+        {"max_steps": 9},
+        {"rtol": 1e-17, "atol": 1e-30},
+        {"tau": dyn.SampledController(lambda q, qd, t: -2.0 * qd, period=0.05)},
+    ],
+    ids=" ".join,
+)
+def test_ends_alone_are_those_of_all_steps(method: str, options: dict[str, Any]) -> None:
+    """Such a run records no step; it is one of as many steps, and stops and warns in the same words."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", dyn.SimulationWarning)
+        ends = dyn.simulate(ARM, *START, SPAN, method, t_eval=[0.0, SPAN], **options)
+        whole = dyn.simulate(ARM, *START, SPAN, method, **options)
+    assert (ends.t.tolist(), ends.q.tolist()) == (whole.t[[0, -1]].tolist(), whole.q[[0, -1]].tolist())
+    counts = ("steps", "rejected", "nfev", "njev", "nlu", "dt", "message", "warnings")
+    assert [getattr(ends.stats, name) for name in counts] == [getattr(whole.stats, name) for name in counts]
+
+
+@mark.parametrize(("rates", "said"), [(lambda x, t: [x[0] * x[0]], "stopped"), (lambda x, t: [-1e4 * x[0]], "stiff")])
+def test_ends_alone_tell_of_poles_and_stiffness(rates: Any, said: str) -> None:
+    model = dyn.OdeSystem(rates, ["x"])
+    with pytest.warns(dyn.SimulationWarning, match=said):
+        ends = dyn.simulate(model, [1.0], None, 2.0, "dopri5", t_eval=[2.0])
+    with pytest.warns(dyn.SimulationWarning, match=said):
+        whole = dyn.simulate(model, [1.0], None, 2.0, "dopri5")
+    assert (ends.t[-1], ends.q[-1, 0], ends.stats.steps) == (whole.t[-1], whole.q[-1, 0], whole.stats.steps)
+
+
 def test_a_linkage_goes_on_step_by_step() -> None:
     def energy(q: Any, qd: Any, t: Any) -> Any:
         return 0.5 * (qd[0] ** 2 + qd[1] ** 2) - 9.81 * q[1]

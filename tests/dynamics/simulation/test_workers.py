@@ -19,6 +19,7 @@ from pytest import mark, raises
 from cgraph.codegen import llvm_engine
 from dynamics.simulation.ensembles import task, workers as workers_module
 from dynamics.simulation.ensembles.simulate_many import simulate_many
+from dynamics.simulation.steps import step_program
 from tests.dynamics.ensembles import arms, same
 from tests.dynamics.models import random_arm
 from tests.dynamics.step_options import step
@@ -114,7 +115,7 @@ def test_a_killed_process_is_a_sentence(kind: str) -> None:
 
 
 def programs_made() -> int:
-    return task._vector_code.cache_info().misses + task._compiled.cache_info().misses
+    return step_program._arrived.cache_info().misses
 
 
 def test_threads_make_the_code_once(monkeypatch: pytest.MonkeyPatch) -> None:
