@@ -216,13 +216,7 @@ _LEAVES = {row.name: Op(row.name, 0, row.scalar, row.array, row.partials) for ro
 
 
 def columns(row: Row) -> Op:
-    """All columns of a node's operation, its `op`; those of a leaf are empty.
-
-    >>> import cgraph as cg
-    >>> from cgraph.extend import columns
-    >>> columns(cg.sin(cg.variable("x")).op).c
-    'sin({0})'
-    """
+    """All columns of a node's operation, its `op`; those of a leaf are empty."""
     return OPS.get(row.name) or _LEAVES[row.name]
 
 

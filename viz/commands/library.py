@@ -7,6 +7,7 @@ from cgraph.extend import doors
 TYPE_CHECKING = False
 
 if TYPE_CHECKING:
+    from dynamics.equations.constraints.integrability import ConstraintLint
     from dynamics.equations.formulations.node_classes import form_classes, formulation_classes
     from dynamics.equations.momentum.both_forms import (
         HAMILTON,
