@@ -111,7 +111,7 @@ class Label:
 
     @property
     def lines(self) -> frozenset[SourceLine]:
-        """Where the node was written; empty unless `cg.recording_lines` was on."""
+        """Source lines where the node was written; empty unless `cg.recording_lines` was on."""
         return self._lines.members
 
     def derived(self, role: str) -> Label:

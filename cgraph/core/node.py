@@ -91,7 +91,7 @@ class Node:
 
     @property
     def lines(self) -> frozenset[SourceLine]:
-        """Where the node, or the node it derives from, was written; empty unless `cg.recording_lines` was on."""
+        """Source lines where the node, or its origin, was written; empty unless `cg.recording_lines` was on."""
         return self.label.lines
 
     def __repr__(self) -> str:

@@ -128,7 +128,7 @@ class Names:
         return self.graph.outputs[name] if isinstance(name, str) and name in self.graph.outputs else self.one(who, what)
 
     def _near(self, who: str, known: Iterable[str]) -> str:
-        """Which of the known names may be meant; a part of a sentence, empty where none is near."""
+        """Known names that may be meant, as part of a sentence; empty where none is near."""
         near = nearest(str(who), [each for name in known for each in dict.fromkeys((self.shown(name), name))])
         return f": did you mean {' or '.join(near)}?" if near else ""
 

@@ -11,7 +11,7 @@ from ..core.node import Node
 
 
 def path_count(nodes: Sequence[Node], edges: Sequence[Edge], source: Node, sink: Node) -> int:
-    """How many ways lead from source to sink, through x * x two; exact, however many.
+    """Number of ways from source to sink, through x * x two; exact, however many.
 
     nodes, edges: those between the two, in topological order.
     """

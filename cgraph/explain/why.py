@@ -1,4 +1,4 @@
-"""Why an output depends on an input: how many paths, the heaviest of them, and what they add up to."""
+"""Dependence of an output on an input: number of paths, the heaviest of them, and what they add up to."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Path:
 
 @dataclass(frozen=True, eq=False)
 class Why:
-    """How an output depends on an input; made by `why`. `str` of it is the explanation.
+    """Dependence of an output on an input; made by `why`. `str` of it is the explanation.
 
     Attributes
     ----------
@@ -161,7 +161,7 @@ def why(
     *,
     names: Mapping[str, str] | None = None,
 ) -> Why:
-    """Why `output` depends on `input`: the number of paths, and the k heaviest at the point `at`.
+    """Explain why `output` depends on `input`: the number of paths, and the k heaviest at the point `at`.
 
     The value of a path is the product of the partials along it; over all paths these add up to the derivative. All
     numbers come from sweeps over the nodes, without a list of paths, so that 10^20 of them are no obstacle.

@@ -46,7 +46,7 @@ def _sum(a: float, b: float, outwards: Callable[[float], float], anything: float
 
 
 def _with_sign(value: float, positive: bool) -> Interval:
-    """Both sides of a rounded product or quotient, which keep the sign that is known."""
+    """Bounds of a rounded product or quotient, which keep the sign that is known."""
     return (max(0.0, _down(value)), _up(value)) if positive else (_down(value), min(0.0, _up(value)))
 
 
@@ -181,7 +181,7 @@ def atan2(y: Interval, x: Interval) -> Interval:
 
 
 def _outwards(low: float, high: float) -> Interval:
-    """Both rounded outwards, where zero is known to be exact."""
+    """Bounds rounded outwards, where zero is known to be exact."""
     return (low if low == 0.0 else _down(low, ULPS)), (high if high == 0.0 else _up(high, ULPS))
 
 
@@ -273,7 +273,7 @@ def not_equal(a: Interval, b: Interval) -> Interval:
 
 
 def below(limit: float, there: str) -> Callable[[Interval], str | None]:
-    """For a domain that begins at `limit`."""
+    """Rule of a domain that begins at `limit`."""
 
     def singular(a: Interval) -> str | None:
         if a[0] < limit:
@@ -284,29 +284,29 @@ def below(limit: float, there: str) -> Callable[[Interval], str | None]:
 
 
 def steep(words: str) -> Callable[[Interval], str | None]:
-    """For a function whose slope is infinite at 0."""
+    """Rule of a function whose slope is infinite at 0."""
     return lambda a: words if a[0] <= 0.0 <= a[1] else None
 
 
 def arc(a: Interval) -> str | None:
-    """For asin and acos."""
+    """Rule of asin and acos."""
     if a[0] < -1.0 or a[1] > 1.0:
         return "there is no value beyond -1 and 1, and the slope is infinite at both"
     return "the slope is infinite at -1 and 1" if a[0] == -1.0 or a[1] == 1.0 else None
 
 
 def divisor(a: Interval, b: Interval) -> str | None:
-    """For a quotient."""
+    """Rule of a quotient."""
     return "the divisor can be 0" if b[0] <= 0.0 <= b[1] else None
 
 
 def origin(words: str) -> Callable[[Interval, Interval], str | None]:
-    """For functions of a point in the plane."""
+    """Rule of functions of a point in the plane."""
     return lambda a, b: words if a[0] <= 0.0 <= a[1] and b[0] <= 0.0 <= b[1] else None
 
 
 def power(a: Interval, b: Interval) -> str | None:
-    """For a ** b."""
+    """Rule of a ** b."""
     if b[0] == b[1] and b[0].is_integer():
         return "the base can be 0 under a negative power" if b[0] < 0.0 and a[0] <= 0.0 <= a[1] else None
     if a[0] < 0.0:

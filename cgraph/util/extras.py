@@ -9,7 +9,7 @@ from .require import require_choice
 
 
 def install(extra: str) -> str:
-    """How to get the packages of an extra, such as "viz", as the end of an error's sentence.
+    """Command that installs the packages of an extra, such as "viz", as the end of an error's sentence.
 
     The argument of the command is quoted, since some shells expand brackets.
     """

@@ -148,7 +148,7 @@ def check_can_animate(kind: str) -> None:
 
 
 def _mp4(frame: Callable[[int], Canvas], count: int) -> bytes:
-    """By ffmpeg, which gets the frames as they are drawn; sides are even, as its usual colors need."""
+    """Film by ffmpeg, which gets the frames as they are drawn; sides are even, as its usual colors need."""
     first = frame(0).picture()
     width, height = first.width // 2 * 2, first.height // 2 * 2
     with TemporaryDirectory() as folder:

@@ -82,7 +82,7 @@ class Subject:
         ]
 
     def play(self, kind: str, graphs: Mapping[str, Graph], **other: object) -> dict[str, object] | None:
-        """What the page's script draws by these graphs, at its state; None where they are too large for it."""
+        """Data by which the page's script draws these graphs at its state; None where they are too large for it."""
         if sum([len(graph.nodes) for graph in graphs.values()]) > LARGEST:
             return None
         return {"kind": kind} | {name: graph_data(graph) for name, graph in graphs.items()} | other

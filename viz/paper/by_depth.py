@@ -110,7 +110,7 @@ def _cause(forms: Mapping[str, Counts]) -> str:
 
 
 def _chain(links: int, method: str) -> dict[str, Graph]:
-    """Both forms of a planar chain, by one order of elimination."""
+    """The two forms of a planar chain, by one order of elimination."""
     arm = chain(0.1, 0.1, links)
     return {"Lagrange": state_equation(arm, method), "Hamilton": hamilton_equations(arm, method)}
 

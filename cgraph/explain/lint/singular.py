@@ -48,7 +48,7 @@ def value_of(op: Op, arguments: list[Interval], *, same: bool = False) -> Interv
 
 
 def singular_at(op: Op, arguments: list[Interval]) -> str | None:
-    """Where within the arguments' intervals the operation has no bounded slope, in words; None if nowhere."""
+    """Words on where in the arguments' intervals the operation has no bounded slope; None if nowhere."""
     if op.singular is not None:
         return op.singular(*arguments)
     return None if op.interval is not None else f"{op.name}, of which no bounds are known"
