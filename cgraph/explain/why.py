@@ -22,7 +22,7 @@ from .paths import best_paths, by_target, path_count
 from .reachability import between
 
 EXACT = 10**15  # up to here a number of paths is printed digit by digit
-LENGTH = 90  # characters up to which a path is written out; a longer one is written by its tags
+LONGEST_PATH = 90  # characters up to which a path is written out; a longer one is written by its tags
 
 
 @dataclass(frozen=True, eq=False)
@@ -276,7 +276,7 @@ def _path(names: Names, output: str, edges: tuple[Edge, ...], value: float | Non
     start, end = names.text(edges[0].source), [] if inner and names.text(inner[-1]) == output else [output]
     text = " -> ".join([start, *[names.text(node) for node in inner], *end])
     tags = sorted({tag for node in inner for tag in node.tags})
-    if len(text) > LENGTH:
+    if len(text) > LONGEST_PATH:
         text = " -> ".join([start, *_route(names, inner), *end])
     elif tags:
         text += f"  [{', '.join(tags)}]"

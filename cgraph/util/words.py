@@ -6,9 +6,9 @@ import difflib
 from collections.abc import Iterable, Sequence
 from itertools import islice
 
-_MOST, _LENGTH = 5000, 80  # names compared, and characters of each: an error should come at once
-_ALIKE = 0.7  # share of the letters that two names have in common
-_LISTED = 12  # names that are listed where none is near
+_MOST_NAMES, _LONGEST_NAME = 5000, 80  # names compared, and characters of each: an error should come at once
+_ALIKE = 0.7  # share of the letters that two names have in common at least
+_MOST_LISTED = 12  # names that are listed where none is near
 
 
 def counted(number: int, noun: str) -> str:
@@ -24,9 +24,9 @@ def nearest(name: str, known: Iterable[str], most: int = 3) -> list[str]:
     ['q.ankle']
     """
     folded: dict[str, str] = {}
-    for each in islice(known, _MOST):
-        folded.setdefault(each[:_LENGTH].casefold(), each)
-    return [folded[each] for each in difflib.get_close_matches(name[:_LENGTH].casefold(), folded, most, _ALIKE)]
+    for each in islice(known, _MOST_NAMES):
+        folded.setdefault(each[:_LONGEST_NAME].casefold(), each)
+    return [folded[each] for each in difflib.get_close_matches(name[:_LONGEST_NAME].casefold(), folded, most, _ALIKE)]
 
 
 def or_nearest(name: str, known: Sequence[str]) -> str:
@@ -45,4 +45,4 @@ def or_nearest(name: str, known: Sequence[str]) -> str:
 
 def listed(names: Sequence[str]) -> str:
     """The names; of many the first, and the last."""
-    return ", ".join(names if len(names) <= _LISTED else [*names[: _LISTED - 2], "...", names[-1]])
+    return ", ".join(names if len(names) <= _MOST_LISTED else [*names[: _MOST_LISTED - 2], "...", names[-1]])

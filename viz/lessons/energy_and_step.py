@@ -17,8 +17,8 @@ from .subject import Screen, Subject, number
 FACTORS = (2, 4, 16)
 STEPS, FINE = 100, 16  # of the coarse motion, and how many of the reference's there are in one
 LONGEST_MOTION, HALVINGS = 1.0, 20  # s, of the motion whose order is measured, and how often it is halved
-ROUNDING = 1e-13  # of some hundred steps: an error that says nothing about a method
-SMALL = 1e-5  # of the largest coordinate: an error that has not grown beyond its order
+ROUNDING_ERROR = 1e-13  # of some hundred steps: an error that says nothing about a method
+SMALL_ERROR = 1e-5  # of the largest coordinate: an error that has not grown beyond its order
 
 
 _BRAKED = (
@@ -34,7 +34,7 @@ def energy_and_step(subject: Subject) -> Screen:
     t_end, errors = _measured(subject)
     told = (
         f"Measured here: a factor of {number(errors[1] / errors[2])}."
-        if errors[2] > ROUNDING * max(1.0, float(np.abs(subject.q).max()))
+        if errors[2] > ROUNDING_ERROR * max(1.0, float(np.abs(subject.q).max()))
         else "This system moves so evenly that both are rounding."
     )
     rows = [[f"{t_end / (factor * STEPS):.3g}", number(error)] for factor, error in errors.items()]
@@ -81,7 +81,7 @@ def _measured(subject: Subject) -> tuple[float, dict[int, float]]:
             exact, coarse, finer = (_end(subject, t_end, factor * STEPS) for factor in (FINE, 1, 2))
         if exact is not None and coarse is not None and finer is not None:
             errors = {1: float(np.abs(coarse - exact).max()), 2: float(np.abs(finer - exact).max())}
-            if errors[1] <= SMALL * float(np.abs(exact).max()):
+            if errors[1] <= SMALL_ERROR * float(np.abs(exact).max()):
                 return t_end, errors
         t_end /= 2.0
     raise RuntimeError(f"{subject.scene.name} moves too fast for a lesson: rk4 misses it within {2.0 * t_end:g} s")

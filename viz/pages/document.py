@@ -11,10 +11,13 @@ from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
 from tempfile import TemporaryFile
+from typing import Any
 
 from cgraph.extend import Json
 
 from .html import STYLE, compose
+
+ReportData = Mapping[str, Any]  # a report, or a part of one, as plain data: `to_dict()` of it, or its JSON file
 
 
 @dataclass(frozen=True)

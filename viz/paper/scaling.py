@@ -10,7 +10,7 @@ from dynamics.simulation.progress_bar import Progress
 
 from ..pages.document import Block, Paragraph, Table
 from ..pages.formulations import COLORS, TITLES
-from ..plots.direct_labels import Line, Panel, labeled
+from ..plots.direct_labels import Line, PlotPanel, labeled
 from .part import Part, plotted
 
 
@@ -45,7 +45,7 @@ def scaling_of_counts(links: Sequence[int] = COUNTS) -> Part:
     return Part("scaling", "Scaling with the number of links", blocks, data, {"scaling.csv": points_csv})
 
 
-def _panels(rows: Sequence[NodeScaling]) -> list[Panel]:
+def _panels(rows: Sequence[NodeScaling]) -> list[PlotPanel]:
     """Edges and times over the number of links, beside lines of slope 1 and 2."""
     panels = []
     for title, y, of in (("edges", "edges", "edges"), ("one compiled evaluation", "time [µs]", "microseconds")):
@@ -59,7 +59,7 @@ def _panels(rows: Sequence[NodeScaling]) -> list[Panel]:
         at = [line.y[rows[0].n.index(links[0])] for line in lines]
         for power, start in ((1, 0.5 * min(at)), (2, 2.0 * max(at))):
             lines.append(Line(f"slope {power}", links, [start * (n / links[0]) ** power for n in links], None))
-        panels.append(Panel(title, "links n", y, lines))
+        panels.append(PlotPanel(title, "links n", y, lines))
     return panels
 
 
