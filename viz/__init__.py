@@ -11,12 +11,12 @@ if TYPE_CHECKING:
     from .graph_drawing.render import render_png as render_png, render_svg as render_svg
     from .inspector.page import page as page
     from .lessons.lesson import lesson as lesson
-    from .models.animate import animate as animate
     from .models.driven_motion import driven as driven
-    from .models.inspect import inspect as inspect
-    from .models.live import live_page as live_page
+    from .models.film import animate as animate
+    from .models.inspection_page import inspect as inspect
+    from .models.live_motion import live_page as live_page
     from .models.typed_text import typed_text as typed_text
-    from .typed.page import typed_page as typed_page
+    from .typed.text_page import typed_page as typed_page
 
 if not TYPE_CHECKING:  # the command line has to await Ctrl-C before it loads anything
     __getattr__, __dir__ = doors(__name__, __file__)

@@ -9,7 +9,7 @@ import numpy as np
 from dynamics.experiments.paper_numbers import EmbeddingError, embedding_errors
 
 from ..pages.document import Block, Paragraph, Table
-from ..pages.formulations import COLORS, TITLES
+from ..pages.formulation_table import COLORS, TITLES
 from ..plots.direct_labels import Line, PlotPanel, labeled
 from .part import Part, plotted
 

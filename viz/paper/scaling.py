@@ -9,7 +9,7 @@ from dynamics.experiments.text_table import csv_text
 from dynamics.simulation.progress_bar import Progress
 
 from ..pages.document import Block, Paragraph, Table
-from ..pages.formulations import COLORS, TITLES
+from ..pages.formulation_table import COLORS, TITLES
 from ..plots.direct_labels import Line, PlotPanel, labeled
 from .part import Part, plotted
 

@@ -9,7 +9,7 @@ from cgraph.extend import Json
 from dynamics.experiments.paper_numbers import PAPER_MS, Row, table_1
 
 from ..pages.document import Block, Paragraph, Table
-from ..pages.formulations import COLORS, TITLES
+from ..pages.formulation_table import COLORS, TITLES
 from ..plots import plot
 from .part import Part, plotted
 
