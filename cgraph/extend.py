@@ -106,7 +106,7 @@ if TYPE_CHECKING:  # shared by the three packages alone: no promise is made for 
     )
     from .util.caches import kept_by_first as kept_by_first, memo as memo
     from .util.extras import install as install, scipy_module as scipy_module
-    from .util.html_text import html_lines as html_lines, html_table as html_table, picture as picture
+    from .util.html_text import html_lines as html_lines, html_table as html_table, render_html as render_html
     from .util.json_type import Json as Json
     from .util.real_arrays import is_finite as is_finite, real_array as real_array, real_number as real_number
     from .util.require import (

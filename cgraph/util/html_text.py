@@ -37,7 +37,7 @@ def html_text(text: str) -> str:
     return f"<p>{escape(text)}</p>"
 
 
-def picture(kind: str, what: object) -> str | None:
+def render_html(kind: str, what: object) -> str | None:
     """The HTML that a drawing package makes of something (entry point `kind` of the group `cgraph.renderers`), if any.
 
     None where no package is installed that draws it, or where it cannot: the notebook shows text then.

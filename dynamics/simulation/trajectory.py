@@ -383,7 +383,7 @@ class Trajectory:
 
     def _repr_html_(self) -> str | None:
         """The plot that a notebook shows, when a drawing package is installed (extra `viz`)."""
-        return extend.picture("trajectory", self)
+        return extend.render_html("trajectory", self)
 
     def __repr__(self) -> str:
         n, stats = self.q.shape[1], self.stats
