@@ -47,7 +47,7 @@ class SharedSet:
 
     @property
     def members(self) -> frozenset[Any]:
-        """All members."""
+        """Set of all members."""
         return self.part if self.base is None else frozenset().union(*self._parts())
 
     @property

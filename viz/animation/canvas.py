@@ -74,14 +74,14 @@ class Canvas:
         self._draw = draw.Draw(self.image)
 
     def copy(self) -> Canvas:
-        """Another one with the same picture."""
+        """Copy with the same picture."""
         other = Canvas.__new__(Canvas)
         other.image = self.image.copy()
         other._draw = _pillow()[1].Draw(other.image)
         return other
 
     def put(self, other: Canvas, x: int, y: int) -> None:
-        """Another picture, with its upper left corner there."""
+        """Put another picture, with its upper left corner there."""
         self.image.paste(other.image, (_FINE * x, _FINE * y))
 
     def line(self, points: Sequence[Point], color: str, width: float) -> None:

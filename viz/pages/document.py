@@ -139,7 +139,7 @@ class Document:
     sections: Sequence[Section] = field(default_factory=tuple)
 
     def pictures(self) -> list[Picture]:
-        """All pictures, in order."""
+        """List of all pictures, in order."""
         blocks = [*self.introduction, *(block for section in self.sections for block in section.blocks)]
         return [block for block in blocks if isinstance(block, Picture)]
 
