@@ -148,7 +148,7 @@ def without_nearly_redundant(constraints: Constraints) -> Constraints:
 
 
 def _gaps(constraints: Constraints, numbers: RowNumbers, found: list[dict[str, float]], closed: set[int]) -> Array:
-    """How far each row is open, (m,), at the most, at random states where these are closed."""
+    """Largest gap of each row, (m,), at random states where these are closed."""
     points, others = list(found), [k for k in range(len(constraints)) if k not in closed]
     with suppress(ConstraintError):
         points += RowNumbers(constraints.without(dict.fromkeys(others, 0.0))).states()
