@@ -31,7 +31,7 @@ Tensor = tuple[Triple, Triple, Triple]  # rows
 
 
 class Motion(NamedTuple):
-    """How a body's frame moves, in axes whose z is the joint's axis: the body's own.
+    """Twist of a body's frame, in axes whose z is the joint's axis: the body's own.
 
     vertical, depth, strength: a mass m at r from the origin has the potential energy m strength (depth + vertical . r).
     turn: from the joint's axes to those of the motion.
@@ -175,7 +175,7 @@ def energy(motion: Motion, at: LinkState) -> Node:
 
 
 class Acceleration(NamedTuple):
-    """How a body's motion changes, in axes that stand still where those of its motion are just now.
+    """Acceleration of a body, in axes that stand still where those of its motion are just now.
 
     A point of the body, b from its origin, has the acceleration linear + tensor b. For a body that moves in a plane
     `swept` takes b in the axes of the body and gives it in those of the plane; else it is the tensor.
