@@ -112,7 +112,7 @@ def _once_more(name: str, more: float = 1.0) -> Call:
 
 
 def _nothing_kept() -> Call:
-    """No Jacobian and no factors of a step before."""
+    """Statements that forget Jacobian and factors of the step before."""
     return Call(Graph([], {"current": 0.0, "h_factored": 0.0}), (), ("current", "h_factored"))
 
 
@@ -169,7 +169,7 @@ def _sizes(problem: Problem) -> Call:
 
 
 def _matrices(m: int) -> list[Statement]:
-    """Both systems of Newton's iteration, factored."""
+    """Statements that factor the real and the complex matrix of Newton's iteration."""
     unit, h, slope = cg.variables("unit h slope")
     real = Map(Graph([unit, h, slope], {"w": _REAL / h * unit - slope}), ("unit", "h", "jacobian"), ("real",))
     jacobian = [cg.variables([f"j{row}_{column}" for column in range(m)]) for row in range(m)]

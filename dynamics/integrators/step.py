@@ -130,5 +130,5 @@ def with_registers(step: Step, own: Mapping[str, int]) -> dict[str, int]:
 
 
 def rate_calls(problem: Problem, *statements: Sequence[Statement]) -> int:
-    """How often statements evaluate the rate; those inside an iteration count themselves."""
+    """Number of times that statements evaluate the rate; those inside an iteration count themselves."""
     return sum(isinstance(each, Call) and each.graph is problem.rate for part in statements for each in part)
