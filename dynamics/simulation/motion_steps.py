@@ -44,7 +44,7 @@ class MotionSteps:
 
     @property
     def t(self) -> float:
-        """Where the motion is [s]."""
+        """Time that the motion has reached [s]."""
         return self._stepper.t
 
     @property
@@ -58,7 +58,7 @@ class MotionSteps:
         return self._stepper.state[self._nq :]
 
     def step(self) -> None:
-        """One step more on the way to t_end.
+        """Take one step on the way to t_end.
 
         Raises
         ------

@@ -66,7 +66,7 @@ class Recorder:
         self._next, self.last, self._last_state = following, last, block.x[-1].copy()
 
     def add_last(self) -> None:
-        """Where a run stopped becomes its last row, also between the times of t_eval."""
+        """Add the state at which a run stopped as its last row, also between the times of t_eval."""
         recorded = [times[-1] for times, _ in self._parts if len(times)]
         if not recorded or self.direction * (self.last - recorded[-1]) > 0.0:
             self._append(np.array([self.last]), self._last_state[None])
@@ -118,7 +118,7 @@ def ended(
     said: Sequence[str] = (),
     error: ErrorEstimate | None = None,
 ) -> Stats:
-    """How a run went.  counts: steps to seconds of `Stats`.  of_matrices: njev, nlu and their costs.
+    """Statistics of a run.  counts: steps to seconds of `Stats`.  of_matrices: njev, nlu and their costs.
 
     status, event: why it stopped early, or what ended it.  said: what speaks against it besides its error.
     """

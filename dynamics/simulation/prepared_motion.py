@@ -35,7 +35,7 @@ KEPT = 16  # sets of parameter values, whose equations a motion keeps
 
 
 class MotionEnd(NamedTuple):
-    """Where a motion ended, as `PreparedMotion.end` gives it.
+    """End of a motion, as `PreparedMotion.end` gives it.
 
     Parameters
     ----------
@@ -227,7 +227,7 @@ class PreparedMotion:
         )
 
     def _stepper(self, moving: Moving) -> Stepper | None:
-        """That of this thread; None where an end needs more than steps."""
+        """Stepper of this thread; None where an end needs more than steps."""
         steppers = moving.steppers
         try:
             found: Stepper | None = steppers.found
@@ -246,7 +246,7 @@ class PreparedMotion:
         return moving.start(q, qd, t0, moving.values(parameters))
 
     def _moving(self, parameters: Mapping[str, Any] | None) -> Moving:
-        """What moves with these values of parameters that are built in, of the last few the same again."""
+        """Moving parts with these values of built-in parameters, kept for the last few values."""
         if self._varied and isinstance(parameters, Mapping):
             parameters = {name: value for name, value in parameters.items() if name not in self._varied}
         key = None if parameters is None else _key(parameters)
@@ -305,7 +305,7 @@ class PreparedMotion:
 
 
 def _level_of_caller() -> int:
-    """Where in the stack, above who asks, these files were called from."""
+    """Level of the stack, above who asks, from which these files were called."""
     level, frame = 1, sys._getframe(1)
     while frame.f_back is not None and frame.f_globals["__name__"].startswith("dynamics.simulation."):
         level, frame = level + 1, frame.f_back
@@ -313,7 +313,7 @@ def _level_of_caller() -> int:
 
 
 def _key(parameters: Mapping[str, Any]) -> Any:
-    """What tells parameter values apart, 0.0 and -0.0 too; of what are none, a key of its own."""
+    """Key that tells parameter values apart, 0.0 and -0.0 too; a key of its own for what are none."""
     try:
         return tuple([(name, type(value), float(value).hex()) for name, value in parameters.items()])
     except (TypeError, ValueError, OverflowError, AttributeError):
@@ -327,7 +327,7 @@ def _integrate(
     steps: list[StepBlock] | None,
     again: Callable[[RunOptions], Integration] | None,
 ) -> tuple[Stats, tuple[Array, Array]]:
-    """How a run from x goes, and its rows, times and states.  steps: see `_noted`.  again: see `outcome`."""
+    """Outcome of a run from x, and its rows, times and states.  steps: see `_noted`.  again: see `outcome`."""
     recorder = Recorder(x, options.times, options.t0, options.direction)
     stats = outcome(run, x, recorder, options, _noted(run, x, recorder, options, steps), again)
     if stats.message != REACHED:  # where it ended is its last row, also between the times of t_eval

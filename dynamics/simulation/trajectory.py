@@ -37,7 +37,7 @@ class SimulationWarning(UserWarning):
 
 @dataclass(frozen=True)
 class Stats:
-    """How a run went, in SciPy's words where it has them.
+    """Statistics of a run, in SciPy's words where it has them.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ class Stats:
 
 
 class Crossings(NamedTuple):
-    """Where an event happened.
+    """Crossings of an event: instants and states.
 
     Parameters
     ----------
@@ -363,7 +363,7 @@ class Trajectory:
 
     @property
     def message(self) -> str:
-        """That it reached t_end, or where and why the run stopped."""
+        """Sentence that the run reached t_end, or where and why it stopped."""
         return self.stats.message
 
     @property

@@ -205,7 +205,7 @@ def _ensemble(
 
 
 def _warnings(stats: EnsembleStats) -> list[str]:
-    """Of the first trajectory that stopped early, and of the first that something speaks against, with their number."""
+    """Warnings of the first trajectory that stopped early and of the first in doubt, with their numbers."""
     early = {
         k: str(stats.message[k]).removeprefix("stopped ")
         for k in np.flatnonzero(stats.status < 0).tolist()

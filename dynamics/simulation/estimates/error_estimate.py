@@ -36,7 +36,7 @@ UNKNOWN = "the error is unknown"
 
 
 class ErrorEstimate(NamedTuple):
-    """Of one run: the largest error and that at the end, relative to the sizes of components."""
+    """Largest error of one run and that at its end, relative to the sizes of components."""
 
     largest: float
     last: float
@@ -106,7 +106,7 @@ class Estimator:
         return not self.longer or self._unresolved.branches is not None
 
     def segment(self, stretches: Sequence[EqualSteps]) -> None:
-        """After a reset, the runs go on with these steps."""
+        """Go on with these steps after a reset."""
         lasted, self._begun = abs(stretches[0].begin - self._begun), stretches[0].begin
         for beside in self._beside:
             beside.course.follow(stretches, lasted)
@@ -166,7 +166,7 @@ class Estimator:
         self._end = States(t[-1:], x[:, -1:], states.resets)
 
     def _until(self, beside: _Beside, end: float, resets: int) -> Iterator[States]:
-        """What a run beside comes to until it is at `end` after so many resets, unless it takes another course."""
+        """States of a run beside until it is at `end` after so many resets, unless it takes another course."""
         direction, rounding, course = self.options.direction, SAME * np.spacing(abs(end)), beside.course
         while not beside.lost and beside.resets <= resets:
             ahead = direction * (beside.t - end)
@@ -247,7 +247,7 @@ class Estimator:
 
 
 class RunEstimate:
-    """Is told the blocks of a run from x as they come; of a run whose error is not estimated it forgets them.
+    """Estimate of a run's error from its blocks as they come; of a run whose error is not estimated it forgets them.
 
     Runs beside have resets of their own. The forces of a controller answer the states of the run, and would be others
     beside it: there each stretch of steps under the same forces is compared by itself, from where the run is.
@@ -288,7 +288,7 @@ class RunEstimate:
         self._estimator.add(States(block.t, block.x[None], 0 if controlled else self._run.resets))
 
     def result(self) -> ErrorEstimate | None:
-        """After the last step; None where there was none."""
+        """Estimate after the last step; None where there was none."""
         begin = time.perf_counter()
         error = None if self._estimator is None else self._estimator.estimates()[0]
         self.seconds += time.perf_counter() - begin

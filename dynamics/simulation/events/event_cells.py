@@ -45,7 +45,7 @@ class WatchedSteps(NamedTuple):
         return self.event.slope(t, x, self.parameters, block.slopes_at(rows, s), block.h[rows])
 
     def rounding(self, rows: Indices, s: Array) -> Array:
-        """What a value may be off by because numbers are rounded, (k,)."""
+        """Rounding errors of values, (k,)."""
         t, x = self.block.times_at(rows, s), self.block.states_at(rows, s)
         return np.maximum(self.noise, self.event.error(t, x, self.parameters, *self.block.rounding(rows, t, x)))
 
@@ -64,11 +64,11 @@ class Cells(NamedTuple):
     rounding: Array
 
     def take(self, which: Flags | Indices) -> Cells:
-        """Some of them."""
+        """Subset of the cells."""
         return Cells._make([array[which] for array in self])
 
     def beside(self, extreme: Callable[[Array, Array], Array], values: Array) -> Array:
-        """Of a cell's value and those of its neighbors the smallest or largest."""
+        """Smallest or largest of a cell's value and its neighbors'."""
         result = values.copy()
         left = np.flatnonzero((self.rows[:-1] == self.rows[1:]) & (self.b[:-1] == self.a[1:]))
         result[left] = extreme(result[left], values[left + 1])
@@ -145,7 +145,7 @@ def _whole(steps: WatchedSteps) -> Cells:
 
 
 def _split(steps: WatchedSteps, cells: Cells, *, bounded: bool) -> Cells:
-    """Their halves. The cubic of a cell, compared with value and slope in its middle, tells how far theirs are off.
+    """Halves of cells. The cubic of a cell, compared with value and slope in its middle, tells how far theirs are off.
 
     bounded: whether the rounding is asked for; that of whole steps seldom matters.
     """

@@ -188,7 +188,7 @@ def _steps(segment: Segment, begin: float) -> tuple[Array, Array]:
 
 
 def _by_begin(segment: Segment) -> tuple[Array, Array]:
-    """How the times of the steps of a segment and their lengths depend on where it begins."""
+    """Derivatives of the times and lengths of a segment's steps by the time at which it begins."""
     count = len(segment.t) - 1
     if segment.equal:
         return 1.0 - np.arange(count) / segment.equal, np.full(count, -1.0 / segment.equal)

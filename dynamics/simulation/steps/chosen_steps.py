@@ -66,7 +66,7 @@ class AdaptiveIntegration(NativeIntegration):
         return self.runner.memory({"x": x, "p": self.parameters, **beginning(self.options, self.relative, end)})
 
     def _hold(self, t: float, x: Array) -> float:
-        """Where the steps from t on end; of a controller, take its forces for this period."""
+        """End of the steps from t on; take a controller's forces for this period."""
         if self.control is None:
             return self.options.t_end
         self.parameters = self.control.at(t, x)
@@ -115,7 +115,7 @@ class AdaptiveIntegration(NativeIntegration):
                 )
 
     def too_small(self, memory: Array) -> str:
-        """Why a run stopped whose step became too small."""
+        """Reason why a run stopped whose step became too small."""
         t, x = self._number(memory, "t"), self.runner.read(memory, "x")
         where = f"stopped at t = {t:.6g} s: "
         rate = values_of(self.program.rate, [*x.tolist(), t, *self.parameters])

@@ -51,7 +51,7 @@ class Stepper(ABC):
 
     @property
     def t(self) -> float:
-        """Where the run is [s]."""
+        """Time that the run has reached [s]."""
         return float(self._numbers[self._at["t"]])
 
     @property
@@ -66,7 +66,7 @@ class Stepper(ABC):
         self._begin(t0, t_end)
 
     def begin_from(self, q: ArrayLike, qd: ArrayLike | None, t0: float, t_end: float) -> bool:
-        """The same of q and qd, of the right shapes; whether they are finite."""
+        """Begin from q and qd, of the right shapes; whether they are finite."""
         self._memory[:] = self._start
         self._q[:] = q
         if qd is not None:
@@ -79,7 +79,7 @@ class Stepper(ABC):
 
     @abstractmethod
     def to_end(self) -> None:
-        """After `begin`, all steps; `failed` where they do not come to t_end."""
+        """Take all steps after `begin`; `failed` where they do not come to t_end."""
 
     @abstractmethod
     def until(self, t: float) -> None:
@@ -87,10 +87,10 @@ class Stepper(ABC):
 
     @abstractmethod
     def step(self) -> None:
-        """One step more on the way to t_end."""
+        """Take one step on the way to t_end."""
 
     def _passes(self, most: int = 2**62) -> None:
-        """So many passes, or until the program stops, in pieces of bounded time: Ctrl-C ends them in between."""
+        """Make so many passes, or until the program stops, in pieces of bounded time: Ctrl-C ends them in between."""
         passes, numbers, stop = FIRST_PASSES, self._numbers, self._at[self.stop]
         self._advance(min(most, passes))
         most -= passes
@@ -125,12 +125,12 @@ class ChosenStepper(Stepper):
         self.to_end()
 
     def to_end(self) -> None:
-        """All steps."""
+        """Take all steps."""
         self._passes()
         self._look()
 
     def step(self) -> None:
-        """One step more on the way to t_end."""
+        """Take one step on the way to t_end."""
         numbers, row, status = self._numbers, self._at["row"], self._at["status"]
         self._towards(numbers[self._at["start.t_end"]])
         self._advance(1)
@@ -172,11 +172,11 @@ class EqualStepper(Stepper):
         self._left = 0
 
     def to_end(self) -> None:
-        """All steps."""
+        """Take all steps."""
         self.until(self._t_end)
 
     def step(self) -> None:
-        """One step more on the way to t_end."""
+        """Take one step on the way to t_end."""
         if not self._left:
             self._way = self._stretch(self._t_end)
             self._left = self._way.steps
