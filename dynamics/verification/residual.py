@@ -95,7 +95,7 @@ class Certificate:
         return lines + [f"left out: {each}" for each in self.left_out]
 
     def to_dict(self) -> dict[str, Json]:
-        """For JSON."""
+        """Dictionary for JSON."""
         return (
             {"passed": self.passed}
             | asdict(self)

@@ -45,7 +45,7 @@ class Stage(NamedTuple):
 
 
 class Stages(dict[str, Stage]):
-    """What each stage has taken, by name; a call runs the next one."""
+    """Times of the stages, by name; a call runs the next one."""
 
     def __call__(self, name: str, function: Callable[[], Made]) -> Made:
         """Run a stage, its cost noted under that name."""

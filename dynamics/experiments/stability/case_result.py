@@ -54,7 +54,7 @@ class CaseResult:
 
     @property
     def verdict(self) -> str:
-        """In a word."""
+        """Verdict in a word."""
         return "meets" if self.meets else "limit" if self.reason else "unexplained"
 
     def to_dict(self) -> dict[str, Any]:

@@ -118,7 +118,7 @@ class Target:
 
 
 def targets(curves: Sequence[Curve], errors: Sequence[float] = TARGETS) -> list[Target]:
-    """For each error, ours first."""
+    """Targets for each error, ours first."""
     fastest_runs = []
     for error in errors:
         ours = None
@@ -183,7 +183,7 @@ STALLED = 2  # knobs in a row without a smaller error, after which no finer one 
 
 
 class EndMetrics(Protocol):
-    """What tells the error of an end."""
+    """Measures of the error of an end."""
 
     def at_end(self, x: Array) -> float:
         """The error of a state at t_end."""
@@ -287,7 +287,7 @@ def _point(solver: Solver, tried: Tried, metrics: ErrorMetrics) -> Point:
 def sweep(
     solver: AnySolver, metrics: EndMetrics, limit: float, knobs: Sequence[float] | None = None
 ) -> Entry[AnySolver]:
-    """From coarse to fine: each knob once, until it takes too long or is no longer better."""
+    """Sweep from coarse to fine: each knob once, until it takes too long or is no longer better."""
     entry = Entry(solver)
     best, stalled = math.inf, 0
     usual = solver.tolerances if solver.kind == CHOSEN else [float(INTERVALS * 2**k) for k in range(24)]
