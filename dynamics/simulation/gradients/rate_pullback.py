@@ -54,6 +54,7 @@ class RatePullback:
         n = len(self.mu)
         power, *rest = folded([self.power, *self.solved, *self.q_dot, *self.shared], build)
         solved, q_dot, shared = rest[:n], rest[n : len(rest) - len(self.shared)], rest[len(rest) - len(self.shared) :]
+        # x_bar = d(-mu . r)/dx + qdot_bar dqdot/dx, with mu = M^-1 qdd_bar put in afterwards
         seeds: dict[Node, Node] = {power: ONE}
         with building(build):
             for node, bar in zip(q_dot, self.bars, strict=False):  # the other bars are those of accelerations
@@ -113,6 +114,7 @@ def _more_than(rate: Graph, nodes: Sequence[Node]) -> int:
 def _power(system: System, mu: Sequence[Node], qdd: Sequence[Node]) -> Node:
     """-mu . (M qdd + bias - tau - forces + D qd), each force where it works: on the velocity that mu makes of it."""
     terms, build = bias_terms(system, qdd), Builder()
+    # dz = (dz/dqd) mu of each velocity z that an inertial force f works on: mu . (M qdd + ..) = sum of f dz
     along = tangents(dict(zip(system.qd, mu, strict=True)), list(terms.inertial), build)
     power = ZERO
     with building(build):
