@@ -161,7 +161,7 @@ def _returned(vector: str, results: Sequence[str], where: str) -> list[str]:
 
 
 def _sine_cosine(to: Lines, x: str, names: Iterable[str]) -> list[str]:
-    """For |x| <= 1e6: x = k pi/2 + r. The products of k (20 bits) with the first two parts of pi/2 are exact."""
+    """Sine, cosine for |x| <= 1e6: x = k pi/2 + r. Products of k (20 bits) with two parts of pi/2 are exact."""
     shifted = to.f("fadd", to.f("fmul", x, 0.63661977236758134308, exact=True), MAGIC, exact=True)
     k = to.f("fsub", shifted, MAGIC, exact=True)
     quadrant = to.bits(shifted)

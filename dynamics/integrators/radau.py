@@ -153,7 +153,7 @@ def _lengths(m: int) -> dict[str, int]:
 
 
 def _sizes(problem: Problem) -> Call:
-    """How large each component has been so far, and its rounding: of no less than 1e-6 of the largest of its kind."""
+    """Call for the size of each component so far, and its rounding: of no less than 1e-6 of the largest of its kind."""
     m, nq = problem.size, problem.nq
     names = ["size", "x", "rate"]
     size, x, rate = ([cg.variable(f"{name}{k}") for k in range(m)] for name in names)

@@ -314,7 +314,7 @@ class Trajectory:
 
     @cached_property
     def multipliers(self) -> dict[str, Array]:
-        """What holds the constraints at the rows, {name: (T,)}: M qdd = tau + forces - damping qd - bias + J^T lambda.
+        """Multipliers of constraints at the rows, {name: (T,)}: M qdd = tau + forces - damping qd - bias + J^T lambda.
 
         The force [N] or torque [N m] of a `Loop`, whose rows are named after it; of other rows J qd + a = 0 the power
         [W] over the unit of J qd. 0 of rows that follow from others. Without constraints there are none.

@@ -92,7 +92,7 @@ def lost_rank(constraints: Constraints, q: Array, t: float, parameters: Mapping[
 
 
 def least_new(constraints: Constraints, q: Array, t: float, parameters: Mapping[str, float]) -> float:
-    """How much is new at a state of the row of which least is, of those a system is solved with; 0 if one follows."""
+    """New share at a state, of the row of which least is, of those a system is solved with; 0 if one follows."""
     rows, numbers = list(independent_rows(constraints)), row_numbers(constraints)
     matrix = numbers.matrix(numbers.point(q, {"t": t, **parameters}))
     matrix[np.setdiff1d(np.arange(len(matrix)), rows)] = 0.0

@@ -301,7 +301,7 @@ class Task:
             run.interrupt()
 
     def _before_lanes(self, chunk: Chunk, part: Part, stopped: Callable[[], bool]) -> int:
-        """How many trajectories are done one by one first: until that took as long as lanes take to be made, about.
+        """Number of trajectories done one by one first: until that took as long as lanes take to be made, about.
 
         Of a few, or of short ones, that is all. The results are the same.
         """

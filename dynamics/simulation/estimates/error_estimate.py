@@ -223,7 +223,7 @@ class Estimator:
         return result
 
     def _errors(self, changes: Sequence[Array]) -> Array:
-        """Of each component, (k, m), from differences between the first run and the second, and that and the third.
+        """Errors of components, (k, m), from differences between the first run and the second, and that and the third.
 
         The law of the method holds where these, in the largest, have the ratio that goes with it, and where they have a
         lower one as of another order. Across a kink it depends on where in a step that is: no ratio tells.

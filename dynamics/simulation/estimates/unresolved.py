@@ -1,4 +1,4 @@
-"""What steps cannot resolve of a rate, along a run: waves of the time that are too fast, and its jumps and kinks."""
+"""Parts of a rate that steps cannot resolve, along a run: waves in time too fast for them, jumps and kinks."""
 
 from __future__ import annotations
 

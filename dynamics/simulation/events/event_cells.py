@@ -76,7 +76,7 @@ class Cells(NamedTuple):
         return result
 
     def control_points(self) -> Array:
-        """Of the cubics through values and slopes at the ends, which their hull contains, (4, k)."""
+        """Control points, (4, k), of the cubics through values and slopes at the ends, which their hull contains."""
         third = (self.b - self.a) / 3.0
         inner = self.g_a + self.slope_a * third, self.g_b - self.slope_b * third
         return np.stack([self.g_a, *inner, self.g_b])
