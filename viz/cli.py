@@ -70,7 +70,7 @@ def _say(line: str) -> None:
 
 
 def _nobody_reads() -> bool:
-    """Whether it is standard output that broke, and no other pipe."""
+    """Whether the pipe that broke is standard output."""
     if not hasattr(select, "poll"):
         return True
     output = select.poll()

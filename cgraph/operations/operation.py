@@ -200,7 +200,7 @@ class Op(Row):
 
     @cached_property
     def calls_library(self) -> bool:
-        """Whether machine code calls a function of the C library for it."""
+        """Whether machine code calls a function of the C library for the operation."""
         return not self.llvm or any(["{call}" in line for line in self.llvm])
 
     @property

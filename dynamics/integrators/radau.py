@@ -137,7 +137,7 @@ def _factored() -> Call:
 
 
 def _keeping() -> Call:
-    """After an accepted step: whether the Jacobian serves the next, and, if that is hardly longer, its factors, too."""
+    """Statements after an accepted step: whether the Jacobian serves the next, its factors, too, if hardly longer."""
     theta, h, wanted = inputs = cg.variables("theta h next")
     slow, same = theta > FAST, abs(h)
     alike = (1.0 - slow) * (wanted >= same) * (wanted <= LONGER * same)

@@ -103,7 +103,7 @@ class Step:
 
     @property
     def iterates(self) -> bool:
-        """Whether it turns as often as numbers say, so that steps side by side wait for one another."""
+        """Whether the step iterates as often as numbers say, so that steps side by side wait for one another."""
         return any(isinstance(each, While | FixedPoint) for each in (*self.start, *self.derived))
 
 

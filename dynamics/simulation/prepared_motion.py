@@ -216,7 +216,7 @@ class PreparedMotion:
         return MotionSteps(stepper, x, float(t0), t_end, moving.stepped.nq)
 
     def _steps(self, moving: Moving) -> bool:
-        """Whether its steps are ours alone, with nothing done between them."""
+        """Whether the motion's steps are ours alone, with nothing done between them."""
         options = self._options
         return not (
             self._events

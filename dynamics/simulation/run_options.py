@@ -128,7 +128,7 @@ class RunOptions:
 
     @property
     def estimated(self) -> bool:
-        """Whether runs beside it estimate the error."""
+        """Whether runs beside the main one estimate the error."""
         return not self.adaptive and self.estimate_error is not False
 
     @property

@@ -36,7 +36,7 @@ class Residual:
 
     @property
     def passed(self) -> bool:
-        """Whether it is within its bound; NaN is not."""
+        """Whether the residual is within its bound; NaN is not."""
         return self.value <= self.bound.value
 
 

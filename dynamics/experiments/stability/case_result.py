@@ -49,7 +49,7 @@ class CaseResult:
 
     @property
     def explained(self) -> bool:
-        """Whether it meets its bounds or has a reason why not."""
+        """Whether the case meets its bounds or has a reason why not."""
         return self.meets or bool(self.reason)
 
     @property

@@ -124,7 +124,7 @@ class Joint:
 
     @property
     def moves(self) -> bool:
-        """Whether it has a coordinate."""
+        """Whether the joint has a coordinate."""
         return self.kind in COMPOSITIONS or self.type.moves
 
     @property

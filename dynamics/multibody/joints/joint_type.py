@@ -55,12 +55,12 @@ class JointType(ABC):
 
     @property
     def turns(self) -> bool:
-        """Whether it turns the body."""
+        """Whether the joint turns the body."""
         return True
 
     @property
     def measured_about_axis(self) -> bool:
-        """Whether its coordinate is an angle about the axis and nothing else: axes turned about it are an offset."""
+        """Whether the coordinate is an angle about the axis and nothing else: axes turned about it are an offset."""
         return False
 
     def with_pitch(self, pitch: float) -> JointType:

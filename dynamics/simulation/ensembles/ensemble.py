@@ -97,7 +97,7 @@ class RunTable:
 
     @property
     def interrupted(self) -> bool:
-        """Whether a run has been."""
+        """Whether a run has been interrupted."""
         failed = np.flatnonzero(self.columns["status"] < 0).tolist()
         return any(self.messages[k].startswith(INTERRUPTED) for k in failed)
 

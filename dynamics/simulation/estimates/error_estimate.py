@@ -102,7 +102,7 @@ class Estimator:
 
     @property
     def every(self) -> bool:
-        """Whether it looks at all steps, for one may pass a jump or a kink."""
+        """Whether all steps are looked at, for one may pass a jump or a kink."""
         return not self.longer or self._unresolved.branches is not None
 
     def segment(self, stretches: Sequence[EqualSteps]) -> None:
@@ -188,7 +188,7 @@ class Estimator:
                 difference.lose(beside.t)
 
     def estimates(self) -> list[ErrorEstimate]:
-        """Of each run, and whether it is as good as it was asked to be; NaN where nothing could be compared."""
+        """Estimate of each run, and whether the run is as good as asked; NaN where nothing could be compared."""
         self._compare()
         first = self._differences[0]
         if not first.compared and np.isnan(first.lost).all():

@@ -139,7 +139,7 @@ class ChosenStepper(Stepper):
         self._look()
 
     def _look(self) -> None:
-        """Whether it failed; and what to say of constraints."""
+        """Note whether the run failed, and warn of constraints."""
         flat, p = self._run.flat, self._run.parameters
         if flat.rows is not None:
             row = np.array([[self.t, self._numbers[self._at["h"]], *self._x]])
