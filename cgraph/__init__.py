@@ -11,17 +11,17 @@ if TYPE_CHECKING:
     from .autodiff.jacobian import hessian as hessian, jacobian as jacobian
     from .autodiff.products import gradient as gradient, jvp as jvp, vjp as vjp
     from .autodiff.sparsity import sparsity as sparsity
-    from .codegen.c.c_source import CSource as CSource, to_c as to_c
+    from .codegen.c.c_source import to_c as to_c
     from .codegen.disk_cache import clear_cache as clear_cache
     from .codegen.wasm.to_wasm import to_wasm as to_wasm
     from .core.checks import GraphError as GraphError
     from .core.graph import Edge as Edge, Graph as Graph
     from .core.node import Node as Node, constant as constant, variable as variable
     from .core.scope import tag as tag
-    from .explain.compare import Comparison as Comparison, compare as compare
-    from .explain.lint.lint import Lint as Lint, lint as lint
-    from .explain.why import Why as Why, why as why
-    from .explain.why_not import WhyNot as WhyNot, why_not as why_not
+    from .explain.compare import compare as compare
+    from .explain.lint.lint import lint as lint
+    from .explain.why import why as why
+    from .explain.why_not import why_not as why_not
     from .operations import abs as abs, round as round
     from .operations.table import (
         acos as acos,
@@ -62,7 +62,7 @@ if TYPE_CHECKING:
     )
     from .program.functions.compile import compile as compile
     from .program.functions.compiled import Compiled as Compiled
-    from .program.loop import Loop as Loop, loop as loop
+    from .program.loop import loop as loop
     from .simplification.double_double import double_double as double_double
     from .simplification.simplify import simplify as simplify, specialize as specialize
     from .util.caches import clear_caches as clear_caches

@@ -1,9 +1,11 @@
 """The library's source files: their syntax trees and what they import."""
 
 import ast
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache, cached_property
+from importlib import import_module
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -58,3 +60,15 @@ def sources() -> dict[str, Source]:
     """{file: its source} of all three packages."""
     files = [path.relative_to(ROOT).as_posix() for name in PACKAGES for path in sorted((ROOT / name).rglob("*.py"))]
     return {file: Source(file) for file in files}
+
+
+def listed_names(page: str) -> list[tuple[str, str]]:
+    """(package or module, name) of all names in the `{names}` blocks of a page."""
+    blocks = re.findall(r"^```{names} ([\w.]+)\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
+    return [(module, name) for module, names in blocks for name in names.split()]
+
+
+def result_types() -> dict[str, type]:
+    """{dotted name: type} of what functions return and no public list has: the types of docs/reference/results.md."""
+    page = (ROOT / "docs" / "reference" / "results.md").read_text(encoding="utf-8")
+    return {f"{module}.{name}": getattr(import_module(module), name) for module, name in listed_names(page)}

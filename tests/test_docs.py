@@ -14,8 +14,10 @@ import pytest
 import cgraph as cg
 import dynamics as dyn
 import viz
+from cgraph import extend
 from docs.sphinx_extensions.command_reference import markdown
 from tests.slow import slow
+from tests.sources import listed_names, result_types
 from viz.commands.command import complete, parse
 
 ROOT = Path(__file__).parents[1]
@@ -26,6 +28,7 @@ PAGES = {
         *sorted([*(ROOT / "docs").glob("*.md"), *(ROOT / "docs" / "reference").glob("*.md")]),
     )
 }
+RESULTS = "docs/reference/results.md"
 RUN = [name for name, page in PAGES.items() if "```python\n" in page]
 FENCE = re.compile(r"^```(\w*)[^\n]*\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 MARK = "-- end of example --"
@@ -166,13 +169,14 @@ def test_the_command_reference_has_all_that_the_parsers_have() -> None:
 
 
 def test_the_reference_has_every_public_name_once() -> None:
-    listed = [
-        (package, name)
-        for page in PAGES.values()
-        for package, names in re.findall(r"^```{names} (\w+)\n(.*?)^```$", page, re.MULTILINE | re.DOTALL)
-        for name in names.split()
-    ]
+    listed = [pair for name, page in PAGES.items() if name != RESULTS for pair in listed_names(page)]
     assert sorted(listed) == sorted((each.__name__, name) for each in (cg, dyn, viz) for name in each.__all__)
+
+
+def test_a_type_that_is_only_returned_is_on_the_page_of_results_and_no_public_name() -> None:
+    public = [getattr(each, name) for each in (cg, extend, dyn, viz) for name in each.__all__]
+    assert len(result_types()) > 20
+    assert [name for name, result in result_types().items() if result in public] == []
 
 
 def test_the_tests_of_the_paper_s_equations_are_named() -> None:

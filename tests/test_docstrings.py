@@ -17,7 +17,7 @@ import dynamics as dyn
 import viz
 from cgraph.extend import install
 from cgraph.operations.table import OPS
-from tests.sources import sources
+from tests.sources import result_types, sources
 
 PUBLIC = (cg, cgraph.extend, dyn, viz)
 # What an example may use without importing it, beside the names of its module; in its output `...` is any text.
@@ -60,8 +60,9 @@ def test_an_example_prints_what_is_shown(room: str, tmp_path: Path, monkeypatch:
 
 
 def public() -> dict[str, type | FunctionType]:
-    """{dotted name: object} of the public functions and classes, without errors and operations."""
+    """{dotted name: object} of the public functions and classes and of results, without errors and operations."""
     named = {f"{module.__name__}.{name}": getattr(module, name) for module in PUBLIC for name in module.__all__}
+    named |= result_types()
     operations = {f"cgraph.{name}" for name in OPS}
     return {
         name: value
@@ -101,14 +102,13 @@ def lacks(value: type | FunctionType) -> list[str]:
     return missing
 
 
-HELPERS = set(cgraph.extend.__all__) - set(cg.__all__)  # for whoever builds on nodes: a sentence and an example
+NODES = ("cgraph.extend", "cgraph.autodiff", "cgraph.program")  # for whoever builds on nodes: a sentence, an example
 
 
 def test_what_is_public_says_its_parameters_and_shows_an_example() -> None:
     offenders = {}
     for name, value in public().items():
-        package, _, last = name.rpartition(".")
-        helper = package == "cgraph.extend" and last in HELPERS
+        helper = name.startswith(NODES)
         if missing := ([] if ">>> " in (value.__doc__ or "") else ["Examples"]) if helper else lacks(value):
             offenders[name] = missing
     assert offenders == {}

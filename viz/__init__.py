@@ -7,30 +7,16 @@ TYPE_CHECKING = False  # as a checker knows it; typing takes longer to load than
 if TYPE_CHECKING:
     from cgraph import __version__ as __version__
 
-    from .graph_drawing.dot import to_dot
-    from .graph_drawing.render import render_png, render_svg
-    from .inspector.page import page
-    from .lessons.lesson import lesson
-    from .models.animate import animate
-    from .models.driven_motion import driven
-    from .models.inspect import inspect
-    from .models.live import live_page
-    from .models.typed_text import typed_text
-    from .typed.page import typed_page
-
-__all__ = [
-    "animate",
-    "driven",
-    "inspect",
-    "lesson",
-    "live_page",
-    "page",
-    "render_png",
-    "render_svg",
-    "to_dot",
-    "typed_page",
-    "typed_text",
-]
+    from .graph_drawing.dot import to_dot as to_dot
+    from .graph_drawing.render import render_png as render_png, render_svg as render_svg
+    from .inspector.page import page as page
+    from .lessons.lesson import lesson as lesson
+    from .models.driven_motion import driven as driven
+    from .models.film import animate as animate
+    from .models.inspection_page import inspect as inspect
+    from .models.live_motion import live_page as live_page
+    from .models.typed_text import typed_text as typed_text
+    from .typed.text_page import typed_page as typed_page
 
 if not TYPE_CHECKING:  # the command line has to await Ctrl-C before it loads anything
     __getattr__, __dir__ = doors(__name__, __file__)

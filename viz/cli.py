@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 from .commands.signals import ENDING, ignore_late, settled, stoppable, stopped, watch_loading
 
-FINE, FINDING, ERROR = 0, 1, 2  # exit statuses, as docs/commands.md has them
+SUCCESS, FINDING, ERROR = 0, 1, 2  # exit statuses, as docs/commands.md has them
 ERRORS = (ValueError, TypeError, OSError, ImportError, RuntimeError, MemoryError, ArithmeticError)
 
 
@@ -61,7 +61,7 @@ def _command(arguments: Sequence[str] | None) -> int:
     settled()
     if sys.stdout is not None:
         sys.stdout.flush()
-    return status or FINE
+    return status or SUCCESS
 
 
 def _say(line: str) -> None:
@@ -70,7 +70,7 @@ def _say(line: str) -> None:
 
 
 def _nobody_reads() -> bool:
-    """Whether it is standard output that broke, and no other pipe."""
+    """Whether the pipe that broke is standard output."""
     if not hasattr(select, "poll"):
         return True
     output = select.poll()

@@ -23,7 +23,7 @@ NONE = -1  # the color of what takes part in no sweep
 
 
 class Coloring(NamedTuple):
-    """How sweeps give a matrix: every entry from a forward sweep, over columns, or from a reverse one, over rows.
+    """Sweeps that give a matrix: every entry from a forward sweep, over columns, or from a reverse one, over rows.
 
     columns, rows: the color of each, NONE for one that no sweep takes.  by_row: of each entry whether a reverse sweep
     gives it.

@@ -215,7 +215,7 @@ class _Jets:
         return building(self.build)
 
     def graphs(self) -> Jets:
-        """Both graphs."""
+        """The two graphs."""
         with self._building():
             left = [self._number(a) * self.k if kind == "weighted" else self._number(a) for a, _, kind in self.sums]
             right = [self._number(b) for _, b, _ in self.sums]

@@ -59,7 +59,7 @@ def _grouped(values: Indices, keys: Indices, count: int) -> list[list[int]]:
 
 
 def sparsity(graph: Graph, wrt: str | Node | Sequence[str | Node] | None = None) -> csr_array:
-    """Where the Jacobian of a graph can be other than zero, whatever the values of the inputs.
+    """Pattern of the Jacobian of a graph: entries that can be other than zero, whatever the values of the inputs.
 
     An entry that is left out is zero everywhere: no path leads from the input to the output, or each one passes an
     operation with the slope 0, such as `floor`. An entry that is there may be zero too, at some points or, where terms

@@ -243,7 +243,7 @@ def _mover(name: str, count: int, arithmetic: Arithmetic, *, filling: bool) -> l
 
 
 def _block(arithmetic: Arithmetic, filling: bool) -> list[str]:
-    """One square: lines that transpose what begins in column %r of the rows."""
+    """Lines for one square: they transpose what begins in column %r of the rows."""
     t, lanes = arithmetic.type, arithmetic.lanes
     lines = []
     for k in range(lanes):

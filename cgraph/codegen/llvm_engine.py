@@ -114,7 +114,7 @@ class Host:
 
 
 def host() -> Host:
-    """This machine. Raises ImportError when llvmlite is not installed."""
+    """Machine on which this runs. Raises ImportError when llvmlite is not installed."""
     try:
         from llvmlite import __version__, binding
     except ImportError:

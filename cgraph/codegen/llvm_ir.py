@@ -30,7 +30,7 @@ def libm_functions(graph: Graph) -> dict[str, int]:
 
 
 def point_arithmetic(flags: str, registers: int = REGISTERS) -> Arithmetic:
-    """One point at a time."""
+    """Arithmetic for one point at a time."""
     return Arithmetic(flags, registers=registers, together=TOGETHER)
 
 
@@ -215,7 +215,7 @@ def _places_of_outputs(graph: Graph, last: Collection[int]) -> tuple[dict[Node, 
 
 
 def _merged(graph: Graph, arithmetic: Arithmetic, products: Mapping[Node, Node] | None) -> Merged:
-    """What the arithmetic does in one step; sums side by side of one point, whose products are not rounded."""
+    """Arithmetic joined into one step; sums side by side of one point, whose products are not rounded."""
     products = (products_of(graph) if products is None else products) if arithmetic.fuses else {}
     sums = vector_sums(graph, products) if arithmetic.lanes == 1 else {}
     return Merged(_joined_calls(graph, arithmetic), products, _of_libm(graph, arithmetic), sums)

@@ -53,7 +53,7 @@ class Parts:
         self._count = 0  # of names
 
     def forget(self) -> list[str]:
-        """Nothing is in a register any more: the lines that keep what is needed."""
+        """Lines that keep what is needed, after which nothing is in a register any more."""
         lines = [line for step in self._names for line in self._keep(step)]
         self._names, self._latest = {}, []
         return lines

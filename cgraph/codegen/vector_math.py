@@ -46,7 +46,7 @@ class Lines:
         self.flags, self.exact = f"{flags} " if flags else "", "contract " if "contract" in flags.split() else ""
 
     def add(self, instruction: str) -> str:
-        """One more value, and its name."""
+        """Add a value, and return its name."""
         self._count += 1
         self.text.append(f"  %t{self._count} = {instruction}")
         return f"%t{self._count}"
@@ -161,7 +161,7 @@ def _returned(vector: str, results: Sequence[str], where: str) -> list[str]:
 
 
 def _sine_cosine(to: Lines, x: str, names: Iterable[str]) -> list[str]:
-    """For |x| <= 1e6: x = k pi/2 + r. The products of k (20 bits) with the first two parts of pi/2 are exact."""
+    """Sine, cosine for |x| <= 1e6: x = k pi/2 + r. Products of k (20 bits) with two parts of pi/2 are exact."""
     shifted = to.f("fadd", to.f("fmul", x, 0.63661977236758134308, exact=True), MAGIC, exact=True)
     k = to.f("fsub", shifted, MAGIC, exact=True)
     quadrant = to.bits(shifted)
@@ -196,7 +196,7 @@ def _sine_cosine(to: Lines, x: str, names: Iterable[str]) -> list[str]:
 
 
 def _exp(to: Lines, x: str) -> str:
-    """For -708 <= x <= 709: x = k ln 2 + r."""
+    """Exponential for -708 <= x <= 709: x = k ln 2 + r."""
     shifted = to.f("fadd", to.f("fmul", x, 1.44269504088896338700, exact=True), MAGIC, exact=True)
     k = to.f("fsub", shifted, MAGIC, exact=True)
     high = to.f("fsub", x, to.f("fmul", k, LN2[0], exact=True), exact=True)
@@ -213,7 +213,7 @@ def _exp(to: Lines, x: str) -> str:
 
 
 def _log(to: Lines, x: str) -> str:
-    """For positive normal numbers: x = 2**k (1 + f), sqrt(1/2) <= 1 + f < sqrt(2), and s = f / (2 + f)."""
+    """Logarithm of positive normal numbers: x = 2**k (1 + f), sqrt(1/2) <= 1 + f < sqrt(2), and s = f / (2 + f)."""
     bits = to.bits(x)
     root_half = 0x3FE6A09E667F3BCD
     exponent = to.n("ashr", to.n("sub", bits, root_half), 52)

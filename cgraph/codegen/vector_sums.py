@@ -115,7 +115,7 @@ def _in_order(graph: Graph, found: Mapping[Node, Sums]) -> bool:
 
 
 class Vectors:
-    """Where factors and sums lie beside each other in the memory %w.
+    """Layout of factors and sums beside each other in the memory %w.
 
     slots: {node: its places}.  places: how many there are.
     """

@@ -16,11 +16,6 @@ def check_name(what: str, name: str, *, spaces: bool = True) -> str:
     Names are labels: generated code numbers its identifiers, so a name may be a keyword, a formula or a word of any
     language. What would change a text around it is refused: control characters, characters without a glyph (which make
     two names look alike), and halves of surrogate pairs, which no file can hold. Raises TypeError, ValueError.
-
-    >>> from cgraph.extend import check_name
-    >>> check_name("a joint", "left\nelbow")
-    Traceback (most recent call last):
-    ValueError: the name of a joint must be printable, got '\n' in 'left\nelbow'
     """
     if not isinstance(name, str):
         raise TypeError(f"the name of {what} must be a string, got {type(name).__name__}: {name!r:.60}")

@@ -53,7 +53,7 @@ def tangents(
 
 
 class ReachedNodes:
-    """For each node a flag: a node that is not 0 exactly where one sweep, forward or reverse, reaches it.
+    """Flags of nodes, each a node that is not 0 exactly where one sweep, forward or reverse, reaches it.
 
     A selecting operation such as `where` has the partial 0 in an argument that it leaves out. Beyond it, whichever way
     the sweep goes, the tangent or cotangent is 0 and must stay 0, though partials there may be infinite or NaN: in

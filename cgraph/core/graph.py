@@ -213,9 +213,9 @@ class Graph:
 
     def _repr_html_(self) -> str | None:
         """The drawing that a notebook shows, when a drawing package is installed (extra `viz`)."""
-        from ..util.html_text import picture
+        from ..util.html_text import render_html
 
-        return picture("graph", self)
+        return render_html("graph", self)
 
     def __reduce__(self) -> tuple[Any, ...]:
         from ..writing.records import reduced

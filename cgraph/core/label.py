@@ -47,7 +47,7 @@ class SharedSet:
 
     @property
     def members(self) -> frozenset[Any]:
-        """All members."""
+        """Set of all members."""
         return self.part if self.base is None else frozenset().union(*self._parts())
 
     @property
@@ -111,7 +111,7 @@ class Label:
 
     @property
     def lines(self) -> frozenset[SourceLine]:
-        """Where the node was written; empty unless `cg.recording_lines` was on."""
+        """Source lines where the node was written; empty unless `cg.recording_lines` was on."""
         return self._lines.members
 
     def derived(self, role: str) -> Label:

@@ -91,7 +91,7 @@ class Node:
 
     @property
     def lines(self) -> frozenset[SourceLine]:
-        """Where the node, or the node it derives from, was written; empty unless `cg.recording_lines` was on."""
+        """Source lines where the node, or its origin, was written; empty unless `cg.recording_lines` was on."""
         return self.label.lines
 
     def __repr__(self) -> str:
@@ -102,9 +102,9 @@ class Node:
 
     def _repr_html_(self) -> str | None:
         """The formula that a notebook shows, when a drawing package is installed (extra `viz`)."""
-        from ..util.html_text import picture
+        from ..util.html_text import render_html
 
-        return picture("node", self)
+        return render_html("node", self)
 
     def __bool__(self) -> NoReturn:
         raise TypeError("a Node has no truth value before it is evaluated; choose between nodes with cg.where")

@@ -118,7 +118,7 @@ class Comparison:
         }
 
     def overlay(self) -> Overlay:
-        """Both graphs as one, for a single drawing.
+        """The union of the two graphs, for a single drawing.
 
         An output that both compute alike keeps its name, any other is `left tau0` or `right tau0`. An atom is drawn as
         the variable of its name; what a graph computes it from ends in a separate output, `right q0`.

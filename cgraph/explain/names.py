@@ -15,8 +15,8 @@ from ..writing.source_lines import lines_text
 
 Name = str | Node
 Value = TypeVar("Value")
-LENGTH = 32  # characters up to which a node is written out; a longer one refers to its parts by their %numbers
-DEPTH = 4  # most operations within one another in such a text
+LONGEST_TEXT = 32  # characters up to which a node is written out; a longer one refers to its parts by their %numbers
+DEEPEST_TEXT = 4  # most operations within one another in such a text
 
 _NEGATION, _WHOLE = SUM, 9  # how strongly a leading minus binds, and a name or a function
 
@@ -128,7 +128,7 @@ class Names:
         return self.graph.outputs[name] if isinstance(name, str) and name in self.graph.outputs else self.one(who, what)
 
     def _near(self, who: str, known: Iterable[str]) -> str:
-        """Which of the known names may be meant; a part of a sentence, empty where none is near."""
+        """Known names that may be meant, as part of a sentence; empty where none is near."""
         near = nearest(str(who), [each for name in known for each in dict.fromkeys((self.shown(name), name))])
         return f": did you mean {' or '.join(near)}?" if near else ""
 
@@ -147,11 +147,11 @@ class Names:
             return self.shown(node.name)
         return f"%{self.number[node]}" if node in self.number else "?"
 
-    def text(self, node: Node, length: int = LENGTH) -> str:
+    def text(self, node: Node, length: int = LONGEST_TEXT) -> str:
         """A name, or the formula, such as `qd0 * dt`, as deep as `length` characters allow."""
         if node.name or not node.args:
             return self.short(node)
-        for depth in range(DEPTH, 1, -1):
+        for depth in range(DEEPEST_TEXT, 1, -1):
             text = self._written(node, depth)[0]
             if len(text) <= length:
                 return text

@@ -11,7 +11,7 @@ from ..core.node import Node
 
 
 def path_count(nodes: Sequence[Node], edges: Sequence[Edge], source: Node, sink: Node) -> int:
-    """How many ways lead from source to sink, through x * x two; exact, however many.
+    """Number of ways from source to sink, through x * x two; exact, however many.
 
     nodes, edges: those between the two, in topological order.
     """
@@ -37,7 +37,7 @@ def by_target(edges: Sequence[Edge]) -> dict[Node, list[Edge]]:
     return incoming
 
 
-_Step = tuple[float, Edge | None, int]  # one of the best ways to a node: cost, last edge, rank among those before it
+_Way = tuple[float, Edge | None, int]  # one of the best ways to a node: cost, last edge, rank among those before it
 
 
 def best_paths(
@@ -53,11 +53,11 @@ def best_paths(
     nodes, edges: those between the two, in topological order. A path whose cost is infinite is left out.
     """
     incoming = by_target(edges)
-    start: list[_Step] = [(0.0, None, 0)]
+    start: list[_Way] = [(0.0, None, 0)]
     best = dict.fromkeys(sources, start[:k])
     for node in nodes:
         if node not in sources:
-            ways: list[_Step] = []
+            ways: list[_Way] = []
             for edge in incoming.get(node, ()):
                 if math.isfinite(more := cost(edge)):
                     ways += [(step[0] + more, edge, rank) for rank, step in enumerate(best.get(edge.source, ()))]
@@ -70,7 +70,7 @@ def best_paths(
 _cost = itemgetter(0)
 
 
-def _traced(best: dict[Node, list[_Step]], step: _Step) -> tuple[Edge, ...]:
+def _traced(best: dict[Node, list[_Way]], step: _Way) -> tuple[Edge, ...]:
     edges: list[Edge] = []
     while (edge := step[1]) is not None:
         edges.append(edge)

@@ -1,4 +1,4 @@
-"""Why an output depends on an input: how many paths, the heaviest of them, and what they add up to."""
+"""Dependence of an output on an input: number of paths, the heaviest of them, and what they add up to."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from .paths import best_paths, by_target, path_count
 from .reachability import between
 
 EXACT = 10**15  # up to here a number of paths is printed digit by digit
-LENGTH = 90  # characters up to which a path is written out; a longer one is written by its tags
+LONGEST_PATH = 90  # characters up to which a path is written out; a longer one is written by its tags
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +47,7 @@ class Path:
 
 @dataclass(frozen=True, eq=False)
 class Why:
-    """How an output depends on an input; made by `why`. `str` of it is the explanation.
+    """Dependence of an output on an input; made by `why`. `str` of it is the explanation.
 
     Attributes
     ----------
@@ -161,7 +161,7 @@ def why(
     *,
     names: Mapping[str, str] | None = None,
 ) -> Why:
-    """Why `output` depends on `input`: the number of paths, and the k heaviest at the point `at`.
+    """Explain why `output` depends on `input`: the number of paths, and the k heaviest at the point `at`.
 
     The value of a path is the product of the partials along it; over all paths these add up to the derivative. All
     numbers come from sweeps over the nodes, without a list of paths, so that 10^20 of them are no obstacle.
@@ -276,7 +276,7 @@ def _path(names: Names, output: str, edges: tuple[Edge, ...], value: float | Non
     start, end = names.text(edges[0].source), [] if inner and names.text(inner[-1]) == output else [output]
     text = " -> ".join([start, *[names.text(node) for node in inner], *end])
     tags = sorted({tag for node in inner for tag in node.tags})
-    if len(text) > LENGTH:
+    if len(text) > LONGEST_PATH:
         text = " -> ".join([start, *_route(names, inner), *end])
     elif tags:
         text += f"  [{', '.join(tags)}]"

@@ -1,4 +1,4 @@
-"""Why an output does not depend on an input: how far the input reaches, and what the output is made from."""
+"""Independence of an output from an input: how far the input reaches, and what the output is made from."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .reachability import ancestors, descendants
 
 @dataclass(frozen=True, eq=False)
 class WhyNot:
-    """Why an output does not depend on an input; made by `why_not`. `str` of it is the explanation.
+    """Independence of an output from an input; made by `why_not`. `str` of it is the explanation.
 
     Attributes
     ----------
@@ -99,7 +99,7 @@ def why_not(
     *,
     names: Mapping[str, str] | None = None,
 ) -> WhyNot:
-    """Why `output` does not depend on `input`: how far the input reaches, and what the output is made from.
+    """Explain why `output` does not depend on `input`: the input's reach, and what the output is made from.
 
     Parameters
     ----------

@@ -10,11 +10,11 @@ from collections.abc import Callable
 
 from .operation import OPS, Interval
 
-LINE: Interval = (-math.inf, math.inf)
+REAL_LINE: Interval = (-math.inf, math.inf)
 FLAG: Interval = (0.0, 1.0)
 ULPS = 4  # C libraries in use stay within 2 (glibc manual, "Known Maximum Errors"); the vector ones of NumPy within 4
-_FAR = 2.0**20  # beyond, sine and cosine are taken for anything in [-1, 1]: the period's own rounding would matter
-_LARGEST = math.nextafter(math.inf, 0.0)
+_MAX_ANGLE = 2.0**20  # beyond, sine and cosine are taken for anything in [-1, 1]: the period's rounding would matter
+_MAX_FLOAT = math.nextafter(math.inf, 0.0)
 _SLACK = 1e-9  # by which an extremum of sine or cosine may lie outside an interval and is counted as inside
 
 
@@ -22,7 +22,7 @@ _SLACK = 1e-9  # by which an extremum of sine or cosine may lie outside an inter
 
 
 def _down(x: float, ulps: int = 1) -> float:
-    return min(x - ulps * math.ulp(x), _LARGEST) if x != -math.inf and x != math.inf else min(x, _LARGEST)
+    return min(x - ulps * math.ulp(x), _MAX_FLOAT) if x != -math.inf and x != math.inf else min(x, _MAX_FLOAT)
 
 
 def _up(x: float, ulps: int = 1) -> float:
@@ -46,7 +46,7 @@ def _sum(a: float, b: float, outwards: Callable[[float], float], anything: float
 
 
 def _with_sign(value: float, positive: bool) -> Interval:
-    """Both sides of a rounded product or quotient, which keep the sign that is known."""
+    """Bounds of a rounded product or quotient, which keep the sign that is known."""
     return (max(0.0, _down(value)), _up(value)) if positive else (_down(value), min(0.0, _up(value)))
 
 
@@ -96,7 +96,7 @@ def square(a: Interval) -> Interval:
 
 def div(a: Interval, b: Interval) -> Interval:
     """Bounds of a / b."""
-    return LINE if b[0] <= 0.0 <= b[1] else _corners(_quotient, a, b)
+    return REAL_LINE if b[0] <= 0.0 <= b[1] else _corners(_quotient, a, b)
 
 
 def magnitude(a: Interval) -> Interval:
@@ -111,14 +111,14 @@ def _meet(a: Interval, low: float, high: float) -> Interval | None:
 
 
 def rising(
-    name: str, domain: Interval = LINE, bounds: Interval = LINE, ulps: int = ULPS, *, falling: bool = False
+    name: str, domain: Interval = REAL_LINE, bounds: Interval = REAL_LINE, ulps: int = ULPS, *, falling: bool = False
 ) -> Callable[[Interval], Interval]:
     """The interval of a monotonic function on its domain; outside of it there is no number to bound."""
 
     def value(a: Interval) -> Interval:
         inside = _meet(a, *domain)
         if inside is None:
-            return LINE
+            return REAL_LINE
         first, last = inside[::-1] if falling else inside
         return max(bounds[0], _end(name, first, _down, ulps)), min(bounds[1], _end(name, last, _up, ulps))
 
@@ -129,7 +129,7 @@ def wave(name: str, top: float) -> Callable[[Interval], Interval]:
     """The interval of a sine or cosine, whose maxima lie at top + 2 pi k."""
 
     def value(a: Interval) -> Interval:
-        if not max(abs(a[0]), abs(a[1])) < _FAR:
+        if not max(abs(a[0]), abs(a[1])) < _MAX_ANGLE:
             return -1.0, 1.0
         low = -1.0 if _contains_turn(a, top + math.pi, math.tau) else min([_end(name, x, _down, ULPS) for x in a])
         high = 1.0 if _contains_turn(a, top, math.tau) else max([_end(name, x, _up, ULPS) for x in a])
@@ -146,7 +146,7 @@ def _contains_turn(a: Interval, start: float, period: float) -> bool:
 def tan(a: Interval) -> Interval:
     """Bounds of tan a, none beside a pole."""
     if _tan_pole(a):
-        return LINE
+        return REAL_LINE
     return rising("tan")(a)
 
 
@@ -156,7 +156,7 @@ def no_tangent(a: Interval) -> str | None:
 
 
 def _tan_pole(a: Interval) -> bool:
-    return not max(abs(a[0]), abs(a[1])) < _FAR or _contains_turn(a, math.pi / 2, math.pi)
+    return not max(abs(a[0]), abs(a[1])) < _MAX_ANGLE or _contains_turn(a, math.pi / 2, math.pi)
 
 
 def cosh(a: Interval) -> Interval:
@@ -181,7 +181,7 @@ def atan2(y: Interval, x: Interval) -> Interval:
 
 
 def _outwards(low: float, high: float) -> Interval:
-    """Both rounded outwards, where zero is known to be exact."""
+    """Bounds rounded outwards, where zero is known to be exact."""
     return (low if low == 0.0 else _down(low, ULPS)), (high if high == 0.0 else _up(high, ULPS))
 
 
@@ -190,10 +190,10 @@ def pow(a: Interval, b: Interval) -> Interval:
     if b[0] == b[1] and b[0].is_integer():
         return _whole_power(a, b[0])
     if a[0] < 0.0 and b[0] != b[1]:
-        return LINE  # a whole exponent between the bounds has a value there, another has none
+        return REAL_LINE  # a whole exponent between the bounds has a value there, another has none
     inside = _meet(a, 0.0, math.inf)
     if inside is None:
-        return LINE
+        return REAL_LINE
     corners = [OPS["pow"].scalar(x, y) for x in inside for y in b]
     return max(0.0, _down(min(corners), ULPS)), _up(max(corners), ULPS)
 
@@ -202,7 +202,7 @@ def _whole_power(a: Interval, n: float) -> Interval:
     if n == 0.0:
         return 1.0, 1.0
     if n < 0.0 and a[0] <= 0.0 <= a[1]:
-        return LINE
+        return REAL_LINE
     ends = [OPS["pow"].scalar(x, n) for x in a]
     if n % 2.0 == 0.0:
         low = 0.0 if a[0] <= 0.0 <= a[1] else max(0.0, _down(min(ends), ULPS))
@@ -234,7 +234,7 @@ def maximum(a: Interval, b: Interval) -> Interval:
 def fmod(a: Interval, b: Interval) -> Interval:
     """Bounds of the remainder of a / b: of the sign of a, not larger than a, and smaller than b."""
     if b[0] <= 0.0 <= b[1]:
-        return LINE
+        return REAL_LINE
     if magnitude(a)[1] < magnitude(b)[0]:
         return a
     size = min(magnitude(a)[1], magnitude(b)[1])
@@ -273,7 +273,7 @@ def not_equal(a: Interval, b: Interval) -> Interval:
 
 
 def below(limit: float, there: str) -> Callable[[Interval], str | None]:
-    """For a domain that begins at `limit`."""
+    """Rule of a domain that begins at `limit`."""
 
     def singular(a: Interval) -> str | None:
         if a[0] < limit:
@@ -284,29 +284,29 @@ def below(limit: float, there: str) -> Callable[[Interval], str | None]:
 
 
 def steep(words: str) -> Callable[[Interval], str | None]:
-    """For a function whose slope is infinite at 0."""
+    """Rule of a function whose slope is infinite at 0."""
     return lambda a: words if a[0] <= 0.0 <= a[1] else None
 
 
 def arc(a: Interval) -> str | None:
-    """For asin and acos."""
+    """Rule of asin and acos."""
     if a[0] < -1.0 or a[1] > 1.0:
         return "there is no value beyond -1 and 1, and the slope is infinite at both"
     return "the slope is infinite at -1 and 1" if a[0] == -1.0 or a[1] == 1.0 else None
 
 
 def divisor(a: Interval, b: Interval) -> str | None:
-    """For a quotient."""
+    """Rule of a quotient."""
     return "the divisor can be 0" if b[0] <= 0.0 <= b[1] else None
 
 
 def origin(words: str) -> Callable[[Interval, Interval], str | None]:
-    """For functions of a point in the plane."""
+    """Rule of functions of a point in the plane."""
     return lambda a, b: words if a[0] <= 0.0 <= a[1] and b[0] <= 0.0 <= b[1] else None
 
 
 def power(a: Interval, b: Interval) -> str | None:
-    """For a ** b."""
+    """Rule of a ** b."""
     if b[0] == b[1] and b[0].is_integer():
         return "the base can be 0 under a negative power" if b[0] < 0.0 and a[0] <= 0.0 <= a[1] else None
     if a[0] < 0.0:

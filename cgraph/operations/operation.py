@@ -200,7 +200,7 @@ class Op(Row):
 
     @cached_property
     def calls_library(self) -> bool:
-        """Whether machine code calls a function of the C library for it."""
+        """Whether machine code calls a function of the C library for the operation."""
         return not self.llvm or any(["{call}" in line for line in self.llvm])
 
     @property
@@ -216,13 +216,7 @@ _LEAVES = {row.name: Op(row.name, 0, row.scalar, row.array, row.partials) for ro
 
 
 def columns(row: Row) -> Op:
-    """All columns of a node's operation, its `op`; those of a leaf are empty.
-
-    >>> import cgraph as cg
-    >>> from cgraph.extend import columns
-    >>> columns(cg.sin(cg.variable("x")).op).c
-    'sin({0})'
-    """
+    """All columns of a node's operation, its `op`; those of a leaf are empty."""
     return OPS.get(row.name) or _LEAVES[row.name]
 
 

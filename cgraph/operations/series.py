@@ -55,7 +55,7 @@ def zero_safe_mul(orders: Orders, y: Node, a: Node, b: Node) -> Node:
 
 
 def _crossed(orders: Orders, a: Node, b: Node) -> list[tuple[Node, Node]]:
-    """Each argument with coefficient k of the other, where that moves."""
+    """Terms of each argument with coefficient k of the other, where that moves."""
     pairs = ((b, orders.at(a)), (a, orders.at(b)))
     return [(x, each) for x, each in pairs if each is not None]
 

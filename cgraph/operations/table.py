@@ -29,7 +29,7 @@ def _atan2_partials(y: Node, a: Node, b: Node) -> tuple[Node, Node]:
 
 
 def _hypot_partials(y: Node, a: Node, b: Node) -> tuple[Node, Node]:
-    length = y + _LEAST  # what it is, but for 0, and for the last bit of a subnormal number
+    length = y + _SMALLEST_FLOAT  # what it is, but for 0, and for the last bit of a subnormal number
     return a / length, b / length
 
 
@@ -66,7 +66,7 @@ _REAL = (-8.0, 8.0)
 _POSITIVE = (0.4, 2.5)
 _UNIT = (-0.8, 0.8)
 _INF = math.inf
-_LEAST = math.ulp(0.0)
+_SMALLEST_FLOAT = math.ulp(0.0)
 
 # By place: name, arity, value on floats, value on arrays, partials of (output y, arguments), samples. The rest by name.
 # A table is read by columns, so the formatter leaves it alone.

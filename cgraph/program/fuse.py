@@ -101,7 +101,7 @@ class _Registers:
         self._products: dict[Node, Node] = {}  # {sum: the product that it is rounded with}
 
     def follow(self, statement: Call | Map | Sum) -> None:
-        """What the statement writes, computed from what there is."""
+        """Values that the statement writes, computed from those that there are."""
         if isinstance(statement, Call):
             given = [value for name in statement.inputs for value in self._values(name)]
             values = self._applied(statement.graph, given, products_in(statement))
@@ -118,7 +118,7 @@ class _Registers:
             self._written[name], values = values[:length], values[length:]
 
     def statement(self) -> Call:
-        """All that was followed."""
+        """Statement of all that was followed."""
         inputs = [value for values in self._read.values() for value in values]
         outputs = [value for values in self._written.values() for value in values]
         graph = Graph(inputs, {f"{k}": value for k, value in enumerate(outputs)})

@@ -91,7 +91,10 @@ class Loop:
         return self._runner.run(self._memory(x, 1), passes, every).rows
 
     def batch(self, X: ArrayLike, passes: int, every: int = 1) -> Array:
-        """Run the passes from N starts at once: X (n_in, N) gives (passes // every, n_carry, N)."""
+        """Run the passes from N starts at once: X (n_in, N) gives (passes // every, n_carry, N).
+
+        The last axis counts the starts, as in `Compiled.batch`.
+        """
         return self._runner.run_many(self._memory(X, 2), passes, every).rows
 
     def _memory(self, x: ArrayLike, dimensions: int) -> Array:

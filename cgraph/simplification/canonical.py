@@ -278,12 +278,12 @@ def collected(terms: Iterable[tuple[Powers, Term]]) -> Sum:
 
 
 def without_zeros(a: Sum) -> Sum:
-    """Without terms that are rounding alone."""
+    """Sum without terms that are rounding alone."""
     return {powers: term for powers, term in a.items() if abs(term.value) > COEFFICIENT_ROUNDING * term.size}
 
 
 def key(a: Sum) -> frozenset[tuple[Powers, complex]]:
-    """What two equal sums share."""
+    """Key that equal sums share."""
     return frozenset([(powers, term.value) for powers, term in a.items()])
 
 

@@ -20,7 +20,7 @@ from ..writing.naming import free_suffix
 
 
 def double_double(graph: Graph, *, low: bool = False) -> Graph:
-    """The same function, with sums, differences, products, quotients and roots to twice the digits of float64.
+    """The function, with sums, differences, products, quotients and roots to twice the digits of float64.
 
     Tags and roles stay. Inputs and constants count as exact. Functions (sin, exp, ..) are those of float64 with the low
     part of their argument to first order: to an ulp, which is like a rounding of the data.

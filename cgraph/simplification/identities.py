@@ -95,7 +95,7 @@ class _Writer:
         return waves if _length(waves) + NEW_ANGLE * len(angles - self.canonical.written) < _length(best) else best
 
     def _fourier(self, a: Sum) -> Sum:
-        """As a sum of sines and cosines of sums of angles; with negative powers as it is."""
+        """Sum of sines and cosines of sums of angles; a polynomial with negative powers as it is."""
         if any([power < 0 for powers in a for _, power in powers]):
             return a
         result: Sum = {}

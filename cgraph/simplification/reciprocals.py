@@ -12,7 +12,7 @@ from ..util.require import require_graph
 
 
 def with_reciprocals(graph: Graph) -> Graph:
-    """The same function with products by 1 / d wherever several numbers are divided by the same d.
+    """The function with products by 1 / d wherever several numbers are divided by the same d.
 
     A division takes a processor as long as ten to thirty products. A quotient is then rounded twice, within 1.5 units
     in the last place. It is the last thing to do to a graph: `simplify` and `specialize` make quotients of them again.

@@ -66,7 +66,7 @@ _POINTS, _SIGNS = 256, 1021  # samples, whose mean is certain to a tenth; operat
 
 
 def rounding_spread(graph: Graph, values: Mapping[str, float], sizes: Mapping[str, float] | None = None) -> float:
-    """How far outputs move where the results of all operations are off by one part in 2^30, either way at random.
+    """Shift of outputs where the results of all operations are off by one part in 2^30, either way at random.
 
     Of the worst output, in parts of the largest and of 2^-30: the mean of the sample points where that is finite,
     infinite without any. A running bound adds sizes where errors cancel, as they do by the thousand in an elimination.

@@ -13,7 +13,7 @@ from ..util.require import require_graph, require_mapping, require_sequence
 
 
 def simplify(graph: Graph) -> Graph:
-    """The same function in fewer nodes: constants folded and collected, equal nodes merged, `1 * x` and the like gone.
+    """The function in fewer nodes: constants folded and collected, equal nodes merged, `1 * x` and the like gone.
 
     Assumes finite operands and non-zero divisors: `0 * x = 0`, `x - x = 0`, `x / x = 1`, `x + 0 = x` also for -0.0.
     Sums and products may be taken in another order, so values can differ by rounding.

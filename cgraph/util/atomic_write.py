@@ -8,10 +8,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
-from .explain_failure import explain_failure
 
-
-@explain_failure
 def atomic_write(path: str | Path, data: str | bytes, *, mode: int = 0o666) -> Path:
     """Write a file whole or not at all, by way of a temporary file beside it; its path. Text is UTF-8.
 
@@ -30,18 +27,8 @@ def atomic_write(path: str | Path, data: str | bytes, *, mode: int = 0o666) -> P
     return Path(path)
 
 
-@explain_failure
 def write_files(files: Mapping[Path, str | bytes], *, mode: int = 0o666) -> None:
-    """Write several files, all or none: they take their places once all are written beside them. As `atomic_write`.
-
-    >>> import tempfile
-    >>> from pathlib import Path
-    >>> from cgraph.extend import write_files
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     write_files({Path(folder, name): name for name in ("a.txt", "b.txt")})
-    ...     sorted(path.name for path in Path(folder).iterdir())
-    ['a.txt', 'b.txt']
-    """
+    """Write several files, all or none: they take their places once all are written beside them. As `atomic_write`."""
     if not 0 <= mode <= 0o7777:
         raise ValueError(f"mode must be permissions from 0 to 0o7777, got {mode!r:.20}")
     with ExitStack() as temporaries:
@@ -59,7 +46,6 @@ def write_files(files: Mapping[Path, str | bytes], *, mode: int = 0o666) -> None
                 temporary.replace(target)
 
 
-@explain_failure
 def check_writable(path: str | Path) -> None:
     """Find out whether a file could be written, before the work of making what goes there. Leaves nothing behind.
 

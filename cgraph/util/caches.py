@@ -16,7 +16,7 @@ Result = TypeVar("Result")
 
 
 class Memo(Protocol[Arguments, Result]):
-    """A function that keeps its last results, and the function that makes them."""
+    """Function that keeps its last results, and the function that makes them."""
 
     __wrapped__: Callable[Arguments, Result]
 
@@ -24,7 +24,7 @@ class Memo(Protocol[Arguments, Result]):
         """The result, kept or made."""
 
     def cache_info(self) -> _CacheInfo:
-        """How many results were made, and how many are kept."""
+        """Numbers of results made and kept."""
 
     def cache_clear(self) -> None:
         """Keep none."""
@@ -131,5 +131,5 @@ def clear_caches() -> int:
 
 
 def kept_results() -> int:
-    """How many results functions keep at present."""
+    """Number of results that functions keep at present."""
     return sum([each.cache_info().currsize for each in _memos]) + sum([len(results.known) for results in list(_kept)])

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Iterator
 from importlib import import_module
+from itertools import chain
 
 Homes = dict[str, tuple[str, str | None]]  # {name: (module that has it, its name there; None for the module itself)}
 
@@ -19,10 +20,10 @@ def doors(
 ) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
     """The `__getattr__` and `__dir__` of a module whose names are written elsewhere, by its `__name__` and `__file__`.
 
-    `__all__` is the list of these names, unless the module has one.
-
     The imports of the file under `if TYPE_CHECKING:`, which type checkers read, say where each name is written. A
-    module is imported when one of its names is first asked for, and the name then stays in the package.
+    module is imported when one of its names is first asked for, and the name then stays in the package. `__all__` is
+    the list of names of the first such block; those of a second one are there, too, and no promise is made for them.
+
     otherwise: what gives a name that no import brings, or raises AttributeError.  first: a module that is imported
     before any of those that have the names.  explained: functions of the core whose wrong arguments are told in a
     sentence, see `explain_failure`.
@@ -31,43 +32,45 @@ def doors(
     >>> "jvp" in dir(cg)
     True
     """
-    found: Homes = {}
+    blocks: list[Homes] = []
 
-    def homes() -> Homes:
-        if not found:
-            found.update(_homes(file))
-        return found
+    def homes() -> list[Homes]:
+        if not blocks:
+            blocks.extend(_homes(file))
+        return blocks
 
     def load(name: str) -> object:
         if name == "__all__":
-            return sorted(homes())
-        if name not in homes():
+            return [each for each in sorted(homes()[0]) if not each.startswith("_")]
+        home = next((block[name] for block in homes() if name in block), None)
+        if home is None:
             if otherwise is not None and not name.startswith("_"):
                 return otherwise(name)
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        module, inner = homes()[name]
+        place, inner = home
         if first:
             import_module(first)
-        home = import_module(module, getattr(sys.modules[package], "__package__", package))
-        if inner is not None and not hasattr(home, inner):  # a module of that package
-            import_module(f"{home.__name__}.{inner}")
-        value = home if inner is None else getattr(home, inner)
+        module = import_module(place, getattr(sys.modules[package], "__package__", package))
+        if inner is not None and not hasattr(module, inner):  # a module of that package
+            import_module(f"{module.__name__}.{inner}")
+        value = module if inner is None else getattr(module, inner)
         if name in explained:
             value = import_module("cgraph.util.explain_failure").explain_failure(value)
         setattr(sys.modules[package], name, value)
         return value
 
-    return load, lambda: sorted({*vars(sys.modules[package]), *homes()})
+    return load, lambda: sorted({*vars(sys.modules[package]), *chain.from_iterable(homes())})
 
 
-def _homes(file: str) -> Homes:
+def _homes(file: str) -> Iterator[Homes]:
+    """Homes of the names that each block of a file imports for type checkers."""
     import ast
 
     with open(file, encoding="utf-8") as source:  # noqa: PTH123 (pathlib takes longer to load than this file)
         tree = ast.parse(source.read())
-    homes: Homes = {}
     for block in tree.body:
         if isinstance(block, ast.If) and isinstance(block.test, ast.Name) and block.test.id == "TYPE_CHECKING":
+            homes: Homes = {}
             for line in block.body:
                 assert isinstance(line, ast.ImportFrom)
                 above = "." * line.level
@@ -75,4 +78,4 @@ def _homes(file: str) -> Homes:
                     whole = line.module is None
                     home = (above + name.name, None) if whole else (f"{above}{line.module}", name.name)
                     homes[name.asname or name.name] = home
-    return homes
+            yield homes

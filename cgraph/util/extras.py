@@ -9,24 +9,15 @@ from .require import require_choice
 
 
 def install(extra: str) -> str:
-    """How to get the packages of an extra, such as "viz", as the end of an error's sentence.
+    """Command that installs the packages of an extra, such as "viz", as the end of an error's sentence.
 
     The argument of the command is quoted, since some shells expand brackets.
-
-    >>> from cgraph.extend import install
-    >>> install("viz")
-    "in a checkout of cgraph, pip install '.[viz]'"
     """
     return f"in a checkout of cgraph, pip install '.[{extra}]'"
 
 
 def scipy_module(name: str, what: str) -> ModuleType:
-    """SciPy's module `integrate` or `sparse`. Raises ImportError, saying that `what` needs SciPy, where there is none.
-
-    >>> from cgraph.extend import scipy_module
-    >>> scipy_module("integrate", "method 'scipy:BDF'").__name__
-    'scipy.integrate'
-    """
+    """SciPy's module `integrate` or `sparse`. Raises ImportError, that `what` needs it, where there is none."""
     require_choice("name", name, ("integrate", "sparse"))
     try:
         return import_module(f"scipy.{name}")

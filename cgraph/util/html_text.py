@@ -6,21 +6,14 @@ from collections.abc import Sequence
 from html import escape
 from importlib.metadata import entry_points
 
-from .explain_failure import explain_failure
-
 LEFT, RIGHT = "text-align:left", "text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap"
 
 
-@explain_failure
 def html_table(header: Sequence[str], rows: Sequence[Sequence[str]], *, title: str = "", texts: int = 1) -> str:
     """A table of texts as HTML, in which what the texts hold is shown as it is, never run.
 
     header: names of the columns; of empty ones no line is drawn.  texts: so many of the first columns are words, read
     from the left; the others are numbers.
-
-    >>> from cgraph.extend import html_table
-    >>> "&lt;b&gt;" in html_table(["name", "size"], [["<b>", "3"]])
-    True
     """
 
     def line(cells: Sequence[str], kind: str) -> str:
@@ -34,14 +27,8 @@ def html_table(header: Sequence[str], rows: Sequence[Sequence[str]], *, title: s
     return f'<div style="overflow-x:auto"><table>{above}{head}<tbody>{body}</tbody></table></div>'
 
 
-@explain_failure
 def html_lines(text: str) -> str:
-    """Text in its lines, in letters of equal width, as HTML.
-
-    >>> from cgraph.extend import html_lines
-    >>> html_lines("x < y")
-    '<pre>x &lt; y</pre>'
-    """
+    """Text in its lines, in letters of equal width, as HTML."""
     return f"<pre>{escape(text)}</pre>"
 
 
@@ -50,15 +37,10 @@ def html_text(text: str) -> str:
     return f"<p>{escape(text)}</p>"
 
 
-@explain_failure
-def picture(kind: str, what: object) -> str | None:
+def render_html(kind: str, what: object) -> str | None:
     """The HTML that a drawing package makes of something (entry point `kind` of the group `cgraph.renderers`), if any.
 
     None where no package is installed that draws it, or where it cannot: the notebook shows text then.
-
-    >>> from cgraph.extend import picture
-    >>> picture("sculpture", 3) is None
-    True
     """
     for renderer in entry_points(group="cgraph.renderers", name=kind):
         try:

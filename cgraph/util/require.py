@@ -15,32 +15,19 @@ import numpy as np
 
 from ..core.graph import Graph
 from ..core.node import Node
-from .explain_failure import explain_failure
 
 
 def require_flag(what: str, value: object) -> bool:
-    """The value as a bool: True or False, also NumPy's. Raises TypeError for what Python only counts as one.
-
-    >>> from cgraph.extend import require_flag
-    >>> require_flag("check", "no")
-    Traceback (most recent call last):
-    TypeError: check must be True or False, got 'no'
-    """
+    """The value as a bool: True or False, also NumPy's. Raises TypeError for what Python only counts as one."""
     if isinstance(value, (bool, np.bool_)):
         return bool(value)
     raise TypeError(f"{what} must be True or False, got {value!r:.60}")
 
 
-@explain_failure
 def require_whole(what: str, value: object, least: int = 0) -> int:
     """The value as an int, if it is a whole number from `least`, also NumPy's; no bool.
 
     Raises TypeError for what is no whole number, ValueError for one that is less, or does not fit 64 bits.
-
-    >>> from cgraph.extend import require_whole
-    >>> require_whole("passes", 2.5)
-    Traceback (most recent call last):
-    TypeError: passes must be a whole number from 0, got float: 2.5
     """
     if isinstance(value, bool) or not isinstance(value, Integral):
         raise TypeError(f"{what} must be a whole number from {least}, got {type(value).__name__}: {value!r:.60}")
@@ -52,15 +39,8 @@ def require_whole(what: str, value: object, least: int = 0) -> int:
     return number
 
 
-@explain_failure
 def require_choice(what: str, value: object, choices: Collection[str]) -> str:
-    """The value, if it is one of the choices. Raises ValueError for any other.
-
-    >>> from cgraph.extend import require_choice
-    >>> require_choice("backend", "fast", ["llvm", "python"])
-    Traceback (most recent call last):
-    ValueError: backend must be one of llvm, python, got 'fast'
-    """
+    """The value, if it is one of the choices. Raises ValueError for any other."""
     if isinstance(value, str) and value in choices:
         return value
     raise ValueError(f"{what} must be one of {', '.join(choices)}, got {value!r:.60}")
@@ -89,11 +69,6 @@ def require_mapping(what: str, value: object, of: str) -> Mapping[Any, Any]:
     """The value, if it is a mapping. Raises TypeError for anything else.
 
     of: from what to what, as "input: value".
-
-    >>> from cgraph.extend import require_mapping
-    >>> require_mapping("at", [1.0], "input: value")
-    Traceback (most recent call last):
-    TypeError: at must be a mapping {input: value}, got list: [1.0]
     """
     if not isinstance(value, Mapping):
         raise TypeError(f"{what} must be a mapping {{{of}}}, got {type(value).__name__}: {value!r:.60}")
@@ -101,13 +76,7 @@ def require_mapping(what: str, value: object, of: str) -> Mapping[Any, Any]:
 
 
 def require_texts(what: str, value: object) -> Mapping[str, str]:
-    """The value, if it is a mapping of names to texts; an empty one for None. Raises TypeError for anything else.
-
-    >>> from cgraph.extend import require_texts
-    >>> require_texts("names", {"q0": 1})
-    Traceback (most recent call last):
-    TypeError: names must be a mapping {name: text}, got int for 'q0': 1
-    """
+    """The value, if it is a mapping of names to texts; an empty one for None. Raises TypeError for anything else."""
     texts: Mapping[str, Any] = {} if value is None else require_mapping(what, value, "name: text")
     for name, text in texts.items():
         if not isinstance(text, str):
@@ -117,26 +86,14 @@ def require_texts(what: str, value: object) -> Mapping[str, str]:
 
 
 def require_path(what: str, value: object) -> Path:
-    """The value, a string or a path, as a path, a leading ~ read as the home. Raises TypeError for anything else.
-
-    >>> from cgraph.extend import require_path
-    >>> require_path("folder", 3)
-    Traceback (most recent call last):
-    TypeError: folder must be a path, got int: 3
-    """
+    """The value, a string or a path, as a path, a leading ~ read as the home. Raises TypeError for anything else."""
     if not isinstance(value, (str, os.PathLike)):
         raise TypeError(f"{what} must be a path, got {type(value).__name__}: {value!r:.60}")
     return Path(value).expanduser()
 
 
 def require_graph(what: str, graph: object) -> None:
-    """Raise TypeError, saying that the function `what` needs a graph, for anything else.
-
-    >>> from cgraph.extend import require_graph
-    >>> require_graph("gradient", 3)
-    Traceback (most recent call last):
-    TypeError: gradient needs a cg.Graph, got int: 3
-    """
+    """Raise TypeError, saying that the function `what` needs a graph, for anything else."""
     if isinstance(graph, Graph):
         return
     hint = ""

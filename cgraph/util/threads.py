@@ -10,7 +10,6 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from ..core.evaluation import Array
-from .explain_failure import explain_failure
 
 
 def thread_count(threads: int | None) -> int:
@@ -29,7 +28,6 @@ def thread_count(threads: int | None) -> int:
     return int(threads)
 
 
-@explain_failure
 def share(work: Callable[[int], None], items: Iterable[int], threads: int) -> None:
     """Run `work(item)` for every item, in whichever thread is free; the caller's thread is one of them.
 

@@ -6,40 +6,29 @@ import difflib
 from collections.abc import Iterable, Sequence
 from itertools import islice
 
-from .explain_failure import explain_failure
-from .require import require_whole
-
-_MOST, _LENGTH = 5000, 80  # names compared, and characters of each: an error should come at once
-_ALIKE = 0.7  # share of the letters that two names have in common
-_LISTED = 12  # names that are listed where none is near
+_MOST_NAMES, _LONGEST_NAME = 5000, 80  # names compared, and characters of each: an error should come at once
+_ALIKE = 0.7  # share of the letters that two names have in common at least
+_MOST_LISTED = 12  # names that are listed where none is near
 
 
-@explain_failure
 def counted(number: int, noun: str) -> str:
-    """The number, at least 0, and the noun, in the plural of all but 1.
-
-    >>> from cgraph.extend import counted
-    >>> counted(1, "node"), counted(2, "node")
-    ('1 node', '2 nodes')
-    """
-    return f"{require_whole('number', number)} {noun}{'' if number == 1 else 's'}"
+    """The number, at least 0, and the noun, in the plural of all but 1."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
-@explain_failure
 def nearest(name: str, known: Iterable[str], most: int = 3) -> list[str]:
     """The known names, at most so many, that are spelled most like a name, whatever their case; the best first.
 
-    >>> from cgraph.extend import nearest
+    >>> from cgraph.util.words import nearest
     >>> nearest("q.ankel", ["q.hip", "q.knee", "q.ankle"])
     ['q.ankle']
     """
     folded: dict[str, str] = {}
-    for each in islice(known, _MOST):
-        folded.setdefault(each[:_LENGTH].casefold(), each)
-    return [folded[each] for each in difflib.get_close_matches(name[:_LENGTH].casefold(), folded, most, _ALIKE)]
+    for each in islice(known, _MOST_NAMES):
+        folded.setdefault(each[:_LONGEST_NAME].casefold(), each)
+    return [folded[each] for each in difflib.get_close_matches(name[:_LONGEST_NAME].casefold(), folded, most, _ALIKE)]
 
 
-@explain_failure
 def or_nearest(name: str, known: Sequence[str]) -> str:
     """End of an error that begins with "there is no ...": the nearest of the known names, or some of them.
 
@@ -56,4 +45,4 @@ def or_nearest(name: str, known: Sequence[str]) -> str:
 
 def listed(names: Sequence[str]) -> str:
     """The names; of many the first, and the last."""
-    return ", ".join(names if len(names) <= _LISTED else [*names[: _LISTED - 2], "...", names[-1]])
+    return ", ".join(names if len(names) <= _MOST_LISTED else [*names[: _MOST_LISTED - 2], "...", names[-1]])

@@ -16,7 +16,7 @@ LINES = 40
 
 
 class Notation(NamedTuple):
-    """How formulas are written; a text is (formula, how strongly it binds, as in `MathML`).
+    """Notation of formulas; a text is (formula, how strongly it binds, as in `MathML`).
 
     names: of names, {name: formula}; two names never have one formula.  number: of a constant, its text.
     operation: of an operation's row and the texts of its arguments, its text.

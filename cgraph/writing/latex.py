@@ -81,7 +81,7 @@ def _block(lines: Lines) -> str:
 
 
 def literal(text: str) -> str:
-    """Any text as one upright word."""
+    """LaTeX of any text as one upright word."""
     return rf"\mathrm{{{''.join([_SPECIAL.get(sign, sign) for sign in text]).replace(' ', '~')}}}"
 
 

@@ -9,7 +9,7 @@ from ..core.node import Node, as_node, variable
 
 
 def variables(names: str | Sequence[str]) -> list[Node]:
-    """Several variables.
+    """Variables of several names.
 
     Parameters
     ----------

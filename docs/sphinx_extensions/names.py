@@ -7,7 +7,7 @@ from sphinx.util.docutils import SphinxDirective
 
 
 class Names(SphinxDirective):
-    """```{names} dynamics``` and below it, in any number of lines, names of the package."""
+    """```{names} dynamics``` and below it, in any number of lines, names of that package or module."""
 
     required_arguments = 1
     has_content = True

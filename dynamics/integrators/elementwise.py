@@ -20,7 +20,7 @@ def weighted(nodes: Sequence[Node], weights: Sequence[float]) -> Node:
 
 
 def used(weights: Sequence[float], register: str) -> tuple[list[Node], list[float], tuple[str, ...]]:
-    """Of registers that are numbered from 0: those of a weight that is not 0, as nodes, their weights and names."""
+    """Registers, numbered from 0, whose weight is not 0, as nodes, with their weights and names."""
     numbers = [k for k, weight in enumerate(weights) if weight]
     nodes = cg.variables([f"s{k}" for k in numbers])
     return nodes, [weights[k] for k in numbers], tuple([f"{register}{k}" for k in numbers])
@@ -34,7 +34,7 @@ def advanced(target: str, weights: Sequence[float], slope: str = "slope") -> Map
 
 
 def combined(rows: Sequence[Sequence[float]], sources: Sequence[str], targets: Sequence[str]) -> Map:
-    """Each target = sum of weight * source, of its row of weights."""
+    """Statement for each target = sum of weight * source, by its row of weights."""
     nodes = cg.variables([f"s{k}" for k in range(len(sources))])
     graph = Graph(nodes, {f"{k}": weighted(nodes, row) for k, row in enumerate(rows)})
     return Map(graph, tuple(sources), tuple(targets))

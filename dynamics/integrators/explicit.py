@@ -80,7 +80,7 @@ def _error(tableau: Tableau, problem: Problem, last: str) -> list[Statement]:
 
 
 def _squares(estimates: Sequence[Sequence[float]], targets: tuple[str, ...]) -> Sum:
-    """For each estimate the sum over the state of (h * (sum of weight * slope) / scale)^2; NaN if x_new is infinite."""
+    """Sum over the state, for each estimate, of (h * (sum of weight * slope) / scale)^2; NaN if x_new is infinite."""
     numbers = [k for k in range(len(estimates[0])) if any(weights[k] for weights in estimates)]
     slopes, (*sizes, h) = cg.variables([f"s{k}" for k in numbers]), cg.variables((*SCALE, "h"))
     size = scale(*sizes)

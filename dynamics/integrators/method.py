@@ -123,7 +123,7 @@ def _of_order(method: Method, order: int) -> Method:
 
 
 def equal_registers(problem: Problem) -> dict[str, int]:
-    """What every program of equal steps has."""
+    """Registers of every program of equal steps."""
     single = dict.fromkeys(("t", "h", "start", "count", "evaluations", "nonfinite"), 1)
     return {"x": problem.size, "x_new": problem.size, "p": len(problem.parameters), **single}
 
@@ -142,7 +142,7 @@ def equal(step: Step, problem: Problem) -> Program:
 
 
 def _advance(evaluations: int) -> list[Statement]:
-    """After a step: the next time, computed from the start so that it does not drift; whether the state is finite."""
+    """Call after a step: the next time, computed from the start without drift; whether the state is finite."""
     names = ("start", "count", "h", "evaluations")
     start, count, h, done = inputs = cg.variables(names)
     outputs = {"t": start + (count + 1.0) * h, "count": count + 1.0, "evaluations": done + float(evaluations)}

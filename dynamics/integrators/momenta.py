@@ -108,7 +108,7 @@ def in_form(problem: Problem, form: str) -> Problem:
 
 @kept_by_first
 def momentum_form(problem: Problem) -> Problem:
-    """The same motion in q and p = dL/dqd.
+    """Problem of the motion in q and p = dL/dqd.
 
     Raises ValueError for a first-order system; ConstraintError, SingularMassMatrixError and ValueError as
     `hamilton_equations`.

@@ -78,7 +78,7 @@ class Problem:
 
     @property
     def lengths(self) -> tuple[float, ...]:
-        """What 1 of a state counts beside 1 of others, see `System.lengths`; of momenta the inverse of their qd's."""
+        """Scale of each component of a state in comparisons, see `System.lengths`; of momenta the inverse of qd's."""
         if self.system is None:
             return (1.0,) * self.size
         q, qd = self.system.lengths[: self.nq], self.system.lengths[self.nq :]
@@ -220,7 +220,7 @@ def quantity(problem: Problem, what: str, function: Callable[..., Any], tau: Seq
 
 
 def state_arguments(problem: Problem) -> tuple[Any, ...]:
-    """What a function of the state is called with: (q, qd, t, p) as nodes, or (x, t, p) of a first-order system."""
+    """Arguments of a function of the state: (q, qd, t, p) as nodes, or (x, t, p) of a first-order system."""
     p = Parameters(())
     p.update(_parameters(problem))  # a copy, which a caller may change
     if problem.system is None:
@@ -239,7 +239,7 @@ def _known(problem: Problem) -> frozenset[Node]:
 
 
 def quantity_inputs(problem: Problem) -> list[Node]:
-    """What a `quantity` may depend on: the states of the model, t, applied forces and the model's parameters."""
+    """Inputs of a `quantity`: the states of the model, t, applied forces and the model's parameters."""
     inputs = state_inputs(problem.model)
     return cg.variables([*inputs.states, TIME, *inputs.applied, *inputs.parameters])
 

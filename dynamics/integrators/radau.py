@@ -106,7 +106,7 @@ def radau_step(problem: Problem) -> Step:
 
 
 def _nothing_kept() -> Call:
-    """No Jacobian and no factors of a step before."""
+    """Statements that forget Jacobian and factors of the step before."""
     return Call(Graph([], {"current": 0.0, "h_factored": 0.0}), (), ("current", "h_factored"))
 
 
@@ -131,7 +131,7 @@ def _factored() -> Call:
 
 
 def _keeping() -> Call:
-    """After an accepted step: whether the Jacobian serves the next, and, if that is hardly longer, its factors, too."""
+    """Statements after an accepted step: whether the Jacobian serves the next, its factors, too, if hardly longer."""
     theta, h, wanted = inputs = cg.variables("theta h next")
     slow, same = theta > FAST, abs(h)
     alike = (1.0 - slow) * (wanted >= same) * (wanted <= LONGER * same)
@@ -147,7 +147,7 @@ def _lengths(m: int) -> dict[str, int]:
 
 
 def _sizes(problem: Problem) -> Call:
-    """How large each component has been so far, and its rounding: of no less than 1e-6 of the largest of its kind."""
+    """Call for the size of each component so far, and its rounding: of no less than 1e-6 of the largest of its kind."""
     m, nq = problem.size, problem.nq
     names = ["size", "x", "rate"]
     size, x, rate = ([cg.variable(f"{name}{k}") for k in range(m)] for name in names)
@@ -163,7 +163,7 @@ def _sizes(problem: Problem) -> Call:
 
 
 def _matrices(m: int) -> list[Statement]:
-    """Both systems of Newton's iteration, factored."""
+    """Statements that factor the real and the complex matrix of Newton's iteration."""
     unit, h, slope = cg.variables("unit h slope")
     real = Map(Graph([unit, h, slope], {"w": _REAL / h * unit - slope}), ("unit", "h", "jacobian"), ("real",))
     jacobian = [cg.variables([f"j{row}_{column}" for column in range(m)]) for row in range(m)]

@@ -103,7 +103,7 @@ class Step:
 
     @property
     def iterates(self) -> bool:
-        """Whether it turns as often as numbers say, so that steps side by side wait for one another."""
+        """Whether the step iterates as often as numbers say, so that steps side by side wait for one another."""
         return any(isinstance(each, While | FixedPoint) for each in (*self.start, *self.derived))
 
 
@@ -130,5 +130,5 @@ def with_registers(step: Step, own: Mapping[str, int]) -> dict[str, int]:
 
 
 def rate_calls(problem: Problem, *statements: Sequence[Statement]) -> int:
-    """How often statements evaluate the rate; those inside an iteration count themselves."""
+    """Number of times that statements evaluate the rate; those inside an iteration count themselves."""
     return sum(isinstance(each, Call) and each.graph is problem.rate for part in statements for each in part)

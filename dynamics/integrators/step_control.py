@@ -47,7 +47,7 @@ SMALLEST_ATOL = 2.0**-1022  # in place of 0: a state that is 0 and stays 0 has n
 
 
 def registers(problem: Problem) -> dict[str, int]:
-    """What every program has."""
+    """Registers of every program."""
     names = "t h tried next max_step min_step end fresh rtol accepted status rejected error error_old"
     names += " evaluations at_limit t_old t_new jump longest leap still moved turned anew search trials due"
     names += " sized seen row largest longest_made"
@@ -57,7 +57,7 @@ def registers(problem: Problem) -> dict[str, int]:
 
 
 def recorded(dense: bool, degree: int) -> list[str]:
-    """What a row of the record holds."""
+    """Registers that a row of the record holds."""
     return ["t", "h", "x", *(["t_old", "x_old", *(f"dense{k + 1}" for k in range(degree))] if dense else [])]
 
 
@@ -77,12 +77,12 @@ def trial() -> Call:
 
 
 def scale(x: Node, x_new: Node, rtol: Node, atol: Node, leap: Node) -> Node:
-    """What an error is measured by, of the registers `SCALE`."""
+    """Scale of an error, of the registers `SCALE`."""
     return atol + rtol * cg.maximum(abs(x), abs(x_new)) + leap * abs(x_new - x)
 
 
 def control(evaluations: int) -> Call:
-    """From the estimate of a trial: whether it is accepted. A NaN is an error beyond measure.
+    """Call that accepts a trial or not, by its estimate. A NaN is an error beyond measure.
 
     A step below the resolution of t, or of the run, is not accepted whatever its error: only one that ends the run may
     be so short.
@@ -168,7 +168,7 @@ def count(more: int, register: str = "evaluations") -> Call:
 
 
 def first_pass(*statements: Statement) -> If:
-    """What is done before the first trial alone."""
+    """Branch before the first trial alone."""
     return If("fresh", (*statements, Call(function("fresh", none=0.0), ("fresh",), ("fresh",))))
 
 
@@ -197,7 +197,7 @@ def chosen(step: Step, problem: Problem, *, dense: bool, degree: int, starts: bo
 
 
 def _forgotten(step: Step) -> list[Statement]:
-    """Before the first trial, what one step hands on to the next is 0: what it reads before it is sure to write it."""
+    """Registers that are 0 before the first trial: those that a step reads before it is sure to write them."""
     first: dict[str, None] = {}
     written: set[str] = set()
     for each in (*step.start, *step.rates, *step.prepare, *step.body, *step.error, *step.kept, *(step.handed or ())):

@@ -55,7 +55,7 @@ def partitioned_step(method: Partitioned, problem: Problem, composition: Composi
 
 
 def _lacking_momenta(problem: Problem) -> str:
-    """Why coordinates and momenta cannot be advanced in turn."""
+    """Reason why coordinates and momenta cannot be advanced in turn; empty if they can."""
     system = problem.system
     if system is None:
         return "momenta in turn; a system of first order has none"

@@ -106,7 +106,7 @@ class Composition:
 
 
 def _closed(order: int, *half: float) -> Composition:
-    """With the middle number that makes their sum 1."""
+    """Numbers with the middle one that makes their sum 1."""
     return Composition(order, (*half, 1.0 - 2.0 * sum(half)))
 
 

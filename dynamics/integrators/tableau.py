@@ -109,7 +109,7 @@ DOPRI5 = Tableau(
 
 @kept_by_first
 def real_stability(tableau: Tableau) -> float:
-    """Where on the negative real axis stability ends: the smallest z > 0 with |R(-z)| > 1, to a sixty-fourth."""
+    """End of stability on the negative real axis: the smallest z > 0 with |R(-z)| > 1, to a sixty-fourth."""
     for k in itertools.count(1):
         slopes: list[float] = []
         for row in (*tableau.a, tableau.b):

@@ -61,7 +61,7 @@ def _refuse(body: Body, what: str) -> None:
 def _carried(
     bodies: Sequence[Body], moments: Mapping[str, tuple[Array, Array]]
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """For each body, with all that it carries: the mass, and what its inertia about the joint is when stretched out."""
+    """Mass of each body with all that it carries, and what its inertia about the joint is when stretched out."""
     mass, first, second = ({body.name: 0.0 for body in bodies} | {WORLD: 0.0} for _ in range(3))
     for body in reversed(bodies):
         name, parent = body.name, body.parent
@@ -76,7 +76,7 @@ def _carried(
 
 
 def _turning(bodies: Sequence[Body]) -> dict[str, tuple[Array | None, str]]:
-    """For each body the axis that it always turns about, None for several, and the nearest body that a joint turns.
+    """Axis that each body always turns about, None for several, and the nearest body that a joint turns.
 
     The axis is in the body's axes; it is zero, and there is no such body, where no joint on the way turns.
     """

@@ -146,7 +146,7 @@ def _carried(twist: arb_mat) -> arb_mat:
 
 
 def _rotation(number: Maker, axis: Array, angle: Number) -> arb_mat:
-    """By an angle about an axis of the frame, 3 x 3: c 1 + (1 - c) a a^T + s [a]."""
+    """Rotation by an angle about an axis of the frame, 3 x 3: c 1 + (1 - c) a a^T + s [a]."""
     assert sorted(np.abs(axis)) == [0.0, 0.0, 1.0]
     a, c = _column(number, axis), angle.cos()
     return _matrix(number, np.eye(3)) * c + a * a.transpose() * (1 - c) + _skew(a) * angle.sin()

@@ -30,8 +30,7 @@ class Reference:
 
     Examples
     --------
-    >>> import dynamics as dyn
-    >>> exact = dyn.Reference((1.0,), (("0.33333333333333333333",),), 1e-20, "by hand")
+    >>> exact = Reference((1.0,), (("0.33333333333333333333",),), 1e-20, "by hand")
     >>> print(exact.deviation([[1.0 / 3.0]]))
     [[-1.85003837e-17]]
     """

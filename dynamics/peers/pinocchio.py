@@ -227,7 +227,7 @@ def constrained_accelerations(mechanism: Mechanism, q: Array, qd: Array, tau: Ar
 def constraint_dynamics(
     mechanism: Mechanism, proximal: tuple[float, float, int]
 ) -> Callable[[Array], tuple[Callable[[], object], Callable[[], Array]]]:
-    """At x = (q, qd, tau): a call, and what reads the accelerations, (n,), that it left.
+    """Call at x = (q, qd, tau), and a function that reads the accelerations, (n,), that it left.
 
     proximal: what is left of the constraints, its regularization, and iterations. Raises as above.
     """

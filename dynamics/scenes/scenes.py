@@ -78,17 +78,17 @@ class Scene:
 
     @property
     def coordinates(self) -> tuple[str, ...]:
-        """Those of the model."""
+        """Coordinates of the model."""
         return self.model.coordinates
 
     @property
     def velocities(self) -> tuple[str, ...]:
-        """Those of the model."""
+        """Velocities of the model."""
         return self.model.velocities
 
     @property
     def parameters(self) -> Mapping[str, float]:
-        """Those of the model."""
+        """Parameters of the model."""
         return self.model.parameters
 
     @property

@@ -60,7 +60,7 @@ class MotionSteps:
         return self._run.qd.copy()
 
     def step(self) -> None:
-        """One step more on the way to t_end.
+        """Take one step on the way to t_end.
 
         Raises
         ------

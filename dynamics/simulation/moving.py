@@ -88,7 +88,7 @@ def with_applied(model: Model, tau: Any, parameters: Mapping[str, Any] | None) -
 
 
 class Moving:
-    """What moves in the runs of a motion with these parameters: the equations, bound to numbers, and the events.
+    """Moving parts of the runs of a motion with these parameters: the equations, bound to numbers, and the events.
 
     varied: parameters whose values stay open.  p: values of the inputs of the problem that are not built in.
     plain: whether any finite q and qd of the right shapes are a start as they are.
@@ -134,7 +134,7 @@ class Moving:
         return start_state(self.model, q, qd, numbers, t0)
 
     def graphs(self, p: Sequence[float]) -> Mapping[str, Graph]:
-        """What a trajectory computes accelerations, forces and energies by."""
+        """Graphs by which a trajectory computes accelerations, forces and energies."""
         return RunGraphs(self, dict(zip(self.problem.parameters, p, strict=True))) if p else self._graphs
 
     def velocities(self, p: Sequence[float]) -> Graph | None:

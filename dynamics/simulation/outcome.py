@@ -65,7 +65,7 @@ class Recorder:
         self._next, self.last, self._last_state = following, last, block.x[-1].copy()
 
     def add_last(self) -> None:
-        """Where a run stopped becomes its last row, also between the times of t_eval."""
+        """Add the state at which a run stopped as its last row, also between the times of t_eval."""
         recorded = [times[-1] for times, _ in self._parts if len(times)]
         if not recorded or self.direction * (self.last - recorded[-1]) > 0.0:
             self._append(np.array([self.last]), self._last_state[None])

@@ -38,7 +38,7 @@ KEPT = 16  # sets of parameter values, whose equations a motion keeps
 
 
 class MotionEnd(NamedTuple):
-    """Where a motion ended, as `PreparedMotion.end` gives it.
+    """End of a motion, as `PreparedMotion.end` gives it.
 
     Parameters
     ----------
@@ -220,7 +220,7 @@ class PreparedMotion:
         return MotionSteps(run, x, float(t0), t_end)
 
     def _steps(self, moving: Moving) -> bool:
-        """Whether its steps are ours alone, with nothing done between them."""
+        """Whether the motion's steps are ours alone, with nothing done between them."""
         options = self._options
         return not (
             self._events
@@ -256,7 +256,7 @@ class PreparedMotion:
         return moving.start(q, qd, t0, moving.values(parameters))
 
     def _moving(self, parameters: Mapping[str, Any] | None) -> Moving:
-        """What moves with these values of parameters that are built in, of the last few the same again."""
+        """Moving parts with these values of built-in parameters, kept for the last few values."""
         if self._varied and isinstance(parameters, Mapping):
             parameters = {name: value for name, value in parameters.items() if name not in self._varied}
         key = None if parameters is None else _key(parameters)
@@ -384,7 +384,7 @@ def prepare(
 
 
 def _level_of_caller() -> int:
-    """Where in the stack, above who asks, these files were called from."""
+    """Level of the stack, above who asks, from which these files were called."""
     level, frame = 1, sys._getframe(1)
     while frame.f_back is not None and frame.f_globals["__name__"].startswith("dynamics.simulation."):
         level, frame = level + 1, frame.f_back
@@ -392,7 +392,7 @@ def _level_of_caller() -> int:
 
 
 def _key(parameters: Mapping[str, Any]) -> Any:
-    """What tells parameter values apart, 0.0 and -0.0 too; of what are none, a key of its own."""
+    """Key that tells parameter values apart, 0.0 and -0.0 too; a key of its own for what are none."""
     try:
         return tuple([(name, type(value), float(value).hex()) for name, value in parameters.items()])
     except (TypeError, ValueError, OverflowError, AttributeError):

@@ -62,7 +62,7 @@ def unreached_momenta(
     *,
     start: tuple[float, Array, Array],
 ) -> list[str]:
-    """What speaks against rows (T, m) of a problem in momenta, a sentence each.
+    """Doubts of rows (T, m) of a problem in momenta, a sentence each.
 
     parameters: further inputs of the graph, (k,); without them 0, of forces that velocities do not depend on.
     start: the instant, q and qd, and the state (m,) that they make.

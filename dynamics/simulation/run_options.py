@@ -95,7 +95,7 @@ class RunOptions:
         self.__dict__.update(span(self.t0, self.t_end, self.t_eval), max_steps=most)
 
     def over(self, t0: float, t_end: float, t_eval: ArrayLike | None) -> RunOptions:
-        """The same of another run. Raises as a run does for its times."""
+        """Options of another run. Raises as a run does for its times."""
         other = object.__new__(RunOptions)
         other.__dict__.update(self.__dict__, **span(t0, t_end, t_eval))
         return other
@@ -128,7 +128,7 @@ class RunOptions:
 
     @property
     def estimated(self) -> bool:
-        """Whether runs beside it estimate the error."""
+        """Whether runs beside the main one estimate the error."""
         return not self.adaptive and self.estimate_error is not False
 
     @property
@@ -186,12 +186,12 @@ class RunOptions:
 
     @property
     def length(self) -> float:
-        """Of the run [s]."""
+        """Length of the run [s]."""
         return abs(self.t_end - self.t0)
 
     @property
     def row_times(self) -> Array:
-        """Of equal steps: the times of the rows, t_eval or every step, (T,)."""
+        """Times of the rows of equal steps, t_eval or every step, (T,)."""
         if self.times is not None:
             return self.times
         steps = step_count(self.length, self.step)
@@ -199,7 +199,7 @@ class RunOptions:
 
     @property
     def instants(self) -> list[float]:
-        """What equal steps have to meet [s]: t0, t_eval and t_end."""
+        """Instants that equal steps have to meet [s]: t0, t_eval and t_end."""
         times: list[float] = [] if self.times is None else self.times.tolist()
         first = [] if times[:1] == [self.t0] else [self.t0]
         last = [] if times[-1:] == [self.t_end] else [self.t_end]

@@ -56,7 +56,7 @@ class SampledController:
 
 
 class HeldForces(NamedTuple):
-    """What a SampledController has given in a run, a row for each period.
+    """Forces that a SampledController gave in a run, a row for each period.
 
     Parameters
     ----------
@@ -156,5 +156,5 @@ class Hold:
 
 
 def _rounding(t: float | Array) -> float | Array:
-    """By how much two times that are meant to be the same may differ [s]."""
+    """Largest difference of two times that are meant to be the same [s]."""
     return SAME * np.spacing(np.abs(t))

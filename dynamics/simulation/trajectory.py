@@ -37,7 +37,7 @@ class SimulationWarning(UserWarning):
 
 @dataclass(frozen=True)
 class Stats:
-    """How a run went, in SciPy's words where it has them.
+    """Statistics of a run, in SciPy's words where it has them.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ class Stats:
 
 
 class Crossings(NamedTuple):
-    """Where an event happened.
+    """Crossings of an event: instants and states.
 
     Parameters
     ----------
@@ -314,7 +314,7 @@ class Trajectory:
 
     @cached_property
     def multipliers(self) -> dict[str, Array]:
-        """What holds the constraints at the rows, {name: (T,)}: M qdd = tau + forces - damping qd - bias + J^T lambda.
+        """Multipliers of constraints at the rows, {name: (T,)}: M qdd = tau + forces - damping qd - bias + J^T lambda.
 
         The force [N] or torque [N m] of a `Loop`, whose rows are named after it; of other rows J qd + a = 0 the power
         [W] over the unit of J qd. 0 of rows that follow from others. Without constraints there are none.
@@ -363,7 +363,7 @@ class Trajectory:
 
     @property
     def message(self) -> str:
-        """That it reached t_end, or where and why the run stopped."""
+        """Sentence that the run reached t_end, or where and why it stopped."""
         return self.stats.message
 
     @property
@@ -383,7 +383,7 @@ class Trajectory:
 
     def _repr_html_(self) -> str | None:
         """The plot that a notebook shows, when a drawing package is installed (extra `viz`)."""
-        return extend.picture("trajectory", self)
+        return extend.render_html("trajectory", self)
 
     def __repr__(self) -> str:
         n, stats = self.q.shape[1], self.stats

@@ -116,7 +116,7 @@ def call_user_function(what: str, function: Callable[..., object], *arguments: o
 
 
 def _takes(function: Callable[..., object], count: int) -> bool:
-    """Whether it can be called with so many arguments."""
+    """Whether the function can be called with so many arguments."""
     if (code := _plain_code(function)) is not None:
         return 0 <= code.co_argcount - count <= len(function.__defaults__ or ())
     try:
@@ -127,7 +127,7 @@ def _takes(function: Callable[..., object], count: int) -> bool:
 
 
 def _keeps(function: Callable[..., object], place: int, name: str) -> bool:
-    """Whether its argument at this place has a default and another name: a value that it keeps."""
+    """Whether the function's argument at this place has a default and another name: a value that is kept."""
     if _plain_code(function) is not None and not function.__defaults__:
         return False
     taken = [*inspect.signature(function).parameters.values()][place : place + 1]

@@ -12,7 +12,7 @@ Function = Callable[..., Sequence[Node | float]]
 
 @dataclass(frozen=True, eq=False)
 class QuasiVelocities:
-    """How velocities u, (n,), move coordinates q, (nq,): qdot = G(q) u, with nq >= n.
+    """Motion of coordinates q, (nq,), by velocities u, (n,): qdot = G(q) u, with nq >= n.
 
     With the Lagrangian written in them, L(q, u, t), the equations of motion are those of Hamel, and of Euler and
     Poincare where q is a rotation:

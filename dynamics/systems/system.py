@@ -221,7 +221,7 @@ class System:
 
     @property
     def _given(self) -> tuple[Node, ...]:
-        """All nodes that the caller gave."""
+        """List of the nodes that the caller gave."""
         return (
             *self.partial_lagrangians,
             *self.forces,

@@ -59,7 +59,7 @@ def _moved(system: System, q: Array, qd: Array, t: float, rng: np.random.Generat
 
 
 def new_rows(system: System, q: Array, t: float) -> float:
-    """How much of the constraint that is nearest to a sum of the others is new; 1 without constraints."""
+    """Share of the constraint nearest to a sum of the others that is new; 1 without constraints."""
     return least_new(system.constraints, q, t, system.parameters) if len(system.constraints) else 1.0
 
 

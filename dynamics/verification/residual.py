@@ -36,7 +36,7 @@ class Residual:
 
     @property
     def passed(self) -> bool:
-        """Whether it is within its bound; NaN is not."""
+        """Whether the residual is within its bound; NaN is not."""
         return self.value <= self.bound.value
 
 
@@ -100,7 +100,7 @@ class Certificate:
         return lines + [f"left out: {each}" for each in self.left_out]
 
     def to_dict(self) -> dict[str, Json]:
-        """For JSON."""
+        """Dictionary for JSON."""
         return (
             {"passed": self.passed}
             | asdict(self)

@@ -30,7 +30,7 @@ RUN = [
 
 
 def test_the_table_has_every_status_and_every_command() -> None:
-    assert list(MEANS) == [cli.FINE, cli.FINDING, cli.ERROR, 130, 141, 143]
+    assert list(MEANS) == [cli.SUCCESS, cli.FINDING, cli.ERROR, 130, 141, 143]
     assert list(EXAMPLES) == list(COMMANDS)
     assert all(row[0] and row[2] for row in EXAMPLES.values())
     findings = {row[0].strip("`") for row in ROWS if len(row) == 5 and row[1]} - {"command"}
@@ -92,7 +92,7 @@ def test_a_full_disk_is_an_error_in_one_line(
 
 def test_a_closed_output_is_no_error(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "stdout", None)
-    assert cli.main(["completion", "bash"]) == cli.FINE
+    assert cli.main(["completion", "bash"]) == cli.SUCCESS
 
 
 def test_a_mistake_of_ours_is_no_finding(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:

@@ -74,14 +74,14 @@ class Canvas:
         self._draw = draw.Draw(self.image)
 
     def copy(self) -> Canvas:
-        """Another one with the same picture."""
+        """Copy with the same picture."""
         other = Canvas.__new__(Canvas)
         other.image = self.image.copy()
         other._draw = _pillow()[1].Draw(other.image)
         return other
 
     def put(self, other: Canvas, x: int, y: int) -> None:
-        """Another picture, with its upper left corner there."""
+        """Put another picture, with its upper left corner there."""
         self.image.paste(other.image, (_FINE * x, _FINE * y))
 
     def line(self, points: Sequence[Point], color: str, width: float) -> None:
@@ -148,7 +148,7 @@ def check_can_animate(kind: str) -> None:
 
 
 def _mp4(frame: Callable[[int], Canvas], count: int) -> bytes:
-    """By ffmpeg, which gets the frames as they are drawn; sides are even, as its usual colors need."""
+    """Film by ffmpeg, which gets the frames as they are drawn; sides are even, as its usual colors need."""
     first = frame(0).picture()
     width, height = first.width // 2 * 2, first.height // 2 * 2
     with TemporaryDirectory() as folder:

@@ -16,23 +16,23 @@ from .canvas import DARK, LIGHT, RATE, Canvas, Colors, Point
 SIDE, TITLE, CLOCK, MARGIN = 340, 30, 26, 14  # pixels: of a panel, its title, the time below, and around
 SIZE, SMALL = 14, 12  # of letters
 FOLLOW = 5.0  # how much larger than the mechanism its way is where the frame goes with it
-FINE = 4  # instants a frame, of the ways and curves that are drawn
-TRACE = RATE * FINE  # instants that the tip's way is shown for
+FRAME_ROWS = 4  # instants a frame, of the ways and curves that are drawn
+TRACE = RATE * FRAME_ROWS  # instants that the tip's way is shown for
 NAMED = 7  # curves at most
 SMALLEST = 1e-300  # what float64 has room for, with a product to spare
-ROUNDING = 1e-12  # of the largest value of a curve: a change that is none
+CURVE_ROUNDING = 1e-12  # of the largest value of a curve: a change that is none
 
 
 @dataclass(frozen=True)
 class Motion:
-    """Content of a panel.  values: (T, k, 2) points [m] or (T, m) curves, `FINE` rows a frame.  wrong: painted so."""
+    """Content of a panel.  values: (T, k, 2) points [m] or (T, m) curves, `FRAME_ROWS` a frame.  wrong: painted so."""
 
     title: str
     values: Array
     wrong: bool = False
 
 
-class Panel(ABC):
+class FilmPanel(ABC):
     """One kind of panel; all of a film share its scale.  wanted: as the motions' values, drawn faint, or None."""
 
     def __init__(self, motions: Sequence[Motion], wanted: Array | None) -> None:
@@ -44,7 +44,7 @@ class Panel(ABC):
         """Row k of a motion, in the square of `SIDE` below its title, whose left side is at 0."""
 
 
-class Sticks(Panel):
+class Sticks(FilmPanel):
     """Points that move, as sticks from their parents, (k,), -1 for what hangs in the world."""
 
     def __init__(self, motions: Sequence[Motion], wanted: Array | None, parents: Sequence[int]) -> None:
@@ -111,7 +111,7 @@ class Sticks(Panel):
                     canvas.line([(MARGIN, y), (MARGIN + SIDE, y)], colors.faint, 0.5)
 
 
-class Curves(Panel):
+class Curves(FilmPanel):
     """Coordinates over time: what has been, and where each is now.  names: of the curves, (m,).  t: (T,) [s]."""
 
     def __init__(self, motions: Sequence[Motion], wanted: Array | None, names: Sequence[str], t: Array) -> None:
@@ -122,7 +122,7 @@ class Curves(Panel):
         largest = max(abs(self.low), abs(self.high))
         if largest > 1.0 / SMALLEST:
             raise ValueError(f"coordinates up to {largest:.3g} are too large to be drawn")
-        if self.high - self.low <= max(ROUNDING * largest, SMALLEST):  # nothing moves
+        if self.high - self.low <= max(CURVE_ROUNDING * largest, SMALLEST):  # nothing moves
             pad = 0.5 * (largest if largest > SMALLEST else 1.0)
             self.low, self.high = self.low - pad, self.high + pad
 
@@ -159,10 +159,10 @@ class Curves(Panel):
             canvas.text((float(columns[k]) + 8.0, y), name, color, SMALL)
 
 
-def film(panel: Panel, t: Array, dark: bool = False, title: str = "") -> Callable[[int], Canvas]:
+def film(panel: FilmPanel, t: Array, dark: bool = False, title: str = "") -> Callable[[int], Canvas]:
     """Function that draws a frame: the panels of the motions side by side, the time below.
 
-    title: above all, empty for none.  t: (T,) [s], of which every `FINE`th is a frame.
+    title: above all, empty for none.  t: (T,) [s], of which every `FRAME_ROWS`th is a frame.
     """
     colors = DARK if dark else LIGHT
     wide = SIDE + 2 * MARGIN
@@ -176,12 +176,12 @@ def film(panel: Panel, t: Array, dark: bool = False, title: str = "") -> Callabl
         canvas = blank.copy()
         for i, motion in enumerate(panel.motions):
             part = Canvas(wide, TITLE + SIDE, colors.page)
-            panel.draw(part, motion, FINE * k, colors)
+            panel.draw(part, motion, FRAME_ROWS * k, colors)
             part.text(
                 (wide / 2.0, TITLE / 2.0), motion.title, colors.wrong if motion.wrong else colors.text, SIZE, "mm"
             )
             canvas.put(part, i * wide, head)
-        canvas.text((width / 2.0, height - CLOCK / 2.0), f"t = {t[FINE * k]:.2f} s", colors.text, SMALL, "mm")
+        canvas.text((width / 2.0, height - CLOCK / 2.0), f"t = {t[FRAME_ROWS * k]:.2f} s", colors.text, SMALL, "mm")
         return canvas
 
     return frame

@@ -26,13 +26,13 @@ class Command(argparse.ArgumentParser):
         self.names: dict[str, Callable[[], Iterable[str]]] = {}
 
     def load(self) -> None:
-        """Have the command's arguments."""
+        """Add the command's arguments."""
         if self.file:
             import_module(f".{self.file}", __package__).add(self)
             self.file = ""
 
     def complete(self) -> None:
-        """Have the arguments, and in their help the names."""
+        """Add the arguments, with the names in their help."""
         self.load()
         told = {name: ", ".join(names()) for name, names in self.names.items()}
         self.epilog = self.epilog and self.epilog.format(**told)

@@ -7,6 +7,7 @@ from cgraph.extend import doors
 TYPE_CHECKING = False
 
 if TYPE_CHECKING:
+    from dynamics.equations.constraints.integrability import ConstraintLint
     from dynamics.equations.formulations.node_classes import form_classes, formulation_classes
     from dynamics.equations.momentum.both_forms import (
         HAMILTON,
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from dynamics.experiments.work_precision.work_precision import to_csv
     from dynamics.integrators import TABLEAUS
     from dynamics.io.load import compiled
+    from dynamics.multibody.changes.pruning import PruneResult
     from dynamics.scenes.start import Start, moving_start, rest_text, with_start
     from dynamics.verification.certificate import certify
 
@@ -36,14 +38,14 @@ if TYPE_CHECKING:
     from ..graph_drawing.dot import to_dot
     from ..graph_drawing.render import check_can_draw, render_png, render_svg, tags_to_collapse
     from ..lessons.lesson import SCREENS, lesson
-    from ..models.animate import animate, frames
     from ..models.driven_motion import driven
     from ..models.equations import equation_graphs, equations_latex, equations_text
-    from ..models.inspect import inspection_page
+    from ..models.film import animate, frames
     from ..models.inspection import FRAMES, inspection
-    from ..models.live import live_page
+    from ..models.inspection_page import inspection_page
+    from ..models.live_motion import live_page
     from ..models.remarks import constant_momentum, tree_alone
-    from ..pages import pruning as pruning_page, stability as stability_page, work_precision as work_precision_page
+    from ..pages import pruning_page, stability_page, work_precision_page
     from ..pages.document import check_folder, document_files
     from ..pages.html import html_target
     from ..paper.paper import paper

@@ -6,6 +6,7 @@ import argparse
 
 import cgraph as cg
 import dynamics as dyn
+from cgraph import extend
 
 from . import library
 from .arguments import (
@@ -66,7 +67,7 @@ def run(options: argparse.Namespace) -> int:
     proof = lint_text(report, verdict)
     proof = proof if scene.ode is None else f"Holds: equations of first order have no velocities.\n{report}"
     ok = not faults and not (verdict and verdict.differs)
-    held = dyn.lint_constraints(scene) if scene.ode is None else dyn.ConstraintLint({}, {})
+    held = dyn.lint_constraints(scene) if scene.ode is None else library.ConstraintLint({}, {})
     if str(held):
         proof = f"{proof}\n{held}"
     conserved = dyn.conserved_momenta(scene) if scene.ode is None else ()
@@ -95,7 +96,7 @@ def run(options: argparse.Namespace) -> int:
     return 0 if ok and held.ok else 1
 
 
-def lint_text(report: cg.Lint, verdict: dyn.Verdict | None) -> str:
+def lint_text(report: extend.Lint, verdict: dyn.Verdict | None) -> str:
     """The report with the verdict before it, which tells better than tags what is gained on a path from qd to q."""
     if verdict is None:
         return str(report)

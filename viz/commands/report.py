@@ -256,7 +256,7 @@ def pruning_content(
     return {**described, "effects": list(kept), "graphs": graphs}
 
 
-def _account(pruned: dyn.PruneResult) -> dict[str, Any]:
+def _account(pruned: library.PruneResult) -> dict[str, Any]:
     full, left = pruned.full.counts(), pruned.graph.counts()
     sizes: dict[str, Any] = {
         name: {size: getattr(counts, size) for size in ("nodes", "edges", "depth")}

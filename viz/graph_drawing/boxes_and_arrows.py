@@ -11,13 +11,13 @@ from cgraph.extend import Names, columns, counted
 
 from .. import theme
 from ..theme import Paint
-from .draw_shapes import BOX, LEAF, Arrow, Attributes, Box
+from .draw_shapes import BOX, LEAF_SIZE, Arrow, Attributes, Box
 
 ClusterRule = Callable[[Node], str | None]
 
 _CONSTANT = {"shape": "box", "style": "filled", "height": "0.24", "margin": "0.05,0.02", "fontsize": "12"}
 _OPERATION = {"shape": "ellipse", "style": "filled", "height": "0.42", "width": "0.42", "margin": "0.04,0.02"}
-_OUTPUT = {**LEAF, "shape": "box", "style": "filled", "peripheries": "2"}
+_OUTPUT = {**LEAF_SIZE, "shape": "box", "style": "filled", "peripheries": "2"}
 _PART = {"shape": "box3d", "style": "filled", "margin": "0.16,0.08"}
 _THICK = {"penwidth": "3"}
 

@@ -175,10 +175,10 @@ def plain_drawing(
     )
 
 
-LENGTH = 10  # characters that fit a node
+LONGEST_LABEL = 10  # characters that fit a node
 
 
-def short_formulas(graph: Graph, names: Mapping[str, str], length: int = LENGTH) -> dict[Node, str]:
+def short_formulas(graph: Graph, names: Mapping[str, str], length: int = LONGEST_LABEL) -> dict[Node, str]:
     """The formulas of those operations without a name that have one of at most `length` characters.
 
     names: {name in the graph: text shown}.

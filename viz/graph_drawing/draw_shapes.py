@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 
 Attributes = dict[str, str]
 
-LEAF = {"height": "0.34", "margin": "0.09,0.04"}
-BOX = {**LEAF, "shape": "box", "style": "filled,rounded"}
+LEAF_SIZE = {"height": "0.34", "margin": "0.09,0.04"}
+BOX = {**LEAF_SIZE, "shape": "box", "style": "filled,rounded"}
 
 
 @dataclass(frozen=True)

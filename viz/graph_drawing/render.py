@@ -20,7 +20,7 @@ from .dot import to_dot
 
 ENGINES = ("dot", "neato", "fdp", "sfdp", "circo", "twopi", "osage", "patchwork")
 LONGEST_WAIT = 1e6  # s, that a drawing may be waited for
-LARGE = 500  # nodes; beyond, a layered drawing takes long and shows little
+LARGE_GRAPH = 500  # nodes; beyond, a layered drawing takes long and shows little
 
 # The WebAssembly Graphviz runs in a process of its own: it has no time limit, it aborts the process when threads use
 # it, and one failed drawing spoils the next. Its machine code is kept in wasmtime's cache, in the user's cache folder:
@@ -187,7 +187,7 @@ def check_can_draw(png: bool = True) -> None:
 
 def tags_to_collapse(graph: Graph) -> list[str]:
     """The tags to draw as one box where a graph has too many nodes for a picture: the rarest first, such as a link."""
-    if len(graph.nodes) <= LARGE:
+    if len(graph.nodes) <= LARGE_GRAPH:
         return []
     sizes = Counter([tag for node in graph.nodes for tag in node.tags])
     return sorted(sizes, key=lambda tag: (sizes[tag], theme.natural_order(tag)))

@@ -30,7 +30,7 @@ from ..pages.operations import graph_data
 from .content import Motion, State, StateTable, Version
 
 STAGES = {PRIMAL: "as written", ADJOINT: "reverse sweep", TANGENT: "forward sweep"}
-SMALL = 60  # nodes of a graph that is laid out by Graphviz
+SMALL_GRAPH = 60  # nodes of a graph that is laid out by Graphviz
 NODE_HEIGHT, LEAF_HEIGHT = 34.0, 30.0  # pixels, as in arrange.js
 LONGEST_NAME = 24  # letters of a name for which a box has room
 Letters = Callable[[str], str]
@@ -151,7 +151,7 @@ def _drawings(graphs: Sequence[Graph], letters: Letters) -> list[dict[str, Json]
     nodes: [x, y, width] of every node, null for a constant, which is written where it is used; outputs the same.
     lines: {"n<source> n<target>" or "n<source> o<name>": path}.
     """
-    if max([len(graph.nodes) for graph in graphs], default=0) > SMALL:
+    if max([len(graph.nodes) for graph in graphs], default=0) > SMALL_GRAPH:
         return [None] * len(graphs)
     planned = [_planned(graph, letters) for graph in graphs]
     try:

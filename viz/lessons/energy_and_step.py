@@ -19,8 +19,8 @@ from .subject import Screen, Subject, number
 FACTORS = (2, 4, 16)  # by which the error of a method of order 1, 2 or 4 shrinks
 STEPS, FINE = (100, 30, 10), 16  # of the coarse motion, and how many of the reference's there are in one
 LONGEST_MOTION, HALVINGS = 1.0, 20  # s, of the motion whose order is measured, and how often it is halved
-ROUNDING = 1e-12  # of the largest coordinate: an error that says nothing about a method
-SMALL = 1e-5  # of the largest coordinate: an error that has not grown beyond its order
+ROUNDING_ERROR = 1e-12  # of the largest coordinate: an error that says nothing about a method
+SMALL_ERROR = 1e-5  # of the largest coordinate: an error that has not grown beyond its order
 
 
 _BRAKED = (
@@ -113,8 +113,8 @@ def _measured(subject: Subject) -> Measured:
                 continue
             size = max(float(np.abs(exact).max()), float(np.abs(subject.q).max()))
             errors = {1: float(np.abs(coarse - exact).max()), 2: float(np.abs(finer - exact).max())}
-            if errors[1] <= SMALL * size:
-                last = Measured(t_end, steps, errors, ROUNDING * size)
+            if errors[1] <= SMALL_ERROR * size:
+                last = Measured(t_end, steps, errors, ROUNDING_ERROR * size)
                 if errors[2] > last.rounding:
                     return last
         if last is not None:

@@ -24,7 +24,7 @@ from .. import theme
 from ..pages.operations import graph_data
 
 DT = 1e-3  # s, of the embedded formulations
-LARGEST = 4000  # nodes that the page computes many times a second
+LARGEST_GRAPH = 4000  # nodes that the page computes many times a second
 SHOWN = 6  # joints with a slider or a row of their own; of more, the first
 REACH = 3.2  # of a slider to both sides of 0
 _SPEEDS, _ACCELERATIONS, _BENDS = (1.0, -0.8, 0.6), (0.5, 1.0, -0.7), (0.0, -0.8, 0.9)  # in turn, for the joints
@@ -82,8 +82,8 @@ class Subject:
         ]
 
     def play(self, kind: str, graphs: Mapping[str, Graph], **other: object) -> dict[str, object] | None:
-        """What the page's script draws by these graphs, at its state; None where they are too large for it."""
-        if sum([len(graph.nodes) for graph in graphs.values()]) > LARGEST:
+        """Data by which the page's script draws these graphs at its state; None where they are too large for it."""
+        if sum([len(graph.nodes) for graph in graphs.values()]) > LARGEST_GRAPH:
             return None
         return {"kind": kind} | {name: graph_data(graph) for name, graph in graphs.items()} | other
 

@@ -1,5 +1,5 @@
 """The live motion: a panel that computes a system's motion in the page, by WebAssembly."""
 
-from .page import Live, page_text, panel
+from .live_panel import Live, page_text, panel
 
 __all__ = ["Live", "page_text", "panel"]

@@ -152,7 +152,7 @@ def _along(
 
 
 def _hamilton(scene: Scene, end: float, times: Array | None, say: Callable[[str], None]) -> Inspection:
-    """Both forms of the equations in the state (q, p), along a motion that is stepped in it; velocities follow."""
+    """The two forms of the equations in the state (q, p), along a motion that is stepped in it; velocities follow."""
     say(f"{scene.name}: deriving Hamilton's equations, and the state equation beside them")
     forms = both_forms(scene)
     hamilton, system, sizes = forms[HAMILTON], scene.system, form_sizes(forms)

@@ -108,7 +108,7 @@ class _Writer:
         self.written: dict[Node, tuple[str, int]] = {}
 
     def text(self, q: Sequence[float], qd: Sequence[float]) -> str:
-        """All lines."""
+        """Text of all lines."""
         system, damping = self.system, [node for node in self.system.damping if isinstance(node, Node)]
         order = topological([system.lagrangian, *system.forces, *damping])
         uses = Counter([arg for node in order for arg in node.args])
@@ -175,5 +175,5 @@ def _usable(name: str) -> bool:
 
 
 def _number(value: float) -> str:
-    """All digits, and no point where none is needed."""
+    """Number with all its digits, and no point where none is needed."""
     return repr(float(value)).removesuffix(".0")

@@ -11,10 +11,13 @@ from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
 from tempfile import TemporaryFile
+from typing import Any
 
 from cgraph.extend import Json
 
 from .html import STYLE, compose
+
+ReportData = Mapping[str, Any]  # a report, or a part of one, as plain data: `to_dict()` of it, or its JSON file
 
 
 @dataclass(frozen=True)
@@ -136,7 +139,7 @@ class Document:
     sections: Sequence[Section] = field(default_factory=tuple)
 
     def pictures(self) -> list[Picture]:
-        """All pictures, in order."""
+        """List of all pictures, in order."""
         blocks = [*self.introduction, *(block for section in self.sections for block in section.blocks)]
         return [block for block in blocks if isinstance(block, Picture)]
 

@@ -94,7 +94,7 @@ class Panel(NamedTuple):
 def compose(
     title: str, body: str, style: str, script: str = "", data: Mapping[str, object] | None = None, allowed: str = ""
 ) -> Page:
-    """One file, of which nothing is fetched from anywhere, and whose policy lets its own script and style alone run.
+    """Page of one file, which fetches nothing and whose policy lets its own script and style alone run.
 
     body: HTML.  data: {id of an element: what scripts read there as JSON}.  allowed: what else scripts may do. A page
     without a script may have styles at its elements.

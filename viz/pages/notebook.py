@@ -12,7 +12,7 @@ from cgraph.extend import Array, counted, require_graph, topological
 
 from .. import theme
 from ..graph_drawing.dot import to_dot
-from ..graph_drawing.render import LARGE, render_svg, tags_to_collapse
+from ..graph_drawing.render import LARGE_GRAPH, render_svg, tags_to_collapse
 from .mathml import equations
 
 SECONDS = 20.0  # for Graphviz; a cell that takes longer shows text
@@ -40,7 +40,7 @@ def graph_html(graph: Graph) -> str:
     said = (
         f"{counted(len(graph.nodes), 'node')}; <code>viz.page(graph)</code> unfolds them, and shows values and paths."
     )
-    if len(graph.nodes) > LARGE and not tags:
+    if len(graph.nodes) > LARGE_GRAPH and not tags:
         return f"<p>{escape(repr(graph))}: {said}</p>"
     svg = render_svg(to_dot(graph, collapse=tags), timeout=SECONDS)
     note = f"<p>Folded by tags: {said}</p>" if tags else ""

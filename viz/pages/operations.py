@@ -12,7 +12,7 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import OPS, Json, Op
 
-Part = str | int | list[Any]  # of a formula: a text, the number of an argument, [element, attributes, *parts]
+FormulaPart = str | int | list[Any]  # of a formula: a text, the number of an argument, [element, attributes, *parts]
 
 
 def values() -> str:
@@ -61,7 +61,7 @@ def slopes(op: Op) -> dict[str, Json]:
     return {"code": code, "out": [number[node] for node in partials]}
 
 
-def _tree(op: Op) -> Part:
+def _tree(op: Op) -> FormulaPart:
     """The formula of an operation as a tree, so that the page makes elements and reads no markup."""
     assert op.mathml is not None
     try:
@@ -71,7 +71,7 @@ def _tree(op: Op) -> Part:
     return _element(root)
 
 
-def _element(element: ElementTree.Element) -> Part:
+def _element(element: ElementTree.Element) -> FormulaPart:
     """[name, attributes, *what is inside]."""
     parts = _parts(element.text)
     for child in element:
@@ -79,7 +79,7 @@ def _element(element: ElementTree.Element) -> Part:
     return [element.tag, element.attrib, *parts]
 
 
-def _parts(text: str | None) -> list[Part]:
+def _parts(text: str | None) -> list[FormulaPart]:
     """Text and the numbers of arguments, which stand as {0}, {1}, .. in it."""
     return [
         int(part[1:-1]) if re.fullmatch(r"{\d}", part) else part for part in re.split(r"({\d})", text or "") if part

@@ -18,14 +18,14 @@ from .part import Part, drawn
 TITLES = {LAGRANGE: "Lagrange: accelerations of (q, q̇)", HAMILTON: "Hamilton: rates of (q, p)"}
 SPRING, ARM = "a rotor on a spring", "the three-link arm"
 LARGER = {"a planar chain of 20": "planar 20", "an arm of 7 in space": "arm 7", "a tree of 15": "tree 15"}
-LARGE = Scale(
+LARGE_SCALE = Scale(
     row=68.0,
     gap=62.0,
     width=48.0,
     height=30.0,
     names={**theme.ONE_JOINT, "p0": "p", "q0_dot": "dθ/dt", "qd0_dot": "dω/dt"},
 )
-SMALL = Scale(row=15.0, gap=13.0, width=8.0, height=8.0, ticks=5)
+SMALL_SCALE = Scale(row=15.0, gap=13.0, width=8.0, height=8.0, ticks=5)
 LINKS = 50  # of the chain that is drawn as a silhouette
 METHODS = ("recursive", "balanced")
 SIZES = ("nodes", "edges", "depth", "width")
@@ -40,11 +40,11 @@ def figure7(larger: Mapping[str, str] = LARGER) -> Part:
     shown = {SPRING: both_forms(scenes.load("spring_mass")), ARM: both_forms(scenes.load("triple_pendulum"))}
     sizes = {name: form_sizes(forms) for name, forms in shown.items()}
     sizes |= {name: form_sizes(both_forms(SCENES[model]())) for name, model in larger.items()}
-    spring = levels_svg([LevelPanel(TITLES[name], graph) for name, graph in shown[SPRING].items()], LARGE)
+    spring = levels_svg([LevelPanel(TITLES[name], graph) for name, graph in shown[SPRING].items()], LARGE_SCALE)
     level = sizes[ARM][VELOCITIES_ALONE].depth
     marks: dict[str, Mapping[str, int]] = {HAMILTON: {"q̇ is solved": level}}
     arm = levels_svg(
-        [LevelPanel(TITLES[name], graph, marks.get(name, {})) for name, graph in shown[ARM].items()], SMALL
+        [LevelPanel(TITLES[name], graph, marks.get(name, {})) for name, graph in shown[ARM].items()], SMALL_SCALE
     )
     kinds = kinds_in(*shown[SPRING].values(), *shown[ARM].values())
     legend = legend_svg(theme.in_words(kinds, theme.MOTION_WORDS))
@@ -110,7 +110,7 @@ def _cause(forms: Mapping[str, Counts]) -> str:
 
 
 def _chain(links: int, method: str) -> dict[str, Graph]:
-    """Both forms of a planar chain, by one order of elimination."""
+    """The two forms of a planar chain, by one order of elimination."""
     arm = chain(0.1, 0.1, links)
     return {"Lagrange": state_equation(arm, method), "Hamilton": hamilton_equations(arm, method)}
 

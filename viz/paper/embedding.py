@@ -14,8 +14,8 @@ from dynamics.experiments.timing import exponent
 from dynamics.systems.model import Model, as_system
 
 from ..pages.document import Block, Paragraph, Table
-from ..pages.formulations import COLORS, TITLES
-from ..plots.direct_labels import Line, Panel, labeled
+from ..pages.formulation_table import COLORS, TITLES
+from ..plots.direct_labels import Line, PlotPanel, labeled
 from .part import Part, plotted
 
 LINKS = (1, 2, 3, 6)
@@ -113,7 +113,7 @@ def embedding(links: Sequence[int] = LINKS) -> Part:
     return Part("law", "How wrong, and why dt does not help", blocks, data)
 
 
-def _panels(laws: Sequence[EmbeddingError]) -> list[Panel]:
+def _panels(laws: Sequence[EmbeddingError]) -> list[PlotPanel]:
     """The errors, and the distances from their limits beside a line of slope 1."""
     x = "dt [s] (smaller to the right)"
     panels = []
@@ -124,7 +124,7 @@ def _panels(laws: Sequence[EmbeddingError]) -> list[Panel]:
             for law in laws
             if getattr(law, of).min() > 0.0
         ]  # fmt: skip
-        panels.append(Panel(title, x, "largest |Δτ| [N m]", lines))
+        panels.append(PlotPanel(title, x, "largest |Δτ| [N m]", lines))
     steps = laws[0].dt.tolist()
     top = 4.0 * max(max(line.y) for line in panels[1].lines)
     panels[1].lines.append(Line("slope 1", steps, [top * dt / steps[0] for dt in steps], None))

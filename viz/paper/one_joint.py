@@ -14,7 +14,7 @@ from ..graph_drawing.dot import plain_drawing
 from ..graph_drawing.legend import kinds_in, legend_svg, to_adaptive
 from ..graph_drawing.render import render_svg
 from ..pages.document import Block, Listing, Paragraph, Picture
-from ..pages.formulations import TITLES, WHY_FEWER, size_table
+from ..pages.formulation_table import TITLES, WHY_FEWER, size_table
 from .part import Part, drawn
 
 EQUATION = "Lagrange's equation, τ = dp/dt − ∂L/∂θ"

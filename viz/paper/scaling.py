@@ -14,8 +14,8 @@ from dynamics.experiments.timing import exponent, spent
 from dynamics.simulation.progress_bar import Progress
 
 from ..pages.document import Block, Paragraph, Table
-from ..pages.formulations import COLORS, TITLES
-from ..plots.direct_labels import Line, Panel, labeled
+from ..pages.formulation_table import COLORS, TITLES
+from ..plots.direct_labels import Line, PlotPanel, labeled
 from .part import Part, plotted
 
 COUNTS = (1, 2, 3, 4, 6, 8, 10, 14, 20, 28, 40)
@@ -97,7 +97,7 @@ def scaling_of_counts(links: Sequence[int] = COUNTS) -> Part:
     return Part("scaling", "Scaling with the number of links", blocks, data, {"scaling.csv": points_csv})
 
 
-def _panels(rows: Sequence[NodeScaling]) -> list[Panel]:
+def _panels(rows: Sequence[NodeScaling]) -> list[PlotPanel]:
     """Edges and times over the number of links, beside lines of slope 1 and 2."""
     panels = []
     for title, y, of in (("edges", "edges", "edges"), ("one compiled evaluation", "time [µs]", "microseconds")):
@@ -111,7 +111,7 @@ def _panels(rows: Sequence[NodeScaling]) -> list[Panel]:
         at = [line.y[rows[0].n.index(links[0])] for line in lines]
         for power, start in ((1, 0.5 * min(at)), (2, 2.0 * max(at))):
             lines.append(Line(f"slope {power}", links, [start * (n / links[0]) ** power for n in links], None))
-        panels.append(Panel(title, "links n", y, lines))
+        panels.append(PlotPanel(title, "links n", y, lines))
     return panels
 
 

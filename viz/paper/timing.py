@@ -17,7 +17,7 @@ from dynamics.experiments.timing import spent
 from dynamics.peers.torch import eager_evaluations
 
 from ..pages.document import Block, Paragraph, Table
-from ..pages.formulations import COLORS, TITLES
+from ..pages.formulation_table import COLORS, TITLES
 from ..plots import plot
 from .part import Part, plotted
 

@@ -22,8 +22,8 @@ if TYPE_CHECKING:
 COLORS = (theme.BLUE, theme.ORANGE, theme.GREEN, theme.PURPLE, theme.SKY_BLUE)  # seen on white and on black
 LABEL = 8.0  # points
 APART = 1.1  # of a label's height, from one to the next
-GAP = 6.0  # points between the end of a curve and its label
-LETTER = 0.58  # of a label's size, the width of a letter
+LABEL_GAP = 6.0  # points between the end of a curve and its label
+LETTER_WIDTH = 0.58  # of a label's size, the width of a letter
 REACH = 26  # half heights that a label may be moved up or down
 ROOM = 0.2  # of the axis, for the names
 
@@ -40,7 +40,7 @@ class Line:
 
 
 @dataclass(frozen=True)
-class Panel:
+class PlotPanel:
     """Curves under a title.  x, y: the axes' names."""
 
     title: str
@@ -50,7 +50,7 @@ class Panel:
 
 
 def labeled(
-    panels: Sequence[Panel], *, columns: int = 2, shared: bool = True, rising: bool = False, room: float = ROOM
+    panels: Sequence[PlotPanel], *, columns: int = 2, shared: bool = True, rising: bool = False, room: float = ROOM
 ) -> Figure:
     """Panels with logarithmic axes, x from large on the left to small on the right; `rising`, the other way.
 
@@ -119,15 +119,15 @@ def _name(axis: Axes, lines: Sequence[Line]) -> None:
     paths = [axis.transData.transform(np.column_stack([line.x, line.y])) for line in lines if len(line.x)]
     inked = np.vstack([_dense(path) for path in paths]) if paths else np.empty((0, 2))
     frame = axis.get_window_extent()
-    height, letter = APART * LABEL * scale, LETTER * LABEL * scale
-    placed: list[Box] = []
+    height, letter = APART * LABEL * scale, LETTER_WIDTH * LABEL * scale
+    placed: list[LabelBox] = []
     named = [line for line in lines if len(line.x)]
     for line, path in sorted(zip(named, paths, strict=True), key=lambda pair: -pair[1][-1, 1]):
         end = path[-1]
         width = letter * len(line.name)
-        left = min(end[0] + GAP * scale, frame.x1 - width)
+        left = min(end[0] + LABEL_GAP * scale, frame.x1 - width)
         choices = [
-            Box(left + dx * letter, left + dx * letter + width, end[1] + dy * 0.5 * height, height)
+            LabelBox(left + dx * letter, left + dx * letter + width, end[1] + dy * 0.5 * height, height)
             for dx in (0, 2, 4, 7, 10)
             for dy in range(-REACH, REACH + 1)
             if left + dx * letter + width <= frame.x1 + 1.0
@@ -135,7 +135,7 @@ def _name(axis: Axes, lines: Sequence[Line]) -> None:
         inside = [box for box in choices if frame.y0 < box.middle - height / 2 and box.middle + height / 2 < frame.y1]
         best = min(inside or choices, key=lambda box: box.cost(end, placed, inked, letter))
         placed.append(best)
-        moved = abs(best.middle - end[1]) > 0.6 * height or best.left - end[0] > 2.5 * GAP * scale
+        moved = abs(best.middle - end[1]) > 0.6 * height or best.left - end[0] > 2.5 * LABEL_GAP * scale
         arrow: dict[str, Any] = {"arrowstyle": "-", "color": theme.LINE, "linewidth": 0.5, "shrinkA": 1, "shrinkB": 2}
         axis.annotate(
             line.name,
@@ -150,7 +150,7 @@ def _name(axis: Axes, lines: Sequence[Line]) -> None:
         )
 
 
-class Box(NamedTuple):
+class LabelBox(NamedTuple):
     """Place where a name could be, in pixels."""
 
     left: float
@@ -158,7 +158,7 @@ class Box(NamedTuple):
     middle: float
     height: float
 
-    def cost(self, end: Points, placed: Sequence[Box], inked: Points, letter: float) -> float:
+    def cost(self, end: Points, placed: Sequence[LabelBox], inked: Points, letter: float) -> float:
         """Cost of a place: on another name is worst, then on curves, then far from the end."""
         names = sum(
             other.left - 2 * letter < self.right

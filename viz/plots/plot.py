@@ -59,7 +59,7 @@ def to_svg(figure: Figure) -> str:
 
 
 def to_adaptive_svg(figure: Figure, *, background: bool = False) -> str:
-    """As `to_svg`, with ink for light and dark pages, as the reader's system asks, and no background.
+    """The figure as SVG text with ink for light and dark pages, as the reader's system asks, and no background.
 
     background: with one that adapts too, for pages that may have made another choice than the system.
     """

@@ -166,7 +166,7 @@ class BalancedElimination(EdgePushing):
         return super().info({*negative, *[unknown for pair in self._copies.values() for unknown in pair]})
 
     def depth_of(self, solved: EdgePushing, wrt: Sequence[Node]) -> int:
-        """How deep the solution of some equations is."""
+        """Depth of the solution of some equations."""
         return max([self._depth(solved.dots[node]) for node in wrt], default=0)
 
     def _depth(self, node: Node) -> int:

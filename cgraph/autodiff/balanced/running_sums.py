@@ -31,7 +31,7 @@ class Block(NamedTuple):
 
 
 def balanced_sums(graph: Graph) -> Graph:
-    """The same function with long running sums in blocks of 2, 4, 8 .. terms: their depth is the logarithm of n.
+    """The function with long running sums in blocks of 2, 4, 8 .. terms: their depth is the logarithm of n.
 
     A partial sum of k terms is made of the blocks that the binary digits of k stand for (as in Fenwick's tree). One sum
     of n terms takes n - 1 additions as before, and is log2 n + 1 deep at most; all of its partial sums take about

@@ -42,7 +42,7 @@ def _is_in_the_library(name: str) -> bool:
 
 
 def distinct(names: Sequence[str]) -> list[str]:
-    """For each of these different names a different word of ASCII letters, digits and _, to stand behind a prefix.
+    """Different words for different names, of ASCII letters, digits and _, to stand behind a prefix.
 
     A name that is such a word stays; Greek letters are spelled out; other characters become _, and its place follows
     where two names would become one.

@@ -81,5 +81,5 @@ def counted(items: list[bytes]) -> bytes:
 
 
 def sized(content: bytes) -> bytes:
-    """How many bytes, then these."""
+    """Number of bytes, then these."""
     return unsigned(len(content)) + content

@@ -24,7 +24,7 @@ class Tableau(Protocol):
 
 
 class Embedded(Tableau, Protocol):
-    """One with weights of an error estimate."""
+    """Explicit method with weights of an error estimate."""
 
     @property
     def error(self) -> tuple[tuple[float, ...], ...]:

@@ -15,8 +15,8 @@ from ..edge_partials import Point, checked
 from ..names import Names
 from .finding import Finding
 
-UNIT = 2.0**-53  # relative error of one rounding
-DIGITS = -math.log10(UNIT)  # 15.95 decimal digits of a float64
+ROUNDOFF = 2.0**-53  # relative error of one rounding
+FLOAT_DIGITS = -math.log10(ROUNDOFF)  # 15.95 decimal digits of a float64
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,7 @@ class Rounded:
 
 def rounded(names: Names, at: Point) -> Rounded:
     """Values and error bounds: each input is off by half a unit in the last place, as a decimal number would be."""
-    values, errors = error_bounds(names.graph.nodes, checked(names, at), UNIT, of_inputs=UNIT)
+    values, errors = error_bounds(names.graph.nodes, checked(names, at), ROUNDOFF, of_inputs=ROUNDOFF)
     return Rounded(*[{node: float(each[node]) for node in names.graph.nodes} for each in (values, errors)])
 
 

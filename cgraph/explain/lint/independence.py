@@ -136,7 +136,7 @@ def _report(
 def _paths_through(
     cut: Sequence[Edge], nodes: Sequence[Node], edges: Sequence[Edge], sources: Sequence[Node], sinks: Sequence[Node]
 ) -> list[list[Edge]]:
-    """For each edge of the cut a shortest path from a source to a sink through it."""
+    """Shortest path from a source to a sink through each edge of the cut."""
     paths = []
     for edge in cut:
         (before,) = best_paths(nodes, edges, sources, [edge.source], 1)

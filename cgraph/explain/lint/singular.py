@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 from ...core.graph import Graph
 from ...core.node import CONSTANT, VARIABLE, Node
-from ...operations.bounds import LINE
+from ...operations.bounds import REAL_LINE
 from ...operations.operation import Interval, Op, columns
 from ...util.json_type import Json, json_number
 from ...util.real_arrays import real_number
@@ -28,7 +28,7 @@ def intervals(graph: Graph, box: Box) -> dict[Node, Interval]:
     found: dict[Node, Interval] = {}
     for node in graph.nodes:
         if node.op is VARIABLE:
-            found[node] = given.get(str(node.name), LINE)
+            found[node] = given.get(str(node.name), REAL_LINE)
         elif node.op is CONSTANT:
             assert node.value is not None
             found[node] = (node.value, node.value)
@@ -41,14 +41,14 @@ def intervals(graph: Graph, box: Box) -> dict[Node, Interval]:
 def value_of(op: Op, arguments: list[Interval], *, same: bool = False) -> Interval:
     """The interval of an operation's value; `same`: its two arguments are one node."""
     if op.interval is None:
-        return LINE
+        return REAL_LINE
     if same and op.interval_of_same is not None:
         return op.interval_of_same(arguments[0])
     return op.interval(*arguments)
 
 
 def singular_at(op: Op, arguments: list[Interval]) -> str | None:
-    """Where within the arguments' intervals the operation has no bounded slope, in words; None if nowhere."""
+    """Words on where in the arguments' intervals the operation has no bounded slope; None if nowhere."""
     if op.singular is not None:
         return op.singular(*arguments)
     return None if op.interval is not None else f"{op.name}, of which no bounds are known"

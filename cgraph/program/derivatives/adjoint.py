@@ -15,7 +15,7 @@ HEAVY = 4  # operations of a graph for each of its outputs, from which on these 
 
 
 class Replayed(NamedTuple):
-    """How values come back that statements backwards read.
+    """Recovery of the values that statements backwards read.
 
     again: what computes those that are cheap.  tape: registers to be recorded, results of heavy statements.
     wanted: registers that both need from before the assignments.
@@ -64,7 +64,7 @@ class Adjoint(Registers):
             row.transpose(assignment, self)
 
     def collect(self, register: str, bar: str) -> None:
-        """One more term of a register's cotangent."""
+        """Add a term to a register's cotangent."""
         if register not in self.bars:
             self.bars[register] = bar
             return
@@ -107,12 +107,12 @@ class Adjoint(Registers):
         return [self.recording.get(each, each) for each in part]
 
     def replayed(self, part: Sequence[Assignment], statements: Sequence[Statement]) -> Replayed:
-        """How the values come back that statements read of assignments before them."""
+        """Recovery of the values that statements read of assignments before them."""
         return replayed(self.forward(part), effects(statements)[0])
 
 
 def replayed(assignments: Sequence[Assignment], values: Iterable[str]) -> Replayed:
-    """How values come back that assignments computed: those of heavy statements are recorded, others made again."""
+    """Recovery of values that assignments computed: those of heavy statements are recorded, others made again."""
     wanted, tape = set(values), dict[str, None]()
     again: list[Statement] = []
     for assignment in reversed(assignments):

@@ -32,11 +32,11 @@ class Pullback(Protocol):
 
     @property
     def residuals(self) -> int:
-        """How many of the last outputs have no cotangents."""
+        """Number of the last outputs that have no cotangents."""
         ...
 
     def __call__(self, wrt: Sequence[Node]) -> Graph:
-        """From the inputs, the values of the outputs, and their cotangents, to the cotangents of `wrt`."""
+        """Graph from inputs, values of outputs and their cotangents to the cotangents of `wrt`."""
         ...
 
 

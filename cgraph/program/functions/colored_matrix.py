@@ -45,7 +45,7 @@ class Derivative(NamedTuple):
 
 
 class Part(NamedTuple):
-    """Some of the entries, by a derivative along sums of unit vectors.
+    """Entries that one derivative along sums of unit vectors gives.
 
     colors: of each unit vector the sum that it is in.  color, result: of each entry, the sum and the number in its
     results that holds it.  entries: their numbers in the pattern.

@@ -70,8 +70,9 @@ class Compiled(BoundFunction, Differentiable):
     def batch(self, X: ArrayLike, threads: int | None = 1, *, out: Array | None = None) -> Array:
         """Values of the outputs, (n_out, N), at N points X, (n_in, N).
 
-        Machine code reads and writes points that lie one after another, such as `rows.T` of rows (N, n_in), as they
-        lie: `.T` of the result then is rows, too.
+        The last axis counts the points here, so that the numbers of one input lie side by side in the lanes of vectors;
+        derivatives and motions have it first. Machine code reads and writes points that lie one after another, such as
+        `rows.T` of rows (N, n_in), as they lie: `.T` of the result then is rows, too.
         out: where they go, an array of float64 (n_out, N) that shares no memory with X; a new one by default.
         threads: how many may share the work; None: one for each core. A batch too small to gain by it takes fewer, and
         generated Python (backend "python") takes one. They change nothing in the values.

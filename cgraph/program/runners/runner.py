@@ -182,6 +182,7 @@ class Runner(ABC):
         """Run N memories (size, N) at once, in vectors: as `run` does each, whichever course it takes.
 
         feed: (passes, feed_width, N), or (passes, feed_width, 1) for all.  The record has rows (rows, width, N).
+        The last axis counts the memories, as in `Compiled.batch`: each number of all of them is a row, read as vectors.
         Raises GraphError, besides as `run`, for a program with `record_if` or `stop`, by which memories would have
         other numbers of rows or passes, or with statements that run one memory alone.
         """

@@ -194,7 +194,7 @@ class _Lanes:
         return f"{begin}.at"
 
     def move(self, name: str, stack: str, begin: str, names: Names) -> None:
-        """Between rows of the stack and registers, end to end: to the stack, "stack.put", or from it, "stack.get"."""
+        """Move between rows of the stack and registers, end to end: to it, "stack.put", or from it, "stack.get"."""
         writer, at = self._writer, 0
         function = writer.functions.text(name, partial(_move_text, name=name))
         for register in names:

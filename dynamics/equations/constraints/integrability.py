@@ -39,7 +39,7 @@ ROW_ROUNDING = 1e-9  # of the size of a row and its slopes
 
 @documented
 def integrable_rows(model: Model) -> dict[str, bool]:
-    """Which constraints hold positions: those given as such, and rows of velocities that could be (holonomic ones).
+    """Constraints that hold positions: those given as such, and rows of velocities that could be (holonomic ones).
 
     A row that is not integrable, such as that of rolling, holds velocities alone: all positions can still be reached.
 
@@ -197,7 +197,7 @@ class ConstraintLint:
         return "\n".join(lines + [f"coordinate {name!r} {multipliers[said]}" for name, said in self.vakonomic.items()])
 
     def to_dict(self) -> dict[str, Json]:
-        """For JSON."""
+        """Dictionary for JSON."""
         return {"ok": self.ok, "integrable": dict(self.integrable), "vakonomic": dict(self.vakonomic)}
 
 

@@ -92,7 +92,7 @@ def lost_rank(constraints: Constraints, q: Array, t: float, parameters: Mapping[
 
 
 def least_new(constraints: Constraints, q: Array, t: float, parameters: Mapping[str, float]) -> float:
-    """How much is new at a state of the row of which least is, of those a system is solved with; 0 if one follows."""
+    """New share at a state, of the row of which least is, of those a system is solved with; 0 if one follows."""
     rows, numbers = list(independent_rows(constraints)), row_numbers(constraints)
     matrix = numbers.matrix(numbers.point(q, {"t": t, **parameters}))
     matrix[np.setdiff1d(np.arange(len(matrix)), rows)] = 0.0
@@ -148,7 +148,7 @@ def without_nearly_redundant(constraints: Constraints) -> Constraints:
 
 
 def _gaps(constraints: Constraints, numbers: RowNumbers, found: list[dict[str, float]], closed: set[int]) -> Array:
-    """How far each row is open, (m,), at the most, at random states where these are closed."""
+    """Largest gap of each row, (m,), at random states where these are closed."""
     points, others = list(found), [k for k in range(len(constraints)) if k not in closed]
     with suppress(ConstraintError):
         points += RowNumbers(constraints.without(dict.fromkeys(others, 0.0))).states()

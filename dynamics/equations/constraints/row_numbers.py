@@ -181,7 +181,7 @@ class RowNumbers:
         return reach
 
     def typical(self, point: dict[str, float], reach: Array) -> Array:
-        """How large entries of J are about a state, (m, n), where the rows need not be met."""
+        """Sizes of the entries of J about a state, (m, n), where the rows need not be met."""
         rng = np.random.default_rng(1)
         places = [point, *[self.displaced(point, reach, rng) for _ in range(NEAR)]]
         near = [np.abs(self.matrix(each)) for each in places]

@@ -173,7 +173,7 @@ def _finished(system: System, formulation: str) -> Graph:
 
 
 def _smaller(system: System) -> tuple[str, Graph]:
-    """That of the `SMALL` ones whose finished graph is the smaller, and this graph.
+    """Name of the `SMALL` formulation whose finished graph is the smaller, and this graph.
 
     Of bodies the chain rule gave it in none of 1600 random trees beyond 58 nodes, unless most joints are slides, which
     take 7 nodes each; so for large graphs, which take long, it is not asked.

@@ -300,6 +300,6 @@ def _state(system: System, verdict: Verdict) -> tuple[dict[str, float], int]:
 
 
 def _listed(texts: Iterable[str]) -> str:
-    """All of a few texts, of many the first."""
+    """Text of a few texts, or of the first of many."""
     shown = list(texts)
     return ", ".join(shown if len(shown) <= SHOWN else [*shown[:SHOWN], f"and {len(shown) - SHOWN} more"])

@@ -56,7 +56,7 @@ class ColumnGraphs(NamedTuple):
 
     @property
     def sides(self) -> int:
-        """How many entries the right-hand sides have."""
+        """Number of entries of the right-hand sides."""
         return self.columns * (len(self.column.inputs) - self.factors)
 
 
@@ -82,7 +82,7 @@ class LinearizationParts(NamedTuple):
 
     @property
     def size(self) -> int:
-        """How many nodes `written_out` has, about."""
+        """Number of nodes of `written_out`, about."""
         shared = topological([*self.solve.x, *entries(self.sides)])
         return len(shared) + (len(self.sides) + self.n) * len(self.solve.column) + self.beside
 

@@ -139,7 +139,7 @@ def _slopes(
 
 
 def _following(system: System, kept: tuple[int, ...], matrix: Array) -> list[int]:
-    """For each row in turn a velocity that follows from the others, by the largest entry: columns of J, (m, n)."""
+    """Velocities that follow from the others, one for each row in turn, by the largest entry of J, (m, n)."""
     left, chosen = equilibrated(matrix), list[int]()
     for k, row in enumerate(left):
         pivot = int(np.abs(row).argmax())

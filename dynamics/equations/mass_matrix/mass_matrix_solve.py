@@ -57,7 +57,7 @@ class MassSolve(NamedTuple):
         return result
 
     def size(self, sides: int) -> int:
-        """How many nodes the solutions of so many right-hand sides take, about."""
+        """Number of nodes of the solutions of so many right-hand sides, about."""
         return len(topological(self.x)) + sides * len(self.column)
 
     def split(self) -> tuple[list[Node], Graph]:

@@ -1,4 +1,4 @@
-"""Both forms of the equations of motion, of accelerations and of momenta, their sizes, and how far they agree."""
+"""Accelerations and momenta: the two forms of the equations of motion, their sizes, and their agreement."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def form_sizes(forms: Mapping[str, Graph]) -> dict[str, Counts]:
 
 
 def form_agreement(model: Model, forms: Mapping[str, Graph], at: Mapping[str, float]) -> Agreement:
-    """How far both forms agree at a state.  at: values of the inputs of the state equation."""
+    """Difference of the two forms at a state.  at: values of the inputs of the state equation."""
     system, momenta = as_system(model), momentum(model)
     lagrange, hamilton = forms[LAGRANGE], forms[HAMILTON]
     moved = lagrange.evaluate({name: at[name] for name in lagrange.input_names})

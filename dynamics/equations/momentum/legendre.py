@@ -121,6 +121,7 @@ class Legendre:
             lagrangian, *momenta = self._at_velocities([self.lagrangian, *self.momenta], velocities)
             with building(self.build):
                 missing = [p - momentum for p, momentum in zip(self.p, momenta, strict=True)]
+                # the slope of L - p u along the step, at its end over at its start
                 good = cg.less_equal(-OVERSHOOT, dot(here.step, missing) / work)
             step = here.step
             if k < self.iterations:

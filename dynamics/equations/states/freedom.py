@@ -50,7 +50,7 @@ class Freedom:
     shares: Mapping[str, float]
 
     def __str__(self) -> str:
-        """One sentence."""
+        """Sentence on the freedoms."""
         rows = ", ".join([f"{name!r} ({self.shares[name]:.1e} of it is new)" for name in self.redundant])
         rest = f"; redundant at tolerance {self.tolerance:g}: {rows}" if rows else ""
         return f"{self.freedoms} freedom(s): {len(self.shares)} constraint row(s) of rank {self.rank}{rest}"

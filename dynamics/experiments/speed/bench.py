@@ -249,7 +249,7 @@ def _differences(row: Row) -> dict[str, tuple[str, str]]:
 
 
 def _worst(rows: Sequence[Row]) -> list[Row]:
-    """One row for each scene, of each peer the cell that differs most over the modes."""
+    """Row of each scene, with the cell of each peer that differs most over the modes."""
     result: dict[str, Row] = {}
     for row in rows:
         kept = result.setdefault(row.scene, Row(row.scene, row.task, row.mode, row.coordinates))

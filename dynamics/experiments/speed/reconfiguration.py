@@ -50,13 +50,13 @@ def angle(version: int) -> float:
 
 
 def by_kernels(mechanism: Mechanism) -> Torque:
-    """By the kernels, which are there already."""
+    """Equations by kernels, which are there already."""
     run = RecursiveInverseDynamics(mechanism)
     return lambda q: run(q, q / 2, -q)
 
 
 def by_rebuild(mechanism: Mechanism) -> Torque:
-    """By a mechanism that shares nothing with another."""
+    """Equations by a mechanism that shares nothing with another."""
     fresh = Mechanism(mechanism.bodies, mechanism.gravity, locked=mechanism.locked)
     function = cg.compile(inverse_dynamics(fresh))
     return lambda q: np.asarray(function(np.concatenate([q, q / 2, -q])))

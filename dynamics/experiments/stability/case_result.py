@@ -49,12 +49,12 @@ class CaseResult:
 
     @property
     def explained(self) -> bool:
-        """Whether it meets its bounds or has a reason why not."""
+        """Whether the case meets its bounds or has a reason why not."""
         return self.meets or bool(self.reason)
 
     @property
     def verdict(self) -> str:
-        """In a word."""
+        """Verdict in a word."""
         return "meets" if self.meets else "limit" if self.reason else "unexplained"
 
     def to_dict(self) -> dict[str, Any]:

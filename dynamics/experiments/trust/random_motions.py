@@ -245,7 +245,7 @@ def random_motion(number: int) -> AccuracyTask:
 
 
 def from_rest(rng: np.random.Generator, name: str) -> AccuracyTask:
-    """At rest at 0, under forces that begin at 0 and grow."""
+    """Motion from rest at 0, under forces that begin at 0 and grow."""
     power = float(rng.integers(1, 5))
     pushes: list[Push] = [
         lambda t: cg.sin(3.0 * t),

@@ -59,7 +59,7 @@ def _ours(task: AccuracyTask, method: str | None = None) -> None:
 
 
 def _heyoka(task: AccuracyTask, compact: bool = False, cached: bool = False) -> None:
-    """From the Lagrangian by heyoka's own derivatives; a state equation, or what it cannot derive, from ours."""
+    """Rate from the Lagrangian by heyoka's own derivatives; a state equation, or what it cannot derive, from ours."""
     hy = heyoka()
     if not cached:
         leave_cache(hy)
@@ -74,7 +74,7 @@ def _heyoka(task: AccuracyTask, compact: bool = False, cached: bool = False) -> 
 
 
 def _casadi(task: AccuracyTask) -> None:
-    """From the Lagrangian by CasADi's own derivatives; a state equation as it is."""
+    """Rate from the Lagrangian by CasADi's own derivatives; a state equation as it is."""
     ca = casadi()
     if task.mechanical:
         case = PeerModel(task.name, task.model)

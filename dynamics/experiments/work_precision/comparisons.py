@@ -84,7 +84,7 @@ class Comparison:
 
 
 def tolerances(first: float, last: float, per_decade: int = 4) -> list[float]:
-    """From loose to tight, powers of ten."""
+    """Tolerances from loose to tight, powers of ten."""
     count = round(per_decade * np.log10(first / last))
     powers: list[float] = np.geomspace(first, last, count + 1).tolist()
     return powers

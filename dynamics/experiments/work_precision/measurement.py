@@ -40,7 +40,7 @@ STALLED = 2  # knobs in a row without a smaller error, after which no finer one 
 
 
 class EndMetrics(Protocol):
-    """What tells the error of an end."""
+    """Measures of the error of an end."""
 
     def at_end(self, x: Array) -> float:
         """The error of a state at t_end."""
@@ -107,7 +107,7 @@ class Entry(Generic[AnySolver]):
 def sweep(
     solver: AnySolver, metrics: EndMetrics, limit: float, knobs: Sequence[float] | None = None
 ) -> Entry[AnySolver]:
-    """From coarse to fine: each knob once, until it takes too long or is no longer better."""
+    """Sweep from coarse to fine: each knob once, until it takes too long or is no longer better."""
     entry = Entry(solver)
     best, stalled = math.inf, 0
     usual = solver.tolerances if solver.kind == CHOSEN else [float(INTERVALS * 2**k) for k in range(24)]

@@ -115,7 +115,7 @@ MOTIONS: dict[str, Callable[[], AccuracyTask]] = {
 
 
 def _entry(name: str) -> dict[str, Any]:
-    """What the file has of a motion. Raises ValueError where it is of another start."""
+    """Entry of a motion in the file. Raises ValueError where it is of another start."""
     task, entry = MOTIONS[name](), json.loads(FILE.read_text(encoding="utf-8"))[name]
     if entry["start"] != task.identity["start"]:
         raise ValueError(f"the exact ends of {name!r} are of another start; compute them again")

@@ -75,7 +75,7 @@ class Cell:
 
 @dataclass(frozen=True)
 class Missed:
-    """Why a group has no way to an error.  best: the smallest error that it got to, where it ran."""
+    """Reason why a group has no way to an error.  best: the smallest error that it got to, where it ran."""
 
     why: str
     best: float | None = None
@@ -187,7 +187,7 @@ def _swept(solver: EndSolver, metrics: EndMetrics, limit: float, say: Callable[[
 
 
 def doubted(entries: Sequence[Entry[EndSolver]], error: float, size: Array) -> str:
-    """Why the exact end may be none: three solvers, ours and peers, agree far better with each other; or nothing."""
+    """Doubt of the exact end: three solvers, ours and peers, agree far better with each other; or nothing."""
     finest = [(entry.solver, min(entry.tried, key=lambda each: each.error)) for entry in entries if entry.tried]
     for one, ours in finest:
         if not one.ours or ours.error < ROUNDING or error > TOGETHER * ours.error:

@@ -70,7 +70,7 @@ class EndSolver(ABC):
         self.start = np.array(task.start)
 
     def until(self, t_end: float) -> EndSolver:
-        """The same to another end, with what is compiled already."""
+        """Run to another end, with what is compiled already."""
         other = copy.copy(self)
         other.task = replace(self.task, t_end=t_end)
         return other

@@ -138,7 +138,7 @@ def to_z(axis: Array) -> Array:
 
 
 def joint_placement(outer: Array, orientation: ArrayLike, position: ArrayLike, axes: Array) -> tuple[Array, Triple]:
-    """Where a joint is at q = 0: its `axes` as columns and its origin, both in the parent's axes `outer`."""
+    """Placement of a joint at q = 0: its `axes` as columns and its origin, both in the parent's axes `outer`."""
     return snapped(outer.T @ np.asarray(orientation) @ axes), constant(product(outer.T, np.asarray(position)))
 
 

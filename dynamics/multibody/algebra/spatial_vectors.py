@@ -11,7 +11,7 @@ from .turns import Turn
 
 
 class Twist(NamedTuple):
-    """How a body moves, its velocity or its acceleration in space: the part of a point of it last."""
+    """Twist of a body, its velocity or its acceleration in space: the part of a point of it last."""
 
     angular: Triple
     linear: Triple
@@ -53,7 +53,7 @@ class Wrench(NamedTuple):
         return Wrench(scaled(factor, self.torque), scaled(factor, self.force))
 
     def carried(self, velocity: Twist) -> Wrench:
-        """Its rate, where it is carried along with a velocity: (w x n + v x f, w x f)."""
+        """Rate of a wrench that is carried along with a velocity: (w x n + v x f, w x f)."""
         torque = plus(cross(velocity.angular, self.torque), cross(velocity.linear, self.force))
         return Wrench(torque, cross(velocity.angular, self.force))
 

@@ -41,7 +41,7 @@ class MechanismWarning(UserWarning):
 
 @dataclass(frozen=True, eq=False)
 class Joint:
-    """How a body hangs on its parent; the joint is at the origin of the body's frame.
+    """Joint of a body to its parent, at the origin of the body's frame.
 
     `position` and all that is said to be a float may have parameters in place of numbers, see `Body`.
 
@@ -124,7 +124,7 @@ class Joint:
 
     @property
     def moves(self) -> bool:
-        """Whether it has a coordinate."""
+        """Whether the joint has a coordinate."""
         return self.kind in COMPOSITIONS or self.type.moves
 
     @property

@@ -22,7 +22,7 @@ _FORCES = {"rad/s": "N m", "m/s": "N"}
 
 
 class Places(NamedTuple):
-    """Where the coordinates and the velocities of a joint stand among all."""
+    """Places of a joint's coordinates and velocities among all."""
 
     q: slice
     u: slice
@@ -112,7 +112,7 @@ def _are_rates(kind: JointType) -> bool:
 
 
 def quasi_velocities(bodies: Sequence[Body]) -> QuasiVelocities | None:
-    """How the joints' velocities move their coordinates; None where they are all rates of coordinates."""
+    """Map from the joints' velocities to rates of coordinates; None where it is the identity."""
     types = [body.joint.type for body in bodies]
     if all([_are_rates(kind) for kind in {*types}]):
         return None

@@ -211,7 +211,7 @@ def release(mechanism: Mechanism, q: ArrayLike, qd: ArrayLike, body: str) -> Rel
 
 
 def _motion(mechanism: Mechanism, body: Body, q: Array, qd: Array) -> tuple[FreeBody, Array, Array]:
-    """How a body of the mechanism moves, and the Jacobians (3, n) of its center's velocity and of its omega."""
+    """Motion of a body of the mechanism, and the Jacobians (3, n) of its center's velocity and of its omega."""
     graph = mechanism.motion(body.name, np.asarray(body.center))
     rates = np.vstack([qd, np.eye(len(qd))])  # the state's own, then each coordinate alone
     found = graph.evaluate(_named(q=q, qd=rates.T))

@@ -250,7 +250,7 @@ def _steps(
     values: Mapping[str, float],
     outputs: Sequence[str] | None,
 ) -> list[_Step]:
-    """From the model as given, one thing after another taken out."""
+    """Steps from the model as given, one thing after another taken out."""
     steps = [_Step(model, {}, None)]
     for effect in EFFECTS:
         if effect not in kept and has_effect(steps[-1].model, effect):

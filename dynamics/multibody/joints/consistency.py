@@ -68,7 +68,7 @@ def contradiction(joint: JointType) -> str:
 
 
 def _sample(joint: JointType, inputs: list[Node], nodes: list[Node]) -> tuple[Array, Array]:
-    """How far coordinates are from neutral ones at a state where all nodes are finite, and their values there."""
+    """Distance of coordinates from neutral ones at a state where all nodes are finite, and their values."""
     neutral, sizes, count = np.array(joint.neutral), np.sin(np.arange(1.0, 1.0 + len(inputs)) ** 2), len(joint.neutral)
     for k in range(HALVINGS):
         at = _values(list(joint.normalized(inputs[:count])), inputs[:count], neutral + 0.5 ** (k + 1) * sizes[:count])

@@ -55,12 +55,12 @@ class JointType(ABC):
 
     @property
     def turns(self) -> bool:
-        """Whether it turns the body."""
+        """Whether the joint turns the body."""
         return True
 
     @property
     def measured_about_axis(self) -> bool:
-        """Whether its coordinate is an angle about the axis and nothing else: axes turned about it are an offset."""
+        """Whether the coordinate is an angle about the axis and nothing else: axes turned about it are an offset."""
         return False
 
     def with_pitch(self, pitch: float) -> JointType:
@@ -76,7 +76,7 @@ class JointType(ABC):
         """Turn from the axes that the body has at neutral coordinates, the joint's, to those that it has."""
 
     def translation(self, q: Sequence[Node]) -> Triple:
-        """Where the body's origin is, in the joint's axes [m]."""
+        """Position of the body's origin in the joint's axes [m]."""
         return STILL
 
     @abstractmethod
@@ -113,7 +113,7 @@ class JointType(ABC):
         return [ZERO] * len(u)
 
     def stretches(self, q: Sequence[Node], reference: float | Node) -> Sequence[Node]:
-        """How far the joint's spring of stiffness k is stretched along the velocities; none where it has no spring.
+        """Stretch of the joint's spring of stiffness k along the velocities; none where it has no spring.
 
         The energy is k/2 times the sum of their squares, whose slopes along the velocities they are.
         """
@@ -164,15 +164,15 @@ class AxialJoint(JointType):
         return self._turned(1.0) == 1.0 and not self.slides
 
     def stretches(self, q: Sequence[Node], reference: float | Node) -> Sequence[Node]:
-        """From the coordinate where it pulls nowhere."""
+        """Distance from the coordinate where the spring pulls nowhere."""
         return [q[0] - reference]
 
     def angle(self, x: Node) -> Node:
-        """How far the coordinate turns the body [rad]; of its rate, the angular velocity. Linear in it."""
+        """Angle by which the coordinate turns the body [rad]; of its rate, the angular velocity. Linear in it."""
         return ZERO
 
     def shift(self, x: Node) -> Node:
-        """How far the coordinate moves the body's origin [m]; of its rate, the velocity. Linear in it."""
+        """Distance by which the coordinate moves the body's origin [m]; of its rate, the velocity. Linear in it."""
         return ZERO
 
     def turn(self, q: Sequence[Node]) -> Turn:
@@ -180,7 +180,7 @@ class AxialJoint(JointType):
         return about_z(self.angle(q[0]))
 
     def translation(self, q: Sequence[Node]) -> Triple:
-        """Along z."""
+        """Translation along z."""
         return ZERO, ZERO, self.shift(q[0])
 
     def velocity(self, q: Sequence[Node], u: Sequence[Node]) -> Twist:
@@ -221,7 +221,7 @@ class SpatialJoint(JointType):
     """A joint of several freedoms, which turns the body by a matrix."""
 
     def placement(self, axis: Array, at: Array) -> tuple[Array, Array]:
-        """By its rotation and translation."""
+        """Placement by rotation and translation."""
         with building(Builder()):
             q = [cg.constant(x) for x in at.tolist()]
             turn = [[spatial.plain(each) for each in row] for row in self.rotation(q)]
@@ -233,5 +233,5 @@ class SpatialJoint(JointType):
         """The body's axes as columns, in those that it has at neutral coordinates: the joint's."""
 
     def turn(self, q: Sequence[Node]) -> Turn:
-        """By the matrix."""
+        """Turn by the matrix."""
         return MatrixTurn(self.rotation(q))

@@ -30,7 +30,7 @@ AXES = ("world", "body")
 
 
 def frame_placement(model: Model, body: str, at: ArrayLike = (0.0, 0.0, 0.0)) -> Graph:
-    """Where a body's frame is in the world, moved to a point of the body.
+    """Placement of a body's frame in the world, moved to a point of the body.
 
     Parameters
     ----------

@@ -39,7 +39,7 @@ class Moments(NamedTuple):
 
 
 def center_of_mass(model: Model) -> Graph:
-    """Where the center of mass is, and its velocity. Bodies that are fixed to the world are left out.
+    """Position and velocity of the center of mass. Bodies that are fixed to the world are left out.
 
     Parameters
     ----------

@@ -67,7 +67,7 @@ def without_axial_moments(links: Sequence[Link], joints: Sequence[JointType], pa
 
 
 def _count(link: Link) -> int:
-    """How many inertial numbers are not zero."""
+    """Number of inertial numbers that are not zero."""
     mass, moment, inertia = link.inertial
     return int(np.count_nonzero([mass, *moment, *inertia[np.tril_indices(3)]]))
 

@@ -43,19 +43,19 @@ class _Placed(NamedTuple):
 
     @property
     def placed_by(self) -> int:
-        """How many numbers place it."""
+        """Number of constants in the link's place and turn."""
         turned = int(np.count_nonzero(self.turn[:2, 2]) == 2)
         return int(np.count_nonzero(self.place)) + _TURN * turned
 
     @property
     def numbers(self) -> int:
-        """How many there are that other origins and axes may have as zeros."""
+        """Number of constants that other origins and axes may have as zeros."""
         _, moment, inertia = self.own
         shown = [moment[0], moment[1], inertia[0, 1], inertia[0, 2], inertia[1, 2]]
         return self.placed_by + int(np.count_nonzero(shown))
 
     def carried(self, by: _Placed) -> _Placed:
-        """On the parent as it is now, placed as on the one before its origin was moved and its axes were turned."""
+        """Link on the parent as it is now, placed as before the parent's origin was moved and its axes were turned."""
         back = _about_z(-by.angle)
         place = spatial.product(back, spatial.added(self.place, np.array([0.0, 0.0, -by.moved])))
         return self._replace(turn=spatial.snapped(back @ self.turn), place=place)
@@ -167,7 +167,7 @@ def _turns(own: _Placed, child: _Placed) -> list[float]:
 
 
 def _extent(body: Numbers) -> float:
-    """How far from its origin the mass of a body is, by its moments; infinite without any."""
+    """Distance of a body's mass from its origin, by its moments; infinite without any."""
     return math.sqrt(float(np.abs(body.inertia).max()) / body.mass) if body.mass > 0.0 else math.inf
 
 

@@ -22,7 +22,7 @@ from .links import LinkState, axes_of
 
 
 class PointMotion(NamedTuple):
-    """How a point fixed to a body moves, in the world's axes."""
+    """Motion of a point fixed to a body, in the world's axes."""
 
     position: Triple
     velocity: Triple
@@ -50,7 +50,7 @@ class KinematicChain:
         return vector
 
     def motion(self, at: ArrayLike) -> PointMotion:
-        """How the point `at`, (3,) in the body's frame, moves: summed from the body to the world."""
+        """Motion of the point `at`, (3,) in the body's frame: summed from the body to the world."""
         point = spatial.constant(spatial.placed(self.position, self.orientation, at))
         velocity, omega = STILL, STILL
         for step in self.steps:
@@ -75,7 +75,7 @@ class KinematicChain:
         return cg.simplify(Graph([*q, *qd], outputs))
 
     def place_of(self, at: ArrayLike) -> Triple:
-        """Where a point of the frame is, in the frame of the body inwards [m]."""
+        """Position of a point of the frame in the frame of the body inwards [m]."""
         point = spatial.constant(spatial.placed(self.position, self.orientation, at))
         return self._inwards(point, points=True)
 

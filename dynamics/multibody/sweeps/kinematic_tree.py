@@ -20,7 +20,7 @@ from .links import MergedBody, axes_of, inertia_in
 
 @dataclass(frozen=True, eq=False)
 class Carrier:
-    """Where a body's frame is in that of the moving body that carries it, which is itself if it moves."""
+    """Placement of a body's frame in that of the moving body that carries it, itself if it moves."""
 
     name: str  # of the moving body, or "world"
     position: Array  # (3,) [m]

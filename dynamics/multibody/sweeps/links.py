@@ -135,22 +135,22 @@ class LinkState(NamedTuple):
 
     @property
     def turn(self) -> Turn:
-        """From the joint's axes to the link's."""
+        """Turn from the joint's axes to the link's."""
         return self.joint.turn(self.moved)
 
     @property
     def shift(self) -> Triple:
-        """Where the joint has the link's origin, in the joint's axes [m]."""
+        """Position of the link's origin in the joint's axes [m]."""
         return self.joint.translation(self.moved)
 
     @property
     def place(self) -> Triple:
-        """Where the link's origin is from its parent's, in the parent's axes [m]."""
+        """Position of the link's origin from its parent's, in the parent's axes [m]."""
         return spatial.plus(self.link.place, spatial.rotate(self.link.turn, self.shift))
 
     @property
     def columns(self) -> list[Twist]:
-        """How each velocity of the joint moves the link, in the link's axes."""
+        """Twists of the link by each velocity of the joint, in the link's axes."""
         return self.joint.columns(self.moved)
 
     def into(self, vector: Triple) -> Triple:
@@ -162,7 +162,7 @@ class LinkState(NamedTuple):
         return [(velocity, self.link.stiffness * x) for velocity, x in zip(self.u, self.stretches(), strict=False)]
 
     def stretches(self) -> Sequence[Node]:
-        """How far the spring is stretched along each velocity; nothing where there is no spring."""
+        """Stretch of the spring along each velocity; nothing where there is no spring."""
         absent = not isinstance(self.link.stiffness, Node) and not self.link.stiffness
         return [] if absent else self.joint.stretches(self.q, self.link.spring_reference)
 
@@ -185,7 +185,7 @@ def link_states(
 
 
 def parents_of(bodies: Sequence[Body]) -> list[int]:
-    """For each body the index of the one that carries it, -1 for the world."""
+    """Index of the body that carries each body, -1 for the world."""
     index = {body.name: i for i, body in enumerate(bodies)}
     return [index.get(body.parent, -1) for body in bodies]
 

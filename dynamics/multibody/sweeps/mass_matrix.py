@@ -69,12 +69,12 @@ class Carried(NamedTuple):
 
     @property
     def turn(self) -> list[Step]:
-        """From its axes to those of its joint; none where S is the same in both."""
+        """Steps from its axes to those of its joint; none where S is the same in both."""
         return [] if self.plane or self.at.turn.still else [self.at.turn]
 
     @property
     def outwards(self) -> list[Step]:
-        """From the axes of its joint, about its origin, to those of its parent's motion, about the parent's origin."""
+        """Steps from the axes of its joint, about its origin, to those of its parent's motion, about the parent's."""
         plane, link = self.before, self.at.link
         steps: list[Step] = [Shift(self.at.shift), *constant_turns(link.turn)]
         if plane and self.plane:
@@ -109,7 +109,7 @@ def mass_matrix_columns(bodies: Sequence[Carried], n: int) -> list[list[Node]]:
 
 
 def size_of(rows: Sequence[Sequence[Node]]) -> int:
-    """How many nodes a matrix takes."""
+    """Number of nodes of a matrix."""
     return len(topological([entry for row in rows for entry in row]))
 
 

@@ -31,7 +31,7 @@ Tensor = tuple[Triple, Triple, Triple]  # rows
 
 
 class Motion(NamedTuple):
-    """How a body's frame moves, in axes whose z is the joint's axis: the body's own.
+    """Twist of a body's frame, in axes whose z is the joint's axis: the body's own.
 
     vertical, depth, strength: a mass m at r from the origin has the potential energy m strength (depth + vertical . r).
     turn: from the joint's axes to those of the motion.
@@ -175,7 +175,7 @@ def energy(motion: Motion, at: LinkState) -> Node:
 
 
 class Acceleration(NamedTuple):
-    """How a body's motion changes, in axes that stand still where those of its motion are just now.
+    """Acceleration of a body, in axes that stand still where those of its motion are just now.
 
     A point of the body, b from its origin, has the acceleration linear + tensor b. For a body that moves in a plane
     `swept` takes b in the axes of the body and gives it in those of the plane; else it is the tensor.
@@ -213,10 +213,12 @@ def propagate_acceleration(parent: Acceleration, before: Motion, after: Motion, 
         linear = parent.linear if stays else before.into(parent.linear)
         linear = turn.into(at.into(plus(linear, _times(parent.swept if stays else parent.tensor, at.place))))
         rate, omega = joint.acceleration(q, at.u), turn.into(at.into(before.omega))
+        # + a_joint + 2 omega x v_joint
         linear = plus(plus(linear, rate.linear), cross(omega, scaled(2.0, relative.linear)))
     with cg.tag(KINETIC):  # velocities are linear in u, so that those of u_dot are their rates at constant q
         angular = plus(turn.into(at.into(parent.angular)), rate.angular)
         change = joint.velocity(q, at.u_dot)
+        # + omega x omega_joint + alpha_joint
         angular = plus(plus(angular, cross(omega, relative.angular)), change.angular)
         linear = plus(linear, change.linear)
         tensor = swept = _tensor(after.omega, angular)
@@ -237,6 +239,7 @@ def wrench(acceleration: Acceleration, motion: Motion, at: LinkState) -> list[Bi
     with cg.tag(KINETIC):
         force, torque = _times(acceleration.swept, link.moment), []
         for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+            # component i of J alpha + omega x J omega
             turn = inertia[i][i] * alpha[i] + (inertia[k][k] - inertia[j][j]) * (w[j] * w[k])
             turn = turn + inertia[j][k] * (w[j] * w[j] - w[k] * w[k])
             torque.append(turn + inertia[i][k] * tensor[j][i] - inertia[i][j] * tensor[k][i])

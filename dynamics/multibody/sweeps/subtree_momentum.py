@@ -83,6 +83,7 @@ def momentum_rates(
             up = at.into(scaled(parent.strength, carrier.vertical))
             rates = [-(a + composite.mass * b) for a, b in zip(turned, up, strict=True)]
     with cg.tag(KINETIC):
+        # (w x n + v x f, w x f), from axes and an origin that move
         carried = composite.momentum.carried(Twist(motion.omega, motion.velocity))
     with cg.tag(POTENTIAL):
         up = scaled(motion.strength, motion.vertical)  # gravity is -up

@@ -217,6 +217,7 @@ def _enter_both(result: TorqueDerivatives, outer: Column, inner: Column, reactio
         result.by_q[j][i] = _displaced_by(outer, reaction)
     with cg.tag(KINETIC):
         result.by_qd[i][j] = outer.motion.power(reaction.moved)  # dtau_i/du_j = S_i . (I (psi'_j + S'_j) + 2 B S_j)
+        # dtau_j/du_i = (psi'_i + S'_i) . I S_j + S_i . 2 B^T S_j
         result.by_qd[j][i] = outer.rate.power(reaction.accelerated) + dot(outer.motion.angular, reaction.couple)
         result.mass[i][j] = result.mass[j][i] = outer.motion.power(reaction.accelerated)
 
@@ -237,4 +238,5 @@ def _enter(result: TorqueDerivatives, outer: Column, inner: Column, reaction: Re
 
 def _displaced_by(outer: Column, reaction: Reaction) -> Node:
     """Change of the force at the inner freedom by a displacement of the outer one."""
+    # dtau_j/dq_i = psi''_i . I S_j + psi'_i . 2 B^T S_j
     return outer.carried_rate.power(reaction.accelerated) + dot(outer.carried.angular, reaction.couple)

@@ -25,7 +25,7 @@ class Bodies(Protocol):
 
     @property
     def bodies(self) -> Sequence[Body]:
-        """All bodies."""
+        """Tuple of all bodies."""
 
     @property
     def moving(self) -> Sequence[Body]:
@@ -36,7 +36,7 @@ class Bodies(Protocol):
         """Loops that close the tree."""
 
     def position(self, body: str, at: ArrayLike = ...) -> Graph:
-        """Where a point of a body is: outputs x, y, z."""
+        """Position of a point of a body: outputs x, y, z."""
 
 
 class Skeleton(NamedTuple):
@@ -94,7 +94,7 @@ def drawn_points(mechanism: Bodies) -> list[tuple[str, ArrayLike, int]]:
 
 
 def _turns(bodies: Sequence[Body], graph: Graph, q: Array, parents: Sequence[int]) -> tuple[int, ...]:
-    """For every velocity: a quarter of a turn of its joint turns the points that hang on it by as much, if seen so."""
+    """Signs of the joints' quarter turns as seen in the picture, one for every velocity; 0 for others."""
 
     def points(at: Array) -> Array:
         values = graph.evaluate({f"q{i}": float(value) for i, value in enumerate(at)})
@@ -125,7 +125,7 @@ def _hung(parents: Sequence[int], root: int) -> list[int]:
 
 
 def _above(mechanism: Bodies) -> dict[str, str]:
-    """For each body the nearest one inwards that moves; the world's name where there is none."""
+    """Nearest moving body inwards of each body; the world's name where there is none."""
     parents = {body.name: body.parent for body in mechanism.bodies}
     moving = {body.name for body in mechanism.moving}
     result = {body.name: body.parent for body in mechanism.moving}
@@ -160,7 +160,7 @@ def _tips(mechanism: Bodies) -> Iterator[tuple[str, ArrayLike]]:
 
 
 def view(points: Array) -> Array:
-    """From which side points, (.., 3), are looked at: (2, 3), right and up of the picture."""
+    """Directions of the picture among points, (.., 3): (2, 3), its right and its up."""
     extent = np.ptp(points.reshape(-1, 3), axis=0)
     flat = extent <= _FLAT * extent.max()
     if flat[1]:

@@ -184,7 +184,7 @@ class Mechanism(ModifiableStructure):
 
     @property
     def carriers(self) -> dict[str, Carrier]:
-        """For every body where it is in the frame of the moving body that carries it."""
+        """Placement of every body in the frame of the moving body that carries it."""
         return self._merged[1]
 
     @cached_property
@@ -246,11 +246,11 @@ class Mechanism(ModifiableStructure):
 
     @property
     def parents(self) -> list[int]:
-        """For each of the moving bodies the index of the one that carries it, -1 for the world."""
+        """Index of the moving body that carries each moving body, -1 for the world."""
         return self._equations.parents
 
     def position(self, body: str, at: ArrayLike = (0.0, 0.0, 0.0)) -> Graph:
-        """Where a point of a body is in the world. Inputs q0.. and parameters of positions; outputs x, y, z [m].
+        """Position of a point of a body in the world. Inputs q0.. and parameters of positions; outputs x, y, z [m].
 
         at: (3,) [m], the point, in the body's frame. Raises MechanismError for an unknown body.
         """
@@ -260,7 +260,7 @@ class Mechanism(ModifiableStructure):
         return cg.simplify(Graph([*self.system.q, *self._lengths], dict(zip("xyz", place, strict=True))))
 
     def motion(self, body: str, at: ArrayLike = (0.0, 0.0, 0.0)) -> Graph:
-        """How a body moves in the world: inputs q0.., qd0.., parameters of positions; outputs in the world's axes.
+        """Motion of a body in the world: inputs q0.., qd0.., parameters of positions; outputs in the world's axes.
 
         x, y, z [m] and vx, vy, vz [m/s] of a point; wx, wy, wz [rad/s], the body's angular velocity; R_0_0, R_0_1, ..
         row by row, its axes as columns.

@@ -45,7 +45,7 @@ class TreeEquations:
 
     @cached_property
     def parents(self) -> list[int]:
-        """For each body the index of the one that carries it, -1 for the world."""
+        """Index of the body that carries each body, -1 for the world."""
         return parents_of(self.bodies)
 
     @cached_property
@@ -125,7 +125,7 @@ class TreeEquations:
         return hinged and self._numeric and self.parents == list(range(-1, len(self.bodies) - 1))
 
     def partial_lagrangians(self, q: Sequence[Node], qd: Sequence[Node]) -> list[Node]:
-        """One for each body, tagged with its name and energy."""
+        """Lagrangian of each body, tagged with its name and energy."""
         with building(Builder()):
             partials = [each.partial for each in self._moved(q, qd)]
             if self.base_parameters:

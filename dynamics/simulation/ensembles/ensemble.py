@@ -18,7 +18,7 @@ Counts = np.ndarray[Any, np.dtype[np.int64]]
 
 @dataclass(frozen=True)
 class EnsembleStats:
-    """How N runs went: `Stats`, with an entry for each trajectory where they differ.
+    """Statistics of N runs: `Stats`, with an entry for each trajectory where they differ.
 
     Parameters
     ----------
@@ -68,7 +68,7 @@ COLUMNS |= dict.fromkeys(("dt", "error", "error_at_end"), np.float64)  # None is
 
 
 class RunTable:
-    """How runs side by side went, a row of `Stats` each, which are set as they end; before, they are interrupted.
+    """Statistics of runs side by side, a row of `Stats` each, set as they end; before, they are interrupted.
 
     columns: {name: numbers of all}.  messages, warnings: of each.
     """
@@ -103,7 +103,7 @@ class RunTable:
 
     @property
     def interrupted(self) -> bool:
-        """Whether a run has been."""
+        """Whether a run has been interrupted."""
         failed = np.flatnonzero(self.columns["status"] < 0).tolist()
         return any(self.messages[k].startswith(INTERRUPTED) for k in failed)
 

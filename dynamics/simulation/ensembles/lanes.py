@@ -72,7 +72,7 @@ def fits_lanes(program: StepProgram, options: RunOptions, count: int) -> bool:
 
 
 def _both(first: Flags, second: Flags) -> Flags:
-    """Where both are."""
+    """Conjunction of the two flags."""
     where: Flags = first & second
     return where
 
@@ -105,7 +105,7 @@ class InLanes(ABC):
         return len(self._which) > 0
 
     def result(self, rows: Array) -> tuple[Flags, dict[str, Array]]:
-        """Which runs reached their end with nothing to say of them, (k,), and columns of how they went.
+        """Flags of runs that reached their end without a remark, (k,), and columns of their statistics.
 
         rows: (k, T, m), receives the states at the times of the options, NaN from where a run has not come to.
         """
@@ -116,7 +116,7 @@ class InLanes(ABC):
         return self._whole(), self._columns()
 
     def reached(self, k: int) -> str:
-        """How far run k has come, in words; empty before its first step."""
+        """Progress of run k, in words; empty before its first step."""
         return f" after t = {self.read('t')[k]:.6g} s" if self._passes[k, 0] else ""
 
     def read(self, name: str) -> Array:
@@ -125,19 +125,19 @@ class InLanes(ABC):
 
     @abstractmethod
     def _left(self) -> float:
-        """How many passes may be made before one has to be asked again."""
+        """Number of passes that may be made before a run has to be asked again."""
 
     @abstractmethod
     def _going(self) -> Flags:
-        """Which are not over."""
+        """Flags of the runs that are not over."""
 
     @abstractmethod
     def _whole(self) -> Flags:
-        """Which reached their end, and nothing is to be said of them."""
+        """Flags of the runs that reached their end without a remark."""
 
     @abstractmethod
     def _columns(self) -> dict[str, Array]:
-        """How they went."""
+        """Columns of the runs' statistics."""
 
     @abstractmethod
     def _states(self) -> Array:
@@ -187,7 +187,7 @@ class ChosenInLanes(InLanes):
         return _both(self.read("status") == 0.0, self.read("trials") < self.options.max_steps)
 
     def _whole(self) -> Flags:
-        """What is said of runs at a stability limit depends on their course."""
+        """Flags as of every method, without runs at a stability limit, whose remark depends on their course."""
         return _both(self.read("status") == DONE, self.read("at_limit") < HELD)
 
     def _columns(self) -> dict[str, Array]:

@@ -194,7 +194,7 @@ def _ensemble(
     starts: tuple[Array, Array, Array],
     seconds: float,
 ) -> Ensemble:
-    """All that has come.  starts: q and qd, the states (N, m) that they make, and the parameters of the problem."""
+    """Ensemble of all that has come.  starts: q and qd, their states (N, m), and the parameters of the problem."""
     times, rows, nq, p = options.row_times, whole.rows, problem.nq, starts[2]
     logs = [split_crossings(watch, log, nq, p[k]) for k, log in enumerate(whole.happened)]
     crossings = {event.name: tuple([named[event.name] for named in logs]) for event in watch.events}
@@ -208,7 +208,7 @@ def _ensemble(
 
 
 def _warnings(stats: EnsembleStats) -> list[str]:
-    """Of the first trajectory that stopped early, and of the first that something speaks against, with their number."""
+    """Warnings of the first trajectory that stopped early and of the first in doubt, with their numbers."""
     early = {
         k: str(stats.message[k]).removeprefix("stopped ")
         for k in np.flatnonzero(stats.status < 0).tolist()

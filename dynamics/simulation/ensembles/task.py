@@ -54,7 +54,7 @@ class Chunk:
 
 @dataclass(frozen=True)
 class Part:
-    """What a chunk gives, or all: rows (k, T, m), NaN from where a trajectory stopped on, and how each run went."""
+    """Results of a chunk, or of all: rows (k, T, m), NaN after a trajectory has stopped, and the runs' statistics."""
 
     first: int
     rows: Array
@@ -62,7 +62,7 @@ class Part:
     happened: list[list[Happening]]  # the events of each, if any are looked for
 
     def put(self, part: Part) -> None:
-        """What a part gives, in its place."""
+        """Put the results of a part in their place."""
         here = slice(part.first, part.first + len(part.rows))
         if not np.may_share_memory(part.rows, self.rows):  # from another process
             self.rows[here] = part.rows
@@ -129,7 +129,7 @@ def _block_limits(code: VectorCode, count: int) -> tuple[int, int]:
 
 
 def _advanced(code: VectorCode, memories: Array, steps: int, every: int) -> tuple[Array, States]:
-    """So many steps: the record of each `every`th, and its states."""
+    """Record and states of each `every`th of so many steps."""
     record, read = code.one_pass.run_many(memories, steps, every).rows, code.one_pass.read
     farthest = int(np.argmax(read(memories, "count")[0]))  # where one has failed its time stands still
     times, states = np.ascontiguousarray(record[:, 0, farthest]), record[:, 1 : 1 + code.program.size]
@@ -212,7 +212,7 @@ class VectorizedIntegration:
         self._reached = float(self.runner.read(self._memories, "t")[0, 0])
 
     def interrupt(self) -> None:
-        """Those that have not failed end here, with the rows that they have."""
+        """End the runs that have not failed, with the rows that they have."""
         self._good[self._live] = self._at
         self.end(f"{INTERRUPTED} after t = {self._reached:.6g} s")
 
@@ -304,7 +304,7 @@ class Task:
             run.interrupt()
 
     def _before_lanes(self, chunk: Chunk, part: Part, stopped: Callable[[], bool]) -> int:
-        """How many trajectories are done one by one first: until that took as long as lanes take to be made, about.
+        """Number of trajectories done one by one first: until that took as long as lanes take to be made, about.
 
         Of a few, or of short ones, that is all. The results are the same.
         """
@@ -343,7 +343,7 @@ class Task:
     def _one_by_one(
         self, chunk: Chunk, part: Part, which: Iterable[int], stopped: Callable[[], bool], seconds: float = math.inf
     ) -> int:
-        """How many of these were run, or given up for Ctrl-C: no more once they took so long [s]."""
+        """Number of these that were run, or given up for Ctrl-C: no more once they took so long [s]."""
         with _lock:
             compiled = compile_steps(self.program, self.options.backend)
         run: Integration | None = None

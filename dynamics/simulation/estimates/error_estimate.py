@@ -105,11 +105,11 @@ class Estimator:
 
     @property
     def every(self) -> bool:
-        """Whether it looks at all steps, for one may pass a jump or a kink."""
+        """Whether all steps are looked at, for one may pass a jump or a kink."""
         return not self.longer or self._unresolved.branches is not None
 
     def segment(self, stretches: Sequence[EqualSteps]) -> None:
-        """After a reset, the runs go on with these steps."""
+        """Go on with these steps after a reset."""
         lasted, self._begun = abs(stretches[0].begin - self._begun), stretches[0].begin
         for beside in self._beside:
             beside.course.follow(stretches, lasted)
@@ -169,7 +169,7 @@ class Estimator:
         self._end = States(t[-1:], x[:, -1:], states.resets)
 
     def _until(self, beside: _Beside, end: float, resets: int) -> Iterator[States]:
-        """What a run beside comes to until it is at `end` after so many resets, unless it takes another course."""
+        """States of a run beside until it is at `end` after so many resets, unless it takes another course."""
         direction, rounding, course = self.options.direction, SAME * np.spacing(abs(end)), beside.course
         while not beside.lost and beside.resets <= resets:
             ahead = direction * (beside.t - end)
@@ -228,7 +228,7 @@ class Estimator:
         return ErrorEstimates(largest.max(axis=1), last.max(axis=1), warnings)
 
     def _errors(self, changes: Sequence[Array]) -> Array:
-        """Of each component, (k, m), from differences between the first run and the second, and that and the third.
+        """Errors of components, (k, m), from differences between the first run and the second, and that and the third.
 
         The law of the method holds where these, in the largest, have the ratio that goes with it, and where they have a
         lower one as of another order. Across a kink it depends on where in a step that is: no ratio tells.
@@ -245,7 +245,7 @@ class Estimator:
 
 
 class RunEstimate:
-    """Is told the blocks of a run from x as they come; of a run whose error is not estimated it forgets them.
+    """Estimate of a run's error from its blocks as they come; of a run whose error is not estimated it forgets them.
 
     Runs beside have resets of their own. The forces of a controller answer the states of the run, and would be others
     beside it: there each stretch of steps under the same forces is compared by itself, from where the run is.

@@ -19,7 +19,7 @@ LATE, SHARE = 2.0, 0.1  # steps, or of the time since the last reset: a run so m
 
 
 class Law(NamedTuple):
-    """What follows from differences where the error is a power of the step.
+    """Ratios of differences where the error is a power of the step.
 
     ratio: of the second difference to the first.  share: of the first one, that is error.
     """
@@ -47,7 +47,7 @@ class Course:
         self.late = max(LATE * self.longest, SHARE * lasted)
 
     def meets(self, t: Array) -> Flags:
-        """Which of the instants t (r,) are ends of its steps, but for rounding."""
+        """Flags of the instants t (r,) that are ends of its steps, but for rounding."""
         begins, h = (np.array(column) for column in zip(*[part[:2] for part in self.stretches], strict=True))
         sign = math.copysign(1.0, h[0])
         part = np.maximum(np.searchsorted(sign * begins, sign * t) - 1, 0)
@@ -56,12 +56,12 @@ class Course:
         return same
 
     def steps(self, t: float) -> list[EqualSteps]:
-        """From t on."""
+        """Steps from t on."""
         return joined(t, self.stretches)
 
 
 def courses(stretches: Sequence[EqualSteps], order: int, *, shorter: bool = False) -> tuple[list[Course], Law]:
-    """Those of two runs of longer steps; where there are too few of them, of one of steps half as long.
+    """Courses of two runs of longer steps; where there are too few of them, of one of steps half as long.
 
     shorter: of half, for every stretch has to end where it does.
     """
@@ -79,7 +79,7 @@ def courses(stretches: Sequence[EqualSteps], order: int, *, shorter: bool = Fals
 
 
 class States(NamedTuple):
-    """Of k runs side by side: instants (r,) and states (k, r, m), after so many resets."""
+    """States of k runs side by side: instants (r,) and states (k, r, m), after so many resets."""
 
     t: Array
     x: Array
@@ -87,7 +87,7 @@ class States(NamedTuple):
 
 
 def matches(times: Array, others: Array) -> tuple[Indices, Indices]:
-    """Where two courses of time have the same instants but for rounding: indices into both. Both go the same way."""
+    """Indices of the instants that two courses of time share but for rounding; both go the same way."""
     direction = 1.0 if len(times) < 2 or times[-1] > times[0] else -1.0
     near = np.searchsorted(direction * times, direction * others)
     near = np.clip(near, 0, len(times) - 1)
@@ -98,7 +98,7 @@ def matches(times: Array, others: Array) -> tuple[Indices, Indices]:
 
 
 def even(rows: Indices) -> slice | Indices:
-    """The same rows; as a slice, which copies nothing, where they are evenly spaced."""
+    """Index of rows as a slice, which copies nothing, where they are evenly spaced."""
     if not len(rows):
         return slice(0)
     apart = int(rows[1] - rows[0]) if len(rows) > 1 else 1
@@ -107,7 +107,7 @@ def even(rows: Indices) -> slice | Indices:
 
 
 class Difference:
-    """Between two streams of states at the instants of both, (k, m): the largest so far, and the last.
+    """Difference of two streams of states at common instants, (k, m): the largest so far, and the last.
 
     lost: the time since which it is infinite, for one of the runs is not finite or takes another course, (k,); NaN
     before.
@@ -121,7 +121,7 @@ class Difference:
         self._streams: tuple[list[States], list[States]] = [], []
 
     def add(self, which: int, states: States) -> None:
-        """More states of one of the streams."""
+        """Add states of one of the streams."""
         self._streams[which].append(states)
 
     def restart(self) -> None:
@@ -131,7 +131,7 @@ class Difference:
             stream.clear()
 
     def lose(self, t: float, runs: Flags | bool = True) -> None:
-        """From t on nothing is known of these runs."""
+        """Mark these runs as unknown from t on."""
         new = np.isnan(self.lost) & runs
         self.lost[new] = t
         self.largest[new] = self.last[new] = math.inf

@@ -21,7 +21,7 @@ ROUNDING = 1e-10  # of the largest component of its kind: where one is that smal
 
 @dataclass(frozen=True, eq=False)
 class StateKinds:
-    """Which components of a state can be compared, (m,) each.
+    """Components of a state that can be compared, (m,) each.
 
     kinds, groups: the same number for those of one kind, as coordinates, or of one quantity, as a quaternion's.
     lengths: what 1 of a component stands for beside 1 of others of its kind, see `System.lengths`.
@@ -34,12 +34,12 @@ class StateKinds:
     ordinary: bool
 
     def largest_of_kind(self, values: Array) -> Array:
-        """For each component the largest size of those of its kind, as one of its own, (.., m)."""
+        """Largest size among components of one kind, as one of each component's own, (.., m)."""
         columns = dict(zip(self.largest.input_names, np.moveaxis(values, -1, 0), strict=True))
         return np.stack(list(self.largest.evaluate(columns).values()), axis=-1)
 
     def scale(self, size: Array) -> Array:
-        """What errors are measured by, of components that have been so large, (.., m)."""
+        """Scale of errors of components that have been so large, (.., m)."""
         alike = replace(self, kinds=(0,) * len(self.kinds)) if self.ordinary else self
         result: Array = size + ROUNDING * alike.largest_of_kind(size)
         return result
@@ -61,7 +61,7 @@ class StateKinds:
 
 
 def _largest_nodes(values: Sequence[Node], alike: Sequence[int]) -> list[Node]:
-    """For each the largest of those of the same number."""
+    """Largest node among those of the same number, for each."""
     found: dict[int, Node] = {}
     for value, number in zip(values, alike, strict=True):
         found[number] = cg.maximum(found[number], value) if number in found else value

@@ -1,4 +1,4 @@
-"""What steps cannot resolve of a rate, along a run: waves of the time that are too fast, and its jumps and kinks."""
+"""Parts of a rate that steps cannot resolve, along a run: waves in time too fast for them, jumps and kinks."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ WAVES = ("sin", "cos", "tan")
 
 
 class Branch(NamedTuple):
-    """Of an operation: a number that changes only across its jump or kink, and its value where that is given."""
+    """Branch of an operation: a number that changes only across its jump or kink, and its value where that is given."""
 
     of: Callable[..., Node]
     given: Callable[..., Node]
@@ -46,7 +46,7 @@ def _whole(ratio: Node) -> Node:
 
 
 class Unresolved(NamedTuple):
-    """What tells, along a run, how well steps can follow a rate. All have its inputs, in its order.
+    """Graphs that tell, along a run, how well steps can follow a rate. All have its inputs, in its order.
 
     waves: what changes with time of all that it takes sines, cosines and tangents of.  branches: numbers that are
     others on the other side of a jump or a kink.  sides: the rate where these are given, as further inputs.
@@ -59,7 +59,7 @@ class Unresolved(NamedTuple):
 
 @kept_by_first
 def unresolved(rate: Graph) -> Unresolved:
-    """Of a rate; None in place of what it has not."""
+    """Graphs of the unresolved parts of a rate; None in place of those that it has not."""
     timed = {node for node in rate.inputs if node.name == TIME}
     for node in rate.nodes:
         if not timed.isdisjoint(node.args):
@@ -89,7 +89,7 @@ def _sides(rate: Graph, names: dict[Node, str]) -> Graph:
 
 
 def turning(waves: Graph, t: Array, x: Array, p: Array) -> Array:
-    """How fast sines and cosines turn at most [rad/s], (k,), between states x (k, r, m) at times t (r,)."""
+    """Largest angular velocity of sines and cosines [rad/s], (k,), between states x (k, r, m) at times t (r,)."""
     phases = _values(waves, t, x, p[:, None])
     return np.asarray((np.abs(np.diff(phases)) / np.abs(np.diff(t))).max(axis=(0, 2)))
 
@@ -123,7 +123,7 @@ def missed(what: Unresolved, order: int, t: Array, x: Array, p: Array) -> tuple[
 
 
 class _End(NamedTuple):
-    """Of steps: times (n,), states (n, m) and branches (.., n)."""
+    """Ends of steps: times (n,), states (n, m) and branches (.., n)."""
 
     t: Array
     x: Array
@@ -131,7 +131,7 @@ class _End(NamedTuple):
 
 
 def _way(branches: Graph, begin: _End, end: _End, p: Array) -> Array:
-    """Of the steps, (n,): how far the first and the last change of a branch are from the nearer end, at most."""
+    """Distances, (n,), of the first and last change of a branch in the steps from the nearer end, at most."""
     low, length = np.array([[0.0], [1.0]]), np.array([[1.0], [-1.0]])  # from both ends
     sides = np.stack([begin.branch, end.branch], axis=1)[..., None]
     parts = np.arange(1.0, PARTS + 1.0) / PARTS

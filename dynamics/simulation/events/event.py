@@ -23,7 +23,7 @@ ROUNDINGS = 8.0  # that the interpolation of a state, and the sum of a motion, m
 
 @dataclass(frozen=True)
 class Event:
-    """Where a quantity passes through zero, and what happens there.
+    """Event: a quantity that passes through zero, and what happens there.
 
     A quantity that touches zero and turns back counts too, with direction 0, where its extremum is zero to the rounding
     of its evaluation. One that stays zero for a while has one event, where it arrives; one that starts there has none

@@ -44,7 +44,7 @@ class WatchedSteps(NamedTuple):
         return self.event.slope(t, x, self.parameters, block.slopes_at(rows, s), block.h[rows])
 
     def rounding(self, rows: Indices, s: Array) -> Array:
-        """What a value may be off by because numbers are rounded, (k,)."""
+        """Rounding errors of values, (k,)."""
         t, x = self.block.times_at(rows, s), self.block.states_at(rows, s)
         return np.maximum(self.noise, self.event.error(t, x, self.parameters, *self.block.rounding(rows, t, x)))
 
@@ -63,11 +63,11 @@ class Cells(NamedTuple):
     rounding: Array
 
     def take(self, which: Flags | Indices) -> Cells:
-        """Some of them."""
+        """Subset of the cells."""
         return Cells._make([array[which] for array in self])
 
     def beside(self, extreme: Callable[[Array, Array], Array], values: Array) -> Array:
-        """Of a cell's value and those of its neighbors the smallest or largest."""
+        """Smallest or largest of a cell's value and its neighbors'."""
         result = values.copy()
         left = np.flatnonzero((self.rows[:-1] == self.rows[1:]) & (self.b[:-1] == self.a[1:]))
         result[left] = extreme(result[left], values[left + 1])
@@ -75,7 +75,7 @@ class Cells(NamedTuple):
         return result
 
     def control_points(self) -> Array:
-        """Of the cubics through values and slopes at the ends, which their hull contains, (4, k)."""
+        """Control points, (4, k), of the cubics through values and slopes at the ends, which their hull contains."""
         third = (self.b - self.a) / 3.0
         inner = self.g_a + self.slope_a * third, self.g_b - self.slope_b * third
         return np.stack([self.g_a, *inner, self.g_b])
@@ -144,7 +144,7 @@ def _whole(steps: WatchedSteps) -> Cells:
 
 
 def _split(steps: WatchedSteps, cells: Cells, *, bounded: bool) -> Cells:
-    """Their halves. The cubic of a cell, compared with value and slope in its middle, tells how far theirs are off.
+    """Halves of cells. The cubic of a cell, compared with value and slope in its middle, tells how far theirs are off.
 
     bounded: whether the rounding is asked for; that of whole steps seldom matters.
     """

@@ -22,7 +22,7 @@ PROBES = 0.5 ** np.arange(50, 0, -5)  # of a cell: how far from a zero the sign 
 
 
 class Crossing(NamedTuple):
-    """Where a quantity reaches zero."""
+    """Crossing of zero by a quantity."""
 
     row: int  # of the step
     s: float  # share of the step
@@ -33,7 +33,7 @@ class Crossing(NamedTuple):
 
 @dataclass
 class Side:
-    """On which side of zero a quantity is, between one part of a run and the next.
+    """Side of zero on which a quantity is, between one part of a run and the next.
 
     sign: its last, 0 before it has one; of one at rest on zero, that of the side that it belongs to, if there is one.
     slope: at the end of the last step; NaN at a start.  left: of a run that starts on zero, the sign with which the
@@ -53,7 +53,7 @@ class Side:
 
 
 def crossings(steps: WatchedSteps, side: Side) -> tuple[list[Crossing], Flags]:
-    """What happens in these steps, and in which (steps,) more may have happened; moves `side` on.
+    """Crossings in these steps, and flags of (steps,) in which more may have happened; moves `side` on.
 
     A quantity crosses zero where its sign turns, and touches it where an extremum is zero to the rounding of its
     evaluation. One that stays zero does so from where it arrives; one that rests there, and leaves to the other side
@@ -66,7 +66,7 @@ def crossings(steps: WatchedSteps, side: Side) -> tuple[list[Crossing], Flags]:
 
 
 def _join(cells: Cells, side: Side) -> None:
-    """Where steps meet, the quantity has the slope that it had at the end of the step before: a turn counts once."""
+    """Give the quantity, where steps meet, its slope at the end of the step before: a turn counts once."""
     first = np.flatnonzero(np.diff(cells.rows)) + 1
     cells.slope_a[first] = cells.slope_b[first - 1]
     if not math.isnan(side.slope):
@@ -99,7 +99,7 @@ class _Chain:
         self.signs[1::2], self.signs[2::2] = after[:-1], before[1:]
 
     def _zeros(self, g: Array, signs: Array, *, start: bool) -> Flags:
-        """Which looks are at zero: exactly, or, beside a change of sign or such a look, to rounding.
+        """Flags of the looks at zero: exactly, or, beside a change of sign or such a look, to rounding.
 
         signs: from the side before the first look on.  start: whether the first look is.
         """
@@ -136,7 +136,7 @@ class _Chain:
         return beside
 
     def at_signs(self, side: Side) -> list[Crossing]:
-        """Where signs turn, and where a quantity that was zero at a look goes back to where it came from."""
+        """Crossings where signs turn, and touches of a quantity that was zero at a look and goes back."""
         signs = self.signs
         known = np.flatnonzero(signs)
         if side.resting:
@@ -144,7 +144,7 @@ class _Chain:
         return self._turns(side, known) if len(known) else []
 
     def _after_rest(self, side: Side, known: Indices) -> list[Crossing]:
-        """Where a quantity at rest on zero leaves to a side that is not its own, and what it does then."""
+        """Crossing of a quantity at rest on zero that leaves to a side that is not its own."""
         if not len(known):
             return []
         side.left, last = math.nan, (int(known[0]) - 1) // 2  # look at which it is zero
@@ -153,7 +153,7 @@ class _Chain:
         return [*([] if own else [leaves]), *self._turns(side, known)]
 
     def _turns(self, side: Side, known: Indices) -> list[Crossing]:
-        """The same from entries with signs alone."""
+        """Turns of sign from entries with signs alone."""
         signs = self.signs
         i, j, last = known[:-1], known[1:], int(known[-1])
         at_zero = (i % 2 == 0) & self.zero[i // 2]
@@ -180,7 +180,7 @@ class _Chain:
         return len(zeros) > 1 and bool(place[-1] - place[0] > WHILE)
 
     def _touch(self, start: int, end: int) -> Crossing:
-        """Where its slope turns between two entries, or, where that is not seen, at a look between them."""
+        """Touch where the slope turns between two entries, or, where no turn is seen, at a look between them."""
         sign, first, last = float(self.signs[start]), start // 2, end // 2
         look = (first + last + start % 2) // 2
         row, s = self.rows[[look]], self.shares[[look]]
@@ -196,7 +196,7 @@ class _Chain:
         return Crossing(int(row[0]), float(s[0]), sign, touching=True)
 
     def _arrivals(self, entries: Indices) -> list[Crossing]:
-        """Where the quantity first is not of the sign that it has at these entries."""
+        """First instants at which the quantity has not the sign that it has at these entries."""
         signs, looks = self.signs[entries], entries // 2
         rows, s = self.rows[looks], self.shares[looks]
         inside = entries % 2 == 1
@@ -215,7 +215,7 @@ class _Chain:
         return along
 
     def at_extrema(self) -> Iterator[Crossing]:
-        """Where it comes near zero and turns back within a cell: two crossings, a touch, or nothing."""
+        """Crossings of a quantity that comes near zero and turns back within a cell: two, a touch, or none."""
         cells, sign = self.cells, self.signs[1::2]
         ends = (sign != 0.0) & (sign == self.signs[2::2]) & ~self.zero[:-1] & ~self.zero[1:]
         dips = ends & (cells.slope_a * sign < 0.0) & (cells.slope_b * sign >= 0.0) & ~cells.clear()

@@ -43,7 +43,7 @@ Found = tuple[int, float, int, Crossing]  # step, share of it, number of the eve
 
 
 class _Zeros(NamedTuple):
-    """At an instant: which quantities are at zero, the values of all, and the motions of these, (k,)."""
+    """Quantities at zero at an instant, the values of all, and the motions of these, (k,)."""
 
     at: Flags
     values: Array
@@ -94,7 +94,7 @@ class EventLog:
             self._happen(self._last, float(self._last.t[0]), self._last.x[0], waiting)
 
     def _found(self, part: StepBlock) -> list[Found]:
-        """What reaches zero in these steps, in order."""
+        """Crossings in these steps, in order."""
         found: list[Found] = []
         self._see(part, 0, part.x_old[0])
         self._sides = self._sides or [self._start(number, part) for number in range(len(self.program.events))]
@@ -109,7 +109,7 @@ class EventLog:
         return sorted(found)
 
     def _start(self, number: int, part: StepBlock) -> Side:
-        """At the start of the run. What is zero there, to rounding, rests; with a reset, on the side to come from."""
+        """Side at the start of the run: zero, to rounding, is rest; with a reset, the side to come from."""
         event, t, x = self.program.events[number], part.t_old[:1], part.x_old[:1]
         value = float(event.value(t, x, self.parameters)[0])
         if not abs(value) <= self._noise(number, float(t[0]), x[0]):
@@ -212,7 +212,7 @@ class EventLog:
         self._sides = [self._side(number, zeros) for number in range(len(events))]
 
     def _side(self, number: int, zeros: _Zeros) -> Side:
-        """After a reset: a quantity at zero is on the side that it moves to, or rests there."""
+        """Side after a reset: of a quantity at zero that to which it moves, or rest."""
         if not zeros.at[number]:
             return Side(float(np.sign(zeros.values[number])))
         motion = float(np.sign(zeros.motions[number]))
@@ -228,7 +228,7 @@ class EventLog:
 
     @property
     def _roundings(self) -> float:
-        """By how much states may be off by now, relative to how far they have gone.
+        """Rounding errors of states by now, relative to how far they have gone.
 
         Roundings of steps add up at random; a rate that is off takes its state off by that share of the whole way.
         """
@@ -236,11 +236,11 @@ class EventLog:
 
     @property
     def _gone(self) -> Array:
-        """How far states and their rates have gone, (2, m), at least as far as they are large."""
+        """Distances that states and their rates have gone, (2, m), at least their sizes."""
         return np.fmax(self._sizes, self._ways)
 
     def _noise(self, number: int, t: float, x: Array, end: Array | float = 0.0) -> float:
-        """By how much a quantity may be off for that, also inside a step to an end (1, m)."""
+        """Error of a quantity by the rounding of states, also inside a step to an end (1, m)."""
         errors = self._roundings * self._gone[:1] + UNIT * np.abs(end), np.array([self._roundings * abs(t)])
         return float(self.program.events[number].error(np.array([t]), x[None], self.parameters, *errors)[0])
 
@@ -254,7 +254,7 @@ class EventLog:
 def split_crossings(
     program: EventProgram, happened: Sequence[Happening], nq: int, parameters: ArrayLike = 0.0
 ) -> dict[str, Crossings]:
-    """Of each event by name, (number, t, x) as times and states, split after nq numbers into q and qd."""
+    """Crossings by the event's name, from (number, t, x), with states split after nq numbers into q and qd."""
     result = {}
     for number, event in enumerate(program.events):
         matching = [(t, x) for k, t, x in happened if k == number]
@@ -289,7 +289,7 @@ class WatchedIntegration(Integration):
         return any(event.reset is not None for event in self.log.program.events)
 
     def beside(self, steps: Callable[[float], Sequence[EqualSteps]]) -> WatchedIntegration:
-        """The same run with other equal steps: those of a segment from the time on at which it begins."""
+        """Run with other equal steps: those of a segment from the time on at which it begins."""
         first, options = self._segments[0], replace(self.options, max_steps=math.inf)
         assert isinstance(first, FixedStepIntegration)
         return WatchedIntegration(
@@ -297,7 +297,7 @@ class WatchedIntegration(Integration):
         )
 
     def crossings(self, nq: int, parameters: ArrayLike = 0.0) -> dict[str, Crossings]:
-        """Of each event by name, where it happened, with states split after nq numbers; parameters: of the problem."""
+        """Crossings by the event's name, with states split after nq numbers; parameters: of the problem."""
         return split_crossings(self.log.program, self.log.happened, nq, parameters)
 
     def blocks(self, x: Array) -> Iterator[StepBlock]:

@@ -195,7 +195,7 @@ def _final(graph: Graph | None, motion: MotionRequest, segments: MotionSegments)
 
 
 def _gradients(motion: MotionRequest, start: Array, inputs: Array, rows: Array, end: Bars) -> dict[str, Array]:
-    """By the names of `wrt`, from the cotangents of the start, of the inputs, and of the forces of each step."""
+    """Gradients by the names of `wrt`, of cotangents of the start, of the inputs, and of the forces of each step."""
     nq, forces, equations = motion.problem.nq, motion.forces, motion.equations
     result: dict[str, Array] = {}
     if motion.by_parameters:

@@ -177,7 +177,7 @@ def _shapes(motions: MotionRequest) -> dict[str, tuple[int, ...]]:
 
 
 def _some(motions: MotionRequest, part: range) -> MotionRequest:
-    """Some of the motions; one by chosen steps with these."""
+    """Subset of the motions; one by chosen steps with these."""
     here = slice(part.start, part.stop)
     x, tau, values = (array[..., here] for array in (motions.x, motions.tau, motions.values))
     return replace(motions, x=x, tau=tau, values=values).with_segments()

@@ -83,7 +83,7 @@ class MotionRequest:
 
     @property
     def forces(self) -> int:
-        """How many of the applied forces are inputs."""
+        """Number of the applied forces that are inputs."""
         return self.equations.forces
 
     def with_segments(self, events: Sequence[Event] = ()) -> MotionRequest:
@@ -127,7 +127,7 @@ class MotionRequest:
 
     @property
     def many(self) -> int:
-        """How many motions go side by side, N."""
+        """Number N of motions side by side."""
         return len(self.x.T)
 
     @property

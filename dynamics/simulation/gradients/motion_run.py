@@ -67,7 +67,7 @@ class MotionRun:
         return _memory(self.step.forward, {**given, **values}, motion.many)
 
     def tried(self) -> Array:
-        """Where the last step arrives, (m, 1)."""
+        """State at which the last step arrives, (m, 1)."""
         count, memory = len(self.motion.h), self._memory.copy()
         self.step.forward.run(memory, 1, 1, _fed(self.motion, count - 1, count))
         return self._state(memory)
@@ -100,7 +100,7 @@ class MotionRun:
         return bad
 
     def stopped(self, k: int) -> str:
-        """Where motion k, which went wrong, did so: the first step after which it is, in words."""
+        """Place where motion k went wrong: the first step after which it has, in words."""
         motion, forward, memory = self.motion, self.step.forward, self._begin()
         before, first, size = memory, 0, PIECE
         while first < len(motion.h):

@@ -101,11 +101,13 @@ class MotionSegments:
             inputs += np.concatenate(more)
             if k == 0:
                 break
+            # cotangents of the instants and lengths of the steps, to which the event adds at the last
             t, h = (rows[:, names.index(name), 0].copy() for name in ("t", "h"))
             t[-1] += later
             if segment.event:
                 h[-1] = 0.0  # which the event determines
             by_t, by_h = _by_begin(segment)
+            # begin_bar = sum over steps of t_bar dt/dbegin + h_bar dh/dbegin
             begin = t @ by_t + h @ by_h + (bars["t"][0] if "t" in bars else np.zeros(1))
             end = Bars(bars["x"], begin, np.zeros(0))
         if motion.equations.start is None:
@@ -144,8 +146,10 @@ class MotionSegments:
             if segment.event:
                 g = _pulled_at(self.events[segment.event].values, run.motion, run.x, end, np.ones((1, 1)))
                 tangents, slope = tangents[:, :, :-1], tangents[-1, :, -1]
+                # dg = dg/dx dx + dg/dt dt + dg/dp dp at fixed h, and dh = -dg / (dg/dx dx/dh + dg/dt)
                 at_event = g.x[:, 0] @ tangents[-1] + g.t * times[-2] + g.inputs[:, 0] @ inputs
                 length = -at_event / (g.x[:, 0] @ slope + g.t)
+                # dx += dx/dh dh, dt += dh
                 tangents[-1] += slope[:, None] * length
                 times[-1] = times[-2] + length
             parts.append(Rows(run.motion.t, states, times, tangents))
@@ -187,7 +191,7 @@ def _steps(segment: Segment, begin: float) -> tuple[Array, Array]:
 
 
 def _by_begin(segment: Segment) -> tuple[Array, Array]:
-    """How the times of the steps of a segment and their lengths depend on where it begins."""
+    """Derivatives of the times and lengths of a segment's steps by the time at which it begins."""
     count = len(segment.t) - 1
     if segment.equal:
         return 1.0 - np.arange(count) / segment.equal, np.full(count, -1.0 / segment.equal)
@@ -203,6 +207,7 @@ def _arrive(run: MotionRun, event: WatchedEvent) -> None:
         point = motion.at_end(x, float(t[0]))
         values = point[len(x) + 1 :, 0].tolist()
         g, x_dot = event.value(t, x.T, values), _evaluated(motion.problem.rate, point)
+        # Newton's method: h -= g / (dg/dx xdot + dg/dt)
         step = float(g[0] / event.slope(t, x.T, values, x_dot.T, np.ones(1))[0])
         if not abs(step) < last:
             break
@@ -218,6 +223,7 @@ def _before_event(run: MotionRun, event: WatchedEvent, end: Bars, inputs: Array)
     """Cotangents where a segment arrives at an event, with h as the event determines it; and that of t there."""
     g = _pulled_at(event.values, run.motion, run.x, float(run.motion.t[-1]), np.ones((1, 1)))
     slope = run.last_slope(g.x) + g.t
+    # lambda with h_bar = x_bar dx/dh + t_bar + lambda (dg/dx dx/dh + dg/dt) = 0
     share = -(run.last_slope(end.x) + end.t) / slope
     inputs += share * g.inputs
     return Bars(end.x + share * g.x, np.zeros(1), inputs), float((end.t + share * g.t)[0])

@@ -80,12 +80,12 @@ class StepBlock(NamedTuple):
             return values_of(_tangent(self.normalization, self.x.shape[1]), inputs, len(s)).T
 
     def rounding(self, rows: Indices, t: Array, x: Array) -> tuple[Array, Array]:
-        """By how much states x (k, m) in these steps may be off, (k, m), and the times t (k,), for being rounded."""
+        """Rounding errors, (k, m), of states x (k, m) in these steps, and of the times t (k,)."""
         x_error = np.abs(self.x_old[rows]) + np.abs(self.x[rows]) + np.abs(x)
         return UNIT * x_error, UNIT * (np.abs(self.t_old[rows]) + np.abs(t))
 
     def part(self, which: slice) -> StepBlock:
-        """Some of the steps."""
+        """Subset of the steps."""
         dense = None if self.dense is None else self.dense[which]
         t, x, t_old, h, x_old = (array[which] for array in (self.t, self.x, self.t_old, self.h, self.x_old))
         return StepBlock(t, x, t_old, h, x_old, dense, self.normalization)
@@ -112,7 +112,7 @@ def _with_time(normalization: Graph, states: Array, times: Array) -> list[Array]
 
 @kept_by_first
 def _tangent(graph: Graph, m: int) -> Graph:
-    """Of the outputs, from the inputs and the tangents of the first m."""
+    """Tangents of the outputs, from the inputs and the tangents of the first m."""
     return cg.jvp(graph, list(graph.input_names[:m]))
 
 

@@ -56,7 +56,7 @@ def equal_steps(instants: Sequence[float], dt: float) -> list[EqualSteps]:
 
 
 def even_steps(instants: Sequence[float], dt: float) -> list[EqualSteps]:
-    """The same as `equal_steps`, but with instants that are evenly spaced, to rounding, in one stretch."""
+    """Equal steps as of `equal_steps`, with instants that are evenly spaced, to rounding, in one stretch."""
     times = np.array(instants)
     gaps, ulps = np.diff(times), np.spacing(np.maximum(np.abs(times[:-1]), np.abs(times[1:])))
     breaks = np.flatnonzero(np.abs(np.diff(gaps)) > EVEN * ulps[1:]) + 1
@@ -74,7 +74,7 @@ def even_steps(instants: Sequence[float], dt: float) -> list[EqualSteps]:
 
 
 def halved(stretches: Iterable[EqualSteps]) -> list[EqualSteps]:
-    """Each step as two."""
+    """Two steps in place of each."""
     return [part._replace(h=0.5 * part.h, steps=2 * part.steps) for part in stretches]
 
 

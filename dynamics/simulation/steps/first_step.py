@@ -133,7 +133,7 @@ def _sum(names: str, target: str, rule: Callable[..., Node]) -> Sum:
 
 
 def _largest(kinds: StateKinds, source: str, target: str) -> Call:
-    """For each component the largest size of those of its kind."""
+    """Largest size among components of one kind, for each component."""
     return Call(kinds.largest, (_at(source),), (_at(target),))
 
 
@@ -152,7 +152,7 @@ def _first_try(length: Node, longest: Node, least: Node) -> Node:
 
 
 def _begin(problem: Problem, kinds: StateKinds, *, starts: bool) -> If:
-    """What a run begins with: its start, the rate there, and whether to look ahead, to search, or to set out."""
+    """Beginning of a run: its start, the rate there, and whether to look ahead, to search, or to set out."""
 
     def begun(t: Node, t_end: Node, first: Node, sized: Node, longest: Node) -> Values:
         length = abs(t_end - t)
@@ -187,7 +187,7 @@ def _begin(problem: Problem, kinds: StateKinds, *, starts: bool) -> If:
 
 
 def _after_start(problem: Problem, kinds: StateKinds) -> list[Statement]:
-    """Where a force jumps at the start, the rate right after it: it changes in the first instant, and no more."""
+    """Rate right after a force's jump at the start: it changes in the first instant, and no more."""
 
     def jumps(first: Node, after: Node, later: Node, kind: Node, kind_after: Node) -> Node:
         least = SUDDEN * cg.maximum(kind, kind_after)
@@ -314,7 +314,7 @@ def _set_out(problem: Problem) -> list[Statement]:
 
 
 def _turn(m: int, order: int) -> tuple[Statement, ...]:
-    """After a trial of the search: the next one, or whether its step is confirmed.
+    """Turn of the search after a trial: the next one, or whether its step is confirmed.
 
     The estimate of an embedded method can vanish by symmetry, such as at a start from rest, and a guess from the first
     derivatives can be far off; halving cannot be fooled by either. Of an initial layer that a method damps, both the

@@ -51,7 +51,7 @@ class FlatPosition:
         return [text + where]
 
     def creeping(self, goes_on: bool, steps: int, longest: float, rows: Array, parameters: Sequence[float]) -> str:
-        """What to say of a run that hardly comes on near such a position, after so many steps; "" of others."""
+        """Sentence on a run that hardly comes on near a flat position, after so many steps; "" of others."""
         if self.rows is None or not goes_on or not len(rows) or steps < self._mark[0] + CREEP:
             return ""
         t, (before, begin) = float(rows[-1, 0]), self._mark

@@ -133,7 +133,7 @@ class ScipyIntegration(Integration):
         return solver
 
     def _stepped(self, solver: Any) -> bool:
-        """One step more; False where there is none, and then `status` says why."""
+        """Take one step; False where there is none, and then `status` says why."""
         where = f"stopped at t = {solver.t:.6g} s: "
         try:
             with warnings.catch_warnings(record=True) as said:
@@ -155,7 +155,7 @@ class ScipyIntegration(Integration):
         return not self.status
 
     def _gave_up(self, solver: Any, said: Sequence[str | None]) -> str:
-        """Why the solver has failed: what is not finite at the state that it has come to, or what SciPy says."""
+        """Reason why the solver has failed: what is not finite at the state that it has come to, or what SciPy says."""
         rate = self.solver.rate(solver.t, solver.y)
         if len(bad := np.flatnonzero(~np.isfinite(rate))):
             return f"the rate of {self.components[bad[0]]} is not finite"

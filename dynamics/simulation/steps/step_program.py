@@ -24,7 +24,7 @@ KEPT = 8  # programs from elsewhere that a process keeps ready
 
 @dataclass(frozen=True, eq=False)
 class StepProgram:
-    """What a run reads of a problem and a method."""
+    """Program of a problem's steps by a method, as a run reads it."""
 
     components: tuple[str, ...]  # of the state, in words
     parameters: tuple[str, ...]  # inputs that are not built in
@@ -70,7 +70,7 @@ class CompiledSteps:
 
     @cached_property
     def prices(self) -> tuple[float, float]:
-        """Of an evaluation of the Jacobian and of a factorization, in evaluations of the rate."""
+        """Prices of an evaluation of the Jacobian and of a factorization, in evaluations of the rate."""
         return prices(self.program.steps, self.program.rate) if self.factorizations else (0.0, 0.0)
 
 
@@ -102,7 +102,7 @@ def step_program(problem: Problem, method: Method, *, dense: bool) -> StepProgra
 
 
 def state_kinds(problem: Problem) -> StateKinds:
-    """Which components can be compared.
+    """Components that can be compared.
 
     Coordinates are a kind, and velocities; those of no known length are others, and so is a group of several
     coordinates, such as a quaternion.
@@ -136,14 +136,14 @@ def _normalized(steps: Program, problem: Problem, method: Method) -> Program:
 
 
 def normalizing(problem: Problem, time: str) -> list[Statement]:
-    """What is done to register x, a state that a step arrives at, at an instant: its constraints are met."""
+    """Statements that make register x, a state that a step arrives at, meet its constraints at an instant."""
     if problem.projection is not None:
         return [Call(problem.projection, ("x", time, "p"), ("x",))]
     return [] if problem.normalization is None else [Call(problem.normalization, ("x",), ("x",))]
 
 
 def between(problem: Problem) -> Graph | None:
-    """What is done to states between the ends of steps: the projection where it needs no more than states and t."""
+    """Graph through which states between the ends of steps go: the projection where states and t are all it needs."""
     if problem.projection is None or problem.parameters:
         return problem.normalization
     return problem.projection

@@ -70,7 +70,7 @@ class Integration(ABC):
         """The steps from x (m,) on, some at a time."""
 
     def crossings(self, nq: int, parameters: ArrayLike = 0.0) -> dict[str, Crossings]:
-        """Of each event by name, where it happened, with states split after nq numbers; parameters: of the problem."""
+        """Crossings by the event's name, with states split after nq numbers; parameters: of the problem."""
         return {}
 
     def with_dense(self, block: StepBlock) -> StepBlock:
@@ -83,7 +83,7 @@ class Integration(ABC):
 
 
 class NativeRun(NamedTuple):
-    """What a run of one of our methods is made of.
+    """Run of one of our methods: its program, memory and record.
 
     parameters: values of the program's inputs that are not built in.
     stopped: asked before every block; a run that is stopped raises StoppedError.
@@ -241,7 +241,7 @@ class FixedStepIntegration(NativeIntegration):
         self.stretches, self.stretch = stretches, stretches[0]
 
     def beside(self, stretches: Sequence[EqualSteps], parameters: Sequence[float]) -> FixedStepIntegration:
-        """The same by other steps, with parameters in place of a controller."""
+        """Run by other steps, with parameters in place of a controller."""
         options = replace(self.options, max_steps=math.inf)
         run = self.run._replace(options=options, parameters=parameters, control=None)
         return FixedStepIntegration(run, stretches=stretches)
@@ -352,7 +352,7 @@ class FixedStepIntegration(NativeIntegration):
 
 
 def failed_step(components: Sequence[str], t: float, before: Array, x: Array, singular: int) -> str:
-    """Why a step from one state to another, (m,), at t, failed.
+    """Reason why a step from one state to another, (m,), at t, failed.
 
     singular: the number of the component whose inertia is not positive, from 1 on; else 0.
     """
@@ -376,7 +376,7 @@ def nonfinite(components: Sequence[str], state: Array) -> str:
 
 
 def unsolved(components: Sequence[str], before: Array, x: Array) -> str:
-    """Why a step from one state to another, (m,), which is no solution, failed: with the component that moved most."""
+    """Reason why a step to a state, (m,), that is no solution failed: with the component that moved most."""
     moved = np.abs(x - before) / np.maximum(np.abs(x), np.abs(before)).clip(TINY)
     first = components[int(np.argmax(moved))]
     return f"the equations of the step did not converge; the step is too long, first of all for {first}"

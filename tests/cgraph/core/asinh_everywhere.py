@@ -19,7 +19,7 @@ import cgraph as cg
 import dynamics as dyn
 import viz
 from cgraph.core.node import apply
-from cgraph.explain.lint.cancellation import UNIT, rounded
+from cgraph.explain.lint.cancellation import ROUNDOFF, rounded
 from cgraph.explain.lint.singular import intervals
 from cgraph.explain.names import Names
 from cgraph.extend import OPS
@@ -133,8 +133,8 @@ def test_lint():
     assert set(intervals(GRAPH, {"x": (0.5, 2.0)}).values()) == {(0.5, 2.0), (-math.inf, math.inf)}
     at = {"x": 0.6}
     value = GRAPH.evaluate(at)["y"]
-    inherited = 0.6 * UNIT / math.hypot(1.0, 0.6)  # of an input that is half a unit off
-    assert rounded(Names(GRAPH), at).errors[GRAPH.outputs["y"]] == pytest.approx(inherited + 2.0 * UNIT * value)
+    inherited = 0.6 * ROUNDOFF / math.hypot(1.0, 0.6)  # of an input that is half a unit off
+    assert rounded(Names(GRAPH), at).errors[GRAPH.outputs["y"]] == pytest.approx(inherited + 2.0 * ROUNDOFF * value)
     lossy = cg.Graph([X], {"y": cg.asinh(X) - 1.0})
     assert "digits are lost" in str(cg.lint(lossy, at={"x": math.sinh(1.0) + 1e-9}))
 

@@ -14,6 +14,7 @@ import cgraph as cg
 import dynamics as dyn
 from dynamics.equations.states.consistent_state import nearest_state
 from dynamics.equations.states.evaluate import Array
+from dynamics.simulation.gradients.sensitivities import Sensitivities
 
 from ..linkages import bar, four_bar
 
@@ -50,7 +51,7 @@ def ended(run: Any) -> tuple[Array, Array]:
     return run.q[..., -1, :].ravel(), run.qd[..., -1, :].ravel()
 
 
-def columns(run: dyn.Sensitivities) -> tuple[Array, Array]:
+def columns(run: Sensitivities) -> tuple[Array, Array]:
     return run.q[-1], run["tau"][-1, :3]
 
 

@@ -16,6 +16,7 @@ from dynamics.equations.states.consistent_state import nearest_state
 from dynamics.experiments.speed import bench_scenes
 from dynamics.integrators import METHODS, Tableau, derive, runge_kutta
 from dynamics.simulation.gradients import motion_run
+from dynamics.simulation.gradients.gradient import MotionGradient
 from dynamics.simulation.gradients.motion_equations import motion_equations, rate_pullback, sharing
 from dynamics.simulation.gradients.motion_programs import motion_programs
 from dynamics.systems.system import System
@@ -328,7 +329,7 @@ def test_events_that_reset_the_state_or_end_the_motion(method: str, events: Any)
     given = {"t_end": 1.0, "method": method, "events": events, "wrt": ["q", "tau", "m", "e"], "backend": "python"}
     given |= {"rtol": 1e-7} if METHODS[method].adaptive else {"dt": 0.05}
 
-    def at(q: float = 1.0, tau: float = 0.2, **numbers: float) -> dyn.MotionGradient:
+    def at(q: float = 1.0, tau: float = 0.2, **numbers: float) -> MotionGradient:
         final = lambda q, qd, t: q[0] * qd[0] + t * q[0]  # noqa: E731
         return dyn.gradient(FALLING, final, [q], [0.1], tau=[tau], parameters=numbers, **given)
 

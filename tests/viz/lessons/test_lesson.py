@@ -241,7 +241,7 @@ def test_a_line_makes_the_page(tmp_path, capsys, monkeypatch):
 
 
 def test_a_system_too_large_for_the_page_is_said_to_be(monkeypatch):
-    monkeypatch.setattr("viz.lessons.subject.LARGEST", 5)
+    monkeypatch.setattr("viz.lessons.subject.LARGEST_GRAPH", 5)
     assert "too large to be computed" in torque_parts(subject_of(MODELS["wheel"]())).to_html(3)
 
 

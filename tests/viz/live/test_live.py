@@ -17,8 +17,8 @@ import viz
 from dynamics.integrators import TABLEAUS
 from tests.each_row import each_row
 from viz.live import Live, page_text
-from viz.live.page import SCRIPTS
-from viz.models.live import live_of
+from viz.live.live_panel import SCRIPTS
+from viz.models.live_motion import live_of
 from viz.pages.html import asset
 
 ROUNDING = 1e-12  # relative: a few hundred steps of sines that differ in the last bit

@@ -15,7 +15,7 @@ import viz
 from dynamics import scenes
 from tests.each_row import each_row
 from viz.animation.canvas import DARK, LIGHT
-from viz.models.animate import _at, frames
+from viz.models.film import _at, frames
 
 Image = pytest.importorskip("PIL.Image")
 ARM = dyn.planar_arm([1.0, 0.5], [1.0, 0.8])

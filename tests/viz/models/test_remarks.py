@@ -9,8 +9,8 @@ import dynamics as dyn
 from dynamics.equations.states.consistent_state import nearest_state
 from tests.dynamics.linkages import four_bar
 from viz import cli
-from viz.models.inspect import inspection_page
 from viz.models.inspection import inspection
+from viz.models.inspection_page import inspection_page
 from viz.models.remarks import tree_alone
 
 SCENE = """

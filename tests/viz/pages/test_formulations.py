@@ -13,7 +13,7 @@ from viz.graph_drawing.dot import short_formulas
 from viz.graph_drawing.legend import kinds_in, legend_svg
 from viz.models.inspection import inspection
 from viz.pages.document import Document, to_markdown
-from viz.pages.formulations import COLORS, TITLES, size_table
+from viz.pages.formulation_table import COLORS, TITLES, size_table
 
 DOCS = Path(__file__).parents[3] / "docs"
 

@@ -12,7 +12,7 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
-from viz.graph_drawing.render import LARGE
+from viz.graph_drawing.render import LARGE_GRAPH
 from viz.pages.notebook import COLUMNS, graph_html, trajectory_html
 
 EVIL = "<script>alert(1)</script>"
@@ -68,7 +68,7 @@ def test_a_large_graph_is_folded_and_the_way_to_its_page_is_said():
     x = cg.variable("x")
     with cg.tag("long"):
         y = x
-        for _ in range(LARGE):
+        for _ in range(LARGE_GRAPH):
             y = cg.sin(y)
     folded = graph_html(cg.Graph([x], {"y": y}))
     assert folded.count("<svg") == 1
@@ -78,11 +78,11 @@ def test_a_large_graph_is_folded_and_the_way_to_its_page_is_said():
 
 def test_a_large_graph_without_tags_is_told_in_words():
     y = x = cg.variable("x")
-    for _ in range(LARGE):
+    for _ in range(LARGE_GRAPH):
         y = cg.sin(y)
     told = graph_html(cg.Graph([x], {"y": y}))
     assert "<svg" not in told
-    assert f"{LARGE + 1} nodes" in told
+    assert f"{LARGE_GRAPH + 1} nodes" in told
 
 
 def test_a_node_shows_its_formula():

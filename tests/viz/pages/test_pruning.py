@@ -8,7 +8,7 @@ import pytest
 import dynamics as dyn
 from viz.cli import main
 from viz.commands.report import pruning_content
-from viz.pages import pruning
+from viz.pages import pruning_page
 from viz.pages.document import to_html
 
 
@@ -21,7 +21,7 @@ def test_the_page_has_every_row_of_the_account() -> None:
     assert [each["what"] for each in forward["remains"]] == ["unobservable inertial numbers"]
     for graph in content["graphs"]:
         assert sum(each["nodes"] for each in graph["left_out"]) == graph["full"]["nodes"] - graph["pruned"]["nodes"]
-    page = to_html(pruning.document(content))
+    page = to_html(pruning_page.document(content))
     for each in (row for graph in content["graphs"] for row in graph["left_out"]):
         assert f"<td>{each['what']}</td><td>{each['why']}</td><td>{each['nodes']}</td>" in page
 

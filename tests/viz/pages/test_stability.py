@@ -9,7 +9,7 @@ import pytest
 
 from tests.each_row import each_row
 from viz import cli
-from viz.pages import stability
+from viz.pages import stability_page
 from viz.pages.document import Document, document_files, to_html
 
 pytest.importorskip("matplotlib")
@@ -54,14 +54,14 @@ CONTENT = {
 @pytest.fixture(scope="module")
 def document() -> Document:
     """The document, drawn once."""
-    return stability.document(CONTENT)
+    return stability_page.document(CONTENT)
 
 
 @pytest.fixture
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pictures are empty, where only words and tables are looked at."""
-    monkeypatch.setattr(stability, "shares", lambda rows: None)
-    monkeypatch.setattr(stability, "to_adaptive_svg", lambda figure: "<svg/>")
+    monkeypatch.setattr(stability_page, "shares", lambda rows: None)
+    monkeypatch.setattr(stability_page, "to_adaptive_svg", lambda figure: "<svg/>")
 
 
 def test_the_page_counts_verdicts_and_gives_every_reason_once(document: Document) -> None:
@@ -73,17 +73,17 @@ def test_the_page_counts_verdicts_and_gives_every_reason_once(document: Document
 
 
 def test_a_line_is_a_figure_and_a_long_name_stays_in_one() -> None:
-    (line,) = stability._lines(ROWS[1])
+    (line,) = stability_page._lines(ROWS[1])
     assert line[0] == ROWS[1]["case"]
-    first, second = stability._lines(ROWS[0])
+    first, second = stability_page._lines(ROWS[0])
     assert first == ["Robertson", "radau", "meets", "error [ulp]", "1.0e-09", "1", "12 + 3", "0.25"]
     assert second == ["", "", "", "error [ulp]", "0.5", "", "", ""]
-    assert stability._lines(ROWS[3])[0][4] == "nan ✗"
+    assert stability_page._lines(ROWS[3])[0][4] == "nan ✗"
 
 
 def test_success_does_not_stand_in_the_box_of_a_warning(document: Document, undrawn: None) -> None:
     right = {**CONTENT, "sections": [{"name": "Cases", "about": "", "rows": ROWS[:3]}]}
-    assert 'class="warning"' not in to_html(stability.document(right))
+    assert 'class="warning"' not in to_html(stability_page.document(right))
     assert '<p class="warning">1 of 4 rows' in to_html(document)
 
 
@@ -91,22 +91,22 @@ def test_success_does_not_stand_in_the_box_of_a_warning(document: Document, undr
     ("value", "bound", "share"),
     [
         (2.0, 4.0, 0.5),
-        ("nan", 1.0, stability.TO),
-        ("inf", 1.0, stability.TO),
-        (0.0, 0.0, stability.FROM),
+        ("nan", 1.0, stability_page.TO),
+        ("inf", 1.0, stability_page.TO),
+        (0.0, 0.0, stability_page.FROM),
         (1.0, 0.0, 1e13),
     ],
 )
 def test_a_share_is_drawn_within_the_picture(value: float | str, bound: float, share: float) -> None:
-    assert stability._share({"value": value, "bound": bound}) == share
+    assert stability_page._share({"value": value, "bound": bound}) == share
 
 
 def test_what_is_beyond_its_bound_is_drawn_in_the_color_of_what_is_wrong() -> None:
-    axis = stability.shares(ROWS).axes[0]
+    axis = stability_page.shares(ROWS).axes[0]
     met, missed = (line for line in axis.lines if line.get_marker() in ("o", "X"))
     assert list(met.get_xdata()) == [1e-9]
-    assert list(missed.get_xdata()) == [7.0, 8.0, stability.TO]
-    assert missed.get_color() == stability.theme.SPURIOUS
+    assert list(missed.get_xdata()) == [7.0, 8.0, stability_page.TO]
+    assert missed.get_color() == stability_page.theme.SPURIOUS
     assert [label.get_text() for label in axis.get_yticklabels()] == [each["case"] for each in ROWS]
 
 

@@ -21,7 +21,7 @@ pytest.importorskip("matplotlib")
 from dynamics import METHODS
 from tests.each_row import each_row
 from viz import theme
-from viz.pages.work_precision import _look, _power, _time, work_precision
+from viz.pages.work_precision_page import _look, _power, _time, work_precision
 from viz.plots.direct_labels import COLORS, labeled
 
 
@@ -92,7 +92,7 @@ def page() -> str:
         return kept[0]
 
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr("viz.pages.work_precision.labeled", once)
+        patched.setattr("viz.pages.work_precision_page.labeled", once)
         return to_html(work_precision(content()))
 
 
@@ -139,8 +139,8 @@ def test_the_page_needs_no_other_file(page: str) -> None:
 @pytest.fixture
 def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pictures are empty, where only words and tables are looked at: drawing takes seconds."""
-    monkeypatch.setattr("viz.pages.work_precision.labeled", lambda *_, **__: None)
-    monkeypatch.setattr("viz.pages.work_precision.to_adaptive_svg", lambda _: "<svg/>")
+    monkeypatch.setattr("viz.pages.work_precision_page.labeled", lambda *_, **__: None)
+    monkeypatch.setattr("viz.pages.work_precision_page.to_adaptive_svg", lambda _: "<svg/>")
 
 
 def test_a_report_without_results_is_still_a_page(undrawn: None) -> None:

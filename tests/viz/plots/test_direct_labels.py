@@ -9,14 +9,14 @@ pytest.importorskip("matplotlib")
 
 from matplotlib.text import Text
 
-from viz.plots.direct_labels import Line, Panel, labeled
+from viz.plots.direct_labels import Line, PlotPanel, labeled
 
 
 def test_names_lie_apart_and_inside() -> None:
     """Ten curves that end within a few pixels of each other."""
     x = np.geomspace(1e-1, 1e-9, 9)
     lines = [Line(f"contender {k}", x, 1e-3 * (1 + 0.03 * k) * x**-0.2, k) for k in range(10)]
-    figure = labeled([Panel("many", "x", "y", lines)], columns=1)
+    figure = labeled([PlotPanel("many", "x", "y", lines)], columns=1)
     figure.draw_without_rendering()
     (axis,) = figure.axes
     boxes = [Text.get_window_extent(text) for text in axis.texts]  # without the lines that lead to them
@@ -30,14 +30,14 @@ def test_names_lie_apart_and_inside() -> None:
 
 
 def test_a_narrow_axis_has_two_powers_of_ten() -> None:
-    figure = labeled([Panel("narrow", "x", "y", [Line("a", [3e-5, 2e-5], [1.0, 2.0])])], columns=1)
+    figure = labeled([PlotPanel("narrow", "x", "y", [Line("a", [3e-5, 2e-5], [1.0, 2.0])])], columns=1)
     (axis,) = figure.axes
     assert [tick for tick in axis.get_xticks() if 1e-6 < tick < 1e-3] == pytest.approx([1e-4, 1e-5])
 
 
 def test_an_axis_may_rise_and_a_curve_have_its_own_color() -> None:
     line = Line("chain rule", [1.0, 10.0, 100.0], [1.0, 2.0, 3.0], "#123456")
-    left, right = (labeled([Panel("p", "x", "y", [line])], columns=1, rising=up).axes[0] for up in (False, True))
+    left, right = (labeled([PlotPanel("p", "x", "y", [line])], columns=1, rising=up).axes[0] for up in (False, True))
     assert left.get_xlim()[0] > left.get_xlim()[1]
     assert right.get_xlim()[0] < 1.0 < 100.0 < right.get_xlim()[1]
     assert right.lines[0].get_color() == "#123456"

@@ -8,7 +8,7 @@ from typing import Any
 
 from py_mini_racer import MiniRacer
 
-from viz.typed.page import script
+from viz.typed.text_page import script
 
 HELPERS = """
 const edges = (graph) => graph.nodes.reduce((sum, node) => sum + node.args.length, 0);

@@ -98,7 +98,7 @@ def euler_equations(growth: float) -> StabilityCase:
 
 
 def middle_axis(growth: float) -> StabilityCase:
-    """The same motion as a Lagrangian system of three Euler angles."""
+    """Motion of the middle axis as a Lagrangian system of three Euler angles."""
     start = _start(INERTIA, OMEGA)
     return StabilityCase(
         name="free body about its middle axis, Euler angles",

@@ -15,7 +15,7 @@ from cgraph.core.node import apply
 from cgraph.explain.lint.cancellation import rounded
 from cgraph.explain.lint.singular import intervals, value_of
 from cgraph.explain.names import Names
-from cgraph.operations.bounds import LINE
+from cgraph.operations.bounds import REAL_LINE
 from cgraph.operations.operation import OPS
 from tests import high_precision
 from tests.strategies import Case, cases, examples
@@ -229,7 +229,7 @@ def test_a_value_lies_within_its_bounds(name, data):
     arguments = [data.draw(st.floats(low, high)) for low, high in box]
     low, high = value_of(op, box)
     value = op.scalar(*arguments)
-    if math.isfinite(value) and (low, high) != LINE:  # which holds every number
+    if math.isfinite(value) and (low, high) != REAL_LINE:  # which holds every number
         assert low <= value <= high
         exact = high_precision.evaluate(
             cg.Graph(nodes := cg.variables(list("abc"[: op.arity])), {"f": apply(op, *nodes)}),

@@ -28,7 +28,7 @@ from dynamics.multibody.trees.mechanism import as_mechanism
 from dynamics.systems.model import Model
 
 from ..animation.canvas import KINDS, RATE, check_can_animate, encode
-from ..animation.panels import FINE, Curves, Motion, Panel, Sticks, film
+from ..animation.panels import FRAME_ROWS, Curves, FilmPanel, Motion, Sticks, film
 
 MOST_FRAMES, MOST_MOTIONS = 1000, 4
 FILM = 10.0  # s, a length that is offered
@@ -125,7 +125,7 @@ def animate(
         raise ValueError(f"marked: there is no motion {unknown[0]!r:.80} (there are {', '.join(known)})")
     times = _times(known.values(), speed)
     panel = _panel(model, known, times, wanted, set(wrong))
-    count = (len(times) - 1) // FINE + 1
+    count = (len(times) - 1) // FRAME_ROWS + 1
     made = Animation(encode(film(panel, times, require_flag("dark", dark), title), count, kind))
     made.kind = kind
     if target is not None:
@@ -163,8 +163,8 @@ def _times(motions: Collection[Trajectory], speed: float) -> Array:
         raise ValueError(f"speed must be positive and finite, got {speed!r}")
     start = min(float(min(each.t[0], each.t[-1])) for each in motions)
     end = max(float(max(each.t[0], each.t[-1])) for each in motions)
-    count = FINE * (frames(end - start, speed) - 1) + 1
-    return np.asarray(start + speed / (RATE * FINE) * np.arange(count), dtype=np.float64)
+    count = FRAME_ROWS * (frames(end - start, speed) - 1) + 1
+    return np.asarray(start + speed / (RATE * FRAME_ROWS) * np.arange(count), dtype=np.float64)
 
 
 def frames(length: float, speed: float) -> int:
@@ -184,12 +184,12 @@ def _panel(
     times: Array,
     wanted: Callable[[Array], ArrayLike] | None,
     wrong: Collection[str],
-) -> Panel:
+) -> FilmPanel:
     rows = [_at(each, times) for each in known.values()]
     if wanted is not None:
         rows.append(_wanted(wanted, times, len(model.coordinates)))
     mechanism = as_mechanism(model)
-    make: Callable[..., Panel] = partial(Curves, names=list(model.coordinates), t=times)
+    make: Callable[..., FilmPanel] = partial(Curves, names=list(model.coordinates), t=times)
     shown = rows
     if mechanism is not None:  # all at once, so that they are seen from one side
         points, parents, *_ = skeleton(mechanism.bind(), np.concatenate(rows))

@@ -4,33 +4,31 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from .. import theme
 from ..plots.plot import empty_figure, style, to_adaptive_svg
-from .document import Block, Document, Paragraph, Picture, Section, Table
+from .document import Block, Document, Paragraph, Picture, ReportData, Section, Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Content = Mapping[str, Any]  # what `to_dict()` of the report gives, or its JSON file
-Row = Content
 FROM, TO = 1e-12, 1e13  # shares of a bound that are drawn; what is outside is drawn at the border
 WIDTH, LINE, FRAME = 10.0, 0.17, 1.0  # inches: of a picture, of each case, and for the axis
 
 
-def document(content: Content) -> Document:
+def document(content: ReportData) -> Document:
     """The document of one report."""
     sections = [_limits(content), *[_section(section) for section in content["sections"] if section["rows"]]]
     return Document("Stiff and extreme cases", _introduction(content), sections)
 
 
-def _rows(content: Content) -> list[Row]:
+def _rows(content: ReportData) -> list[ReportData]:
     return [row for section in content["sections"] for row in section["rows"]]
 
 
-def _introduction(content: Content) -> list[Block]:
+def _introduction(content: ReportData) -> list[Block]:
     counts = Counter(row["verdict"] for row in _rows(content))
     verdict = f"{counts['meets']} of {len(_rows(content))} rows meet their bounds"
     verdict += f"; limits with a known reason: {counts['limit']}; unexplained: {counts['unexplained']}"
@@ -48,9 +46,9 @@ def _introduction(content: Content) -> list[Block]:
     ]
 
 
-def _limits(content: Content) -> Section:
+def _limits(content: ReportData) -> Section:
     """The reasons, each once, with the rows that it is of."""
-    groups: dict[str, list[Row]] = {}
+    groups: dict[str, list[ReportData]] = {}
     for row in _rows(content):
         if row["verdict"] != "meets":
             groups.setdefault(row["reason"] or row["stopped"] or "No reason is known.", []).append(row)
@@ -67,7 +65,7 @@ def _limits(content: Content) -> Section:
 _HEADER = ["case", "method", "verdict", "figure", "value", "bound", "steps", "time [s]"]
 
 
-def _section(section: Row) -> Section:
+def _section(section: ReportData) -> Section:
     name, rows = section["name"], section["rows"]
     anchor = re.sub(r"[^a-z]+", "-", name.lower())
     svg = to_adaptive_svg(shares(rows))
@@ -89,7 +87,7 @@ def _section(section: Row) -> Section:
     )
 
 
-def _lines(row: Row, missed: bool = False) -> list[list[str]]:
+def _lines(row: ReportData, missed: bool = False) -> list[list[str]]:
     """A line of cells for each figure, or for those beyond their bounds; what they share stands in the first."""
     measured: list[list[str]] = []
     for figure in row["measurements"]:
@@ -103,12 +101,12 @@ def _lines(row: Row, missed: bool = False) -> list[list[str]]:
     ]
 
 
-def _unit(figure: Row) -> str:
+def _unit(figure: ReportData) -> str:
     """The unit, in brackets; none for a share of what the section names."""
     return "" if str(figure["unit"]).startswith("of ") else f" [{figure['unit']}]"
 
 
-def _run(row: Row) -> list[str]:
+def _run(row: ReportData) -> list[str]:
     rejected = f" + {row['rejected']}" if row["rejected"] else ""
     return [f"{row['steps']}{rejected}", f"{row['seconds']:.2f}"]
 
@@ -120,7 +118,7 @@ def _number(value: float | str) -> str:
     return f"{value:.1e}" if value and not 0.01 <= abs(value) < 1000.0 else f"{value:.2g}"
 
 
-def shares(rows: Sequence[Row]) -> Figure:
+def shares(rows: Sequence[ReportData]) -> Figure:
     """Every figure over its bound, a line for each case, on one logarithmic axis; those beyond 1 in another color."""
     names = list(dict.fromkeys(row["case"] for row in rows))
     points = [
@@ -147,7 +145,7 @@ def shares(rows: Sequence[Row]) -> Figure:
     return figure
 
 
-def _share(figure: Row) -> float:
+def _share(figure: ReportData) -> float:
     """The figure over its bound, within what is drawn; what is no number at the far end."""
     value, bound = float(figure["value"]), float(figure["bound"])
     if value != value:

@@ -14,7 +14,7 @@ from ..inspector import page
 from ..pages.html import Page, html_target
 from ..typed import box
 from .inspection import Inspection, inspection
-from .live import live_panel
+from .live_motion import live_panel
 from .remarks import tree_alone
 from .typed_text import text_or_none
 

@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
 from .. import theme
-from ..plots.direct_labels import COLORS, Line, Panel, bars, labeled
+from ..plots.direct_labels import COLORS, Line, PlotPanel, bars, labeled
 from ..plots.plot import to_adaptive_svg
-from .document import Block, Document, Paragraph, Picture, Section, Table, left_out
+from .document import Block, Document, Paragraph, Picture, ReportData, Section, Table, left_out
 
-Content = Mapping[str, Any]  # what `to_dict()` of the report gives, or its JSON file
-Row = Content
 EQUAL, CHOSEN = "equal steps", "chosen steps"
 DRAWN = 3.0  # errors above are no motion of this kind any more
 
 
-def work_precision(content: Content) -> Document:
+def work_precision(content: ReportData) -> Document:
     """The document of one report."""
     sections = [_fastest(content), _against_time(content), _orders(content)]
     if content["conservative"]:
@@ -27,7 +24,7 @@ def work_precision(content: Content) -> Document:
     return Document(f"Error and run time: {content['name']}", _introduction(content), sections)
 
 
-def _introduction(content: Content) -> list[Block]:
+def _introduction(content: ReportData) -> list[Block]:
     times = content["times"]
     stiff = "; stiff" if content["stiff"] else ""
     return [
@@ -48,18 +45,18 @@ def _introduction(content: Content) -> list[Block]:
     ]
 
 
-def _sized(content: Content) -> str:
+def _sized(content: ReportData) -> str:
     return {"own": "value at that instant", "given": "natural size"}.get(content["relative_to"], "largest value")
 
 
-def _busy(content: Content) -> str:
+def _busy(content: ReportData) -> str:
     before, after = content["load"]
     if before is None or after is None:
         return ""
     return f"The load of the machine was {before:.1f} before and {after:.1f} after: above its cores, times are noisy."
 
 
-def _fastest(content: Content) -> Section:
+def _fastest(content: ReportData) -> Section:
     rows: list[list[str]] = []
     groups = list(dict.fromkeys(target["group"] for target in content["targets"]))
     for error in dict.fromkeys(target["error"] for target in content["targets"]):
@@ -75,7 +72,7 @@ def _fastest(content: Content) -> Section:
     return Section("fastest", "Fastest for an error", [table, Paragraph(note)])
 
 
-def _target(target: Row | None) -> str:
+def _target(target: ReportData | None) -> str:
     if target is None:
         return "-"
     ratio = "" if target["group"] == "ours" or target["ratio"] is None else f" [{_digits(target['ratio'])}]"
@@ -83,7 +80,7 @@ def _target(target: Row | None) -> str:
     return f"{_time(target['seconds'])} {name}{ratio}"
 
 
-def _against_time(content: Content) -> Section:
+def _against_time(content: ReportData) -> Section:
     panels, best = _panels(content, "error", "error at the end")
     caption = "Run time against error at the end: lower and further right is better. The same scales in all panels."
     if best:
@@ -91,7 +88,7 @@ def _against_time(content: Content) -> Section:
     return Section("time", "Run time against error", [_picture("time", panels, caption)])
 
 
-def _picture(name: str, panels: Sequence[Panel], caption: str, shared: bool = True) -> Block:
+def _picture(name: str, panels: Sequence[PlotPanel], caption: str, shared: bool = True) -> Block:
     """The panels that have points, or words where there is nothing to draw."""
     drawn = [panel for panel in panels if any(len(line.x) for line in panel.lines)]
     if not drawn:
@@ -99,22 +96,22 @@ def _picture(name: str, panels: Sequence[Panel], caption: str, shared: bool = Tr
     return Picture(name, to_adaptive_svg(labeled(drawn, shared=shared)), caption)
 
 
-def _grouped(content: Content) -> dict[tuple[str, bool], list[Row]]:
+def _grouped(content: ReportData) -> dict[tuple[str, bool], list[ReportData]]:
     """{(equal or chosen steps, whether they are ours): curves}."""
     kinds = [(kind, ours) for kind in (EQUAL, CHOSEN) for ours in (True, False)]
     return {each: [curve for curve in content["curves"] if (curve["kind"], curve["ours"]) == each] for each in kinds}
 
 
-def _panel(kind: str, ours: bool, x: str, y: str, lines: list[Line]) -> Panel:
-    return Panel(f"{'ours' if ours else 'others'}, {kind}", f"{x} (smaller to the right)", y, lines)
+def _panel(kind: str, ours: bool, x: str, y: str, lines: list[Line]) -> PlotPanel:
+    return PlotPanel(f"{'ours' if ours else 'others'}, {kind}", f"{x} (smaller to the right)", y, lines)
 
 
-def _panels(content: Content, x: str, name: str) -> tuple[list[Panel], list[str]]:
+def _panels(content: ReportData, x: str, name: str) -> tuple[list[PlotPanel], list[str]]:
     """Run times against x, which has that name, of ours and the others, of equal and of chosen steps.
 
     Besides, which of ours stand among the others.
     """
-    panels: list[Panel] = []
+    panels: list[PlotPanel] = []
     shown: list[str] = []
     groups = _grouped(content)
     for (kind, ours), curves in groups.items():
@@ -126,7 +123,7 @@ def _panels(content: Content, x: str, name: str) -> tuple[list[Panel], list[str]
     return panels, shown
 
 
-def _best(ours: Sequence[Row], content: Content) -> list[Row]:
+def _best(ours: Sequence[ReportData], content: ReportData) -> list[ReportData]:
     """The one of ours that is fastest at the smallest error that any of them reaches within a factor of a hundred."""
     reached = [(min(point["error"] for point in curve["points"]), curve) for curve in ours if curve["points"]]
     if not reached:
@@ -140,14 +137,14 @@ def _best(ours: Sequence[Row], content: Content) -> list[Row]:
     return [reached[min(times)[1]][1]]
 
 
-def _line(curve: Row, x: str, y: str, color: int | str, dashed: bool, before: str = "") -> Line:
+def _line(curve: ReportData, x: str, y: str, color: int | str, dashed: bool, before: str = "") -> Line:
     """A curve's points in two of their columns, those without a number or far off left out."""
     shown = [(point[x], point[y]) for point in curve["points"] if point[x] and point[y] and _drawn(point)]
     name = before + curve["name"].removeprefix("MuJoCo ")
     return Line(name, [a for a, _ in shown], [b for _, b in shown], color, dashed)
 
 
-def _look(curve: Row) -> tuple[int | str, bool]:
+def _look(curve: ReportData) -> tuple[int | str, bool]:
     """Color and dashes of a curve, the same on every page: one for every method of ours, and every maker of others."""
     if not curve["ours"]:
         color = [color for begin, color in theme.MAKERS.items() if curve["name"].startswith(begin)]
@@ -157,11 +154,11 @@ def _look(curve: Row) -> tuple[int | str, bool]:
     return number, number >= len(COLORS)
 
 
-def _drawn(point: Row) -> bool:
+def _drawn(point: ReportData) -> bool:
     return point["error"] < DRAWN and point["largest"] is not None and point["largest"] < 10.0 * DRAWN
 
 
-def _orders(content: Content) -> Section:
+def _orders(content: ReportData) -> Section:
     panels = []
     for (kind, ours), curves in _grouped(content).items():
         equal = kind == EQUAL
@@ -202,13 +199,13 @@ def _orders(content: Content) -> Section:
     )
 
 
-def _energy(content: Content) -> Section:
+def _energy(content: ReportData) -> Section:
     panels, _ = _panels(content, "drift", "change of energy")
     caption = "Run time against the largest change of energy over the instants, relative to the largest kinetic energy."
     return Section("energy", "Energy", [_picture("energy", panels, caption)])
 
 
-def _cold(content: Content) -> Section:
+def _cold(content: ReportData) -> Section:
     known = sorted(
         [start for start in content["cold"] if start["seconds"] is not None], key=lambda start: start["seconds"]
     )
@@ -238,7 +235,7 @@ def _cold(content: Content) -> Section:
     return Section("cold", "Cold start", [Paragraph(words), picture, Table("Cold starts", header, rows), *failed])
 
 
-def _points(content: Content) -> Section:
+def _points(content: ReportData) -> Section:
     blocks: list[Block] = [Paragraph("The same figures are in the CSV and JSON files.")]
     header = ["steps or tolerance", "steps", "rejected", "evaluations", "shortest", "median", "error at the end"]
     header += ["largest error", *(["change of energy"] if content["conservative"] else [])]
@@ -260,7 +257,7 @@ def _points(content: Content) -> Section:
     return Section("points", "All points", blocks)
 
 
-def _absent(content: Content) -> Section:
+def _absent(content: ReportData) -> Section:
     return Section(
         "absent",
         "What is not there",

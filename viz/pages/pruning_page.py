@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import Any
+from collections.abc import Sequence
 
-from .document import Block, Document, Paragraph, Section, Table, left_out
+from .document import Block, Document, Paragraph, ReportData, Section, Table, left_out
 
-Content = Mapping[str, Any]  # what `cgraph report --pruning --json` gives
 HEADER = ["", "why", "nodes", "edges"]
 
 
-def document(content: Content) -> Document:
+def document(content: ReportData) -> Document:
     """The document of one scene."""
     sizes = [
         [graph["equations"], *(f"{graph[part][what]}" for what in ("nodes", "edges") for part in ("full", "pruned"))]
@@ -28,7 +26,7 @@ def document(content: Content) -> Document:
     )
 
 
-def _section(graph: Content) -> Section:
+def _section(graph: ReportData) -> Section:
     saved = graph["full"]["nodes"] - graph["pruned"]["nodes"]
     share = f"{saved / graph['full']['nodes']:.0%}" if saved else "nothing"
     blocks: list[Block] = [Paragraph(f"{saved} of {graph['full']['nodes']} nodes are left out: {share}.", point=True)]
@@ -44,5 +42,5 @@ def _section(graph: Content) -> Section:
     return Section(graph["equations"].replace(" ", "-"), graph["equations"].capitalize(), blocks)
 
 
-def _rows(terms: Sequence[Content]) -> list[list[str]]:
+def _rows(terms: Sequence[ReportData]) -> list[list[str]]:
     return [[term["what"], term["why"], f"{term['nodes']}", f"{term['edges']}"] for term in terms]
