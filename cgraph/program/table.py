@@ -8,7 +8,7 @@ from importlib import import_module
 from typing import Any
 
 from .statement import StatementRow, register_statement
-from .statements import call, control, matrix, memory, tiles
+from .statements import call, control, matrix, memory
 
 
 def _later(file: str, name: str) -> Callable[..., Any]:
@@ -29,7 +29,7 @@ def _derivatives(file: str, kind: str) -> dict[str, Any]:
 # fmt: off   (a table is read by columns: kind, reads, writes, in Python, check; as machine code, side by side; more)
 MAP = StatementRow(
     call.Map,
-    ("shared", "inputs"),
+    ("shared", "inputs", "asked"),
     ("outputs",),
     call.run_map,
     call.check_elements,
@@ -65,7 +65,7 @@ ROWS = [
         **_derivatives("call_rules", "call"),
     ),
     MAP,
-    replace(MAP, kind=call.Sum, run=call.run_sum, text=call.sum_text),
+    replace(MAP, kind=call.Sum, reads=("shared", "inputs"), run=call.run_sum, text=call.sum_text),
     StatementRow(
         matrix.Factor,
         ("matrix",),
@@ -139,25 +139,14 @@ ROWS = [
         **_derivatives("memory_rules", "pop"),
     ),
     StatementRow(
-        tiles.TiledMap,
-        ("shared", "inputs", "tiles", "outputs"),
-        ("outputs",),
-        tiles.run_tiled_map,
-        tiles.check_tiled_map,
-        graph="graph",
-        text=tiles.tiled_map_text,
-        beside=tiles.run_tiled_map,
-        **_derivatives("tile_rules", "tiled_map"),
-    ),
-    StatementRow(
-        tiles.Scatter,
+        memory.Scatter,
         ("source", "target"),
         ("target",),
-        tiles.run_scatter,
-        tiles.check_scatter,
-        text=tiles.scatter_text,
-        beside=tiles.run_scatter,
-        **_derivatives("tile_rules", "scatter"),
+        memory.run_scatter,
+        memory.check_scatter,
+        text=memory.scatter_text,
+        beside=memory.run_scatter,
+        **_derivatives("memory_rules", "scatter"),
     ),
 ]
 # fmt: on

@@ -1,4 +1,4 @@
-"""Derivatives of Take, Push, Pop: numbers go where their values came from."""
+"""Derivatives of Take, Scatter, Push, Pop: numbers go where their values came from."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from ...core.graph import Graph
 from ...core.node import Node, constant
 from ...writing.naming import variables
 from ..statements.call import Call, copied, copied_or_zero, zeroed
-from ..statements.memory import Pop, Push, Take
+from ..statements.memory import Pop, Push, Scatter, Take
 from .adjoint import Adjoint
 from .single_assignment import Assignment
 from .tangent import Tangent
@@ -41,6 +41,35 @@ def collect_taken(adjoint: Adjoint, source: str, target: str, moves: Iterable[tu
     graph = Graph(bars, {f"{j}": totals.get(j, constant(0.0)) for j in range(adjoint.lengths[source])})
     adjoint.add(Call(graph, (adjoint.bars[target],), (bar,)))
     adjoint.collect(source, bar)
+
+
+# What a Scatter does not write stays as it was, and so does its tangent; its cotangent goes on to before.
+
+
+def push_scatter(assignment: Assignment, tangent: Tangent) -> None:
+    """target_dot[places[i]] = source_dot[table[i]]."""
+    scatter: Scatter = assignment.statement  # type: ignore[assignment]
+    (before,) = assignment.sources
+    if scatter.target in tangent.active and {scatter.source, before} & tangent.dots.keys():
+        dot = tangent.dot(scatter.target)
+        tangent.add(copied_or_zero(tangent.dots.get(before), dot))
+        tangent.add(Scatter(tangent.dot_or_zero(scatter.source), dot, scatter.table, scatter.places))
+
+
+def pull_scatter(assignment: Assignment, adjoint: Adjoint) -> None:
+    """source_bar[table[i]] += target_bar[places[i]], the last of those with one place; there target_bar before is 0."""
+    scatter: Scatter = assignment.statement  # type: ignore[assignment]
+    (before,) = assignment.sources
+    if scatter.target not in adjoint.bars:
+        return
+    if before in adjoint.active:
+        bar, none = adjoint.bar(before), adjoint.fresh("none", 1)
+        adjoint.add(copied(adjoint.bars[scatter.target], bar), zeroed(none))
+        adjoint.add(Scatter(none, bar, (0,) * len(scatter.places), scatter.places))
+        adjoint.collect(before, bar)
+    if scatter.source in adjoint.active:
+        last = dict(zip(scatter.places, scatter.table, strict=True))
+        collect_taken(adjoint, scatter.source, scatter.target, last.items())
 
 
 # The tangent of a stack is a stack of tangents with a count of its own, and what is put on one comes off the other.

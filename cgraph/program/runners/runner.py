@@ -66,7 +66,7 @@ class Runner(ABC):
     [8.0]
     """
 
-    lanes, tiles = 8, 512  # directions in a tile, and tiles in a block of them
+    lanes, vectors = 8, 512  # directions in a vector, and vectors in a block of them
     vector_cost = 1  # of an operation on a vector of directions, in operations on numbers
     takes_rows = False  # whether batches of points that lie one after another are read and written as they lie
 
@@ -174,8 +174,8 @@ class Runner(ABC):
     def _bind_pass(self, x: tuple[str, Array], y: tuple[str, Array]) -> tuple[Callable[[], None], Mapping[str, Array]]:
         """A function of nothing: one pass, of which a register x that is read and a y that is written lie in arrays.
 
-        The arrays, contiguous and of as many numbers, are not checked; no `Map` may write y. With it come the other
-        registers, zeros.
+        The arrays, contiguous and of as many numbers, are not checked; a `Map` that writes y has elements in whole
+        vectors. With it come the other registers, zeros.
         """
 
     def run_many(self, memories: Array, passes: int, every: int = 1, feed: ArrayLike | None = None) -> Record:
