@@ -124,14 +124,15 @@ class Functions:
     def _gather(self, t: str, size: int) -> str:
         """`x -> the vector of x[0], .., x[size - 1]`, by a load for each, of which LLVM would make one."""
         name = f"gathered{size}"
-        if (name,) not in self._names:
-            self._names[name,] = name
-            ir, vector = FunctionWriter(self.arithmetic), "poison"
+
+        def text(arithmetic: Arithmetic) -> list[str]:
+            ir, vector = FunctionWriter(arithmetic), "poison"
             for lane in range(size):
                 number = ir.value(f"load volatile double, ptr {ir.at('%x', lane)}, align 8")
                 vector = ir.value(f"insertelement {t} {vector}, double {number}, i32 {lane}")
-            self.definitions += ir.function(f"internal {t} @{name}(ptr %x) nounwind noinline", f"{t} {vector}")
-        return name
+            return ir.function(f"internal {t} @{name}(ptr %x) nounwind noinline", f"{t} {vector}")
+
+        return self.text(name, text)
 
     def total(self, count: int) -> str:
         """y = x[0] + .. + x[count - 1], added up in this order from 0."""

@@ -20,10 +20,10 @@ def _later(file: str, name: str) -> Callable[..., Any]:
     return rule
 
 
-def _derivatives(file: str, kind: str) -> dict[str, Any]:
-    """The rules `push_kind` and `pull_kind` of a file."""
+def _derivatives(file: str, kind: str, push: str = "") -> dict[str, Any]:
+    """The rules `push_kind`, or another, and `pull_kind` of a file."""
     file = f"derivatives.{file}"
-    return {"jvp": _later(file, f"push_{kind}"), "transpose": _later(file, f"pull_{kind}")}
+    return {"jvp": _later(file, f"push_{push or kind}"), "transpose": _later(file, f"pull_{kind}")}
 
 
 # fmt: off   (a table is read by columns: kind, reads, writes, in Python, check; as machine code, side by side; more)
@@ -62,7 +62,7 @@ ROWS = [
         graph="graph",
         text=call.call_text,
         beside=call.call_beside,
-        **_derivatives("call_rules", "call"),
+        **_derivatives("call_rules", "call", "elements"),
     ),
     MAP,
     replace(MAP, kind=call.Sum, reads=("shared", "inputs"), run=call.run_sum, text=call.sum_text),
@@ -115,7 +115,7 @@ ROWS = [
         memory.check_take,
         text=memory.take_text,
         beside=memory.run_take,
-        **_derivatives("memory_rules", "take"),
+        **_derivatives("memory_rules", "take", "moved"),
     ),
     StatementRow(
         memory.Push,
@@ -126,7 +126,7 @@ ROWS = [
         text=memory.push_text,
         beside=memory.run_push,
         masked=_later("many", "masked_push"),
-        **_derivatives("memory_rules", "push"),
+        **_derivatives("memory_rules", "push", "moved"),
     ),
     StatementRow(
         memory.Pop,
@@ -136,7 +136,7 @@ ROWS = [
         memory.check_stack,
         text=memory.pop_text,
         beside=memory.run_pop,
-        **_derivatives("memory_rules", "pop"),
+        **_derivatives("memory_rules", "pop", "moved"),
     ),
     StatementRow(
         memory.Scatter,
@@ -146,7 +146,7 @@ ROWS = [
         memory.check_scatter,
         text=memory.scatter_text,
         beside=memory.run_scatter,
-        **_derivatives("memory_rules", "scatter"),
+        **_derivatives("memory_rules", "scatter", "moved"),
     ),
 ]
 # fmt: on

@@ -3,52 +3,44 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from ...core.graph import Graph
+from ..statement import Names
 from ..statements.call import Call, Map, Sum, elements, sizes
 from .adjoint import Adjoint
-from .products import Product, split
+from .products import split
 from .single_assignment import Assignment, Registers
 from .tangent import Tangent
 
 # tangents: y = f(x), y_dot = f'(x) x_dot
 
 
-def push_call(assignment: Assignment, tangent: Tangent) -> None:
-    """y_dot = f'(x) x_dot."""
-    call: Call = assignment.statement  # type: ignore[assignment]
-    moving = tangent.moving(call.inputs)
-    if not moving or tangent.active.isdisjoint(call.outputs):
-        return
-    product = tangent.products.pushed(call.graph, tangent.of(call.inputs), moving, tangent.of(call.outputs))
-    if product.graph is not None:
-        dots = [tangent.dots[call.inputs[k]] for k in moving]
-        results = tuple([tangent.dot(call.outputs[k]) for k in product.kept])
-        tangent.add(Call(product.graph, (*call.inputs, *dots), results))
-
-
 def push_elements(assignment: Assignment, tangent: Tangent) -> None:
-    """y_dot[i] = f'(x[i]) x_dot[i], or their sum."""
-    statement: Map | Sum = assignment.statement  # type: ignore[assignment]
-    if tangent.active.isdisjoint(statement.outputs):
-        return
-    names, first = (*statement.shared, *statement.inputs), len(statement.shared)
+    """y_dot[i] = f'(x[i]) x_dot[i], or their sum; a call is one of them."""
+    statement: Call | Map | Sum = assignment.statement  # type: ignore[assignment]
+    common: Names = () if isinstance(statement, Call) else statement.shared
+    names, first = (*common, *statement.inputs), len(common)
     moving, lengths = tangent.moving(names), _in_element(statement, tangent)
-    product = tangent.products.pushed(statement.graph, lengths[0], moving, lengths[1]) if moving else Product(None, ())
+    if not moving or tangent.active.isdisjoint(statement.outputs):
+        return
+    product = tangent.products.pushed(statement.graph, lengths[0], moving, lengths[1])
     if product.graph is None:
         return
-    dots, common = [tangent.dots[names[k]] for k in moving], sum([k < first for k in moving])
-    shared, others = (*statement.shared, *dots[:common]), (*statement.inputs, *dots[common:])
+    dots, of_all = [tangent.dots[names[k]] for k in moving], sum([k < first for k in moving])
+    others = (*statement.inputs, *dots[of_all:])
     results = tuple([tangent.dot(statement.outputs[k]) for k in product.kept])
     graph = _shared_first(product.graph, lengths[0], first, moving)
-    if isinstance(statement, Map):
-        tangent.add(Map(graph, others, results, shared, statement.asked))
+    if isinstance(statement, Call):
+        tangent.add(Call(graph, others, results))
     else:
-        tangent.add(Sum(graph, others, results, shared))
+        tangent.add(replace(statement, graph=graph, inputs=others, outputs=results, shared=(*common, *dots[:of_all])))
 
 
-def _in_element(statement: Map | Sum, registers: Registers) -> tuple[tuple[int, ...], tuple[int, ...]]:
+def _in_element(statement: Call | Map | Sum, registers: Registers) -> tuple[tuple[int, ...], tuple[int, ...]]:
     """The numbers of the registers that are inputs of the graph for one element, and of those that are its outputs."""
+    if isinstance(statement, Call):
+        return registers.of(statement.inputs), registers.of(statement.outputs)
     inputs = (*registers.of(statement.shared), *sizes(statement, registers.lengths, statement.inputs))
     if isinstance(statement, Map):
         return inputs, sizes(statement, registers.lengths, statement.outputs)
