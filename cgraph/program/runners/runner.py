@@ -66,7 +66,8 @@ class Runner(ABC):
     [8.0]
     """
 
-    lanes, vectors = 8, 512  # directions in a vector, and vectors in a block of them
+    # Directions in a vector, and vectors in a block of them: odd, for rows a power of two apart share a few cache lines.
+    lanes, vectors = 8, 513
     vector_cost = 1  # of an operation on a vector of directions, in operations on numbers
     takes_rows = False  # whether batches of points that lie one after another are read and written as they lie
 
