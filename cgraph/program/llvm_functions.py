@@ -7,7 +7,7 @@ from typing import Any
 
 from ..codegen.arithmetic import Arithmetic
 from ..codegen.function_writer import FunctionWriter
-from ..codegen.llvm_ir import body, libm_functions
+from ..codegen.llvm_ir import libm_functions, write_graph
 from ..core.graph import Graph
 from ..core.node import Node
 
@@ -179,20 +179,10 @@ class Functions:
         pointers: Sequence[str],
         **how: Any,
     ) -> None:
-        """The graph in a function of that name, whose parts are defined before.
-
-        x, y: where the inputs and outputs are: type, pointer, index.  pointers: all of these.  how: see `instructions`.
-        """
-
-        def address(base: str, value: str, row: int) -> list[str]:
-            return [f"  {value} = getelementptr {(x if base == 'x' else y)[row]}"]
-
-        written = body(graph, ir.arithmetic, address, name, [f"ptr {each}" for each in pointers], **how)
-        for line in written.definitions:
+        """The graph in a function of that name, after what it calls; arguments: see `write_graph`."""
+        for line in write_graph(ir, name, graph, {"x": x, "y": y}, pointers, **how):
             quick = self.quick and line.startswith("define")
             self.definitions.append(line.replace("noinline {", "noinline optnone {") if quick else line)
-        ir.scratch += written.start
-        ir.lines += written.lines
 
     def _define(
         self, key: tuple[object, ...], kind: str, text: Text, arithmetic: Arithmetic, inputs: int, outputs: int
