@@ -10,6 +10,7 @@ from ..core.node import CONSTANT, Node
 from ..operations.operation import OPS, columns
 from ..operations.texts import LLVM_ONE_OR_ZERO, LLVM_WHERE
 from .arithmetic import REGISTERS, Arithmetic, bits, words_of
+from .function_writer import FunctionWriter
 from .parts import Parts
 from .schedule import Joined, Merged, Step, joined_calls, products_of, schedule
 from .vector_math import POLYNOMIAL, helpers
@@ -37,14 +38,12 @@ def point_arithmetic(flags: str, registers: int = REGISTERS) -> Arithmetic:
 def scalar_ir(graph: Graph, flags: str = "", registers: int = REGISTERS) -> str:
     """A module with `void point(double *x, double *y, double *)`: the outputs y at the inputs x."""
     arithmetic = point_arithmetic(flags, registers)
-    written = body(graph, arithmetic, _element, "point", ["ptr %x", "ptr %y"])
-    lines = [*preamble([graph], arithmetic), *written.definitions]
-    lines += ["define void @point(ptr noalias %x, ptr noalias %y, ptr) nounwind {", "start:"]
-    return "\n".join([*lines, *written.start, *written.lines, "  ret void", "}", ""])
-
-
-def _element(base: str, name: str, row: int) -> list[str]:
-    return [f"  {name} = getelementptr double, ptr %{base}, i64 {row}"]
+    ir = FunctionWriter(arithmetic)
+    places = {"x": [f"double, ptr %x, i64 {k}" for k in range(len(graph.inputs))]}
+    places["y"] = [f"double, ptr %y, i64 {k}" for k in range(len(graph.outputs))]
+    definitions = write_graph(ir, "point", graph, places, ["%x", "%y"])
+    point = ir.function("void @point(ptr noalias %x, ptr noalias %y, ptr) nounwind")
+    return "\n".join([*preamble([graph], arithmetic), *definitions, *point, ""])
 
 
 def preamble(graphs: Iterable[Graph], arithmetic: Arithmetic) -> list[str]:
@@ -84,43 +83,39 @@ def declarations(functions: Mapping[str, int]) -> list[str]:
     ]
 
 
-class Body(NamedTuple):
-    """The instructions that compute a graph.
-
-    start: what stands once at the start of the function.  lines: the rest, which may be in a loop.
-    definitions: of what they need in the module: the functions that they call, for a long graph, and constants.
-    """
-
-    start: list[str]
-    lines: list[str]
-    definitions: list[str]
-
-
-def body(
-    graph: Graph,
-    arithmetic: Arithmetic,
-    address: Address,
+def write_graph(
+    ir: FunctionWriter,
     name: str,
-    scope: Sequence[str],
+    graph: Graph,
+    places: Mapping[str, Sequence[str]],
+    pointers: Sequence[str],
     **how: Any,
-) -> Body:
-    """The instructions that compute a graph in the function of that name, in functions of their own if it is long.
+) -> list[str]:
+    """Write what computes a graph into the function of that name, in functions of their own if it is long.
 
-    scope: what the addresses are made from, each with its type.  how: see `instructions`.
+    places: where the inputs, "x", and outputs, "y", are: type, pointer, index.  pointers: all of these.  how: see
+    `instructions`.  Returns the definitions that the module needs besides: of those functions, and of constants.
     """
-    code = instructions(graph, arithmetic, address, name, **how)
-    memory = [f"  %w = alloca [{code.places} x {arithmetic.type}], align 64"] if code.places else []
+
+    def address(base: str, value: str, row: int) -> list[str]:
+        return [f"  {value} = getelementptr {places[base][row]}"]
+
+    code = instructions(graph, ir.arithmetic, address, name, **how)
+    if code.places:
+        ir.scratch.append(f"  %w = alloca [{code.places} x {ir.type}], align 64")
     if len(code.parts) == 1:
-        return Body([*memory, *code.start], code.parts[0], code.definitions)
-    values = [*scope, "ptr %w"] if code.places else scope
-    parameters = ", ".join([each.replace("ptr ", "ptr noalias ") for each in values])
-    definitions, calls = list(code.definitions), []
+        ir.scratch += code.start
+        ir.lines += code.parts[0]
+        return code.definitions
+    values = [*pointers, "%w"] if code.places else pointers
+    parameters = ", ".join([f"ptr noalias {each}" for each in values])
+    definitions = list(code.definitions)
     for number, lines in enumerate(code.parts):
-        function = f"@{name}.part{number}"
-        calls.append(f"  call void {function}({', '.join(values)})")
-        definitions += [f"define internal void {function}({parameters}) nounwind noinline {{", "start:"]
+        part = f"@{name}.part{number}"
+        ir.line(f"call void {part}({', '.join([f'ptr {each}' for each in values])})")
+        definitions += [f"define internal void {part}({parameters}) nounwind noinline {{", "start:"]
         definitions += [*code.start, *lines, "  ret void", "}"]
-    return Body(memory, calls, definitions)
+    return definitions
 
 
 class Code(NamedTuple):

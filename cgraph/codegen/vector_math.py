@@ -8,8 +8,10 @@ equations of motion take sines and cosines of joint angles and hardly anything e
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Iterable, Mapping, Sequence
+
+from .arithmetic import Arithmetic
+from .function_writer import FunctionWriter
 
 MAGIC = 6755399441055744.0  # 1.5 * 2**52: added to a small number, it leaves the nearest integer in the low bits
 LARGEST_ANGLE = 1e6
@@ -32,40 +34,31 @@ LN2 = (6.93147180369123816490e-01, 1.90821492927058770002e-10)
 EXP = tuple(1.0 / f for f in (2, 6, 24, 120, 720, 5040, 40320, 362880, 3628800, 39916800, 479001600, 6227020800))
 
 
-class Lines:
-    """Instructions on vectors, one named value after another. An argument is a value's name or a number for all lanes.
+class _Vectors(FunctionWriter):
+    """Instructions on vectors. An argument is a value's name or a number for all lanes.
 
-    lanes: doubles in a vector.  flags: of the polynomials' own arithmetic; of them, `exact` instructions keep only the
-    leave to round a product and its sum once.
+    Of the flags of the polynomials' own arithmetic, `exact` instructions keep only the leave to round a product and its
+    sum once.
     """
-
-    def __init__(self, lanes: int, flags: str) -> None:
-        self.text: list[str] = []
-        self.d, self.i, self.b = (f"<{lanes} x {each}>" for each in ("double", "i64", "i1"))
-        self.lanes, self._count = lanes, 0
-        self.flags, self.exact = f"{flags} " if flags else "", "contract " if "contract" in flags.split() else ""
-
-    def add(self, instruction: str) -> str:
-        """Add a value, and return its name."""
-        self._count += 1
-        self.text.append(f"  %t{self._count} = {instruction}")
-        return f"%t{self._count}"
 
     def f(self, op: str, a: str | float, b: str | float, exact: bool = False) -> str:
         """Arithmetic on doubles."""
-        return self.add(f"{op} {self.exact if exact else self.flags}{self.d} {number(a)}, {number(b)}")
+        flags = self.arithmetic.flags.split()
+        kept = " ".join([each for each in flags if each == "contract" or not exact])
+        return self.value(f"{op} {kept} {self.type} {self.of(a)}, {self.of(b)}")
 
-    def n(self, op: str, a: str, b: int) -> str:
-        """Arithmetic on integers, with a constant."""
-        return self.add(f"{op} {self.i} {a}, splat (i64 {b})")
+    def of(self, value: str | float) -> str:
+        """A value's name as it is; a number as the constant of all lanes."""
+        return value if isinstance(value, str) else self.number(value)
 
-    def bits(self, a: str) -> str:
-        """The bits of doubles."""
-        return self.add(f"bitcast {self.d} {a} to {self.i}")
+    def n(self, op: str, a: str, b: str | int) -> str:
+        """Arithmetic on integers, with a constant or another value."""
+        return self.value(f"{op} <{self.lanes} x i64> {a}, {b if isinstance(b, str) else f'splat (i64 {b})'}")
 
-    def double(self, a: str) -> str:
-        """The doubles of these bits."""
-        return self.add(f"bitcast {self.i} {a} to {self.d}")
+    def cast(self, a: str, back: bool = False) -> str:
+        """The bits of doubles, as integers; or the doubles of bits."""
+        kinds = (f"<{self.lanes} x i64>", self.type) if back else (self.type, f"<{self.lanes} x i64>")
+        return self.value(f"bitcast {kinds[0]} {a} to {kinds[1]}")
 
     def polynomial(self, x: str, coefficients: Sequence[float]) -> str:
         """c0 + c1 x + c2 x**2 + ..., by Estrin's scheme: (c0 + c1 x) + (c2 + c3 x) x**2 + ..., few steps deep."""
@@ -80,9 +73,7 @@ class Lines:
 
     def between(self, x: str, low: float, high: float) -> str:
         """Lanes that lie in [low, high]; a NaN does not."""
-        above = self.add(f"fcmp oge {self.d} {x}, {number(low)}")
-        below = self.add(f"fcmp ole {self.d} {x}, {number(high)}")
-        return self.add(f"and {self.b} {above}, {below}")
+        return self.value(f"and {self.bits} {self.compare('oge', x, low)}, {self.compare('ole', x, high)}")
 
 
 POLYNOMIAL = ("sin", "cos", "exp", "log")
@@ -114,57 +105,51 @@ def helpers(functions: Mapping[str, int], lanes: int, flags: str, *, polynomials
 
 def _lane_by_lane(inner: str, name: str, arity: int, lanes: int) -> list[str]:
     """The function of libm, called for each lane."""
-    vector = f"<{lanes} x double>"
-    text = [
-        f"define internal {vector} @{inner}({', '.join(f'{vector} %a{k}' for k in range(arity))}) nounwind noinline {{"
-    ]
-    result = "poison"
+    ir, result = FunctionWriter(Arithmetic(lanes=lanes)), "poison"
     for lane in range(lanes):
-        text += [f"  %a{k}.{lane} = extractelement {vector} %a{k}, i32 {lane}" for k in range(arity)]
-        args = ", ".join(f"double %a{k}.{lane}" for k in range(arity))
-        text.append(f"  %y{lane} = call double @{name}({args})")
-        text.append(f"  %r{lane} = insertelement {vector} {result}, double %y{lane}, i32 {lane}")
-        result = f"%r{lane}"
-    return [*text, f"  ret {vector} {result}", "}"]
+        numbers = [ir.value(f"extractelement {ir.type} %a{k}, i32 {lane}") for k in range(arity)]
+        number = ir.value(f"call double @{name}({', '.join([f'double {each}' for each in numbers])})")
+        result = ir.value(f"insertelement {ir.type} {result}, double {number}, i32 {lane}")
+    arguments = ", ".join([f"{ir.type} %a{k}" for k in range(arity)])
+    return ir.function(f"internal {ir.type} @{inner}({arguments}) nounwind noinline", f"{ir.type} {result}")
 
 
 def _guarded(names: Sequence[str], lanes: int, flags: str) -> list[str]:
     """The polynomial in the lanes that lie in the interval, libm in the others. Two names give both results."""
-    to = Lines(lanes, flags)
+    to = _Vectors(Arithmetic(flags, lanes))
     inside = to.between("%x", *INTERVALS[names[0]])
     if names[0] in ("sin", "cos"):
         results = _sine_cosine(to, "%x", names)
     else:
         results = [(_exp if names[0] == "exp" else _log)(to, "%x")]
-    everywhere = to.add(f"call i1 @llvm.vector.reduce.and.v{lanes}i1({to.b} {inside})")
-    to.text += [f"  br i1 {everywhere}, label %fast, label %slow", "fast:"]
-    to.text += _returned(to.d, results, "fast")
-    to.text.append("slow:")
+    kind = to.type if len(names) == 1 else f"{{{to.type}, {to.type}}}"
+    everywhere = to.value(f"call i1 @llvm.vector.reduce.and.v{lanes}i1({to.bits} {inside})")
+    to.fork(everywhere, "fast", "slow")
+    to.block("fast")
+    to.line(f"ret {kind} {_together(to, results)}")
+    to.block("slow")
     mixed = []
     for name, result in zip(names, results, strict=True):
-        of_libm = to.add(f"call {to.d} @each{lanes}.{name}({to.d} %x)")
-        mixed.append(to.add(f"select {to.b} {inside}, {to.d} {result}, {to.d} {of_libm}"))
-    to.text += _returned(to.d, mixed, "slow")
-    kind = to.d if len(names) == 1 else f"{{{to.d}, {to.d}}}"
-    return [f"define internal {kind} @lanes{lanes}.{''.join(names)}({to.d} %x) nounwind noinline {{", *to.text, "}"]
+        of_libm = to.value(f"call {to.type} @each{lanes}.{name}({to.type} %x)")
+        mixed.append(to.choose(inside, result, of_libm))
+    head = f"internal {kind} @lanes{lanes}.{''.join(names)}({to.type} %x) nounwind noinline"
+    return to.function(head, f"{kind} {_together(to, mixed)}")
 
 
-def _returned(vector: str, results: Sequence[str], where: str) -> list[str]:
+def _together(to: _Vectors, results: Sequence[str]) -> str:
+    """One result, or two as a pair."""
     if len(results) == 1:
-        return [f"  ret {vector} {results[0]}"]
-    pair = f"{{{vector}, {vector}}}"
-    return [
-        f"  %{where}.1 = insertvalue {pair} poison, {vector} {results[0]}, 0",
-        f"  %{where}.2 = insertvalue {pair} %{where}.1, {vector} {results[1]}, 1",
-        f"  ret {pair} %{where}.2",
-    ]
+        return results[0]
+    pair = f"{{{to.type}, {to.type}}}"
+    first = to.value(f"insertvalue {pair} poison, {to.type} {results[0]}, 0")
+    return to.value(f"insertvalue {pair} {first}, {to.type} {results[1]}, 1")
 
 
-def _sine_cosine(to: Lines, x: str, names: Iterable[str]) -> list[str]:
-    """Sine, cosine for |x| <= 1e6: x = k pi/2 + r. Products of k (20 bits) with two parts of pi/2 are exact."""
+def _sine_cosine(to: _Vectors, x: str, names: Iterable[str]) -> list[str]:
+    """For |x| <= 1e6: x = k pi/2 + r. The products of k (20 bits) with the first two parts of pi/2 are exact."""
     shifted = to.f("fadd", to.f("fmul", x, 0.63661977236758134308, exact=True), MAGIC, exact=True)
     k = to.f("fsub", shifted, MAGIC, exact=True)
-    quadrant = to.bits(shifted)
+    quadrant = to.cast(shifted)
     first = to.f("fsub", x, to.f("fmul", k, HALF_PI[0], exact=True), exact=True)
     taken = to.f("fmul", k, HALF_PI[1], exact=True)
     second = to.f("fsub", first, taken, exact=True)
@@ -180,23 +165,22 @@ def _sine_cosine(to: Lines, x: str, names: Iterable[str]) -> list[str]:
     tail = to.f("fadd", to.f("fmul", to.f("fmul", z, z), to.polynomial(z, COS)), missing)
     cosine = to.f("fadd", most, tail, exact=True)
 
-    odd = to.add(f"trunc {to.i} {quadrant} to {to.b}")
+    odd = to.value(f"trunc <{to.lanes} x i64> {quadrant} to {to.bits}")
     results = []
     for name in names:
         one, other = (sine, cosine) if name == "sin" else (cosine, sine)
-        value = to.add(f"select {to.b} {odd}, {to.d} {other}, {to.d} {one}")
+        value = to.choose(odd, other, one)
         turns = quadrant if name == "sin" else to.n("add", quadrant, 1)
         sign = to.n("and", to.n("shl", turns, 62), -(2**63))
-        value = to.double(to.add(f"xor {to.i} {to.bits(value)}, {sign}"))
+        value = to.cast(to.n("xor", to.cast(value), sign), back=True)
         if name == "sin":  # of -0.0 it is -0.0
-            zero = to.add(f"fcmp oeq {to.d} {x}, {number(0.0)}")
-            value = to.add(f"select {to.b} {zero}, {to.d} {x}, {to.d} {value}")
+            value = to.choose(to.compare("oeq", x, 0.0), x, value)
         results.append(value)
     return results
 
 
-def _exp(to: Lines, x: str) -> str:
-    """Exponential for -708 <= x <= 709: x = k ln 2 + r."""
+def _exp(to: _Vectors, x: str) -> str:
+    """For -708 <= x <= 709: x = k ln 2 + r."""
     shifted = to.f("fadd", to.f("fmul", x, 1.44269504088896338700, exact=True), MAGIC, exact=True)
     k = to.f("fsub", shifted, MAGIC, exact=True)
     high = to.f("fsub", x, to.f("fmul", k, LN2[0], exact=True), exact=True)
@@ -205,20 +189,20 @@ def _exp(to: Lines, x: str) -> str:
     lost = to.f("fsub", to.f("fsub", high, r, exact=True), low, exact=True)
     more = to.f("fadd", to.f("fmul", to.f("fmul", r, r), to.polynomial(r, EXP)), lost)
     value = to.f("fadd", to.f("fadd", more, r, exact=True), 1.0, exact=True)
-    half = to.n("ashr", to.n("shl", to.bits(shifted), 32), 33)  # k / 2, rounded down; twice, as 2**1024 is no double
-    whole = to.n("ashr", to.n("shl", to.bits(shifted), 32), 32)
-    for power in (half, to.add(f"sub {to.i} {whole}, {half}")):
-        value = to.f("fmul", value, to.double(to.n("shl", to.n("add", power, 1023), 52)), exact=True)
+    half = to.n("ashr", to.n("shl", to.cast(shifted), 32), 33)  # k / 2, rounded down; twice, as 2**1024 is no double
+    whole = to.n("ashr", to.n("shl", to.cast(shifted), 32), 32)
+    for power in (half, to.n("sub", whole, half)):
+        value = to.f("fmul", value, to.cast(to.n("shl", to.n("add", power, 1023), 52), back=True), exact=True)
     return value
 
 
-def _log(to: Lines, x: str) -> str:
-    """Logarithm of positive normal numbers: x = 2**k (1 + f), sqrt(1/2) <= 1 + f < sqrt(2), and s = f / (2 + f)."""
-    bits = to.bits(x)
+def _log(to: _Vectors, x: str) -> str:
+    """For positive normal numbers: x = 2**k (1 + f), sqrt(1/2) <= 1 + f < sqrt(2), and s = f / (2 + f)."""
+    bits = to.cast(x)
     root_half = 0x3FE6A09E667F3BCD
     exponent = to.n("ashr", to.n("sub", bits, root_half), 52)
-    one_plus = to.double(to.add(f"sub {to.i} {bits}, {to.n('shl', exponent, 52)}"))
-    k = to.f("fsub", to.double(to.n("add", exponent, 0x4338000000000000)), MAGIC, exact=True)
+    one_plus = to.cast(to.n("sub", bits, to.n("shl", exponent, 52)), back=True)
+    k = to.f("fsub", to.cast(to.n("add", exponent, 0x4338000000000000), back=True), MAGIC, exact=True)
     f = to.f("fsub", one_plus, 1.0, exact=True)
     s = to.f("fdiv", f, to.f("fadd", f, 2.0, exact=True), exact=True)
     z = to.f("fmul", s, s)
@@ -227,10 +211,3 @@ def _log(to: Lines, x: str) -> str:
     small = to.f("fadd", to.f("fmul", s, to.f("fadd", half, remainder)), to.f("fmul", k, LN2[1]))
     inner = to.f("fsub", to.f("fsub", half, small), f)
     return to.f("fsub", to.f("fmul", k, LN2[0], exact=True), inner, exact=True)
-
-
-def number(value: str | float) -> str:
-    """A value's name as it is; a number as the constant of all lanes, to the last bit."""
-    if isinstance(value, str):
-        return value
-    return f"splat (double 0x{struct.unpack('>Q', struct.pack('>d', value))[0]:016X})"

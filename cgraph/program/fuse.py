@@ -15,7 +15,7 @@ from ..core.traversal import rebuild
 from ..operations.operation import OPS, columns
 from .program import Program
 from .statement import Statement, row_of
-from .statements.call import Call, Map, Sum, elements, products_in
+from .statements.call import Call, Map, Sum, elements, products_in, several
 from .statements.control import If
 
 # Operations of one call: it compiles in some tens of milliseconds, and a short run gains no more.
@@ -77,6 +77,8 @@ def _work(statement: Statement, program: Program, uses: Counter[int]) -> float:
     if isinstance(statement, Call):
         return size if (uses[id(statement.graph)] - 1) * size <= COPIES else math.inf
     count = elements(statement, program.registers)
+    if several(statement, program.registers):
+        return math.inf
     return size * count if count <= FEW and size * count <= STRAIGHT else math.inf
 
 

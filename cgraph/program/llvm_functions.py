@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from ..codegen.arithmetic import Arithmetic, words_of
-from ..codegen.llvm_ir import Body, body, libm_functions
+from ..codegen.arithmetic import Arithmetic
+from ..codegen.function_writer import FunctionWriter
+from ..codegen.llvm_ir import libm_functions, write_graph
 from ..core.graph import Graph
 from ..core.node import Node
 
 Lengths = tuple[int, ...]  # of the registers that are a function's arguments
+Text = Callable[[FunctionWriter, str], None]  # what writes a function of that name
 
 
 class Functions:
@@ -41,194 +43,159 @@ class Functions:
 
         products: see `instructions`.  exact: no product is joined with a sum.
         """
-        t, arithmetic = self.arithmetic.type, self.arithmetic.unfused if exact else self.arithmetic
-        places = [[f"{t}, ptr %in{k}, i64 {at}" for at in range(size)] for k, size in enumerate(registers)]
+        arithmetic = self.arithmetic.unfused if exact else self.arithmetic
+        pointers = [f"%in{k}" for k in range(len(registers))]
+        places = [_places(arithmetic.type, pointers[k : k + 1], registers[k : k + 1]) for k in range(len(registers))]
         x, y = ([place for k in which for place in places[k]] for which in (reads, writes))
         known = set(x)
         again = {row for row, place in enumerate(y) if place in known}
 
-        def lines() -> list[str]:
-            scope = _pointers("in", registers)
-            written = self._body(graph, arithmetic, x, y, scope, products=products, last=again)
-            return [*written.start, *written.lines]
+        def text(ir: FunctionWriter, name: str) -> None:
+            self._body(ir, name, graph, x, y, pointers, products=products, last=again)
 
         key = (id(graph), registers, tuple(reads), tuple(writes), exact)
-        return self._define(key, "call", lines, len(registers), 0)
+        return self._define(key, "call", text, arithmetic, len(registers), 0)
 
-    def map(self, graph: Graph, inputs: Lengths, count: int, shared: Lengths = (), apart: Sequence[bool] = ()) -> str:
-        """y[i] = graph(shared, x[i]) for i = 0 .. count - 1; an input of another length holds one number for all i.
+    def map(
+        self,
+        graph: Graph,
+        shared: Lengths,
+        inputs: Lengths,
+        outputs: Lengths,
+        count: int,
+        apart: Sequence[bool] = (),
+        *,
+        asked: bool = False,
+    ) -> str:
+        """y[i] = graph(shared, x[i]) for i = 0 .. count - 1, whose number k in a register is at k count + i.
 
         Where it can, a vector of elements at a time; results beyond the last one go to the register's padding.
         apart: the inputs whose numbers have just been written one by one, and so are read: one load of them all would
-        wait until they are in the cache.
+        wait until they are in the cache.  asked: the last input says how many elements matter.
         """
-        first, inputs = len(shared), (*shared, *inputs)
+        one_each = max((*inputs, *outputs), default=1) <= count
         in_vectors = self.arithmetic.lanes == 1 and self.width > 1 and count > 1 and not libm_functions(graph)
+        in_vectors = in_vectors and (one_each or count % self.width == 0)
         arithmetic = self.arithmetic._replace(lanes=self.width, together=1) if in_vectors else self.arithmetic
-        t, same = (
-            arithmetic.type,
-            [k for k, length in enumerate(inputs) if in_vectors and k >= first and length != count],
-        )
-        written = [first + k for k, each in enumerate(apart) if each and in_vectors and inputs[first + k] == count]
-        scope = [*_pointers("in", inputs), *_pointers("out", graph.outputs), "i64 %i", *[f"ptr %same{k}" for k in same]]
-        scope += [f"ptr %vector{k}" for k in written]
+        same = [k for k, length in enumerate(inputs) if length == 1 != count]
+        gathered = [k for k, each in enumerate(apart) if each and in_vectors and inputs[k] == count]
+        first, one, vector = len(shared), self.arithmetic.type, arithmetic.type
 
-        def lines() -> list[str]:
-            spread = []  # a vector of equal numbers for each input that is the same for all elements
-            for k in same:
-                spread += [f"  %same{k} = alloca {t}, align 64", f"  %one{k} = load double, ptr %in{k}, align 8"]
-                spread += [*arithmetic.splat(f"%all{k}", f"%one{k}"), f"  store {t} %all{k}, ptr %same{k}, align 64"]
-            x = self._elements(t, inputs, first, count, same)
-            gathered: list[str] = []
-            gather = f"gathered{min(count, arithmetic.lanes)}"
-            if written:
-                self.text(gather, lambda _: _gathered_text(t, gather, min(count, arithmetic.lanes)))
-            for k in written:
-                spread.append(f"  %vector{k} = alloca {t}, align 64")
-                gathered += [
-                    f"  %register{k} = getelementptr {t}, ptr %in{k}, i64 %i",
-                    f"  %gathered{k} = call {t} @{gather}(ptr %register{k})",
-                    f"  store {t} %gathered{k}, ptr %vector{k}, align 64",
+        def text(ir: FunctionWriter, name: str) -> None:
+            common, found = [f"%in{k}" for k in range(first)], [f"%in{first + k}" for k in range(len(inputs))]
+            for k in same if in_vectors else ():  # a vector of equal numbers
+                number = ir.spread(ir.load_at(found[k], "double"))
+                found[k] = ir.room()
+                ir.store_at(number, found[k])
+            gather = self._gather(vector, min(count, self.width)) if gathered else ""
+            brought = {k: ir.room() for k in gathered}
+            end = self._asked(ir, f"%in{first + len(inputs)}", count) if asked and self.arithmetic.lanes == 1 else count
+            with ir.loop(0, end, arithmetic.lanes if in_vectors else 1) as i:
+                for k in gathered:
+                    ir.store_at(ir.value(f"call {vector} @{gather}(ptr {ir.at(found[k], i, one)})"), brought[k])
+                x = _places(one, common, shared)
+                pointers = []
+                for k, length in enumerate(inputs):
+                    pointers.append(brought.get(k, found[k] if k in same else ir.at(found[k], i, one)))
+                    step = 0 if k in same else count
+                    x += [f"{one}, ptr {pointers[-1]}, i64 {at * step}" for at in range(max(1, length // count))]
+                targets = [ir.at(f"%out{k}", i, one) for k in range(len(outputs))]
+                y = [
+                    f"{one}, ptr {target}, i64 {at * count}"
+                    for target, length in zip(targets, outputs, strict=True)
+                    for at in range(length // count)
                 ]
-                x[sum(shared) + k - first] = f"{t}, ptr %vector{k}, i64 0"
-            y = [f"{t}, ptr %out{k}, i64 %i" for k in range(len(graph.outputs))]
-            body = self._body(graph, arithmetic, x, y, scope, uniform=sum(shared) if in_vectors else 0)
-            body = body._replace(lines=[*gathered, *body.lines])
-            return [*spread, *_loop(body, [], -(-count // arithmetic.lanes) if in_vectors else count)]
+                uniform = sum(shared) if in_vectors else 0
+                self._body(ir, name, graph, x, y, [*common, *pointers, *targets], uniform=uniform)
 
-        key = ("map", id(graph), inputs, count, first, tuple(written))
-        return self._define(key, "map", lines, len(inputs), len(graph.outputs))
+        key = ("map", id(graph), shared, inputs, outputs, count, tuple(gathered), asked)
+        return self._define(key, "map", text, arithmetic, first + len(inputs) + asked, len(outputs))
 
-    def _elements(self, t: str, inputs: Lengths, shared: int, count: int, same: Sequence[int] = ()) -> list[str]:
-        """Places of the inputs of element %i: what all share, end to end, then one number of each other register."""
-        places = _end_to_end(self.arithmetic.type, "in", inputs[:shared])
-        for k, length in list(enumerate(inputs))[shared:]:
-            own = f"ptr %in{k}, i64 {'%i' if length == count else 0}"
-            places.append(f"{t}, {f'ptr %same{k}, i64 0' if k in same else own}")
-        return places
+    @staticmethod
+    def _asked(ir: FunctionWriter, register: str, count: int) -> str:
+        """The number of elements that a register asks for, from one to `count`."""
+        number, t = ir.load_at(register, "double"), "double"
+        for relation, bound in (("ogt", 1), ("olt", count)):
+            limit = f"{float(bound)!r}"
+            inside = ir.value(f"fcmp {relation} {t} {number}, {limit}")
+            number = ir.value(f"select i1 {inside}, {t} {number}, {t} {limit}")
+        return ir.value(f"fptosi {t} {number} to i64")
 
-    def tiled_map(
-        self, graph: Graph, shared: Lengths, inputs: Lengths, outputs: Lengths, lanes: int, count: int, some: bool
-    ) -> str:
-        """y = graph(shared, x) of every tile, each number a vector; of every element, where that would not do.
+    def _gather(self, t: str, size: int) -> str:
+        """`x -> the vector of x[0], .., x[size - 1]`, by a load for each, of which LLVM would make one."""
+        name = f"gathered{size}"
 
-        So it is with memories side by side, which are vectors themselves, and with functions of the C library.
-        inputs, outputs: the numbers of an element in each register.  some: the last input says how many of `count`.
-        """
-        in_vectors = self.arithmetic.lanes == 1 and not libm_functions(graph)
-        arithmetic = self.arithmetic._replace(lanes=lanes, together=1) if in_vectors else self.arithmetic
-        t, step = arithmetic.type, 1 if in_vectors else lanes
-        among = some and self.arithmetic.lanes > 1  # each memory has a number of tiles of its own
-        scope = [*_pointers("in", shared), *_pointers("from", inputs), *_pointers("to", outputs)]
-        scope += ["ptr %results"] if among else []
+        def text(arithmetic: Arithmetic) -> list[str]:
+            ir, vector = FunctionWriter(arithmetic), "poison"
+            for lane in range(size):
+                number = ir.value(f"load volatile double, ptr {ir.at('%x', lane)}, align 8")
+                vector = ir.value(f"insertelement {t} {vector}, double {number}, i32 {lane}")
+            return ir.function(f"internal {t} @{name}(ptr %x) nounwind noinline", f"{t} {vector}")
 
-        def lines() -> list[str]:
-            x = [*_end_to_end(self.arithmetic.type, "in", shared), *_end_to_end(t, "from", inputs, step)]
-            y = _end_to_end(t, "to", outputs, step)
-            results = [f"{t}, ptr %results, i64 {k}" for k in range(len(y))] if among else y
-            written = self._body(graph, arithmetic, x, results, scope, uniform=sum(shared) if in_vectors else 0)
-            here = [f"  %tile = udiv i64 %i, {step}", f"  %lane = urem i64 %i, {step}"] if step > 1 else []
-            elements = [("from", k, size, f"%in{len(shared) + k}") for k, size in enumerate(inputs)]
-            for name, k, size, register in (
-                *elements,
-                *[("to", k, size, f"%out{k}") for k, size in enumerate(outputs)],
-            ):
-                at = f"%{name}{k}.at"
-                if step > 1:
-                    here += [f"  {at}.tile = mul i64 %tile, {size * step}", f"  {at} = add i64 {at}.tile, %lane"]
-                else:
-                    here.append(f"  {at} = mul i64 %i, {size}")
-                here.append(f"  %{name}{k} = getelementptr {t}, ptr {register}, i64 {at}")
-            start = _tiles_text(self.arithmetic, count, f"%in{len(shared) + len(inputs)}", step) if some else []
-            start += [f"  %results = alloca {t}, i64 {len(y)}, align 64"] if among else []
-            after = _among_text(self.arithmetic, results, y, step) if among else []
-            body = written._replace(start=[*start, *written.start], lines=[*here, *written.lines])
-            return _loop(body, after, "%steps" if some else count * step)
-
-        key = ("tiles", id(graph), shared, inputs, outputs, lanes, count, some)
-        return self._define(key, "tiles", lines, len(shared) + len(inputs) + some, len(outputs))
+        return self.text(name, text)
 
     def total(self, count: int) -> str:
         """y = x[0] + .. + x[count - 1], added up in this order from 0."""
         t = self.arithmetic.type
-        lines = ["  br label %each", "each:", "  %i = phi i64 [ 0, %start ], [ %next, %more ]"]
-        lines += [
-            f"  %sum = phi {t} [ {self.arithmetic.number(0.0)}, %start ], [ %total, %more ]",
-            f"  %going = icmp slt i64 %i, {count}",
-            "  br i1 %going, label %more, label %end",
-            "more:",
-            f"  %at = getelementptr {t}, ptr %in0, i64 %i",
-            f"  %here = load {t}, ptr %at, align 8",
-            f"  %total = fadd {t} %sum, %here",
-            "  %next = add i64 %i, 1",
-            "  br label %each",
-            "end:",
-            f"  store {t} %sum, ptr %out0, align 8",
-        ]
-        return self._define(("total", count), "total", lambda: lines, 1, 1)
+
+        def text(ir: FunctionWriter, _: str) -> None:
+            if not count:
+                ir.store_at(ir.number(0.0), "%out0")
+                return
+            with ir.loop(0, count) as i:
+                before = f"[ {ir.number(0.0)}, %start ], [ {i}.total, %{i[1:]}.again ]"
+                ir.line(f"{i}.sum = phi {t} {before}")
+                ir.line(f"{i}.total = fadd {t} {i}.sum, {ir.load_at(ir.at('%in0', i))}")
+            ir.store_at(f"{i}.total", "%out0")
+
+        return self._define(("total", count), "total", text, self.arithmetic, 1, 1)
 
     def take(self, table: Sequence[int], places: Sequence[int] = ()) -> str:
         """y[i] = x[table[i]], or y[places[i]]; where these are all, in order, they are left out."""
-        t, size = self.arithmetic.type, len(table)
+        size = len(table)
         places = () if tuple(places) == tuple(range(size)) else places
 
-        def number(kind: str, numbers: Sequence[int]) -> list[str]:
-            name, text = f"@{kind}{len(self._names)}", ", ".join(f"i64 {each}" for each in numbers)
-            self.definitions.append(f"{name} = internal unnamed_addr constant [{size} x i64] [{text}]")
-            return [
-                f"  %{kind}.at = getelementptr i64, ptr {name}, i64 %i",
-                f"  %{kind} = load i64, ptr %{kind}.at, align 8",
-            ]
+        def text(ir: FunctionWriter, name: str) -> None:
+            def number(kind: str, numbers: Sequence[int], i: str) -> str:
+                listed = ", ".join(f"i64 {each}" for each in numbers)
+                constant = f"@{name}.{kind} = internal unnamed_addr constant [{size} x i64] [{listed}]"
+                self.definitions.append(constant)
+                return ir.load_at(ir.at(f"@{name}.{kind}", i, "i64"), "i64")
 
-        def lines() -> list[str]:
-            body = [
-                *number("table", table),
-                *(number("place", places) if places else []),
-                f"  %from = getelementptr {t}, ptr %in0, i64 %table",
-                f"  %to = getelementptr {t}, ptr %out0, i64 {'%place' if places else '%i'}",
-                f"  %taken = load {t}, ptr %from, align 8",
-                f"  store {t} %taken, ptr %to, align 8",
-            ]
-            return _loop(Body([], body, []), [], size) if size else []
+            with ir.loop(0, size) as i:
+                taken = ir.load_at(ir.at("%in0", number("table", table, i)))
+                ir.store_at(taken, ir.at("%out0", number("places", places, i) if places else i))
 
-        return self._define(("take", tuple(table), tuple(places)), "take", lines, 1, 1)
+        key = ("take", tuple(table), tuple(places))
+        return self._define(key, "take", text, self.arithmetic, 1, 1)
 
     def _body(
         self,
+        ir: FunctionWriter,
+        name: str,
         graph: Graph,
-        arithmetic: Arithmetic,
         x: Sequence[str],
         y: Sequence[str],
-        scope: Sequence[str],
+        pointers: Sequence[str],
         **how: Any,
-    ) -> Body:
-        """The body of the function that is being defined, those that it calls defined before.
-
-        x, y: where the inputs and outputs are: type, pointer, index.  how: see `instructions`.
-        """
-
-        def address(base: str, name: str, row: int) -> list[str]:
-            return [f"  {name} = getelementptr {(x if base == 'x' else y)[row]}"]
-
-        name = next(reversed(self._names.values()))
-        written = body(graph, arithmetic, address, name, scope, **how)
-        for line in written.definitions:
+    ) -> None:
+        """The graph in a function of that name, after what it calls; arguments: see `write_graph`."""
+        for line in write_graph(ir, name, graph, {"x": x, "y": y}, pointers, **how):
             quick = self.quick and line.startswith("define")
             self.definitions.append(line.replace("noinline {", "noinline optnone {") if quick else line)
-        return written
 
     def _define(
-        self, key: tuple[object, ...], kind: str, lines: Callable[[], list[str]], inputs: int, outputs: int
+        self, key: tuple[object, ...], kind: str, text: Text, arithmetic: Arithmetic, inputs: int, outputs: int
     ) -> str:
         """The name of the function of this key, which is written when it is first asked for."""
         key, how = (*key, self.quick), " noinline optnone" if self.quick else ""
         if key not in self._names:
             name = self._names[key] = f"{kind}{len(self._names)}"
-            arguments = [*(f"ptr noalias %in{k}" for k in range(inputs))]
-            arguments += [f"ptr noalias %out{k}" for k in range(outputs)]
-            head = f"define internal void @{name}({', '.join(arguments)}) nounwind{how} {{"
-            inner = lines()  # which may define functions of its own
-            self.definitions += [head, "start:", *inner, "  ret void", "}"]
+            ir = FunctionWriter(arithmetic)
+            text(ir, name)  # which may define functions of its own
+            arguments = [f"%{side}{k}" for side, count in (("in", inputs), ("out", outputs)) for k in range(count)]
+            listed = ", ".join([f"ptr noalias {argument}" for argument in arguments])
+            self.definitions += ir.function(f"internal void @{name}({listed}) nounwind{how}")
         return self._names[key]
 
     def text(self, name: str, text: Callable[[Arithmetic], Sequence[str]]) -> str:
@@ -239,77 +206,10 @@ class Functions:
         return name
 
 
-def _tiles_text(arithmetic: Arithmetic, count: int, register: str, step: int) -> list[str]:
-    """%steps: `step` times the tiles that a register asks for, from one to `count`; of memories, the most."""
-    t, bits, one, most = arithmetic.type, words_of(arithmetic)["b"], arithmetic.number(1.0), arithmetic.number(count)
-    lines = [
-        f"  %asked = load {t}, ptr {register}, align 8",
-        f"  %several = fcmp ogt {t} %asked, {one}",
-        f"  %least = select {bits} %several, {t} %asked, {t} {one}",
-        f"  %fits = fcmp olt {t} %least, {most}",
-        f"  %tiles = select {bits} %fits, {t} %least, {t} {most}",
-    ]
-    if arithmetic.lanes > 1:
-        lines.append(f"  %most = call double @llvm.vector.reduce.fmax.{arithmetic.suffix}({t} %tiles)")
-    whole = f"  %whole = fptosi double {'%most' if arithmetic.lanes > 1 else '%tiles'} to i64"
-    return [*lines, whole, f"  %steps = mul i64 %whole, {step}"]
-
-
-def _among_text(arithmetic: Arithmetic, results: Sequence[str], targets: Sequence[str], step: int) -> list[str]:
-    """The results of an element among its numbers, in memories that ask for its tile."""
-    t, bits = arithmetic.type, words_of(arithmetic)["b"]
-    lines = [
-        f"  %tile.next = add i64 {'%tile' if step > 1 else '%i'}, 1",
-        "  %number = uitofp i64 %tile.next to double",
-    ]
-    lines += [*arithmetic.splat("%numbers", "%number"), f"  %asks = fcmp ole {t} %numbers, %tiles"]
-    for row, (result, target) in enumerate(zip(results, targets, strict=True)):
-        lines += [
-            f"  %new{row}.at = getelementptr {result}",
-            f"  %old{row}.at = getelementptr {target}",
-            f"  %new{row} = load {t}, ptr %new{row}.at, align 8",
-            f"  %old{row} = load {t}, ptr %old{row}.at, align 8",
-            f"  %put{row} = select {bits} %asks, {t} %new{row}, {t} %old{row}",
-            f"  store {t} %put{row}, ptr %old{row}.at, align 8",
-        ]
-    return lines
-
-
-def _end_to_end(t: str, name: str, lengths: Lengths, step: int = 1) -> list[str]:
-    """Places of the numbers of registers, end to end, each so many numbers behind the one before."""
-    return [f"{t}, ptr %{name}{k}, i64 {at * step}" for k, length in enumerate(lengths) for at in range(length)]
-
-
-def _gathered_text(t: str, name: str, size: int) -> list[str]:
-    """The function `name(x)`: the vector of x[0], .., x[size - 1], by a load for each, of which LLVM would make one."""
-    lines, vector = [f"define internal {t} @{name}(ptr %x) nounwind noinline {{"], "poison"
-    for lane in range(size):
-        lines += [
-            f"  %x{lane}.at = getelementptr double, ptr %x, i64 {lane}",
-            f"  %x{lane} = load volatile double, ptr %x{lane}.at, align 8",
-            f"  %vector{lane} = insertelement {t} {vector}, double %x{lane}, i32 {lane}",
-        ]
-        vector = f"%vector{lane}"
-    return [*lines, f"  ret {t} {vector}", "}"]
-
-
-def _pointers(name: str, registers: Iterable[object]) -> list[str]:
-    return [f"ptr %{name}{k}" for k, _ in enumerate(registers)]
-
-
-def _loop(written: Body, after: list[str], count: int | str) -> list[str]:
-    """The body, which may hold blocks, and the lines after it for %i = 0 .. count - 1."""
+def _places(t: str, pointers: Sequence[str], lengths: Lengths) -> list[str]:
+    """Places of the numbers of registers, end to end."""
     return [
-        *written.start,
-        "  br label %each",
-        "each:",
-        "  %i = phi i64 [ 0, %start ], [ %next, %last ]",
-        *written.lines,
-        "  br label %last",
-        "last:",
-        *after,
-        "  %next = add i64 %i, 1",
-        f"  %more = icmp slt i64 %next, {count}",
-        "  br i1 %more, label %each, label %end",
-        "end:",
+        f"{t}, ptr {pointer}, i64 {at}"
+        for pointer, length in zip(pointers, lengths, strict=True)
+        for at in range(length)
     ]

@@ -98,17 +98,9 @@ class Adjoint(Registers):
         parts = tuple([tuple(self.forward(part)) for part in assignment.parts])
         self.recording[assignment] = replace(assignment, statement=statement, copies=tuple(copies), parts=parts)
 
-    def flat(self, part: Sequence[Assignment]) -> list[Statement]:
-        """The statements of assignments, copies included, recording where there is a way back."""
-        return [*flat(self.forward(part))]
-
     def forward(self, part: Sequence[Assignment]) -> list[Assignment]:
-        """The assignments as they are run forward."""
+        """The assignments as they are run forward, recording where there is a way back."""
         return [self.recording.get(each, each) for each in part]
-
-    def replayed(self, part: Sequence[Assignment], statements: Sequence[Statement]) -> Replayed:
-        """Recovery of the values that statements read of assignments before them."""
-        return replayed(self.forward(part), effects(statements)[0])
 
 
 def replayed(assignments: Sequence[Assignment], values: Iterable[str]) -> Replayed:
@@ -121,7 +113,7 @@ def replayed(assignments: Sequence[Assignment], values: Iterable[str]) -> Replay
             if outputs.issuperset(effects(flat(part))[1]):
                 inner = replayed(part, wanted)
                 again, wanted, tape = [*inner.again, *again], inner.wanted, tape | dict.fromkeys(inner.tape)
-            elif turn := needed([*flat(part)], wanted):  # of an iteration, one more than was run
+            elif turn := needed(flat(part), wanted):  # of an iteration, one more than was run
                 again, wanted = [*turn, *again], wanted | set(effects(turn)[0])
         here = [name for name in reads_and_writes(assignment.statement)[1] if name in wanted]
         if here and _heavy(assignment.statement):

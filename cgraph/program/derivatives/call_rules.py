@@ -3,67 +3,48 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from dataclasses import replace
 
 from ...core.graph import Graph
 from ..statement import Names
-from ..statements.call import Call, Map, Sum, elements
-from ..statements.tiles import TiledMap
+from ..statements.call import Call, Map, Sum, elements, sizes
 from .adjoint import Adjoint
-from .products import Product, split
-from .single_assignment import Assignment
+from .products import split
+from .single_assignment import Assignment, Registers
 from .tangent import Tangent
 
 # tangents: y = f(x), y_dot = f'(x) x_dot
 
 
-def push_call(assignment: Assignment, tangent: Tangent) -> None:
-    """y_dot = f'(x) x_dot."""
-    call: Call = assignment.statement  # type: ignore[assignment]
-    moving = tangent.moving(call.inputs)
-    if not moving or tangent.active.isdisjoint(call.outputs):
-        return
-    product = tangent.products.pushed(call.graph, tangent.of(call.inputs), moving, tangent.of(call.outputs))
-    if product.graph is not None:
-        dots = [tangent.dots[call.inputs[k]] for k in moving]
-        results = tuple([tangent.dot(call.outputs[k]) for k in product.kept])
-        tangent.add(Call(product.graph, (*call.inputs, *dots), results))
-
-
 def push_elements(assignment: Assignment, tangent: Tangent) -> None:
-    """y_dot[i] = f'(x[i]) x_dot[i], or their sum."""
-    statement: Map | Sum = assignment.statement  # type: ignore[assignment]
-    if tangent.active.isdisjoint(statement.outputs):
+    """y_dot[i] = f'(x[i]) x_dot[i], or their sum; a call is one of them."""
+    statement: Call | Map | Sum = assignment.statement  # type: ignore[assignment]
+    common: Names = () if isinstance(statement, Call) else statement.shared
+    names, first = (*common, *statement.inputs), len(common)
+    moving, lengths = tangent.moving(names), _in_element(statement, tangent)
+    if not moving or tangent.active.isdisjoint(statement.outputs):
         return
-    one_each = isinstance(statement, Map)
-    outputs = (1,) * len(statement.outputs) if one_each else tangent.of(statement.outputs)
-    pushed = pushed_elements(statement, (1,) * len(statement.inputs), outputs, tangent)
-    if pushed.graph is not None:
-        results = tuple([tangent.dot(statement.outputs[k]) for k in pushed.kept])
-        tangent.add(type(statement)(pushed.graph, pushed.inputs, results, pushed.shared))
-
-
-class Pushed(NamedTuple):
-    """The graph of tangents of elements, the outputs that it has, and its registers; no graph where nothing moves."""
-
-    graph: Graph | None = None
-    kept: tuple[int, ...] = ()
-    shared: Names = ()
-    inputs: Names = ()
-
-
-def pushed_elements(
-    statement: Map | Sum | TiledMap, inputs: tuple[int, ...], outputs: tuple[int, ...], tangent: Tangent
-) -> Pushed:
-    """The tangents of a graph of elements, which have so many numbers in each register."""
-    names, first = (*statement.shared, *statement.inputs), len(statement.shared)
-    moving, lengths = tangent.moving(names), (*tangent.of(statement.shared), *inputs)
-    product = tangent.products.pushed(statement.graph, lengths, moving, outputs) if moving else Product(None, ())
+    product = tangent.products.pushed(statement.graph, lengths[0], moving, lengths[1])
     if product.graph is None:
-        return Pushed()
-    dots, common = [tangent.dots[names[k]] for k in moving], sum([k < first for k in moving])
-    shared, others = (*statement.shared, *dots[:common]), (*statement.inputs, *dots[common:])
-    return Pushed(_shared_first(product.graph, lengths, first, moving), product.kept, shared, others)
+        return
+    dots, of_all = [tangent.dots[names[k]] for k in moving], sum([k < first for k in moving])
+    others = (*statement.inputs, *dots[of_all:])
+    results = tuple([tangent.dot(statement.outputs[k]) for k in product.kept])
+    graph = _shared_first(product.graph, lengths[0], first, moving)
+    if isinstance(statement, Call):
+        tangent.add(Call(graph, others, results))
+    else:
+        tangent.add(replace(statement, graph=graph, inputs=others, outputs=results, shared=(*common, *dots[:of_all])))
+
+
+def _in_element(statement: Call | Map | Sum, registers: Registers) -> tuple[tuple[int, ...], tuple[int, ...]]:
+    """The numbers of the registers that are inputs of the graph for one element, and of those that are its outputs."""
+    if isinstance(statement, Call):
+        return registers.of(statement.inputs), registers.of(statement.outputs)
+    inputs = (*registers.of(statement.shared), *sizes(statement, registers.lengths, statement.inputs))
+    if isinstance(statement, Map):
+        return inputs, sizes(statement, registers.lengths, statement.outputs)
+    return inputs, registers.of(statement.outputs)
 
 
 def _shared_first(graph: Graph, lengths: tuple[int, ...], first: int, moving: Sequence[int]) -> Graph:
@@ -108,8 +89,9 @@ def pull_elements(assignment: Assignment, adjoint: Adjoint) -> None:
     seeded, wanted = adjoint.seeded(statement.outputs), adjoint.wanted(inputs)
     if not seeded or not wanted or not count:
         return
-    lengths = (*adjoint.of(statement.shared), *[1] * len(statement.inputs))
-    outputs = (1,) * len(statement.outputs) if one_each else adjoint.of(statement.outputs)
+    if isinstance(statement, Map) and statement.asked:
+        raise TypeError("a Map of as many elements as are asked for has no cotangents")
+    lengths, outputs = _in_element(statement, adjoint)
     product = adjoint.products.pulled(statement.graph, lengths, wanted, outputs, seeded, summed=not one_each)
     if product.graph is None:
         return
@@ -130,6 +112,6 @@ def pull_elements(assignment: Assignment, adjoint: Adjoint) -> None:
         graph = Graph(nodes, {f"bar{j}": node for j, node in enumerate(results[at : at + length])})
         at += length
         bar = adjoint.bar(name)
-        in_all = k < first or adjoint.lengths[name] != count  # the same number for all elements
+        in_all = k < first or adjoint.lengths[name] != count * length  # the same number for all elements
         adjoint.add(Sum(graph, others, (bar,), shared) if in_all else Map(graph, others, (bar,), shared))
         adjoint.collect(name, bar)

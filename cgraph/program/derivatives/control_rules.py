@@ -12,11 +12,10 @@ from ..statement import Statement, effects, reads_and_writes
 from ..statements.call import Map, added, copied, copied_or_zero, zeroed
 from ..statements.control import If, While
 from ..statements.memory import Pop, Push
-from .adjoint import Adjoint
-from .single_assignment import Assigned, Assignment
+from .adjoint import Adjoint, replayed
+from .single_assignment import Assigned, Assignment, flat
 from .tangent import Tangent
 
-Part = tuple[Assignment, ...]
 Body = tuple[Statement, ...]
 
 # If
@@ -34,12 +33,12 @@ def assign_if(statement: If, assigned: Assigned) -> Assignment:
     assigned.current = before
     at = [assigned.write(name) for name in writes]
     after = tuple([dict(zip(at, end, strict=True)) for end in ends])
-    return Assignment(If(decides, *_ways(assigned, parts, after)), parts=tuple(parts), after=after)
+    return Assignment(If(decides, *_ways(parts, after)), parts=tuple(parts), after=after)
 
 
-def _ways(registers: Assigned | Adjoint, parts: Sequence[Part], after: Sequence[Mapping[str, str]]) -> list[Body]:
+def _ways(parts: Sequence[Sequence[Assignment]], after: Sequence[Mapping[str, str]]) -> list[Body]:
     """The bodies, at the end of which what either writes is where it is read."""
-    return [(*registers.flat(part), *_turned(where)) for part, where in zip(parts, after, strict=True)]
+    return [(*flat(part), *_turned(where)) for part, where in zip(parts, after, strict=True)]
 
 
 def push_if(assignment: Assignment, tangent: Tangent) -> None:
@@ -71,7 +70,7 @@ def pull_if(assignment: Assignment, adjoint: Adjoint) -> None:
         inner.append(adjoint.inner({ends[name]: bar for name, bar in seeds.items()}))
         inner[-1].pull(part)
     if any([each in adjoint.recording for part in assignment.parts for each in part]):
-        ways = _ways(adjoint, assignment.parts, assignment.after)
+        ways = _ways([adjoint.forward(part) for part in assignment.parts], assignment.after)
         adjoint.recorded(assignment, If(_decides(assignment), *ways), ())
     written = {name for part in assignment.parts for name in _written(part)}
     outer = dict.fromkeys([name for each in inner for name in each.bars if name not in written])
@@ -108,7 +107,7 @@ def assign_while(statement: While, assigned: Assigned) -> Assignment:
     after = dict(zip(at, [assigned.now(name) for name in writes], strict=True))
     assigned.current = outside
     copies = tuple([copied(source, name) for source, name in zip(before, at, strict=True)])
-    loop = While(assigned.now(statement.register), (*assigned.flat(turn), *_turned(after)))
+    loop = While(assigned.now(statement.register), (*flat(turn), *_turned(after)))
     return Assignment(loop, copies, parts=(turn,), after=(after,))
 
 
@@ -152,13 +151,14 @@ def pull_while(assignment: Assignment, adjoint: Adjoint) -> None:
         bars |= {name: adjoint.bar(name) for name in more}
     inside = {*_written(turn), *after}
     sums = {name: adjoint.bar(name) for name in inner.bars if name not in inside and name in adjoint.active}
-    replayed = adjoint.replayed(turn, inner.statements)
-    record = (*[name for name in after if name in replayed.wanted], *replayed.tape)
+    forward = adjoint.forward(turn)
+    values = replayed(forward, effects(inner.statements)[0])
+    record = (*[name for name in after if name in values.wanted], *values.tape)
     width = sum(adjoint.of(record))
     stack, turns, left = (
         adjoint.fresh(name, length) for name, length in (("stack", adjoint.turns * width), ("turns", 1), ("left", 1))
     )
-    body = (*adjoint.flat(turn), Push(stack, turns, record), *_turned(after))
+    body = (*flat(forward), Push(stack, turns, record), *_turned(after))
     adjoint.recorded(assignment, replace(loop, body=body), (*assignment.copies, zeroed(turns)))
     adjoint.add(copied(turns, left))
     adjoint.add(*[copied_or_zero(outer.get(name), bar) for name, bar in bars.items()])
@@ -170,7 +170,7 @@ def pull_while(assignment: Assignment, adjoint: Adjoint) -> None:
     back += [copied(source, other) for source, other in beside.items()]
     back += [copied_or_zero(source and beside.get(source, source), bar) for bar, source in handed.items()]
     # x_bar_k = f_x^T x_bar_k+1 and e_bar += f_e^T x_bar_k+1, from the last turn back
-    adjoint.add(While(left, (Pop(stack, left, record), *replayed.again, *inner.statements, *back)))
+    adjoint.add(While(left, (Pop(stack, left, record), *values.again, *inner.statements, *back)))
     ends = (*bars.values(), *sums.values(), adjoint.unsolved)  # NaN after turns that the stack had no room for
     adjoint.add(*[Map(_UNLESS_FULL, (end, turns), (end,)) for end in ends])
     for source, name in zip(assignment.sources, after, strict=True):

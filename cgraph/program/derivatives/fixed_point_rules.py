@@ -12,7 +12,7 @@ from ..statement import Statement, effects
 from ..statements.call import Call, Sum, added, copied, copied_or_zero
 from ..statements.control import FixedPoint, While
 from .adjoint import Adjoint
-from .single_assignment import Assigned, Assignment, Registers
+from .single_assignment import Assigned, Assignment, Registers, flat
 from .tangent import Tangent
 
 MOST_TURNS = 200.0
@@ -49,7 +49,7 @@ def push_fixed_point(assignment: Assignment, tangent: Tangent) -> None:
             break
         moving |= {name: tangent.fresh(f"{name}_dot", tangent.lengths[name]) for name in more}
     if tangent.values:
-        tangent.add(*assignment.flat_parts())
+        tangent.add(*flat(turn))
     rows = [(dot, None, inner.dots.get(after[name])) for name, dot in moving.items()]
     tangent.add(*until_settled(rows, inner.statements, tangent))
     for name, end in after.items():

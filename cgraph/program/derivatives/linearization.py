@@ -107,7 +107,7 @@ class Linearization:
         """
         ends = [self.handed.get(name, name) for name in results]
         assignments = [self._recording.get(each, each) for each in self._plain]
-        body = needed([*flat(assignments)], {*self.handed.values(), *ends, *tape})
+        body = needed(flat(assignments), {*self.handed.values(), *ends, *tape})
         used = _names(body)
         lengths = {name: self._lengths[name] for name in self._lengths if self._at not in name or name in used}
         copies = [copied(after, before) for before, after in self.handed.items() if self._lengths[before]]

@@ -1,4 +1,4 @@
-"""Derivatives of Take, Push, Pop: numbers go where their values came from."""
+"""Derivatives of Take, Scatter, Push, Pop: numbers go where their values came from."""
 
 from __future__ import annotations
 
@@ -7,20 +7,37 @@ from collections.abc import Iterable
 from ...core.graph import Graph
 from ...core.node import Node, constant
 from ...writing.naming import variables
+from ..statement import names_in, row_of, with_names
 from ..statements.call import Call, copied, copied_or_zero, zeroed
-from ..statements.memory import Pop, Push, Take
+from ..statements.memory import Pop, Push, Scatter, Take
 from .adjoint import Adjoint
 from .single_assignment import Assignment
 from .tangent import Tangent
 
+# The tangent of a stack is a stack of tangents with a count of its own, and what is put on one comes off the other.
+# What a Scatter does not write stays as it was, and so does its tangent; its cotangent goes on to before.
 
-def push_take(assignment: Assignment, tangent: Tangent) -> None:
-    """target_dot[i] = source_dot[table[i]]."""
-    take = assignment.statement
-    assert isinstance(take, Take)
-    if take.source in tangent.dots and take.target in tangent.active:
-        source = tangent.dots[take.source]
-        tangent.add(Take(source, tangent.dot(take.target), take.table))
+_MOVED = {Take: ("source", "target"), Scatter: ("source", "target"), Push: ("stack", "rows"), Pop: ("stack", "rows")}
+
+
+def push_moved(assignment: Assignment, tangent: Tangent) -> None:
+    """Tangents go where the numbers go: the same statement of them, with a count of its own."""
+    statement = assignment.statement
+    row, moved = row_of(statement), _MOVED[type(statement)]
+    read = [field for field in moved if field not in row.writes]
+    written = names_in(statement, [field for field in moved if field in row.writes])
+    changed = names_in(statement, [field for field in row.writes if field in row.reads])
+    before = dict(zip(changed, assignment.sources, strict=True))
+    givers = {*names_in(statement, read), *[before[name] for name in written if name in before]}
+    if givers.isdisjoint(tangent.dots) or tangent.active.isdisjoint(written):
+        return
+    pushed = with_names(statement, read, tangent.dot_or_zero)
+    dots = {name: tangent.dot(name) for name in written}
+    works = {name: dots.get(name) or tangent.fresh(name, tangent.lengths[name]) for name in changed}
+    for name, work in works.items():
+        old = before[name]
+        tangent.add(copied_or_zero(tangent.dots.get(old), work) if name in dots else copied(old, work))
+    tangent.add(with_names(pushed, row.writes, {**works, **dots}.__getitem__))
 
 
 def pull_take(assignment: Assignment, adjoint: Adjoint) -> None:
@@ -43,30 +60,20 @@ def collect_taken(adjoint: Adjoint, source: str, target: str, moves: Iterable[tu
     adjoint.collect(source, bar)
 
 
-# The tangent of a stack is a stack of tangents with a count of its own, and what is put on one comes off the other.
-
-
-def push_push(assignment: Assignment, tangent: Tangent) -> None:
-    """The tangents of the row go onto the stack of tangents."""
-    push = assignment.statement
-    assert isinstance(push, Push)
-    if push.stack not in tangent.active:
+def pull_scatter(assignment: Assignment, adjoint: Adjoint) -> None:
+    """source_bar[table[i]] += target_bar[places[i]], the last of those with one place; there target_bar before is 0."""
+    scatter: Scatter = assignment.statement  # type: ignore[assignment]
+    (before,) = assignment.sources
+    if scatter.target not in adjoint.bars:
         return
-    stack, count = assignment.sources[:2]
-    dot, work = tangent.dot(push.stack), tangent.fresh("count", 1)
-    tangent.add(copied_or_zero(tangent.dots.get(stack), dot))
-    tangent.add(copied(count, work), Push(dot, work, tuple([tangent.dot_or_zero(name) for name in push.rows])))
-
-
-def push_pop(assignment: Assignment, tangent: Tangent) -> None:
-    """The tangents of the row come off the stack of tangents."""
-    pop = assignment.statement
-    assert isinstance(pop, Pop)
-    if pop.stack not in tangent.dots:
-        return
-    work = tangent.fresh("count", 1)
-    tangent.add(copied(assignment.sources[0], work))
-    tangent.add(Pop(tangent.dots[pop.stack], work, tuple([tangent.dot(name) for name in pop.rows])))
+    if before in adjoint.active:
+        bar, none = adjoint.bar(before), adjoint.fresh("none", 1)
+        adjoint.add(copied(adjoint.bars[scatter.target], bar), zeroed(none))
+        adjoint.add(Scatter(none, bar, (0,) * len(scatter.places), scatter.places))
+        adjoint.collect(before, bar)
+    if scatter.source in adjoint.active:
+        last = dict(zip(scatter.places, scatter.table, strict=True))
+        collect_taken(adjoint, scatter.source, scatter.target, last.items())
 
 
 def pull_push(assignment: Assignment, adjoint: Adjoint) -> None:

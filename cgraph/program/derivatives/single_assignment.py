@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from ..statement import Names, Statement, bodies_of, names_in, row_of, with_names
@@ -33,10 +33,6 @@ class Assignment:
     def sources(self) -> Names:
         """The registers that its copies are of: the values before, of what it changes in place."""
         return tuple([copy.inputs[0] for copy in self.copies])
-
-    def flat_parts(self) -> list[Statement]:
-        """The statements of all its parts."""
-        return [statement for part in self.parts for statement in flat(part)]
 
 
 @dataclass
@@ -106,12 +102,7 @@ class Assigned(Registers):
         row = row_of(statement)
         return with_names(statement, dict.fromkeys((*row.reads, *row.writes)), self.now)
 
-    def flat(self, part: Sequence[Assignment]) -> list[Statement]:
-        """The statements of assignments, copies included."""
-        return [*flat(part)]
 
-
-def flat(assignments: Sequence[Assignment]) -> Iterator[Statement]:
+def flat(assignments: Iterable[Assignment]) -> list[Statement]:
     """The statements of assignments, copies included."""
-    for assignment in assignments:
-        yield from assignment.statements
+    return [statement for assignment in assignments for statement in assignment.statements]

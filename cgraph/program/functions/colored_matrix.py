@@ -19,8 +19,8 @@ from ...util.threads import write_batch
 from ..program import Program
 from ..runners.runner import Runner
 from ..statement import Names, Statement
-from ..statements.call import Call
-from ..statements.tiles import Scatter, TiledMap
+from ..statements.call import Call, Map
+from ..statements.memory import Scatter
 from .bound_function import BoundFunction
 
 LEAST = 64  # points in a block, a multiple of every processor's vectors
@@ -57,16 +57,16 @@ class Part(NamedTuple):
     result: Indices
     entries: Indices
 
-    def tiles(self, lanes: int) -> int:
-        """Number of tiles of directions."""
-        return -(-(max(self.colors) + 1) // lanes)
+    def directions(self, lanes: int) -> int:
+        """Number of directions, filled up to whole vectors."""
+        return -(-(max(self.colors) + 1) // lanes) * lanes
 
     def seeds(self, lanes: int) -> Array:
-        """Sum of the unit vectors of each color, in tiles."""
-        seeds = np.zeros((self.tiles(lanes), len(self.colors), lanes))
+        """Sum of the unit vectors of each color, a column each."""
+        seeds = np.zeros((len(self.colors), self.directions(lanes)))
         for k, color in enumerate(self.colors):
             if color != NONE:
-                seeds[color // lanes, k, color % lanes] = 1.0
+                seeds[k, color] = 1.0
         return seeds.ravel()
 
 
@@ -75,7 +75,7 @@ class ColoredMatrix:
 
     entries: those that can be other than zero, in the order in which `values` gives them.
     source: the graph that gives them all, or the parts that do.  points: the numbers in a point.
-    lanes: the directions in a tile.  ready: makes a program ready to run.
+    lanes: the directions in a vector.  ready: makes a program ready to run.
     """
 
     def __init__(
@@ -148,7 +148,7 @@ class ColoredMatrix:
             return
         rows = values.reshape(len(points), -1)
         width, columns = self._runner(values.ndim == 3, careful, 1)._columns("x", self._seeds(1))
-        directions = sum([part.tiles(1) for part in self._parts])
+        directions = sum([part.directions(1) for part in self._parts])
         write_batch(max(width // (1 + directions) // LEAST, 1) * LEAST, columns, points.T, rows.T, threads)
         if not careful and any([part.derivative.guarded for part in self._parts]):
             mend(values, lambda at, found: self.write(points[at], found, threads, careful=True))
@@ -166,7 +166,7 @@ class ColoredMatrix:
             return self._made[key]
 
     def _program(self, dense: bool, careful: bool, lanes: int) -> Program:
-        """x -> y, the entries, or with `dense` the whole matrix; the directions in tiles of so many lanes."""
+        """x -> y, the entries, or with `dense` the whole matrix; the directions in vectors of so many lanes."""
         m, n = self.entries.shape
         places = self.entries.rows * n + self.entries.columns if dense else np.arange(len(self.entries.rows))
         registers = {"x": self._points, "y": m * n if dense else len(places)}
@@ -179,15 +179,15 @@ class ColoredMatrix:
         checks: dict[str, int] = {}
         for k, part in enumerate(self._parts):
             derivative = part.derivative.careful if careful else part.derivative
-            (primal, linear), tiles = derivative.split, part.tiles(lanes)
-            sizes = len(primal.outputs), tiles * len(part.colors) * lanes, tiles * len(linear.outputs) * lanes
+            (primal, linear), count = derivative.split, part.directions(lanes)
+            sizes = len(primal.outputs), len(part.colors) * count, len(linear.outputs) * count
             registers |= {f"{letter}{k}": size for letter, size in zip("pst", sizes, strict=True)}
-            taken = ((part.color // lanes) * len(linear.outputs) + part.result) * lanes + part.color % lanes
+            taken = part.result * count + part.color
             checked = derivative.guarded is not None and lanes > 1  # of points side by side the entries are looked at
-            statements += product_statements(derivative, k, f"t{k}", lanes, checked=checked)
+            statements += product_statements(derivative, k, f"t{k}", checked=checked)
             statements.append(Scatter(f"t{k}", "y", _tuple(taken), _tuple(places[part.entries])))
             if checked:
-                checks[f"check{k}"] = tiles * lanes
+                checks[f"check{k}"] = count
         if checks:
             registers |= {**checks, "nonfinite": 1}
             statements.append(Call(_nonfinite(sum(checks.values())), (*checks,), ("nonfinite",)))
@@ -204,18 +204,18 @@ def mend(values: Array, write: Callable[[Indices, Array], None]) -> None:
 
 
 def product_statements(
-    derivative: Derivative, k: int, results: str, lanes: int, tiles: Names = (), *, checked: bool
+    derivative: Derivative, k: int, results: str, asked: Names = (), *, checked: bool
 ) -> list[Statement]:
-    """A register of results: of the point x along tiles of directions s; the number k stands behind names.
+    """A register of results: of the point x along directions s, side by side; the number k stands behind names.
 
     checked: a register `check` has NaN for a direction of which a result is infinite or NaN, else 0.
     """
     (primal, linear), p = derivative.split, f"p{k}"
     statements: list[Statement] = [Call(primal, ("x",), (p,))]
-    statements.append(TiledMap(linear, (f"s{k}",), (results,), (p,), lanes, tiles))
+    statements.append(Map(linear, (f"s{k}",), (results,), (p,), asked))
     if checked:
         count = _nonfinite(len(linear.outputs))
-        statements.append(TiledMap(count, (results,), (f"check{k}",), (), lanes, tiles))
+        statements.append(Map(count, (results,), (f"check{k}",), (), asked))
     return statements
 
 

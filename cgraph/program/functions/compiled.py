@@ -61,7 +61,7 @@ class Compiled(BoundFunction, Differentiable):
         Differentiable.__init__(self, graph, ready)
         self.backend, self.options = backend, options
         self._runner = own(Program({"x": self.n_in, "y": self.n_out}, [Call(graph, ("x",), ("y",))], ["y"]))
-        self.lanes, self.tiles, self.vector_cost = self._runner.lanes, self._runner.tiles, self._runner.vector_cost
+        self.lanes, self.vectors, self.vector_cost = self._runner.lanes, self._runner.vectors, self._runner.vector_cost
         self.source = self._runner._point_text("x", "y")
         BoundFunction.__init__(self, self._bound, self.n_in, (self.n_out,))
         if (on_lists := self._runner._on_lists("x")) is not None:

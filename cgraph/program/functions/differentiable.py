@@ -61,7 +61,7 @@ class Differentiable:
     transposed Jacobian are of these alone; x has all inputs.
     """
 
-    lanes, tiles, vector_cost = 1, 1, 1  # as of a Runner
+    lanes, vectors, vector_cost = 1, 1, 1  # as of a Runner
 
     def __init__(self, graph: Graph, ready: Ready) -> None:
         self.graph, self._ready = graph, ready
@@ -239,11 +239,11 @@ class Differentiable:
 
     @_once
     def _pushed(self, chosen: Chosen) -> DirectionProducts:
-        return DirectionProducts(self._forward(chosen), self._ready, self.lanes, self.tiles)
+        return DirectionProducts(self._forward(chosen), self._ready, self.lanes * self.vectors)
 
     @_once
     def _pulled(self, chosen: Chosen) -> DirectionProducts:
-        return DirectionProducts(self._reverse(chosen), self._ready, self.lanes, self.tiles)
+        return DirectionProducts(self._reverse(chosen), self._ready, self.lanes * self.vectors)
 
     def _matrix(self, matrix: ColoredMatrix, points: Array, sparse: bool, threads: int | None) -> Any:
         count = threads if type(threads) is int and threads > 0 else thread_count(threads)

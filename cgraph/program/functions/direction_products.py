@@ -23,12 +23,12 @@ PANEL_NUMBERS = 2**22  # numbers in the rows of points and directions that are w
 
 
 class _Buffers(NamedTuple):
-    """Buffers of one call at a time: memory of a point, directions and results in tiles, how many, checks."""
+    """Buffers of one call at a time: memory of a point, directions and results in columns, how many, checks."""
 
     x: Any  # memory
     directions: Array
     results: Array
-    tiles: memoryview
+    asked: memoryview
     check: memoryview | None
     run: Callable[[], None]
 
@@ -36,26 +36,25 @@ class _Buffers(NamedTuple):
 class DirectionProducts:
     """Writer of products; any number of threads may call it at once.
 
-    ready: makes a program ready to run.  lanes, tiles: directions in a tile, and tiles in a block.
+    ready: makes a program ready to run.  block: directions at a time, in whole vectors.
     """
 
-    def __init__(self, derivative: Derivative, ready: Callable[[Program], Runner], lanes: int, tiles: int) -> None:
-        self._derivative, self._how = derivative, (ready, lanes, tiles)
+    def __init__(self, derivative: Derivative, ready: Callable[[Program], Runner], block: int) -> None:
+        self._derivative, self._how = derivative, (ready, block)
         split = derivative.split
-        sizes = {"x": len(split.primal.inputs), "p0": len(split.primal.outputs), "tiles0": 1}
-        self._tiles = tiles, split.directions, lanes
-        self._results = tiles, len(split.linear.outputs), lanes
+        sizes = {"x": len(split.primal.inputs), "p0": len(split.primal.outputs), "asked": 1}
+        self._directions, self._results = (split.directions, block), (len(split.linear.outputs), block)
         checked = derivative.guarded is not None
         if checked:
-            sizes["check0"] = tiles * lanes
-        sizes |= {"s0": math.prod(self._tiles), "y": math.prod(self._results)}
-        body = product_statements(derivative, 0, "y", lanes, ("tiles0",), checked=checked)
+            sizes["check0"] = block
+        sizes |= {"s0": math.prod(self._directions), "y": math.prod(self._results)}
+        body = product_statements(derivative, 0, "y", ("asked",), checked=checked)
         self._runner = ready(Program(sizes, body, ["y"]))
         self._free: list[_Buffers] = []  # pop and append are atomic
 
     def __call__(self, x: Array, directions: Array, result: Array) -> None:
         """The results, (k, results), along directions, (k, entries), at a point."""
-        size = self._tiles[0] * self._tiles[2]
+        size = self._how[1]
         if len(directions) <= size:
             self._block(x, directions, result)
             return
@@ -92,21 +91,12 @@ class DirectionProducts:
             buffers = self._free.pop()
         except IndexError:
             buffers = self._buffers()
-        count, lanes = len(directions), self._tiles[2]
-        full, rest = divmod(count, lanes)
-        s, y = buffers.directions, buffers.results
+        count = len(directions)
         buffers.x[:] = x
-        if full:
-            s[:full] = directions[: full * lanes].reshape(full, lanes, s.shape[1]).transpose(0, 2, 1)
-        if rest:  # the last tile is filled up with zeros
-            s[full, :, :rest] = directions[full * lanes :].T
-            s[full, :, rest:] = 0.0
-        buffers.tiles[0] = full + bool(rest)
+        buffers.directions[:, :count] = directions.T
+        buffers.asked[0] = count
         buffers.run()
-        if full:
-            result[: full * lanes].reshape(full, lanes, y.shape[1]).transpose(0, 2, 1)[...] = y[:full]
-        if rest:
-            result[full * lanes :] = y[full, :, :rest].T
+        result[...] = buffers.results[:, :count].T
         found = b"" if buffers.check is None else buffers.check[: 8 * count].tobytes()
         self._free.append(buffers)
         if found.count(0) < len(found):  # zeros, but NaN where a result is infinite or NaN
@@ -115,9 +105,9 @@ class DirectionProducts:
     def _buffers(self) -> _Buffers:
         x, y = np.empty(self._runner.program.registers["x"]), aligned(math.prod(self._results))
         run, registers = self._runner._bind_pass(("x", x), ("y", y))
-        s, check = registers["s0"].reshape(self._tiles), registers.get("check0")
+        s, check = registers["s0"].reshape(self._directions), registers.get("check0")
         found = None if check is None else check.data.cast("B")
-        return _Buffers(x.data, s, y.reshape(self._results), registers["tiles0"].data, found, run)
+        return _Buffers(x.data, s, y.reshape(self._results), registers["asked"].data, found, run)
 
     @cached_property
     def _guarded(self) -> DirectionProducts:

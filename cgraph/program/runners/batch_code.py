@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from ...codegen.arithmetic import Arithmetic
+from ...codegen.arithmetic import Arithmetic, bits
 from ...codegen.batch_ir import Batch, Place, rows_ir
+from ...codegen.function_writer import FunctionWriter
 from ...codegen.llvm_engine import Code
 from ...core.evaluation import Array
 from ...util.memory import aligned, lies_in_rows
@@ -80,12 +83,18 @@ def program_rows_ir(program: Program, name: str, lanes: int, flags: str, registe
 
     Both are read and written where they lie among the registers.
     """
-    places = offsets(program.registers, 1)
+    places, arithmetic = offsets(program.registers, 1), Arithmetic(flags, lanes, registers)
     point, *results = [Place(places[each], program.registers[each]) for each in (name, *program.record)]
-    calls = ["  %rows = call i64 @run(ptr %w, ptr null, i64 1, i64 1, ptr %done, ptr null)"]
-    driver = rows_ir(Arithmetic(flags, lanes), point, results, calls, ["  %done = alloca i64, align 8"])
-    source = program_ir(replace(program, record=()), Arithmetic(flags, lanes, registers), 1)
+
+    def compute(ir: FunctionWriter, *_: str) -> None:
+        ir.line(_ONE_RUN.format(done=ir.room(1, "i64")))
+
+    source = program_ir(replace(program, record=()), arithmetic, 1)
+    driver = rows_ir(Arithmetic(flags, lanes), point, results, compute)
     return Batch("\n".join([source, *driver, ""]), lanes * places[""])
+
+
+_ONE_RUN = "call i64 @run(ptr %w, ptr null, i64 1, i64 2, ptr {done}, ptr null, i64 0)"
 
 
 class LaneCode:
@@ -127,219 +136,149 @@ class LaneCode:
 
 def lane_ir(program: Program, kept: int, clock: str, arithmetic: Arithmetic) -> Batch:
     """The module with `lanes`, see `LaneCode`, of a program under masks whose first `kept` numbers outlive a pass."""
-    places, lanes = offsets(program.registers, 1), arithmetic.lanes
     source = program_ir(replace(program, record=(), record_if=None, stop=None), arithmetic, 1)
-    row, at = [], 0
-    for name in program.record:
-        row.append(_ROW.format(at=at, place=places[name] * lanes, count=program.registers[name], lanes=lanes))
-        at += program.registers[name]
-    t, bits = arithmetic.type, f"i{lanes}"
-    words = {"t": t, "n": f"<{lanes} x i64>", "b": f"<{lanes} x i1>", "bits": bits, "lanes": lanes, "kept": kept}
-    words |= {"all": 2**lanes - 1, "width": program.width, "row": "\n".join(row)}
-    words |= {"stop": places[program.stop] if program.stop is not None else 0, "clock": places[clock]}
-    words["stopped"] = "%stopped.each" if program.stop is not None else "zeroinitializer"
-    words["wanted"] = places[program.record_if] if program.record_if is not None else places[clock]
-    return Batch("\n".join([source, _LANES_TEXT.format(**words)]), places[""])
+    lines = _LaneWriter(program, kept, clock, arithmetic).definitions()
+    return Batch("\n".join([source, *lines, ""]), offsets(program.registers, 1)[""])
 
 
-# Number k of row `which` of an array of rows lies next to the one before, that of a lane as many apart as there are
-# lanes. A lane holds memory %which, or -1; all begin as lanes that have ended with nothing.
-_ROW = """\
-  %row.to{at} = getelementptr double, ptr %row.to, i64 {at}
-  %row.from{at}.lane = add i64 %r, {place}
-  %row.from{at} = getelementptr double, ptr %w, i64 %row.from{at}.lane
-  call void @move(ptr %row.to{at}, ptr %row.from{at}, i64 {count}, i64 1, i64 {lanes})"""
-_LANES_TEXT = """\
-define internal void @move(ptr noalias %to, ptr noalias %from, i64 %count, i64 %to.step, i64 %from.step) nounwind {{
-start:
-  %some = icmp sgt i64 %count, 0
-  br i1 %some, label %each, label %end
-each:
-  %k = phi i64 [ 0, %start ], [ %next, %each ]
-  %to.at = mul i64 %k, %to.step
-  %from.at = mul i64 %k, %from.step
-  %a = getelementptr double, ptr %to, i64 %to.at
-  %b = getelementptr double, ptr %from, i64 %from.at
-  %value = load double, ptr %b, align 8
-  store double %value, ptr %a, align 8
-  %next = add i64 %k, 1
-  %more = icmp slt i64 %next, %count
-  br i1 %more, label %each, label %end
-end:
-  ret void
-}}
-define void @lanes(ptr noalias %w, ptr noalias %memories, ptr noalias %which, ptr noalias %passes, ptr noalias %rows,
-                   ptr noalias %marks, i64 %count, i64 %most, i64 %n) nounwind {{
-start:
-  %done = alloca i64, align 8
-  %holds = alloca {n}, align 64
-  %left = alloca {n}, align 64
-  %due = alloca {t}, align 64
-  %given = alloca i64, align 8
-  %live = alloca i64, align 8
-  store {n} splat (i64 -1), ptr %holds, align 64
-  store {n} zeroinitializer, ptr %left, align 64
-  store {t} splat (double 0x7FF0000000000000), ptr %due, align 64
-  store i64 0, ptr %given, align 8
-  store i64 0, ptr %live, align 8
-  %clocks = getelementptr {t}, ptr %w, i64 {clock}
-  %wishes = getelementptr {t}, ptr %w, i64 {wanted}
-  %stops = getelementptr {t}, ptr %w, i64 {stop}
-  br label %ended
-pass:
-  %unused = call i64 @run(ptr %w, ptr null, i64 1, i64 2, ptr %done, ptr null, i64 0)
-  %clock = load {t}, ptr %clocks, align 8
-  %wish = load {t}, ptr %wishes, align 8
-  %due.now = load {t}, ptr %due, align 64
-  %reached.each = fcmp oge {t} %clock, %due.now
-  %wished.each = fcmp ogt {t} %wish, zeroinitializer
-  %rows.each = and {b} %reached.each, %wished.each
-  %rows.bits = bitcast {b} %rows.each to {bits}
-  %rows.some = icmp ne {bits} %rows.bits, 0
-  br i1 %rows.some, label %record, label %recorded
-record:
-  %r = phi i64 [ 0, %pass ], [ %r.next, %record.next ]
-  %r.bit = trunc i64 %r to {bits}
-  %r.bits = lshr {bits} %rows.bits, %r.bit
-  %r.on = trunc {bits} %r.bits to i1
-  br i1 %r.on, label %row, label %record.next
-row:
-  %r.holds.at = getelementptr i64, ptr %holds, i64 %r
-  %r.holds = load i64, ptr %r.holds.at, align 8
-  %r.count = mul i64 %r.holds, 2
-  %r.mark = add i64 %r.count, 1
-  %mark.at = getelementptr i64, ptr %passes, i64 %r.mark
-  %mark = load i64, ptr %mark.at, align 8
-  %row.first = mul i64 %r.holds, %n
-  %row.number = add i64 %row.first, %mark
-  %row.at = mul i64 %row.number, {width}
-  %row.to = getelementptr double, ptr %rows, i64 %row.at
-{row}
-  %r.clock.at = getelementptr double, ptr %clocks, i64 %r
-  %r.clock = load double, ptr %r.clock.at, align 8
-  br label %skip
-skip:
-  %k = phi i64 [ %mark, %row ], [ %k.next, %skip.test ]
-  %k.next = add i64 %k, 1
-  %k.more = icmp slt i64 %k.next, %n
-  br i1 %k.more, label %skip.test, label %skipped
-skip.test:
-  %next.at = getelementptr double, ptr %marks, i64 %k.next
-  %next.mark = load double, ptr %next.at, align 8
-  %passed = fcmp ole double %next.mark, %r.clock
-  br i1 %passed, label %skip, label %skipped
-skipped:
-  %new.due = phi double [ 0x7FF0000000000000, %skip ], [ %next.mark, %skip.test ]
-  store i64 %k.next, ptr %mark.at, align 8
-  %r.due.at = getelementptr double, ptr %due, i64 %r
-  store double %new.due, ptr %r.due.at, align 8
-  br label %record.next
-record.next:
-  %r.next = add i64 %r, 1
-  %r.more = icmp slt i64 %r.next, {lanes}
-  br i1 %r.more, label %record, label %recorded
-recorded:
-  %left.before = load {n}, ptr %left, align 64
-  %left.now = sub {n} %left.before, splat (i64 1)
-  store {n} %left.now, ptr %left, align 64
-  %stop = load {t}, ptr %stops, align 8
-  %stopped.each = fcmp une {t} %stop, zeroinitializer
-  %spent.each = icmp sle {n} %left.now, zeroinitializer
-  %ended.each = or {b} %spent.each, {stopped}
-  %ended.bits = bitcast {b} %ended.each to {bits}
-  %ended.some = icmp ne {bits} %ended.bits, 0
-  br i1 %ended.some, label %ended, label %pass
-ended:
-  %over = phi {bits} [ -1, %start ], [ %ended.bits, %recorded ]
-  br label %lane
-lane:
-  %e = phi i64 [ 0, %ended ], [ %e.next, %lane.next ]
-  %e.bit = trunc i64 %e to {bits}
-  %e.bits = lshr {bits} %over, %e.bit
-  %e.on = trunc {bits} %e.bits to i1
-  %e.w = getelementptr double, ptr %w, i64 %e
-  %e.holds.at = getelementptr i64, ptr %holds, i64 %e
-  %e.left.at = getelementptr i64, ptr %left, i64 %e
-  %e.due.at = getelementptr double, ptr %due, i64 %e
-  br i1 %e.on, label %give.back, label %lane.next
-give.back:
-  %e.holds = load i64, ptr %e.holds.at, align 8
-  %e.held = icmp sge i64 %e.holds, 0
-  br i1 %e.held, label %put, label %take
-put:
-  %put.at = mul i64 %e.holds, {kept}
-  %put.to = getelementptr double, ptr %memories, i64 %put.at
-  call void @move(ptr %put.to, ptr %e.w, i64 {kept}, i64 1, i64 {lanes})
-  %e.count = mul i64 %e.holds, 2
-  %count.at = getelementptr i64, ptr %passes, i64 %e.count
-  %count.before = load i64, ptr %count.at, align 8
-  %e.left = load i64, ptr %e.left.at, align 8
-  %e.passes = sub i64 %most, %e.left
-  %count.now = add i64 %count.before, %e.passes
-  store i64 %count.now, ptr %count.at, align 8
-  %live.before = load i64, ptr %live, align 8
-  %live.less = sub i64 %live.before, 1
-  store i64 %live.less, ptr %live, align 8
-  store i64 -1, ptr %e.holds.at, align 8
-  br label %take
-take:
-  %g = load i64, ptr %given, align 8
-  %g.more = icmp slt i64 %g, %count
-  br i1 %g.more, label %get, label %look
-get:
-  %g.next = add i64 %g, 1
-  store i64 %g.next, ptr %given, align 8
-  %g.at = getelementptr i64, ptr %which, i64 %g
-  %new = load i64, ptr %g.at, align 8
-  store i64 %new, ptr %e.holds.at, align 8
-  store i64 %most, ptr %e.left.at, align 8
-  %live.few = load i64, ptr %live, align 8
-  %live.more = add i64 %live.few, 1
-  store i64 %live.more, ptr %live, align 8
-  %get.at = mul i64 %new, {kept}
-  %get.from = getelementptr double, ptr %memories, i64 %get.at
-  call void @move(ptr %e.w, ptr %get.from, i64 {kept}, i64 {lanes}, i64 1)
-  %new.count = mul i64 %new, 2
-  %new.mark = add i64 %new.count, 1
-  %new.mark.at = getelementptr i64, ptr %passes, i64 %new.mark
-  %first = load i64, ptr %new.mark.at, align 8
-  %first.more = icmp slt i64 %first, %n
-  br i1 %first.more, label %get.due, label %get.none
-get.due:
-  %first.at = getelementptr double, ptr %marks, i64 %first
-  %first.due = load double, ptr %first.at, align 8
-  store double %first.due, ptr %e.due.at, align 8
-  br label %lane.next
-get.none:
-  store double 0x7FF0000000000000, ptr %e.due.at, align 8
-  br label %lane.next
-look: ; nothing waits: the lane does what another one does, and records nothing
-  %j = phi i64 [ 0, %take ], [ %j.next, %look.next ]
-  %j.holds.at = getelementptr i64, ptr %holds, i64 %j
-  %j.holds = load i64, ptr %j.holds.at, align 8
-  %j.live = icmp sge i64 %j.holds, 0
-  br i1 %j.live, label %follow, label %look.next
-look.next:
-  %j.next = add i64 %j, 1
-  %j.more = icmp slt i64 %j.next, {lanes}
-  br i1 %j.more, label %look, label %lane.next
-follow:
-  %j.w = getelementptr double, ptr %w, i64 %j
-  call void @move(ptr %e.w, ptr %j.w, i64 {kept}, i64 {lanes}, i64 {lanes})
-  %j.left.at = getelementptr i64, ptr %left, i64 %j
-  %j.left = load i64, ptr %j.left.at, align 8
-  store i64 %j.left, ptr %e.left.at, align 8
-  store double 0x7FF0000000000000, ptr %e.due.at, align 8
-  br label %lane.next
-lane.next:
-  %e.next = add i64 %e, 1
-  %e.more = icmp slt i64 %e.next, {lanes}
-  br i1 %e.more, label %lane, label %lanes.done
-lanes.done:
-  %live.now = load i64, ptr %live, align 8
-  %goes.on = icmp sgt i64 %live.now, 0
-  br i1 %goes.on, label %pass, label %end
-end:
-  ret void
-}}
-"""
+class _LaneWriter(FunctionWriter):
+    """The function `lanes`: passes of memories, each of which begins in a lane where another one has ended.
+
+    Number k of row j of an array of rows lies next to the one before, that of a lane as many apart as there are lanes.
+    """
+
+    def __init__(self, program: Program, kept: int, clock: str, arithmetic: Arithmetic) -> None:
+        super().__init__(arithmetic)
+        self._program, self._kept, self._clock = program, kept, clock
+        self._places = offsets(program.registers, 1)
+        self._integers = f"<{self.lanes} x i64>"
+        # Of each lane: its memory, or -1; the passes that are left to it; and the next mark of its clock.
+        self._holds, self._left, self._due = self.room(1, self._integers), self.room(1, self._integers), self.room()
+        self._given, self._live, self._over = [self.room(1, "i64") for _ in range(3)]  # memories, and the lanes' bits
+
+    def definitions(self) -> list[str]:
+        """The function, and the one that it moves numbers with."""
+        self.store_at("splat (i64 -1)", self._holds, self._integers)
+        self.store_at("zeroinitializer", self._left, self._integers)
+        self.store_at(self.number(math.inf), self._due)
+        for address, value in ((self._given, 0), (self._live, 0), (self._over, -1)):  # all end, with nothing
+            self.store_at(value, address, "i64")
+        done = self.room(1, "i64")
+        with self.repeat() as end:
+            with self._lanes_of(self.load_at(self._over, "i64")) as lane:
+                self._give_back(lane)
+                self._take(lane)
+            self.leave_unless(self.integer("icmp sgt", self.load_at(self._live, "i64"), 0), end)
+            self.line(_ONE_RUN.format(done=done))
+            self._record_lanes()
+            left = self.value(f"sub {self._integers} {self.load_at(self._left, self._integers)}, splat (i64 1)")
+            self.store_at(left, self._left, self._integers)
+            over = self.value(f"icmp sle {self._integers} {left}, zeroinitializer")
+            if self._program.stop is not None:  # NaN counts as not 0
+                stopped = self.compare("une", self._number(self._program.stop), 0.0)
+                over = self.value(f"or {self.bits} {over}, {stopped}")
+            self.store_at(self._mask(over), self._over, "i64")
+        moving = FunctionWriter(Arithmetic())
+        with moving.loop(0, "%count") as k:
+            source, target = (moving.at(f"%{end}", moving.integer("mul", k, f"%{end}.step")) for end in ("from", "to"))
+            moving.store_at(moving.load_at(source), target)
+        return [
+            *moving.function(f"internal void @move({_MOVE}) nounwind"),
+            *self.function(f"void @lanes({_ALL}) nounwind"),
+        ]
+
+    def _number(self, register: str) -> str:
+        return self.load_at(self.at("%w", self._places[register]))
+
+    def _mask(self, condition: str) -> str:
+        return self.value(f"zext i{self.lanes} {self.mask(condition)} to i64")
+
+    @contextmanager
+    def _lanes_of(self, mask: str) -> Iterator[str]:
+        """The lines inside, for every lane whose bit is 1."""
+        with self.when(self.integer("icmp ne", mask, 0)), self.loop(0, self.lanes) as lane:
+            bit = self.value(f"trunc i64 {self.integer('lshr', mask, lane)} to i1")
+            with self.when(bit):
+                yield lane
+
+    def _move(self, target: str, to_step: int, source: str, from_step: int, count: int) -> None:
+        steps = f"i64 {count}, i64 {to_step}, i64 {from_step}"
+        self.line(f"call void @move(ptr {target}, ptr {source}, {steps})")
+
+    def _row(self, base: str, row: str, width: str | int) -> str:
+        """The address of a row of doubles."""
+        return self.at(base, self.integer("mul", row, width), "double")
+
+    def _count_of(self, memory: str, column: int) -> str:
+        """The address of how many passes a memory has run, or marks passed."""
+        return self.at("%passes", self.integer("add", self.integer("mul", memory, 2), column), "i64")
+
+    def _set_due(self, lane: str, mark: str) -> str:
+        """The next mark of a lane, infinite behind the last; whether there is one."""
+        due, there = self.at(self._due, lane, "double"), self.integer("icmp slt", mark, "%n")
+        self.store_at(bits(math.inf), due, "double")
+        with self.when(there):
+            self.store_at(self.load_at(self.at("%marks", mark, "double"), "double"), due, "double")
+        return there
+
+    def _record_lanes(self) -> None:
+        """A row in the lanes whose clock has reached a mark, where a row is wanted."""
+        clock, program = self._number(self._clock), self._program
+        reached = self.compare("oge", clock, self.load_at(self._due))
+        wish = self.compare("ogt", self._number(program.record_if or self._clock), 0.0)
+        with self._lanes_of(self._mask(self.value(f"and {self.bits} {reached}, {wish}"))) as lane:
+            memory = self.load_at(self.at(self._holds, lane, "i64"), "i64")
+            passed, mark = self._count_of(memory, 1), self.room(1, "i64")
+            first = self.load_at(passed, "i64")
+            number = self.integer("add", self.integer("mul", memory, "%n"), first)
+            row, at = self._row("%rows", number, program.width), 0
+            for name in program.record:
+                source = self.at("%w", self.integer("add", lane, self._places[name] * self.lanes), "double")
+                self._move(self.at(row, at, "double"), 1, source, self.lanes, program.registers[name])
+                at += program.registers[name]
+            here = self.load_at(self.at(self.at("%w", self._places[self._clock]), lane, "double"), "double")
+            self.store_at(first, mark, "i64")
+            with self.repeat() as skipped:  # marks that it has passed at once
+                self.change(mark, "add 1")
+                self.leave_unless(self._set_due(lane, self.load_at(mark, "i64")), skipped)
+                due = self.load_at(self.at(self._due, lane, "double"), "double")
+                self.leave_unless(self.value(f"fcmp ole double {due}, {here}"), skipped)
+            self.store_at(self.load_at(mark, "i64"), passed, "i64")
+
+    def _give_back(self, lane: str) -> None:
+        """The memory of a lane that has ended goes back to its row."""
+        held = self.at(self._holds, lane, "i64")
+        memory = self.load_at(held, "i64")
+        with self.when(self.integer("icmp sge", memory, 0)):
+            self._move(
+                self._row("%memories", memory, self._kept), 1, self.at("%w", lane, "double"), self.lanes, self._kept
+            )
+            left = self.load_at(self.at(self._left, lane, "i64"), "i64")
+            self.change(self._count_of(memory, 0), f"add {self.integer('sub', '%most', left)}")
+            self.change(self._live, "sub 1")
+            self.store_at(-1, held, "i64")
+
+    def _take(self, lane: str) -> None:
+        """The next memory for a lane; where none waits it does what another one does, and records nothing."""
+        here, left = self.at("%w", lane, "double"), self.at(self._left, lane, "i64")
+        given = self.load_at(self._given, "i64")
+        with self.when(self.integer("icmp slt", given, "%count")) as otherwise:
+            self.change(self._given, "add 1")
+            self.change(self._live, "add 1")
+            new = self.load_at(self.at("%which", given, "i64"), "i64")
+            self.store_at(new, self.at(self._holds, lane, "i64"), "i64")
+            self.store_at("%most", left, "i64")
+            self._move(here, self.lanes, self._row("%memories", new, self._kept), 1, self._kept)
+            self._set_due(lane, self.load_at(self._count_of(new, 1), "i64"))
+            otherwise()
+            self.store_at(bits(math.inf), self.at(self._due, lane, "double"), "double")
+            with self.loop(0, self.lanes) as other:
+                memory = self.load_at(self.at(self._holds, other, "i64"), "i64")
+                with self.when(self.integer("icmp sge", memory, 0)):
+                    self._move(here, self.lanes, self.at("%w", other, "double"), self.lanes, self._kept)
+                    self.store_at(self.load_at(self.at(self._left, other, "i64"), "i64"), left, "i64")
+
+
+_ALL = ", ".join([f"ptr noalias %{name}" for name in ("w", "memories", "which", "passes", "rows", "marks")])
+_ALL += ", i64 %count, i64 %most, i64 %n"
+_MOVE = "ptr noalias %to, ptr noalias %from, i64 %count, i64 %to.step, i64 %from.step"

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from ...codegen.arithmetic import REGISTERS, Arithmetic
+from ...codegen.function_writer import copied_bytes
 from ...codegen.llvm_engine import MissingFunctionError
 from ...codegen.llvm_ir import libm_functions, point_arithmetic, preamble, scalar_ir
 from ..llvm_functions import Functions
 from ..program import Program, whole_graph
 from ..statement import row_of
-from ..writer import Writer, copy_text
+from ..writer import Writer
 
 
 def program_functions(program: Program) -> dict[str, int]:
@@ -55,7 +56,7 @@ def program_ir(program: Program, arithmetic: Arithmetic, width: int = 1) -> str:
     width: of the vectors in which `Map` goes through its elements.
     """
     functions = Functions(arithmetic, width)
-    run = _RunFunction(program, functions).lines()
+    run = _run_function(program, Writer(program.registers, functions))
     return "\n".join([*preamble(program.graphs(), arithmetic), *functions.definitions, *run, ""])
 
 
@@ -70,127 +71,63 @@ def point_ir(
     if graph is not None:
         return scalar_ir(graph, flags, registers), {"": 0}
     functions = Functions(point_arithmetic(flags, registers), width)
-    writer = Writer(program.registers, functions)
-    writer.pointers |= {x: "%x", y: "%y"}
-    writer.run(program.body)
+    ir = Writer(program.registers, functions)
     # Single numbers last: others then begin where vectors may.
     lengths = sorted(program.registers.items(), key=lambda item: item[1] < 2)
     inner = {name: length for name, length in lengths if name not in (x, y)}
     places = offsets(inner, width)
-    lines = [
-        *preamble(program.graphs(), functions.arithmetic),
-        *functions.definitions,
-        "define void @point(ptr noalias %x, ptr noalias %y, ptr noalias %memory) nounwind {",
-        "start:",
-        *[f"  {writer.pointers[each]} = getelementptr double, ptr %memory, i64 {places[each]}" for each in inner],
-        *writer.scratch,
-        *writer.written,
-    ]
-    return "\n".join([*lines, "  ret void", "}", ""]), places
+    ir.pointers = {x: "%x", y: "%y", **{name: ir.at("%memory", places[name]) for name in inner}}
+    ir.run(program.body)
+    point = ir.function("void @point(ptr noalias %x, ptr noalias %y, ptr noalias %memory) nounwind")
+    lines = [*preamble(program.graphs(), functions.arithmetic), *functions.definitions, *point]
+    return "\n".join([*lines, ""]), places
 
 
 _ARGUMENTS = "ptr noalias %memory, ptr noalias %records, i64 %passes, i64 %every, ptr %done, ptr noalias %feed, "
 _ARGUMENTS += "i64 %stride"
 
 
-class _RunFunction(Writer):
+def _run_function(program: Program, ir: Writer) -> list[str]:
     """The function `run`: the passes, and in each of them the statements, the record and the stop.
 
     for (done = 0; done < passes;) {
         read; statements; done++; if (--until == 0) { until = every; record } if (stop) break
     }
     """
+    places = offsets(program.registers, ir.functions.width)
+    ir.pointers = {name: ir.at("%memory", places[name]) for name in program.registers}
+    row, until = ir.room(1, "ptr"), ir.room(1, "i64")
+    ir.store_at("%records", row, "ptr")
+    ir.store_at("%every", until, "i64")
+    ir.store_at(0, "%done", "i64")
+    with ir.repeat() as end:
+        before = ir.load_at("%done", "i64")
+        ir.leave_unless(ir.integer("icmp slt", before, "%passes"), end)
+        if program.feed:  # registers = row `done` of the feed
+            fed = ir.at("%feed", ir.integer("mul", before, "%stride"))
+            _moved(ir, program.feed, fed, reading=True)
+        ir.run(program.body)
+        ir.store_at(ir.integer("add", before, 1), "%done", "i64")
+        waits = ir.integer("sub", ir.load_at(until, "i64"), 1)
+        ir.store_at(waits, until, "i64")
+        with ir.when(ir.integer("icmp eq", waits, 0)):
+            ir.store_at("%every", until, "i64")
+            wanted = ir.positive(program.record_if) if program.record_if is not None else "true"
+            with ir.when(wanted):
+                ir.store_at(_moved(ir, program.record, ir.load_at(row, "ptr"), reading=False), row, "ptr")
+        if program.stop is not None:  # NaN counts as not 0
+            stopped = ir.compare("une", ir.load(program.stop), 0.0)
+            ir.leave_unless(ir.value(f"xor i1 {stopped}, true"), end)
+    first, last = [ir.value(f"ptrtoint ptr {each} to i64") for each in ("%records", ir.load_at(row, "ptr"))]
+    rows = ir.integer("sdiv", ir.integer("sub", last, first), max(1, program.width) * ir.size)
+    return ir.function(f"i64 @run({_ARGUMENTS}) nounwind", f"i64 {rows}")
 
-    def __init__(self, program: Program, functions: Functions) -> None:
-        super().__init__(program.registers, functions)
-        self.program = program
 
-    def lines(self) -> list[str]:
-        """The whole function."""
-        places = offsets(self.program.registers, self.functions.width)
-        self.run(self.program.body)
-        return [
-            f"define i64 @run({_ARGUMENTS}) nounwind {{",
-            "start:",
-            *(
-                f"  {pointer} = getelementptr {self.type}, ptr %memory, i64 {places[name]}"
-                for name, pointer in self.pointers.items()
-            ),
-            *self.scratch,
-            "  %row = alloca ptr, align 8",
-            "  %until = alloca i64, align 8",
-            "  store ptr %records, ptr %row",
-            "  store i64 %every, ptr %until",
-            "  store i64 0, ptr %done",
-            "  br label %top",
-            "top:",
-            "  %before = load i64, ptr %done",
-            "  %more = icmp slt i64 %before, %passes",
-            "  br i1 %more, label %pass, label %end",
-            "pass:",
-            *self._read(),
-            *self.written,
-            "  %after = add i64 %before, 1",
-            "  store i64 %after, ptr %done",
-            *self._record(),
-            *self._stop(),
-            "end:",  # rows = (row - records) / bytes of a row
-            "  %last = load ptr, ptr %row",
-            "  %last.at = ptrtoint ptr %last to i64",
-            "  %first.at = ptrtoint ptr %records to i64",
-            "  %bytes = sub i64 %last.at, %first.at",
-            f"  %rows = sdiv i64 %bytes, {max(1, self.program.width) * self.size}",
-            "  ret i64 %rows",
-            "}",
-        ]
-
-    def _read(self) -> list[str]:
-        """Registers = row `done` of the feed."""
-        if not self.program.feed:
-            return []
-        lines = [
-            "  %fed = mul i64 %before, %stride",
-            f"  %fed0 = getelementptr {self.type}, ptr %feed, i64 %fed",
-        ]
-        for k, name in enumerate(self.program.feed):
-            length = self.program.registers[name]
-            lines += [
-                copy_text(self.pointers[name], f"%fed{k}", length * self.size),
-                f"  %fed{k + 1} = getelementptr {self.type}, ptr %fed{k}, i64 {length}",
-            ]
-        return lines
-
-    def _record(self) -> list[str]:
-        """if (--until == 0) { until = every; if (record_if > 0) write a row }."""
-        lines = [
-            "  %waited = load i64, ptr %until",
-            "  %waits = sub i64 %waited, 1",
-            "  store i64 %waits, ptr %until",
-            "  %due = icmp eq i64 %waits, 0",
-            "  br i1 %due, label %due.now, label %recorded",
-            "due.now:",
-            "  store i64 %every, ptr %until",
-        ]
-        if self.program.record_if is not None:
-            lines += self.positive("%wanted", self.program.record_if)
-            lines += ["  br i1 %wanted, label %write, label %recorded"]
-        else:
-            lines += ["  br label %write"]
-        lines += ["write:", "  %row0 = load ptr, ptr %row"]
-        for k, name in enumerate(self.program.record):
-            length = self.program.registers[name]
-            lines += [
-                copy_text(f"%row{k}", self.pointers[name], length * self.size),
-                f"  %row{k + 1} = getelementptr {self.type}, ptr %row{k}, i64 {length}",
-            ]
-        return [*lines, f"  store ptr %row{len(self.program.record)}, ptr %row", "  br label %recorded", "recorded:"]
-
-    def _stop(self) -> list[str]:
-        """if (stop != 0) break, where NaN counts as not 0."""
-        if self.program.stop is None:
-            return ["  br label %top"]
-        return [
-            f"  %stop.value = load double, ptr {self.pointers[self.program.stop]}, align 8",
-            "  %stop = fcmp une double %stop.value, 0.0",
-            "  br i1 %stop, label %end, label %top",
-        ]
+def _moved(ir: Writer, names: Sequence[str], row: str, *, reading: bool) -> str:
+    """Registers from a row, where they lie end to end, or to it; the address behind it."""
+    for name in names:
+        length, register = ir.registers[name], ir.pointer(name)
+        target, source = (register, row) if reading else (row, register)
+        ir.line(copied_bytes(target, source, length * ir.size))
+        row = ir.at(row, length)
+    return row

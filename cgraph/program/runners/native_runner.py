@@ -56,7 +56,7 @@ class PointCode(NamedTuple):
 class NativeRunner(Runner):
     """A program as machine code. Any number of threads may run it at once, on a memory each."""
 
-    takes_rows, tiles = True, 16
+    takes_rows, vectors = True, 17
 
     def __init__(self, program: Program, flags: str, cache: Cache | None = None) -> None:
         host = llvm.host()

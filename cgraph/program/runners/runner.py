@@ -18,7 +18,6 @@ from ...util.real_arrays import real_array
 from ...util.require import require_mapping, require_whole
 from ...util.threads import thread_count, write_batch
 from ..program import Program
-from ..statement import reads_and_writes, row_of
 from .llvm_ir import offsets
 
 if TYPE_CHECKING:
@@ -66,7 +65,8 @@ class Runner(ABC):
     [8.0]
     """
 
-    lanes, tiles = 8, 512  # directions in a tile, and tiles in a block of them
+    # Directions in a vector, and vectors in a block: odd, since rows a power of two apart would share few cache lines.
+    lanes, vectors = 8, 513
     vector_cost = 1  # of an operation on a vector of directions, in operations on numbers
     takes_rows = False  # whether batches of points that lie one after another are read and written as they lie
 
@@ -174,8 +174,8 @@ class Runner(ABC):
     def _bind_pass(self, x: tuple[str, Array], y: tuple[str, Array]) -> tuple[Callable[[], None], Mapping[str, Array]]:
         """A function of nothing: one pass, of which a register x that is read and a y that is written lie in arrays.
 
-        The arrays, contiguous and of as many numbers, are not checked; no `Map` may write y. With it come the other
-        registers, zeros.
+        The arrays, contiguous and of as many numbers, are not checked; a `Map` that writes y has elements in whole
+        vectors. With it come the other registers, zeros.
         """
 
     def run_many(self, memories: Array, passes: int, every: int = 1, feed: ArrayLike | None = None) -> Record:
@@ -211,6 +211,8 @@ class Runner(ABC):
         Raises GraphError for another shape; if the program cannot `run_many`, or has a feed; if a pass reads or records
         a register, other than this one, that it may not have set before.
         """
+        from ..many import outliving
+
         count, rows = thread_count(threads), np.ascontiguousarray(real_array(name, values))
         length = len(self.read(np.empty(self.size), name))
         if rows.ndim != 2 or rows.shape[1] != length:
@@ -218,8 +220,8 @@ class Runner(ABC):
         self._require_beside()
         if self.program.feed:
             raise GraphError("a batch takes no feed: give its registers a place in the one that varies")
-        if (unset := _first_unset(self.program, name)) is not None:
-            raise GraphError(f"a batch needs a pass that sets what it reads: register {unset!r} is read before")
+        if unset := [each for each in outliving(self.program) if each != name]:
+            raise GraphError(f"a batch needs a pass that sets what it reads: register {unset[0]!r} is read before")
         shape = len(rows), self.program.width
         result = np.empty(shape) if out is None else out
         require_out(result, shape, rows)
@@ -279,16 +281,3 @@ class Runner(ABC):
 
     @abstractmethod
     def _run_many(self, memories: Array, passes: int, every: int, feed: Array) -> Record: ...
-
-
-def _first_unset(program: Program, known: str) -> str | None:
-    """A register that a pass reads or records before it is sure to have set it, if there is one besides `known`."""
-    is_set = {known}
-    for statement in program.body:
-        reads, writes = reads_and_writes(statement)
-        for name in reads:
-            if name not in is_set:
-                return name
-        if not row_of(statement).bodies:  # which may run no time at all
-            is_set |= {*writes}
-    return next((name for name in program.record if name not in is_set), None)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -55,9 +56,10 @@ class Call(Statement):
 class Map(Statement):
     """outputs[i] = graph(shared, inputs[i]) for every element i.
 
-    inputs, outputs: a register for each input and each output of the graph, of one common length; an input of length 1
-    has the same value for every element.  shared: registers which, end to end, are the graph's first inputs, the same
-    for every element.
+    inputs, outputs: registers which, end to end, are the inputs and outputs of the graph, each with the numbers of all
+    n elements: its number k of element i is at k n + i. An input of length 1 has the same value for every element.
+    shared: registers which, end to end, are the graph's first inputs, the same for every element.
+    asked: a register that says how many elements matter, the first ones and at least one; others may be left out.
 
     >>> import cgraph as cg
     >>> from cgraph.extend import Map
@@ -69,6 +71,7 @@ class Map(Statement):
     inputs: Names
     outputs: Names
     shared: Names = ()
+    asked: Names = ()
 
 
 @dataclass(frozen=True, init=False)
@@ -104,8 +107,26 @@ def products_in(call: Call) -> Mapping[Node, Node]:
 
 def elements(statement: Map | Sum, lengths: Lengths) -> int:
     """The number of elements that a statement runs over."""
-    names = statement.outputs if isinstance(statement, Map) else statement.inputs
-    return max([lengths[name] for name in names], default=1)
+    if isinstance(statement, Map):
+        results = len(statement.graph.outputs)
+        return sum([lengths[name] for name in statement.outputs]) // results if results else 1
+    wide = [lengths[name] for name in statement.inputs if lengths[name] != 1]
+    numbers = len(statement.graph.inputs) - sum([lengths[name] for name in statement.shared])
+    of_each = numbers - len(statement.inputs) + len(wide)
+    return sum(wide) // max(1, of_each) if wide else 1
+
+
+def sizes(statement: Map | Sum, lengths: Lengths, names: Names) -> tuple[int, ...]:
+    """The numbers that an element has in each of some registers."""
+    count = max(1, elements(statement, lengths))
+    return tuple([max(1, lengths[name] // count) for name in names])
+
+
+def several(statement: Map | Sum, lengths: Lengths) -> bool:
+    """Whether an element has several numbers in a register."""
+    shared = sum([lengths[name] for name in statement.shared])
+    fewer = len(statement.inputs) + shared < len(statement.graph.inputs)
+    return fewer or (isinstance(statement, Map) and len(statement.outputs) < len(statement.graph.outputs))
 
 
 def copied(source: str, target: str) -> Map:
@@ -163,22 +184,25 @@ def check_elements(statement: Map | Sum, lengths: Lengths) -> None:
     known = sum([length_of(lengths, where, name) for name in statement.shared])
     if known > len(graph.inputs):
         raise GraphError(f"{where} has {len(graph.inputs)} inputs, the shared registers hold {known}")
-    registers = [(statement.inputs, len(graph.inputs) - known)]
-    if isinstance(statement, Map):
-        registers.append((outputs, len(graph.outputs)))
-    for names, wanted in registers:
-        if len(names) != wanted:
-            raise GraphError(f"{where} needs {wanted} registers, got {len(names)}: {', '.join(names)}")
     for name in (*statement.inputs, *outputs):
         length_of(lengths, where, name)
     count = elements(statement, lengths)
-    for name in statement.inputs:
-        if lengths[name] not in (1, count):
-            raise GraphError(f"{where}: register {name!r} needs length {count} or 1, got {lengths[name]}")
+    registers = [(statement.inputs, len(graph.inputs) - known)]
     if isinstance(statement, Map):
-        for name in outputs:
-            require_length(lengths, where, name, count)
-    elif len(outputs) == len(graph.outputs) == 1:
+        registers.append((outputs, len(graph.outputs)))
+        for name in statement.asked:
+            require_length(lengths, where, name, 1)
+    for names, wanted in registers:
+        of_each = sizes(statement, lengths, names)
+        if sum(of_each) != wanted:
+            raise GraphError(f"{where} needs {wanted} registers, got {sum(of_each)}: {', '.join(names)}")
+        for name, size in zip(names, of_each, strict=True):
+            if lengths[name] != count * size and (lengths[name] != 1 or names is outputs):
+                raise GraphError(f"{where}: register {name!r} needs length {count} or 1, got {lengths[name]}")
+    if isinstance(statement, Map):
+        require_once(where, outputs)
+        return
+    if len(outputs) == len(graph.outputs) == 1:
         require_length(lengths, where, outputs[0], 1)
     elif (total := sum([lengths[name] for name in outputs])) != len(graph.outputs):
         raise GraphError(f"{where} needs {len(graph.outputs)} outputs, the registers {', '.join(outputs)} hold {total}")
@@ -194,7 +218,19 @@ def run_call(call: Call, state: State, execution: Execution) -> None:
 
 
 def run_map(statement: Map, state: State, execution: Execution) -> None:
-    """Run in Python, element by element."""
+    """Run in Python, element by element; as one batch where registers are arrays, or hold several numbers of each."""
+    count = elements(statement, execution.lengths)
+    if several(statement, execution.lengths) or isinstance(state[statement.outputs[0]], np.ndarray):
+        for name in statement.asked:
+            count = int(min(max(1.0, state[name][0]), count))
+        results, at = _at_once(statement, state, (count,), execution), 0
+        for name, size in zip(statement.outputs, sizes(statement, execution.lengths, statement.outputs), strict=True):
+            numbers = np.asarray(state[name], dtype=np.float64).reshape(size, -1)
+            numbers[:, :count] = results[at : at + size]
+            if not isinstance(state[name], np.ndarray):  # which has them already
+                state[name] = numbers.ravel().tolist()
+            at += size
+        return
     columns = _rows(statement, state, execution)
     for slot, name in enumerate(statement.outputs):
         state[name] = [values[slot] for values in columns]
@@ -212,7 +248,10 @@ def _rows(statement: Map | Sum, state: State, execution: Execution) -> list[Sequ
     """The outputs for every element."""
     count = elements(statement, execution.lengths)
     inputs = [[value] * count for value in _joined(state, statement.shared)]
-    inputs += [state[name] if len(state[name]) == count else state[name] * count for name in statement.inputs]
+    for name in statement.inputs:
+        numbers = state[name]
+        one_for_all = len(numbers) == 1
+        inputs += [numbers * count] if one_for_all else [numbers[k : k + count] for k in range(0, len(numbers), count)]
     return (
         [execution.values(statement.graph, values) for values in zip(*inputs, strict=True)]
         if inputs
@@ -241,17 +280,26 @@ def call_beside(call: Call, state: dict[str, Array], execution: Execution) -> No
 
 def elements_beside(statement: Map | Sum, state: dict[str, Array], execution: Execution) -> None:
     """Run many memories: all elements as one batch."""
-    # All elements of all N states are points of one batch: (inputs, elements * N) -> (outputs, elements, N).
     shape = (elements(statement, execution.lengths), execution.many)
-    rows = [row for name in statement.shared for row in state[name]]
-    rows += [state[name] for name in statement.inputs]
-    inputs = np.array([np.broadcast_to(row, shape) for row in rows]).reshape(len(rows), shape[0] * shape[1])
-    results = execution.batch(statement.graph, inputs).reshape(len(statement.graph.outputs), *shape)
+    results = _at_once(statement, state, shape, execution)
     if isinstance(statement, Map):
-        state.update(zip(statement.outputs, results, strict=True))
-        return
-    totals = np.add.accumulate(results, axis=1)[:, -1] if shape[0] else np.zeros((len(results), shape[1]))
-    spread(totals, statement.outputs, state)
+        results = results.reshape(len(results) * shape[0], shape[1])
+    elif shape[0]:
+        results = np.add.accumulate(results, axis=1)[:, -1]
+    else:
+        results = np.zeros((len(results), shape[1]))
+    spread(results, statement.outputs, state)
+
+
+def _at_once(statement: Map | Sum, state: dict[str, Any], shape: tuple[int, ...], execution: Execution) -> Array:
+    """The outputs for the first elements, of one memory or of many, (outputs, elements, ..), as one batch."""
+    rows = [np.broadcast_to(value, shape) for name in statement.shared for value in state[name]]
+    for name, size in zip(statement.inputs, sizes(statement, execution.lengths, statement.inputs), strict=True):
+        numbers = np.asarray(state[name])
+        numbers = numbers.reshape(size, len(numbers) // size, *shape[1:])[:, : shape[0]]
+        rows += [np.broadcast_to(row, shape) for row in numbers]
+    points = np.array(rows).reshape(len(rows), math.prod(shape))
+    return execution.batch(statement.graph, points).reshape(len(statement.graph.outputs), *shape)
 
 
 # as machine code
@@ -267,25 +315,28 @@ def call_text(call: Call, writer: Writer) -> None:
 
 def map_text(statement: Map, writer: Writer) -> None:
     """Write as machine code, in vectors of elements."""
-    if count := elements(statement, writer.registers):
-        inputs = (*statement.shared, *statement.inputs)
-        writer.calls(_of_elements(statement, count, writer), inputs, statement.outputs)
+    if elements(statement, writer.registers):
+        inputs = (*statement.shared, *statement.inputs, *statement.asked)
+        name = _of_elements(statement, writer.lengths(statement.outputs), writer)
+        writer.calls(name, inputs, statement.outputs)
 
 
 def sum_text(statement: Sum, writer: Writer) -> None:
     """Write as machine code: all terms, in vectors of elements, then added up in order."""
     count = elements(statement, writer.registers)
-    terms = [writer.beside(f"terms{k}", count) for k in range(len(statement.graph.outputs))]
+    terms = [writer.beside(count) for _ in statement.graph.outputs]
     if count:
         inputs = [writer.pointer(name) for name in (*statement.shared, *statement.inputs)]
-        writer.call(_of_elements(statement, count, writer), [*inputs, *terms])
+        writer.call(_of_elements(statement, (count,) * len(terms), writer), [*inputs, *terms])
     totals = [writer.place(name, k) for name in statement.outputs for k in range(writer.registers[name])]
     for term, total in zip(terms, totals, strict=True):
         writer.call(writer.functions.total(count), [term, total])
 
 
-def _of_elements(statement: Map | Sum, count: int, writer: Writer) -> str:
-    """The function that runs the graph for every element."""
-    before, of = writer.before, writer.lengths
+def _of_elements(statement: Map | Sum, outputs: tuple[int, ...], writer: Writer) -> str:
+    """The function that runs the graph for every element, where results have these lengths."""
+    before, of, count = writer.before, writer.lengths, elements(statement, writer.registers)
     apart = [name in before.outputs for name in statement.inputs] if isinstance(before, Call) else []
-    return writer.functions.map(statement.graph, of(statement.inputs), count, of(statement.shared), apart)
+    asked = isinstance(statement, Map) and bool(statement.asked)
+    lengths = of(statement.shared), of(statement.inputs), outputs
+    return writer.functions.map(statement.graph, *lengths, count, apart, asked=asked)

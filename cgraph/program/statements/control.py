@@ -81,24 +81,18 @@ def run_if(statement: If, state: dict[str, Any], execution: Execution) -> None:
 
 def while_text(statement: While | FixedPoint, writer: Writer) -> None:
     """Write as machine code."""
-    label = writer.label("while")
-    writer.jump(label)
-    writer.block(label)
-    writer.branch(statement.register, f"{label}.body", f"{label}.end")
-    writer.block(f"{label}.body")
-    writer.run(statement.body)
-    writer.jump(label)
-    writer.block(f"{label}.end")
+    with writer.repeat() as end:
+        writer.leave_unless(writer.positive(statement.register), end)
+        writer.run(statement.body)
 
 
 def if_text(statement: If, writer: Writer) -> None:
     """Write as machine code."""
-    label, functions = writer.label("if"), writer.functions
+    functions = writer.functions
     before, functions.quick = functions.quick, functions.quick or statement.seldom
-    writer.branch(statement.register, f"{label}.yes", f"{label}.no")
-    for way, body in (("yes", statement.body), ("no", statement.otherwise)):
-        writer.block(f"{label}.{way}")
-        writer.run(body)
-        writer.jump(f"{label}.end")
-    writer.block(f"{label}.end")
+    with writer.when(writer.positive(statement.register)) as otherwise:
+        writer.run(statement.body)
+        if statement.otherwise:
+            otherwise()
+            writer.run(statement.otherwise)
     functions.quick = before

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...codegen.arithmetic import Arithmetic
+from ...codegen.function_writer import FunctionWriter
 from ...core.evaluation import Array
 from ..statement import Execution, Lengths, Statement, length_of, require_length
-from .function_writer import FunctionWriter
 
 if TYPE_CHECKING:
     from ..writer import Writer
@@ -84,7 +84,7 @@ def factor_text(statement: Factor, writer: Writer) -> None:
     """Write as machine code."""
     n = writer.registers[statement.pivots]
     name = writer.functions.text("lu.factor", _lu_factor_text)
-    writer.line(f"call void @{name}({writer.arguments(statement.matrix, statement.pivots)}, i64 {n})")
+    writer.call(name, [writer.pointer(each) for each in (statement.matrix, statement.pivots)], n)
 
 
 def solve_text(statement: Solve, writer: Writer) -> None:
@@ -93,8 +93,8 @@ def solve_text(statement: Solve, writer: Writer) -> None:
     name, text = "lu.solve", _lu_solve_text
     if statement.transposed:
         name, text = "lu.solve.transposed", _lu_solve_transposed_text
-    arguments = writer.arguments(statement.matrix, statement.pivots, statement.vector)
-    writer.line(f"call void @{writer.functions.text(name, text)}({arguments}, i64 {n})")
+    registers = statement.matrix, statement.pivots, statement.vector
+    writer.call(writer.functions.text(name, text), [writer.pointer(each) for each in registers], n)
 
 
 def _factor(a: Array, pivots: Array) -> None:
@@ -160,73 +160,126 @@ def _exchange(b: Array, k: int, pivots: Array) -> None:
     b[k], b[rows, ..., lanes] = np.moveaxis(b[rows, ..., lanes], 0, -1), np.moveaxis(b[k].copy(), -1, 0)
 
 
+class _MatrixWriter(FunctionWriter):
+    """A function of a matrix %a, n * n, row by row, and its pivots %p."""
+
+    def place(self, row: str, column: str) -> str:
+        """The place of a[row, column] in a, row * n + column."""
+        return self.integer("add", self.integer("mul", row, "%n"), column)
+
+    def element(self, row: str, column: str) -> str:
+        """The address of a[row, column]."""
+        return self.at("%a", self.place(row, column))
+
+    def entry(self, row: str, column: str) -> str:
+        """a[row, column]."""
+        return self.load_at(self.element(row, column))
+
+    def subtract_product(self, target: str, a: str, b: str) -> None:
+        """*target -= a * b."""
+        product = self.apply("fmul", a, b)
+        self.store_at(self.apply("fsub", self.load_at(target), product), target)
+
+    def divide(self, target: str, divisor: str) -> str:
+        """*target /= divisor; the quotient."""
+        quotient = self.apply("fdiv", self.load_at(target), divisor)
+        self.store_at(quotient, target)
+        return quotient
+
+    def backwards(self, i: str) -> str:
+        """n - 1 - i."""
+        return self.integer("sub", self.integer("sub", "%n", 1), i)
+
+    def exchange(self, base: str, first: str, second: str, lane: str) -> None:
+        """Exchange base[first] and base[second] in one lane."""
+        places = [self.double_at(base, each, lane) for each in (first, second)]
+        numbers = [self.load_at(place, "double") for place in places]
+        for number, place in zip(reversed(numbers), places, strict=True):
+            self.store_at(number, place, "double")
+
+    def pivot(self, k: str, lane: str) -> str:
+        """The row p[k] of one lane; k where that is none, as in a lane that is not asked for."""
+        number = self.load_at(self.double_at("%p", k, lane), "double")
+        if self.lanes > 1:
+            sides = ("oge", "0.0"), ("olt", self.value("sitofp i64 %n to double"))
+            low, high = [self.value(f"fcmp {relation} double {number}, {end}") for relation, end in sides]
+            there, own = self.value(f"and i1 {low}, {high}"), self.value(f"sitofp i64 {k} to double")
+            number = self.value(f"select i1 {there}, double {number}, double {own}")
+        return self.value(f"fptosi double {number} to i64")
+
+
 def _lu_factor_text(arithmetic: Arithmetic) -> list[str]:
     """`void lu.factor(double *a, double *p, int64_t n)`, as `factor`."""
-    ir = FunctionWriter(arithmetic)
-    best, chosen = (ir.value(f"alloca {ir.type}, align 64") for _ in range(2))
-    with ir.loop("0", "%n") as k:
+    ir = _MatrixWriter(arithmetic)
+    best, chosen = ir.room(), ir.room()
+
+    def size(i: str, k: str) -> str:
+        return ir.value(f"call {ir.type} @llvm.fabs.{arithmetic.suffix}({ir.type} {ir.entry(i, k)})")
+
+    def number(i: str) -> str:
+        return ir.spread(ir.value(f"sitofp i64 {i} to double"))
+
+    with ir.loop(0, "%n") as k:
         # p[k] = argmax over i >= k of |a[i, k]|
-        next_k = ir.value(f"add i64 {k}, 1")
-        ir.store(ir.absolute(ir.load(ir.element(k, k))), best)
-        ir.store(ir.everywhere(k), chosen)
+        next_k = ir.integer("add", k, 1)
+        ir.store_at(size(k, k), best)
+        ir.store_at(number(k), chosen)
         with ir.loop(next_k, "%n") as i:
-            here, before = ir.absolute(ir.load(ir.element(i, k))), ir.load(best)
-            larger = ir.above(here, before)
-            ir.store(ir.choose(larger, here, before), best)
-            ir.store(ir.choose(larger, ir.everywhere(i), ir.load(chosen)), chosen)
-        ir.store(ir.load(chosen), ir.at("%p", k))
+            here, before = size(i, k), ir.load_at(best)
+            larger = ir.compare("ogt", here, before)
+            ir.store_at(ir.choose(larger, here, before), best)
+            ir.store_at(ir.choose(larger, number(i), ir.load_at(chosen)), chosen)
+        ir.store_at(ir.load_at(chosen), ir.at("%p", k))
         with ir.each_lane() as lane:  # exchange rows k and p[k]
             row = ir.pivot(k, lane)
-            count = ir.value(f"select i1 {ir.value(f'icmp eq i64 {row}, {k}')}, i64 0, i64 %n")
-            with ir.loop("0", count) as j:
-                ir.exchange("%a", ir.index(k, j), ir.index(row, j), lane)
+            with ir.when(ir.integer("icmp ne", row, k)), ir.loop(0, "%n") as j:
+                ir.exchange("%a", ir.place(k, j), ir.place(row, j), lane)
         # for i > k:  l = a[i, k] /= a[k, k];  a[i, j] -= l a[k, j] for j > k
-        pivot = ir.load(ir.element(k, k))
+        pivot = ir.entry(k, k)
         with ir.loop(next_k, "%n") as i:
-            target = ir.element(i, k)
-            gain = ir.divide(target, pivot)
+            gain = ir.divide(ir.element(i, k), pivot)
             with ir.loop(next_k, "%n") as j:
-                ir.subtract_product(ir.element(i, j), gain, ir.load(ir.element(k, j)))
-    return ir.function("lu.factor", "ptr %a, ptr %p, i64 %n")
+                ir.subtract_product(ir.element(i, j), gain, ir.entry(k, j))
+    return ir.function("internal void @lu.factor(ptr %a, ptr %p, i64 %n) nounwind")
 
 
 def _lu_solve_text(arithmetic: Arithmetic) -> list[str]:
     """`void lu.solve(double *a, double *p, double *b, int64_t n)`, as `solve`."""
-    ir = FunctionWriter(arithmetic)
+    ir = _MatrixWriter(arithmetic)
     # b = P b
-    with ir.loop("0", "%n") as k, ir.each_lane() as lane:
+    with ir.loop(0, "%n") as k, ir.each_lane() as lane:
         ir.exchange("%b", k, ir.pivot(k, lane), lane)
     # L y = b:  b[i] -= a[i, k] b[k] for i > k, k = 0 .. n - 1
-    with ir.loop("0", "%n") as k:
-        value = ir.load(ir.at("%b", k))
-        with ir.loop(ir.value(f"add i64 {k}, 1"), "%n") as i:
-            ir.subtract_product(ir.at("%b", i), ir.load(ir.element(i, k)), value)
+    with ir.loop(0, "%n") as k:
+        value = ir.load_at(ir.at("%b", k))
+        with ir.loop(ir.integer("add", k, 1), "%n") as i:
+            ir.subtract_product(ir.at("%b", i), ir.entry(i, k), value)
     # U x = y:  b[k] /= a[k, k], b[i] -= a[i, k] b[k] for i < k, k = n - 1 .. 0
-    with ir.loop("0", "%n") as back:
-        k = ir.value(f"sub i64 {ir.value('sub i64 %n, 1')}, {back}")
-        value = ir.divide(ir.at("%b", k), ir.load(ir.element(k, k)))
-        with ir.loop("0", k) as i:
-            ir.subtract_product(ir.at("%b", i), ir.load(ir.element(i, k)), value)
-    return ir.function("lu.solve", "ptr %a, ptr %p, ptr %b, i64 %n")
+    with ir.loop(0, "%n") as back:
+        k = ir.backwards(back)
+        value = ir.divide(ir.at("%b", k), ir.entry(k, k))
+        with ir.loop(0, k) as i:
+            ir.subtract_product(ir.at("%b", i), ir.entry(i, k), value)
+    return ir.function("internal void @lu.solve(ptr %a, ptr %p, ptr %b, i64 %n) nounwind")
 
 
 def _lu_solve_transposed_text(arithmetic: Arithmetic) -> list[str]:
     """`void lu.solve.transposed(double *a, double *p, double *b, int64_t n)`, as `solve_transposed`."""
-    ir = FunctionWriter(arithmetic)
+    ir = _MatrixWriter(arithmetic)
     # U^T y = b:  b[k] /= a[k, k], b[i] -= a[k, i] b[k] for i > k, k = 0 .. n - 1
-    with ir.loop("0", "%n") as k:
-        value = ir.divide(ir.at("%b", k), ir.load(ir.element(k, k)))
-        with ir.loop(ir.value(f"add i64 {k}, 1"), "%n") as i:
-            ir.subtract_product(ir.at("%b", i), ir.load(ir.element(k, i)), value)
+    with ir.loop(0, "%n") as k:
+        value = ir.divide(ir.at("%b", k), ir.entry(k, k))
+        with ir.loop(ir.integer("add", k, 1), "%n") as i:
+            ir.subtract_product(ir.at("%b", i), ir.entry(k, i), value)
     # L^T z = y:  b[i] -= a[k, i] b[k] for i < k, k = n - 1 .. 0
-    with ir.loop("0", "%n") as back:
-        k = ir.value(f"sub i64 {ir.value('sub i64 %n, 1')}, {back}")
-        value = ir.load(ir.at("%b", k))
-        with ir.loop("0", k) as i:
-            ir.subtract_product(ir.at("%b", i), ir.load(ir.element(k, i)), value)
+    with ir.loop(0, "%n") as back:
+        k = ir.backwards(back)
+        value = ir.load_at(ir.at("%b", k))
+        with ir.loop(0, k) as i:
+            ir.subtract_product(ir.at("%b", i), ir.entry(k, i), value)
     # x = P^T z
-    with ir.loop("0", "%n") as back:
-        k = ir.value(f"sub i64 {ir.value('sub i64 %n, 1')}, {back}")
+    with ir.loop(0, "%n") as back:
+        k = ir.backwards(back)
         with ir.each_lane() as lane:
             ir.exchange("%b", k, ir.pivot(k, lane), lane)
-    return ir.function("lu.solve.transposed", "ptr %a, ptr %p, ptr %b, i64 %n")
+    return ir.function("internal void @lu.solve.transposed(ptr %a, ptr %p, ptr %b, i64 %n) nounwind")

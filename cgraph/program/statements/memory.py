@@ -1,4 +1,4 @@
-"""Take, Push, Pop: numbers of registers gathered into others, and kept on a stack."""
+"""Take, Scatter, Push, Pop: numbers of registers gathered into others, put among them, and kept on a stack."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...codegen.arithmetic import Arithmetic, words_of
+from ...codegen.arithmetic import Arithmetic
+from ...codegen.function_writer import FunctionWriter
 from ...core.checks import GraphError
 from ...core.evaluation import Array
 from ..statement import (
@@ -22,7 +23,6 @@ from ..statement import (
     require_length,
     require_once,
 )
-from .function_writer import FunctionWriter
 
 if TYPE_CHECKING:
     from ..writer import Writer
@@ -41,6 +41,16 @@ class Take(Statement):
     source: str
     target: str
     table: tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Scatter(Statement):
+    """target[places[i]] = source[table[i]]; other numbers of the target stay as they are."""
+
+    source: str
+    target: str
+    table: tuple[int, ...]
+    places: tuple[int, ...]
 
 
 @dataclass(frozen=True)
@@ -84,6 +94,18 @@ def check_take(take: Take, lengths: Lengths) -> None:
         raise GraphError(f"Take needs places from 0 to {size - 1} of register {take.source!r}, got {outside[0]!r:.60}")
 
 
+def check_scatter(statement: Scatter, lengths: Lengths) -> None:
+    """Raises GraphError if a place is outside of its register, or there are not as many on either side."""
+    for name, places in ((statement.source, statement.table), (statement.target, statement.places)):
+        size = length_of(lengths, "Scatter", name)
+        if places and not 0 <= min(places) <= max(places) < size:
+            raise GraphError(f"Scatter needs places from 0 to {size - 1} of register {name!r}")
+    if len(statement.table) != len(statement.places):
+        raise GraphError(
+            f"Scatter needs a place for each of {len(statement.table)} numbers, got {len(statement.places)}"
+        )
+
+
 def check_stack(statement: Push | Pop, lengths: Lengths) -> None:
     """Raises GraphError if the stack does not hold whole rows."""
     where = type(statement).__name__
@@ -99,6 +121,15 @@ def check_stack(statement: Push | Pop, lengths: Lengths) -> None:
 def run_take(take: Take, state: dict[str, Any], execution: Execution) -> None:
     """Run in Python, of one memory or of many."""
     execution.write(state, take.target, np.asarray(state[take.source], dtype=np.float64)[list(take.table)])
+
+
+def run_scatter(statement: Scatter, state: dict[str, Any], execution: Execution) -> None:
+    """Run in Python."""
+    if execution.many >= 0:  # else in place
+        state[statement.target] = np.array(state[statement.target])
+    source, target = state[statement.source], state[statement.target]
+    for number, place in zip(statement.table, statement.places, strict=True):
+        target[place] = source[number] if execution.many >= 0 else float(source[number])
 
 
 def run_push(push: Push, state: dict[str, Any], execution: Execution) -> None:
@@ -151,77 +182,61 @@ def take_text(take: Take, writer: Writer) -> None:
     writer.calls(name, (take.source,), (take.target,))
 
 
+def scatter_text(scatter: Scatter, writer: Writer) -> None:
+    """Write as machine code."""
+    name = writer.functions.take(scatter.table, scatter.places)
+    writer.call(name, [writer.pointer(scatter.source), writer.pointer(scatter.target)])
+
+
 def push_text(push: Push, writer: Writer) -> None:
     """if (0 <= count < most) { stack[count] = row; count += 1 } else count = NaN, in every lane."""
-    lanes, count = _Lanes(writer), writer.load(push.count)
-    fits = lanes.both(("oge", count, 0.0), ("olt", count, _most(push, writer.registers)))
-    begin = lanes.begin(fits, count, sum(writer.lengths(push.rows)))
-    lanes.move("stack.put", push.stack, begin, push.rows)
-    lanes.count(push.count, fits, writer.value(f"fadd {writer.type} {count}, {writer.number(1.0)}"))
+    count, one = writer.load(push.count), writer.number(1.0)
+    fits = _both(writer, writer.compare("oge", count, 0.0), writer.compare("olt", count, _most(push, writer.registers)))
+    _move(writer, "stack.put", push, fits, count)
+    after = writer.value(f"fadd {writer.type} {count}, {one}")
+    writer.store(writer.choose(fits, after, math.nan), push.count)
 
 
 def pop_text(pop: Pop, writer: Writer) -> None:
     """if (0 < count <= most) { count -= 1; row = stack[count] } else row = count = NaN, in every lane."""
-    lanes, count = _Lanes(writer), writer.load(pop.count)
-    some = lanes.both(("ogt", count, 0.0), ("ole", count, _most(pop, writer.registers)))
-    left = writer.value(f"fsub {writer.type} {count}, {writer.number(1.0)}")
-    begin = lanes.begin(some, left, sum(writer.lengths(pop.rows)))
+    count, one = writer.load(pop.count), writer.number(1.0)
+    some = _both(writer, writer.compare("ogt", count, 0.0), writer.compare("ole", count, _most(pop, writer.registers)))
+    left = writer.value(f"fsub {writer.type} {count}, {one}")
     for name in pop.rows:
         writer.fill_with_nan(name)
-    lanes.move("stack.get", pop.stack, begin, pop.rows)
-    lanes.count(pop.count, some, left)
+    _move(writer, "stack.get", pop, some, left)
+    writer.store(writer.choose(some, left, math.nan), pop.count)
 
 
-class _Lanes:
-    """Text over lanes, in some of which a condition holds."""
+def _both(writer: Writer, a: str, b: str) -> str:
+    """The lanes in which two conditions hold."""
+    return writer.value(f"and {writer.bits} {a}, {b}")
 
-    def __init__(self, writer: Writer) -> None:
-        self._writer, self._bits = writer, words_of(writer.functions.arithmetic)["b"]
 
-    def both(self, *comparisons: tuple[str, str, float]) -> str:
-        """Condition that holds in the lanes where two comparisons do."""
-        writer = self._writer
-        a, b = [writer.value(f"fcmp {name} {writer.type} {x}, {writer.number(y)}") for name, x, y in comparisons]
-        return writer.value(f"and {self._bits} {a}, {b}")
-
-    def begin(self, condition: str, number: str, width: int) -> str:
-        """The address of where rows of these numbers begin in a stack; -1 where the condition does not hold."""
-        writer, t = self._writer, self._writer.type
-        begin = writer.value(f"fmul {t} {number}, {writer.number(float(width))}")
-        begin = writer.value(f"select {self._bits} {condition}, {t} {begin}, {t} {writer.number(-1.0)}")
-        writer.scratch.append(f"  {begin}.at = alloca {t}, align 64")
-        writer.line(f"store {t} {begin}, ptr {begin}.at, align 8")
-        return f"{begin}.at"
-
-    def move(self, name: str, stack: str, begin: str, names: Names) -> None:
-        """Move between rows of the stack and registers, end to end: to it, "stack.put", or from it, "stack.get"."""
-        writer, at = self._writer, 0
-        function = writer.functions.text(name, partial(_move_text, name=name))
-        for register in names:
-            length = writer.registers[register]
-            pointers = f"ptr {writer.pointer(stack)}, ptr {begin}, ptr {writer.pointer(register)}"
-            writer.line(f"call void @{function}({pointers}, i64 {at}, i64 {length})")
-            at += length
-
-    def count(self, register: str, condition: str, after: str) -> None:
-        """The count after, NaN where the condition does not hold."""
-        writer, t = self._writer, self._writer.type
-        nan = writer.number(math.nan)
-        writer.store(writer.value(f"select {self._bits} {condition}, {t} {after}, {t} {nan}"), register)
+def _move(writer: Writer, name: str, statement: Push | Pop, condition: str, number: str) -> None:
+    """Row `number` of a stack to its registers, "stack.get", or back, "stack.put", in the lanes of a condition."""
+    begin, at = writer.room(), 0
+    first = writer.value(f"fmul {writer.type} {number}, {writer.number(float(sum(writer.lengths(statement.rows))))}")
+    writer.store_at(writer.choose(condition, first, -1.0), begin)
+    function = writer.functions.text(name, partial(_move_text, name=name))
+    for register in statement.rows:
+        length = writer.registers[register]
+        writer.call(function, [writer.pointer(statement.stack), begin, writer.pointer(register)], at, length)
+        at += length
 
 
 def _move_text(arithmetic: Arithmetic, name: str) -> list[str]:
     """`void name(stack, begin, row, at, n)`: stack[begin + at + j] = row[j], or back, in lanes where begin >= 0."""
     ir = FunctionWriter(arithmetic)
     with ir.each_lane() as lane:
-        begin = ir.load_double(ir.double_at("%begin", "0", lane))
-        there = ir.value(f"fcmp oge double {begin}, 0.0")
-        count = ir.value(f"select i1 {there}, i64 %n, i64 0")
-        first = ir.value(f"add i64 {ir.value(f'fptosi double {begin} to i64')}, %at")
-        with ir.loop("0", count) as j:
-            in_stack = ir.double_at("%stack", ir.value(f"add i64 {first}, {j}"), lane)
-            source, target = in_stack, ir.double_at("%row", j, lane)
-            if name == "stack.put":
-                source, target = target, source
-            ir.do(f"store double {ir.load_double(source)}, ptr {target}, align 8")
-    return ir.function(name, "ptr %stack, ptr %begin, ptr %row, i64 %at, i64 %n")
+        begin = ir.load_at(ir.double_at("%begin", "0", lane), "double")
+        with ir.when(ir.value(f"fcmp oge double {begin}, 0.0")):
+            first = ir.integer("add", ir.value(f"fptosi double {begin} to i64"), "%at")
+            with ir.loop(0, "%n") as j:
+                in_stack, in_row = (
+                    ir.double_at("%stack", ir.integer("add", first, j), lane),
+                    ir.double_at("%row", j, lane),
+                )
+                source, target = (in_row, in_stack) if name == "stack.put" else (in_stack, in_row)
+                ir.store_at(ir.load_at(source, "double"), target, "double")
+    return ir.function(f"internal void @{name}(ptr %stack, ptr %begin, ptr %row, i64 %at, i64 %n) nounwind")

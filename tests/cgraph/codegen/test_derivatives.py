@@ -130,8 +130,8 @@ def test_the_number_of_directions_is_no_matter(backend, k, monkeypatch):
     assert found.shape == (k, 8)
     some = range(0, k, 97)
     assert same(found[some], np.array([values(graph, POINT, directions[i]) for i in some]).reshape(-1, 8))
-    monkeypatch.setattr(functions.NativeRunner, "tiles", 1)  # blocks of one vector
-    monkeypatch.setattr(functions.PythonRunner, "tiles", 1)
+    monkeypatch.setattr(functions.NativeRunner, "vectors", 1)  # in a block
+    monkeypatch.setattr(functions.PythonRunner, "vectors", 1)
     function = compiled(example(), backend, fma=False)
     assert same(function.jvp(POINT, directions), found)
     assert same(function.jvp(POINT, np.asfortranarray(directions)), found)

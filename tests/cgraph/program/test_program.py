@@ -10,7 +10,7 @@ from hypothesis import given, settings, strategies as st
 
 import cgraph as cg
 from cgraph.extend import Call, Factor, If, Map, Program, Solve, Sum, While, runner
-from cgraph.program.statements.tiles import Scatter, TiledMap
+from cgraph.program.statements.memory import Scatter
 from tests.strategies import examples
 from tests.tolerances import LONG_SUM
 
@@ -268,23 +268,22 @@ def test_machine_code_agrees_with_python_to_the_last_bit() -> None:
 
 @pytest.mark.parametrize("asked", [0.0, 1.0, 2.0, 2.5, 99.0, math.nan])
 @pytest.mark.parametrize("wave", [False, True])  # functions of the C library go element by element
-def test_tiles_that_are_not_asked_for_stay_as_they_are(backend: str, asked: float, wave: bool) -> None:
-    k, a, b = cg.variables("k a b")
-    graph = cg.Graph([k, a, b], {"sum": k * (cg.sin(a) if wave else a) + b, "difference": a - b})
-    registers = {"k": 1, "pairs": 12, "sums": 6, "differences": 6, "tiles": 1}
-    tiled = TiledMap(graph, ("pairs",), ("sums", "differences"), ("k",), 2, ("tiles",))
-    ready = runner(Program(registers, [tiled], record=["sums", "differences"]), backend, fma=False)
-    pairs, old = np.arange(12.0), np.full(6, -1.0)
-    memory = ready.memory({"k": 3.0, "pairs": pairs, "sums": old, "differences": old, "tiles": asked})
-    together = np.repeat(memory[:, None], 11, axis=1)
-    ready.write(together, "tiles", np.array([[asked, 1.0, 3.0, 2.0, *[asked] * 7]]))
-    first, second = pairs.reshape(3, 2, 2)[:, 0].ravel(), pairs.reshape(3, 2, 2)[:, 1].ravel()
-    wanted = np.stack([3.0 * (np.array([*map(math.sin, first)]) if wave else first) + second, first - second])
-    many = ready.run_many(together, 1).rows[0]
-    for number, found in ((asked, ready.run(memory, 1).rows[0]), *zip((asked, 1.0, 3.0, 2.0), many.T, strict=False)):
-        computed = 2 * int(min(3.0, max(1.0, number)))
-        expected = np.where(np.arange(6) < computed, wanted, -1.0)
-        assert found.tolist() == expected.ravel().tolist()
+@pytest.mark.parametrize("count", [5, 8])  # in vectors, too, where elements fill them
+def test_elements_have_several_numbers_in_a_register(backend: str, asked: float, wave: bool, count: int) -> None:
+    k, a, b, c = cg.variables("k a b c")
+    outputs = {"sum": k * (cg.sin(a) if wave else a) + b, "product": b * c, "difference": a - b}
+    graph = cg.Graph([k, a, b, c], outputs)
+    registers = {"k": 1, "pairs": 2 * count, "c": 1, "both": 2 * count, "differences": count, "asked": 1}
+    several = Map(graph, ("pairs", "c"), ("both", "differences"), ("k",), ("asked",))
+    ready = runner(Program(registers, [several], record=["both", "differences"]), backend, fma=False)
+    first, second = np.arange(2.0 * count).reshape(2, count)
+    memory = ready.memory({"k": 3.0, "pairs": [*first, *second], "c": 0.3, "asked": asked})
+    waves = np.array([*map(math.sin, first)]) if wave else first
+    wanted = np.stack([3.0 * waves + second, second * 0.3, first - second])
+    many = ready.run_many(np.repeat(memory[:, None], 11, axis=1), 1).rows[0]
+    for found in (ready.run(memory, 1).rows[0], *many.T):
+        computed = int(min(count, max(1.0, asked)))
+        assert found.reshape(3, count)[:, :computed].tolist() == wanted[:, :computed].tolist()
 
 
 ONE = cg.Graph([cg.variable("a")], {"o": -cg.variable("a")})
@@ -305,9 +304,8 @@ ONE = cg.Graph([cg.variable("a")], {"o": -cg.variable("a")})
         ({"a": 2}, [If("a", ())], "If needs register 'a' to have length 1, got 2"),
         ({"a": 3, "p": 2}, [Factor("a", "p")], "Factor needs register 'a' to have length 4, got 3"),
         ({"a": 4, "p": 2, "b": 1}, [Solve("a", "p", "b")], "Solve needs register 'b' to have length 2, got 1"),
-        ({"a": 5, "b": 4}, [TiledMap(ONE, ("a",), ("b",), (), 2)], "needs register 'a' to have length 4, got 5"),
-        ({"a": 4, "b": 4}, [TiledMap(ONE, (), ("b",), ("a",), 2)], "has 1 inputs, the shared registers hold 4"),
-        ({"a": 4}, [TiledMap(ONE, ("a",), ("a",), (), 2)], "both reads and writes register 'a'"),
+        ({"a": 4, "b": 2}, [Map(ONE, ("a",), ("b",))], "needs 1 registers, got 2: a"),
+        ({"a": 2, "b": 2}, [Map(ONE, ("a",), ("b",), (), ("a",))], "needs register 'a' to have length 1, got 2"),
         ({"a": 2, "b": 1}, [Scatter("a", "b", (0,), (1,))], "Scatter needs places from 0 to 0 of register 'b'"),
         ({"a": 2, "b": 1}, [Scatter("a", "b", (0, 1), (0,))], "Scatter needs a place for each of 2 numbers, got 1"),
         ({"a": -1}, [], "register 'a' needs a length, an integer not negative, got -1"),

@@ -29,7 +29,7 @@ from cgraph.extend import (
     program_vjp,
     runner,
 )
-from cgraph.program.statements.tiles import Scatter, TiledMap
+from cgraph.program.statements.memory import Scatter
 from tests.slow import slow
 from tests.tolerances import CONDITIONED, EQUATIONS, LONG_SUM
 
@@ -49,8 +49,7 @@ LENGTHS = {
     "turns": 1,
 }
 LENGTHS |= {"stack": 4 * N, "count": 1, "test": 1}
-TILES, LANES = 3, 2  # of `pairs`, two numbers an element, and of `singles`, `results`, one
-LENGTHS |= {"pairs": 2 * TILES * LANES, "singles": TILES * LANES, "results": TILES * LANES, "tiles": 1}
+LENGTHS |= {"pairs": 2 * N, "singles": N, "results": N}  # two numbers an element, or one
 LENGTHS["new pairs"] = LENGTHS["pairs"]
 VECTORS, NUMBERS = ("x", "y", "z"), ("s", "f")
 
@@ -76,7 +75,7 @@ class RandomProgram:
             self.fixed_point,
             self.stack,
             self.scatter,
-            self.tiled,
+            self.several,
         ]
         body = [each for _ in range(self.rng.integers(3, 6)) for each in self.any(0)]
         self.program = Program(LENGTHS, body, record=["x", "y", "z", "s"], feed=["f"])
@@ -142,22 +141,21 @@ class RandomProgram:
             Scatter(self.vector(), self.vector(), tuple(self.rng.integers(0, N, 2).tolist()), tuple(places.tolist()))
         ]
 
-    def tiled(self, depth: int) -> list[Statement]:
-        """Some of the tiles or all, of numbers scattered before, and of those that are there from before."""
+    def several(self, depth: int) -> list[Statement]:
+        """Several numbers of an element in a register, those scattered before, or that are there from before."""
         p, q, s, a, b, c = nodes = cg.variables("p q s a b c")
         graph = cg.Graph(nodes, {"pair0": self.formula([a, p, c]), "pair1": 0.5 * c, "one": self.formula([b, q, s])})
         size = LENGTHS["pairs"]
         fill = Scatter(self.vector(), "pairs", tuple(k % N for k in range(size)), tuple(range(size)))
-        count = Call(cg.Graph([s], {"t": 1.0 + cg.floor(3.0 * cg.abs(s))}), ("s",), ("tiles",))
-        some = ("tiles",) if self.rng.integers(2) else ()
-        inputs, outputs = ("pairs", "singles"), ("new pairs", "results")
+        outputs: tuple[str, ...] = ("new pairs", "results")
         if self.rng.integers(2):
             graph = cg.Graph(nodes, {"one": self.formula([*nodes]), "new0": q * a, "new1": cg.constant(0.5)})
             outputs = ("results", "new pairs")
-        tiled = TiledMap(graph, inputs, outputs, ("p", "s"), LANES, some)
-        table = tuple(self.rng.integers(0, TILES * LANES, N).tolist())
+        table = tuple(self.rng.integers(0, N, N).tolist())
         keep = Scatter("new pairs", "singles", table, table)
-        return [count, fill, tiled, keep, Take(str(self.rng.choice(["results", "new pairs"])), self.vector(), table)]
+        taken = Take(str(self.rng.choice(["results", "new pairs"])), self.vector(), table)
+        total = Sum(cg.Graph(nodes[3:], {"t": b * self.formula([a, c])}), ("new pairs", "results"), "s")
+        return [fill, Map(graph, ("pairs", "singles"), outputs, ("p", "s")), keep, taken, total]
 
     def loop(self, depth: int) -> list[Statement]:
         n, s = cg.variables("n s")
@@ -233,14 +231,15 @@ def complex_run(program: Program, state: dict[str, Array], feed: Array) -> dict[
                 case Call():
                     spread(graph_at(each.graph, joined(each.inputs)), each.outputs)
                 case Map() | Sum():
-                    shared, inputs = joined(each.shared), [np.resize(state[name], N) for name in each.inputs]
+                    shared, given = joined(each.shared), [state[name] for name in each.inputs]
+                    inputs = [row for one in given for row in np.resize(one, (max(1, len(one) // N), N))]
                     rows = np.array(
                         [graph_at(each.graph, np.concatenate([shared, row])) for row in zip(*inputs, strict=True)]
                     )
                     if isinstance(each, Sum):
                         spread(rows.sum(axis=0), each.outputs)
                     else:
-                        state.update(zip(each.outputs, rows.T, strict=True))
+                        spread(rows.T.ravel(), each.outputs)
                 case If():
                     run(each.body if state[each.register][0].real > 0.0 else each.otherwise)
                 case While() | FixedPoint():
@@ -258,16 +257,6 @@ def complex_run(program: Program, state: dict[str, Array], feed: Array) -> dict[
                     for k, place in zip(each.table, each.places, strict=True):
                         target[place] = state[each.source][k]
                     state[each.target] = target
-                case TiledMap():
-                    shared, count = joined(each.shared), int(state["tiles"][0].real) if each.tiles else TILES
-                    old = {name: state[name].reshape(TILES, -1, LANES).copy() for name in (*each.inputs, *each.outputs)}
-                    for tile, lane in np.ndindex(max(1, min(count, TILES)), LANES):
-                        element = np.concatenate([old[name][tile, :, lane] for name in each.inputs])
-                        found = graph_at(each.graph, np.concatenate([shared, element]))
-                        for name in each.outputs:
-                            width = old[name].shape[1]
-                            old[name][tile, :, lane], found = found[:width], found[width:]
-                    state.update({name: old[name].ravel() for name in each.outputs})
                 case Push():
                     at = int(state[each.count][0].real) * N
                     stack = state[each.stack].copy()
