@@ -16,6 +16,7 @@ from cgraph.core.node import apply
 from cgraph.extend import OPS
 from dynamics.integrators import METHODS, taylor
 from tests.dynamics.planet import PERIHELION, planet, position
+from tests.slow import slow
 
 ROUNDINGS = 2e-14  # of a few dozen steps
 SERIES: dict[str, tuple[Callable[..., Any], Callable[..., Any]]] = {
@@ -73,6 +74,31 @@ def test_all_orders_at_once_and_one_after_another_are_the_same(
     assert one.stats.steps == other.stats.steps
     assert one.q == approx(other.q, abs=1e-11)
     assert one.t == approx(other.t, rel=1e-11)
+
+
+@mark.parametrize("length", [1e9, -1e9, *slow(1e3, 1e12, 1e20, 1e50)])
+@mark.parametrize("rtol", [1e-6, 1e-15, *slow(1e-9, 1e-12)])
+@mark.parametrize("atol", [None, 1e-9])
+def test_a_run_may_be_far_longer_than_the_motion(length: float, rtol: float, atol: float | None) -> None:
+    """Coefficients of a time as long as the run overflow."""
+    pytest.importorskip("llvmlite")
+    swing = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2.0 - 0.5 * q[0] ** 2.0, ["x"])
+    down = dyn.Event("down", lambda q, qd, t: q[0], terminal=True)
+    run = dyn.simulate(swing, [1.0], [0.0], length, "taylor", rtol=rtol, atol=atol, events=[down], max_steps=100)
+    assert run.success, run.stats.message
+    assert run.t[-1] == approx(math.copysign(math.pi / 2.0, length), abs=20.0 * max(rtol, atol or 0.0))
+
+
+@mark.parametrize("length", [10.0, *slow(0.1, 1e3, 1e6)])
+@mark.parametrize("tolerance", [1e-6, 1e-10, *slow(1e-12)])
+def test_the_first_step_misses_no_more_than_others(length: float, tolerance: float) -> None:
+    """From rest, where the first change of a velocity in all the run says nothing of its size."""
+    arm, start = dyn.planar_arm([1.0, 1.0], [1.0, 1.0]), ([0.5, 0.5], [0.0, 0.0])
+    event = dyn.Event("late", lambda q, qd, t: q[0] - 0.4, terminal=True)
+    run = dyn.simulate(arm, *start, length, "taylor", rtol=tolerance, events=[event])
+    exact = dyn.simulate(arm, *start, run.t[1], "taylor", rtol=1e-15, t_eval=[run.t[1]])
+    assert abs(run.q[1] - exact.q[-1]).max() < 0.1 * tolerance
+    assert abs(run.qd[1] - exact.qd[-1]).max() < 0.1 * tolerance * abs(exact.qd).max()
 
 
 def test_orders_follow_the_tolerance() -> None:
