@@ -96,7 +96,7 @@ class Method:
 
         >>> from dynamics.integrators import METHODS
         >>> METHODS["taylor"].at(1e-9), METHODS["taylor"].at(1e-12)
-        (<Method of order 12, steps by error>, <Method of order 15, steps by error>)
+        (<Method of order 14, steps by error>, <Method of order 17, steps by error>)
         """
         return self if self.order_at is None else _of_order(self, self.order_at(rtol))
 

@@ -1,12 +1,12 @@
 """Taylor's method: steps by the Taylor series of the solution, of an order by the tolerance.
 
-Order and step follow Jorba and Zou, Experimental Mathematics 14 (2005) 99: order -log(rtol) / 2 + 1, and the step at
-which the last two terms are as small as the tolerance. Coefficients are of the time in units of the step before, so
-that they neither overflow nor depend on the unit of time. What a step missed is seen at its end, where the derivative
-of the polynomial has to be the rate; coefficients 0 of the next step are computed there anyway.
+Order and step follow Jorba and Zou, Experimental Mathematics 14 (2005) 99: the step at which the last two terms are as
+small as the tolerance, and order -log(rtol) / 2 + 3, two more than theirs. Coefficients are of the time in units of the
+step before, so that they neither overflow nor depend on the unit of time. What a step missed is seen at its end, where
+the derivative of the polynomial has to be the rate; coefficients 0 of the next step are computed there anyway.
 
-All coefficients are one graph where it is short: its values stay in registers, and its code is read from the nearest
-cache. Else a graph of one order is repeated, with sums of products over many nodes at a time.
+All coefficients are one graph where it is short: its values stay in registers. Else a graph of one order is repeated,
+with sums of products over many nodes at a time.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from .problem import Problem
 from .step import Step
 from .step_control import count
 
-SHORT = 10_000  # operations of all coefficients: the code of more does not fit the nearest cache, and is no faster
+SHORT = 24_000  # operations of all coefficients, before folding: more take a second to compile, a third less to run
 CHECKED = 2.0**-46  # relative: rounding of the rates, below which a defect says nothing
 # Units in a step, inverse: a shorter one is tried again in a unit of its own, for what starts at 0 is measured by its
 # first change, which is that of a whole unit.

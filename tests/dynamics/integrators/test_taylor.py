@@ -98,14 +98,14 @@ def test_the_first_step_misses_no_more_than_others(length: float, tolerance: flo
     run = dyn.simulate(arm, *start, length, "taylor", rtol=tolerance, events=[event])
     exact = dyn.simulate(arm, *start, run.t[1], "taylor", rtol=1e-15, t_eval=[run.t[1]])
     assert abs(run.q[1] - exact.q[-1]).max() < 0.1 * tolerance
-    assert abs(run.qd[1] - exact.qd[-1]).max() < 0.1 * tolerance * abs(exact.qd).max()
+    assert abs(run.qd[1] - exact.qd[-1]).max() < 0.2 * tolerance
 
 
 def test_orders_follow_the_tolerance() -> None:
     method = METHODS["taylor"]
     assert [method.at(rtol).order for rtol in (0.5, 1e-6, 1e-9, 1e-12, 1e-15, 1e-30, 0.0, 10.0)] == [
-        *(3, 8, 12, 15),
-        *(19, 20, 20, 20),
+        *(4, 10, 14, 17),
+        *(21, 22, 22, 22),
     ]
     assert method.at(1e-9) is method.at(2e-9)  # so that a problem keeps one program for both
     assert METHODS["dop853"].at(1e-9) is METHODS["dop853"]
