@@ -40,7 +40,7 @@ SHORT = 24_000  # operations of all coefficients, before folding: more take a se
 CHECKED = 2.0**-46  # relative: rounding of the rates, below which a defect says nothing
 # Units in a step, inverse: a shorter one is tried again in a unit of its own, for what starts at 0 is measured by its
 # first change, which is that of a whole unit.
-APART = 8.0
+APART = 3.0
 SHORTEST = 2.0**-10  # units: the first try where terms say nothing, as of what stays at 0, or overflow
 
 

@@ -89,16 +89,17 @@ def test_a_run_may_be_far_longer_than_the_motion(length: float, rtol: float, ato
     assert run.t[-1] == approx(math.copysign(math.pi / 2.0, length), abs=20.0 * max(rtol, atol or 0.0))
 
 
-@mark.parametrize("length", [10.0, *slow(0.1, 1e3, 1e6)])
-@mark.parametrize("tolerance", [1e-6, 1e-10, *slow(1e-12)])
+@mark.parametrize("length", [10.0, *slow(1.0, 1e3, 1e6)])
+@mark.parametrize("tolerance", [1e-6, 1e-12, *slow(1e-8, 1e-10)])
 def test_the_first_step_misses_no_more_than_others(length: float, tolerance: float) -> None:
-    """From rest, where the first change of a velocity in all the run says nothing of its size."""
-    arm, start = dyn.planar_arm([1.0, 1.0], [1.0, 1.0]), ([0.5, 0.5], [0.0, 0.0])
-    event = dyn.Event("late", lambda q, qd, t: q[0] - 0.4, terminal=True)
-    run = dyn.simulate(arm, *start, length, "taylor", rtol=tolerance, events=[event])
-    exact = dyn.simulate(arm, *start, run.t[1], "taylor", rtol=1e-15, t_eval=[run.t[1]])
-    assert abs(run.q[1] - exact.q[-1]).max() < 0.1 * tolerance
-    assert abs(run.qd[1] - exact.qd[-1]).max() < 0.2 * tolerance
+    """From rest, where what a velocity would gain in the whole run, by its first rate, says nothing of its size."""
+    pytest.importorskip("llvmlite")
+    arm, start = dyn.planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7]), ([1.5, 0.2, -0.1], [0.0] * 3)
+    motion = dyn.prepare(arm, "taylor", rtol=tolerance).start(*start, t_end=length)
+    motion.step()
+    exact = dyn.simulate(arm, *start, motion.t, "taylor", rtol=1e-15, t_eval=[motion.t])
+    assert abs(motion.q - exact.q[-1]).max() < 0.03 * tolerance
+    assert abs(motion.qd - exact.qd[-1]).max() < 0.03 * tolerance
 
 
 def test_orders_follow_the_tolerance() -> None:
