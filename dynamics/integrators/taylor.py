@@ -53,7 +53,8 @@ def taylor_step(problem: Problem, order: int) -> Step:
     else:
         series, lengths = _by_orders(m, graphs, order)
     unit, h = cg.variables("unit h")
-    share = Call(function("h unit", s=h / unit), ("h", "unit"), ("s",))
+    # By itself, so that the arrival follows no call that writes coefficients: it would gather them one by one.
+    share = Call(function("h unit", s=h / unit), ("h", "unit"), ("s",), exact=True)
     at_all = Call(function("unit h", unit=cg.where(unit, unit, h)), ("unit", "h"), ("unit",))  # where nothing is wished
     at_most = cg.minimum(cg.variable("next"), abs(cg.variable("end") - cg.variable("t")))
     controls = ["unit", "last", "before", "next", "end", "rtol", "s", "at_t"]
