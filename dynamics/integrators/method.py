@@ -42,7 +42,8 @@ class Method:
         The relative tolerance below which a step's own rounding is larger.
     starts : bool
         Whether steps need no search for the first, and no limit by the one before, since each is at most what the
-        derivatives at its start allow: `prepare` makes `next` no larger.
+        derivatives at its start allow: `prepare`, which comes before every trial, makes `next` no larger. After a trial
+        that was too long all begins again, with `start`.
 
     order_at : callable, optional
         Of a method whose order goes by the relative tolerance: the order for one, at most `order`. The step is then
@@ -95,7 +96,7 @@ class Method:
 
         >>> from dynamics.integrators import METHODS
         >>> METHODS["taylor"].at(1e-9), METHODS["taylor"].at(1e-12)
-        (<Method of order 12, steps by error>, <Method of order 15, steps by error>)
+        (<Method of order 14, steps by error>, <Method of order 17, steps by error>)
         """
         return self if self.order_at is None else _of_order(self, self.order_at(rtol))
 

@@ -10,7 +10,8 @@ from cgraph.extend import Call, FixedPoint, Map, Statement, While, copied, effec
 from .problem import Problem
 
 # What a step may read of a run; in equal steps and derivatives those for which it has lengths are 0.
-SHARED = ("x", "x_new", "t", "h", "p", "rtol", "atol", "leap", "next", "evaluations", "error", "at_limit", "accepted")
+SHARED: tuple[str, ...] = ("x", "x_new", "t", "h", "p", "rtol", "atol", "leap", "next", "end", "evaluations", "error")
+SHARED += ("at_limit", "accepted")
 
 
 @dataclass(frozen=True, eq=False)

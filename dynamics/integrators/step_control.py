@@ -136,8 +136,10 @@ def accept_step(order: int, *after: Statement, starts: bool) -> If:
     kept = (copied("x", "x_old"), copied("t", "t_old"))
     arrived = (copied("x_new", "x"), copied("t_new", "t"))
     if starts:
-        free = Call(Graph([], {"next": math.inf}), (), ("next",))
-        return If("accepted", (*kept, *after, *arrived, free), (_shrunk(order),))
+        free, again = (
+            Call(Graph([], {name: value}), (), (name,)) for name, value in (("next", math.inf), ("fresh", 1.0))
+        )
+        return If("accepted", (*kept, *after, *arrived, free), (_shrunk(order), again))
     h, longest, turned = cg.variables("h longest turned")
     lost = cg.minimum(cg.sqrt(turned), FORGOTTEN) * longest
     after_h = Graph([h, longest, turned], {"longest": cg.maximum(abs(h), longest - lost)})
@@ -175,7 +177,8 @@ def first_pass(*statements: Statement) -> If:
 def chosen(step: Step, problem: Problem, *, dense: bool, degree: int, starts: bool) -> Program:
     """A trial of one step a pass.
 
-    starts: whether the next step is at most what the derivatives at its start allow, whatever the one before was.
+    starts: whether the next step is at most what the derivatives at its start allow, whatever the one before was. After
+    a trial that was too long the rates are those of its end, so that all begins again.
     """
     lengths = with_registers(step, registers(problem))
     rates, prepare = ([*part, *_counted(problem, part)] for part in (step.rates, step.prepare))
@@ -184,7 +187,7 @@ def chosen(step: Step, problem: Problem, *, dense: bool, degree: int, starts: bo
     if first:
         body.append(first_pass(*first))
     if again:
-        body.append(If("accepted", tuple(again)))
+        body += again if starts else [If("accepted", tuple(again))]
     body += [trial(), *step.body, *step.error]
     body.append(control(rate_calls(problem, step.body, step.error)))
     after: list[Statement] = []

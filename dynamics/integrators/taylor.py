@@ -1,12 +1,12 @@
 """Taylor's method: steps by the Taylor series of the solution, of an order by the tolerance.
 
-Order and step follow Jorba and Zou, Experimental Mathematics 14 (2005) 99: order -log(rtol) / 2 + 1, and the step at
-which the last two terms are as small as the tolerance. Coefficients are of the time in units of the step before, so
-that they neither overflow nor depend on the unit of time. What a step missed is seen at its end, where the derivative
-of the polynomial has to be the rate; coefficients 0 of the next step are computed there anyway.
+Order and step follow Jorba and Zou, Experimental Mathematics 14 (2005) 99: the step at which the last two terms are as
+small as the tolerance, and order -log(rtol) / 2 + 3, two more than theirs. Coefficients are of the time in units of the
+step before, so that they neither overflow nor depend on the unit of time. What a step missed is seen at its end, where
+the derivative of the polynomial has to be the rate; coefficients 0 of the next step are computed there anyway.
 
-All coefficients are one graph where it is short: its values stay in registers, and its code is read from the nearest
-cache. Else a graph of one order is repeated, with sums of products over many nodes at a time.
+All coefficients are one graph where it is short: its values stay in registers. Else a graph of one order is repeated,
+with sums of products over many nodes at a time.
 """
 
 from __future__ import annotations
@@ -36,8 +36,12 @@ from .problem import Problem
 from .step import Step
 from .step_control import count
 
-SHORT = 10_000  # operations of all coefficients: the code of more does not fit the nearest cache, and is no faster
+SHORT = 24_000  # operations of all coefficients, before folding: more take a second to compile, a third less to run
 CHECKED = 2.0**-46  # relative: rounding of the rates, below which a defect says nothing
+# Units in a step, inverse: a shorter one is tried again in a unit of its own, for what starts at 0 is measured by its
+# first change, which is that of a whole unit.
+APART = 3.0
+SHORTEST = 2.0**-10  # units: the first try where terms say nothing, as of what stays at 0, or overflow
 
 
 def taylor_step(problem: Problem, order: int) -> Step:
@@ -49,22 +53,24 @@ def taylor_step(problem: Problem, order: int) -> Step:
     else:
         series, lengths = _by_orders(m, graphs, order)
     unit, h = cg.variables("unit h")
-    share = Call(function("h unit", s=h / unit), ("h", "unit"), ("s",))
+    # By itself, so that the arrival follows no call that writes coefficients: it would gather them one by one.
+    share = Call(function("h unit", s=h / unit), ("h", "unit"), ("s",), exact=True)
     at_all = Call(function("unit h", unit=cg.where(unit, unit, h)), ("unit", "h"), ("unit",))  # where nothing is wished
-    controls = ["unit", "last", "before", "next", "rtol", "s", "at_t"]
-    lengths |= dict.fromkeys([*c, "rate", "rounding", "rounding_new", "slope", "atol"], m)
+    at_most = cg.minimum(cg.variable("next"), abs(cg.variable("end") - cg.variable("t")))
+    controls = ["unit", "last", "before", "next", "end", "rtol", "s", "at_t"]
+    lengths |= dict.fromkeys([*c, "rate", "rounding", "rounding_new", "slope", "atol", "weight"], m)
     lengths |= {"zeros": graphs.zeros} | dict.fromkeys(controls, 1)
     return Step(
         lengths,
         [share, _arrival(order)],
         [_rates(graphs, "x", "t"), count(1)],
         [at_all, *series, *_wish(order)],
-        [copied("next", "unit")],
+        [Call(function("next end t", unit=at_most), ("next", "end", "t"), ("unit",))],
         kept=[copied("rounding_new", "rounding"), copied("h", "unit")],
-        fixed=("rounding", "rounding_new", "atol", *controls),
+        fixed=("rounding", "rounding_new", "atol", "weight", *controls),
         error=[stage_time("at_t", 1.0), _rates(graphs, "x_new", "at_t"), count(1), *_checked(m, order)],
         estimate=order,
-        handed=(),  # a trial that is not accepted leaves other rates behind, and coefficients, which go on
+        handed=(),
         dense=[_dense(order)],
         dense_lengths=dict.fromkeys(_names("dense", order), m),
     )
@@ -106,17 +112,26 @@ def _by_orders(m: int, graphs: Jets, order: int) -> tuple[list[Statement], dict[
 
 
 def _wish(order: int) -> list[Statement]:
-    """Register `next`: at most the step at which the last two terms are within the tolerance."""
-    c, x, first, rtol, atol = inputs = cg.variables("c x first rtol atol")
-    part = c / (atol + rtol * cg.maximum(abs(x), abs(first)))  # what starts at 0 is as large as its first change
-    square = Graph(inputs, {"y": part * part})
+    """Register `next`: at most the step at which the last two terms are within the tolerance.
+
+    That is y^(-1 / 2k) units, y the sum of squares of c_k over the tolerance, with a safety factor. Both are taken as a
+    power of the higher order alone, which is the same for a step as long as the one before, and takes half the time.
+    """
+    x, first, rtol, atol = inputs = cg.variables("x first rtol atol")
+    size = cg.maximum(abs(x), abs(first))  # what starts at 0 is as large as its first change
+    weight = Graph(inputs, {"weight": 1.0 / (atol + rtol * size)})
+    c, each = inputs = cg.variables("c weight")
+    square = Graph(inputs, {"y": (c * each) * (c * each)})
     last, before, unit, wanted = inputs = cg.variables("last before unit next")
-    share = cg.minimum(before ** (-0.5 / (order - 1.0)), (math.exp(4.0) * last) ** (-0.5 / order))
-    h = abs(unit) * share * math.exp(-0.7 / (order - 1.0))
-    graph = Graph(inputs, {"h": cg.where(cg.equal(h, h), cg.minimum(wanted, h), 0.0)})
-    sizes = {"last": order, "before": order - 1}
-    sums = [Sum(square, (f"c{k}", "x", "c1", "rtol", "atol"), name) for name, k in sizes.items()]
-    return [*sums, Call(graph, ("last", "before", "unit", "next"), ("next",))]
+    terms = cg.maximum(math.exp(1.4) * before, math.exp(4.0 + 1.4 * order / (order - 1.0)) * last)
+    share = terms ** (-0.5 / order)
+    h = abs(unit) * cg.where(share > SHORTEST, share, SHORTEST)
+    graph = Graph(inputs, {"h": cg.where(h < wanted, h, wanted)})
+    return [
+        Map(weight, ("x", "c1", "rtol", "atol"), ("weight",)),
+        *[Sum(square, (f"c{k}", "weight"), name) for name, k in (("last", order), ("before", order - 1))],
+        Call(graph, ("last", "before", "unit", "next"), ("next",)),
+    ]
 
 
 def _arrival(order: int) -> Map:
@@ -139,15 +154,20 @@ def _polynomial(c: Sequence[Node], s: Node) -> Node:
 
 
 def _checked(m: int, order: int) -> list[Statement]:
-    """Register `error`: what the step misses by its defect, the difference of rate and derivative at its end."""
+    """Register `error`: what the step misses by its defect, the difference of rate and derivative at its end.
+
+    One that has to be tried again misses a tolerance more.
+    """
     slope, rate, x, x_new, rtol, atol, h = inputs = cg.variables("slope rate x x_new rtol atol h")
     scale = atol + cg.maximum(rtol, CHECKED) * cg.maximum(abs(x), abs(x_new)) + CHECKED * abs(slope)
-    part = (slope - h * rate) / ((order + 1.0) * scale)
-    total, h, t = cg.variables("error h t")
-    error = cg.where(cg.not_equal(t, t + h), cg.sqrt(total / m), math.inf)
+    part = (slope - h * rate) / scale
+    names = ("error", "h", "t", "next", "unit")
+    total, h, t, wanted, unit = of_all = cg.variables(names)
+    missed = cg.sqrt(total * (1.0 / (m * (order + 1.0) ** 2)))
+    error = cg.where(cg.not_equal(t, t + h), cg.where(APART * wanted < abs(unit), missed + 1.0, missed), math.inf)
     return [
         Sum(Graph(inputs, {"y": part * part}), ("slope", "rate", "x", "x_new", "rtol", "atol", "h"), "error"),
-        Call(Graph([total, h, t], {"error": error}), ("error", "h", "t"), ("error",)),
+        Call(Graph(of_all, {"error": error}), names, ("error",)),
     ]
 
 

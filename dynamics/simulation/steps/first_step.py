@@ -3,7 +3,8 @@
 A run writes x, t, p, sized and registers of the start, see `given`. Before its own first trial the program then looks
 ahead by Euler's steps, where it is `sized`, for the tolerance that goes with the sizes of the state to come; and tries
 steps with a tolerance that anything meets, each whole (`search` = 3) and as two halves (2, 1), until these confirm it;
-and so on in `ROUNDS`, as long as the look ahead went much farther than the step.
+and so on in `ROUNDS`, as long as the look ahead went much farther than the step. A method that `starts` by itself has
+neither: its first trial is as long as it wishes, and sizes are looked at as soon as there are others than the start's.
 """
 
 from __future__ import annotations
@@ -38,6 +39,7 @@ HALVINGS = 100.0  # of a look ahead
 JUMP = 1e-2  # of the longest of the last steps: how much of it a jump may take, where atol is chosen by sizes
 SUDDEN = 1e-3  # of a kind of rate: a force that jumps at the start changes it by more
 FIRST_LOOK = 32.0  # trials, after which atol is raised to the sizes so far; then after twice as many
+AT_ONCE = 1.0  # the same where no look ahead has found sizes
 WHOLE, FIRST_HALF, SECOND_HALF = 3.0, 2.0, 1.0  # register `search`
 
 Values = dict[str, "Node | float"]
@@ -64,14 +66,15 @@ def with_first_step(steps: Program, problem: Problem, kinds: StateKinds, order: 
     """
     m = problem.size
     own = {_at(name): m if name in STATES else 1 for name in (*STATES, *SINGLE)}
-    begin = (_begin(problem, kinds, starts=starts), _look(problem, kinds), *_set_out(problem))
+    if starts:
+        found, turn = [If(_at("begins"), (*_begin(), *_as_wished(kinds)))], []
+    else:
+        found = [If(_at("begins"), (*_begin(), *_rates_at_start(problem, kinds))), _look(problem, kinds)]
+        turn = [If("search", _turn(m, order), seldom=True)]
+    set_out = If("anew", (*found, *_set_out(problem, AT_ONCE if starts else FIRST_LOOK)), seldom=True)
     raised = (*_tolerance(kinds), _copy("tolerance", "atol"), _rule("seen", lambda n: {"seen": 2.0 * n, "due": 0.0}))
-    set_out, turn, raise_atol = (
-        If(register, body, seldom=True)
-        for register, body in (("anew", begin), ("search", _turn(m, order)), ("due", raised))
-    )
-    body = [set_out, *steps.body, turn, If("row", (_over(_LARGER, "size x", "size"),)), raise_atol]
-    return replace(steps, registers={**steps.registers, **own}, body=body)
+    sizes = [If("row", (_over(_LARGER, "size x", "size"),)), If("due", raised, seldom=True)]
+    return replace(steps, registers={**steps.registers, **own}, body=[set_out, *steps.body, *turn, *sizes])
 
 
 def _graph(names: str, rule: Callable[..., Node]) -> Graph:
@@ -151,15 +154,13 @@ def _first_try(length: Node, longest: Node, least: Node) -> Node:
     return cg.maximum(LEAP * cg.minimum(length, longest), least)
 
 
-def _begin(problem: Problem, kinds: StateKinds, *, starts: bool) -> If:
-    """Beginning of a run: its start, the rate there, and whether to look ahead, to search, or to set out."""
+def _begin() -> list[Statement]:
+    """What a run begins with: its start, and whether to look ahead, to search, or to set out."""
 
     def begun(t: Node, t_end: Node, first: Node, sized: Node, longest: Node) -> Values:
         length = abs(t_end - t)
         least = cg.minimum(length, cg.maximum(2.0 * RESOLUTION * abs(t), math.ulp(0.0)))
         h_try = _first_try(length, longest, least)
-        search: Node | float = 0.0 if starts else cg.where(cg.maximum(sized, first), 0.0, WHOLE)
-        given = cg.where(first, first, length)
         return {
             "t0": t,
             "length": length,
@@ -167,9 +168,9 @@ def _begin(problem: Problem, kinds: StateKinds, *, starts: bool) -> If:
             "least": least,
             "h_look": cg.where(first, first, LEAP * cg.minimum(length, longest)),
             "look": sized,
-            "search": search,
+            "search": cg.where(cg.maximum(sized, first), 0.0, WHOLE),
             "h_try": h_try,
-            "h_next": given if starts else cg.where(first, given, h_try),
+            "h_next": cg.where(first, first, h_try),
             "longest_next": 0.0,
             "tested": 0.0,
             "rounds": 0.0,
@@ -177,23 +178,25 @@ def _begin(problem: Problem, kinds: StateKinds, *, starts: bool) -> If:
             "jumps": 0.0,
         }
 
-    body = [
-        _copy("x", "x_start"),
-        _rate(problem, "x", "t", "rate_start"),
-        _copy("rate_start", "rate_look"),
-        _rule("t t_end first sized longest_step", begun),
-    ]
-    return If(_at("begins"), (*body, *(_after_start(problem, kinds) if problem.timed else ())))
+    return [_copy("x", "x_start"), _rule("t t_end first sized longest_step", begun)]
 
 
-def _after_start(problem: Problem, kinds: StateKinds) -> list[Statement]:
-    """Rate right after a force's jump at the start: it changes in the first instant, and no more."""
+def _as_wished(kinds: StateKinds) -> list[Statement]:
+    """No search: the first trial is as long as the method wishes, by sizes of the start alone."""
+    wish = _rule("first length", lambda first, length: {"h_next": cg.where(first, first, length), "search": 0.0})
+    return [wish, If("sized", (_map("x_start", "size", _size), *_tolerance(kinds)))]
+
+
+def _rates_at_start(problem: Problem, kinds: StateKinds) -> list[Statement]:
+    """The rate at the start; of a force that jumps there, right after it: it changes in the first instant, no more."""
 
     def jumps(first: Node, after: Node, later: Node, kind: Node, kind_after: Node) -> Node:
         least = SUDDEN * cg.maximum(kind, kind_after)
         return (abs(after - first) > least) * (abs(later - after) <= least)
 
-    body: list[Statement] = []
+    body: list[Statement] = [_rate(problem, "x", "t", "rate_start"), _copy("rate_start", "rate_look")]
+    if not problem.timed:
+        return body
     for k, target in ((1.0, "rate_ahead"), (2.0, "rate_before")):
         instant = _rule("t toward instant", lambda t, toward, instant, k=k: {"t_ahead": t + toward * (k * instant)})
         body += [instant, _rate(problem, "x", "t_ahead", target)]
@@ -284,7 +287,7 @@ def _euler(problem: Problem, kinds: StateKinds) -> list[Statement]:
     ]
 
 
-def _set_out(problem: Problem) -> list[Statement]:
+def _set_out(problem: Problem, first_look: float) -> list[Statement]:
     """The next trial is from the start: one of the search, with a tolerance that anything meets, or the first."""
 
     def limits(search: Node, *given: Node) -> Values:
@@ -303,7 +306,7 @@ def _set_out(problem: Problem) -> list[Statement]:
             "error_old": cg.where(search, 1.0, 1e-4),
             "fresh": 1.0,
             "accepted": 1.0,
-            "seen": FIRST_LOOK,
+            "seen": first_look,
             **dict.fromkeys("status rejected evaluations at_limit trials".split(), 0.0),
             **({} if problem.projection is None else {"farthest": 0.0}),
         }

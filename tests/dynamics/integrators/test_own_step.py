@@ -121,7 +121,7 @@ def test_a_step_that_does_not_make_x_new_is_refused(body: Any, monkeypatch: pyte
             run(DRIVEN, START, None, 1.0, EQUAL)
 
 
-@mark.parametrize(("taken", "method"), [("end", OWN), ("count", EQUAL)])
+@mark.parametrize(("taken", "method"), [("status", OWN), ("count", EQUAL)])
 def test_a_register_of_the_run_s_name_is_refused(taken: str, method: str, monkeypatch: pytest.MonkeyPatch) -> None:
     def clash(problem: Problem) -> Step:
         step = parabola(problem)
