@@ -97,7 +97,7 @@ def test_an_operation_shows_its_symbol() -> None:
 
 
 @each_row("op", [op for op in OPS.values() if op.symbol])
-def test_every_row_of_the_table_can_be_drawn(op: Op) -> None:
+def test_every_operation_can_be_drawn(op: Op) -> None:
     inputs = cg.variables([f"x{i}" for i in range(op.arity)])
     graph = cg.Graph(inputs, {"y": apply(op, *inputs)})
     assert boxes(graph)[f"n{len(graph.nodes) - 1}"]["label"] == op.symbol
