@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import cmath
 import json
-import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -353,17 +350,6 @@ def test_a_motion_cut_short_is_a_finding(own, capsys):
     found = figures(capsys, "simulate", "own.py:slow", "--start", "decay=1", "--t-end", "1")
     assert found["end"] == {"decay": pytest.approx(np.exp(-1.0))}
     assert "energy" not in found
-
-
-def test_two_runs_print_the_same_bytes(capsys):
-    """In processes with other hashes of text: this one has a seed that is random."""
-    arguments = ["compare", "spring_mass", "--json"]
-    folder = str(Path(cli.__file__).parents[1])
-    environment = os.environ | {"PYTHONHASHSEED": "1", "PYTHONPATH": folder}
-    command = [sys.executable, "-m", "viz", *arguments]
-    other = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
-    assert cli.main(arguments) == other.returncode
-    assert capsys.readouterr().out == other.stdout != ""
 
 
 @each_row(
