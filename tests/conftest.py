@@ -80,6 +80,19 @@ def quick_machine_code(request: pytest.FixtureRequest) -> Iterator[None]:
 
 
 @pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty folder, in which the test runs."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def without(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
+    """Importing a module fails from here on, as where its package is not installed."""
+    return lambda module: monkeypatch.setitem(sys.modules, module, None)
+
+
+@pytest.fixture
 def ctrl_c() -> Iterator[None]:
     """Ctrl-C raises KeyboardInterrupt even where the tests were started with SIGINT ignored, as background jobs are."""
     before = signal.signal(signal.SIGINT, signal.default_int_handler)

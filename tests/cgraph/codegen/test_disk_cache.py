@@ -326,15 +326,14 @@ def test_another_process_reads_what_this_one_compiled(folder):
     assert (path.stat().st_mtime_ns, path.stat().st_ino) == written
 
 
-def test_a_relative_path_means_the_folder_it_meant(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_a_relative_path_means_the_folder_it_meant(here, monkeypatch):
     function = cg.compile(graph(), "llvm", cache="here")
-    (tmp_path / "elsewhere").mkdir()
-    monkeypatch.chdir(tmp_path / "elsewhere")
+    (here / "elsewhere").mkdir()
+    monkeypatch.chdir(here / "elsewhere")
     function.batch(POINTS)
     pickle.loads(pickle.dumps(function))
-    assert len(entries(tmp_path / "here")) == 2
-    assert list((tmp_path / "elsewhere").iterdir()) == []
+    assert len(entries(here / "here")) == 2
+    assert list((here / "elsewhere").iterdir()) == []
 
 
 @POSIX
@@ -373,8 +372,8 @@ def test_clearing_removes_the_entries_and_nothing_else(tmp_path, monkeypatch):
     assert clear_cache(tmp_path / "nothing here") == 0
 
 
-def test_the_choice_is_no_matter_without_machine_code(folder, monkeypatch):
-    monkeypatch.setitem(sys.modules, "llvmlite", None)
+def test_the_choice_is_no_matter_without_machine_code(folder, without):
+    without("llvmlite")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         function = cg.compile(graph(), cache=folder)

@@ -234,8 +234,8 @@ def test_the_source_is_the_text_of_llvm():
     assert cg.compile(chain()).source == function.source
 
 
-def test_without_llvmlite_auto_is_generated_python(monkeypatch):
-    monkeypatch.setitem(sys.modules, "llvmlite", None)
+def test_without_llvmlite_auto_is_generated_python(without):
+    without("llvmlite")
     function = cg.compile(chain())
     assert function.source == cg.compile(chain(), "python").source
     assert same(function([0.1, 0.2, 0.3]), evaluated(chain(), [[0.1, 0.2, 0.3]])[0])

@@ -1,7 +1,6 @@
 """Batches by several threads: the same values, every column once, and a clean end."""
 
 import signal
-import sys
 import threading
 
 import numpy as np
@@ -31,10 +30,10 @@ def points(count):
 
 
 @pytest.fixture(params=[*ENGINES, "auto without llvmlite"])
-def function(request, monkeypatch):
+def function(request, without, monkeypatch):
     """Functions whose blocks are small, so that small batches have many."""
     if "without" in request.param:
-        monkeypatch.setitem(sys.modules, "llvmlite", None)
+        without("llvmlite")
     monkeypatch.setattr(native_runner, "WORK", 24 * len(graph().nodes))
     for module in (python_runner, runner):
         monkeypatch.setattr(module, "BLOCK", 24)

@@ -129,9 +129,8 @@ def test_the_page_of_a_file_tells_forces_from_torques(tmp_path, capsys):
     ],
     ids=["inspect", "pruning"],
 )
-def test_pages_say_at_the_top_what_the_model_lacks(tmp_path, monkeypatch, capsys, command, page):
+def test_pages_say_at_the_top_what_the_model_lacks(here, capsys, command, page):
     pytest.importorskip("mujoco")
-    monkeypatch.chdir(tmp_path)
     Path("out").mkdir()
     servo = '</worldbody><actuator><position name="servo" joint="hinge" kp="50"/></actuator>'
     Path("cart.xml").write_text(MODEL.replace("</worldbody>", servo))
@@ -139,7 +138,7 @@ def test_pages_say_at_the_top_what_the_model_lacks(tmp_path, monkeypatch, capsys
     assert cli.main([name, "cart.xml", *options]) == 0
     what = "actuators that act with no input (servo: -50 length)"
     assert f"cgraph: warning: 'cart.xml': left out {what}\n" in capsys.readouterr().err
-    assert f" {what}." in (tmp_path / "out" / page).read_text(encoding="utf-8")
+    assert f" {what}." in (here / "out" / page).read_text(encoding="utf-8")
 
 
 def test_lint_looks_in_a_box_and_at_a_point(capsys):
@@ -264,10 +263,9 @@ late = dyn.Scene("late", "it ends at infinity", runaway, (1.0,), (0.0,), 9.0)
 
 
 @pytest.fixture
-def own(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def own(here):
     Path("own.py").write_text(OWN)
-    return tmp_path
+    return here
 
 
 @each_row(

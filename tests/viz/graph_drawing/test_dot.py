@@ -1,8 +1,7 @@
 """The drawing of a graph as DOT: what is drawn, under which ids, and with which words."""
 
 import re
-import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 from xml.etree import ElementTree
 
@@ -348,7 +347,7 @@ def test_the_picture_carries_the_ids() -> None:
     assert set(boxes(graph)) | set(arrows(graph)) <= identities
 
 
-def test_without_graphviz_the_error_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "graphviz", None)
+def test_without_graphviz_the_error_names_the_extra(without: Callable[[str], None]) -> None:
+    without("graphviz")
     with pytest.raises(ImportError, match=r"pip install '\.\[viz\]'"):
         to_dot(spring())

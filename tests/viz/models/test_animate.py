@@ -132,11 +132,11 @@ def test_what_cannot_be_shown_is_told(arguments, named, message):
         viz.animate(*arguments, **named)
 
 
-def test_a_missing_program_or_package_is_told(monkeypatch, tmp_path):
+def test_a_missing_program_or_package_is_told(without, monkeypatch, tmp_path):
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(RuntimeError, match=r"MP4 needs the program ffmpeg on the PATH; .gif and .apng need no program"):
         viz.animate(ARM, FALL, tmp_path / "a.mp4")
-    monkeypatch.setitem(sys.modules, "PIL", None)
+    without("PIL")
     with pytest.raises(ImportError, match=r"animations need Pillow: .*viz"):
         viz.animate(ARM, FALL)
     assert not [*tmp_path.iterdir()]
