@@ -73,7 +73,7 @@ def quick_machine_code(request: pytest.FixtureRequest) -> Iterator[None]:
     """
     users = "optimized" in request.keywords or "HYPOTHESIS_PROFILE" in os.environ
     with pytest.MonkeyPatch.context() as patch:
-        if not (users or {"codegen", "program"} & set(request.path.parts)):
+        if not users:
             patch.setattr(llvm_engine, "LEVEL", 0)
             patch.setattr(llvm_engine.Host, "_translated", _translated)
         yield

@@ -21,6 +21,8 @@ from cgraph import clear_cache
 from cgraph.codegen import disk_cache as cache, llvm_engine as llvm
 from tests.each_row import each_row
 
+pytestmark = pytest.mark.optimized
+
 llvmlite = pytest.importorskip("llvmlite")
 binding = pytest.importorskip("llvmlite.binding")
 

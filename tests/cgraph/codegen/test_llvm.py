@@ -22,6 +22,8 @@ from tests.each_row import each_row
 from tests.strategies import cases, examples
 from tests.ulps import same, ulps_apart
 
+pytestmark = pytest.mark.optimized
+
 pytest.importorskip("llvmlite")
 
 BATCH_ULPS = 4.0  # of a batch against one point at a time

@@ -15,6 +15,8 @@ from tests.cgraph.engines import RUNNERS, evaluated
 from tests.strategies import cases
 from tests.ulps import same
 
+pytestmark = pytest.mark.optimized
+
 SPECIAL = (0.0, -0.0, 1.0, -1.5, 0.5, 5e-324, 1e300, 800.0, -800.0, math.inf, -math.inf, math.nan)
 
 

@@ -21,6 +21,8 @@ from tests.strategies import cases, examples
 from tests.tolerances import SHORT_SUM
 from tests.ulps import exact, same, ulps_apart
 
+pytestmark = pytest.mark.optimized
+
 binding = pytest.importorskip("llvmlite.binding")
 
 ULPS = 2.0  # what the polynomials promise

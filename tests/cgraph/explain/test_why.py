@@ -167,7 +167,11 @@ def test_marks_are_nodes_and_edges_of_the_graph():
 @each_row(
     ("arguments", "error", "words"),
     [
-        (("h", "x"), cg.GraphError, r"nothing in the graph is called 'h' \(inputs x, y, z; named nodes a; outputs f, g\)"),
+        (
+            ("h", "x"),
+            cg.GraphError,
+            r"is called 'h' \(inputs x, y, z; named nodes a; outputs f, g\)",
+        ),
         (("f", "w"), cg.GraphError, "nothing in the graph is called 'w'"),
         (("f", 3), TypeError, "input is given by its name or itself, got int: 3"),
         (("f", cg.variable("strange")), cg.GraphError, "<node variable strange> is not a node of the graph"),
