@@ -126,15 +126,6 @@ def test_a_long_graph_is_cut_into_parts(tmp_path, monkeypatch):
     assert same(called(build(tmp_path, [source]), "arm", graph, points), evaluated(graph, points))
 
 
-def test_a_deep_graph_needs_no_recursion():
-    x = node = cg.variable("x")
-    for _ in range(20_000):
-        node = cg.sin(node)
-    source = cg.to_c(cg.Graph([x], {"y": node}), "deep").source
-    assert source.count("static void deep_part_") == 10
-    assert "double w[1];" in source
-
-
 @needs_cc
 def test_what_compilers_know_of_functions_changes_no_bit(tmp_path):
     """One call for a sine and its cosine; x * x for pow(x, 2.0), 1 / x for pow(x, -1.0), exp2(x) for pow(2.0, x).
