@@ -3,7 +3,6 @@
 import os
 import re
 import shlex
-import shutil
 import subprocess
 import sys
 from contextlib import chdir, redirect_stdout
@@ -65,11 +64,6 @@ def commands(page: str) -> list[str]:
     """The commands `cgraph ...` that a page shows to a shell, without their first word."""
     blocks = [text for kind, text in FENCE.findall(page) if kind == "sh"]
     return re.findall(r"^(?:\S*/)?cgraph ([^#\n|]+?) *(?:[#|].*)?$", "\n".join(blocks), re.MULTILINE)
-
-
-def chromium() -> str | None:
-    """The program, where there is one."""
-    return next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 
 
 def texts(svg: Path) -> list[str]:
