@@ -134,19 +134,13 @@ def test_an_unused_input_has_the_derivative_zero():
     assert cg.hessian(one).evaluate(values) == {"d2f/dxdx": 2.0, "d2f/dxdz": 0.0, "d2f/dzdx": 0.0, "d2f/dzdz": 0.0}
 
 
-def test_an_output_that_is_an_input_has_the_derivative_one():
-    graph = cg.Graph([x, y], {"f": x, "g": x})
-    assert cg.jvp(graph).evaluate({"x": 3.0, "y": 0.0, "x_dot": 5.0, "y_dot": 0.0}) == {"f_dot": 5.0, "g_dot": 5.0}
-    assert cg.vjp(graph).evaluate({"x": 3.0, "y": 0.0, "f_bar": 5.0, "g_bar": 7.0}) == {"x_bar": 12.0, "y_bar": 0.0}
-    assert cg.gradient(cg.Graph([x], {"f": x})).evaluate({"x": 2.0}) == {"df/dx": 1.0}
-
-
-def test_an_output_that_another_output_uses_counts_both_ways():
-    s = cg.sin(x)
-    graph = cg.Graph([x], {"s": s, "f": s * s})
-    pulled = cg.vjp(graph).evaluate({"x": 0.3, "s_bar": 10.0, "f_bar": 1.0})
-    # d/dx (10 sin x + sin^2 x)
-    assert pulled["x_bar"] == pytest.approx((10 + 2 * math.sin(0.3)) * math.cos(0.3), rel=LAST_BITS)
+def test_outputs_that_are_inputs_or_used_by_others_count_all_ways():
+    graph = cg.Graph([x, y], {"f": x, "g": x, "h": 3.0 * x, "k": (3.0 * x) * (3.0 * x)})
+    at = {"x": 1.0, "y": 0.0}
+    pushed = cg.jvp(graph).evaluate(at | {"x_dot": 5.0, "y_dot": 0.0})
+    assert pushed == {"f_dot": 5.0, "g_dot": 5.0, "h_dot": 15.0, "k_dot": 90.0}
+    pulled = cg.vjp(graph).evaluate(at | {"f_bar": 5.0, "g_bar": 7.0, "h_bar": 10.0, "k_bar": 1.0})
+    assert pulled == {"x_bar": 60.0, "y_bar": 0.0}
 
 
 def test_the_jacobian_is_the_same_in_both_modes():
@@ -155,14 +149,8 @@ def test_the_jacobian_is_the_same_in_both_modes():
     wide = cg.jacobian(cg.Graph([x, y, z], {"w": w}))
     tall = cg.jacobian(cg.Graph([x, y, z], {"w": w, "a": x, "b": y, "c": z}))
     values = {"x": 0.3, "y": -0.7, "z": 1.1}
-    expected = {
-        "dw/dx": math.cos(0.3) * -0.7,
-        "dw/dy": math.sin(0.3) + math.exp(-0.7) * 1.1,
-        "dw/dz": math.exp(-0.7),
-    }
-    for graph in (wide, tall):
-        found = graph.evaluate(values)
-        assert {name: found[name] for name in expected} == pytest.approx(expected, rel=LAST_BITS)
+    found = tall.evaluate(values)
+    assert wide.evaluate(values) == pytest.approx({name: found[name] for name in wide.outputs}, rel=LAST_BITS)
     assert wide.counts().by_role.keys() & {"adjoint", "tangent"} == {"adjoint"}
     assert tall.counts().by_role.keys() & {"adjoint", "tangent"} == {"tangent"}
 
