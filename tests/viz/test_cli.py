@@ -18,7 +18,6 @@ import cgraph as cg
 import dynamics as dyn
 import viz
 from dynamics import scenes
-from dynamics.scenes import scenes as registry
 from tests.each_row import each_row
 from tests.slow import slow
 from viz import cli
@@ -369,17 +368,17 @@ def test_peers_that_a_figure_does_without_are_named_with_their_extra(without, ca
     assert "Pinocchio is not installed: in a checkout of cgraph, pip install '.[bench]'" in printed
 
 
-def runaway():
-    """A particle whose acceleration grows with its place: it is at infinity before its time."""
-    system = dyn.System(lambda q, qd, t, p: qd[0] ** 2 / 2 + q[0] ** 4, ["x"])
-    return dyn.Scene("runaway", "it ends at infinity", system, (1.0,), (0.0,), 10.0)
+LATE = """import dynamics as dyn
+runaway = dyn.System(lambda q, qd, t, p: qd[0] ** 2 / 2 + q[0] ** 4, ["x"])  # at infinity before its time
+late = dyn.Scene("late", "it ends at infinity", runaway, (1.0,), (0.0,), 10.0)
+"""
 
 
 @pytest.mark.filterwarnings("always:the run stopped:dynamics.SimulationWarning")
-def test_a_motion_that_ends_before_its_time_is_a_finding_and_the_page_says_so(tmp_path, monkeypatch, capsys):
-    monkeypatch.setitem(registry._SCENES, "runaway", runaway)
-    page = tmp_path / "a.html"
-    assert cli.main(["inspect", "runaway", "--out", str(page)]) == 1
+def test_a_motion_that_ends_before_its_time_is_a_finding_and_the_page_says_so(here, capsys):
+    page = here / "a.html"
+    (here / "own.py").write_text(LATE)
+    assert cli.main(["inspect", "own.py:late", "--out", str(page)]) == 1
     said = capsys.readouterr().err
     (line,) = [line for line in said.splitlines() if "stopped" in line]
     sentence = f"The motion is not whole: it {line.removeprefix('cgraph: warning: the run ')}."
