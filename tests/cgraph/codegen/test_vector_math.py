@@ -278,7 +278,7 @@ def test_the_deeper_argument_is_computed_first():
 
 def test_a_schedule_of_a_deep_graph_needs_no_recursion_and_no_square_of_its_size():
     x = node = cg.variable("x")
-    for _ in range(30_000):
+    for _ in range(20_000):
         node = cg.sin(node) * cg.cos(node)
     graph = cg.Graph([x], {"y": node})
-    assert len(schedule(graph, Merged(joined_calls(graph, TOGETHER), {}))) == len(graph.nodes) - 1 + 30_000
+    assert len(schedule(graph, Merged(joined_calls(graph, TOGETHER), {}))) == len(graph.nodes) - 1 + 20_000
