@@ -103,12 +103,12 @@ def test_registers_that_are_read_and_written(backend: str) -> None:
     assert run.run(run.memory({"x": [1, 2, 3], "y": [4, 5, 6]}), 1).rows.tolist() == [[4, 5, 6, 1, 2, 3]]
 
 
-@each_row("count", [1, 3, 8, 19])
-def test_registers_that_every_element_shares(backend: str, count: int) -> None:
+@each_row(("count", "order"), itertools.product([1, 3, 8, 19], ["xh", "hx"]))
+def test_registers_that_every_element_shares(backend: str, count: int, order: str) -> None:
     a, b, c, x, h = cg.variables("a b c x h")
-    graph = cg.Graph([a, b, c, x, h], {"u": (a + b * x) * h, "v": c - x})
+    graph = cg.Graph([a, b, c, *cg.variables([*order])], {"u": (a + b * x) * h, "v": c - x})
     registers = {"ab": 2, "c": 1, "x": count, "h": 1, "u": count, "v": count}
-    program = Program(registers, [Map(graph, ("x", "h"), ("u", "v"), shared=("ab", "c"))], record=["u", "v"])
+    program = Program(registers, [Map(graph, tuple(order), ("u", "v"), shared=("ab", "c"))], record=["u", "v"])
     run, elements = runner(program, backend, fma=False), np.arange(count) + 0.5
     start = {"ab": [2.0, 3.0], "c": 7.0, "x": elements, "h": 0.25}
     expected = [*((2.0 + 3.0 * elements) * 0.25), *(7.0 - elements)]
