@@ -3,7 +3,6 @@
 import atexit
 import gc
 import os
-import shutil
 import signal
 import sys
 from collections.abc import Callable, Generator, Iterator
@@ -16,6 +15,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from cgraph.codegen import llvm_engine
+from tests.chromium import chromium
 
 if sys.dont_write_bytecode:  # else every process that a test starts would compile the library anew
     _bytecode = TemporaryDirectory(prefix="cgraph-bytecode-")
@@ -73,10 +73,23 @@ def quick_machine_code(request: pytest.FixtureRequest) -> Iterator[None]:
     """
     users = "optimized" in request.keywords or "HYPOTHESIS_PROFILE" in os.environ
     with pytest.MonkeyPatch.context() as patch:
-        if not (users or {"codegen", "program"} & set(request.path.parts)):
+        if not users:
             patch.setattr(llvm_engine, "LEVEL", 0)
             patch.setattr(llvm_engine.Host, "_translated", _translated)
         yield
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty folder, in which the test runs."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def without(monkeypatch: pytest.MonkeyPatch) -> Callable[[str], None]:
+    """Importing a module fails from here on, as where its package is not installed."""
+    return lambda module: monkeypatch.setitem(sys.modules, module, None)
 
 
 @pytest.fixture
@@ -91,8 +104,7 @@ def ctrl_c() -> Iterator[None]:
 def browser() -> Iterator[Any]:
     """A running Chromium."""
     api = pytest.importorskip("playwright.sync_api", reason="the browser extra has it")
-    program = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-    if program is None:
+    if (program := chromium()) is None:
         pytest.skip("there is no Chromium on PATH")
     with api.sync_playwright() as playwright:
         opened = playwright.chromium.launch(executable_path=program, args=["--no-sandbox"])

@@ -32,15 +32,15 @@ def each_row(
         @pytest.mark.parametrize("each_row_of", cases)
         @wraps(test)
         def whole(each_row_of: list[tuple[Any, ...]], **fixtures: Any) -> None:
-            wrong = {}
+            wrong = []
             for values in each_row_of:
                 try:
                     test(**dict(zip(keys, values, strict=True)), **fixtures)
                 except Exception as error:
                     if len(each_row_of) == 1:
                         raise
-                    wrong[repr(values)[:100]] = f"{type(error).__name__}: {error}"
-            assert wrong == {}
+                    wrong.append(f"{repr(values)[:100]}: {type(error).__name__}: {error}")
+            assert not wrong, "\n".join([f"{len(wrong)} of {len(each_row_of)} rows", *wrong])
 
         others = [each for each in inspect.signature(test).parameters.values() if each.name not in keys]
         row_of = inspect.Parameter("each_row_of", inspect.Parameter.POSITIONAL_OR_KEYWORD)

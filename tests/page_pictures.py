@@ -16,7 +16,8 @@ from pathlib import Path
 
 from PIL import Image
 
-from tests.test_docs import PAGES, ROOT, RUN, chromium, commands, pictures, run_examples
+from tests.chromium import chromium
+from tests.test_docs import PAGES, ROOT, RUN, commands, pictures, run_examples
 from viz import cli
 
 WIDTH, HEIGHT, COLORS = 1200, 760, 64  # of the picture of a page

@@ -3,11 +3,13 @@
 import os
 import re
 import shlex
-import shutil
 import subprocess
 import sys
+from contextlib import chdir, redirect_stdout
+from io import StringIO
 from pathlib import Path
 from pkgutil import resolve_name
+from runpy import run_path
 
 import pytest
 
@@ -33,13 +35,7 @@ RUN = [name for name, page in PAGES.items() if "```python\n" in page]
 FENCE = re.compile(r"^```(\w*)[^\n]*\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 MARK = "-- end of example --"
 SECONDS = 120  # for one page; each takes a few
-# A page's program, whose machine code is made in a quarter of the time, as in most tests.
-QUICKLY = """
-import runpy, sys
-from cgraph.codegen import llvm_engine
-llvm_engine.LEVEL = 0
-runpy.run_path(sys.argv[1], run_name="__main__")
-"""
+APART = ("docs/extending.md", "docs/ensembles.md")  # in processes of their own: rows are added, workers are started
 
 
 def examples(page: str) -> list[tuple[int, str, str]]:
@@ -73,22 +69,17 @@ def commands(page: str) -> list[str]:
     return re.findall(r"^(?:\S*/)?cgraph ([^#\n|]+?) *(?:[#|].*)?$", "\n".join(blocks), re.MULTILINE)
 
 
-def chromium() -> str | None:
-    """The program, where there is one."""
-    return next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-
-
 def texts(svg: Path) -> list[str]:
     """The texts of a drawing."""
     return sorted(re.findall(r"<text[^>]*>([^<]*)", svg.read_text(encoding="utf-8")))
 
 
-def run_examples(name: str, folder: Path, *, quickly: bool = False) -> subprocess.CompletedProcess[str]:
+def run_examples(name: str, folder: Path) -> subprocess.CompletedProcess[str]:
     """The examples of a page, run in the empty folder "empty" of a folder."""
     (folder / "page.py").write_text(program(PAGES[name]), encoding="utf-8")
     (folder / "empty").mkdir()
     return subprocess.run(
-        [sys.executable, "-W", "error", "-X", "utf8", *(["-c", QUICKLY] if quickly else []), str(folder / "page.py")],
+        [sys.executable, "-W", "error", "-X", "utf8", str(folder / "page.py")],
         cwd=folder / "empty",
         env=os.environ | {"PYTHONPATH": str(ROOT)},
         capture_output=True,
@@ -110,9 +101,17 @@ LONG = "docs/derivatives.md"  # its figures take most of the time
 @pytest.mark.parametrize("name", [*[name for name in RUN if name != LONG], *slow(LONG)])
 def test_examples_print_what_is_shown(name: str, tmp_path: Path) -> None:
     """From top to bottom, in one namespace, in an empty folder, and write the pictures that the page shows."""
-    run = run_examples(name, tmp_path, quickly="HYPOTHESIS_PROFILE" not in os.environ)
-    assert run.returncode == 0, run.stderr
-    printed = run.stdout.split(f"{MARK}\n")[:-1]
+    if name in APART:
+        run = run_examples(name, tmp_path)
+        assert run.returncode == 0, run.stderr
+        text = run.stdout
+    else:
+        (tmp_path / "page.py").write_text(program(PAGES[name]), encoding="utf-8")
+        (tmp_path / "empty").mkdir()
+        with redirect_stdout(StringIO()) as output, chdir(tmp_path / "empty"):
+            run_path(str(tmp_path / "page.py"), run_name="__main__")
+        text = output.getvalue()
+    printed = text.split(f"{MARK}\n")[:-1]
     shown = [(line, output) for line, _, output in examples(PAGES[name])]
     assert [(line, text) for (line, _), text in zip(shown, printed, strict=True)] == shown
     folder = tmp_path / "empty"

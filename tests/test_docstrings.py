@@ -53,8 +53,7 @@ def run(example: doctest.DocTest) -> str:
 
 
 @pytest.mark.parametrize("room", examples())
-def test_an_example_prints_what_is_shown(room: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
+def test_an_example_prints_what_is_shown(room: str, here: Path) -> None:
     if absent := list(filter(None, map(run, examples()[room]))):
         pytest.skip(f"not run: {', '.join(absent)}")
 

@@ -1,18 +1,13 @@
 """The structure of the project: which way imports point, what an import loads, how long a file may be."""
 
 import ast
-import json
-import os
 import re
-import subprocess
 import sys
 import tomllib
 from collections.abc import Iterable, Iterator
-from pathlib import Path
 
 import pytest
 
-import viz
 from tests.sources import PACKAGES, ROOT, Source, sources as read_sources
 
 PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
@@ -42,8 +37,6 @@ OPTIONAL = {
 }
 
 FILE, CLASS, FUNCTION = 400, 200, 60  # lines at most; of a class and of a function without docstrings
-LABORATORY = tuple([f"dynamics.{room}" for room in ("experiments", "peers", "verification", "multiprecision")])
-MODULES = 200  # of ours, which a first run of `simulate` loads at most
 LONGER: dict[str, str] = {}  # {file, or file::name: why it may be longer}
 MODELS = {"Model", "System", "OdeSystem", "Mechanism", "PlanarArm", "Scene"}  # nobody asks which of them it has
 MUJOCO = ("dynamics/io/mujoco_twin.py",)  # its models are MuJoCo's, without types
@@ -110,21 +103,6 @@ def test_the_core_is_small_and_imports_numpy_and_the_standard_library_alone(sour
     assert len(core) <= 12
     assert sum(map(len, texts.values())) <= 1300
     assert code <= 700
-
-
-def test_the_core_loads_nothing_else_of_ours(tmp_path: Path) -> None:
-    modules = [f"cgraph.core.{path.stem}" for path in (ROOT / "cgraph" / "core").glob("[!_]*.py")]
-    program = f"import {', '.join(modules)}; print(*[m for m in sys.modules if m.startswith('cgraph.')])"
-    run = subprocess.run(
-        [sys.executable, "-c", f"import sys; {program}"], cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)},
-        capture_output=True, text=True, check=True
-    )  # fmt: skip
-    assert set(run.stdout.split()) - set(modules) == {
-        "cgraph.core",
-        "cgraph.util",
-        "cgraph.util.doors",
-        "cgraph.util.version",
-    }
 
 
 def test_no_public_function_takes_a_model_of_any_type(sources: dict[str, Source]) -> None:
@@ -203,67 +181,6 @@ def test_a_docstring_says_more_than_where_to_look(sources: dict[str, Source]) ->
         if pointer.fullmatch(text)
     ]
     assert found == []
-
-
-def loaded(program: str, folder: Path) -> dict[str, set[str]]:
-    """{step: packages loaded up to there} of a program that calls `step(name)`, run in a process of its own."""
-    text = (
-        "import atexit, contextlib, io, json, sys, numpy.random\n"
-        "old, steps = set(sys.modules), {}\n"
-        "def step(name): steps[name] = sorted({each.partition('.')[0] for each in set(sys.modules) - old})\n"
-        f"{program}\n"
-        "print(json.dumps(steps))"
-    )
-    run = subprocess.run(
-        [sys.executable, "-c", text], cwd=folder, env=os.environ | {"PYTHONPATH": str(ROOT)}, capture_output=True,
-        text=True, check=False
-    )  # fmt: skip
-    assert run.returncode == 0, run.stderr
-    return {name: set(packages) - {"__mp_main__"} for name, packages in json.loads(run.stdout).items()}
-
-
-def test_a_simulation_loads_what_it_uses() -> None:
-    program = (
-        "import sys, dynamics as dyn\n"
-        "dyn.simulate(dyn.planar_arm([1.0, 0.8], [1.0, 0.8]), [1.0, 0.5], [0.0, 0.0], t_end=1.0)\n"
-        "print(*[name for name in sys.modules if name.partition('.')[0] in ('cgraph', 'dynamics')])"
-    )
-    environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    run = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True)
-    names = run.stdout.split()
-    assert "dynamics.simulation.simulate" in names
-    assert not any(name.startswith("cgraph.autodiff.balanced") for name in names)  # an order that is asked for
-    assert len(names) <= MODULES
-    assert [name for name in names if name.startswith(LABORATORY)] == []
-
-
-def test_importing_a_package_loads_numpy_and_the_standard_library(tmp_path: Path) -> None:
-    steps = loaded("\n".join([f"import {package}; step('{package}')" for package in PACKAGES]), tmp_path)
-    own = {"cgraph": {"cgraph"}, "dynamics": {"cgraph", "dynamics"}, "viz": {"cgraph", "dynamics", "viz"}}
-    for package, packages in steps.items():
-        assert package in packages
-        assert packages <= {*sys.stdlib_module_names, "numpy", *own[package]}, package
-
-
-def test_drawing_knows_nothing_of_mechanics(tmp_path: Path) -> None:
-    drawing = sorted({*viz.__all__} - {"animate", "driven", "inspect", "lesson", "live_page", "typed_text"})
-    assert "dynamics" not in loaded(f"from viz import {', '.join(drawing)}; step('viz')", tmp_path)["viz"]
-
-
-def test_a_command_loads_no_optional_dependency_that_it_does_not_use(tmp_path: Path) -> None:
-    commands = ["scenes", "draw --help", "report --help", "--help", "draw chain --out a.dot"]
-    program = (
-        "import viz.cli\n"
-        "def main(command):\n"
-        "    with contextlib.redirect_stdout(io.StringIO()), contextlib.suppress(SystemExit):\n"
-        "        viz.cli.main(command.split())\n"
-        "    step(command)\n"
-        f"for command in {commands}: main(command)"
-    )
-    plain = {*sys.stdlib_module_names, "numpy", *PACKAGES}
-    for command, packages in loaded(program, tmp_path).items():
-        assert "viz" in packages
-        assert packages <= plain | ({"graphviz"} if ".dot" in command else set()), command
 
 
 def test_every_package_is_typed() -> None:

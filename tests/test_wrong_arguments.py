@@ -536,9 +536,8 @@ ROOMS = sorted({name.rpartition(".")[0] for name in CALLS})
 @pytest.mark.filterwarnings("ignore")
 @pytest.mark.parametrize("labels", [FEW, pytest.param(tuple(JUNK.keys() - set(FEW)), marks=pytest.mark.slow)])
 @pytest.mark.parametrize("room", ROOMS)
-def test_junk_in_any_place_is_told_in_a_sentence(room, labels, monkeypatch, tmp_path):
+def test_junk_in_any_place_is_told_in_a_sentence(room, labels, here):
     """Whatever stands in place of a right argument or entry: an answer, or an error that the library itself raises."""
-    monkeypatch.chdir(tmp_path)
     names = [name for name in CALLS if name.rpartition(".")[0] == room]
     assert {name: found for name in names if (found := list(faults(name, labels)))} == {}
 

@@ -9,7 +9,6 @@ import re
 import shutil
 import subprocess
 import sys
-import warnings
 from importlib import import_module
 from pathlib import Path
 
@@ -19,7 +18,6 @@ import cgraph as cg
 import dynamics as dyn
 import viz
 from dynamics import scenes
-from dynamics.scenes import scenes as registry
 from tests.each_row import each_row
 from tests.slow import slow
 from viz import cli
@@ -128,16 +126,15 @@ def test_a_model_file_stands_where_a_scene_s_name_does(tmp_path, capsys):
         ("report chain --pruning --lock a=1 --lock a=2", "--lock takes each body once"),
     ],
 )
-def test_a_mistake_gets_one_line_and_exit_status_2(tmp_path, monkeypatch, capsys, arguments, said):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "a_file").write_text("in the way")
+def test_a_mistake_gets_one_line_and_exit_status_2(here, capsys, arguments, said):
+    (here / "a_file").write_text("in the way")
     assert cli.main(arguments.split() if isinstance(arguments, str) else arguments) == 2
     error = capsys.readouterr().err
     assert error.count("\n") == 1
     assert error.startswith("cgraph: error: ")
     assert "Errno" not in error
     assert said in error
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["a_file"]
+    assert sorted(path.name for path in here.iterdir()) == ["a_file"]
 
 
 def test_the_exit_status_of_a_process_is_the_command_s():
@@ -146,43 +143,22 @@ def test_the_exit_status_of_a_process_is_the_command_s():
     assert done.stderr == "cgraph: error: there is no file 'nowhere.xml'\n"
 
 
-def test_what_the_system_says_has_no_number(monkeypatch, capsys):
-    def fail(_):
-        open("/nowhere/at/all")  # noqa: PTH123, SIM115 - what raises is Python itself
-
-    monkeypatch.setattr("viz.commands.scenes.run", fail)
-    assert cli.main(["scenes"]) == 2
-    assert capsys.readouterr().err == "cgraph: error: /nowhere/at/all: No such file or directory\n"
+USAGE = """paint|draw|draw chain --out x.dot --formulation f|lint|why spring_mass tau0|why spring_mass tau0 q0 --k -1
+why spring_mass tau0 q0 --at q0|why spring_mass tau0 q0 --at q0=nan|why spring_mass tau0 q0 --at q0=1,q0=2
+lint spring_mass --box q0=0:1,q0=0:2|certify spring_mass --seed -1|bench --budget -1|lesson
+inspect spring_mass --out x.html --t-end 0|why spring_mass tau0 q0 --svg answer.png
+why spring_mass tau0 q0 --forward --formulation kinetic_only|lint spring_mass --box q0=1|lint spring_mass --box q0=2:1
+compare spring_mass --formulations chain_rule|compare spring_mass --formulations chain_rule none
+simulate chain --start a,b|simulate chain --start q0=1,q0=2|simulate chain --t-end -1|simulate chain --rtol 0
+draw chain --out a.dot --forward --formulation kinetic_only"""
 
 
 @each_row(
     ("arguments", "said"),
     [
-        ("paint", ""),
-        ("draw", ""),
-        ("draw chain --out x.dot --formulation f", ""),
-        ("lint", ""),
-        ("why spring_mass tau0", ""),
-        ("why spring_mass tau0 q0 --k -1", ""),
-        ("why spring_mass tau0 q0 --at q0", ""),
-        ("why spring_mass tau0 q0 --at q0=nan", ""),
-        ("why spring_mass tau0 q0 --at q0=1,q0=2", ""),
-        ("lint spring_mass --box q0=0:1,q0=0:2", ""),
-        ("certify spring_mass --seed -1", ""),
-        ("bench --budget -1", ""),
-        ("inspect spring_mass --out x.html --t-end 0", ""),
-        ("why spring_mass tau0 q0 --svg answer.png", ""),
-        ("why spring_mass tau0 q0 --forward --formulation kinetic_only", ""),
-        ("lint spring_mass --box q0=1", ""),
-        ("lint spring_mass --box q0=2:1", ""),
-        ("compare spring_mass --formulations chain_rule", ""),
-        ("compare spring_mass --formulations chain_rule none", ""),
-        ("lesson", ""),
-        ("simulate chain --start a,b", ""),
-        ("simulate chain --start q0=1,q0=2", ""),
-        ("simulate chain --t-end -1", ""),
-        ("simulate chain --rtol 0", ""),
-        ("draw chain --out a.dot --forward --formulation kinetic_only", ""),
+        *[(line, "") for line in re.split(r"[|\n]", USAGE)],
+        ("draw chain chain --out a.dot", "unrecognized arguments: "),
+        ("bench --quickly", "unrecognized arguments: "),
         ("report spring_mass --start a,b", "argument --start: expected a finite number, got 'a'"),
         ("report spring_mass --start 1,nan", "argument --start: expected a finite number, got 'nan'"),
         ("report spring_mass --pruning --lock tip=x", "argument --lock: expected a finite number, got 'x'"),
@@ -207,6 +183,15 @@ NAMES = [*COMMANDS]
 
 
 def test_every_command_is_in_the_help_and_has_help(capsys):
+    taking = {
+        name: action.help
+        for name, command in complete().items()
+        for action in command._actions
+        if "SCENE" in str(action.metavar) and not action.option_strings
+    }
+    assert {"inspect", "simulate", "animate", "lint", "why", "draw", "certify", "compare", "report"} <= set(taking)
+    assert [name for name, said in taking.items() if IN_PYTHON not in said] == []
+    assert list(FORMULATIONS) == sorted(dyn.FORMULATIONS)
     shown = {}
     for arguments in ([], *([name] for name in NAMES)):
         with pytest.raises(SystemExit) as stop:
@@ -216,17 +201,6 @@ def test_every_command_is_in_the_help_and_has_help(capsys):
     for name in NAMES:
         assert re.search(rf"^    {name}\s", shown[""], re.MULTILINE), name
         assert shown[name].startswith(f"usage: cgraph {name} ")
-
-
-def test_every_command_that_takes_a_scene_says_that_a_python_file_will_do():
-    taking = {
-        name: action.help
-        for name, command in complete().items()
-        for action in command._actions
-        if "SCENE" in str(action.metavar) and not action.option_strings
-    }
-    assert {"inspect", "simulate", "animate", "lint", "why", "draw", "certify", "compare", "report"} <= set(taking)
-    assert [name for name, said in taking.items() if IN_PYTHON not in said] == []
 
 
 def test_a_command_is_loaded_alone(monkeypatch):
@@ -243,23 +217,10 @@ def test_a_command_is_loaded_alone(monkeypatch):
     assert asked[1:] == [f".{name}" for name in COMMANDS]
 
 
-def test_a_formulation_is_chosen_of_those_that_there_are():
-    assert list(FORMULATIONS) == sorted(dyn.FORMULATIONS)
-
-
 def test_every_file_of_commands_is_listed_or_helps_one_that_is():
     files = {path.stem for path in Path(cli.__file__).parent.joinpath("commands").glob("*.py")}
     runs = {name for name in files - {"__init__"} if hasattr(import_module(f"viz.commands.{name}"), "add")}
     assert runs == set(NAMES)
-
-
-def test_ctrl_c_gives_one_line_and_exit_status_230(monkeypatch, capsys):
-    def interrupt(_):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("viz.commands.scenes.run", interrupt)
-    assert cli.main(["scenes"]) == 130
-    assert capsys.readouterr().err == "cgraph: interrupted\n"
 
 
 def test_the_version_is_one(capsys):
@@ -313,14 +274,6 @@ def test_words_of_a_list_may_stand_between_options():
     assert parse(["report", "--quick", "chain", "--json", "spring_mass"]).scenes == ["chain", "spring_mass"]
 
 
-@each_row("arguments", [["draw", "chain", "chain", "--out", "a.dot"], ["bench", "--quickly"]])
-def test_what_no_list_takes_is_refused(capsys, arguments):
-    with pytest.raises(SystemExit) as stop:
-        parse(arguments)
-    assert stop.value.code == 2
-    assert "unrecognized arguments: " in capsys.readouterr().err
-
-
 def test_tags_to_collapse_are_given_one_by_one_or_in_a_list(tmp_path, capsys):
     texts = []
     for i, tags in enumerate((["kinetic,potential"], ["kinetic", "--collapse", "potential"], [""])):
@@ -356,15 +309,14 @@ def test_a_joint_is_locked_by_its_body_or_its_coordinate(capsys):
         assert f"{scene} has no joint 'elbow' to lock; {said}" in capsys.readouterr().err
 
 
-def test_json_of_a_report_writes_no_file_unless_a_folder_is_named(tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
+def test_json_of_a_report_writes_no_file_unless_a_folder_is_named(here, capsys):
     assert cli.main(["report", "spring_mass", "--pruning", "--json"]) == 0
-    assert not [*tmp_path.iterdir()]
+    assert not [*here.iterdir()]
     printed = capsys.readouterr()
     assert json.loads(printed.out)
     assert printed.err == ""
     assert cli.main(["report", "spring_mass", "--pruning", "--json", "--out", "there"]) == 0
-    assert {path.suffix for path in (tmp_path / "there").iterdir()} == {".json", ".md", ".html"}
+    assert {path.suffix for path in (here / "there").iterdir()} == {".json", ".md", ".html"}
 
 
 @pytest.mark.parametrize(
@@ -377,14 +329,13 @@ def test_json_of_a_report_writes_no_file_unless_a_folder_is_named(tmp_path, monk
     ],
 )
 @each_row("target", ["missing/a.svg", "folder.svg"])
-def test_a_place_that_cannot_be_written_is_told_before_the_work(tmp_path, monkeypatch, capsys, arguments, target):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "folder.svg").mkdir(exist_ok=True)
+def test_a_place_that_cannot_be_written_is_told_before_the_work(here, capsys, arguments, target):
+    (here / "folder.svg").mkdir(exist_ok=True)
     assert cli.main(arguments.format(target).split()) == 2
     printed = capsys.readouterr()
     assert printed.out == ""
     assert "cannot write" in printed.err
-    assert [path.name for path in tmp_path.rglob("*")] == ["folder.svg"]
+    assert [path.name for path in here.rglob("*")] == ["folder.svg"]
 
 
 @pytest.mark.parametrize(
@@ -398,49 +349,36 @@ def test_a_place_that_cannot_be_written_is_told_before_the_work(tmp_path, monkey
         ("mujoco", "mujoco", "draw robot.xml --out a.svg"),
     ],
 )
-def test_a_missing_package_is_an_error_that_names_its_extra(tmp_path, monkeypatch, capsys, module, extra, arguments):
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setitem(sys.modules, module, None)
-    (tmp_path / "robot.xml").write_text(MODEL)
+def test_a_missing_package_is_an_error_that_names_its_extra(here, without, capsys, module, extra, arguments):
+    without(module)
+    (here / "robot.xml").write_text(MODEL)
     assert cli.main(arguments.split()) == 2
     printed = capsys.readouterr()
     assert printed.out == ""
     assert f"pip install '.[{extra}]'" in printed.err.splitlines()[-1]
-    assert [path.name for path in tmp_path.iterdir()] == ["robot.xml"]
+    assert [path.name for path in here.iterdir()] == ["robot.xml"]
 
 
-def test_peers_that_a_figure_does_without_are_named_with_their_extra(monkeypatch, capsys):
-    monkeypatch.setitem(sys.modules, "mujoco", None)
-    monkeypatch.setitem(sys.modules, "pinocchio", None)
+def test_peers_that_a_figure_does_without_are_named_with_their_extra(without, capsys):
+    without("mujoco")
+    without("pinocchio")
     assert cli.main(["bench", "agreement", "--links", "1", "--count", "1"]) == 0
     printed = capsys.readouterr().out
     assert "MuJoCo is not installed: in a checkout of cgraph, pip install '.[mujoco]'" in printed
     assert "Pinocchio is not installed: in a checkout of cgraph, pip install '.[bench]'" in printed
 
 
-def test_a_warning_is_a_line_once(monkeypatch, capsys):
-    def warn(_):
-        for _ in range(3):
-            warnings.warn("this is odd", stacklevel=1)
-
-    monkeypatch.setattr("viz.commands.scenes.run", warn)
-    with warnings.catch_warnings():
-        warnings.simplefilter("always")
-        assert cli.main(["scenes"]) == 0
-    assert capsys.readouterr().err == "cgraph: warning: this is odd\n"
-
-
-def runaway():
-    """A particle whose acceleration grows with its place: it is at infinity before its time."""
-    system = dyn.System(lambda q, qd, t, p: qd[0] ** 2 / 2 + q[0] ** 4, ["x"])
-    return dyn.Scene("runaway", "it ends at infinity", system, (1.0,), (0.0,), 10.0)
+LATE = """import dynamics as dyn
+runaway = dyn.System(lambda q, qd, t, p: qd[0] ** 2 / 2 + q[0] ** 4, ["x"])  # at infinity before its time
+late = dyn.Scene("late", "it ends at infinity", runaway, (1.0,), (0.0,), 10.0)
+"""
 
 
 @pytest.mark.filterwarnings("always:the run stopped:dynamics.SimulationWarning")
-def test_a_motion_that_ends_before_its_time_is_a_finding_and_the_page_says_so(tmp_path, monkeypatch, capsys):
-    monkeypatch.setitem(registry._SCENES, "runaway", runaway)
-    page = tmp_path / "a.html"
-    assert cli.main(["inspect", "runaway", "--out", str(page)]) == 1
+def test_a_motion_that_ends_before_its_time_is_a_finding_and_the_page_says_so(here, capsys):
+    page = here / "a.html"
+    (here / "own.py").write_text(LATE)
+    assert cli.main(["inspect", "own.py:late", "--out", str(page)]) == 1
     said = capsys.readouterr().err
     (line,) = [line for line in said.splitlines() if "stopped" in line]
     sentence = f"The motion is not whole: it {line.removeprefix('cgraph: warning: the run ')}."
@@ -458,17 +396,16 @@ def test_the_stages_of_an_inspection_are_told_as_they_begin(tmp_path, capsys):
 
 
 @pytest.mark.parametrize("arguments", ["report spring_mass --pruning --out a/b", "inspect spring_mass --out a.html"])
-def test_a_disk_that_is_full_leaves_nothing_half(tmp_path, monkeypatch, capsys, arguments):
+def test_a_disk_that_is_full_leaves_nothing_half(here, monkeypatch, capsys, arguments):
     def full(self, data):
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(Path, "write_bytes", full)
     assert cli.main(arguments.split()) == 2
     printed = capsys.readouterr()
     assert printed.out == ""
     assert "No space left on device" in printed.err
-    assert not [*tmp_path.rglob("*")]
+    assert not [*here.rglob("*")]
 
 
 def test_without_arguments_the_commands_are_listed(capsys):

@@ -7,7 +7,8 @@ import os
 import re
 import shlex
 import sys
-import tempfile
+import warnings
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -47,14 +48,13 @@ def ended(command: str) -> object:
 
 @pytest.mark.parametrize(("command", "status"), RUN)
 def test_an_example_ends_with_its_status(
-    command: str, status: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    command: str, status: int, here: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.chdir(tmp_path)
     assert ended(command) == status
     printed = capsys.readouterr()
     assert bool(printed.out) == (status != cli.ERROR)
     assert status != cli.ERROR or "error: " in printed.err.splitlines()[-1]
-    assert status != cli.ERROR or not [*tmp_path.iterdir()]
+    assert status != cli.ERROR or not [*here.iterdir()]
 
 
 @pytest.mark.parametrize("arguments", ["completion bash", "why chain tau0 q9 --k 2000"], ids=["short", "long"])
@@ -70,14 +70,46 @@ def test_a_reader_who_leaves_ends_the_command_without_a_word(
     assert capsys.readouterr().err == ""
 
 
-def test_a_pipe_that_breaks_elsewhere_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    def broken(_: object) -> None:
-        raise BrokenPipeError(errno.EPIPE, os.strerror(errno.EPIPE))
+def raised(error: BaseException) -> Callable[[object], None]:
+    """A command that fails."""
 
-    monkeypatch.setattr("viz.commands.scenes.run", broken)
-    with tempfile.TemporaryFile("w") as output:
-        monkeypatch.setattr(sys, "stdout", output)
-        assert cli.main(["scenes"]) == cli.ERROR
+    def command(_: object) -> None:
+        raise error
+
+    return command
+
+
+def warned(_: object) -> None:
+    for _ in range(3):
+        warnings.warn("this is odd", stacklevel=1)
+
+
+ENDS = {  # of a command, its status and its last line
+    "an error of the system": (raised(FileNotFoundError(errno.ENOENT, "No such file", "/nowhere")), cli.ERROR,
+                               "cgraph: error: /nowhere: No such file"),
+    "a pipe that breaks elsewhere": (raised(BrokenPipeError(errno.EPIPE, "Broken pipe")), cli.ERROR,
+                                     "cgraph: error: Broken pipe"),
+    "Ctrl-C": (raised(KeyboardInterrupt()), 130, "cgraph: interrupted"),
+    "a mistake of ours": (raised(KeyError("ours")), cli.ERROR, "KeyError: 'ours'"),
+    "a warning, given three times": (warned, cli.SUCCESS, "cgraph: warning: this is odd"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", ENDS)
+def test_a_command_that_fails_ends_with_a_status_and_a_line(
+    what: str, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    command, status, line = ENDS[what]
+    monkeypatch.setattr("viz.commands.scenes.run", command)
+    for of_a_process in ("watch_loading", "ignore_late"):
+        monkeypatch.setattr(cli, of_a_process, lambda: None)
+    monkeypatch.setattr(sys, "argv", ["cgraph", "scenes"])
+    with warnings.catch_warnings():
+        warnings.simplefilter("always")
+        assert cli.start() == status
+    lines = capfd.readouterr().err.splitlines()
+    assert lines[-1] == line
+    assert len(lines) == 1 or "Traceback" in lines[0]
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no /dev/full")
@@ -93,15 +125,3 @@ def test_a_full_disk_is_an_error_in_one_line(
 def test_a_closed_output_is_no_error(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "stdout", None)
     assert cli.main(["completion", "bash"]) == cli.SUCCESS
-
-
-def test_a_mistake_of_ours_is_no_finding(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    def mistake(_: object) -> None:
-        raise KeyError("ours")
-
-    monkeypatch.setattr("viz.commands.scenes.run", mistake)
-    for of_a_process in ("watch_loading", "ignore_late"):
-        monkeypatch.setattr(cli, of_a_process, lambda: None)
-    monkeypatch.setattr(sys, "argv", ["cgraph", "scenes"])
-    assert cli.start() == cli.ERROR
-    assert "KeyError: 'ours'" in capsys.readouterr().err

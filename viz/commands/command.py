@@ -9,7 +9,6 @@ from importlib import import_module
 from typing import Any
 
 from cgraph import __version__
-from cgraph.extend import or_nearest
 
 
 class Command(argparse.ArgumentParser):
@@ -103,6 +102,8 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     if not words:
         words = ["--help"]
     elif not words[0].startswith("-") and words[0] not in COMMANDS:
+        from cgraph.extend import or_nearest  # here, so that a command that is known does not wait for it
+
         whole.error(f"there is no command {words[0]!r}: {or_nearest(words[0], list(COMMANDS))}")
     options, rest = whole.parse_known_args(words)
     if rest:

@@ -11,6 +11,7 @@ from cgraph.autodiff.hessian_solve import solve_nodes
 from cgraph.autodiff.jacobian import hessian_nodes
 from cgraph.autodiff.symmetric_elimination import SingularError
 from cgraph.core.traversal import topological
+from tests.each_row import each_row
 from tests.tolerances import EQUATIONS, LONG_SUM
 
 from .test_hessian_solve import FUNCTIONS, turning
@@ -58,7 +59,7 @@ def missing(total, x, values, rhs, **how):
 
 
 @pytest.mark.usefixtures("small_pieces")
-@pytest.mark.parametrize("name", [*FUNCTIONS, "turning"])
+@each_row("name", [*FUNCTIONS, "turning"])
 def test_functions_of_all_kinds_are_solved_in_pieces(name):
     function, n = (lambda m, *x: turning(m, 0.3, -0.8, x), 5) if name == "turning" else FUNCTIONS[name]
     x = cg.variables([f"x{i}" for i in range(n)])
@@ -68,9 +69,9 @@ def test_functions_of_all_kinds_are_solved_in_pieces(name):
         assert missing(function(cg, *x), x, values, rng.normal(size=n), order="balanced") < LONG_SUM
 
 
-@pytest.mark.parametrize("leaf", [SMALL, dissection.LEAF])
-@pytest.mark.parametrize("branches", [0.0, 0.4])
-@pytest.mark.parametrize("still", [0.0, 0.4])
+@each_row(
+    ("leaf", "branches", "still"), [(SMALL, 0.0, 0.4), (SMALL, 0.4, 0.0), (dissection.LEAF, 0.4, 0.4), (SMALL, 0, 0)]
+)
 def test_chains_and_trees_are_solved_in_pieces(monkeypatch, leaf, branches, still):
     """Some of them with variables that have no inertia before others have left."""
     monkeypatch.setattr(dissection, "LEAF", leaf)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
+import cgraph as cg
 from cgraph.autodiff import coloring
 from cgraph.autodiff.coloring import NONE, jacobian_coloring, star_coloring
 from cgraph.autodiff.sparsity import Pattern, symmetric
@@ -151,3 +152,7 @@ def test_names_are_looked_up_and_not_compared():
     names = [Name(f"x{k}") for k in range(100)]
     assert free_suffix("_dot", tuple(names), [str(name) for name in names]) == "_dot"
     assert Name.compared < len(names)
+    inputs = cg.variables([str(name) for name in names])
+    graph, Name.compared = cg.Graph(inputs, {"y": inputs[0]}), 0
+    assert graph.evaluate(dict.fromkeys(names, 1.0)) == {"y": 1.0}
+    assert Name.compared < 5 * len(names)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from fractions import Fraction
 from functools import partial
 from itertools import pairwise
@@ -21,6 +22,8 @@ from cgraph.autodiff.rotation_pairs import rotations
 from cgraph.autodiff.symmetric_elimination import SingularError
 from cgraph.core.forward import tangents
 from cgraph.core.traversal import topological
+from tests.cgraph.engines import ENGINES
+from tests.each_row import each_row
 from tests.tolerances import LONG_SUM
 
 # Each function runs on nodes and, with mpmath's functions, on high-precision numbers: {name: (function, inputs)}.
@@ -36,28 +39,36 @@ FUNCTIONS = {
 }
 
 
-@pytest.mark.parametrize("name", FUNCTIONS)
-def test_solves_with_the_hessian(name):
+def solution(function: Callable[..., cg.Node], n: int, inputs: Sequence[cg.Node] = ()) -> cg.Graph:
+    """x0.., r0.. -> s0.., pivot: what solves with the Hessian of the function, and the first pivot that fails."""
+    x, rhs = (cg.variables([f"{name}{i}" for i in range(n)]) for name in "xr")
+    *solved, info = cg.hessian_solve(cg.Graph([*inputs, *x], {"f": function(*x)}), x, rhs, check=True)
+    return cg.Graph([*inputs, *x, *rhs], {f"s{i}": node for i, node in enumerate(solved)} | {"info": info})
+
+
+def assert_solved(function: Callable[..., object], found: np.ndarray, point: np.ndarray, right: np.ndarray) -> None:
+    """The Hessian, of numbers of mpmath, times what was found is the right-hand side; no pivot failed."""
+    n = len(point)
+    hessian = np.empty((n, n))
+    with mpmath.workdps(40):
+        for i, j in np.ndindex(n, n):
+            orders = tuple((k == i) + (k == j) for k in range(n))
+            hessian[i, j] = mpmath.diff(function, tuple(map(mpmath.mpf, point)), orders)
+    expected = np.linalg.solve(hessian, right)
+    assert found[:n] == pytest.approx(expected, rel=LONG_SUM, abs=LONG_SUM * np.abs(expected).max())
+    assert found[n] == 0.0
+
+
+@each_row("name", FUNCTIONS)
+def test_solves_with_the_hessian_and_where_it_is_positive_definite_no_pivot_fails(name):
     function, n = FUNCTIONS[name]
-    x = cg.variables([f"x{i}" for i in range(n)])
-    rhs = cg.variables([f"r{i}" for i in range(n)])
-    solved = cg.hessian_solve(cg.Graph(x, {"f": function(cg, *x)}), x, rhs)
-    graph = cg.Graph([*x, *rhs], {f"s{i}": node for i, node in enumerate(solved)})
-    rng = np.random.default_rng(3)
+    compiled, rng = cg.compile(solution(lambda *x: function(cg, *x), n)), np.random.default_rng(3)
     for _ in range(5):
         point, right = rng.uniform(-0.6, 0.6, n), rng.normal(size=n)
-        with mpmath.workdps(40):
-            hessian = np.empty((n, n))
-            for i in range(n):
-                for j in range(n):
-                    orders = tuple((k == i) + (k == j) for k in range(n))
-                    hessian[i, j] = mpmath.diff(lambda *v: function(mpmath, *v), tuple(map(mpmath.mpf, point)), orders)
-        expected = np.linalg.solve(hessian, right)
-        found = cg.compile(graph)(np.concatenate([point, right]))
-        assert found == pytest.approx(expected, rel=LONG_SUM, abs=LONG_SUM * np.abs(expected).max())
+        assert_solved(lambda *v: function(mpmath, *v), compiled(np.concatenate([point, right])), point, right)
 
 
-@pytest.mark.parametrize("name", FUNCTIONS)
+@each_row("name", FUNCTIONS)
 def test_tangents_are_those_of_the_solution_at_every_node(name):
     """By forward mode along it."""
     function, n = FUNCTIONS[name]
@@ -75,7 +86,7 @@ def test_tangents_are_those_of_the_solution_at_every_node(name):
     assert values[n:] == pytest.approx(list(graph.evaluate(point | along).values()), rel=1e-12, abs=1e-12)
 
 
-@pytest.mark.parametrize("n", [10, 40, 160])
+@each_row("n", [10, 40, 160])
 def test_a_chain_costs_nodes_in_proportion_to_its_length(n):
     x = cg.variables([f"x{i}" for i in range(n)])
     angle = x[0]
@@ -107,41 +118,15 @@ def test_wrong_calls_say_what_was_needed():
         cg.hessian_solve(cg.Graph([x], {"f": x * x, "g": x}), [x], [1.0])
 
 
-def solution(function: Callable[..., cg.Node], n: int) -> cg.Graph:
-    """x0.., r0.. -> s0.., pivot: what solves with the Hessian of the function, and the first pivot that fails."""
-    x, rhs = (cg.variables([f"{name}{i}" for i in range(n)]) for name in "xr")
-    *solved, info = cg.hessian_solve(cg.Graph(x, {"f": function(*x)}), x, rhs, check=True)
-    return cg.Graph([*x, *rhs], {f"s{i}": node for i, node in enumerate(solved)} | {"info": info})
-
-
-@pytest.mark.parametrize("name", FUNCTIONS)
-def test_where_the_hessian_is_positive_definite_no_pivot_fails(name):
-    function, n = FUNCTIONS[name]
-    graph = solution(lambda *x: function(cg, *x), n)
-    for point in np.random.default_rng(3).uniform(-0.6, 0.6, (5, n)):
-        values = dict(zip(graph.input_names, [*point, *[1.0] * n], strict=True))
-        assert graph.evaluate(values)["info"] == 0.0
-
-
-@pytest.mark.parametrize("backend", ["python", "numpy", "llvm"])
+@pytest.mark.parametrize("backend", ENGINES)
 def test_a_pivot_that_is_not_positive_is_found_as_it_happens(backend):
-    if backend == "llvm":
-        pytest.importorskip("llvmlite")
     # Eliminated from the last variable up: d2f/dx2^2 = 6 x2, d2f/dx1^2 = x0, and for x0 there remains 10 - x1^2 / x0.
     graph = solution(lambda x0, x1, x2: 5 * x0 * x0 + 0.5 * x0 * x1 * x1 + x2 * x2 * x2, 3)
     function = cg.compile(graph, backend=backend)
 
-    def pivot(x0: float, x1: float, x2: float) -> float:
-        return float(function([x0, x1, x2, 1.0, 1.0, 1.0])[-1])
-
-    assert pivot(1.0, 0.0, 1.0) == 0
-    assert pivot(1.0, 0.0, 0.0) == 3
-    assert pivot(1.0, 0.0, -1.0) == 3
-    assert pivot(0.0, 0.0, 1.0) == 2
-    assert pivot(-1.0, 0.0, 1.0) == 2
-    assert pivot(1.0, 100.0, 1.0) == 1  # 10 - x1^2 / x0
-    assert pivot(np.nan, 0.0, 1.0) == 2
-    assert pivot(1.0, 0.0, np.nan) == 3
+    nan = math.nan
+    points = [(1, 0, 1), (1, 0, 0), (1, 0, -1), (0, 0, 1), (-1, 0, 1), (1, 100, 1), (nan, 0, 1), (1, 0, nan)]
+    assert [function([*point, 1.0, 1.0, 1.0])[-1] for point in points] == [0, 3, 3, 2, 2, 1, 2, 3]
 
 
 def test_the_pivots_of_a_matrix_are_watched_too():
@@ -176,7 +161,7 @@ def test_a_negative_constant_pivot_is_an_error_at_once():
     assert caught.value.index == 1
 
 
-@pytest.mark.parametrize("point", [-1.0, 0.25])
+@each_row("point", [-1.0, 0.25])
 def test_a_branch_that_is_not_taken_counts_nothing(point):
     x, y = cg.variables("x y")
     root = cg.where(x > 0, x * cg.sqrt(x), 0.0) + cg.exp(cg.sqrt(cg.maximum(x, 0.0)))
@@ -204,6 +189,13 @@ def test_pivots_that_are_zero_are_taken_in_pairs():
         cg.hessian_solve(cg.Graph(v[:3], {"f": v[0] * v[1] + v[1] * v[2]}), v[:3], rhs[:3])
 
 
+def alike(inputs: list[cg.Node], carried: list[cg.Node], apart: list[cg.Node]) -> bool:
+    """Whether two lists of nodes have the same values."""
+    graph = cg.Graph(inputs, {f"s{i}": node for i, node in enumerate([*carried, *apart])})
+    found = cg.compile(graph)(np.random.default_rng(0).uniform(0.2, 0.8, len(inputs)))
+    return bool(found[: len(carried)] == pytest.approx(found[len(carried) :], rel=LONG_SUM))
+
+
 def test_right_hand_sides_at_inner_nodes_are_carried_to_the_variables():
     x = cg.variables("x0 x1 x2")
     y, z = x[0] + cg.sin(x[1]), cg.exp(x[1]) * x[2]
@@ -213,10 +205,15 @@ def test_right_hand_sides_at_inner_nodes_are_carried_to_the_variables():
     slopes = cg.jacobian(cg.Graph(x, {"y": y, "z": z}))(*x)
     rhs = [b[i] + slopes[f"dy/dx{i}"] * b[3] + slopes[f"dz/dx{i}"] * b[4] for i in range(3)]
     rhs[0] = rhs[0] + b[0]
-    apart = cg.hessian_solve(cg.Graph(x, {"f": energy}), x, rhs)
-    graph = cg.Graph([*x, *b], {f"s{i}": node for i, node in enumerate([*carried, *apart])})
-    found = cg.compile(graph)(np.random.default_rng(0).uniform(0.2, 0.8, 8))
-    assert found[:3] == pytest.approx(found[3:], rel=LONG_SUM)
+    assert alike([*x, *b], carried, cg.hessian_solve(cg.Graph(x, {"f": energy}), x, rhs))
+    a, *x = cg.variables("a x0 x1")  # and at a product within a rotation
+    c, s = cg.cos(a), cg.sin(a)
+    product = c * x[0]
+    p, q = product + s * x[1], c * x[1] - s * x[0]
+    energy = p * p + p * q + 3 * q * q
+    carried = solve_nodes(energy, x, b[:2], at={product: b[2]})
+    apart = cg.hessian_solve(cg.Graph([a, *x], {"f": energy}), x, [b[0] + c * b[2], b[1]])
+    assert alike([a, *x, *b[:3]], carried, apart)
 
 
 def turning(m, a, b, x):
@@ -236,24 +233,13 @@ def turning(m, a, b, x):
 
 
 def test_rotations_are_turned_back_as_one() -> None:
-    x, rhs = cg.variables("x0 x1 x2 x3 x4"), cg.variables("r0 r1 r2 r3 r4")
     a, b = cg.variables("a b")
-    solved = cg.hessian_solve(cg.Graph([a, b, *x], {"f": turning(cg, a, b, x)}), x, rhs)
-    function = cg.compile(cg.Graph([a, b, *x, *rhs], {f"s{i}": node for i, node in enumerate(solved)}))
+    function = cg.compile(solution(lambda *x: turning(cg, a, b, x), 5, [a, b]))
     rng = np.random.default_rng(4)
     for _ in range(5):
         angles, point, right = rng.uniform(-3.0, 3.0, 2), rng.uniform(-0.3, 0.3, 5), rng.normal(size=5)
-        hessian = np.empty((5, 5))
-        with mpmath.workdps(40):
-            energy = partial(lambda angles, *v: turning(mpmath, *angles, v), [mpmath.mpf(each) for each in angles])
-            for i in range(5):
-                for j in range(5):
-                    orders = tuple((k == i) + (k == j) for k in range(5))
-                    hessian[i, j] = mpmath.diff(energy, tuple(map(mpmath.mpf, point)), orders)
-        expected = np.linalg.solve(hessian, right)
-        assert function(np.concatenate([angles, point, right])) == pytest.approx(
-            expected, rel=LONG_SUM, abs=LONG_SUM * np.abs(expected).max()
-        )
+        found, at = function(np.concatenate([angles, point, right])), [mpmath.mpf(each) for each in angles]
+        assert_solved(partial(lambda at, *v: turning(mpmath, *at, v), at), found, point, right)
 
 
 def test_which_pairs_of_sums_are_rotations() -> None:
@@ -325,20 +311,6 @@ def test_steps_are_those_of_the_order_from_its_end_with_rotations_by_one_angle_a
     assert elimination_steps(dict.fromkeys(x, ()), {}) == x[::-1]
 
 
-def test_a_right_hand_side_at_a_product_within_a_rotation_is_carried_too() -> None:
-    a, *x = cg.variables("a x0 x1")
-    c, s = cg.cos(a), cg.sin(a)
-    product = c * x[0]
-    p, q = product + s * x[1], c * x[1] - s * x[0]
-    energy = p * p + p * q + 3 * q * q
-    b = cg.variables("b0 b1 bp")
-    carried = solve_nodes(energy, x, b[:2], at={product: b[2]})
-    apart = cg.hessian_solve(cg.Graph([a, *x], {"f": energy}), x, [b[0] + c * b[2], b[1]])
-    graph = cg.Graph([a, *x, *b], {f"s{i}": node for i, node in enumerate([*carried, *apart])})
-    found = cg.compile(graph)(np.random.default_rng(0).uniform(0.2, 0.8, 6))
-    assert found[:2] == pytest.approx(found[2:], rel=LONG_SUM)
-
-
 def test_elimination_is_exact_over_fractions() -> None:
     matrix = [[4, 1, 2], [1, 5, 3], [2, 3, 6]]
     expected = [Fraction(1, 3), Fraction(-2, 7), Fraction(5)]
@@ -366,7 +338,7 @@ def saddle(n, m, seed=0, scale=1.0):
     return total, u, s, np.array(list(hessian.values())).reshape(n + m, n + m)
 
 
-@pytest.mark.parametrize(("n", "m"), [(2, 1), (6, 2), (12, 4)])
+@each_row(("n", "m"), [(2, 1), (6, 2), (12, 4)])
 def test_multipliers_are_solved_for_with_the_variables(n, m):
     total, u, s, matrix = saddle(n, m)
     rhs = np.random.default_rng(1).normal(size=n + m)

@@ -3,7 +3,6 @@
 import ctypes
 import itertools
 import math
-import random
 import re
 import shutil
 import subprocess
@@ -19,16 +18,18 @@ from cgraph.codegen.c import c_statements as body
 from cgraph.core.node import apply
 from cgraph.operations.operation import OPS
 from cgraph.util.atomic_write import atomic_write
+from tests.cgraph.core.test_names import ALIKE, WORDS
+from tests.cgraph.engines import SPECIAL, evaluated, points_of
 from tests.slow import slow
 from tests.strategies import cases
 from tests.tolerances import EQUATIONS
+from tests.ulps import same
 
 CC = shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
 CXX = shutil.which("c++") or shutil.which("g++") or shutil.which("clang++")
 needs_cc = pytest.mark.skipif(CC is None, reason="no C compiler")
 WARNINGS = ["-Wall", "-Wextra", "-Wpedantic", "-Wconversion", "-Werror"]
 STRICT = ["-std=c99", *WARNINGS]
-SPECIAL = (0.0, -0.0, 1.0, -1.0, 0.5, 2.0, -3.0, 5e-324, -2.5e-310, 1e300, -1e300, 800.0, math.inf, -math.inf, math.nan)
 
 
 def build(folder, sources, flags=("-O2",)):
@@ -55,18 +56,14 @@ def called(library, name, graph, points):
     return found
 
 
-def evaluated(graph, points):
-    values = [graph.evaluate(dict(zip(graph.input_names, map(float, point), strict=True))) for point in points]
-    return np.array([[float(value) for value in row.values()] for row in values])
+def agrees(folder, graphs, points, flags=("-O2",)):
+    """Asserts that graphs {name: graph}, compiled together, have the bits of evaluation at points {name: rows}."""
+    library = build(folder, [cg.to_c(graph, name) for name, graph in graphs.items()], flags)
+    found = {name: called(library, name, graph, points[name]) for name, graph in graphs.items()}
+    assert [name for name, graph in graphs.items() if not same(found[name], evaluated(graph, points[name]))] == []
 
 
-def same(found, expected):
-    """Equal to the last bit and in the sign of a zero; any NaN equals another."""
-    bits = np.ascontiguousarray(found).view(np.int64) == np.ascontiguousarray(expected).view(np.int64)
-    return bool(np.all(bits | (np.isnan(found) & np.isnan(expected))))
-
-
-def graph_of(op):
+def with_specials(op):
     """The operation on variables, and on every special number in the place of each."""
     inputs = cg.variables(["a", "b", "c"][: op.arity])
     outputs = {"y": apply(op, *inputs)}
@@ -76,36 +73,30 @@ def graph_of(op):
     return cg.Graph(inputs, outputs)
 
 
-def points_of(op):
-    """Samples, points of the domain, and every combination of IEEE specials."""
-    source = random.Random(op.name)
-    drawn = [tuple(source.uniform(*interval) for interval in op.domain) for _ in range(50)]
-    return [*op.samples, *drawn, *itertools.product(SPECIAL, repeat=op.arity)]
-
-
-ROWS = [pytest.param(op, id=op.name) for op in OPS.values()]
-
-
-@pytest.fixture(scope="module")
-def operations(tmp_path_factory):
-    """Every operation of the table, by optimisation level."""
-    folder = tmp_path_factory.mktemp("operations")
-
-    @cache
-    def at(level):
-        (folder / level).mkdir()
-        return build(folder / level, [cg.to_c(graph_of(op), f"op_{op.name}") for op in OPS.values()], [f"-{level}"])
-
-    return at
+@needs_cc
+@pytest.mark.parametrize("level", ["-O3", *slow("-O0")])
+def test_every_operation_is_that_of_evaluate_to_the_last_bit(level, tmp_path):
+    graphs = {f"op_{op.name}": with_specials(op) for op in OPS.values()}
+    agrees(tmp_path, graphs, {f"op_{op.name}": points_of(op, 50) for op in OPS.values()}, [level])
 
 
 @needs_cc
-@pytest.mark.parametrize("level", ["O3", *slow("O0")])
-@pytest.mark.parametrize("op", ROWS)
-def test_an_operation_is_that_of_evaluate_to_the_last_bit(op, level, operations):
-    graph, points = graph_of(op), points_of(op)
-    found = called(operations(level), f"op_{op.name}", graph, points)
-    assert same(found, evaluated(graph, points))
+@pytest.mark.parametrize("links", [3, 8, *slow(20)])
+def test_equations_of_motion_agree_with_evaluate_to_the_last_bit(links, tmp_path):
+    """Those of arms, and those with quaternions."""
+    arm = dyn.forward_dynamics(dyn.planar_arm([1.0] * links, [0.7] * links, damping=0.1))
+    source = np.random.default_rng(links)
+    agrees(tmp_path, {"arm": arm}, {"arm": source.normal(size=(100, len(arm.inputs)))},
+           ["-O2", "-march=native"] if links == 3 else ["-O2"])  # fmt: skip
+    if links == 3:
+        kinds = {"ball": "ball", "floating": "free", "turned": "free (body axes)"}
+        shape = {"mass": 2.0, "center": [0.1, 0.0, 0.2], "inertia": np.eye(3)}
+        tip = dyn.Body("arm", dyn.Joint("revolute"), "base", 0.5, [0.2, 0.0, 0.0], 0.1 * np.eye(3))
+        rates = {
+            name: dyn.state_equation(dyn.Mechanism([dyn.Body("base", dyn.Joint(kind), **shape), tip]))
+            for name, kind in kinds.items()
+        }
+        agrees(tmp_path, rates, {name: source.normal(size=(50, len(graph.inputs))) for name, graph in rates.items()})
 
 
 @needs_cc
@@ -123,27 +114,6 @@ def test_random_graphs_agree_with_evaluate_to_the_last_bit(batch, part, tmp_path
 
 
 @needs_cc
-@pytest.mark.parametrize("links", [3, 8, *slow(20)])
-def test_forward_dynamics_agree_with_evaluate_to_the_last_bit(links, tmp_path):
-    graph = dyn.forward_dynamics(dyn.planar_arm([1.0] * links, [0.7] * links, damping=0.1))
-    points = np.random.default_rng(links).normal(size=(100, len(graph.inputs)))
-    library = build(tmp_path, [cg.to_c(graph, "arm")], ["-O2", "-march=native"] if links == 3 else ["-O2"])
-    assert same(called(library, "arm", graph, points), evaluated(graph, points))
-
-
-@needs_cc
-def test_state_equations_with_quaternions_agree_with_evaluate_to_the_last_bit(tmp_path):
-    kinds = ["ball", "free", "free (body axes)"]
-    bodies = [dyn.Body("base", dyn.Joint(kind), mass=2.0, center=[0.1, 0.0, 0.2], inertia=np.eye(3)) for kind in kinds]
-    arm = dyn.Body("arm", dyn.Joint("revolute"), "base", mass=0.5, center=[0.2, 0.0, 0.0], inertia=0.1 * np.eye(3))
-    graphs = [dyn.state_equation(dyn.Mechanism([base, arm])) for base in bodies]
-    library = build(tmp_path, [cg.to_c(graph, f"rate{k}") for k, graph in enumerate(graphs)])
-    for k, graph in enumerate(graphs):
-        points = np.random.default_rng(k).normal(size=(50, len(graph.inputs)))
-        assert same(called(library, f"rate{k}", graph, points), evaluated(graph, points))
-
-
-@needs_cc
 def test_a_long_graph_is_cut_into_parts(tmp_path, monkeypatch):
     graph = dyn.forward_dynamics(dyn.planar_arm([1.0] * 10, [0.7] * 10))
     monkeypatch.setattr(body, "PART", 100)
@@ -156,45 +126,28 @@ def test_a_long_graph_is_cut_into_parts(tmp_path, monkeypatch):
     assert same(called(build(tmp_path, [source]), "arm", graph, points), evaluated(graph, points))
 
 
-def test_a_deep_graph_needs_no_recursion():
-    x = node = cg.variable("x")
-    for _ in range(20_000):
-        node = cg.sin(node)
-    source = cg.to_c(cg.Graph([x], {"y": node}), "deep").source
-    assert source.count("static void deep_part_") == 10
-    assert "double w[1];" in source
-
-
 @needs_cc
-def test_the_sine_and_the_cosine_of_one_angle_are_those_of_evaluate(tmp_path):
-    """Compilers call one function for both."""
-    x = cg.variable("x")
-    graph = cg.Graph([x], {"sin": cg.sin(x), "cos": cg.cos(x)})
-    points = np.random.default_rng(0).uniform(-1e3, 1e3, (5000, 1))
-    assert same(called(build(tmp_path, [cg.to_c(graph, "both")]), "both", graph, points), evaluated(graph, points))
+def test_what_compilers_know_of_functions_changes_no_bit(tmp_path):
+    """One call for a sine and its cosine; x * x for pow(x, 2.0), 1 / x for pow(x, -1.0), exp2(x) for pow(2.0, x).
 
-
-@needs_cc
-def test_powers_by_a_constant_are_those_of_evaluate(tmp_path):
-    """Compilers know pow(x, 2.0) as x * x, pow(x, -1.0) as 1.0 / x and pow(2.0, x) as exp2(x): mostly the same."""
-    x = cg.variable("x")
-    graph = cg.Graph([x], {"square": x**2, "inverse": x**-1, "exponential": 2**x})
-    drawn = np.random.default_rng(0).uniform(0.5, 4.0, 20_000).tolist()
-    points = [[x] for x in drawn if math.pow(x, 2.0) != x * x or math.pow(x, -1.0) != 1 / x]
-    library = build(tmp_path, [cg.to_c(graph, "power")])
-    assert same(called(library, "power", graph, points), evaluated(graph, points))
-
-
-@needs_cc
-def test_an_argument_that_the_compiler_can_tell_goes_to_the_library_as_any_other(tmp_path):
-    """Behind a comparison it knows the argument; its own functions round correctly, the library's do not."""
+    Behind a comparison they know an argument; their own functions round correctly, the library's do not.
+    """
     x, y = cg.variables("x y")
-    functions = (cg.cbrt, cg.expm1, cg.erfc, cg.tan, cg.sinh, cg.exp2)
+    drawn = np.random.default_rng(0)
+    powers = [[x] for x in drawn.uniform(0.5, 4.0, 20_000).tolist() if x**2.0 != x * x or x**-1.0 != 1 / x]
     chosen = [1.0 + 0.05 * k + 0.1 * cg.less(x, y) for k in range(30)]
-    outputs = {f"{f.__name__}{k}": f(each) for f in functions for k, each in enumerate(chosen)}
-    graph, points = cg.Graph([x, y], outputs), [[0.0, 1.0], [1.0, 0.0]]
-    library = build(tmp_path, [cg.to_c(graph, "told")], ["-O3"])
-    assert same(called(library, "told", graph, points), evaluated(graph, points))
+    told = {
+        f"{f.__name__}{k}": f(each)
+        for f in (cg.cbrt, cg.expm1, cg.erfc, cg.tan, cg.sinh, cg.exp2)
+        for k, each in enumerate(chosen)
+    }
+    graphs = {
+        "both": cg.Graph([x], {"sin": cg.sin(x), "cos": cg.cos(x)}),
+        "powers": cg.Graph([x], {"square": x**2, "inverse": x**-1, "exponential": 2**x}),
+        "told": cg.Graph([x, y], told),
+    }
+    points = {"both": drawn.uniform(-1e3, 1e3, (5000, 1)), "powers": powers, "told": [[0.0, 1.0], [1.0, 0.0]]}
+    agrees(tmp_path, graphs, points, ["-O3"])
 
 
 @needs_cc
@@ -221,49 +174,28 @@ def test_inputs_unused_passed_on_and_shared_by_outputs(tmp_path):
     u = x * y
     several = cg.Graph([z, y, x], {"a": u, "b": u, "x": x, "x again": x, "c": -math.inf, "d": -0.0, "nan": x / x})
     fixed = cg.Graph([], {"c": cg.sin(cg.constant(0.3)), "nan": cg.log(cg.constant(-1.0))})
-    library = build(tmp_path, [cg.to_c(several, "several"), cg.to_c(fixed, "fixed")])
-    assert same(called(library, "several", several, [[3, 0, 0]]), evaluated(several, [[3, 0, 0]]))
-    assert same(called(library, "fixed", fixed, [[]]), evaluated(fixed, [[]]))
+    agrees(tmp_path, {"several": several, "fixed": fixed}, {"several": [[3, 0, 0]], "fixed": [[]]})
 
 
-AWKWARD = [
-    "a_b",
-    "a/b",
-    "a+b",
-    "a_b_",
-    "double",
-    "exp",
-    "y0",
-    "θ",
-    "theta",
-    "Ω",
-    "N_IN",
-    "x",
-    "*/evil/*",
-    "??/",
-    "λ₁",
-    "\\",
-]
+AWKWARD = r"a_b a/b a+b a_b_ double exp y0 θ theta Ω N_IN x */evil/* ??/ λ₁ \ ".split()
 
 
 @needs_cc
 def test_names_that_collide_have_places_of_their_own(tmp_path):
-    inputs = cg.variables(AWKWARD)
-    outputs = dict(zip(AWKWARD, inputs, strict=True)) | {
-        "two words \\": cg.with_name(2 * inputs[0], "*/ named /*"),
-        "\U0001d49c": inputs[1] * 3,
-    }
+    names = list(dict.fromkeys([*AWKWARD, *ALIKE, *WORDS]))
+    inputs = cg.variables(names)
+    outputs = {name: (k + 1.0) * node for k, (name, node) in enumerate(zip(names, inputs, strict=True))}
+    outputs |= {"two words \\": cg.with_name(2 * inputs[0], "*/ named /*"), "\U0001d49c": inputs[1] * 3}
     graph = cg.Graph(inputs, outputs)
     source = cg.to_c(graph, "odd")
     places = re.findall(r"^    (ODD_(?:IN|OUT)_\w+) = (\d+),", source.header, re.MULTILINE)
     assert [int(row) for _, row in places] == [*range(len(inputs)), *range(len(outputs))]
     assert len({name for name, _ in places}) == len(places)
-    assert [name for name, _ in places][: len(inputs)] == [
+    assert [name for name, _ in places][: len(AWKWARD)] == [
         f"ODD_IN_{word}"
         for word in "a_b a_b_1 a_b_2 a_b_ double exp y0 theta_7 theta Omega N_IN x __evil__ ___ lambda1 _".split()
     ]
-    point = [list(map(float, range(1, len(inputs) + 1)))]
-    assert same(called(build(tmp_path, [source]), "odd", graph, point), evaluated(graph, point))
+    agrees(tmp_path, {"odd": graph}, {"odd": [range(1, len(inputs) + 1)]})
 
 
 def test_a_name_of_one_s_own_stands_beside_the_value():
@@ -273,6 +205,7 @@ def test_a_name_of_one_s_own_stands_beside_the_value():
     assert "%1 = mul x y  (radius)" in graph.listing()
 
 
+@cache
 def pendulum():
     return dyn.forward_dynamics(dyn.planar_arm([2.0], [0.5], damping=0.1))
 
@@ -312,19 +245,8 @@ def stepped():
 def test_a_program_simulates_with_the_header_alone(tmp_path):
     source, _ = cg.to_c(pendulum(), "pendulum").write(tmp_path)
     atomic_write(tmp_path / "main.c", USE)
-    run(
-        [
-            CC,
-            *STRICT,
-            "-O2",
-            "-ffp-contract=off",
-            str(tmp_path / "main.c"),
-            str(source),
-            "-o",
-            str(tmp_path / "main"),
-            "-lm",
-        ]
-    )
+    files = [str(tmp_path / "main.c"), str(source), "-o", str(tmp_path / "main"), "-lm"]
+    run([CC, *STRICT, "-O2", "-ffp-contract=off", *files])
     assert tuple(map(float, run([str(tmp_path / "main")]).split())) == stepped()
 
 
@@ -341,44 +263,17 @@ def test_the_header_is_one_of_cpp_too(standard, tmp_path):
     assert tuple(map(float, run([str(tmp_path / "main")]).split())) == stepped()
 
 
-@pytest.mark.parametrize("name", ["", "2x", "a b", "a-b", "f\n", "_f", "θ", "x.y"])
-def test_a_name_that_is_no_identifier_is_an_error(name):
-    with pytest.raises(ValueError, match="must be a letter, then letters, digits and _, got"):
-        cg.to_c(pendulum(), name)
+TAKEN = """double main sin sinf erfc isnan islessgreater y0 math restrict printf NULL size_t read getc_unlocked stdin
+    EOF class atomic_load va_arg PRIu64""".split()
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        "double",
-        "class",
-        "main",
-        "sin",
-        "sinf",
-        "erfc",
-        "isnan",
-        "islessgreater",
-        "y0",
-        "math",
-        "restrict",
-        "printf",
-        "NULL",
-        "size_t",
-        "read",
-        "getc_unlocked",
-        "stdin",
-        "EOF",
-        "atomic_load",
-        "va_arg",
-        "PRIu64",
-    ],
-)
-def test_a_name_that_is_taken_is_an_error(name):
-    with pytest.raises(ValueError, match=f"must not be a word of C, C\\+\\+ or their library, got '{name}'"):
-        cg.to_c(pendulum(), name)
-
-
-def test_a_name_that_is_no_string_is_an_error():
+def test_a_name_that_is_no_identifier_or_taken_is_an_error():
+    for name in ("", "2x", "a b", "a-b", "f\n", "_f", "θ", "x.y"):
+        with pytest.raises(ValueError, match="must be a letter, then letters, digits and _, got"):
+            cg.to_c(pendulum(), name)
+    for name in TAKEN:
+        with pytest.raises(ValueError, match=f"must not be a word of C, C\\+\\+ or their library, got '{name}'"):
+            cg.to_c(pendulum(), name)
     with pytest.raises(TypeError, match="must be a string, got int: 3"):
         cg.to_c(pendulum(), 3)
 

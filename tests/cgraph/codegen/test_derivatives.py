@@ -14,20 +14,13 @@ from cgraph import GraphError
 from cgraph.codegen import parts
 from cgraph.program.functions import colored_matrix, compile as functions, differentiable
 from tests import high_precision
+from tests.each_row import each_row
 from tests.strategies import cases, examples
 from tests.tolerances import LAST_BITS, LONG_SUM, SHORT_SUM
 from tests.ulps import same
 
-BACKENDS = ("llvm", "python", "numpy")
 LANES, WRITTEN = 0, math.inf  # of `vector_cost`: so that a Jacobian is in lanes, or written out
 x, y, z = cg.variables("x y z")
-
-
-@pytest.fixture(params=BACKENDS)
-def backend(request):
-    if request.param == "llvm":
-        pytest.importorskip("llvmlite")
-    return request.param
 
 
 def compiled(graph, backend="auto", cost=None, **options):
@@ -89,56 +82,38 @@ def test_products_agree_with_thirty_digits(case, seed):
             assert abs(product - value) <= LONG_SUM * (paths[name] + rounding[f"{name}_dot"])
 
 
-@given(cases(), st.integers(0, 99))
-@settings(max_examples=examples(40))
-def test_a_product_with_the_jacobian_and_one_with_its_transpose_are_dual(case, seed):
-    """y_bar . (J x_dot) = (J^T y_bar) . x_dot."""
-    names, m = case.graph.input_names, len(case.graph.outputs)
-    point = np.array([case.values[name] for name in names])
-    rng = np.random.default_rng(seed)
-    x_dot, y_bar = rng.uniform(-1.0, 1.0, (5, len(names))), rng.uniform(-1.0, 1.0, (5, m))
-    function = compiled(case.graph, "python")
-    left, right = function.jvp(point, x_dot), function.vjp(point, y_bar)
-    sizes = high_precision.path_size(case.graph, case.values, dict.fromkeys(names, 1.0))
-    scale = sum(sizes.values())
-    assert np.allclose((left * y_bar).sum(axis=1), (right * x_dot).sum(axis=1), rtol=0.0, atol=LONG_SUM * scale)
-
-
 @given(cases(max_operations=10), st.integers(0, 99))
 @settings(max_examples=examples(16))
 def test_all_back_ends_have_the_same_bits_and_those_of_the_derivative_graphs(case, seed):
     pytest.importorskip("llvmlite")
     point = np.array([case.values[name] for name in case.graph.input_names])
-    rng = np.random.default_rng(seed)
+    rng, backends = np.random.default_rng(seed), ("python", "numpy", "llvm")
     m, n = len(case.graph.outputs), len(point)
     x_dot, y_bar = rng.uniform(-1.0, 1.0, (9, n)), rng.uniform(-1.0, 1.0, (9, m))
     forward = np.array([values(cg.jvp(case.graph), point, row) for row in x_dot])
     reverse = np.array([values(cg.vjp(case.graph), point, row) for row in y_bar])
-    for backend in BACKENDS:
+    for backend in backends:
         function = compiled(case.graph, backend, LANES, fma=False)
         assert same(function.jvp(point, x_dot), forward)
         assert same(function.vjp(point, y_bar), reverse)
-    found = [compiled(case.graph, each, cost, fma=False).jacobian(point) for each in BACKENDS for cost in (0, math.inf)]
+    found = [compiled(case.graph, each, cost, fma=False).jacobian(point) for each in backends for cost in (0, math.inf)]
     assert all(same(each, found[k % 2]) for k, each in enumerate(found))
 
 
-@pytest.mark.parametrize("k", [0, 1, 3, 8, 9, 1000])
-def test_the_number_of_directions_is_no_matter(backend, k, monkeypatch):
+def test_the_number_of_directions_is_no_matter(backend, monkeypatch):
     function, graph = compiled(example(), backend, fma=False), cg.jvp(example())
-    directions = np.random.default_rng(k).uniform(-1.0, 1.0, (k, 4))
-    found = function.jvp(POINT, directions)
-    assert found.shape == (k, 8)
-    some = range(0, k, 97)
-    assert same(found[some], np.array([values(graph, POINT, directions[i]) for i in some]).reshape(-1, 8))
-    monkeypatch.setattr(functions.NativeRunner, "vectors", 1)  # in a block
+    directions = {k: np.random.default_rng(k).uniform(-1.0, 1.0, (k, 4)) for k in (0, 1, 3, 8, 9, 1000)}
+    found = {k: function.jvp(POINT, along) for k, along in directions.items()}
+    for k, along in directions.items():
+        assert found[k].shape == (k, 8)
+        some = range(0, k, 97)
+        assert same(found[k][some], np.array([values(graph, POINT, along[i]) for i in some]).reshape(-1, 8)), k
+    monkeypatch.setattr(functions.NativeRunner, "vectors", 1)  # blocks of one vector
     monkeypatch.setattr(functions.PythonRunner, "vectors", 1)
     function = compiled(example(), backend, fma=False)
-    assert same(function.jvp(POINT, directions), found)
-    assert same(function.jvp(POINT, np.asfortranarray(directions)), found)
-
-
-def test_one_direction_gives_one_product(backend):
-    function = compiled(example(), backend)
+    for k, along in directions.items():
+        assert same(function.jvp(POINT, along), found[k]), k
+        assert same(function.jvp(POINT, np.asfortranarray(along)), found[k]), k
     assert function.jvp(POINT, [1, 0, 0, 0]).tolist() == function.jvp(POINT, [[1.0, 0.0, 0.0, 0.0]])[0].tolist()
     assert function.vjp(POINT, np.eye(8)[3]).tolist() == [1.0, 0.0, 0.0, 0.0]
 
@@ -154,7 +129,6 @@ def chain(sin, points):
 
 
 @pytest.mark.parametrize("cost", [LANES, WRITTEN])
-@pytest.mark.parametrize("backend", ["auto", "python"])
 def test_a_band_and_an_arrow_agree_with_complex_steps(cost, backend):
     n = 40
     inputs = cg.variables([f"x{k}" for k in range(n)])
@@ -217,7 +191,7 @@ def test_zeros_in_a_direction_win_over_infinite_slopes(backend, check, monkeypat
 SELECTED = cg.asin(abs(x))
 
 
-@pytest.mark.parametrize(
+@each_row(
     "f",
     [
         cg.where(SELECTED, SELECTED, abs(y)),
@@ -241,7 +215,7 @@ def test_a_look_at_slopes_sees_every_infinite_one(f, monkeypatch):
 
 
 @pytest.mark.parametrize("cost", [LANES, WRITTEN])
-@pytest.mark.parametrize("wrt", [["z", "x"], "y", ["unused"], ["x", "y", "unused", "z"]])
+@each_row("wrt", [["z", "x"], "y", ["unused"], ["x", "y", "unused", "z"]])
 def test_derivatives_by_chosen_inputs_are_columns_of_those_by_all(backend, cost, wrt):
     function, rng = compiled(example(), backend, cost), np.random.default_rng(0)
     names = [wrt] if isinstance(wrt, str) else wrt
@@ -270,15 +244,6 @@ def test_inputs_to_differentiate_by_are_checked(backend):
         function.jvp(POINT, np.ones(4), wrt=["x", "y"])
     with pytest.raises(GraphError, match=r"in shape \(8, 2\)"):
         function.bind_jacobian(POINT, np.empty((8, 4)), wrt=["x", "y"])
-
-
-@pytest.mark.parametrize("cost", [LANES, WRITTEN])
-def test_bound_calls_stay_in_their_process(backend, cost):
-    function = compiled(example(), backend, cost)
-    point, values = POINT.copy(), np.empty(8)
-    for run in (function.bind(point, values), *[function.bind_jacobian(point, np.empty(k)) for k in ((8, 4), 12)]):
-        with pytest.raises(TypeError, match="a bound call holds addresses of this process"):
-            pickle.dumps(run)
 
 
 def test_names_are_no_matter():
@@ -313,6 +278,9 @@ def test_a_bound_jacobian_writes_its_array(backend, cost):
         assert part() is None
         assert np.array_equal(dense, function.jacobian(point))
         assert np.array_equal(entries, function.jacobian(point, sparse=True).data)
+    for run in (whole, part, function.bind(point, np.empty(8))):
+        with pytest.raises(TypeError, match="a bound call holds addresses of this process"):
+            pickle.dumps(run)
 
 
 def test_a_bound_jacobian_needs_memory_that_it_can_use(backend):
@@ -339,12 +307,17 @@ def test_large_matrices_are_filled_in(backend, monkeypatch):
     assert np.array_equal(function.jacobian(POINT, sparse=True).toarray(), expected)
 
 
-def test_a_result_is_the_callers_own(backend):
+def test_a_result_is_the_callers_own_whatever_the_kind_of_array_and_after_a_pickle(backend):
     function = compiled(example(), backend)
     first = function.jacobian(POINT)
     kept = first.copy()
     function.jacobian(2.0 * POINT)
     assert np.array_equal(first, kept)
+    x_dot = np.ones((2, 8))[:, ::2]
+    for point in (POINT.tolist(), POINT.astype(np.float32), np.repeat(POINT, 2)[::2]):
+        assert np.allclose(function.jacobian(point), kept, rtol=1e-6)
+        assert np.allclose(function.jvp(point, x_dot), function.jvp(POINT, np.ones((2, 4))), rtol=1e-6)
+    assert np.array_equal(pickle.loads(pickle.dumps(function)).jacobian(POINT), kept)
     sparse = function.jacobian(POINT, sparse=True)
     sparse.indices[:] = 0
     assert np.array_equal(function.jacobian(POINT, sparse=True).toarray(), kept)
@@ -375,12 +348,6 @@ def test_threads_make_one_derivative_and_run_it_at_once():
     assert len(found) == 4
 
 
-def test_a_function_that_has_derivatives_pickles(backend):
-    function = compiled(example(), backend)
-    expected = function.jacobian(POINT)
-    assert np.array_equal(pickle.loads(pickle.dumps(function)).jacobian(POINT), expected)
-
-
 def test_machine_code_of_derivatives_is_kept_on_disk(tmp_path):
     pytest.importorskip("llvmlite")
     graph = cg.Graph([x, y], {"f": x * y * y, "g": x / y})
@@ -391,14 +358,6 @@ def test_machine_code_of_derivatives_is_kept_on_disk(tmp_path):
         found.append((products, sorted(tmp_path.iterdir())))
     assert found[0] == found[1]
     assert len(found[0][1]) == 3  # with the function itself
-
-
-@pytest.mark.parametrize("given_x", [POINT.tolist(), POINT.astype(np.float32), np.repeat(POINT, 2)[::2]])
-def test_the_kind_of_array_is_no_matter(backend, given_x):
-    function = compiled(example(), backend)
-    x_dot = np.ones((2, 8))[:, ::2]
-    assert np.allclose(function.jacobian(given_x), function.jacobian(POINT), rtol=1e-6)
-    assert np.allclose(function.jvp(given_x, x_dot), function.jvp(POINT, np.ones((2, 4))), rtol=1e-6)
 
 
 def test_another_shape_is_an_error(backend):

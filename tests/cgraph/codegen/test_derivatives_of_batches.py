@@ -10,15 +10,14 @@ from hypothesis import given, settings, strategies as st
 import cgraph as cg
 from cgraph import GraphError
 from cgraph.program.functions import colored_matrix, differentiable, direction_products
-from tests.cgraph.codegen.test_derivatives import BACKENDS, LANES, WRITTEN, compiled, example, x, y
+from tests.cgraph.codegen.test_derivatives import LANES, WRITTEN, compiled, example, x, y
+from tests.cgraph.engines import RUNNERS
 from tests.strategies import cases, examples
 from tests.ulps import same
 
 
-@pytest.fixture(params=BACKENDS[:2])  # of NumPy, derivatives are those of Python
+@pytest.fixture(params=RUNNERS)  # of NumPy, derivatives are those of Python
 def backend(request):
-    if request.param == "llvm":
-        pytest.importorskip("llvmlite")
     return request.param
 
 

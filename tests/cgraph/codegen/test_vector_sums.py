@@ -14,6 +14,8 @@ from cgraph.codegen.vector_sums import vector_sums
 from cgraph.core.node import Node
 from cgraph.extend import jets, straight
 
+pytestmark = pytest.mark.optimized
+
 pytest.importorskip("llvmlite")
 
 
@@ -41,10 +43,10 @@ def values(graph: cg.Graph, x: Sequence[float]) -> np.ndarray:
 
 
 @given(st.integers(0, 2**32 - 1))
-@settings(max_examples=3, deadline=None)
+@settings(max_examples=2, deadline=None)
 def test_bits_are_those_of_sums_one_by_one(seed: int) -> None:
     draw = random.Random(seed)
-    graph = rounds(draw.randint(4, 21), 12, draw)
+    graph = rounds(draw.randint(4, 13), 9, draw)
     x = [draw.uniform(-1.0, 1.0) for _ in graph.inputs]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(module, "MANY", 0)

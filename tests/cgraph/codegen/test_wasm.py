@@ -2,7 +2,6 @@
 
 import itertools
 import math
-import struct
 from functools import cache
 
 import numpy as np
@@ -12,24 +11,18 @@ from hypothesis import given, settings
 import cgraph as cg
 import dynamics as dyn
 from cgraph.codegen.wasm.functions import library, text_of
-from cgraph.core.node import apply
 from cgraph.operations.operation import OPS
 from dynamics.experiments.speed.bench_scenes import turned_arm
 from dynamics.integrators import TABLEAUS
+from tests.cgraph.engines import SPECIAL, graph_of
+from tests.each_row import each_row
 from tests.strategies import cases, examples
 from tests.tolerances import SUMS
 from tests.ulps import same, ulps_apart
-from tests.wasm import Instance, instance
+from tests.wasm import instance
 
-SPECIAL = (0.0, -0.0, 1.0, -1.0, 0.5, 2.0, -3.0, 5e-324, -2.5e-310, 1e300, -1e300, 800.0, math.inf, -math.inf, math.nan)
 X, Y = cg.variables("x y")
 STATE = cg.Graph([X, Y], {"x_dot": Y, "y_dot": -X})
-
-
-def graph_of(op):
-    """The operation on variables."""
-    inputs = cg.variables(["a", "b", "c"][: op.arity])
-    return cg.Graph(inputs, {"y": apply(op, *inputs)})
 
 
 def calls(op):
@@ -37,11 +30,23 @@ def calls(op):
     return op.name in library(0) and op.name not in ("minimum", "maximum", "sign", "fmod")
 
 
-@pytest.mark.parametrize("op", [pytest.param(op, id=op.name) for op in OPS.values()])
-def test_an_operation_is_that_of_evaluate_and_a_function_agrees_in_kind(op):
+@cache
+def single(op):
+    """The module of an operation alone."""
+    return instance(graph_of(op))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def let_go():
+    """No module outlives wasmtime, which Python may end first."""
+    yield
+    single.cache_clear()
+
+
+@each_row("op", OPS.values())
+def test_every_operation_is_that_of_evaluate_and_a_function_agrees_in_kind(op):
     """Where no function intervenes to the last bit; else in zeros and their signs, infinities and NaN."""
-    graph, near = graph_of(op), 12.0 if calls(op) else 0.0
-    call = instance(graph)
+    call, near = single(op), 12.0 if calls(op) else 0.0
     special = SPECIAL if op.arity < 3 else SPECIAL[::3]
     for point in [*itertools.product(special, repeat=op.arity), *op.samples]:
         found, expected = call(*point), [float(op.scalar(*point))]
@@ -50,17 +55,9 @@ def test_an_operation_is_that_of_evaluate_and_a_function_agrees_in_kind(op):
         assert ulps_apart(found, expected) <= near, point
 
 
-@pytest.fixture(scope="module")
-def single():
-    """The module of an operation alone."""
-    made = cache(lambda op: instance(graph_of(op)))
-    yield made
-    made.cache_clear()
-
-
 @given(case=cases(max_operations=30))
 @settings(max_examples=examples(40))
-def test_random_graphs_agree_to_the_last_bit_with_operations_one_by_one(case, single):
+def test_random_graphs_agree_to_the_last_bit_with_operations_one_by_one(case):
     """Those of evaluation, and in place of the C library's functions the modules' own."""
     values = {}
     for node in case.graph.nodes:
@@ -82,29 +79,9 @@ def test_inputs_unused_passed_on_and_shared_by_outputs():
     call = instance(cg.Graph([z, Y, X], outputs))
     assert same(call(3.0, 0.5, 7.0), [3.5, 3.5, 7.0, 7.0, -math.inf, -0.0, 0.1, -0.1 * 7.0])
     assert instance(cg.Graph([], {"y": cg.sin(cg.constant(0.3))}))() == [math.sin(0.3)]
-
-
-def test_constants_are_exact_in_each_way_of_writing_them():
-    numbers = [
-        0.0,
-        -0.0,
-        1.0,
-        -64.0,
-        -63.0,
-        63.0,
-        64.0,
-        0.5,
-        0.1,
-        1e300,
-        5e-324,
-        2.0**127,
-        2.0**-149,
-        3.4e38,
-        -2.5,
-        1 / 3,
-    ]
-    graph = cg.Graph([X], {f"{k}": number for k, number in enumerate(numbers)})
-    assert same(instance(graph)(0.0), numbers)
+    numbers = [0.0, -0.0, 1.0, -64.0, -63.0, 63.0, 64.0, 0.5, 0.1, 1e300, 5e-324, 2.0**127, 2.0**-149, 3.4e38, -2.5]
+    constants = instance(cg.Graph([X], {f"{k}": number for k, number in enumerate(numbers)}))
+    assert same(constants(0.0), numbers)  # each way of writing them
 
 
 def test_a_deep_graph_and_a_wide_one_need_no_recursion():
@@ -140,7 +117,7 @@ def test_functions_of_the_host_are_imported_when_asked_for():
     assert instance(graph).imports == []
 
 
-@pytest.mark.parametrize("name", ["wave", "product", "load", "double", "evaluate"])
+@each_row("name", ["wave", "product", "load", "double", "evaluate"])
 def test_an_operation_called_as_a_function_within_is_none(name):
     """Rows of a program of its own have any name."""
     text = text_of(type(OPS["sin"])(name, 1, math.sin, np.sin, lambda y, a: (1.0,), ((0.3,),)), ())
@@ -201,8 +178,7 @@ def reached(made, inputs, span, h, rtol, most=10_000):
     return made.read(0, made.sizes[0]), step
 
 
-@pytest.mark.parametrize("rtol", [1e-4, 1e-7, 1e-10])
-@pytest.mark.parametrize("h", [1e-6, 0.1, 50.0])
+@each_row(("h", "rtol"), itertools.product((1e-6, 0.1, 50.0), (1e-4, 1e-7, 1e-10)))
 def test_chosen_steps_keep_the_tolerance_whatever_the_first_is(h, rtol):
     (x, y), _ = reached(instance(STATE, TABLEAUS), [1.0, 0.0], 10.0, h, rtol)
     assert math.hypot(x - math.cos(10.0), y + math.sin(10.0)) <= 10.0 * rtol
@@ -241,7 +217,7 @@ def test_memory_has_room_for_all_that_is_documented():
     assert ulps_apart(before, np.sin(point)) <= 2.0
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("make", "kind", "said"),
     [
         (lambda: cg.to_wasm(X), TypeError, "to_wasm needs a cg.Graph, got Node"),
@@ -258,9 +234,3 @@ def test_a_mistake_is_told_in_one_sentence(make, kind, said):
     with pytest.raises(kind, match=said) as caught:
         make()
     assert "\n" not in str(caught.value)
-
-
-def test_an_instance_is_a_module_as_others_write_them():
-    """The same through the bytes alone."""
-    made = Instance(bytes(cg.to_wasm(STATE)), STATE)
-    assert made(1.0, 2.0) == list(struct.unpack("<2d", struct.pack("<2d", 2.0, -1.0)))

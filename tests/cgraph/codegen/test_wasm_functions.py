@@ -4,12 +4,12 @@ import math
 import random
 
 import mpmath
-import pytest
 
 import cgraph as cg
 from cgraph.core.node import apply
 from cgraph.operations.operation import OPS
 from tests import high_precision
+from tests.each_row import each_row
 from tests.strategies import examples
 from tests.wasm import instance
 
@@ -44,7 +44,7 @@ def hard(op):
     return [(x,) * op.arity for x in around] + ([(1.0 + 2.0**-30, 7e11), (0.5, 1073.5)] if op.name == "pow" else [])
 
 
-@pytest.mark.parametrize("name", sorted(LARGEST))
+@each_row("name", sorted(LARGEST))
 def test_errors_are_below_what_is_said(name):
     op = OPS[name]
     inputs = cg.variables(["a", "b"][: op.arity])

@@ -46,17 +46,23 @@ def test_a_deep_graph_has_derivatives_in_both_modes(deep):
     assert cg.gradient(deep).evaluate({"x": 1.0})["df/dx"] == expected
 
 
-def test_a_deep_graph_is_counted_checked_and_listed(deep):
+def test_a_deep_graph_is_counted_checked_listed_and_pickled(deep):
     counts = deep.counts()
     assert (counts.nodes, counts.edges, counts.depth, counts.width) == (DEEP + 1, DEEP, DEEP, 1)
     deep.check()
     assert deep.listing().count("\n") == DEEP + 2
     assert len(deep.edges) == DEEP
+    assert pickle.loads(pickle.dumps(deep)).listing() == deep.listing()
+    assert len(cg.structure_hash(deep)) == 32
 
 
-def test_a_deep_graph_survives_a_pickle(deep):
-    again = pickle.loads(pickle.dumps(deep))
-    assert again.listing() == deep.listing()
+def test_a_deep_graph_is_compared_and_written(deep):
+    found = cg.compare(deep, cg.Graph(deep.inputs, deep(cg.variable("x"))))
+    assert len(found.common) == len(found.overlay().graph.nodes) == DEEP + 1
+    assert str(found).splitlines()[-1] == "Computed alike: f."
+    source = cg.to_c(deep, "deep").source
+    assert source.count("static void deep_part_") == 10
+    assert "double w[1];" in source
 
 
 def test_a_deep_graph_is_simplified_specialized_and_inlined(deep):

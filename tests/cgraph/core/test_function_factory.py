@@ -13,7 +13,7 @@ import cgraph as cg
 from cgraph.extend import OPS, Op, register
 
 
-def test_a_function_takes_its_arguments_by_name_and_shows_an_example_that_runs() -> None:
+def test_every_operation_takes_its_arguments_by_name_and_shows_an_example_that_runs() -> None:
     for op in OPS.values():
         function, inputs = getattr(cg, op.name), cg.variables(op.parameters)
         assert list(inspect.signature(function).parameters) == op.parameters

@@ -12,6 +12,7 @@ import pytest
 
 import cgraph as cg
 from cgraph.extend import STATEMENTS, Array, Call, If, Program, While, program_jvp, program_vjp, runner
+from tests.cgraph.engines import RUNNERS
 from tests.tolerances import SHORT_SUM
 
 COUNT, LENGTHS = 11, {"f": 2, "z": 2, "u": 2, "n": 1, "c": 1}
@@ -50,7 +51,7 @@ def one(values: dict[str, Array], k: int) -> dict[str, Array]:
     return {name: value[:, k] for name, value in values.items()}
 
 
-@pytest.mark.parametrize("backend", ["python", "llvm"])
+@pytest.mark.parametrize("backend", RUNNERS)
 def test_its_numbers_alone_and_side_by_side(backend: str) -> None:
     ready = runner(program(), backend, fma=False)
     together = ready.run_many(ready.memory(START, COUNT), 1).rows[0]
@@ -60,7 +61,7 @@ def test_its_numbers_alone_and_side_by_side(backend: str) -> None:
         assert alone.tolist() == together[:, k].tolist()
 
 
-@pytest.mark.parametrize("backend", ["python", "llvm"])
+@pytest.mark.parametrize("backend", RUNNERS)
 def test_its_tangents(backend: str) -> None:
     """z_n = f^n z, u_n = f*^m u: their tangents by the product rule."""
     moved, rng = program_jvp(program(), ["f"], constant=["n", "c"]), np.random.default_rng(6)
@@ -79,7 +80,7 @@ def test_its_tangents(backend: str) -> None:
         assert row == pytest.approx(pairs(*ends, *wanted), rel=1e3 * SHORT_SUM, abs=1e3 * SHORT_SUM)
 
 
-@pytest.mark.parametrize("backend", ["python", "llvm"])
+@pytest.mark.parametrize("backend", RUNNERS)
 def test_its_cotangents_are_the_transpose(backend: str) -> None:
     """<w, J v> = <J^T w, v>."""
     moved, rng = program_jvp(program(), ["f"], constant=["n", "c"]), np.random.default_rng(7)

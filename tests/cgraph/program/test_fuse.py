@@ -9,6 +9,7 @@ from cgraph.program import fuse
 from tests.ulps import same
 
 pytest.importorskip("llvmlite")
+pytestmark = pytest.mark.optimized
 
 
 def oscillators(weights=(0.5, 0.5, 1.0)):

@@ -22,8 +22,7 @@ from cgraph.extend import (
     runner,
 )
 from cgraph.program.many import many_keeping, outliving
-from tests.cgraph.program.test_program_derivatives import LENGTHS, PASSES, START, RandomProgram
-from tests.slow import slow
+from tests.cgraph.program.test_program_derivatives import LENGTHS, PASSES, START, RandomProgram, seeds
 
 COUNT = 11  # more than one vector, and not a whole number of them
 EDGES = {3: np.inf, 5: np.nan, 8: 0.0}  # {memory: what one of its numbers is}
@@ -47,7 +46,7 @@ def side_by_side(program: Program, values: dict[str, Array], feed: Array, backen
     return rows
 
 
-@pytest.mark.parametrize("seed", [*range(12), *slow(*range(12, 400))])
+@pytest.mark.parametrize("seed", seeds(400))
 def test_random_programs_in_lanes_run_each_to_its_own_stop(seed: int) -> None:
     """The memories, passes and rows of lanes, in which others follow those that stop, are those of runs alone."""
     pytest.importorskip("llvmlite")
@@ -104,7 +103,7 @@ def test_registers_that_nothing_reads_later_are_not_put_back() -> None:
 
 
 @pytest.mark.filterwarnings("error")
-@pytest.mark.parametrize("seed", [*range(36), *slow(*range(36, 600))])
+@pytest.mark.parametrize("seed", seeds(600))
 def test_random_programs_and_their_derivatives_are_the_same_side_by_side(seed: int) -> None:
     program, rng = RandomProgram(seed).program, np.random.default_rng(seed)
     backend = "python" if seed % 3 else "auto"
@@ -128,22 +127,16 @@ def test_random_programs_and_their_derivatives_are_the_same_side_by_side(seed: i
     side_by_side(back, known | seeds, tape[::-1, : back.feed_width], backend)
 
 
-@pytest.mark.parametrize("backend", ["python", "llvm"])
 def test_a_lane_that_is_done_keeps_its_bits_while_others_go_on(backend: str) -> None:
     """x halved n times; where n is not positive, infinite or NaN, x stays, and so does its sign."""
-    if backend == "llvm":
-        pytest.importorskip("llvmlite")
     program = Program({"x": 1, "n": 1}, [While("n", (HALVE, LESS))], record=["x"])
     n = np.array([[0.0, 1.0, 2.0, 1060.0, -3.0, np.nan, 7.0, 0.5, -0.0, 3.0, -np.inf]])
     rows = side_by_side(program, {"x": np.full((1, COUNT), -1.0), "n": n}, np.empty((1, 0, COUNT)), backend, 1)
     assert rows[0, 0].tolist() == [-1.0, -0.5, -0.25, -(0.5**1060), -1.0, -1.0, -(0.5**7), -0.5, -1.0, -0.125, -1.0]
 
 
-@pytest.mark.parametrize("backend", ["python", "llvm"])
 def test_a_loop_that_one_lane_never_enters_does_not_run_on_for_it(backend: str) -> None:
     """Of x <= 0 the loop inside would have no end: x doubled until it is above 1."""
-    if backend == "llvm":
-        pytest.importorskip("llvmlite")
     short = Call(cg.Graph([X], {"n": 1.0 - X}), ("x",), ("n",))
     double = Call(cg.Graph([X], {"x": 2.0 * X}), ("x",), ("x",))
     program = Program({"x": 1, "n": 1}, [If("x", (short, While("n", (double, short))))], record=["x"])
@@ -153,11 +146,8 @@ def test_a_loop_that_one_lane_never_enters_does_not_run_on_for_it(backend: str) 
     assert (rows[0, 0, x[0] > 0.0] >= 1.0).all()
 
 
-@pytest.mark.parametrize("backend", ["python", "llvm"])
 @pytest.mark.parametrize("transposed", [False, True])
 def test_every_lane_has_pivots_of_its_own(backend: str, transposed: bool) -> None:
-    if backend == "llvm":
-        pytest.importorskip("llvmlite")
     rng, n = np.random.default_rng(1), 5
     registers = {"A": n * n, "p": n, "b": n, "test": 1}
     solve = Factor("A", "p"), Solve("A", "p", "b", transposed)
@@ -178,11 +168,8 @@ def test_every_lane_has_pivots_of_its_own(backend: str, transposed: bool) -> Non
     assert rows[0, :, 0].tolist() == b[:, 0].tolist()
 
 
-@pytest.mark.parametrize("backend", ["python", "llvm"])
 def test_every_lane_has_rows_of_its_own_on_a_stack(backend: str) -> None:
     """n rows on a stack of 4, and m off it: the full and the empty ones count NaN."""
-    if backend == "llvm":
-        pytest.importorskip("llvmlite")
     a = cg.variables("a0 a1 a2")
     turned = cg.Graph(a, {"a": a[1] + 1.0, "b": a[2] * 2.0, "c": a[0]})
     registers = {"x": 1, "y": 2, "stack": 12, "count": 1, "n": 1, "m": 1}
@@ -199,13 +186,9 @@ def test_every_lane_has_rows_of_its_own_on_a_stack(backend: str) -> None:
     side_by_side(program, values, np.empty((2, 0, COUNT)), backend)
 
 
-@pytest.mark.parametrize("backend", ["python", "llvm"])
 def test_a_batch_of_a_program_with_a_loop(backend: str) -> None:
     """From each value of a register of x and n, x halved n times."""
-    if backend == "llvm":
-        pytest.importorskip("llvmlite")
-    x, n = cg.variables("x n")
-    apart = Call(cg.Graph([x, n], {"x": x, "n": n}), ("both",), ("x", "n"))
+    apart = Call(cg.Graph([X, N], {"x": X, "n": N}), ("both",), ("x", "n"))
     registers = {"both": 2, "x": 1, "n": 1}
     values = np.stack([np.linspace(-1.0, 1.0, 37), np.arange(37) % 7.0], axis=1)
     run = runner(Program(registers, [apart, While("n", (HALVE, LESS))], record=["x"]), backend)

@@ -3,6 +3,7 @@
 import gc
 import itertools
 import math
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -11,17 +12,9 @@ from hypothesis import given, settings, strategies as st
 import cgraph as cg
 from cgraph.extend import Call, Factor, If, Map, Program, Solve, Sum, While, runner
 from cgraph.program.statements.memory import Scatter
+from tests.each_row import each_row
 from tests.strategies import examples
 from tests.tolerances import LONG_SUM
-
-BACKENDS = ["python", "llvm"]
-
-
-@pytest.fixture(params=BACKENDS)
-def backend(request: pytest.FixtureRequest) -> str:
-    if request.param == "llvm":
-        pytest.importorskip("llvmlite")
-    return str(request.param)
 
 
 def spring() -> cg.Graph:
@@ -110,12 +103,12 @@ def test_registers_that_are_read_and_written(backend: str) -> None:
     assert run.run(run.memory({"x": [1, 2, 3], "y": [4, 5, 6]}), 1).rows.tolist() == [[4, 5, 6, 1, 2, 3]]
 
 
-@pytest.mark.parametrize("count", [1, 3, 8, 19])
-def test_registers_that_every_element_shares(backend: str, count: int) -> None:
+@each_row(("count", "order"), itertools.product([1, 3, 8, 19], ["xh", "hx"]))
+def test_registers_that_every_element_shares(backend: str, count: int, order: str) -> None:
     a, b, c, x, h = cg.variables("a b c x h")
-    graph = cg.Graph([a, b, c, x, h], {"u": (a + b * x) * h, "v": c - x})
+    graph = cg.Graph([a, b, c, *cg.variables([*order])], {"u": (a + b * x) * h, "v": c - x})
     registers = {"ab": 2, "c": 1, "x": count, "h": 1, "u": count, "v": count}
-    program = Program(registers, [Map(graph, ("x", "h"), ("u", "v"), shared=("ab", "c"))], record=["u", "v"])
+    program = Program(registers, [Map(graph, tuple(order), ("u", "v"), shared=("ab", "c"))], record=["u", "v"])
     run, elements = runner(program, backend, fma=False), np.arange(count) + 0.5
     start = {"ab": [2.0, 3.0], "c": 7.0, "x": elements, "h": 0.25}
     expected = [*((2.0 + 3.0 * elements) * 0.25), *(7.0 - elements)]
@@ -138,7 +131,7 @@ def test_sum_adds_from_the_first_to_the_last(backend: str) -> None:
 
 
 def test_while_and_if(backend: str) -> None:
-    """The greatest common divisor by subtraction."""
+    """The greatest common divisor by subtraction; a NaN ends a while."""
     a, b = cg.variables("a b")
     less = cg.Graph([a, b], {"on": cg.not_equal(a, b), "first": cg.less(b, a)})
     subtract = cg.Graph([a, b], {"d": a - b})
@@ -154,10 +147,6 @@ def test_while_and_if(backend: str) -> None:
     run = runner(program, backend)
     for x, y in ((84, 36), (7, 13), (5, 5), (1, 9)):
         assert run.run(run.memory({"a": x, "b": y}), 1).rows.tolist() == [[math.gcd(x, y)]]
-
-
-def test_a_nan_ends_a_while(backend: str) -> None:
-    a = cg.variable("a")
     program = Program({"a": 1}, [While("a", (Call(cg.Graph([a], {"o": a + 1.0}), ("a",), ("a",)),))], record=["a"])
     run = runner(program, backend)
     assert math.isnan(run.run(run.memory({"a": math.nan}), 1).rows[0, 0])
@@ -177,23 +166,6 @@ def test_record_if_and_stop(backend: str) -> None:
     assert never.run(never.memory({}), 6).rows.ravel().tolist() == [5.0, 6.0]
 
 
-def test_passes_go_on_in_a_memory_that_is_kept(backend: str) -> None:
-    k = cg.variable("k")
-    count = cg.Graph([k], {"k": k + 1.0, "done": (k + 1.0) >= 5.0})
-    run = runner(Program({"k": 1, "done": 1}, [Call(count, ("k",), ("k", "done"))], ["k"], stop="done"), backend)
-    memory = run.memory({"k": 1.0})
-    advance = run.advancing(memory)
-    advance(2)
-    assert run.read(memory, "k").tolist() == [3.0]
-    advance(100)
-    assert run.read(memory, "k").tolist() == [5.0]
-    with pytest.raises(cg.GraphError, match="a memory must be contiguous"):
-        run.advancing(memory[:1].astype(np.float32))
-    fed = runner(Program({"k": 1, "done": 1}, [Call(count, ("k",), ("k", "done"))], ["k"], feed=["k"]), backend)
-    with pytest.raises(cg.GraphError, match="takes no feed"):
-        fed.advancing(fed.memory({}))
-
-
 def test_products_of_an_exact_call_are_rounded_by_themselves(backend: str) -> None:
     """What cancels is 0, also where the graph is called in both ways, and in a branch that seldom runs."""
     nodes = cg.variables("a b c d")
@@ -210,6 +182,19 @@ def test_products_of_an_exact_call_are_rounded_by_themselves(backend: str) -> No
 
 
 def test_a_run_goes_on_where_the_last_one_ended(backend: str) -> None:
+    k = cg.variable("k")
+    count = [Call(cg.Graph([k], {"k": k + 1.0, "done": (k + 1.0) >= 5.0}), ("k",), ("k", "done"))]
+    run = runner(Program({"k": 1, "done": 1}, count, ["k"], stop="done"), backend)
+    memory = run.memory({"k": 1.0})
+    advance = run.advancing(memory)
+    for passes, end in ((2, 3.0), (100, 5.0)):
+        advance(passes)
+        assert run.read(memory, "k").tolist() == [end]
+    with pytest.raises(cg.GraphError, match="a memory must be contiguous"):
+        run.advancing(memory[:1].astype(np.float32))
+    fed = runner(Program({"k": 1, "done": 1}, count, ["k"], feed=["k"]), backend)
+    with pytest.raises(cg.GraphError, match="takes no feed"):
+        fed.advancing(fed.memory({}))
     graph = spring()
     program = Program({"c": 2, "h": 1}, [Call(graph, ("c", "h"), ("c",))], record=["c"])
     run = runner(program, backend)
@@ -227,11 +212,8 @@ def test_factor_and_solve(n: int, seed: int) -> None:
     x = generator.normal(size=n)
     program = Program({"a": n * n, "p": n, "b": n}, [Factor("a", "p"), Solve("a", "p", "b")], record=["b", "a", "p"])
     results = []
-    for kind in BACKENDS:
-        try:
-            run = runner(program, kind, fma=False)
-        except ImportError:
-            continue
+    for kind in ("python", "llvm")[: 1 + bool(find_spec("llvmlite"))]:
+        run = runner(program, kind, fma=False)
         results.append(run.run(run.memory({"a": a.ravel(), "b": a @ x}), 1).rows)
         residual = a @ results[-1][0, :n] - a @ x
         assert np.all(np.abs(residual) <= LONG_SUM * (np.abs(a) @ np.abs(results[-1][0, :n])))
@@ -239,36 +221,19 @@ def test_factor_and_solve(n: int, seed: int) -> None:
         assert one.tolist() == other.tolist()
 
 
-def test_the_pivot_is_the_largest(backend: str) -> None:
+def test_the_pivot_is_the_largest_and_a_singular_matrix_gives_no_number(backend: str) -> None:
     program = Program({"a": 4, "p": 2, "b": 2}, [Factor("a", "p"), Solve("a", "p", "b")], record=["b"])
     run = runner(program, backend)
     assert run.run(run.memory({"a": [0.0, 1.0, 1.0, 0.0], "b": [2.0, 3.0]}), 1).rows.tolist() == [[3.0, 2.0]]
     tiny = run.run(run.memory({"a": [1e-20, 1.0, 1.0, 1.0], "b": [1.0, 2.0]}), 1).rows
     assert tiny.tolist() == [[1.0, 1.0]]
-
-
-def test_a_singular_matrix_gives_no_number(backend: str) -> None:
-    program = Program({"a": 4, "p": 2, "b": 2}, [Factor("a", "p"), Solve("a", "p", "b")], record=["b"])
-    run = runner(program, backend)
     assert not np.isfinite(run.run(run.memory({"a": [1.0, 2.0, 2.0, 4.0], "b": [1.0, 1.0]}), 1).rows).all()
 
 
-def test_machine_code_agrees_with_python_to_the_last_bit() -> None:
-    pytest.importorskip("llvmlite")
-    x, y, h = cg.variables("x y h")
-    rate = cg.Graph([x, y], {"x_dot": cg.sin(y) - 0.1 * x, "y_dot": cg.exp(-x * x) * cg.cos(x)})
-    a, b = cg.variables("a b")
-    ahead = cg.Graph([a, b, h], {"o": a + h * b})
-    registers = {"x": 2, "k": 2, "h": 1}
-    program = Program(registers, [Call(rate, ("x",), ("k",)), Map(ahead, ("x", "k", "h"), ("x",))], record=["x"])
-    rows = [(run := runner(program, kind, fma=False)).run(run.memory({"x": [0.3, 1.0], "h": 0.01}), 500).rows
-            for kind in BACKENDS]  # fmt: skip
-    assert rows[0].tolist() == rows[1].tolist()
-
-
-@pytest.mark.parametrize("asked", [0.0, 1.0, 2.0, 2.5, 99.0, math.nan])
-@pytest.mark.parametrize("wave", [False, True])  # functions of the C library go element by element
-@pytest.mark.parametrize("count", [5, 8])  # in vectors, too, where elements fill them
+@each_row(
+    ("asked", "wave", "count"),  # functions of the C library go element by element; 8 elements fill vectors
+    itertools.product([0.0, 1.0, 2.0, 2.5, 99.0, math.nan], [False, True], [5, 8]),
+)
 def test_elements_have_several_numbers_in_a_register(backend: str, asked: float, wave: bool, count: int) -> None:
     k, a, b, c = cg.variables("k a b c")
     outputs = {"sum": k * (cg.sin(a) if wave else a) + b, "product": b * c, "difference": a - b}
@@ -289,7 +254,7 @@ def test_elements_have_several_numbers_in_a_register(backend: str, asked: float,
 ONE = cg.Graph([cg.variable("a")], {"o": -cg.variable("a")})
 
 
-@pytest.mark.parametrize(
+@each_row(
     ("registers", "body", "message"),
     [
         ({"a": 2}, [Call(ONE, ("b",), ("a",))], "names register 'b', not among a"),
@@ -381,7 +346,6 @@ def test_a_feed_is_read_before_every_pass(backend: str) -> None:
         Program({"u": 1}, [], record=[], feed=["w"])
 
 
-@pytest.mark.parametrize("backend", ["python", "llvm"])
 def test_a_batch_records_what_a_pass_records_from_every_value(backend):
     a, b, y, s = cg.variables("a b y s")
     body = [

@@ -1,7 +1,6 @@
 """Batches by several threads: the same values, every column once, and a clean end."""
 
 import signal
-import sys
 import threading
 
 import numpy as np
@@ -11,6 +10,7 @@ import cgraph as cg
 from cgraph.program.runners import native_runner, python_runner, runner
 from cgraph.util import threads
 from cgraph.util.threads import share, thread_count
+from tests.cgraph.engines import ENGINES
 
 BATCH_ULPS = 4  # of a batch against one point at a time: polynomials in place of libm
 PATIENCE = 30.0  # seconds until a test that waits for another thread gives up
@@ -24,18 +24,16 @@ def graph():
 def points(count):
     """Among them some that a vector of lanes takes to libm, and its neighbours with it."""
     source = np.random.default_rng(7)
-    X = source.uniform(-2.0, 2.0, (2, count))
+    X = source.uniform(-2.0, 2.0, (2, count)).astype(np.float32).astype(float)
     X[0, source.random(count) < 0.05] = 1e9
     return X
 
 
-@pytest.fixture(params=["llvm", "numpy", "auto without llvmlite", "python"])
-def function(request, monkeypatch):
+@pytest.fixture(params=[*ENGINES, "auto without llvmlite"])
+def function(request, without, monkeypatch):
     """Functions whose blocks are small, so that small batches have many."""
-    if request.param == "llvm":
-        pytest.importorskip("llvmlite")
     if "without" in request.param:
-        monkeypatch.setitem(sys.modules, "llvmlite", None)
+        without("llvmlite")
     monkeypatch.setattr(native_runner, "WORK", 24 * len(graph().nodes))
     for module in (python_runner, runner):
         monkeypatch.setattr(module, "BLOCK", 24)
@@ -61,13 +59,6 @@ def test_the_block_is_no_matter_to_the_values(function, monkeypatch):
     np.testing.assert_array_almost_equal_nulp(found, cg.compile(graph(), "numpy").batch(X), BATCH_ULPS)
 
 
-def misaligned(X):
-    memory = np.empty(X.nbytes + 1, np.uint8)[1:]
-    result = memory.view(np.float64).reshape(X.shape)
-    result[:] = X
-    return result
-
-
 LAYOUTS = {
     "Fortran": np.asfortranarray,
     "every second column": lambda X: np.repeat(X, 2, axis=1)[:, ::2],
@@ -75,9 +66,10 @@ LAYOUTS = {
     "rows from below": lambda X: X[::-1].copy()[::-1],
     "columns from the right": lambda X: X[:, ::-1].copy()[:, ::-1],
     "part of a wider array": lambda X: np.pad(X, ((0, 0), (3, 5)))[:, 3:-5],
-    "misaligned": misaligned,
+    "misaligned": lambda X: np.ndarray(X.shape, X.dtype, b"1" + X.tobytes(), 1),
     "misaligned rows": lambda X: np.ndarray(X.shape, X.dtype, b"".join(r.tobytes() + b"12" for r in X), 0, (802, 8)),
     "another byte order": lambda X: X.astype(">f8"),
+    "float32": lambda X: X.astype(np.float32),
     "lists": lambda X: X.tolist(),
 }
 
@@ -103,11 +95,6 @@ def test_one_row_for_all_columns_and_one_column_for_all(function):
     assert np.array_equal(
         function.batch(np.broadcast_to(X[0], (2, 100)), threads=3), function.batch(np.stack([X[0], X[0]]))
     )
-
-
-def test_a_graph_without_inputs(function):
-    constant = cg.compile(cg.Graph([], {"c": cg.constant(1.5), "s": cg.sin(cg.constant(1.0))}), function.backend)
-    assert np.array_equal(constant.batch(np.empty((0, 60)), threads=2), [[1.5] * 60, [np.sin(1.0)] * 60])
 
 
 def test_every_item_is_done_once_whoever_does_it():
@@ -183,13 +170,6 @@ def test_ctrl_c_stops_after_the_blocks_under_way(number):
         share(work, range(100_000), number)
     assert len(done) < 99_999
     assert threading.active_count() == before
-
-
-@pytest.mark.parametrize("number", [0, -1, 2.5, "2", np.nan])
-@pytest.mark.parametrize("backend", ["auto", "numpy", "python"])
-def test_any_other_number_of_threads_is_an_error(number, backend):
-    with pytest.raises(ValueError, match="threads must be a whole number from 1, or None for one on each core, got"):
-        cg.compile(graph(), backend).batch(points(3), threads=number)
 
 
 def test_none_is_the_number_of_cores_of_this_process():

@@ -88,12 +88,11 @@ def test_c_is_one_text_or_two_files(tmp_path, capsys):
         ("--c --out sin.c", "sin.c names the function: the name of a C function must not be a word of C"),
     ],
 )
-def test_a_mistake_is_told_in_one_line_and_writes_nothing(arguments, said, tmp_path, monkeypatch, capsys):
-    monkeypatch.chdir(tmp_path)
+def test_a_mistake_is_told_in_one_line_and_writes_nothing(arguments, said, here, capsys):
     assert cli.main(["code", "spring_mass", *arguments.split()]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert re.search(re.escape(said), line)
-    assert list(tmp_path.iterdir()) == []
+    assert list(here.iterdir()) == []
 
 
 def test_the_help_names_what_there_is(capsys):

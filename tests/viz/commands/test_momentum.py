@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import pytest
@@ -40,27 +39,18 @@ def own(folder, monkeypatch):
     return folder
 
 
-def said(capsys, *arguments, status=0):
-    assert cli.main(arguments) == status
-    return capsys.readouterr().out
-
-
-def figures(capsys, *arguments, status=0):
-    return json.loads(said(capsys, *arguments, "--json", status=status))
-
-
 def sizes(graph):
     counts = graph.counts()
     return {"nodes": counts.nodes, "edges": counts.edges, "depth": counts.depth, "width": counts.width}
 
 
 @each_row("scene", SCENES)
-def test_lint_and_compare_have_the_sizes_of_both_forms(own, capsys, scene):
+def test_lint_and_compare_have_the_sizes_of_both_forms(own, figures, scene):
     model = dyn.scenes.load(scene)
     forms = dyn.state_equation(model), dyn.hamilton_equations(model)
-    linted = figures(capsys, "lint", scene, "--momentum")
+    linted = figures("lint", scene, "--momentum")
     assert [*linted["sizes"].values()][:2] == [sizes(graph) for graph in forms]
-    found = figures(capsys, "compare", scene, "--momentum", status=1)
+    found = figures("compare", scene, "--momentum", status=1)
     assert found["sizes"] == linted["sizes"]
     assert found["sizes"]["velocities alone"]["depth"] <= found["sizes"]["Hamilton's equations"]["depth"]
     for side, graph in zip(("left", "right"), forms, strict=True):
@@ -71,20 +61,20 @@ def test_lint_and_compare_have_the_sizes_of_both_forms(own, capsys, scene):
     assert not any("bias" in name for name in found["right_classes"])
 
 
-def test_a_state_at_which_there_is_nothing_to_compare_is_no_number(own, capsys):
-    assert set(figures(capsys, "compare", "own.py:away", "--momentum", status=1)["agreement"].values()) == {None}
+def test_a_state_at_which_there_is_nothing_to_compare_is_no_number(own, figures):
+    assert set(figures("compare", "own.py:away", "--momentum", status=1)["agreement"].values()) == {None}
 
 
-def test_the_momenta_and_positions_are_proven_apart(own, capsys):
-    text = said(capsys, "lint", "triple_pendulum", "--momentum")
+def test_the_momenta_and_positions_are_proven_apart(own, said):
+    text = said("lint", "triple_pendulum", "--momentum")
     assert "no path leads from p.joint 1, p.joint 2 and p.joint 3 to q.joint 1" in text
     counts = dyn.hamilton_equations(dyn.scenes.load("triple_pendulum")).counts()
     assert text.splitlines()[-2].split()[-4:] == [str(counts.nodes), "238", str(counts.depth), "28"]
 
 
 @each_row("scene", ["triple_pendulum", "own.py:planet", "own.py:free"])
-def test_why_adds_up_to_the_derivative(own, capsys, scene):
-    found = figures(capsys, "why", scene, "p0_dot", "q0", "--momentum", "--k", "1")
+def test_why_adds_up_to_the_derivative(own, figures, scene):
+    found = figures("why", scene, "p0_dot", "q0", "--momentum", "--k", "1")
     if found["depends"]:
         graph, at = dyn.hamilton_equations(dyn.scenes.load(scene)), found["at"]
         slope = cg.gradient(cg.Graph(graph.inputs, {"rate": graph.outputs["p0_dot"]}), ["q0"])
@@ -103,20 +93,20 @@ def test_why_adds_up_to_the_derivative(own, capsys, scene):
         ("spring_mass", "p0_dot p0", False),
     ],
 )
-def test_a_rate_that_is_0_is_told_why(own, capsys, scene, asked, told):
-    text = said(capsys, "why", scene, *asked.split(), "--momentum")
+def test_a_rate_that_is_0_is_told_why(own, said, figures, scene, asked, told):
+    text = said("why", scene, *asked.split(), "--momentum")
     assert "does not depend on" in text
     assert ("The momentum of 'phi' is constant" in text) is told
-    assert ("constant" in figures(capsys, "why", scene, *asked.split(), "--momentum")) is told
+    assert ("constant" in figures("why", scene, *asked.split(), "--momentum")) is told
 
 
-def test_the_momentum_graph_is_drawn(own, capsys):
+def test_the_momentum_graph_is_drawn(own, said):
     for scene in ("own.py:planet", "triple_pendulum"):
-        assert "nodes" in said(capsys, "draw", scene, "--momentum", "--out", "a.txt")
+        assert "nodes" in said("draw", scene, "--momentum", "--out", "a.txt")
         listing = Path("a.txt").read_text(encoding="utf-8")
         assert dyn.hamilton_equations(dyn.scenes.load(scene)).listing() in listing
         assert "# p0 is p." in listing
-    said(capsys, "draw", "triple_pendulum", "--momentum", "--out", "a.dot")
+    said("draw", "triple_pendulum", "--momentum", "--out", "a.dot")
     drawn = Path("a.dot").read_text(encoding="utf-8")
     assert all(theme.MOTION_WORDS[role] in drawn for role in ("primal", "adjoint", "tangent"))
 

@@ -1,10 +1,7 @@
 """The drawing of a graph as DOT: what is drawn, under which ids, and with which words."""
 
-import json
 import re
-import subprocess
-import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 from xml.etree import ElementTree
 
@@ -88,16 +85,8 @@ def test_an_edge_joins_the_nodes_of_its_id() -> None:
         assert head in (f"n{target}", target)
 
 
-def test_an_operation_shows_its_symbol() -> None:
-    graph = spring()
-    drawn = boxes(graph)
-    for i, node in enumerate(graph.nodes):
-        if node.args:
-            assert drawn[f"n{i}"]["label"] == node.op.symbol
-
-
 @each_row("op", [op for op in OPS.values() if op.symbol])
-def test_every_row_of_the_table_can_be_drawn(op: Op) -> None:
+def test_every_operation_can_be_drawn(op: Op) -> None:
     inputs = cg.variables([f"x{i}" for i in range(op.arity)])
     graph = cg.Graph(inputs, {"y": apply(op, *inputs)})
     assert boxes(graph)[f"n{len(graph.nodes) - 1}"]["label"] == op.symbol
@@ -109,25 +98,15 @@ def test_a_constant_is_drawn_once_for_each_use() -> None:
     assert [attributes["label"] for attributes in drawn.values()].count("0.1235") == 2
 
 
-def test_a_constant_output_and_an_input_output_are_drawn() -> None:
+def test_outputs_are_boxes_of_a_constant_an_input_and_twice_of_one_node_and_names_stand_above_symbols() -> None:
     x = cg.variable("x")
+    named = cg.with_name(x * x, "energy")
+    shown = boxes(cg.Graph([x], {"a": named, "b": named}))
+    assert [shown[each]["label"] for each in ("n1", "o0", "o1")] == ["energy\n×", "a", "b"]
     graph = cg.Graph([x], {"x": x, "two": 2.0})
     drawn = arrows(graph)
     assert {head for _, head, _ in drawn.values()} == {"o0", "o1"}
     assert {tail for tail, _, _ in drawn.values()} <= set(boxes(graph))
-
-
-def test_two_outputs_of_one_node_are_two_boxes() -> None:
-    x = cg.variable("x")
-    y = cg.sin(x)
-    drawn = boxes(cg.Graph([x], {"a": y, "b": y}))
-    assert drawn["o0"]["label"] == "a"
-    assert drawn["o1"]["label"] == "b"
-
-
-def test_a_named_operation_shows_name_and_symbol() -> None:
-    x = cg.variable("x")
-    assert boxes(cg.Graph([x], {"y": cg.with_name(x * x, "energy")}))["n1"]["label"] == "energy\n×"
 
 
 def test_given_names_win_over_prettified_ones() -> None:
@@ -164,63 +143,50 @@ def test_the_legend_has_other_words_where_a_role_is_something_else() -> None:
     assert theme.ROLES["input"].words in source
     with pytest.raises(TypeError, match="legend"):
         to_dot(spring(), legend=None)  # type: ignore[arg-type]
-
-
-def test_the_legend_can_be_left_out() -> None:
     assert "legend" not in to_dot(spring(), legend=False).source
+    assert "wrong term" in to_dot(spring(), marked={spring().nodes[0]}, marked_label="wrong term").source
+    assert "wrong term" not in to_dot(spring(), marked_label="wrong term").source
 
 
-def test_marked_nodes_and_the_edges_out_of_them_have_the_one_color() -> None:
+def test_marked_nodes_and_the_edges_out_of_them_have_a_color_for_each_of_two_groups() -> None:
     graph = spring()
-    marked = {node for node in graph.nodes if "potential" in node.tags}
+    groups = {name: {node for node in graph.nodes if name in node.tags} for name in ("kinetic", "potential")}
     number = {node: i for i, node in enumerate(graph.nodes)}
-    drawn, lines = boxes(graph, marked=marked), arrows(graph, marked=marked)
-    for node, i in number.items():
-        if node.value is None:
-            assert (drawn[f"n{i}"]["color"] == theme.SPURIOUS) == (node in marked)
-            assert ("penwidth" in drawn[f"n{i}"]) == (node in marked)
-    for edge in graph.edges:
-        line = lines[f"e{number[edge.source]}-{number[edge.target]}-{edge.slot}"][2]
-        assert (line.get("color") == theme.SPURIOUS) == (edge.source in marked)
-
-
-def test_the_legend_names_the_marked_only_when_there_are_some() -> None:
-    graph = spring()
-    assert "wrong term" in to_dot(graph, marked={graph.nodes[-1]}, marked_label="wrong term").source
-    assert "wrong term" not in to_dot(graph, marked_label="wrong term").source
-
-
-def test_two_groups_of_marked_nodes_have_a_color_and_a_line_of_the_legend_each() -> None:
-    graph = spring()
-    groups = {
-        name: {node for node in graph.nodes if name in node.tags and node.args} for name in ("kinetic", "potential")
-    }
-    assert all(groups.values())
-    number = {node: i for i, node in enumerate(graph.nodes)}
-    drawn, lines = boxes(graph, marked=groups), arrows(graph, marked=groups)
-    for paint, (name, nodes) in zip(theme.MARKS, groups.items(), strict=True):
-        for i, node in enumerate(graph.nodes):
-            if node.value is None:
-                assert (drawn[f"n{i}"]["color"] == paint.line) == (node in nodes)
-        for edge in graph.edges:
-            line = lines[f"e{number[edge.source]}-{number[edge.target]}-{edge.slot}"][2]
-            assert (line.get("color") == paint.line) == (edge.source in nodes)
-        assert f"label={name}" in to_dot(graph, marked=groups).source
+    for marked, paints in (
+        ({"": groups["potential"]}, {"": theme.SPURIOUS}),
+        (groups, dict(zip(groups, [paint.line for paint in theme.MARKS], strict=True))),
+    ):
+        given = marked if len(marked) > 1 else marked[""]
+        drawn, lines = boxes(graph, marked=given), arrows(graph, marked=given)
+        for name, nodes in marked.items():
+            assert nodes
+            for node, i in number.items():
+                if node.value is None:
+                    assert (drawn[f"n{i}"]["color"] == paints[name]) == (node in nodes)
+                    assert ("penwidth" in drawn[f"n{i}"]) == any(node in each for each in marked.values())
+            for edge in graph.edges:
+                line = lines[f"e{number[edge.source]}-{number[edge.target]}-{edge.slot}"][2]
+                assert (line.get("color") == paints[name]) == (edge.source in nodes)
+            assert not name or f"label={name}" in to_dot(graph, marked=groups).source
     assert theme.MARKS[0].line != theme.MARKS[1].line
 
 
-def test_marked_groups_share_no_node_and_are_two_at_most() -> None:
-    node = spring().nodes[-1]
-    graph = cg.Graph(spring().inputs, {"f": node})
-    with pytest.raises(ValueError, match="1 marked nodes are in both groups"):
-        to_dot(graph, marked={"a": {node}, "b": {node}})
-    with pytest.raises(ValueError, match="at most 2 groups, got 3"):
-        to_dot(graph, marked={"a": {node}, "b": (), "c": ()})
+NODE = chain().nodes[-1]
 
 
-def test_a_marked_node_of_another_graph_is_refused() -> None:
-    with pytest.raises(ValueError, match="1 of 1 marked nodes are not in the graph"):
-        to_dot(spring(), marked={chain().nodes[-1]})
+@each_row(
+    ("options", "words"),
+    [
+        ({"marked": {"a": {NODE}, "b": {NODE}}}, "1 marked nodes are in both groups"),
+        ({"marked": {"a": {NODE}, "b": (), "c": ()}}, "at most 2 groups, got 3"),
+        ({"marked": {spring().nodes[-1]}}, "1 of 1 marked nodes are not in the graph"),
+        ({"collapse": ["link 9"]}, r"'link 9'.*link 1, link 2, link 3"),
+        ({"rankdir": "UP"}, "rankdir must be one of BT"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(options: dict[str, Any], words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        to_dot(cg.Graph([cg.variable("x")], {"y": NODE}), **options)
 
 
 def test_numbered_tags_make_the_clusters() -> None:
@@ -307,16 +273,6 @@ def test_a_collapsed_box_with_marked_nodes_says_so() -> None:
     assert box["color"] == theme.SPURIOUS
 
 
-def test_an_unknown_collapsed_tag_is_refused_with_the_known_ones() -> None:
-    with pytest.raises(ValueError, match=r"'link 9'.*link 1, link 2, link 3"):
-        to_dot(chain(), collapse=["link 9"])
-
-
-def test_an_unknown_direction_is_refused() -> None:
-    with pytest.raises(ValueError, match="rankdir must be one of BT"):
-        to_dot(chain(), rankdir="UP")  # type: ignore[arg-type]
-
-
 def test_a_caption_counts_nodes_and_edges() -> None:
     graph = spring()
     assert f"A spring\n{len(graph.nodes)} nodes, {len(graph.edges)} edges" in to_dot(graph, caption="A spring").source
@@ -350,23 +306,7 @@ def test_the_picture_carries_the_ids() -> None:
     assert set(boxes(graph)) | set(arrows(graph)) <= identities
 
 
-def test_the_same_graph_gives_the_same_text_in_every_run() -> None:
-    program = (
-        "import cgraph as cg, json, viz\n"
-        "with cg.tag('link 2', 'kinetic', 'b', 'a'): y = cg.sin(cg.variable('x')) * 2.0\n"
-        "g = cg.gradient(cg.Graph([cg.variable('x')], {'y': y * y}))\n"
-        "print(json.dumps(viz.to_dot(g, marked=frozenset(g.nodes), clusters=['a', 'link 2']).source))"
-    )
-    texts = set()
-    for seed in ("1", "2"):
-        command = [sys.executable, "-c", program]
-        environment = {"PYTHONPATH": ":".join(sys.path), "PYTHONHASHSEED": seed}
-        run = subprocess.run(command, capture_output=True, text=True, check=True, env=environment)
-        texts.add(json.loads(run.stdout))
-    assert len(texts) == 1
-
-
-def test_without_graphviz_the_error_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "graphviz", None)
+def test_without_graphviz_the_error_names_the_extra(without: Callable[[str], None]) -> None:
+    without("graphviz")
     with pytest.raises(ImportError, match=r"pip install '\.\[viz\]'"):
         to_dot(spring())

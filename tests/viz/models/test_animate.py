@@ -41,8 +41,7 @@ def has(frame, color: str) -> bool:
     return bool((np.abs(frame - wanted).sum(axis=2) < 24).any())
 
 
-@pytest.mark.parametrize("kind", [".gif", ".png", ".apng"])
-@pytest.mark.parametrize(("model", "motion"), [(ARM, FALL), (SYSTEM, SWING)])
+@each_row(("kind", "model", "motion"), [(".gif", ARM, FALL), (".png", SYSTEM, SWING), (".apng", ARM, FALL)])
 def test_a_film_takes_the_time_of_the_motion(model, motion, kind, tmp_path):
     path = tmp_path / f"film{kind}"
     film = viz.animate(model, motion, path)
@@ -132,11 +131,11 @@ def test_what_cannot_be_shown_is_told(arguments, named, message):
         viz.animate(*arguments, **named)
 
 
-def test_a_missing_program_or_package_is_told(monkeypatch, tmp_path):
+def test_a_missing_program_or_package_is_told(without, monkeypatch, tmp_path):
     monkeypatch.setenv("PATH", str(tmp_path))
     with pytest.raises(RuntimeError, match=r"MP4 needs the program ffmpeg on the PATH; .gif and .apng need no program"):
         viz.animate(ARM, FALL, tmp_path / "a.mp4")
-    monkeypatch.setitem(sys.modules, "PIL", None)
+    without("PIL")
     with pytest.raises(ImportError, match=r"animations need Pillow: .*viz"):
         viz.animate(ARM, FALL)
     assert not [*tmp_path.iterdir()]
@@ -153,24 +152,3 @@ def test_mp4_gets_every_frame_and_ffmpeg_is_heard(monkeypatch, tmp_path):
     program.write_text(f"#!{sys.executable}\nimport sys\nsys.exit('no such codec')\n")
     with pytest.raises(RuntimeError, match="ffmpeg cannot write this film: no such codec"):
         viz.animate(ARM, FALL, tmp_path / "a.mp4")
-
-
-@pytest.mark.parametrize("model", [scenes.load("triple_pendulum"), SYSTEM])
-def test_the_right_torque_follows_and_the_flawed_one_falls_away(model):
-    off = {}
-    for formulation in ("chain_rule", "euler_embedded"):
-        run, wanted = viz.driven(model, formulation, t_end=1.0)
-        assert run.stats.success
-        off[formulation] = np.abs(run.q - wanted(run.t)).max()
-    assert off["chain_rule"] < 1e-6 < 0.05 < off["euler_embedded"]
-
-
-def test_a_wanted_motion_needs_coordinates_of_its_own():
-    rod = dyn.System(
-        lambda q, qd, t: qd[0] ** 2 + qd[1] ** 2, "x y", constraints=lambda q, t: {"rod": q[0] ** 2 + q[1] ** 2 - 1.0}
-    )
-    with pytest.raises(ValueError, match="has constraints: a wanted motion cannot be chosen"):
-        viz.driven(rod)
-    free = dyn.Mechanism([dyn.Body("b", dyn.Joint("free"), mass=1.0, inertia=np.eye(3))])
-    with pytest.raises(ValueError, match="has velocities that are not the rates of its coordinates"):
-        viz.driven(free)

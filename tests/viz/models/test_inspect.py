@@ -62,8 +62,7 @@ def test_a_start_that_is_chosen_is_kept(start):
         ((PENDULUM,), {"forward": True, "momentum": True}, "forward and momentum exclude one another"),
     ],
 )
-def test_what_cannot_be_is_told_and_nothing_is_written(arguments, named, message, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
+def test_what_cannot_be_is_told_and_nothing_is_written(arguments, named, message, here):
     with pytest.raises((ValueError, OSError), match=message):
         viz.inspect(*arguments, **named)
-    assert not [*tmp_path.iterdir()]
+    assert not [*here.iterdir()]

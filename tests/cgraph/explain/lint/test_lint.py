@@ -18,6 +18,7 @@ from cgraph.explain.names import Names
 from cgraph.operations.bounds import REAL_LINE
 from cgraph.operations.operation import OPS
 from tests import high_precision
+from tests.each_row import each_row
 from tests.strategies import Case, cases, examples
 from tests.tolerances import EQUATIONS
 
@@ -35,9 +36,13 @@ def state(n: int) -> tuple[str, str]:
 # Independence.
 
 
-@pytest.mark.parametrize("simplify", [True, False])
-@pytest.mark.parametrize("n", [1, 2, 4, 9])
-def test_by_definition_the_blame_is_one_edge_for_each_joint(n, simplify):
+@each_row(("n", "simplify"), [(1, True), (2, False), (4, True), (9, True), (9, False)])
+def test_by_definition_the_blame_is_one_edge_for_each_joint_and_by_the_chain_rule_there_is_a_proof(n, simplify):
+    for formulation in ("chain_rule", "chain_rule_literal"):
+        found = lint(dyn.inverse_dynamics(arm(n), formulation, simplify=simplify), independent=state(n))
+        assert found.ok
+        assert len(found.proofs) == 2
+        assert all("no path leads" in proof for proof in found.proofs)
     graph = dyn.inverse_dynamics(arm(n), "euler_embedded", simplify=simplify)
     found = lint(graph, independent=state(n), function="L")
     (finding,) = found.findings
@@ -48,15 +53,6 @@ def test_by_definition_the_blame_is_one_edge_for_each_joint(n, simplify):
     assert finding.data["corrupted"] == [{"derivative": f"dL/dqd{i}", "gains": f"dt * dL/dq{i}"} for i in range(n)]
     assert found.nodes == dyn.spurious_nodes(graph)
     assert found.edges == set(finding.edges) <= set(graph.edges)
-
-
-@pytest.mark.parametrize("formulation", ["chain_rule", "chain_rule_literal"])
-@pytest.mark.parametrize("n", [1, 3, 6])
-def test_by_the_chain_rule_there_is_a_proof(n, formulation):
-    found = lint(dyn.inverse_dynamics(arm(n), formulation), independent=state(n))
-    assert found.ok
-    assert len(found.proofs) == 2
-    assert all("no path leads" in proof for proof in found.proofs)
 
 
 def test_the_report_on_one_joint():
@@ -157,22 +153,33 @@ def test_groups_may_be_given_in_many_ways():
         assert found.ok
     assert not lint(cg.Graph([x, y], {"f": x * y}), independent=(["x", "y"], ["f", "f"])).ok  # not x of y and f of f
     assert not lint(graph, independent=("two words", "x")).ok
-    for pairs, error, words in (
+
+
+AMBIGUOUS = (("x", "y"), ("y", "z")), ValueError, "one pair of groups or two pairs; give groups as strings or lists"
+REFUSED = [
+    *[(("independent", pairs), error, words) for pairs, error, words in (
         ("x y", TypeError, "expected pairs of groups"),
         (["x", "y", "z"], ValueError, "each entry must be a pair of groups, got 'x'"),
         ([("x", "y", "z")], ValueError, "each entry must be a pair"),
         ([("x y", "y z")], cg.GraphError, "y is in both groups"),
         ([("x", "w")], cg.GraphError, "nothing in the graph is called 'w'"),
-        (
-            (("x", "y"), ("y", "z")),
-            ValueError,
-            "one pair of groups or two pairs; give groups as strings or lists",
-        ),
+        AMBIGUOUS,
         ([("x", "")], ValueError, "a group needs at least one name"),
         ([(3, "x")], TypeError, "a group is a name or several, or nodes; got int: 3"),
-    ):
-        with pytest.raises(error, match=words):
-            lint(graph, independent=pairs)
+    )],
+    *[(("box", {"x": interval}), ValueError, "box: input 'x' needs")
+      for interval in ((1.0, 0.0), (math.nan, 1.0), (0.0,), "01", None, (True, 2))],
+    (("box", {"w": (0.0, 1.0)}), cg.GraphError, "box: the graph has no input w"),
+    *[(("digits", digits), ValueError, "digits must be a positive number") for digits in (0.0, -1.0, math.nan, "4")],
+]  # fmt: skip
+
+
+@each_row(("given", "error", "words"), REFUSED)
+def test_what_makes_no_sense_is_refused(given, error, words):
+    name, value = given
+    at = {"at": dict.fromkeys("xyz", 1.0)} if name == "digits" else {}
+    with pytest.raises(error, match=words):
+        lint(cg.Graph([x, y, z], {"f": x * y + z}), **{name: value}, **at)
 
 
 def test_a_report_is_json():
@@ -319,16 +326,6 @@ def test_a_finding_in_a_box_tells_the_arguments_and_the_tags():
     )
 
 
-@pytest.mark.parametrize(
-    "box", [{"x": (1.0, 0.0)}, {"x": (math.nan, 1.0)}, {"x": (0.0,)}, {"x": "01"}, {"x": None}, {"x": (True, 2)}]
-)
-def test_what_is_no_interval_is_refused(box):
-    with pytest.raises(ValueError, match="box: input 'x' needs"):
-        lint(cg.Graph([x], {"f": x}), box=box)
-    with pytest.raises(cg.GraphError, match="box: the graph has no input y"):
-        lint(cg.Graph([x], {"f": x}), box={"y": (0.0, 1.0)})
-
-
 # A point.
 
 
@@ -361,12 +358,6 @@ def test_what_is_exact_cancels_without_loss():
     graph = cg.Graph([x], {"f": (cg.constant(3.0) - 3.0) + x, "g": x - x})
     assert [finding.nodes for finding in lint(graph, at={"x": 0.1}).findings] == [(graph.outputs["g"],)]
     assert "leaves 0; 16 digits are lost here, 0 remain" in str(lint(graph, at={"x": 0.1}))
-
-
-@pytest.mark.parametrize("digits", [0.0, -1.0, math.nan, "4"])
-def test_digits_must_be_a_positive_number(digits):
-    with pytest.raises(ValueError, match="digits must be a positive number"):
-        lint(cg.Graph([x], {"f": x}), at={"x": 1.0}, digits=digits)
 
 
 def test_deep_graphs_need_no_recursion():
