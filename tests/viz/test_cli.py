@@ -416,7 +416,7 @@ def test_without_arguments_the_commands_are_listed(capsys):
     assert [name for name in COMMANDS if f"\n    {name}" not in shown] == []
 
 
-@each_row("typed, meant", [("simulat", "'simulate'"), ("Draw", "'draw'"), ("xyzzy", "it has paper, bench")])
+@each_row("typed, meant", [("simulat", "'simulate'"), ("Draw", "'draw'"), ("xyzzy", "`cgraph` alone lists them")])
 def test_a_command_that_there_is_not_is_told_with_the_nearest(capsys, typed, meant):
     with pytest.raises(SystemExit) as ended:
         cli.main([typed])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import difflib
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from importlib import import_module
@@ -102,9 +103,9 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     if not words:
         words = ["--help"]
     elif not words[0].startswith("-") and words[0] not in COMMANDS:
-        from cgraph.extend import or_nearest  # here, so that a command that is known does not wait for it
-
-        whole.error(f"there is no command {words[0]!r}: {or_nearest(words[0], list(COMMANDS))}")
+        near = difflib.get_close_matches(words[0].casefold(), COMMANDS, 1)
+        hint = f"did you mean {near[0]!r}?" if near else "`cgraph` alone lists them"
+        whole.error(f"there is no command {words[0]!r}: {hint}")
     options, rest = whole.parse_known_args(words)
     if rest:
         several = getattr(options, getattr(options, "words", ""), None)
