@@ -60,7 +60,7 @@ if TYPE_CHECKING:
     from .multibody.quantities.regressor import inertial_parameters, regressor
     from .multibody.quantities.whole_body import center_of_mass, center_of_mass_jacobian, spatial_momentum
     from .multibody.trees.mechanism import Body, Force, Joint, Loop, Mechanism, MechanismError, MechanismWarning
-    from .multibody.trees.modification import Subtree
+    from .multibody.trees.structure import Subtree
     from .multiprecision.reference import reference
     from .multiprecision.solution import Reference
     from .scenes.scenes import Scene
