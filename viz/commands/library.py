@@ -7,15 +7,6 @@ from cgraph.extend import doors
 TYPE_CHECKING = False
 
 if TYPE_CHECKING:
-    from dynamics.equations.formulations.node_classes import form_classes, formulation_classes
-    from dynamics.equations.momentum.both_forms import (
-        HAMILTON,
-        LAGRANGE,
-        VELOCITIES_ALONE,
-        both_forms,
-        form_agreement,
-        form_sizes,
-    )
     from dynamics.experiments import pruning
     from dynamics.experiments.machine import machine
     from dynamics.experiments.speed import bench as speed
@@ -42,10 +33,19 @@ if TYPE_CHECKING:
     from ..models.inspect import inspection_page
     from ..models.inspection import FRAMES, inspection
     from ..models.live import live_page
+    from ..models.node_classes import form_classes, formulation_classes
     from ..models.remarks import constant_momentum, tree_alone
     from ..pages import pruning as pruning_page, stability as stability_page, work_precision as work_precision_page
     from ..pages.document import check_folder, document_files
     from ..pages.html import html_target
+    from ..paper.both_forms import (
+        HAMILTON,
+        LAGRANGE,
+        VELOCITIES_ALONE,
+        both_forms,
+        form_agreement,
+        form_sizes,
+    )
     from ..paper.paper import paper
     from ..plots.plot import check_can_plot
     from ..typed import typed_page
