@@ -50,13 +50,17 @@ class OdeSystem:
     array([0.367879])
     """
 
+    velocities: tuple[str, ...] = ()  # the rates of states are no states, see `Model`
+    system = mechanism = None  # neither a Lagrangian nor bodies
+
     def __init__(
         self,
         rate: Callable[..., Sequence[Node | float]],
         states: Sequence[str],
         parameters: Mapping[str, float] | None = None,
     ) -> None:
-        self.states = names_of("a system", "state", states, spaces=False)
+        self.coordinates = self.states = names_of("a system", "state", states, spaces=False)
+        self.n = len(self.states)  # number of states
         if named := [name for name in RESERVED if name in self.states]:
             raise ValueError(f"a state cannot be called {named[0]!r}, which is the name of time; choose another")
         self.parameters = {name: parameter_value(name, value) for name, value in parameter_items(parameters)}
@@ -75,34 +79,9 @@ class OdeSystem:
         require_known("the rate", self.rates, known, f"no state, parameter or t (it has {names})")
 
     @property
-    def coordinates(self) -> tuple[str, ...]:
-        """The states, as a `Model` has them."""
-        return self.states
-
-    @property
-    def velocities(self) -> tuple[str, ...]:
-        """None: the rates of the states are no states."""
-        return ()
-
-    @property
-    def system(self) -> None:
-        """None: no Lagrangian."""
-        return None
-
-    @property
     def ode(self) -> OdeSystem:
         """The system itself, as a `Model` has it."""
         return self
-
-    @property
-    def mechanism(self) -> None:
-        """None: a first-order system has no bodies."""
-        return None
-
-    @property
-    def n(self) -> int:
-        """Number of states."""
-        return len(self.states)
 
     @cached_property
     def x(self) -> list[Node]:

@@ -103,6 +103,8 @@ class Mechanism(Structure):
     {'m': 1.0}
     """
 
+    ode = None  # it has a Lagrangian, see `Model`
+
     def __post_init__(self) -> None:
         quantities("gravity", self.gravity)
         require_flag("base_parameters", self.base_parameters)
@@ -175,11 +177,6 @@ class Mechanism(Structure):
     def mechanism(self) -> Mechanism:
         """The mechanism itself, as a `Model` has it."""
         return self
-
-    @property
-    def ode(self) -> None:
-        """None: a mechanism has a Lagrangian, see `Model`."""
-        return None
 
     @property
     def carriers(self) -> dict[str, Carrier]:
