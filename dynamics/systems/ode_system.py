@@ -14,11 +14,10 @@ from .arguments import (
     Parameters,
     call_user_function,
     names_of,
-    node_or_number,
+    one_for_each,
     parameter_items,
     parameter_value,
     require_known,
-    sequence,
 )
 
 RESERVED = (TIME, "dt")
@@ -67,13 +66,8 @@ class OdeSystem:
         if shared := [name for name in self.states if name in self.parameters]:
             raise ValueError(f"{shared[0]!r} is both a state and a parameter; choose another name for one of them")
         p = Parameters(self.parameters)
-        values = sequence("rate must give", call_user_function("rate", rate, self.x, self.t, p))
-        if len(values) != self.n:
-            names = ", ".join(self.states)
-            raise ValueError(f"rate must give {self.n} values, one for each of {names}; got {len(values)}")
-        self.rates = tuple(
-            [node_or_number(f"the rate of {name!r}", x) for name, x in zip(self.states, values, strict=True)]
-        )
+        given = call_user_function("rate", rate, self.x, self.t, p)
+        self.rates = tuple(one_for_each("rate", given, self.states, "the rate of"))
         names = ", ".join((*self.states, *self.parameters))
         known = {*self.x, self.t, *p.values()}
         require_known("the rate", self.rates, known, f"no state, parameter or t (it has {names})")

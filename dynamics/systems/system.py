@@ -20,6 +20,7 @@ from .arguments import (
     call_user_function,
     coefficients,
     node_or_number,
+    one_for_each,
     parameter_items,
     parameter_value,
     require_known,
@@ -281,13 +282,8 @@ class System:
 
 def generalized_forces(what: str, function: Callable[..., object], system: System, p: Parameters) -> list[Node]:
     """Forces of a function of (q, qd, t) or (q, qd, t, p), a node for each velocity. Raises what is wrong with it."""
-    value = call_user_function(what, function, system.q, system.qd, system.t, p)
-    applied = sequence(f"{what} must give", value)
-    if len(applied) != system.n:
-        names = ", ".join(system.velocities)
-        raise ValueError(f"{what} must give {system.n} values, one for each of {names}; got {len(applied)}")
-    pairs = zip(system.velocities, applied, strict=True)
-    return [node_or_number(f"the force on {name!r}", force) for name, force in pairs]
+    given = call_user_function(what, function, system.q, system.qd, system.t, p)
+    return one_for_each(what, given, system.velocities, "the force on")
 
 
 def _kinetic_and_potential(lagrangian: Node, velocities: Sequence[Node]) -> tuple[Node, Node]:

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 import cgraph as cg
@@ -23,7 +22,6 @@ from ...systems.system import System
 from ..algebra import spatial
 from ..algebra.spatial import ZERO
 from ..bodies.body import vector
-from ..sweeps.kinematic_chain import KinematicChain
 from ..trees.mechanism import Mechanism
 from .body_quantity import MECHANISM, body_quantity
 
@@ -59,7 +57,7 @@ def frame_placement(mechanism: Mechanism, body: str, at: ArrayLike = ORIGIN) -> 
     """
     chain, point = mechanism.chain(body), vector(f"the point of body {body!r}: at", at)
     with building(Builder()), cg.tag(body):
-        columns = _columns(chain)
+        columns = chain.columns()
         yield from [columns[j][i] for i in range(3) for j in range(3)]
         yield from chain.motion(point).position
 
@@ -163,15 +161,10 @@ def _twist(mechanism: Mechanism, body: str, at: ArrayLike, axes: str) -> list[No
         motion = chain.motion(point)
         parts = [motion.velocity, motion.omega]
         if axes == "body":
-            columns = _columns(chain)
+            columns = chain.columns()
             parts = [(spatial.dot(columns[0], v), spatial.dot(columns[1], v), spatial.dot(columns[2], v))
                      for v in parts]  # fmt: skip
     return [component for part in parts for component in part]
-
-
-def _columns(chain: KinematicChain) -> list[spatial.Triple]:
-    """The body's axes in the world's."""
-    return [chain.direction(spatial.constant(axis)) for axis in np.eye(3)]
 
 
 def _motion(system: System) -> dict[Node, Node]:
