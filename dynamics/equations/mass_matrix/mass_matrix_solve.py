@@ -29,8 +29,6 @@ DENSE_PATH = 12  # coordinates from the world to a tip; a dense factorization lo
 WORTH = 0.8  # of the nodes by elimination, at most, for the dense one: elimination keeps more digits
 
 Rows = Sequence[Sequence[Node]]
-
-
 Solution = TypeVar("Solution")
 
 
