@@ -31,10 +31,10 @@ from cgraph.extend import (
 from ...systems.kinematics import ONE, ZERO
 from ...systems.system import System
 from ..bias_terms import state_rate
-from ..constraints.constraints import Rows as ConstraintRows, constraint_rows
+from ..constraints.constraints import constraint_rows
 from ..equation import entries
 from ..mass_matrix.accelerations import BY_ENERGY, DENSE_UP_TO, accelerations
-from ..mass_matrix.mass_matrix_solve import MassSolve, Rows, linear, mass_solve, smaller_solution, units
+from ..mass_matrix.mass_matrix_solve import MassSolve, Rows, mass_solve, smaller_solution, units
 from .inverse_dynamics_derivatives import state_slopes, torque_derivatives
 
 Matrix = NDArray[Any]  # of numbers, (.., n, k), or of nodes, (n, k)
@@ -142,43 +142,36 @@ def velocity_form(_: Matrix, x: Matrix, inverse: Matrix, brackets: Matrix) -> tu
 
 def linearization_parts(system: System) -> LinearizationParts:
     """Parts of the velocity form. Raises SingularMassMatrixError for a coordinate without inertia."""
-    if len(system.constraints):
-        return _parts(system, "auto")
-    return smaller_solution(system, lambda method: _parts(system, method), lambda parts: parts.size)
+    if not len(system.constraints):
+        return smaller_solution(
+            system,  # accelerations of the M that is factored again
+            lambda method: _parts(system, accelerations(system, BY_ENERGY if method == "dense" else method), method),
+            lambda parts: parts.size,
+        )
+    solved = accelerations(system)
+    if system.n <= DENSE_UP_TO:
+        with suppress(SingularError):  # which needs rows exchanged
+            return _parts(system, solved, "dense")
+    return _parts(system, solved, "recursive")
 
 
-def _parts(system: System, method: str) -> LinearizationParts:
+def _parts(system: System, solved: Graph, method: str) -> LinearizationParts:
+    """Parts by one method.  solved: the accelerations, and multipliers of constraints."""
     n, build = system.n, Builder()
-    solved = accelerations(system, BY_ENERGY if method == "dense" else method)  # of the M that is factored below
     nodes = dict(zip(solved.outputs, folded(list(solved.outputs.values()), build), strict=True))
     at = {qdd: nodes[f"qdd{i}"] for i, qdd in enumerate(system.qdd)}
-    pulls: list[Node] = []
-    changes: list[list[Node]] = []
+    solve, pulls, changes = mass_solve(system, build, method), list[Node](), list[list[Node]]()
     if len(system.constraints):
-        lagrangian, *rates = folded([system.lagrangian, *system.constraints.rates], build)
-        rows = constraint_rows(system, rates)
+        rows = constraint_rows(system, folded(system.constraints.rates, build))
         at |= {each: nodes[str(each.name)] for each in rows.multipliers}
         pulls = cotangents(dict(zip(rows.rates, rows.multipliers, strict=True)), system.qd, build)  # J^T lambda
         dots = tangents(state_rate(system, system.qdd) | {system.t: ONE}, rows.rates, build)
         slopes = state_slopes(system, [dots.get(z, ZERO) for z in rows.rates], build)  # d(dz/dt)/dx
         changes = [folded(row, build, at) for row in slopes]
-        b = cg.variables([f"b{i}#" for i in range(n + len(rows.kept))])
-        solve = linear(b, _solved(system, lagrangian, rows, b, build)[:n])
-    else:
-        solve = mass_solve(system, build, method)
     found = torque_derivatives(system, at, build, pulls)
     partials = [*[[*q, *qd] for q, qd in zip(found.by_q, found.by_qd, strict=True)], *changes]
     with building(build):
         # M dqdd - J^T dlambda = dtau - d(tau - J^T lambda)/dx dx,  J dqdd = -d(dz/dt)/dx dx
         sides = [[-row[j] for row in partials] for j in range(2 * n)]
-    return LinearizationParts(
-        solved.inputs, sides, solve, {"C": system.kinematics.brackets(build)}, velocity_form, build
-    )
-
-
-def _solved(system: System, lagrangian: Node, rows: ConstraintRows, side: Sequence[Node], build: Builder) -> list[Node]:
-    """(dqdd, -dlambda) for a right-hand side: densely up to 7 coordinates, where that goes without exchanging rows."""
-    if system.n <= DENSE_UP_TO:
-        with suppress(SingularError):
-            return rows.solve_densely(system, lagrangian, side, build)
-    return rows.solve(system, lagrangian, side, build)
+    rest = {"C": system.kinematics.brackets(build)}
+    return LinearizationParts(solved.inputs, sides, solve, rest, velocity_form, build)
