@@ -25,6 +25,7 @@ COMMON = {  # parameters that mean the same in every function that has them
     "q": "q : array_like, (nq,)\n    Coordinates [rad or m].",
     "qd": "qd : array_like, (n,)\n    Velocities [rad/s or m/s].",
     "tau": "tau : array_like, (n,)\n    Applied forces [N m or N], by default 0.",
+    "form": 'form : {"velocity", "momentum"}\n    Of x, as of `simulate`.',
     "t": "t : float\n    Time [s], for a model that depends on it.",
     "parameters": "parameters : mapping of str to float, optional\n    Values in place of the model's own.",
 }

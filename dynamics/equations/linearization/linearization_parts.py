@@ -23,14 +23,11 @@ from cgraph.extend import (
     building,
     cotangents,
     folded,
-    tangents,
     topological,
     with_reciprocals,
 )
 
-from ...systems.kinematics import ONE, ZERO
 from ...systems.system import System
-from ..bias_terms import state_rate
 from ..constraints.constraints import constraint_rows
 from ..equation import entries
 from ..mass_matrix.accelerations import BY_ENERGY, DENSE_UP_TO, accelerations
@@ -165,9 +162,8 @@ def _parts(system: System, solved: Graph, method: str) -> LinearizationParts:
         rows = constraint_rows(system, folded(system.constraints.rates, build))
         at |= {each: nodes[str(each.name)] for each in rows.multipliers}
         pulls = cotangents(dict(zip(rows.rates, rows.multipliers, strict=True)), system.qd, build)  # J^T lambda
-        dots = tangents(state_rate(system, system.qdd) | {system.t: ONE}, rows.rates, build)
-        slopes = state_slopes(system, [dots.get(z, ZERO) for z in rows.rates], build)  # d(dz/dt)/dx
-        changes = [folded(row, build, at) for row in slopes]
+        rates = system.constraints.rate_changes(rows.rates, build, system.qdd)
+        changes = [folded(row, build, at) for row in state_slopes(system, rates, build)]  # d(dz/dt)/dx
     found = torque_derivatives(system, at, build, pulls)
     partials = [*[[*q, *qd] for q, qd in zip(found.by_q, found.by_qd, strict=True)], *changes]
     with building(build):

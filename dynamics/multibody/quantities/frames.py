@@ -14,13 +14,13 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import Builder, building, cotangents, require_choice, tangents
+from cgraph.extend import Builder, building, cotangents, require_choice
 
+from ...equations.bias_terms import along_motion
 from ...equations.equation import Equation, Output, entries
 from ...systems.kinematics import ONE
 from ...systems.system import System
 from ..algebra import spatial
-from ..algebra.spatial import ZERO
 from ..bodies.body import vector
 from ..trees.mechanism import Mechanism
 from .body_quantity import MECHANISM, body_quantity
@@ -93,8 +93,7 @@ def frame_acceleration(mechanism: Mechanism, body: str, at: ArrayLike = ORIGIN, 
     [3.0, 0.0, 4.0, 0.0, -3.0, 0.0]
     """
     system = mechanism.system
-    along = _motion(system) | dict(zip(system.qd, system.qdd, strict=True))
-    return _rates(along, _twist(mechanism, body, at, axes))
+    return along_motion(system, _twist(mechanism, body, at, axes), Builder(), system.qdd)
 
 
 @body_quantity(Equation("q qd", Output("a_{}", ("6",), RATES)), FRAME, NO_FRAME)
@@ -109,7 +108,7 @@ def frame_bias_acceleration(mechanism: Mechanism, body: str, at: ArrayLike = ORI
     >>> dyn.arrays_at(arm, centripetal, q=[0.0], qd=[2.0])["a"][2].tolist()
     4.0
     """
-    return _rates(_motion(mechanism.system), _twist(mechanism, body, at, axes))
+    return along_motion(mechanism.system, _twist(mechanism, body, at, axes), Builder(), None)
 
 
 @body_quantity(Equation("q qd", Output("J_{}_{}", ("6", "n"))), FRAME, NO_FRAME)
@@ -144,7 +143,7 @@ def frame_jacobian_rate(mechanism: Mechanism, body: str, at: ArrayLike = ORIGIN,
     [2.0]
     """
     rows = jacobian_rows(mechanism.system, _twist(mechanism, body, at, axes))
-    return _rates(_motion(mechanism.system), entries(rows))
+    return along_motion(mechanism.system, entries(rows), Builder(), None)
 
 
 def jacobian_rows(system: System, velocities: Sequence[Node]) -> list[list[Node]]:
@@ -165,13 +164,3 @@ def _twist(mechanism: Mechanism, body: str, at: ArrayLike, axes: str) -> list[No
             parts = [(spatial.dot(columns[0], v), spatial.dot(columns[1], v), spatial.dot(columns[2], v))
                      for v in parts]  # fmt: skip
     return [component for part in parts for component in part]
-
-
-def _motion(system: System) -> dict[Node, Node]:
-    """Rates of the coordinates."""
-    return dict(zip(system.q, system.q_dot, strict=True))
-
-
-def _rates(along: dict[Node, Node], nodes: Sequence[Node]) -> list[Node]:
-    dots = tangents(along, nodes, Builder())
-    return [dots.get(node, ZERO) for node in nodes]

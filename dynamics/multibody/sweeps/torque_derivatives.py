@@ -32,6 +32,7 @@ from cgraph import Node
 from cgraph.extend import Builder, as_node, building, cotangents
 
 from ...systems.body_terms import TorqueDerivatives
+from ...systems.kinematics import ONE, gathered
 from ..algebra.inertia import Inertia, Rows, rows, symmetric, traced
 from ..algebra.spatial import STILL, ZERO, Triple, combined, cross, dot, plus, scaled
 from ..algebra.spatial_vectors import IDLE, REST, Twist, Wrench
@@ -292,9 +293,7 @@ def _add_spring(result: TorqueDerivatives, at: LinkState, build: Builder) -> Non
     rate, end = at.joint.rate(at.q, at.u), at.first + len(at.u)
     for i, (_, force) in enumerate(at.springs(), at.first):
         result.torques[i] = result.torques[i] + force
-        seeds: dict[Node, Node] = {}
-        for node, slope in zip(rate, cotangents({force: cg.constant(1.0)}, at.q, build), strict=True):
-            seeds[node] = seeds.get(node, ZERO) + slope
+        seeds = gathered(zip(rate, cotangents({force: ONE}, at.q, build), strict=True))
         for j, slope in zip(range(at.first, end), cotangents(seeds, at.u, build), strict=True):
             result.by_q[i][j] = result.by_q[i][j] + slope
 
