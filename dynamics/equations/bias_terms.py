@@ -56,11 +56,9 @@ def bias_terms(system: System, qdd: Sequence[Node] | None = None) -> BiasTerms:
     rates, n = system.constraints.rates, system.n
     lagrangian, *nodes = folded([system.lagrangian, *system.forces, *pairs, *rates], build)
     forces, pairs, rows = nodes[:n], nodes[n : n + len(pairs)], nodes[n + len(pairs) :]
-    works = [
-        pair for pair in zip(pairs[::2], pairs[1::2], strict=True) if pair[0].value is None and pair[1].value != 0.0
-    ]
-    with building(build):
-        inertial = gathered(works)  # a constant velocity does no virtual work
+    couples = zip(pairs[::2], pairs[1::2], strict=True)
+    with building(build):  # a constant velocity does no virtual work
+        inertial = gathered([(z, force) for z, force in couples if z.value is None and force.value != 0.0])
     return BiasTerms(lagrangian, forces, inertial, [ZERO] * system.n, rows)
 
 
