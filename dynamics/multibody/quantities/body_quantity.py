@@ -46,6 +46,7 @@ def body_quantity(
         first, *others = signature(derivation).parameters.values()
         taken = [first.replace(name="model", annotation="Model"), *others]
         graph.__signature__ = signature(derivation).replace(parameters=taken, return_annotation="Graph")  # type: ignore[attr-defined]
+        graph.__annotations__ = {each.name: each.annotation for each in taken} | {"return": "Graph"}
         return documented(graph, row.returns, known, refused)
 
     return decorate
