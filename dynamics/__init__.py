@@ -95,7 +95,7 @@ if TYPE_CHECKING:
         MechanismError as MechanismError,
         MechanismWarning as MechanismWarning,
     )
-    from .multibody.trees.modification import Subtree as Subtree
+    from .multibody.trees.structure import Subtree as Subtree
     from .multiprecision.reference import reference as reference
     from .scenes.scenes import Scene as Scene
     from .simulation.ensembles.ensemble import Ensemble as Ensemble

@@ -8,7 +8,7 @@ from typing import NamedTuple
 from cgraph import Node
 from cgraph.extend import Builder, building, cotangents, folded, tangents
 
-from ..systems.kinematics import ONE, ZERO
+from ..systems.kinematics import ONE, ZERO, gathered
 from ..systems.system import System
 from .velocity_nodes import velocity_nodes
 
@@ -40,6 +40,12 @@ def state_rate(system: System, qdd: Sequence[Node] | None) -> dict[Node, Node]:
     return rate | ({system.t: ONE} if system.t in system.extra_inputs else {})
 
 
+def along_motion(system: System, nodes: Sequence[Node], build: Builder, qdd: Sequence[Node] | None) -> list[Node]:
+    """d/dt of nodes, one forward sweep.  qdd: accelerations, 0 if None."""
+    dots = tangents(state_rate(system, qdd), nodes, build)
+    return [dots.get(node, ZERO) for node in nodes]
+
+
 def bias_terms(system: System, qdd: Sequence[Node] | None = None) -> BiasTerms:
     """Terms as bodies state them, or else derived from the Lagrangian.  qdd: accelerations, 0 if None."""
     if system.body_terms is None:
@@ -50,11 +56,9 @@ def bias_terms(system: System, qdd: Sequence[Node] | None = None) -> BiasTerms:
     rates, n = system.constraints.rates, system.n
     lagrangian, *nodes = folded([system.lagrangian, *system.forces, *pairs, *rates], build)
     forces, pairs, rows = nodes[:n], nodes[n : n + len(pairs)], nodes[n + len(pairs) :]
-    inertial: dict[Node, Node] = {}
-    with building(build):
-        for velocity, force in zip(pairs[::2], pairs[1::2], strict=True):
-            if velocity.value is None and force.value != 0.0:  # a constant velocity does no virtual work
-                inertial[velocity] = inertial.get(velocity, ZERO) + force
+    couples = zip(pairs[::2], pairs[1::2], strict=True)
+    with building(build):  # a constant velocity does no virtual work
+        inertial = gathered([(z, force) for z, force in couples if z.value is None and force.value != 0.0])
     return BiasTerms(lagrangian, forces, inertial, [ZERO] * system.n, rows)
 
 

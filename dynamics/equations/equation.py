@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import textwrap
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import update_wrapper
 from inspect import cleandoc, signature
@@ -25,6 +25,7 @@ COMMON = {  # parameters that mean the same in every function that has them
     "q": "q : array_like, (nq,)\n    Coordinates [rad or m].",
     "qd": "qd : array_like, (n,)\n    Velocities [rad/s or m/s].",
     "tau": "tau : array_like, (n,)\n    Applied forces [N m or N], by default 0.",
+    "form": 'form : {"velocity", "momentum"}\n    Of x, as of `simulate`.',
     "t": "t : float\n    Time [s], for a model that depends on it.",
     "parameters": "parameters : mapping of str to float, optional\n    Values in place of the model's own.",
 }
@@ -50,7 +51,8 @@ EQUATIONS: dict[str, Equation] = {}
 class Output:
     """A number, a vector or a matrix among the outputs of an equation.
 
-    names: with a place for each index, as "E", "tau{}", "M_{}_{}".  shape: of "n", "2n" and "nq".  unit: in SI.
+    names: with a place for each index, as "E", "tau{}", "M_{}_{}".  shape: of "n", "2n", "nq" and numbers as "3".
+    unit: in SI.
     """
 
     names: str
@@ -60,7 +62,8 @@ class Output:
     def of(self, system: System) -> list[str]:
         """The names of its entries, row by row."""
         sizes = {"n": system.n, "2n": 2 * system.n, "nq": system.nq}
-        return [self.names.format(*index) for index in product(*[range(sizes[each]) for each in self.shape])]
+        counts = [sizes[each] if each in sizes else int(each) for each in self.shape]
+        return [self.names.format(*index) for index in product(*map(range, counts))]
 
     def __str__(self) -> str:
         first, unit = self.names.format(*[0] * len(self.shape)), f" [{self.unit}]" if self.unit else ""
@@ -106,9 +109,9 @@ class Equation:
     def describes(self, function: Documented) -> Documented:
         """The function, with the tables of this equation in its docstring."""
         EQUATIONS[function.__name__] = self
-        return documented(function, self._returns)
+        return documented(function, self.returns)
 
-    def _returns(self, more: str) -> str:
+    def returns(self, more: str) -> str:
         """Section Returns: inputs, outputs, and more of them."""
         inputs = ", ".join([f"{kind}0.." for kind in self.inputs])
         outputs = f"output{'s' * (len(self.outputs) > 1 or bool(self.outputs[0].shape))}"
@@ -119,10 +122,16 @@ class Equation:
         return lambda system: min([cg.simplify(self.graph(system, nodes)) for nodes in derivation(system)], key=_size)
 
 
-def documented(function: Documented, returns: Callable[[str], str] = str) -> Documented:
+def documented(
+    function: Documented,
+    returns: Callable[[str], str] = str,
+    known: Mapping[str, str] = COMMON,
+    refused: str = NO_MODEL,
+) -> Documented:
     """The function, with what its docstring leaves out: parameters that mean the same everywhere, and what is no model.
 
-    returns: what stands under Returns, from what is said there.
+    returns: what stands under Returns, from what is said there.  known: parameters.  refused: what stands under Raises,
+    unless its first error does.
     """
     assert isinstance(function, FunctionType)
     if function.__doc__ is None:  # python -OO
@@ -132,11 +141,11 @@ def documented(function: Documented, returns: Callable[[str], str] = str) -> Doc
     told: dict[str, str] = {}
     for entry in filter(None, re.split(r"\n(?=\S)", sections.get("Parameters", ""))):
         told |= {name.strip(): entry for name in entry.partition("\n")[0].partition(" : ")[0].split(",")}
-    parameters = [told.get(name) or COMMON[name] for name in signature(function).parameters]
+    parameters = [told.get(name) or known[name] for name in signature(function).parameters]
     raised = sections.get("Raises", "")
     sections["Parameters"] = "\n".join(dict.fromkeys(parameters))
     sections["Returns"] = returns(sections.get("Returns", ""))
-    sections["Raises"] = raised if "TypeError" in raised else f"{raised}\n{NO_MODEL}".strip()
+    sections["Raises"] = raised if refused.split(maxsplit=1)[0] in raised else f"{raised}\n{refused}".strip()
     tables = [f"{name}\n{'-' * len(name)}\n{sections[name]}\n" for name in SECTIONS if name in sections]
     function.__doc__ = "\n".join([f"{head.strip()}\n", *tables])
     return function

@@ -246,7 +246,7 @@ def _couplings(joints: Mapping[str, Element], leaders: Mapping[str, str]) -> lis
 
 def _outside(robot: Element, joints: Mapping[str, Element], smooth: Smooth) -> list[str]:
     """Sentences on forces and inputs on a mechanism that are not taken."""
-    limited = [name for name, joint in joints.items() if _limited(joint, name)]
+    limited = [name for name, joint in joints.items() if _limits(joint, name)]
     rubbing = [f"{name}: {force:g}" for name, joint in joints.items() if (force := _friction(joint, name))]
     return present(
         {
@@ -262,20 +262,21 @@ def _forces(joints: Mapping[str, Element], smooth: Smooth) -> list[JointForce]:
     """The forces of joints that are taken."""
     forces: list[JointForce] = []
     for name, joint in joints.items():
-        body, limit, where = _end(joint, name, "child"), _one(joint, f"joint {name!r}", "limit"), f"joint {name!r}"
-        if smooth.limits is not None and limit is not None and _limited(joint, name):
-            lower, upper = (_numbers(limit, where, side, 1, "0")[0] for side in ("lower", "upper"))
-            forces.append(smooth.limit(body, lower, upper))
+        body = _end(joint, name, "child")
+        if smooth.limits is not None and (ends := _limits(joint, name)):
+            forces.append(smooth.limit(body, *ends))
         if smooth.friction is not None and (loss := _friction(joint, name)):
             forces.append(JointFriction(body, loss, smooth.friction))
     return forces
 
 
-def _limited(joint: Element, name: str) -> bool:
+def _limits(joint: Element, name: str) -> tuple[float, float] | None:
+    """The range of a hinge or slide; None without limits."""
     limit, where = _one(joint, f"joint {name!r}", "limit"), f"joint {name!r}"
     if limit is None or joint.get("type") not in ("revolute", "prismatic"):
-        return False
-    return [_numbers(limit, where, side, 1, "0")[0] for side in ("lower", "upper")] != [-FAR, FAR]
+        return None
+    lower, upper = (_numbers(limit, where, side, 1, "0")[0] for side in ("lower", "upper"))
+    return None if (lower, upper) == (-FAR, FAR) else (lower, upper)
 
 
 def _friction(joint: Element, name: str) -> float:

@@ -11,12 +11,14 @@ import numpy as np
 from cgraph.extend import Array, real_number
 
 from ..multibody.algebra import spatial
+from ..multibody.quantities.body_quantity import of_bodies
 from ..multibody.trees.mechanism import WORLD, Body, Mechanism, MechanismError, require_mechanism
 from ..systems.model import Model
 from .stand_ins import INERTIA_ROUNDING, with_stand_ins
 from .write_loops import equality_lines, numbers, site_lines
 
 
+@of_bodies
 def to_mjcf(model: Model, timestep: float = 1e-3) -> str:
     """The bodies of a model as MJCF text: masses and inertias explicit, RK4, contacts off.
 
@@ -29,8 +31,6 @@ def to_mjcf(model: Model, timestep: float = 1e-3) -> str:
 
     Parameters
     ----------
-    model : Model
-        A mechanism, or a scene of one.
     timestep : float
         MuJoCo's step [s].
 

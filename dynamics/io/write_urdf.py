@@ -11,12 +11,14 @@ from numpy.typing import ArrayLike
 from cgraph.extend import Array
 
 from ..multibody.parameters import vanishes
+from ..multibody.quantities.body_quantity import of_bodies
 from ..multibody.trees.mechanism import WORLD, Body, MechanismError, require_mechanism
 from ..systems.model import Model
 from .read_urdf import FAR, GRAVITY
 from .write_loops import mimic_lines, numbers
 
 
+@of_bodies
 def to_urdf(model: Model) -> str:
     """The bodies of a model as URDF text; the root link is "world".
 
@@ -24,11 +26,6 @@ def to_urdf(model: Model) -> str:
     which angles cost a few roundings. A joint that is locked is a weld. Gravity other than 9.81 m/s^2 along -z, which
     URDF has not, is in an element of MuJoCo's that other programs pass over. Of parameters the values are written. A
     loop that couples two joints by a line is a <mimic>, which has no name.
-
-    Parameters
-    ----------
-    model : Model
-        A mechanism, or a scene of one.
 
     Returns
     -------

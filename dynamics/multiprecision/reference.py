@@ -14,7 +14,7 @@ from cgraph import Graph, Node
 from cgraph.extend import atomic_write, require_choice, require_path
 
 from ..equations.state_equation import state_equation, state_inputs
-from ..equations.states.initial_value import initial_value, times_to_record
+from ..equations.states.initial_value import other_inputs, start_state, times_to_record
 from ..systems.controller import with_closed_form
 from ..systems.model import Model, as_equations
 from .collocation import collocation
@@ -103,20 +103,20 @@ def reference(
     if isinstance(digits, bool) or not (isinstance(digits, int) and 1 <= digits <= MOST_DIGITS // 2):
         raise ValueError(f"digits must be a whole number from 1 to {MOST_DIGITS // 2}, got {digits!r}")
     model, constant, _ = with_closed_form(as_equations(model), tau, parameters)
-    start, inputs = initial_value(model, q, qd, constant, parameters), state_inputs(model)
-    x, times = start.x.tolist(), times_to_record(t_eval).tolist()
-    values = {name: start.bound[name] for name in (*inputs.parameters, *inputs.applied)}
+    bound, inputs = other_inputs(model, constant, parameters), state_inputs(model)
+    x, times = start_state(model, q, qd, bound).tolist(), times_to_record(t_eval).tolist()
+    values = {name: bound[name] for name in (*inputs.parameters, *inputs.applied)}
     graph, solver = state_equation(model), REFERENCE_METHODS[method]
 
     def solve() -> Reference:
         def run(wanted: int) -> tuple[list[list[Number]], str]:
-            return solver(graph, start.states, x, times, values, wanted)
+            return solver(graph, inputs.states, x, times, values, wanted)
 
-        return _converged(run, times, digits, FIRST[method](digits), start.states)
+        return _converged(run, times, digits, FIRST[method](digits), inputs.states)
 
     if folder is None:
         return solve()
-    name = key(graph, start.states, x, times, values, method, digits)
+    name = key(graph, inputs.states, x, times, values, method, digits)
     return _kept(Path(folder) / f"{name}.json", times, len(x), solve)
 
 

@@ -157,6 +157,14 @@ def sequence(what: str, value: Any) -> list[Any]:
         raise TypeError(f"{what} a sequence, got {type(value).__name__}: {value!r:.60}") from None
 
 
+def one_for_each(what: str, given: object, names: Sequence[str], of: str) -> list[Node]:
+    """A node for each of the names, of nodes or numbers that a function gave. Raises TypeError or ValueError."""
+    values = sequence(f"{what} must give", given)
+    if len(values) != len(names):
+        raise ValueError(f"{what} must give {len(names)} values, one for each of {', '.join(names)}; got {len(values)}")
+    return [node_or_number(f"{of} {name!r}", value) for name, value in zip(names, values, strict=True)]
+
+
 def node_or_number(what: str, value: Any) -> Node:
     """The node, or the constant of a number. Raises TypeError or ValueError, naming `what`, for anything else."""
     try:

@@ -90,15 +90,14 @@ class Constraints:
     @cached_property
     def rates(self) -> tuple[Node, ...]:
         """All rows as rows of velocities, z(q, u, t) = 0: d phi/dt = J u + d phi/dt at rest, then A u + a."""
-        k = self.kinematics
-        dots = tangents(dict(zip(k.q, k.q_dot, strict=True)) | {self.t: ONE}, self.positions, Builder())
-        return (*[dots.get(phi, ZERO) for phi in self.positions], *self.velocities)
+        return (*self.rate_changes(self.positions, Builder()), *self.velocities)
 
-    def rate_changes(self, rates: list[Node], build: Builder) -> list[Node]:
-        """dz/dt at udot = 0 of the rows z, as they are folded elsewhere."""
+    def rate_changes(self, rows: Sequence[Node], build: Builder, u_dot: Sequence[Node] | None = None) -> list[Node]:
+        """d/dt of rows, as they are folded elsewhere.  u_dot: accelerations, 0 if None."""
         k = self.kinematics
-        dots = tangents(dict(zip(k.q, k.q_dot, strict=True)) | {self.t: ONE}, rates, build)
-        return [dots.get(z, ZERO) for z in rates]
+        along = dict(zip(k.q, k.q_dot, strict=True)) | dict(zip(k.u, u_dot or (), strict=u_dot is not None))
+        dots = tangents(along | {self.t: ONE}, rows, build)
+        return [dots.get(row, ZERO) for row in rows]
 
     def without(self, dropped: Mapping[int, float]) -> Constraints:
         """The constraints with 0 for some rows, which are open by so much."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import cached_property
 
 import numpy as np
@@ -16,6 +16,14 @@ from .quasi_velocities import Function, QuasiVelocities
 
 ONE, ZERO = cg.constant(1.0), cg.constant(0.0)
 TOLERANCE = 1e-9  # of the terms of a bracket: their rounding
+
+
+def gathered(pairs: Iterable[tuple[Node, Node]]) -> dict[Node, Node]:
+    """{node: sum of what stands beside it}: cotangents, of which two may be at one node."""
+    sums: dict[Node, Node] = {}
+    for node, value in pairs:
+        sums[node] = sums[node] + value if node in sums else value
+    return sums
 
 
 class Kinematics:
@@ -60,10 +68,8 @@ class Kinematics:
         """G^T bars: cotangents of the coordinates as those of the velocities, (n,)."""
         if self.quasi is None:
             return list(bars)
-        seeds: dict[Node, Node] = {}
         with building(build):
-            for rate, bar in zip(folded(self.q_dot, build), bars, strict=True):
-                seeds[rate] = seeds[rate] + bar if rate in seeds else bar
+            seeds = gathered(zip(folded(self.q_dot, build), bars, strict=True))
         return cotangents(seeds, self.u, build)
 
     def structure(self, momenta: Sequence[Node], build: Builder) -> list[Node]:

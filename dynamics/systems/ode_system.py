@@ -14,11 +14,10 @@ from .arguments import (
     Parameters,
     call_user_function,
     names_of,
-    node_or_number,
+    one_for_each,
     parameter_items,
     parameter_value,
     require_known,
-    sequence,
 )
 
 RESERVED = (TIME, "dt")
@@ -50,59 +49,33 @@ class OdeSystem:
     array([0.367879])
     """
 
+    velocities: tuple[str, ...] = ()  # the rates of states are no states, see `Model`
+    system = mechanism = None  # neither a Lagrangian nor bodies
+
     def __init__(
         self,
         rate: Callable[..., Sequence[Node | float]],
         states: Sequence[str],
         parameters: Mapping[str, float] | None = None,
     ) -> None:
-        self.states = names_of("a system", "state", states, spaces=False)
+        self.coordinates = self.states = names_of("a system", "state", states, spaces=False)
+        self.n = len(self.states)  # number of states
         if named := [name for name in RESERVED if name in self.states]:
             raise ValueError(f"a state cannot be called {named[0]!r}, which is the name of time; choose another")
         self.parameters = {name: parameter_value(name, value) for name, value in parameter_items(parameters)}
         if shared := [name for name in self.states if name in self.parameters]:
             raise ValueError(f"{shared[0]!r} is both a state and a parameter; choose another name for one of them")
         p = Parameters(self.parameters)
-        values = sequence("rate must give", call_user_function("rate", rate, self.x, self.t, p))
-        if len(values) != self.n:
-            names = ", ".join(self.states)
-            raise ValueError(f"rate must give {self.n} values, one for each of {names}; got {len(values)}")
-        self.rates = tuple(
-            [node_or_number(f"the rate of {name!r}", x) for name, x in zip(self.states, values, strict=True)]
-        )
+        given = call_user_function("rate", rate, self.x, self.t, p)
+        self.rates = tuple(one_for_each("rate", given, self.states, "the rate of"))
         names = ", ".join((*self.states, *self.parameters))
         known = {*self.x, self.t, *p.values()}
         require_known("the rate", self.rates, known, f"no state, parameter or t (it has {names})")
 
     @property
-    def coordinates(self) -> tuple[str, ...]:
-        """The states, as a `Model` has them."""
-        return self.states
-
-    @property
-    def velocities(self) -> tuple[str, ...]:
-        """None: the rates of the states are no states."""
-        return ()
-
-    @property
-    def system(self) -> None:
-        """None: no Lagrangian."""
-        return None
-
-    @property
     def ode(self) -> OdeSystem:
         """The system itself, as a `Model` has it."""
         return self
-
-    @property
-    def mechanism(self) -> None:
-        """None: a first-order system has no bodies."""
-        return None
-
-    @property
-    def n(self) -> int:
-        """Number of states."""
-        return len(self.states)
 
     @cached_property
     def x(self) -> list[Node]:

@@ -20,6 +20,7 @@ from .arguments import (
     call_user_function,
     coefficients,
     node_or_number,
+    one_for_each,
     parameter_items,
     parameter_value,
     require_known,
@@ -64,6 +65,15 @@ class System:
     body_terms : BodyTerms, optional
         What rigid bodies know of their equations beside L; a `Mechanism` hands it in.
 
+    Attributes
+    ----------
+    coordinates, velocities : tuple of str
+        Names, nq and n; of the coordinates alone, unless there are quasi-velocities.
+    q, qd : list of Node
+        Coordinates and velocities, variables q0, q1, .. and qd0, qd1, ...
+    nq, n : int
+        Numbers of coordinates, and of velocities, the degrees of freedom.
+
     Raises
     ------
     TypeError, ValueError
@@ -77,6 +87,8 @@ class System:
     >>> dyn.System(lagrangian, ["x"], parameters={"m": 2.0, "k": 8.0})
     <System of 1 coordinate(s) x, parameters m, k>
     """
+
+    ode = mechanism = None  # neither a first-order system nor bodies, see `Model`
 
     def __init__(
         self,
@@ -93,6 +105,9 @@ class System:
         if not isinstance(body_terms, BodyTerms | None):
             raise TypeError(f"body_terms must be BodyTerms, got {type(body_terms).__name__}: {body_terms!r:.60}")
         self.kinematics, self.body_terms = Kinematics(coordinates, quasi_velocities), body_terms
+        self.coordinates, self.velocities = self.kinematics.coordinates, self.kinematics.velocities
+        self.q, self.qd = self.kinematics.q, self.kinematics.u
+        self.nq, self.n = len(self.q), len(self.qd)
         if body_terms is None:  # the types of joints are known to be consistent
             self.kinematics.require_consistent()
         self.parameters = {name: parameter_value(name, value) for name, value in parameter_items(parameters)}
@@ -129,11 +144,6 @@ class System:
         """The system itself, as a `Model` has it."""
         return self
 
-    @property
-    def ode(self) -> None:
-        """None: no first-order system."""
-        return None
-
     @cached_property
     def forms(self) -> list[System]:
         """The system, and of bodies one with the energy of base numbers, which is another but for its derivatives."""
@@ -150,47 +160,12 @@ class System:
         return self.changed(body_terms=replace(self.body_terms, equations=equations))
 
     @property
-    def mechanism(self) -> None:
-        """None: a Lagrangian alone has no bodies."""
-        return None
-
-    @property
-    def coordinates(self) -> tuple[str, ...]:
-        """Names of the coordinates, nq."""
-        return self.kinematics.coordinates
-
-    @property
-    def velocities(self) -> tuple[str, ...]:
-        """Names of the velocities, n: those of the coordinates, unless there are quasi-velocities."""
-        return self.kinematics.velocities
-
-    @property
-    def n(self) -> int:
-        """Number of velocities, the degrees of freedom."""
-        return len(self.velocities)
-
-    @property
-    def nq(self) -> int:
-        """Number of coordinates, which is n unless there are quasi-velocities."""
-        return len(self.coordinates)
-
-    @property
     def lengths(self) -> tuple[float, ...]:
         """Scale of each coordinate and velocity in comparisons of size [m, of bodies]; 0 if it has none.
 
         1 of lengths, and of angles what they move the bodies by.
         """
         return (1.0,) * (self.nq + self.n) if self.body_terms is None else self.body_terms.lengths
-
-    @property
-    def q(self) -> list[Node]:
-        """Coordinates, variables q0, q1, ..."""
-        return self.kinematics.q
-
-    @property
-    def qd(self) -> list[Node]:
-        """Velocities, variables qd0, qd1, ..."""
-        return self.kinematics.u
 
     @property
     def q_dot(self) -> list[Node]:
@@ -307,13 +282,8 @@ class System:
 
 def generalized_forces(what: str, function: Callable[..., object], system: System, p: Parameters) -> list[Node]:
     """Forces of a function of (q, qd, t) or (q, qd, t, p), a node for each velocity. Raises what is wrong with it."""
-    value = call_user_function(what, function, system.q, system.qd, system.t, p)
-    applied = sequence(f"{what} must give", value)
-    if len(applied) != system.n:
-        names = ", ".join(system.velocities)
-        raise ValueError(f"{what} must give {system.n} values, one for each of {names}; got {len(applied)}")
-    pairs = zip(system.velocities, applied, strict=True)
-    return [node_or_number(f"the force on {name!r}", force) for name, force in pairs]
+    given = call_user_function(what, function, system.q, system.qd, system.t, p)
+    return one_for_each(what, given, system.velocities, "the force on")
 
 
 def _kinetic_and_potential(lagrangian: Node, velocities: Sequence[Node]) -> tuple[Node, Node]:

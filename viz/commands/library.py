@@ -8,15 +8,6 @@ TYPE_CHECKING = False
 
 if TYPE_CHECKING:
     from dynamics.equations.constraints.integrability import ConstraintLint
-    from dynamics.equations.formulations.node_classes import form_classes, formulation_classes
-    from dynamics.equations.momentum.both_forms import (
-        HAMILTON,
-        LAGRANGE,
-        VELOCITIES_ALONE,
-        both_forms,
-        form_agreement,
-        form_sizes,
-    )
     from dynamics.experiments.benches import BENCHES, SPEED, Bench
     from dynamics.experiments.speed import bench as speed
     from dynamics.experiments.stability import stability
@@ -44,10 +35,19 @@ if TYPE_CHECKING:
     from ..models.inspection import FRAMES, inspection
     from ..models.inspection_page import inspection_page
     from ..models.live_motion import live_page
+    from ..models.node_classes import form_classes, formulation_classes
     from ..models.remarks import constant_momentum, tree_alone
     from ..pages import pruning_page, stability_page, work_precision_page
     from ..pages.document import check_folder, document_files
     from ..pages.html import html_target
+    from ..paper.both_forms import (
+        HAMILTON,
+        LAGRANGE,
+        VELOCITIES_ALONE,
+        both_forms,
+        form_agreement,
+        form_sizes,
+    )
     from ..paper.paper import paper
     from ..plots.plot import check_can_plot
     from ..typed import typed_page

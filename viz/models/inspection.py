@@ -13,19 +13,7 @@ from cgraph import Graph, Node
 from cgraph.extend import PRIMAL, TANGENT, Array, counted, real_number, topological
 from dynamics.equations.equations_of_motion import forward_dynamics
 from dynamics.equations.formulations.formulations import inverse_dynamics
-from dynamics.equations.formulations.node_classes import (
-    ACCELERATIONS,
-    BIAS,
-    DAMPING,
-    LEAVES,
-    POSITIONS,
-    RATES,
-    VELOCITIES,
-    form_classes,
-    formulation_classes,
-)
 from dynamics.equations.formulations.verdict import formulation_verdict
-from dynamics.equations.momentum.both_forms import HAMILTON, LAGRANGE, VELOCITIES_ALONE, both_forms, form_sizes
 from dynamics.equations.momentum.hamiltonian import velocities
 from dynamics.equations.momentum.legendre import is_quadratic
 from dynamics.equations.state_equation import state_equation
@@ -41,6 +29,18 @@ from dynamics.systems.system import System
 from .. import theme
 from ..inspector import Motion, StateTable, Step, Version
 from ..pages.document import Table
+from ..paper.both_forms import HAMILTON, LAGRANGE, VELOCITIES_ALONE, both_forms, form_sizes
+from .node_classes import (
+    ACCELERATIONS,
+    BIAS,
+    DAMPING,
+    LEAVES,
+    POSITIONS,
+    RATES,
+    VELOCITIES,
+    form_classes,
+    formulation_classes,
+)
 
 FORMULATIONS = ("euler_embedded", "kinetic_only", "chain_rule")  # those of the paper, the flawed ones first
 FRAMES, RATE = 150, 30.0  # most instants shown, and how many a second

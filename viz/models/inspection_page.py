@@ -6,12 +6,12 @@ import os
 
 from cgraph.extend import require_flag, write_files
 from dynamics import FORMULATIONS, display_names, scenes
-from dynamics.equations.momentum.both_forms import HAMILTON
 from dynamics.scenes.start import Start, moving_start, rest_text, with_start
 from dynamics.systems.model import Model
 
 from ..inspector import page
 from ..pages.html import Page, html_target
+from ..paper.both_forms import HAMILTON
 from ..typed import box
 from .inspection import Inspection, inspection
 from .live_motion import live_panel

@@ -6,13 +6,13 @@ from collections.abc import Mapping
 
 from cgraph import Counts, Graph
 from dynamics import hamilton_equations, scenes, state_equation
-from dynamics.equations.momentum.both_forms import HAMILTON, LAGRANGE, VELOCITIES_ALONE, both_forms, form_sizes
 from dynamics.experiments.speed.bench_scenes import SCENES, chain
 
 from .. import theme
 from ..graph_drawing.legend import kinds_in, legend_svg, to_adaptive
 from ..graph_drawing.levels import LevelPanel, Scale, levels_svg, silhouettes_svg
 from ..pages.document import Block, Paragraph, Picture, Table
+from .both_forms import HAMILTON, LAGRANGE, VELOCITIES_ALONE, both_forms, form_sizes
 from .part import Part, drawn
 
 TITLES = {LAGRANGE: "Lagrange: accelerations of (q, q̇)", HAMILTON: "Hamilton: rates of (q, p)"}

@@ -15,7 +15,7 @@ from cgraph.extend import TANGENT, Builder, building, cotangents, require_choice
 from ...systems.kinematics import ONE, ZERO
 from ...systems.model import Model, as_system
 from ...systems.system import System
-from ..bias_terms import bias_terms, state_rate
+from ..bias_terms import along_motion, bias_terms, state_rate
 from ..equation import LARGEST_REWRITTEN, Equation, Output, shortened
 from ..substitute import substitute
 
@@ -48,8 +48,7 @@ def lagrange_sweeps(system: System, lagrangian: Node, build: Builder) -> tuple[l
     momentum = bars[system.nq :]
     gradient = system.kinematics.slopes(bars[: system.nq], momentum, build)
     # Eq. (4) with y = p: a forward sweep along xdot = (qd, qdd) is the product grad_x p . xdot, never written out.
-    dots = tangents(state_rate(system, system.qdd), momentum, build)
-    return momentum, [dots.get(p, ZERO) for p in momentum], gradient
+    return momentum, along_motion(system, momentum, build, system.qdd), gradient
 
 
 def chain_rule_literal(system: System) -> LagrangeTerms:

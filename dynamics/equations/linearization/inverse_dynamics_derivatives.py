@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import cgraph as cg
 from cgraph import Node
@@ -44,35 +44,46 @@ def inverse_dynamics_derivatives(system: System) -> Iterator[list[Node]]:
     >>> list(at), at["dtau_dq"].round(12).tolist()
     (['tau', 'dtau_dq', 'dtau_dqd', 'M'], [[20.0, 5.0], [5.0, 5.0]])
     """
-    found = torque_derivatives(system, system.qdd, Builder())
+    found = torque_derivatives(system, dict(zip(system.qdd, system.qdd, strict=True)), Builder())
     yield [*found.torques, *entries([*found.by_q, *found.by_qd, *found.mass])]
 
 
-def torque_derivatives(system: System, qdd: Sequence[Node], build: Builder) -> TorqueDerivatives:
-    """Derivatives at these accelerations, with damping and applied forces."""
+def torque_derivatives(
+    system: System, at: Mapping[Node, Node], build: Builder, pulls: Sequence[Node] = ()
+) -> TorqueDerivatives:
+    """Derivatives with damping and applied forces.
+
+    at: the accelerations, and multipliers of constraints, at which they are taken.  pulls: the forces J^T lambda of
+    constraints, which are applied forces, too.
+    """
     stated = None
     if system.body_terms is not None and system.n > 1:  # of one coordinate, these are longer
-        stated = system.body_terms.equations.torque_derivatives((system.q, system.qd, qdd), build)
+        state = system.q, system.qd, [at[each] for each in system.qdd]
+        stated = system.body_terms.equations.torque_derivatives(state, build)
     if stated is None:
-        return _derived(system, qdd, build)
+        return _derived(system, at, build, pulls)
     torque, by_q, by_qd, _ = stated
-    braking = system.braking(build)
+    braking, forces = system.braking(build), folded(system.forces, build)
     with building(build):
-        for i, (brake, force) in enumerate(zip(braking, system.forces, strict=True)):
+        forces = [force + pull for force, pull in zip(forces, pulls, strict=True)] if pulls else forces
+        for i, (brake, force) in enumerate(zip(braking, forces, strict=True)):
             torque[i] = torque[i] + brake - force
             by_qd[i][i] = by_qd[i][i] + system.damping[i]
-    for i, slopes in enumerate(state_slopes(system, folded(system.forces, build), build)):
+    for i, slopes in enumerate(state_slopes(system, forces, build)):
+        slopes = folded(slopes, build, at) if pulls else slopes
         with building(build):
             row = [entry - slope for entry, slope in zip([*by_q[i], *by_qd[i]], slopes, strict=True)]
         by_q[i], by_qd[i] = row[: system.n], row[system.n :]
     return stated
 
 
-def _derived(system: System, qdd: Sequence[Node], build: Builder) -> TorqueDerivatives:
+def _derived(system: System, at: Mapping[Node, Node], build: Builder, pulls: Sequence[Node]) -> TorqueDerivatives:
     """Derivatives from inverse dynamics by a reverse sweep from each torque; M from that of the energy."""
-    at = dict(zip(system.qdd, qdd, strict=True))
-    torque = folded(list(cg.simplify(torques(system)).outputs.values()), build)
-    slopes, n = state_slopes(system, torque, build), system.n
+    torque, n = folded(list(cg.simplify(torques(system)).outputs.values()), build), system.n
+    if pulls:
+        with building(build):
+            torque = [tau - pull for tau, pull in zip(torque, pulls, strict=True)]
+    slopes = state_slopes(system, torque, build)
     flat = folded(substitute([*torque, *entries(slopes)], at), build)
     rows = [flat[k : k + 2 * n] for k in range(n, len(flat), 2 * n)]
     mass = mirrored(system.mass_matrix(system.lagrangian, build))

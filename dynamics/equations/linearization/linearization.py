@@ -49,11 +49,6 @@ def state_space(model: Model, *, form: str = "velocity") -> Graph:
     Of quasi-velocities dp is the change of the numbers p, and A is that of (xi, dp). In (xi, dp + P xi / 2), with
     P_kj = p . c(e_j, e_k) of the brackets c, it is J times a symmetric matrix again.
 
-    Parameters
-    ----------
-    form : {"velocity", "momentum"}
-        Of x, as of `simulate`.
-
     Returns
     -------
     Of the momentum form the inputs are q0.., p0.., without tau0... The velocities of p are those of
@@ -103,9 +98,9 @@ def linearize(
 ) -> tuple[Array, Array]:
     """A, (2n, 2n), and B, (2n, n), of d(xdot) = A dx + B dtau, x = (q, qd), at a state and applied forces (default 0).
 
-    Of the momentum form x = (q, p), see `state_space`; the state is q and qd all the same. Of quasi-velocities dx is of
-    displacements, see there, too. With constraints the state has to meet them (see `consistent_state`), and
-    `reduced_linearization` has the matrices of independent displacements.
+    Of the momentum form x = (q, p), see `state_space`; the state is q and qd all the same, so that nothing is iterated.
+    Of quasi-velocities dx is of displacements, see there, too. With constraints the state has to meet them (see
+    `consistent_state`), and `reduced_linearization` has the matrices of independent displacements.
 
     For many states, and for all digits of long chains, there is `linearize_many`.
 
@@ -113,8 +108,6 @@ def linearize(
     ----------
     q, qd, tau : array_like, (nq,) and (n,)
         Coordinates [rad or m], velocities, and applied forces [N m or N].
-    form : {"velocity", "momentum"}
-        Of x, as of `simulate`. The state is given by velocities in both, so that nothing is iterated.
 
     Returns
     -------

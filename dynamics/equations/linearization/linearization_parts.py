@@ -23,19 +23,15 @@ from cgraph.extend import (
     building,
     cotangents,
     folded,
-    tangents,
     topological,
     with_reciprocals,
 )
 
-from ...systems.kinematics import ONE, ZERO
 from ...systems.system import System
-from ..bias_terms import state_rate
-from ..constraints.constraints import Rows as ConstraintRows, constraint_rows
+from ..constraints.constraints import constraint_rows
 from ..equation import entries
-from ..formulations.formulations import torques
 from ..mass_matrix.accelerations import BY_ENERGY, DENSE_UP_TO, accelerations
-from ..mass_matrix.mass_matrix_solve import MassSolve, Rows, linear, mass_solve, smaller_solution, units
+from ..mass_matrix.mass_matrix_solve import MassSolve, Rows, mass_solve, smaller_solution, units
 from .inverse_dynamics_derivatives import state_slopes, torque_derivatives
 
 Matrix = NDArray[Any]  # of numbers, (.., n, k), or of nodes, (n, k)
@@ -144,64 +140,34 @@ def velocity_form(_: Matrix, x: Matrix, inverse: Matrix, brackets: Matrix) -> tu
 def linearization_parts(system: System) -> LinearizationParts:
     """Parts of the velocity form. Raises SingularMassMatrixError for a coordinate without inertia."""
     if not len(system.constraints):
-        return smaller_solution(system, lambda method: _parts(system, method), lambda parts: parts.size)
-    solved, build = accelerations(system), Builder()
-    sides, solve = _constrained_sides(system, solved, build)
+        return smaller_solution(
+            system,  # accelerations of the M that is factored again
+            lambda method: _parts(system, accelerations(system, BY_ENERGY if method == "dense" else method), method),
+            lambda parts: parts.size,
+        )
+    solved = accelerations(system)
+    if system.n <= DENSE_UP_TO:
+        with suppress(SingularError):  # which needs rows exchanged
+            return _parts(system, solved, "dense")
+    return _parts(system, solved, "recursive")
+
+
+def _parts(system: System, solved: Graph, method: str) -> LinearizationParts:
+    """Parts by one method.  solved: the accelerations, and multipliers of constraints."""
+    n, build = system.n, Builder()
+    nodes = dict(zip(solved.outputs, folded(list(solved.outputs.values()), build), strict=True))
+    at = {qdd: nodes[f"qdd{i}"] for i, qdd in enumerate(system.qdd)}
+    solve, pulls, changes = mass_solve(system, build, method), list[Node](), list[list[Node]]()
+    if len(system.constraints):
+        rows = constraint_rows(system, folded(system.constraints.rates, build))
+        at |= {each: nodes[str(each.name)] for each in rows.multipliers}
+        pulls = cotangents(dict(zip(rows.rates, rows.multipliers, strict=True)), system.qd, build)  # J^T lambda
+        rates = system.constraints.rate_changes(rows.rates, build, system.qdd)
+        changes = [folded(row, build, at) for row in state_slopes(system, rates, build)]  # d(dz/dt)/dx
+    found = torque_derivatives(system, at, build, pulls)
+    partials = [*[[*q, *qd] for q, qd in zip(found.by_q, found.by_qd, strict=True)], *changes]
+    with building(build):
+        # M dqdd - J^T dlambda = dtau - d(tau - J^T lambda)/dx dx,  J dqdd = -d(dz/dt)/dx dx
+        sides = [[-row[j] for row in partials] for j in range(2 * n)]
     rest = {"C": system.kinematics.brackets(build)}
     return LinearizationParts(solved.inputs, sides, solve, rest, velocity_form, build)
-
-
-def _parts(system: System, method: str) -> LinearizationParts:
-    n, build = system.n, Builder()
-    qdd = accelerations(system, BY_ENERGY if method == "dense" else method)  # of the M that is factored below
-    slopes = torque_derivatives(system, folded(list(qdd.outputs.values()), build), build)
-    with building(build):
-        # M dqdd = -(dtau/dq) xi, then -(dtau/dqd) dqd
-        sides = [[-row[j] for row in rows] for rows in (slopes.by_q, slopes.by_qd) for j in range(n)]
-    solve, rest = mass_solve(system, build, method), {"C": system.kinematics.brackets(build)}
-    return LinearizationParts(qdd.inputs, sides, solve, rest, velocity_form, build)
-
-
-def _constrained_sides(system: System, solved: Graph, build: Builder) -> tuple[list[list[Node]], MassSolve]:
-    """Right-hand sides of the 2n numbers of x, (n + m,), and the solution for one: dqdd of
-
-    M dqdd - J^T dlambda = dtau - d(tau - J^T lambda)/dx dx,  J dqdd = -d(dz/dt)/dx dx,  z the rates of constraints.
-
-    solved: the accelerations and multipliers.
-    """
-    n = system.n
-    lagrangian, *rates = folded([system.lagrangian, *system.constraints.rates], build)
-    rows = constraint_rows(system, rates)
-    partials = _slopes(system, rows, solved, build)
-    with building(build):
-        sides = [[-row[j] for row in partials] for j in range(2 * n)]
-    b = cg.variables([f"b{i}#" for i in range(n + len(rows.multipliers))])
-    return sides, linear(b, _solved(system, lagrangian, rows, b, build)[:n])
-
-
-def _solved(system: System, lagrangian: Node, rows: ConstraintRows, side: Sequence[Node], build: Builder) -> list[Node]:
-    """(dqdd, -dlambda) for a right-hand side: densely up to 7 coordinates, where that goes without exchanging rows."""
-    if system.n <= DENSE_UP_TO:
-        with suppress(SingularError):
-            return rows.solve_densely(system, lagrangian, side, build)
-    return rows.solve(system, lagrangian, side, build)
-
-
-def _slopes(system: System, rows: ConstraintRows, solved: Graph, build: Builder) -> list[list[Node]]:
-    """Rows of d(tau - J^T lambda, dz/dt)/d(q, qd), (n + m, 2n), where qdd and lambda are as solved.
-
-    Of quasi-velocities by displacements xi, dq = G xi.
-    """
-    tau, s = cg.simplify(torques(system)), rows.multipliers
-    pulls = cotangents(dict(zip(rows.rates, s, strict=True)), system.qd, build)
-    dots = tangents(state_rate(system, system.qdd) | {system.t: ONE}, rows.rates, build)
-    with building(build):
-        # tau - J^T lambda, then dz/dt
-        equations = [torque - force for torque, force in zip(tau.outputs.values(), pulls, strict=True)]
-    equations += [dots.get(z, ZERO) for z in rows.rates]
-    slopes = entries(state_slopes(system, equations, build))
-    at = {name: node for name, node in solved.outputs.items() if name in {str(each.name) for each in (*system.qdd, *s)}}
-    graph = Graph([*tau.inputs, *s, *system.tau], {str(k): entry for k, entry in enumerate(slopes)})
-    flat = list(cg.specialize(graph, at).outputs.values())
-    width = 2 * system.n
-    return [flat[i : i + width] for i in range(0, len(flat), width)]

@@ -64,15 +64,13 @@ def linearize_many(
     piece, and a column of A and B another. The matrices of a state whose mass matrix is singular, or with a quaternion
     of length 0, have entries that are infinite or NaN.
 
-    Of the momentum form all entries are written out, or of very large systems the products of M^-1 dp/dq are left to
-    NumPy.
+    Of the momentum form, whose states are q and qd, too, all entries are written out, or of very large systems the
+    products of M^-1 dp/dq are left to NumPy.
 
     Parameters
     ----------
     q, qd, tau : array_like, (N, nq) and (N, n)
         Coordinates [rad or m], their velocities, and applied forces [N m or N]; one row is the same for all.
-    form : {"velocity", "momentum"}
-        Of x, as of `linearize`; the states are q and qd in both.
     threads : int, optional
         How many share the states; None: one for each core.
 

@@ -17,7 +17,7 @@ from ..constraints.constraint_rank import DEPENDENT, independent_rows
 from ..constraints.row_numbers import equilibrated
 from ..equation import documented
 from ..states.evaluate import evaluate
-from ..states.initial_value import initial_value
+from ..states.initial_value import parameter_values, start_state
 from .inverse_dynamics_derivatives import state_slopes
 from .linearization import linearize
 
@@ -102,8 +102,9 @@ def reduced_linearization(
     >>> small.A.round(12).tolist(), small.states
     ([[0.0, 1.0], [-4.905, 0.0]], ('q.x', 'qd.x'))
     """
-    system, start = as_system(model), initial_value(model, q, qd, 0.0, parameters, t)
-    n, at = system.n, (start.x[: system.nq], start.x[system.nq :])
+    system = as_system(model)
+    x = start_state(system, q, qd, parameter_values(system, parameters), t)
+    n, at = system.n, (x[: system.nq], x[system.nq :])
     kept = independent_rows(system.constraints)
     slopes = _slopes(system, kept, dict(zip(("q", "qd"), at, strict=True)), t, parameters)
     holonomic = sum(k < len(system.constraints.positions) for k in kept)

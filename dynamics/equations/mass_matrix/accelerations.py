@@ -19,7 +19,7 @@ from ..constraints.constraints import (
     multiplier_outputs,
     unknown_names,
 )
-from .singular_mass_matrix import TORQUE, SingularMassMatrixError, coordinate_sizes, no_inertia, without_inertia
+from .singular_mass_matrix import TORQUE, SingularMassMatrixError, coordinate_sizes, no_inertia, require_inertia
 
 DENSE_UP_TO = 7  # coordinates; beyond, the dense graph is larger on a tree of bodies, and takes long to build
 WORTH = 0.9  # of the recursive graph's nodes, at most, for the dense one: elimination keeps more digits
@@ -28,23 +28,6 @@ TURN = 10  # products that a sine takes as long as, about
 DRAWN = 64  # states at which accelerations are looked at for their size
 LITTLE = 0.01  # of the torques by which bodies are accelerated as by their weight
 GROWTH = 3.0  # times the rounding of the safest graph, at most, at sample points
-
-
-def mass_matrix_graph(system: System) -> Graph:
-    """M(q) of the system as it is written."""
-    lower, n = system.mass_matrix(system.lagrangian), system.n
-    outputs = {f"M_{i}_{j}": lower[max(i, j)][min(i, j)] for i in range(n) for j in range(n)}
-    return cg.simplify(system.graph(outputs, system.q, system.qd))
-
-
-def require_inertia(system: System, accelerations: Graph) -> None:
-    """Raises SingularMassMatrixError where M is singular at every state, though no pivot is the constant zero."""
-    moving = without_inertia(system, accelerations, lambda: mass_matrix_graph(system))
-    if moving:
-        names = " and ".join([repr(system.velocities[i]) for i in moving])
-        raise SingularMassMatrixError(
-            f"the mass matrix is singular at every state: {'a motion of ' * (len(moving) > 1)}{names} has no inertia"
-        )
 
 
 def _require_inertia_without_constraints(system: System) -> None:

@@ -15,22 +15,18 @@ from cgraph.extend import (
     building,
     cotangents,
     folded,
-    hessian_nodes,
-    ldl_solve,
-    solve_nodes,
     topological,
 )
 
 from ...systems.kinematics import ONE, ZERO
 from ...systems.system import System
+from ..constraints.constraints import constraint_rows
 from .singular_mass_matrix import SingularMassMatrixError
 
 DENSE_PATH = 12  # coordinates from the world to a tip; a dense factorization loses digits with about their fourth power
 WORTH = 0.8  # of the nodes by elimination, at most, for the dense one: elimination keeps more digits
 
 Rows = Sequence[Sequence[Node]]
-
-
 Solution = TypeVar("Solution")
 
 
@@ -76,13 +72,13 @@ class MassSolve(NamedTuple):
 def mass_solve(system: System, build: Builder, method: str) -> MassSolve:
     """Solution by elimination on the graph of L, "recursive", or by LDL^T of the matrix, "dense".
 
-    Raises SingularError for an M that is singular at every state.
+    With constraints M x - J^T y = b, J x = b beyond n.  Raises SingularError for an M that is singular at every state.
     """
-    b = cg.variables([f"b{i}#" for i in range(system.n)])
-    (lagrangian,) = folded([system.lagrangian], build)
-    if method == "dense":
-        return linear(b, ldl_solve(hessian_nodes(lagrangian, system.qd, build), b, build))
-    return linear(b, solve_nodes(lagrangian, system.qd, b, build))
+    lagrangian, *rates = folded([system.lagrangian, *system.constraints.rates], build)
+    rows = constraint_rows(system, rates)
+    b = cg.variables([f"b{i}#" for i in range(system.n + len(rows.kept))])
+    solve = rows.solve_densely if method == "dense" else rows.solve
+    return linear(b, solve(system, lagrangian, b, build)[: system.n])
 
 
 def smaller_solution(system: System, make: Callable[[str], Solution], size: Callable[[Solution], int]) -> Solution:

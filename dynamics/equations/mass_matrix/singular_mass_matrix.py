@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,6 +14,7 @@ from cgraph.extend import Array, SingularError, real_array, solve_nodes, topolog
 from ...systems.model import Model, as_system
 from ...systems.system import System
 from ..constraints.constraints import unknown_names
+from ..equation import entries, mirrored
 from ..substitute import substitute
 
 STATES = 3
@@ -110,7 +111,16 @@ def coordinate_sizes(system: System) -> list[float]:
     return [longest if place else 1.0 for place in places]  # several are one quantity, a quaternion
 
 
-def without_inertia(system: System, accelerations: Graph, mass_matrix: Callable[[], Graph]) -> list[int]:
+def require_inertia(system: System, accelerations: Graph) -> None:
+    """Raises SingularMassMatrixError where M is singular at every state, though no pivot is the constant zero."""
+    if moving := _without_inertia(system, accelerations):
+        names = " and ".join([repr(system.velocities[i]) for i in moving])
+        raise SingularMassMatrixError(
+            f"the mass matrix is singular at every state: {'a motion of ' * (len(moving) > 1)}{names} has no inertia"
+        )
+
+
+def _without_inertia(system: System, accelerations: Graph) -> list[int]:
     """The coordinates of which no digit of the acceleration is certain at some random states; [] where M has full rank.
 
     accelerations: the graph of forward dynamics. Its M^-1 mostly shows at once that there is nothing to fear. A pivot
@@ -129,9 +139,10 @@ def without_inertia(system: System, accelerations: Graph, mass_matrix: Callable[
         inverse = _inverse(accelerations, point, n)
         finite = np.isfinite(inverse).all(axis=1)
         if not finite.all():
-            graph = mass_matrix()
-            entries = graph.evaluate({name: point[name] for name in graph.input_names})
-            inertia = np.array([*entries.values()], dtype=np.float64).reshape(n, n)
+            rows = enumerate(entries(mirrored(system.mass_matrix(system.lagrangian))))
+            graph = cg.simplify(system.graph({str(k): entry for k, entry in rows}, system.q, system.qd))
+            numbers = graph.evaluate({name: point[name] for name in graph.input_names}).values()
+            inertia = np.array([*numbers], dtype=np.float64).reshape(n, n)
             if not np.isfinite(inertia).all():
                 continue  # there is no M at this state
             if np.linalg.eigvalsh(balanced(inertia))[0] * SPARE > np.finfo(float).eps * n:

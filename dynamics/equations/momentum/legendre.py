@@ -14,13 +14,9 @@ from cgraph.extend import Builder, Order, SingularError, building, cotangents, f
 from ...systems.constraints import ConstraintError
 from ...systems.kinematics import ONE, ZERO
 from ...systems.system import System
-from ..mass_matrix.accelerations import require_inertia
-from ..mass_matrix.singular_mass_matrix import SingularMassMatrixError, no_inertia
+from ..mass_matrix.singular_mass_matrix import SingularMassMatrixError, no_inertia, require_inertia
 
-SHORTER, LONGER = (
-    1.0 / 16.0,
-    2.0,
-)  # the share of Newton's step to take, after one that went too far, and after a good one
+SHORTER, LONGER = 1.0 / 16.0, 2.0  # times the share of Newton's step after one that went too far, and after a good one
 OVERSHOOT = 0.5  # of a slope at the start of a step, the other way at its end, and the step went too far
 SETTLED = 1e-16  # step M step over u (p - b) where the step is 1e-8 of the velocities: the next one is rounding
 

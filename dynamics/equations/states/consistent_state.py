@@ -16,7 +16,7 @@ from ...systems.system import System
 from ..constraints.constraint_rank import ConstraintWarning
 from ..constraints.projection import projected
 from ..equation import documented
-from .initial_value import given_start
+from .initial_value import given_state, parameter_values
 
 MOVED = "the velocities do not meet the constraints and were moved onto them"
 VELOCITY_ROUNDING = 1e-9  # of the largest velocity, those of angles and lengths by what they move
@@ -89,6 +89,5 @@ def _projected(
     system: System, q: ArrayLike, qd: ArrayLike, t: float, parameters: Mapping[str, float] | None
 ) -> tuple[Array, Array]:
     """The state as it is given, (nq + n,), and moved onto the constraints."""
-    time = finite_time(t)
-    start = given_start(system, q, qd, 0.0, parameters)
-    return start.x, projected(system, start.x, time, {name: start.bound[name] for name in system.parameters})
+    time, start = finite_time(t), given_state(system, q, qd)
+    return start, projected(system, start, time, parameter_values(system, parameters))

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Compiled, Graph
-from cgraph.extend import Array, kept_by_first, real_array, require_mapping
+from cgraph.extend import Array, kept_by_first, real_array
 
 from ...systems.arguments import TIME, finite_time
 from ...systems.model import Model, as_system
@@ -20,6 +20,7 @@ from ...systems.system import System
 from ..constraints.constraint_rank import ConstraintWarning
 from ..constraints.nearly_redundant_rows import lost_rank
 from ..equation import documented
+from .initial_value import parameter_values
 
 STATE = ("q", "qd", "qdd", "tau")  # the prefixes of a graph's inputs, each an array of one number a coordinate
 State = Mapping[str, ArrayLike | None]
@@ -101,16 +102,18 @@ def evaluate(
     What of the state is None or missing is zero, coordinates neutral. Parameters have the model's values unless given.
     Raises ValueError for another shape, what is not finite, or a parameter that the model does not have.
     """
-    values, shape = _input_values(as_system(model), graph.input_names, state, t, parameters)
-    outputs = graph.evaluate(values).values()
-    return np.stack([np.broadcast_to(np.asarray(each, dtype=np.float64), shape) for each in outputs], axis=-1)
+    rows = input_rows(as_system(model), graph.input_names, state, t, parameters)
+    columns = rows.tolist() if rows.ndim == 1 else rows.T
+    outputs = graph.evaluate(dict(zip(graph.input_names, columns, strict=True))).values()
+    return np.stack([np.broadcast_to(np.asarray(each, dtype=np.float64), rows.shape[:-1]) for each in outputs], axis=-1)
 
 
 def input_rows(
     system: System, names: Sequence[str], state: State, t: float, parameters: Mapping[str, float] | None
 ) -> Array:
     """Inputs by their names, (N, n_in), or (n_in,) of one state, which `evaluate` takes likewise."""
-    numbers, (arrays, shape) = _numbers(system, t, parameters), _arrays(system, state)
+    numbers = {TIME: finite_time(t), **parameter_values(system, parameters)}
+    arrays, shape = _arrays(system, state)
     rows, place = np.empty((*shape, len(names))), {name: k for k, name in enumerate(names)}
     for name in place.keys() & numbers.keys():
         rows[..., place[name]] = numbers[name]
@@ -123,28 +126,6 @@ def input_rows(
             if k is not None:
                 rows[..., k] = array[..., i]
     return rows
-
-
-def _input_values(
-    system: System, names: Sequence[str], state: State, t: float, parameters: Mapping[str, float] | None
-) -> tuple[dict[str, float | Array], tuple[int, ...]]:
-    """Values of those inputs, and () or (N,)."""
-    values: dict[str, float | Array] = {**_numbers(system, t, parameters)}
-    arrays, shape = _arrays(system, state)
-    for name, rows in arrays.items():
-        values |= {f"{name}{i}": column if rows.ndim == 2 else float(column) for i, column in enumerate(rows.T)}
-    return {name: values[name] for name in names}, shape
-
-
-def _numbers(system: System, t: float, parameters: Mapping[str, float] | None) -> dict[str, float]:
-    """Time and parameters, the system's values unless given."""
-    parameters = {} if parameters is None else require_mapping("parameters", parameters, "name: number")
-    if unknown := sorted(map(str, set(parameters) - set(system.parameters))):
-        has = ", ".join(system.parameters) or "none"
-        raise ValueError(f"the system has no parameter {unknown[0]!r} (it has {has})")
-    if parameters:
-        system.require_values({**system.parameters, **parameters})
-    return {TIME: finite_time(t), **system.parameters, **parameters}
 
 
 def _arrays(system: System, state: State) -> tuple[dict[str, Array], tuple[int, ...]]:

@@ -14,7 +14,7 @@ from ...systems.arguments import finite_time
 from ...systems.model import Model, as_system
 from ..constraints.nearly_redundant_rows import left_at
 from ..equation import documented
-from .initial_value import given_start
+from .initial_value import given_state, parameter_values
 
 TOLERANCE = 2e-4  # as of a Loop
 
@@ -106,10 +106,9 @@ def freedom(
     system, share, time = as_system(model), real_number("tolerance", tolerance), finite_time(t)
     if not 0.0 <= share < 1.0:
         raise ValueError(f"tolerance must be at least 0 and less than 1, got {tolerance!r}")
-    start = given_start(system, q, np.zeros(system.n), 0.0, parameters)
-    values = {name: start.bound[name] for name in system.parameters}
+    x, values = given_state(system, q, np.zeros(system.n)), parameter_values(system, parameters)
     whole = system.constraints.whole or system.constraints
-    kept, shares, _ = left_at(whole, start.x[: system.nq], time, values, share)
+    kept, shares, _ = left_at(whole, x[: system.nq], time, values, share)
     redundant = tuple([name for k, name in enumerate(whole.names) if k not in kept])
     shown = dict(zip(whole.names, shares.tolist(), strict=True))
     return Freedom(len(kept), redundant, system.n - len(kept), share, shown)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,25 +15,17 @@ from cgraph.extend import Array, real_array
 from ...systems.arguments import parameter_value, per_coordinate
 from ...systems.model import Model
 from ..constraints.projection import projected_start
-from ..state_equation import StateInputs, normalization, normalizer, state_inputs
+from ..state_equation import normalization, normalizer, state_inputs
 
 PAST = 1e-14  # of the end: some roundings, by which a last time may lie past it
-
-
-class InitialValue(NamedTuple):
-    """Start of a motion, and the numbers of every other input of its state equation."""
-
-    x: Array  # (m,): q, normalized, and then qd, or the states of an OdeSystem
-    states: tuple[str, ...]  # names of x
-    bound: dict[str, float]  # tau0.., parameters
 
 
 class InitialValues(NamedTuple):
     """Starts of N motions, and the other inputs of their state equation: one number for all, or one for each."""
 
-    x: Array  # (N, m)
-    states: tuple[str, ...]
-    bound: dict[str, float]
+    x: Array  # (N, m): q, normalized, and then qd, or the states of an OdeSystem
+    states: tuple[str, ...]  # names of x
+    bound: dict[str, float]  # tau0.., parameters
     varied: dict[str, Array]  # (N,) each
 
     def values(self, k: int) -> dict[str, float]:
@@ -41,37 +33,34 @@ class InitialValues(NamedTuple):
         return self.bound | {name: float(column[k]) for name, column in self.varied.items()}
 
 
-def initial_value(
-    model: Model,
-    q: ArrayLike,
-    qd: ArrayLike | None,
-    tau: float | Sequence[float] = 0.0,
-    parameters: Mapping[str, float] | None = None,
-    t: float = 0.0,
-) -> InitialValue:
-    """The start of a model's motion.
+def other_inputs(model: Model, tau: Any = 0.0, parameters: Mapping[str, Any] | None = None) -> dict[str, float]:
+    """The numbers of the inputs of a model's state equation besides its states and t.
 
-    q, qd: (nq,) and (n,), or the states of an OdeSystem and None; of a quaternion in q only the direction counts.
     tau: constant applied force, for all velocities or for each.  parameters: values in place of the model's own.
-    t: when [s]. A start that does not meet the constraints of a system is moved onto them, with a ConstraintWarning.
-
     Raises TypeError or ValueError, naming the argument, for another shape or what is not finite.
     """
-    bound = other_inputs(model, tau, parameters)
-    return InitialValue(start_state(model, q, qd, bound, t), state_inputs(model).states, bound)
-
-
-def other_inputs(model: Model, tau: Any = 0.0, parameters: Mapping[str, Any] | None = None) -> dict[str, float]:
-    """The numbers of the inputs of a model's state equation besides its states and t; see `initial_value`."""
     return _other_inputs(model, tau, parameters, many=False)[0]
 
 
+def parameter_values(model: Model, parameters: Mapping[str, float] | None) -> dict[str, float]:
+    """Values of all parameters of a model, its own unless given.  Raises as `other_inputs`."""
+    return _parameters(model, parameters, many=False)[0]
+
+
+def given_state(model: Model, q: ArrayLike, qd: ArrayLike | None) -> Array:
+    """A state (m,), whether or not it meets the constraints of the model.  Raises as `other_inputs`.
+
+    q, qd: (nq,) and (n,), of a quaternion in q only the direction counts; or the states of an OdeSystem and None.
+    """
+    return normalized(model, np.concatenate(_state_parts(model, q, qd, many=False)))
+
+
 def start_state(model: Model, q: ArrayLike, qd: ArrayLike | None, bound: Mapping[str, float], t: float = 0.0) -> Array:
-    """The state (m,) in which a motion starts, the other inputs as they are `bound`; see `initial_value`."""
-    x, system = normalized(model, np.concatenate(_state_parts(model, q, qd, many=False))), model.system
-    if system is None or not len(system.constraints):
-        return x
-    return projected_start(system, x, t, {name: bound[name] for name in system.parameters})
+    """The state (m,) in which a motion starts at t [s], the other inputs as they are `bound`.
+
+    One that does not meet the constraints of a system is moved onto them, with a ConstraintWarning.
+    """
+    return _met(model, given_state(model, q, qd), bound, t)
 
 
 def initial_values(
@@ -84,40 +73,13 @@ def initial_values(
     *,
     many: bool = True,
 ) -> InitialValues:
-    """The starts of N motions; see `initial_value`. Each of the arguments has one row for all, or one for each.
+    """The starts of N motions, see `start_state`. Each of the arguments has one row for all, or one for each.
 
     many: else one motion, whose arguments have no axis N.
     """
     if not many:
         bound = other_inputs(model, tau, parameters)
         return InitialValues(start_state(model, q, qd, bound, t)[None], state_inputs(model).states, bound, {})
-    start = _given(model, q, qd, tau, parameters)
-    system = model.system
-    if system is None or not len(system.constraints):
-        return start
-    rows = []
-    for k, x in enumerate(start.x):
-        values = start.values(k)
-        rows.append(projected_start(system, x, t, {name: values[name] for name in system.parameters}))
-    return start._replace(x=np.array(rows))
-
-
-def given_start(
-    model: Model,
-    q: ArrayLike,
-    qd: ArrayLike | None,
-    tau: float | Sequence[float] = 0.0,
-    parameters: Mapping[str, float] | None = None,
-) -> InitialValue:
-    """The start as it is given, whether or not it meets the constraints of the model."""
-    x = normalized(model, np.concatenate(_state_parts(model, q, qd, many=False)))
-    return InitialValue(x, state_inputs(model).states, other_inputs(model, tau, parameters))
-
-
-def _given(
-    model: Model, q: ArrayLike, qd: ArrayLike | None, tau: Any, parameters: Mapping[str, Any] | None
-) -> InitialValues:
-    """The starts of N motions as they are given."""
     bound, varied = _other_inputs(model, tau, parameters, many=True)
     parts = _state_parts(model, q, qd, many=True)
     counts = {what: len(array) for what, array in zip(("q", "qd"), parts, strict=False) if array.ndim == 2}
@@ -127,7 +89,18 @@ def _given(
     counts |= {f"parameter {name!r}": len(varied[name]) for name in varied if name not in applied}
     count = _one_count(counts)
     x = normalized(model, np.concatenate([np.broadcast_to(part, (count, part.shape[-1])) for part in parts], axis=-1))
-    return InitialValues(x, states, bound, varied)
+    start = InitialValues(x, states, bound, varied)
+    if model.system is None or not len(model.system.constraints):
+        return start
+    return start._replace(x=np.array([_met(model, row, start.values(k), t) for k, row in enumerate(x)]))
+
+
+def _met(model: Model, x: Array, values: Mapping[str, float], t: float) -> Array:
+    """The state, moved onto the constraints of the model."""
+    system = model.system
+    if system is None or not len(system.constraints):
+        return x
+    return projected_start(system, x, t, {name: values[name] for name in system.parameters})
 
 
 def _other_inputs(
@@ -135,13 +108,11 @@ def _other_inputs(
 ) -> tuple[dict[str, float], dict[str, Array]]:
     """Inputs besides states and t that are the same for all motions, and columns, (N,), of those that are not."""
     inputs, system = state_inputs(model), model.system
-    bound, varied = _parameters(inputs, parameters, many=many)
+    bound, varied = _parameters(model, parameters, many=many)
     if system is None:
         if np.any(real_array("tau", tau)):
             raise ValueError(f"tau must be 0 for a system of first order, which no force acts on, got {tau!r:.60}")
         return bound, varied
-    if parameters:
-        system.require_values({**bound, **varied})
     if many and (tau := real_array("tau", tau)).ndim == 2:
         columns = _rows("tau", tau, len(inputs.applied), "velocity", many=many).T
         return bound, dict(zip(inputs.applied, columns, strict=True)) | varied
@@ -186,13 +157,6 @@ def normalized(model: Model, x: Array) -> Array:
     return result
 
 
-def _check_names(inputs: StateInputs, names: Iterable[str]) -> None:
-    """Raises ValueError for a name that is no parameter."""
-    if unknown := [str(name) for name in names if name not in inputs.parameters]:
-        has = ", ".join(inputs.parameters) or "none"
-        raise ValueError(f"the system has no parameter {', '.join(unknown)} (it has {has})")
-
-
 def times_to_record(t_eval: ArrayLike, t_end: float = math.inf, t0: float = 0.0) -> Array:
     """The times to record, (T,). A last one past t_end by rounding, as that of 0.1 * np.arange(4), becomes t_end.
 
@@ -217,19 +181,22 @@ def times_to_record(t_eval: ArrayLike, t_end: float = math.inf, t0: float = 0.0)
 
 
 def _parameters(
-    inputs: StateInputs, parameters: Mapping[str, Any] | None, *, many: bool
+    model: Model, parameters: Mapping[str, Any] | None, *, many: bool
 ) -> tuple[dict[str, float], dict[str, Array]]:
     """Parameters that are the same for all motions, and columns, (N,), of those that are not."""
     if not isinstance(parameters, Mapping | None):
         raise TypeError(f"parameters must be a mapping of names to numbers, got {parameters!r:.60}")
-    chosen, bound, varied = dict(parameters or {}), dict(inputs.parameters), dict[str, Array]()
-    _check_names(inputs, chosen)
+    chosen, bound, varied = dict(parameters or {}), dict(model.parameters), dict[str, Array]()
+    if unknown := [str(name) for name in chosen if name not in bound]:
+        raise ValueError(f"the system has no parameter {', '.join(unknown)} (it has {', '.join(bound) or 'none'})")
     for name, value in chosen.items():
         if many and np.ndim(value):
             varied[name] = _column(name, value)
             del bound[name]
         else:
             bound[name] = parameter_value(name, np.asarray(value).item() if many else value)
+    if chosen and model.system is not None:
+        model.system.require_values({**bound, **varied})
     return bound, varied
 
 

@@ -15,6 +15,7 @@ import cgraph as cg
 from cgraph import Node
 from cgraph.extend import Builder, building, cotangents, topological
 
+from ...systems.kinematics import gathered
 from ..algebra.spatial import ZERO, Triple
 from ..bodies.body import MechanismError, vector
 from ..sweeps.kinematic_chain import KinematicChain
@@ -105,9 +106,7 @@ def generalized_forces(
             if force.frame == "body":
                 value, torque = chain.direction(value), chain.direction(torque)
             motion = chain.motion(force.at)
-            seeds: dict[Node, Node] = {}
-            for rate, bar in zip((*motion.velocity, *motion.omega), (*value, *torque), strict=True):
-                seeds[rate] = seeds[rate] + bar if rate in seeds else bar  # two rates may be one node
+            seeds = gathered(zip((*motion.velocity, *motion.omega), (*value, *torque), strict=True))
             shares = cotangents(seeds, qd, build)
             total = [sum_ + share for sum_, share in zip(total, shares, strict=True)]
     return total

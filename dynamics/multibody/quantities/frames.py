@@ -8,49 +8,44 @@ of their own.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
-import numpy as np
 from numpy.typing import ArrayLike
 
 import cgraph as cg
-from cgraph import Graph, Node
-from cgraph.extend import Array, Builder, building, cotangents, require_choice, tangents
+from cgraph import Node
+from cgraph.extend import Builder, building, cotangents, require_choice
 
+from ...equations.bias_terms import along_motion
+from ...equations.equation import Equation, Output, entries
 from ...systems.kinematics import ONE
-from ...systems.model import Model
 from ...systems.system import System
 from ..algebra import spatial
-from ..algebra.spatial import ZERO
 from ..bodies.body import vector
-from ..sweeps.kinematic_chain import KinematicChain
-from ..trees.mechanism import require_mechanism
+from ..trees.mechanism import Mechanism
+from .body_quantity import MECHANISM, body_quantity
 
 AXES = ("world", "body")
+FRAME = MECHANISM | {
+    "body": "body : str\n    Name of the body, which may be welded on.",
+    "at": "at : array_like, (3,)\n    The point, in the body's frame [m].",
+    "axes": """axes : {"world", "body"}
+    The axes that linear and angular parts are taken in; both are of the motion against the world.""",
+}
+NO_BODY = """MechanismError
+    For a model without bodies, an unknown body, and a point that is not three finite numbers."""
+NO_FRAME = f"{NO_BODY}\nValueError\n    For other axes."
+ORIGIN = (0.0, 0.0, 0.0)
+RATES = "m/s^2, then rad/s^2"
 
 
-def frame_placement(model: Model, body: str, at: ArrayLike = (0.0, 0.0, 0.0)) -> Graph:
-    """Placement of a body's frame in the world, moved to a point of the body.
-
-    Parameters
-    ----------
-    model : Model
-        A mechanism, or a scene of one.
-    body : str
-        Name of the body, which may be welded on.
-    at : array_like, (3,)
-        The point, in the body's frame [m].
+@body_quantity(Equation("q qd", Output("R_{}_{}", ("3", "3")), Output("p_{}", ("3",), "m")), FRAME, NO_BODY)
+def frame_placement(mechanism: Mechanism, body: str, at: ArrayLike = ORIGIN) -> Iterator[Node]:
+    """Where a body's frame is in the world, moved to a point of the body.
 
     Returns
     -------
-    Graph
-        Inputs q0.., qd0.., parameters; outputs R_0_0, R_0_1, .. row by row, (3, 3), the body's axes as columns in the
-        world's, and p_0, p_1, p_2, (3,), where the point is in the world [m].
-
-    Raises
-    ------
-    MechanismError
-        For a model without bodies, an unknown body, and a point that is not three finite numbers.
+    R has the body's axes as columns in the world's, and p is where the point is in the world.
 
     Examples
     --------
@@ -60,39 +55,16 @@ def frame_placement(model: Model, body: str, at: ArrayLike = (0.0, 0.0, 0.0)) ->
     >>> placed["R"].shape, placed["p"][0].tolist()
     ((3, 3), 1.0)
     """
-    system, chain, point = _frame(model, "frame_placement", body, at)
+    chain, point = mechanism.chain(body), vector(f"the point of body {body!r}: at", at)
     with building(Builder()), cg.tag(body):
-        columns = _columns(chain)
-        outputs = {f"R_{i}_{j}": columns[j][i] for i in range(3) for j in range(3)}
-        outputs |= _named("p", chain.motion(point).position)
-    return cg.simplify(system.graph(outputs, system.q, system.qd))
+        columns = chain.columns()
+        yield from [columns[j][i] for i in range(3) for j in range(3)]
+        yield from chain.motion(point).position
 
 
-def frame_velocity(model: Model, body: str, at: ArrayLike = (0.0, 0.0, 0.0), axes: str = "world") -> Graph:
+@body_quantity(Equation("q qd", Output("V_{}", ("6",), "m/s, then rad/s")), FRAME, NO_FRAME)
+def frame_velocity(mechanism: Mechanism, body: str, at: ArrayLike = ORIGIN, axes: str = "world") -> list[Node]:
     """Velocity V = (v, w) of a point of a body, and of the body's rotation.
-
-    Parameters
-    ----------
-    model : Model
-        A mechanism, or a scene of one.
-    body : str
-        Name of the body.
-    at : array_like, (3,)
-        The point, in the body's frame [m].
-    axes : {"world", "body"}
-        The axes that v and w are taken in; both are of the motion against the world.
-
-    Returns
-    -------
-    Graph
-        Inputs q0.., qd0.., parameters; outputs V_0 .. V_5, (6,): v [m/s], then w [rad/s].
-
-    Raises
-    ------
-    MechanismError
-        As `frame_placement`.
-    ValueError
-        For other axes.
 
     Examples
     --------
@@ -102,30 +74,15 @@ def frame_velocity(model: Model, body: str, at: ArrayLike = (0.0, 0.0, 0.0), axe
     >>> dyn.arrays_at(arm, velocity, q=[0.0], qd=[2.0])["V"].tolist()
     [2.0, 0.0, 0.0, 0.0, -2.0, 0.0]
     """
-    system, twist = _twist(model, "frame_velocity", body, at, axes)
-    return cg.simplify(system.graph(_named("V", twist), system.q, system.qd))
+    return _twist(mechanism, body, at, axes)
 
 
-def frame_acceleration(model: Model, body: str, at: ArrayLike = (0.0, 0.0, 0.0), axes: str = "world") -> Graph:
+@body_quantity(Equation("q qd qdd", Output("a_{}", ("6",), RATES)), FRAME, NO_FRAME)
+def frame_acceleration(mechanism: Mechanism, body: str, at: ArrayLike = ORIGIN, axes: str = "world") -> list[Node]:
     """Rate of `frame_velocity`, dV/dt = J qdd + dJ/dt qd.
 
     In the world's axes that is the acceleration of the point and the angular acceleration; in the body's axes the
     rates of the components, R^T a - w x v and R^T alpha. Gravity has no part in it.
-
-    Parameters
-    ----------
-    model, body, at, axes
-        As in `frame_velocity`.
-
-    Returns
-    -------
-    Graph
-        Inputs q0.., qd0.., qdd0.., parameters; outputs a_0 .. a_5, (6,): [m/s^2], then [rad/s^2].
-
-    Raises
-    ------
-    MechanismError, ValueError
-        As `frame_velocity`.
 
     Examples
     --------
@@ -135,28 +92,13 @@ def frame_acceleration(model: Model, body: str, at: ArrayLike = (0.0, 0.0, 0.0),
     >>> dyn.arrays_at(arm, acceleration, q=[0.0], qd=[2.0], qdd=[3.0])["a"].tolist()
     [3.0, 0.0, 4.0, 0.0, -3.0, 0.0]
     """
-    system, twist = _twist(model, "frame_acceleration", body, at, axes)
-    along = _motion(system) | dict(zip(system.qd, system.qdd, strict=True))
-    return cg.simplify(system.graph(_named("a", _rates(along, twist)), system.q, system.qd, system.qdd))
+    system = mechanism.system
+    return along_motion(system, _twist(mechanism, body, at, axes), Builder(), system.qdd)
 
 
-def frame_bias_acceleration(model: Model, body: str, at: ArrayLike = (0.0, 0.0, 0.0), axes: str = "world") -> Graph:
+@body_quantity(Equation("q qd", Output("a_{}", ("6",), RATES)), FRAME, NO_FRAME)
+def frame_bias_acceleration(mechanism: Mechanism, body: str, at: ArrayLike = ORIGIN, axes: str = "world") -> list[Node]:
     """`frame_acceleration` at qdd = 0, dJ/dt qd, without forming the rate of J.
-
-    Parameters
-    ----------
-    model, body, at, axes
-        As in `frame_velocity`.
-
-    Returns
-    -------
-    Graph
-        Inputs q0.., qd0.., parameters; outputs a_0 .. a_5, (6,): [m/s^2], then [rad/s^2].
-
-    Raises
-    ------
-    MechanismError, ValueError
-        As `frame_velocity`.
 
     Examples
     --------
@@ -166,28 +108,16 @@ def frame_bias_acceleration(model: Model, body: str, at: ArrayLike = (0.0, 0.0, 
     >>> dyn.arrays_at(arm, centripetal, q=[0.0], qd=[2.0])["a"][2].tolist()
     4.0
     """
-    system, twist = _twist(model, "frame_bias_acceleration", body, at, axes)
-    return cg.simplify(system.graph(_named("a", _rates(_motion(system), twist)), system.q, system.qd))
+    return along_motion(mechanism.system, _twist(mechanism, body, at, axes), Builder(), None)
 
 
-def frame_jacobian(model: Model, body: str, at: ArrayLike = (0.0, 0.0, 0.0), axes: str = "world") -> Graph:
+@body_quantity(Equation("q qd", Output("J_{}_{}", ("6", "n"))), FRAME, NO_FRAME)
+def frame_jacobian(mechanism: Mechanism, body: str, at: ArrayLike = ORIGIN, axes: str = "world") -> list[Node]:
     """The Jacobian J of a frame, V = J qd; J^T takes a force at the point and a torque to the joints.
-
-    Parameters
-    ----------
-    model, body, at, axes
-        As in `frame_velocity`.
 
     Returns
     -------
-    Graph
-        Inputs q0.., qd0.., parameters; outputs J_0_0, J_0_1, .. row by row, (6, n): three rows of v, then three of w,
-        a column for each velocity [m or 1; 1 or 1/m].
-
-    Raises
-    ------
-    MechanismError, ValueError
-        As `frame_velocity`.
+    Three rows of v, then three of w, a column for each velocity [m or 1; 1 or 1/m].
 
     Examples
     --------
@@ -197,27 +127,12 @@ def frame_jacobian(model: Model, body: str, at: ArrayLike = (0.0, 0.0, 0.0), axe
     >>> dyn.arrays_at(arm, jacobian, q=[0.0, 0.0])["J"][0].tolist()
     [2.0, 1.0]
     """
-    system, twist = _twist(model, "frame_jacobian", body, at, axes)
-    return cg.simplify(system.graph(_matrix("J", jacobian_rows(system, twist)), system.q, system.qd))
+    return entries(jacobian_rows(mechanism.system, _twist(mechanism, body, at, axes)))
 
 
-def frame_jacobian_rate(model: Model, body: str, at: ArrayLike = (0.0, 0.0, 0.0), axes: str = "world") -> Graph:
+@body_quantity(Equation("q qd", Output("Jdot_{}_{}", ("6", "n"))), FRAME, NO_FRAME)
+def frame_jacobian_rate(mechanism: Mechanism, body: str, at: ArrayLike = ORIGIN, axes: str = "world") -> list[Node]:
     """The rate dJ/dt of `frame_jacobian` along the motion, entry by entry.
-
-    Parameters
-    ----------
-    model, body, at, axes
-        As in `frame_velocity`.
-
-    Returns
-    -------
-    Graph
-        Inputs q0.., qd0.., parameters; outputs Jdot_0_0, Jdot_0_1, .. row by row, (6, n).
-
-    Raises
-    ------
-    MechanismError, ValueError
-        As `frame_velocity`.
 
     Examples
     --------
@@ -227,11 +142,8 @@ def frame_jacobian_rate(model: Model, body: str, at: ArrayLike = (0.0, 0.0, 0.0)
     >>> dyn.arrays_at(arm, rate, q=[0.0], qd=[2.0])["Jdot"][2].tolist()
     [2.0]
     """
-    system, twist = _twist(model, "frame_jacobian_rate", body, at, axes)
-    rows = jacobian_rows(system, twist)
-    flat = _rates(_motion(system), [entry for row in rows for entry in row])
-    rates = [flat[i * system.n : (i + 1) * system.n] for i in range(len(rows))]
-    return cg.simplify(system.graph(_matrix("Jdot", rates), system.q, system.qd))
+    rows = jacobian_rows(mechanism.system, _twist(mechanism, body, at, axes))
+    return along_motion(mechanism.system, entries(rows), Builder(), None)
 
 
 def jacobian_rows(system: System, velocities: Sequence[Node]) -> list[list[Node]]:
@@ -240,43 +152,15 @@ def jacobian_rows(system: System, velocities: Sequence[Node]) -> list[list[Node]
     return [cotangents({velocity: ONE}, system.qd, build) for velocity in velocities]
 
 
-def _frame(model: Model, what: str, body: str, at: ArrayLike) -> tuple[System, KinematicChain, Array]:
-    mechanism = require_mechanism(model, what)
-    return mechanism.system, mechanism.chain(body), vector(f"the point of body {body!r}: at", at)
-
-
-def _twist(model: Model, what: str, body: str, at: ArrayLike, axes: str) -> tuple[System, list[Node]]:
+def _twist(mechanism: Mechanism, body: str, at: ArrayLike, axes: str) -> list[Node]:
     """The six components of V."""
     require_choice("axes", axes, AXES)
-    system, chain, point = _frame(model, what, body, at)
+    chain, point = mechanism.chain(body), vector(f"the point of body {body!r}: at", at)
     with building(Builder()), cg.tag(body):
         motion = chain.motion(point)
         parts = [motion.velocity, motion.omega]
         if axes == "body":
-            columns = _columns(chain)
+            columns = chain.columns()
             parts = [(spatial.dot(columns[0], v), spatial.dot(columns[1], v), spatial.dot(columns[2], v))
                      for v in parts]  # fmt: skip
-    return system, [component for part in parts for component in part]
-
-
-def _columns(chain: KinematicChain) -> list[spatial.Triple]:
-    """The body's axes in the world's."""
-    return [chain.direction(spatial.constant(axis)) for axis in np.eye(3)]
-
-
-def _motion(system: System) -> dict[Node, Node]:
-    """Rates of the coordinates."""
-    return dict(zip(system.q, system.q_dot, strict=True))
-
-
-def _rates(along: dict[Node, Node], nodes: Sequence[Node]) -> list[Node]:
-    dots = tangents(along, nodes, Builder())
-    return [dots.get(node, ZERO) for node in nodes]
-
-
-def _named(name: str, values: Sequence[Node]) -> dict[str, Node]:
-    return {f"{name}_{i}": value for i, value in enumerate(values)}
-
-
-def _matrix(name: str, rows: Sequence[Sequence[Node]]) -> dict[str, Node]:
-    return {f"{name}_{i}_{j}": entry for i, row in enumerate(rows) for j, entry in enumerate(row)}
+    return [component for part in parts for component in part]

@@ -18,6 +18,7 @@ import cgraph as cg
 from cgraph import Compiled, Graph, Node
 from cgraph.extend import Array, Builder, building, cotangents, memo, real_array
 
+from ...systems.kinematics import gathered
 from ..algebra.spatial import STILL, ZERO, Triple
 from ..algebra.spatial_vectors import Twist
 from ..bodies.joint_coordinates import places
@@ -118,10 +119,8 @@ def _kernels(joint: JointType) -> _Kernels:
         motion = propagate_motion(before, at)
         carrier = acceleration_in_space(omega, Twist(angular, linear), ())
         acceleration = propagate_acceleration(carrier, before, motion, at)
-        pairs = [*zip([*motion.velocity, *motion.omega], bars, strict=True), *wrench(acceleration, motion, at)]
-        forces: dict[Node, Node] = {}
-        for z, force in pairs:
-            forces[z] = forces.get(z, ZERO) + force
+        carried = zip([*motion.velocity, *motion.omega], bars, strict=True)
+        forces = gathered([*carried, *wrench(acceleration, motion, at)])
     back = cotangents(forces, [*velocity, *omega, *qd], build)  # motions are linear in velocities: so without these
     with building(build):
         tau = [force + link.damping * u for force, u in zip(back[WRENCH:], qd, strict=True)]

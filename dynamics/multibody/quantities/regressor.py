@@ -19,12 +19,14 @@ from ..bodies.body import WORLD, quantities
 from ..bodies.joint_coordinates import quasi_velocities
 from ..sweeps.links import Link, axes_of, link, link_states
 from ..sweeps.outward import energy, ground, motions
-from ..trees.mechanism import Mechanism, as_mechanism
+from ..trees.mechanism import Mechanism, require_mechanism
+from .body_quantity import of_bodies
 
 PARAMETERS = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")  # the order of Pinocchio
 _LOWER = ((0, 0), (1, 0), (1, 1), (2, 0), (2, 1), (2, 2))  # entries of I in that order
 
 
+@of_bodies
 def regressor(model: Model) -> Graph:
     """Y(q, qd, qdd) with Y pi = tau - armature qdd - damping qd - spring forces + applied forces.
 
@@ -33,20 +35,10 @@ def regressor(model: Model) -> Graph:
     variables. A column of zeros is a parameter that no motion reveals; which combinations of the others do, the rank
     of stacked Y tells.
 
-    Parameters
-    ----------
-    model : Model
-        A mechanism, or a scene of one.
-
     Returns
     -------
     Graph
         Inputs q0.., qd0.., qdd0.., parameters; outputs Y_0_0, Y_0_1, .. row by row, (n, 10 n).
-
-    Raises
-    ------
-    TypeError
-        For a model without bodies.
 
     Examples
     --------
@@ -54,7 +46,7 @@ def regressor(model: Model) -> Graph:
     >>> len(dyn.regressor(dyn.planar_arm([1.0, 0.8], [1.0, 0.5])).outputs)
     40
     """
-    mechanism = _mechanism(model)
+    mechanism = require_mechanism(model, "a regressor")
     names = [f"{each}_{i}" for i in range(len(mechanism.moving)) for each in PARAMETERS]
     while set(names) & mechanism.parameter_values.keys():
         names = [f"{name}_" for name in names]
@@ -71,24 +63,15 @@ def regressor(model: Model) -> Graph:
     return cg.simplify(Graph([*system.q, *system.qd, *system.qdd, *parameters], outputs))
 
 
+@of_bodies
 def inertial_parameters(model: Model) -> Array:
     """Mass, first moment and inertia about the joint's origin of each moving body, all that is welded to it merged in.
-
-    Parameters
-    ----------
-    model : Model
-        A mechanism, or a scene of one.
 
     Returns
     -------
     ndarray, (n, 10)
         In the bodies' axes, columns as `PARAMETERS`: m [kg], m c [kg m], and Ixx, Ixy, Iyy, Ixz, Iyz, Izz [kg m^2].
         Of the mechanism's own parameters it takes the values.
-
-    Raises
-    ------
-    TypeError
-        For a model without bodies.
 
     Examples
     --------
@@ -97,18 +80,11 @@ def inertial_parameters(model: Model) -> Array:
     [2.0, 0.0, 0.0, -6.0]
     """
     rows = []
-    for body in _mechanism(model).bind().moving:
+    for body in require_mechanism(model, "inertial_parameters").bind().moving:
         mass, center = float(body.mass), np.asarray(body.center)
         inertia = spatial.parallel_axis(np.asarray(body.inertia), mass, center)
         rows.append([mass, *(mass * center), *(inertia[i, j] for i, j in _LOWER)])
     return np.array(rows)
-
-
-def _mechanism(model: Model) -> Mechanism:
-    mechanism = as_mechanism(model)
-    if mechanism is None:
-        raise TypeError(f"a regressor needs a Mechanism, got {type(model).__name__}: {model!r:.60}")
-    return mechanism
 
 
 def _partial_lagrangians(mechanism: Mechanism, q: list[Node], qd: list[Node], pi: list[Node]) -> list[Node]:

@@ -11,22 +11,23 @@ from dataclasses import replace
 from typing import NamedTuple
 
 import cgraph as cg
-from cgraph import Graph, Node
+from cgraph import Node
 from cgraph.extend import Builder, building, cotangents, folded, require_choice
 
+from ...equations.equation import Equation, Output, entries
 from ...equations.substitute import substitute
 from ...systems.kinematics import ONE
-from ...systems.model import Model
-from ...systems.system import System
 from ..algebra import spatial
 from ..algebra.spatial import ZERO, Triple
 from ..bodies.body import MechanismError
 from ..sweeps.links import link_states
 from ..sweeps.outward import Motion, energy, motions
-from ..trees.mechanism import Mechanism, require_mechanism
+from ..trees.mechanism import Mechanism
+from .body_quantity import body_quantity
 from .frames import jacobian_rows
 
 POINTS = ("origin", "center of mass")
+NO_MASS = "MechanismError\n    For a model without bodies, and where nothing that moves has mass."
 
 
 class Moments(NamedTuple):
@@ -38,23 +39,9 @@ class Moments(NamedTuple):
     angular: Triple  # momentum about the origin
 
 
-def center_of_mass(model: Model) -> Graph:
-    """Position and velocity of the center of mass. Bodies that are fixed to the world are left out.
-
-    Parameters
-    ----------
-    model : Model
-        A mechanism, or a scene of one.
-
-    Returns
-    -------
-    Graph
-        Inputs q0.., qd0.., parameters; outputs c_0, c_1, c_2, (3,), in the world [m], and v_0, v_1, v_2, (3,) [m/s].
-
-    Raises
-    ------
-    MechanismError
-        For a model without bodies, and where nothing that moves has mass.
+@body_quantity(Equation("q qd", Output("c_{}", ("3",), "m"), Output("v_{}", ("3",), "m/s")), refused=NO_MASS)
+def center_of_mass(mechanism: Mechanism) -> list[Node]:
+    """Where the center of mass is, and its velocity, in the world. Bodies that are fixed to the world are left out.
 
     Examples
     --------
@@ -63,28 +50,13 @@ def center_of_mass(model: Model) -> Graph:
     >>> dyn.arrays_at(arm, dyn.center_of_mass(arm), q=[0.0, 0.0])["c"][2].tolist()
     -1.0
     """
-    system, center, velocity, _ = _center(model, "center_of_mass")
-    outputs = {f"c_{i}": node for i, node in enumerate(center)} | {f"v_{i}": node for i, node in enumerate(velocity)}
-    return cg.simplify(system.graph(outputs, system.q, system.qd))
+    center, velocity, _ = _center(mechanism, "center_of_mass")
+    return [*center, *velocity]
 
 
-def center_of_mass_jacobian(model: Model) -> Graph:
+@body_quantity(Equation("q qd", Output("J_{}_{}", ("3", "n"), "m or 1")), refused=NO_MASS)
+def center_of_mass_jacobian(mechanism: Mechanism) -> list[Node]:
     """The Jacobian J of the center of mass, velocity = J qd.
-
-    Parameters
-    ----------
-    model : Model
-        A mechanism, or a scene of one.
-
-    Returns
-    -------
-    Graph
-        Inputs q0.., qd0.., parameters; outputs J_0_0, J_0_1, .. row by row, (3, n) [m or 1].
-
-    Raises
-    ------
-    MechanismError
-        As `center_of_mass`.
 
     Examples
     --------
@@ -93,13 +65,12 @@ def center_of_mass_jacobian(model: Model) -> Graph:
     >>> dyn.arrays_at(arm, dyn.center_of_mass_jacobian(arm), q=[0.0, 0.0])["J"][0].tolist()
     [1.0, 0.25]
     """
-    system, _, velocity, _ = _center(model, "center_of_mass_jacobian")
-    rows = jacobian_rows(system, velocity)
-    outputs = {f"J_{i}_{j}": entry for i, row in enumerate(rows) for j, entry in enumerate(row)}
-    return cg.simplify(system.graph(outputs, system.q, system.qd))
+    _, velocity, _ = _center(mechanism, "center_of_mass_jacobian")
+    return entries(jacobian_rows(mechanism.system, velocity))
 
 
-def spatial_momentum(model: Model, about: str = "origin") -> Graph:
+@body_quantity(Equation("q qd", Output("h_{}", ("6",), "kg m/s, then kg m^2/s")))
+def spatial_momentum(mechanism: Mechanism, about: str = "origin") -> list[Node]:
     """Linear and angular momentum of the bodies together, in the world's axes; `momentum` is that of the coordinates.
 
     Without gravity and other forces from outside both are constant for a tree on a free base; else their rates are the
@@ -108,15 +79,12 @@ def spatial_momentum(model: Model, about: str = "origin") -> Graph:
 
     Parameters
     ----------
-    model : Model
-        A mechanism, or a scene of one.
     about : {"origin", "center of mass"}
         The point that the angular momentum is about: the world's origin, or the center of mass of the bodies.
 
     Returns
     -------
-    Graph
-        Inputs q0.., qd0.., parameters; outputs h_0 .. h_5, (6,): linear [kg m/s], then angular [kg m^2/s].
+    Three numbers of the linear momentum, then three of the angular one.
 
     Raises
     ------
@@ -134,21 +102,16 @@ def spatial_momentum(model: Model, about: str = "origin") -> Graph:
     [2.0, 0.0, 0.0, 0.0, 0.0, -2.0]
     """
     if require_choice("about", about, POINTS) == "origin":
-        mechanism = require_mechanism(model, "spatial_momentum")
-        system, moments = mechanism.system, _moments(mechanism)
-        angular = moments.angular
-    else:
-        system, center, _, moments = _center(model, "spatial_momentum")
-        with building(Builder()):
-            x, y, z = (a - b for a, b in zip(moments.angular, spatial.cross(center, moments.linear), strict=True))
-        angular = x, y, z
-    outputs = {f"h_{i}": node for i, node in enumerate((*moments.linear, *angular))}
-    return cg.simplify(system.graph(outputs, system.q, system.qd))
+        moments = _moments(mechanism)
+        return [*moments.linear, *moments.angular]
+    center, _, moments = _center(mechanism, "spatial_momentum")
+    with building(Builder()):
+        taken = spatial.cross(center, moments.linear)
+        return [*moments.linear, *[a - b for a, b in zip(moments.angular, taken, strict=True)]]
 
 
-def _center(model: Model, what: str) -> tuple[System, Triple, Triple, Moments]:
-    """The system, center and velocity of the mass, and the moments that they come of."""
-    mechanism = require_mechanism(model, what)
+def _center(mechanism: Mechanism, what: str) -> tuple[Triple, Triple, Moments]:
+    """The center and the velocity of the mass, and the moments that they come of."""
     moments = _moments(mechanism)
     if moments.mass.value == 0.0:
         raise MechanismError(f"{what} needs mass that moves, the bodies of the mechanism have none")
@@ -156,7 +119,7 @@ def _center(model: Model, what: str) -> tuple[System, Triple, Triple, Moments]:
         center, velocity = (
             (x / moments.mass, y / moments.mass, z / moments.mass) for x, y, z in (moments.first, moments.linear)
         )
-    return mechanism.system, center, velocity, moments
+    return center, velocity, moments
 
 
 def _moments(mechanism: Mechanism) -> Moments:

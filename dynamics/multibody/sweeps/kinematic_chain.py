@@ -42,6 +42,10 @@ class KinematicChain:
     steps: tuple[LinkState, ...]
     axes: Array  # (3, 3)
 
+    def columns(self) -> list[Triple]:
+        """The body's axes in the world's."""
+        return [self.direction(spatial.constant(axis)) for axis in np.eye(3)]
+
     def direction(self, vector: Triple) -> Triple:
         """A vector in the body's axes, in the world's."""
         vector = spatial.rotate_transpose(self.orientation.T.tolist(), vector)
@@ -66,8 +70,7 @@ class KinematicChain:
 
     def graph(self, at: ArrayLike, q: Sequence[Node], qd: Sequence[Node]) -> Graph:
         """The motion of a point and the body's axes: outputs x, y, z, vx, vy, vz, wx, wy, wz, R_0_0, R_0_1, .. ."""
-        point = self.motion(at)
-        columns = [self.direction(spatial.constant(each)) for each in np.eye(3)]
+        point, columns = self.motion(at), self.columns()
         outputs = dict(zip(("x", "y", "z"), point.position, strict=True))
         outputs |= dict(zip(("vx", "vy", "vz"), point.velocity, strict=True))
         outputs |= dict(zip(("wx", "wy", "wz"), point.omega, strict=True))

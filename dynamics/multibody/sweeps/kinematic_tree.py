@@ -143,8 +143,8 @@ def _has_parameters(body: Body) -> bool:
     return bool(names_in([*entries(body.mass), *entries(body.center), *entries(body.inertia)]))
 
 
-def require_inertia(bodies: Sequence[Body]) -> tuple[Body, ...]:
-    """The bodies, once each is seen to have inertia along its coordinate: its own, its armature's, or further out.
+def require_inertia(bodies: Sequence[Body]) -> None:
+    """Raises MechanismError for a body without inertia along its coordinate: its own, its armature's, or further out.
 
     Masses further out are taken to move: whether they do, the equations of motion look at.
     """
@@ -155,7 +155,6 @@ def require_inertia(bodies: Sequence[Body]) -> tuple[Body, ...]:
             raise MechanismError(f"body {body.name!r} has {lacks}, carries no mass, and its joint has no armature")
         if body.name in carries or not (vanishes(body.mass) and vanishes(body.inertia)):
             carries.add(body.parent)
-    return tuple(bodies)
 
 
 def resists(body: Body) -> bool:

@@ -37,8 +37,7 @@ from ..sweeps.kinematic_chain import KinematicChain, kinematic_chains
 from ..sweeps.kinematic_tree import Carrier, lock_joints, merge_fixed_bodies, parents_first, require_inertia, resists
 from ..sweeps.links import Link
 from .joint_positions import skeleton
-from .modification import ModifiableStructure
-from .structure import bound_body, bound_force, changed, listed, require_values, used_names
+from .structure import Structure, bound_body, bound_force, changed, listed, require_values, used_names
 from .tree_equations import TreeEquations
 
 __all__ = [
@@ -58,7 +57,7 @@ SHOWN = 6  # names of a kind that a repr shows, at most
 
 
 @dataclass(frozen=True, eq=False)
-class Mechanism(ModifiableStructure):
+class Mechanism(Structure):
     """A tree of rigid bodies under gravity. Coordinates are its moving joints, parents first.
 
     Parameters
@@ -103,6 +102,8 @@ class Mechanism(ModifiableStructure):
     >>> dyn.Mechanism([rod], (0.0, 0.0, -10.0), parameters={"m": 1.0}).parameters
     {'m': 1.0}
     """
+
+    ode = None  # it has a Lagrangian, see `Model`
 
     def __post_init__(self) -> None:
         quantities("gravity", self.gravity)
@@ -176,11 +177,6 @@ class Mechanism(ModifiableStructure):
     def mechanism(self) -> Mechanism:
         """The mechanism itself, as a `Model` has it."""
         return self
-
-    @property
-    def ode(self) -> None:
-        """None: a mechanism has a Lagrangian, see `Model`."""
-        return None
 
     @property
     def carriers(self) -> dict[str, Carrier]:

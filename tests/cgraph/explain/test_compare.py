@@ -9,8 +9,8 @@ from hypothesis import given, settings
 import cgraph as cg
 import dynamics as dyn
 from cgraph import compare
-from dynamics.equations.formulations.node_classes import formulation_classes
 from tests.strategies import Case, cases, examples
+from viz.models.node_classes import formulation_classes
 
 x, y, z = cg.variables("x y z")
 

@@ -9,8 +9,8 @@ import pytest
 import cgraph as cg
 import dynamics as dyn
 from cgraph import Graph, Node
-from dynamics.equations.formulations.node_classes import form_classes
 from dynamics.equations.momentum.legendre import is_quadratic
+from viz.models.node_classes import form_classes
 
 from ..mechanisms import turned_arm
 from ..models import cart_pendulum

@@ -8,8 +8,8 @@ from pytest import approx, mark
 import cgraph as cg
 import dynamics as dyn
 from cgraph.core.traversal import rebuild
-from dynamics.equations.formulations.node_classes import formulation_classes
 from tests.formulations import WRONG
+from viz.models.node_classes import formulation_classes
 
 ROUNDING = 1e-12  # a few dozen operations on numbers of order one
 SEEDS = range(3)

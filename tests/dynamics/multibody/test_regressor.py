@@ -87,5 +87,5 @@ def test_it_is_small_and_free_of_the_parameters() -> None:
 
 
 def test_another_model_is_refused() -> None:
-    with pytest.raises(TypeError, match="a regressor needs a Mechanism, got OdeSystem"):
+    with pytest.raises(dyn.MechanismError, match="a regressor takes rigid bodies, a Mechanism or a scene of one"):
         regressor(dyn.OdeSystem(lambda x, t: [-x[0]], ["x"]))

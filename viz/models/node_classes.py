@@ -6,9 +6,8 @@ from collections.abc import Callable, Iterable
 
 from cgraph import Graph, Node
 from cgraph.extend import ADJOINT, TANGENT, topological
-
-from .formulations import EULER, newton_euler
-from .verdict import Verdict
+from dynamics.equations.formulations.formulations import EULER, newton_euler
+from dynamics.equations.formulations.verdict import Verdict
 
 LEAVES, DAMPING = "inputs and numbers", "damping"
 ENERGIES, NEWTON_EULER = {"kinetic", "potential"}, newton_euler.__name__

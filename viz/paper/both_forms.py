@@ -8,11 +8,10 @@ from typing import NamedTuple
 import cgraph as cg
 from cgraph import Counts, Graph
 from cgraph.extend import Array
-
-from ...systems.model import Model, as_system
-from ..equations_of_motion import momentum
-from ..state_equation import state_equation
-from .hamiltonian import hamilton_equations
+from dynamics.equations.equations_of_motion import momentum
+from dynamics.equations.momentum.hamiltonian import hamilton_equations
+from dynamics.equations.state_equation import state_equation
+from dynamics.systems.model import Model, as_system
 
 LAGRANGE, HAMILTON, VELOCITIES_ALONE = "state equation", "Hamilton's equations", "velocities alone"
 
