@@ -1,6 +1,5 @@
 """Hand-over: bodies caught and let go, with momentum and energy accounted for."""
 
-import math
 from typing import Any
 
 import numpy as np
@@ -8,12 +7,10 @@ from pytest import approx, mark, raises
 
 import dynamics as dyn
 from tests.dynamics.mechanisms import random_body, random_inertia
-from tests.slow import slow
-from tests.tolerances import CONDITIONED, EQUATIONS, LAST_BITS, LONG_SUM, SHORT_SUM, SOLVED, SUMS
+from tests.tolerances import CONDITIONED, EQUATIONS, LAST_BITS, LONG_SUM, SHORT_SUM, SUMS
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 STEP = 1e-5  # of central differences: error about STEP^2
-TIGHT = {"method": "dop853", "rtol": 1e-11, "atol": 1e-12, "progress": False}
 
 
 def arm(n: int = 3, seed: int = 0, gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)) -> dyn.Mechanism:
@@ -61,22 +58,8 @@ def kinetic(mechanism: dyn.Mechanism, q: Array, qd: Array) -> float:
     return float(qd @ m @ qd) / 2.0
 
 
-def about_z(mechanism: dyn.Mechanism, q: Array, qd: Array) -> float:
-    """Angular momentum about the world's z, body by body; armatures are none of it."""
-    total = 0.0
-    for body in mechanism.bodies:
-        moves = values(mechanism.motion(body.name, body.center), q=q, qd=qd)
-        total += _spin(body, *(np.array([moves[name] for name in names.split()]) for names in
-                               ("x y z", "vx vy vz", "wx wy wz")), turn(moves))  # fmt: skip
-    return total
-
-
 def turn(moves: dict[str, float]) -> Array:
     return np.array([[moves[f"R_{i}_{j}"] for j in range(3)] for i in range(3)])
-
-
-def _spin(body: dyn.Body, x: Array, v: Array, w: Array, r: Array) -> float:
-    return float((body.mass * np.cross(x, v) + r @ np.asarray(body.inertia) @ r.T @ w)[2])
 
 
 def test_a_rotor_that_catches_a_point_mass_slows_down_as_the_closed_form_says() -> None:
@@ -114,26 +97,6 @@ def test_the_energy_lost_is_that_of_an_inelastic_impact(seed: int) -> None:
     assert kinetic(holder, q, qd) + free - kinetic(found.mechanism, q, found.qd) == approx(found.energy, rel=SUMS)
 
 
-@mark.parametrize("seed", [0, 1, *slow(2, 3)])
-def test_angular_momentum_about_the_base_s_axis_is_kept(seed: int) -> None:
-    """Without gravity, springs or damping at the base nothing turns the whole about its axis."""
-    rng = np.random.default_rng(seed)
-    holder = arm(seed=seed, gravity=(0.0, 0.0, 0.0))
-    holder = dyn.Mechanism([dyn.Body(b.name, dyn.Joint("revolute", b.joint.axis, b.joint.position), b.parent, b.mass,
-                                     b.center, b.inertia) for b in holder.bodies], (0.0, 0.0, 0.0))  # fmt: skip
-    body = load(seed)
-    q, qd, v, w = rng.normal(size=(4, 3))
-    found = dyn.attach_with_impact(holder, q, qd, body, velocity=v, omega=w)
-    moves = values(found.mechanism.motion("load", body.center), q=q, qd=qd)
-    place = np.array([moves[name] for name in "xyz"])
-    before = about_z(holder, q, qd) + _spin(body, place, v, w, turn(moves))
-    assert about_z(found.mechanism, q, found.qd) == approx(before, rel=EQUATIONS)
-    later = dyn.simulate(found.mechanism, q, found.qd, 0.5, **TIGHT)
-    left = dyn.release(found.mechanism, later.q[-1], later.qd[-1], "load")
-    free = _spin(body, left.body.position, left.body.velocity, left.body.omega, left.body.orientation)
-    assert about_z(left.mechanism, left.q, left.qd) + free == approx(before, rel=CONDITIONED)
-
-
 def test_a_body_that_is_let_go_leaves_with_the_velocity_of_the_hand() -> None:
     holder = arm().attach(load())
     q, qd = np.random.default_rng(1).normal(size=(2, 3))
@@ -162,29 +125,6 @@ def test_a_body_can_be_caught_on_a_hinge_and_by_a_locked_arm() -> None:
     held = dyn.attach_with_impact(holder.lock("b2", 0.3), q[:2], qd[:2], load())
     assert held.qd.shape == (2,)
     assert held.energy > 0.0
-
-
-def test_an_arm_picks_up_carries_and_drops_with_all_energy_accounted_for() -> None:
-    """Three stretches; the energy of arm and load changes by the impact's loss alone. The load then falls freely."""
-    rods = dyn.tree([-1, 0, 1], gravity=(0.0, 0.0, -9.81))
-    hand = dyn.Body("load", dyn.Joint("fixed", position=(0.0, 0.0, -1.0)), "link 3", 0.5, inertia=(1e-3,) * 3)
-    first = dyn.simulate(rods, [1.0, 0.4, -0.3], [0.0] * 3, 0.6, **TIGHT)
-    found = dyn.attach_with_impact(rods, first.q[-1], first.qd[-1], hand)
-    place = pose(found.mechanism, "load", (0.0, 0.0, 0.0), found.q)[0]
-    second = dyn.simulate(found.mechanism, found.q, found.qd, 0.5, **TIGHT)
-    left = dyn.release(found.mechanism, second.q[-1], second.qd[-1], "load")
-    third = dyn.simulate(left.mechanism, left.q, left.qd, 0.4, **TIGHT)
-    weight = hand.mass * 9.81
-    start = first.energy[0] + weight * place[2]  # at rest, waiting
-    held = second.energy
-    assert held[0] == approx(start - found.energy, rel=SOLVED)
-    assert np.ptp(held) < CONDITIONED
-    v, w = left.body.velocity, left.body.omega
-    own = (hand.mass * v @ v + 1e-3 * w @ w) / 2.0 + weight * left.body.position[2]
-    assert third.energy[0] + own == approx(held[-1], rel=EQUATIONS)
-    assert third.energy[-1] == approx(third.energy[0], abs=CONDITIONED)
-    assert found.energy > 0.1
-    assert math.hypot(*v) > 0.5
 
 
 def test_wrong_hand_overs_are_refused() -> None:

@@ -120,12 +120,12 @@ def test_regrouped_inertia_moves_alike_in_no_more_nodes(family: str, equations: 
 def test_by_default_pruning_costs_no_digit(n: int) -> None:
     """Nothing is switched off, so the graph is that of the model; regrouped, it has lost some."""
     importorskip("flint")
-    from tests.dynamics.planar_arm_equations import accelerations
+    from tests.dynamics.tree_in_digits import tree_in_digits
 
     rng = np.random.default_rng(n)
     model = dyn.planar_arm(rng.uniform(0.5, 1.5, n).tolist(), rng.uniform(0.5, 1.5, n).tolist())
     q, qd, tau = rng.uniform(-3.0, 3.0, n), rng.normal(size=n), 5.0 * rng.normal(size=n)
-    exact = accelerations(model, q, qd, tau).high
+    exact = tree_in_digits(model, q, qd, tau, tau)["accelerations"]
     kept, regrouped = (dyn.prune(model, dyn.forward_dynamics, regroup=each).graph for each in (False, True))
     assert structure_hash(dyn.prune(model, dyn.forward_dynamics).graph) == structure_hash(kept)
     errors = [error(run(graph, {"q": q, "qd": qd, "tau": tau}), exact) for graph in (kept, regrouped)]

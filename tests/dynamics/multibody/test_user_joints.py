@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import reduce
 
 import numpy as np
@@ -20,7 +20,6 @@ from tests.dynamics.models import Array
 from tests.dynamics.units import Units, in_units
 from tests.slow import slow
 
-ROUNDING = 1e-12  # of the largest of its kind, in some hundred sums
 ZERO, ONE = cg.constant(0.0), cg.constant(1.0)
 X, Y, Z = range(3)
 Nodes = Sequence[cg.Node]
@@ -243,42 +242,6 @@ def twins(kind: str, seed: int) -> tuple[dyn.Mechanism, dyn.Mechanism]:
         joint = dyn.Joint(part, np.eye(3)[axis], **placed)
         chain.append(dyn.Body("b" if last else f"b{k}", joint, f"b{k - 1}" if k else parent, **(own if last else {})))
     return dyn.Mechanism([*before, whole, *after]), dyn.Mechanism([*before, *chain, *after])
-
-
-def compared(make: Callable[[dyn.Mechanism], Sequence[Array]], pair: tuple[dyn.Mechanism, dyn.Mechanism]) -> float:
-    """The largest difference, of the largest number of its kind and row."""
-    worst = 0.0
-    for a, b in zip(*map(make, pair), strict=True):
-        scale = np.abs(b).max(axis=-1, keepdims=True)
-        worst = max(worst, float((np.abs(a - b) / np.where(scale > 0.0, scale, 1.0)).max()))
-    return worst
-
-
-@mark.parametrize("kind", ["angles", "polar"])
-@mark.parametrize("seed", [7, *slow(*[k for k in range(40) if k != 7])])
-def test_every_equation_is_that_of_its_joints_of_one_axis(kind: str, seed: int) -> None:
-    pair = twins(kind, seed)
-    n, nq = pair[0].system.n, pair[0].system.nq
-    rng = np.random.default_rng(seed + 100)
-    q, qd, x = rng.uniform(0.3, 1.0, nq), rng.normal(size=n), rng.normal(size=n)
-
-    def arrays(derive: Callable[..., cg.Graph], **more: Array) -> Callable[[dyn.Mechanism], Sequence[Array]]:
-        return lambda model: [*dyn.arrays_at(model, derive(model), q=q, qd=qd, **more).values()]
-
-    def hamilton(model: dyn.Mechanism) -> Sequence[Array]:
-        named = {f"q{k}": v for k, v in enumerate(q)} | {f"p{k}": v for k, v in enumerate(x)}
-        values = dyn.hamilton_equations(model).evaluate(named | {f"tau{k}": 0.0 for k in range(n)})
-        return [np.array(list(values.values()))]
-
-    for make in (
-        arrays(dyn.bias),
-        arrays(dyn.forward_dynamics, tau=x),
-        arrays(dyn.inverse_dynamics_derivatives, qdd=x),
-        lambda model: dyn.linearize(model, q, qd, x),
-        lambda model: dyn.linearize(model, q, qd, x, form="momentum"),
-        hamilton,
-    ):
-        assert compared(make, pair) < ROUNDING
 
 
 @mark.parametrize("length", [2.0**-20, *slow(2.0**20)])
