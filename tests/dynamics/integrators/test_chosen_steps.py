@@ -83,16 +83,6 @@ def test_the_clock_makes_the_steps_of_the_state(method: str, t_end: float) -> No
 
 
 @mark.parametrize("method", ADAPTIVE)
-def test_a_run_back_in_time_returns_to_its_start(method: str) -> None:
-    arm = dyn.planar_arm([1.0], [1.0])
-    there = dyn.simulate(arm, [1.0], [0.5], 4.0, method, t0=1.0)
-    back = dyn.simulate(arm, there.q[-1], there.qd[-1], 1.0, method, t0=4.0)
-    assert (there.stats.success, back.stats.success, back.t[-1]) == (True, True, 1.0)
-    assert back.q[-1] == approx([1.0], abs=FOLLOWED)
-    assert back.qd[-1] == approx([0.5], abs=FOLLOWED)
-
-
-@mark.parametrize("method", ADAPTIVE)
 @mark.parametrize("unit", [*slow(2.0**-30, 2.0**30), 2.0**-400])
 def test_the_unit_of_time_changes_no_count_of_steps(method: str, unit: float) -> None:
     def run(unit: float) -> dyn.Trajectory:

@@ -15,7 +15,6 @@ import dynamics as dyn
 from cgraph.core.node import apply
 from cgraph.extend import OPS
 from dynamics.integrators import METHODS, taylor
-from tests.dynamics.planet import PERIHELION, planet, position
 
 ROUNDINGS = 2e-14  # of a few dozen steps
 SERIES: dict[str, tuple[Callable[..., Any], Callable[..., Any]]] = {
@@ -107,14 +106,6 @@ def test_a_chain_of_whole_powers_starts_at_0(power: float) -> None:
     assert run.success
     assert run.stats.steps < 40
     np.testing.assert_allclose(run.q[-1], other.q[-1], rtol=1e-8)
-
-
-def test_events_and_times_lie_on_its_polynomials() -> None:
-    pytest.importorskip("llvmlite")
-    times = np.linspace(0.0, 2.5, 40)
-    axis = dyn.Event("axis", lambda q, qd, t: q[1], direction=-1)
-    run = dyn.simulate(planet(), *PERIHELION, 4.0, "taylor", rtol=1e-14, atol=1e-14, t_eval=times, events=[axis])
-    assert run.q == approx(np.array([position(t) for t in times]), abs=5e-14)
 
 
 @mark.parametrize("name", [name for name, row in OPS.items() if row.piece is not None])

@@ -183,32 +183,6 @@ def test_mujoco_reads_the_same(seed: int) -> None:
     assert worst < EQUATIONS
 
 
-@mark.parametrize("seed", range(5))
-def test_pinocchio_reads_the_same(seed: int) -> None:
-    """Massless links that move, too."""
-    pinocchio = importorskip("pinocchio")
-    rng = np.random.default_rng((seed, 2))
-    text = random_urdf(rng, 9, massless=True)
-    ours, theirs = dyn.load_urdf(text), pinocchio.buildModelFromXML(text)
-    data, n = theirs.createData(), ours.system.n
-    order = [theirs.joints[theirs.getJointId(name)].idx_v for name in ours.coordinates]
-    damping = np.array(ours.system.damping)
-    inverse = cg.compile(dyn.inverse_dynamics(ours), "python")
-    for _ in range(5):
-        x = rng.uniform(-1.0, 1.0, (3, n))
-        given = np.zeros((3, n))
-        given[:, order] = x
-        q = np.concatenate(
-            [[np.cos(a), np.sin(a)] if theirs.joints[i + 1].nq == 2 else [a] for i, a in enumerate(given[0])]
-        )
-        tau = pinocchio.rnea(theirs, data, q, given[1], given[2])[order] + damping * x[1]
-        assert error(inverse(x.ravel()), tau) < EQUATIONS
-    frame = theirs.getFrameId(ours.bodies[-1].name)
-    pinocchio.framesForwardKinematics(theirs, data, q)
-    place = ours.position(ours.bodies[-1].name).evaluate({f"q{i}": x[0, i] for i in range(n)})
-    assert [*place.values()] == approx(data.oMf[frame].translation, abs=EQUATIONS)
-
-
 # --- what is left out
 
 

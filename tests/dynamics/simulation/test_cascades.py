@@ -130,14 +130,6 @@ def test_three_balls_that_are_squeezed_without_restitution_come_to_rest(method: 
     assert run.q[-1] == approx([0.0, 0.0, 0.0], abs=EXACT)
 
 
-@mark.slow
-def test_a_ball_without_room_between_two_walls_stops_the_run_with_their_names() -> None:
-    opposite = dyn.Event("opposite", lambda q, qd, t: -q[0], -1, reset=lambda q, qd, t: (q, [-qd[0]]))
-    with pytest.warns(dyn.SimulationWarning, match="the run stopped at t = 0 s"):
-        message = moved([0.0], [1.0], [wall(0), opposite], 1.0).stats.message
-    assert message.startswith("stopped at t = 0 s: events 'wall 0', 'opposite' reset the state again and again")
-
-
 ORDERS = [
     ("rk4", 0.2),
     ("gauss6", 0.4),

@@ -10,13 +10,11 @@ from pytest import approx, mark, raises
 import cgraph as cg
 import dynamics as dyn
 from dynamics.integrators import METHODS
-from dynamics.systems.system import System
 from tests.dynamics.planet import ECCENTRICITY, PERIHELION, planet, position
 from tests.dynamics.step_options import step
 from tests.slow import slow
 
 FIXED = [name for name, method in METHODS.items() if not method.adaptive]
-ADAPTIVE = [name for name, method in METHODS.items() if method.adaptive]
 KINDS = ["dop853", "rk4", "scipy:DOP853"]  # with dense output of their own, by Hermite, of SciPy
 SHARP = 1e-12  # relative, of an instant found to the last bit
 CROSSING = {1: 2e-2, 2: 2e-5}  # s, by the order of the method: the error of a motion at dt = 1 ms
@@ -57,17 +55,6 @@ def test_events_are_found_where_they_are(method: str) -> None:
     assert (run.t[-1], run.stats.message) == (approx(11.0, rel=SHARP), "event 'late' at t = 11 s")
     assert run.q[-1] == approx(position(11.0 - 2 * np.pi), abs=tolerance)
     assert (run.stats.success, run.stats.status) == (True, 1)
-
-
-def test_an_event_between_the_times_asked_for() -> None:
-    ground = dyn.Event("ground", lambda q, qd, t, p: q[0] - p["floor"], terminal=True)
-    ball = System(lambda q, qd, t, p: 0.5 * qd[0] ** 2 - 9.81 * q[0], ["height"], {"floor": 0.5})
-    there = math.sqrt(2 * 0.5 / 9.81)
-    for method in ("rk4", "dop853"):
-        run = dyn.simulate(ball, [1.0], [0.0], 1.0, method, **step(method, 0.01), t_eval=[0.0, 0.3, 0.9], events=ground)
-        assert run.t == approx([0.0, 0.3, there], rel=SHARP)
-        assert run.events["ground"].t == approx([there], rel=SHARP)
-        assert run.events["ground"].qd[0] == approx([-math.sqrt(2 * 9.81 * 0.5)], rel=SHARP)
 
 
 @mark.parametrize("method", ["dop853", "dopri5", "taylor", "rk4", "radau", "gauss6"])
@@ -228,16 +215,6 @@ def test_instants_do_not_depend_on_the_rows_the_engine_or_the_company_of_other_e
                 continue  # other steps
             assert circle([ask], method=method, **options).events["ask"].t == approx(first, rel=SHARP)
         assert circle([ask, other], method=method).events["ask"].t == approx(first, rel=SHARP)
-
-
-def test_with_scipy_s_solvers_events_and_rows_are_as_exact_as_its_steps() -> None:
-    """By their own dense output; the cubic of Hermite loses five digits in steps as long as these."""
-    event = dyn.Event("half", lambda x, t: x[0] - 0.5)
-    times = np.linspace(0.0, 10.0, 37)
-    for name, tolerance in (("DOP853", 1e-9), ("RK45", 1e-8), ("LSODA", 1e-7)):
-        run = circle([event], method=f"scipy:{name}", t_eval=times)
-        assert run.events["half"].t == approx([TURN, 2 * np.pi - TURN, 2 * np.pi + TURN], abs=tolerance), name
-        assert run.q[:, 0] == approx(np.cos(times), abs=tolerance), name
 
 
 def test_an_event_is_what_it_says() -> None:

@@ -22,7 +22,6 @@ COUNT = FEW + 5  # more than one vector, and not a whole number of them
 TIMES = [0.0, 0.11, 0.12, 0.5, 1.0]
 COMPARED = (0, 3, 8, COUNT - 1)
 TOP = np.diag([0.1, 0.2, 0.25])  # kg m^2
-ROUNDING = 1e-12  # of equal steps, whose lengths between rows are rounded otherwise alone
 LANES = ("dop853", "dopri5", "rodas", "taylor")
 
 
@@ -244,34 +243,6 @@ def test_what_cannot_go_in_lanes_goes_one_by_one() -> None:
     each_is_alone(spring(), one_by_one, q, qd, 0.3, "radau", t_eval=[0.3])
     in_python = simulate_many(spring(), q, qd, 0.05, t_eval=[0.05], backend="python")
     each_is_alone(spring(), in_python, q, qd, 0.05, "dop853", t_eval=[0.05], backend="python")
-
-
-@mark.parametrize("times", [[1.0], [0.0, 0.5, 1.0], [0.25, 0.5, 0.75], None])
-@mark.parametrize("method", ["rk4", "verlet"])
-def test_equal_steps_are_the_same_with_an_estimate_and_without(method: str, times: Any) -> None:
-    model = random_arm(2)
-    q, qd = starts(model, 8)
-    options = {"dt": 0.02, "t_eval": times}
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", dyn.SimulationWarning)
-        beside = simulate_many(model, q, qd, 1.0, method, **options)
-    assert same(beside, simulate_many(model, q, qd, 1.0, method, estimate_error=False, **options))
-    assert same(beside, simulate_many(model, q, qd, 1.0, method, estimate_error=False, workers=2, chunk=10, **options))
-
-
-@stops
-def test_one_of_equal_steps_that_fails_says_what_it_says_alone() -> None:
-    model = dyn.OdeSystem(lambda x, t: [x[0] ** 2], ["x"])
-    x = np.full((COUNT, 1), -1.0)
-    x[7], x[20] = 1.0, 1e200
-    options = {"dt": 0.01, "t_eval": np.linspace(0.0, 2.0, 11), "estimate_error": False}
-    fan = simulate_many(model, x, None, 2.0, "rk4", **options)
-    assert fan.stats.success.tolist() == [k not in (7, 20) for k in range(COUNT)]
-    for k in (0, 7, 20):
-        one = dyn.simulate(model, x[k], None, 2.0, "rk4", **options)
-        rows = int((fan.t <= one.t[-1]).sum())
-        assert fan.q[k, :rows] == approx(one.q[:rows], rel=ROUNDING)
-        assert (fan.stats.message[k], fan.stats.steps[k]) == (one.stats.message, one.stats.steps)
 
 
 @mark.parametrize("seconds", [1e-4, 1e9])  # after one trajectory alone, or never

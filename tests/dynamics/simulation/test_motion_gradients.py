@@ -3,7 +3,6 @@
 import math
 import tracemalloc
 import warnings
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -14,7 +13,7 @@ import cgraph as cg
 import dynamics as dyn
 from dynamics.equations.states.consistent_state import nearest_state
 from dynamics.experiments.speed import bench_scenes
-from dynamics.integrators import METHODS, Tableau, derive, runge_kutta
+from dynamics.integrators import METHODS, derive
 from dynamics.simulation.gradients import motion_run
 from dynamics.simulation.gradients.motion_equations import motion_equations, sharing
 from dynamics.simulation.gradients.motion_programs import motion_programs
@@ -100,37 +99,6 @@ def test_what_gradients_of_every_method_are(method: str) -> None:
     for name, at in {"q": 0.5, "m": 1.3}.items():
         difference = (value(**{name: at + 1e-5}) - value(**{name: at - 1e-5})) / 2e-5
         assert float(np.squeeze(result[name])) == approx(difference, rel=DIFFERENCES, abs=DIFFERENCES)
-
-
-@pytest.fixture(scope="module")
-def exact_slopes() -> Any:
-    """Of `loss` after 0.5 s, by q and k: differences of solutions of 30 digits."""
-    pytest.importorskip("flint")
-
-    def value(q: float = 0.5, k: float = 2.0) -> Fraction:
-        numbers = dyn.reference(BEAD, [q], [0.2], [0.5], parameters={"k": k}, digits=28).decimal[0]
-        q_end, qd_end = (Fraction(number) for number in numbers)
-        return q_end * qd_end + Fraction(1.3) * q_end**2
-
-    e = 2.0**-24
-    by_q, by_k = value(0.5 + e) - value(0.5 - e), value(k=2.0 + e) - value(k=2.0 - e)
-    return [float(by_q / Fraction(2.0 * e)), float(by_k / Fraction(2.0 * e))]
-
-
-@mark.parametrize(
-    ("method", "accuracy"),
-    [
-        ("dop853", {"rtol": 1e-12}),
-        *slow(*[(name, {"rtol": 1e-12}) for name in ("dopri5", "rodas", "radau", "taylor")]),
-        *slow(*[(name, {"dt": 0.005}) for name in ("gauss6", "yoshida8", "kahan_li8")]),
-    ],
-)
-def test_a_gradient_of_short_steps_beside_differences_of_30_digits(
-    method: str, accuracy: dict[str, float], exact_slopes: Any
-) -> None:
-    given = {"wrt": ["q", "k"], "backend": "python", **accuracy}
-    result = dyn.gradient(BEAD, loss, [0.5], [0.2], 0.5, method, **given)
-    assert [result["q"][0], result["k"]] == approx(exact_slopes, rel=DIGITS)
 
 
 @mark.parametrize("method", ["dop853", "taylor"])
@@ -238,23 +206,6 @@ def test_gradients_in_other_units_are_the_same(method: str) -> None:
     assert (other["q"] / unit).tolist() == approx(metres["q"].tolist(), rel=LONG_SUM)
     assert (other["qd"] / unit).tolist() == approx(metres["qd"].tolist(), rel=LONG_SUM)
     assert other["k"] == approx(metres["k"], rel=LONG_SUM)
-
-
-def test_radau_through_a_stiff_spring() -> None:
-    """A mass on a spring of 1e8 N/m with 2e4 N s/m settles at tau / k within a millisecond."""
-
-    def energy(q: Any, qd: Any, t: Any, p: Any) -> Any:
-        return 0.5 * qd[0] ** 2 - 0.5 * p["k"] * q[0] ** 2
-
-    spring = System(energy, ["x"], {"k": 1e8}, damping=2e4)
-    given = {"t_end": 0.1, "method": "radau", "tau": [50.0], "wrt": ["tau", "k", "q"], "rtol": 1e-6}
-    result = dyn.gradient(spring, lambda q, qd, t: q[0], [1e-3], [0.0], **given)
-    forward = dyn.sensitivities(spring, [1e-3], [0.0], **given)
-    assert len(result.t) < 1000
-    assert result["tau"][0] == approx(1e-8, rel=1e-9)
-    assert result["k"] == approx(-50.0 / 1e16, rel=1e-6)
-    for name in ("tau", "k"):
-        assert np.squeeze(forward[name][-1])[0] == approx(float(np.squeeze(result[name])), rel=DUAL)
 
 
 def free_body() -> dyn.Mechanism:
@@ -480,19 +431,6 @@ def test_forces_and_parameters_that_a_call_gives_make_nothing_anew() -> None:
     again = run(0.4, 2.5)
     assert motion_programs.cache_info().misses == made
     assert all(a != b for a, b in zip(first, again, strict=True))
-
-
-def test_the_problem_of_quaternions_is_derived_once() -> None:
-    body = free_body()
-    assert derive(body, {}) is derive(body, {})
-
-
-def test_a_new_tableau_has_gradients(monkeypatch: pytest.MonkeyPatch) -> None:
-    heun = Tableau(2, c=(0.0, 1.0), a=((), (1.0,)), b=(0.5, 0.5))
-    monkeypatch.setitem(METHODS, "heun", runge_kutta(heun))
-    decay = dyn.OdeSystem(lambda x, t: [-2.0 * x[0]], ["x"])
-    result = dyn.gradient(decay, lambda x, t: x[0], [3.0], None, 1.0, "heun", dt=0.25, rtol=0.1, backend="python")
-    assert result["q"] == approx([(1.0 - 0.5 + 0.125) ** 4], rel=SHORT_SUM)
 
 
 def test_checkpoints_give_the_same_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
