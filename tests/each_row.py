@@ -40,7 +40,7 @@ def each_row(
                     if len(each_row_of) == 1:
                         raise
                     wrong[repr(values)[:100]] = f"{type(error).__name__}: {error}"
-            assert wrong == {}
+            assert wrong == {}, "\n".join([f"{row}: {said}" for row, said in wrong.items()])
 
         others = [each for each in inspect.signature(test).parameters.values() if each.name not in keys]
         row_of = inspect.Parameter("each_row_of", inspect.Parameter.POSITIONAL_OR_KEYWORD)

@@ -56,18 +56,6 @@ def test_no_run_passes_a_singularity_and_every_row_is_a_state_at_a_time_of_its_o
         assert run.t[-1] == approx(1.0, rel=NEAR), name
 
 
-@stops
-@mark.parametrize("method", ADAPTIVE)
-def test_a_collision_ends_a_run(method: str) -> None:
-    """From rest at 1 under the attraction 1 / q a body meets the center after pi / (2 sqrt 2)."""
-    body = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 + 1.0 / q[0], ["x"])
-    run = dyn.simulate(body, [1.0], [0.0], 2.0, method, max_steps=MOST)
-    assert (run.stats.success, bool(np.all(np.diff(run.t) > 0.0))) == (False, True)
-    assert run.t[-1] == approx(math.pi / math.sqrt(8.0), rel=NEAR)
-    many = dyn.simulate_many(body, [[1.0], [4.0]], [0.0], 2.0, method, t_eval=[1.0, 2.0], max_steps=MOST)
-    assert many.stats.success.tolist() == [False, True]
-
-
 @mark.parametrize("method", ADAPTIVE)
 @mark.parametrize("t_end", [7.0, -5.0])
 def test_the_clock_makes_the_steps_of_the_state(method: str, t_end: float) -> None:

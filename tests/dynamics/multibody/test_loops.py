@@ -17,7 +17,7 @@ from dynamics.equations.states.consistent_state import nearest_state
 from dynamics.multibody.algebra.spatial import rotation
 from tests.slow import slow
 
-from ..linkages import bar, four_bar, peaucellier, scaled_four_bar, squeezer
+from ..linkages import bar, four_bar, scaled_four_bar, squeezer
 from ..mechanisms import random_body, random_joint, random_rotation
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -387,19 +387,6 @@ def test_a_loop_has_no_units(length: float, mass: float) -> None:
     for name, value in one.items():
         unit = mass * length if name.startswith("lambda") else 1.0
         assert other[name] == pytest.approx(value * unit, rel=1e-13)
-
-
-def test_peaucelliers_linkage_draws_a_straight_line() -> None:
-    """One freedom of seven bars, and no row too many."""
-    model = peaucellier()
-    q, qd = nearest_state(model, [-0.35, 0.7, 0.35, -0.7, 0.1, -0.6, 0.4], [0.3] * 7)
-    run = dyn.simulate(model, q, qd, 0.2, rtol=1e-10)
-    tip = model.position("side 1", (0.2, 0.0, 0.0))
-    state = {f"q{i}": column for i, column in enumerate(run.q.T)}
-    x = np.asarray(tip.evaluate(state)["x"])
-    z = np.asarray(tip.evaluate(state)["z"])
-    assert np.ptp(z) > 1e-3
-    assert np.ptp(x) < 1e-13
 
 
 @pytest.mark.parametrize("angle", [2.0 * np.pi / 3.0, 3.0])

@@ -15,7 +15,6 @@ import dynamics as dyn
 from cgraph import Graph
 from dynamics.multibody.algebra.spatial import from_quaternion
 from dynamics.multibody.trees.mechanism import Body, Joint, Mechanism, MechanismError
-from dynamics.verification.certificate import certify
 from tests.dynamics.mechanisms import FAMILIES, random_body, random_inertia, random_rotation
 from tests.dynamics.models import Array
 from tests.dynamics.parametrized import parametrized
@@ -208,11 +207,6 @@ def test_simulate_many_varies_them() -> None:
     for k, load in enumerate(loads):
         alone = dyn.simulate(pendulums(load=load), *START, **PLAIN)
         assert many.q[k, -1] == approx(alone.q[-1], rel=ROUNDING)
-
-
-def test_the_certificate_holds() -> None:
-    certificate = certify(pendulums(), states=3)
-    assert certificate.passed, str(certificate)
 
 
 def test_pruning_takes_their_parameters_away() -> None:

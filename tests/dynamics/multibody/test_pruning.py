@@ -93,17 +93,6 @@ def test_the_lagrangian_is_the_energy_in_the_world_s_axes(seed: int, regrouped: 
         assert energy.evaluate(state)["E"] == approx(kinetic + potential, abs=AGREEMENT * scale)
 
 
-@mark.parametrize("seed", [*range(3), *slow(*range(3, 12))])
-def test_torques_in_planes_are_those_body_by_body(seed: int) -> None:
-    mechanism = in_planes(seed)
-    n = len(mechanism.moving)
-    for model in (mechanism, replace(mechanism, base_parameters=True)):
-        run, graph = dyn.RecursiveInverseDynamics(model), dyn.inverse_dynamics(mechanism)
-        q, qd, qdd = np.random.default_rng(seed).normal(size=(3, n))
-        expected = np.array(list(graph.evaluate(dict(zip(graph.input_names, [*q, *qd, *qdd], strict=True))).values()))
-        assert run(q, qd, qdd) == approx(expected, abs=AGREEMENT * max(1.0, np.abs(expected).max()))
-
-
 @mark.parametrize("family", ["mixed", "welded", *slow("serial", "branched")])
 @mark.parametrize("equations", BOTH)
 def test_regrouped_inertia_moves_alike_in_no_more_nodes(family: str, equations: Equations) -> None:
@@ -145,12 +134,6 @@ def test_what_regrouping_saves() -> None:
 
 
 # --- the paper's scene
-
-
-def test_the_paper_s_arm_prunes_to_fewer_nodes_that_compute_the_same() -> None:
-    assert nodes(dyn.gravity_force(PAPER)) == 16
-    for equations in BOTH:
-        assert_alike(dyn.prune(PAPER, equations).graph, equations(PAPER))
 
 
 # --- effects

@@ -25,6 +25,7 @@ from tests.dynamics.mechanisms import (
     turned_arm,
     turned_tree,
 )
+from tests.dynamics.multibody.test_units import random_tree as units_tree
 from tests.each_row import each_row
 from tests.slow import slow
 
@@ -152,6 +153,8 @@ SPECIAL: dict[str, Callable[[], dyn.Mechanism]] = {
     "tree": lambda: turned_tree(7),
     "plane and out": in_a_plane_and_out,
     "no gravity": lambda: replace(FAMILIES["mixed"](5), gravity=(0.0, 0.0, 0.0)),
+    "links without mass": lambda: units_tree(6, 5),
+    "rotors in a line": lambda: units_tree(9, 5),
     "planar arm": lambda: dyn.planar_arm([1.0, 0.8, 0.7, 0.9], [1.0, 0.8, 0.7, 0.4], damping=0.1),
     "planar arm of points": lambda: dyn.planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7], mass_model="point", gravity=-3.0),
 }

@@ -140,29 +140,6 @@ def test_a_sampled_controller_sees_velocities(method: str) -> None:
     assert_same(canonical.events["brake"].t, plain.events["brake"].t)
 
 
-@pytest.mark.parametrize("method", ["dop853", *slow("verlet", "rk4")])
-def test_trajectories_of_an_ensemble_are_those_alone(method: str) -> None:
-    """One by one and side by side, with parameters of their masses, and with events."""
-    model, starts, masses = oscillator(), np.array([[0.3], [0.9]]), [0.5, 2.0]
-    how = {"t_eval": [0.0, 0.4, 1.0], "method": method}
-    how |= {"backend": "python"} if method == "dop853" else {"dt": 1e-3}
-    for events in ((), [dyn.Event("fall", lambda q, qd, t, p: qd[0] + 0.5 * p["m"])]):
-        fan = dyn.simulate_many(
-            model, starts, [0.2], 1.0, parameters={"m": masses}, form="momentum", events=events, **how
-        )
-        for k, mass in enumerate(masses):
-            alone = dyn.simulate(
-                model, starts[k], [0.2], 1.0, parameters={"m": mass}, form="momentum", events=events, **how
-            )
-            for column in ("q", "qd", "p"):
-                assert_same(getattr(fan, column)[k], getattr(alone, column), 1e-12)
-            for event in events:
-                for here, there in zip(fan.events[event.name][k], alone.events[event.name], strict=True):
-                    assert_same(here, there, 1e-12)
-            assert fan.p[k] == pytest.approx(mass * fan.qd[k], rel=1e-14)
-    assert dyn.simulate_many(model, starts, [0.2], 1.0, **how).p is None
-
-
 def test_gradients_of_a_motion_are_the_same() -> None:
     """By the start, where p depends on q, and by a parameter that the first momentum depends on; through events."""
     start, how = ([0.5], [0.2]), {"t_end": 1.0, "method": "dop853", "rtol": 1e-12, "backend": "python"}

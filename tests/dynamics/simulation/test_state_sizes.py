@@ -46,18 +46,6 @@ def test_results_do_not_depend_on_units(method: str, units: tuple[tuple[float, f
     assert max(steps) < 1.5 * min(steps)
 
 
-def test_one_unit_of_all_lengths_changes_no_bit() -> None:
-    def end(unit: float) -> list[float]:
-        def lagrangian(q, qd, t):
-            square = (q[0] ** 2 + q[1] ** 2) / unit**2
-            return 0.5 * (qd[0] ** 2 + qd[1] ** 2) + unit**2 / cg.sqrt(square)
-
-        planet = dyn.System(lagrangian, ["x", "y"])
-        return (dyn.simulate(planet, [unit, 0.0], [0.0, 0.8 * unit], 5.0).q[-1] / unit).tolist()
-
-    assert end(1.0) == end(2.0**-60) == end(2.0**60)
-
-
 @mark.parametrize("method", ADAPTIVE)
 def test_a_component_of_rounding_alone_does_not_hold_the_steps(method: str) -> None:
     def lagrangian(q, qd, t):  # a spherical pendulum, swinging in the plane turned by 0.3 rad: y is 0 but for rounding

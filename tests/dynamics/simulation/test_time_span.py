@@ -13,7 +13,6 @@ from dynamics.integrators import METHODS
 from dynamics.simulation.steps.stepping import NativeIntegration
 from tests.dynamics.models import oscillator
 from tests.dynamics.step_options import EVERY_METHOD, LIKE_OTHERS, step
-from tests.early_end import stops
 from tests.slow import slow
 
 EQUAL = [name for name, method in METHODS.items() if not method.adaptive]
@@ -53,21 +52,6 @@ def test_a_run_goes_to_t_end_whatever_is_recorded(method: str) -> None:
         assert many.stats.steps.tolist() == [20, 20]
         assert many.q[0] == approx(whole.q, abs=ROUNDING)
         assert many.t.tolist() == [0.0, 0.25]
-
-
-@stops
-@mark.parametrize("method", ["rk4", "gauss4", "scipy:DOP853"])
-def test_what_goes_wrong_after_the_last_recorded_time_is_said(method: str) -> None:
-    """v' = v^2 leaves the numbers at t = 1."""
-    blow = dyn.OdeSystem(lambda x, t: [x[0] * x[0]], ["v"])
-    run = dyn.simulate(blow, [1.0], None, 3.0, method, t_eval=[0.5], **step(method, 0.01))
-    assert not run.stats.success
-    assert run.stats.message.startswith("stopped at t = ")
-    assert run.t[-1] == approx(1.0, abs=0.1)
-    if method in METHODS:
-        many = dyn.simulate_many(blow, [[1.0], [0.1]], None, 3.0, method, t_eval=[0.5], **step(method, 0.01))
-        assert many.stats.success.tolist() == [False, True]
-        assert many.stats.message[0] == run.stats.message
 
 
 @mark.parametrize("method", [*[name for name in EQUAL if name not in LIKE_OTHERS], "scipy:DOP853", *slow(*LIKE_OTHERS)])
