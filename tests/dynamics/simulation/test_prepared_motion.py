@@ -15,6 +15,9 @@ from pytest import mark
 import dynamics as dyn
 from dynamics.integrators import METHODS
 from tests.dynamics.mechanisms import random_state, random_tree
+from tests.dynamics.models import oscillator
+from tests.dynamics.simulation.test_simulate import ARGUMENTS
+from tests.each_row import each_row
 from tests.slow import slow
 
 ADAPTIVE = [name for name, method in METHODS.items() if method.adaptive]
@@ -223,31 +226,21 @@ def test_it_goes_to_other_processes() -> None:
     np.testing.assert_array_equal(pickle.loads(pickle.dumps(run)).energy, run.energy)
 
 
-@mark.parametrize("call", ["end", "start", "run"])
-@mark.parametrize(
-    ("start", "sentence"),
+@each_row(
+    ("method", "given", "message"),
     [
-        (([math.nan, 0.0], [0.0, 0.0], 1.0), "q must be finite"),
-        (([0.0, 0.0], [0.0, math.inf], 1.0), "qd must be finite"),
-        (([0.0], [0.0, 0.0], 1.0), "q must have shape"),
-        (([0.0, 0.0], [[0.0, 0.0]], 1.0), "qd must have shape"),
-        (([0.0, 0.0], None, 1.0), "qd must have shape"),
-        ((["a", "b"], [0.0, 0.0], 1.0), "q must be real numbers, got text"),
-        (([0.0, 0.0], [0.0, 0.0], 0.0), "t_end must be another time than t0"),
-        (([0.0, 0.0], [0.0, 0.0], math.nan), "t_end must be finite"),
-        (([0.0, 0.0], [0.0, 0.0], 1.0, math.inf), "t0 must be finite"),
-        (([0.0, 0.0], [0.0, 0.0], "1"), "t_end must be a number"),
+        (method, given, message)
+        for method in ("dop853", "rk4")
+        for given, message in ARGUMENTS
+        if set(given) <= {"q", "qd", "t_end", "t0"} and given.get("t_end", 1.0) is not None
     ],
 )
-@mark.parametrize("method", ["dop853", "rk4"])
-def test_wrong_starts_are_refused_in_the_words_of_simulate(
-    method: str, start: tuple[Any, ...], sentence: str, call: str
-) -> None:
-    motion = dyn.prepare(ARM, method, **options_of(method))
-    arrays = [[np.array(part) if isinstance(part, list) else part for part in start[:2]], start[:2]]
-    for state in arrays:
-        with pytest.raises((TypeError, ValueError), match=sentence):
-            (motion if call == "run" else getattr(motion, call))(*state, *start[2:])
+def test_wrong_starts_are_refused_in_the_words_of_simulate(method: str, given: dict[str, Any], message: str) -> None:
+    motion = dyn.prepare(oscillator(), method, **options_of(method))
+    start = {"q": [1.0], "qd": [0.0], "t_end": 1.0, "t0": 0.0} | given
+    for call in (motion, motion.end, motion.start):
+        with pytest.raises((TypeError, ValueError), match=message):
+            call(**start)
 
 
 @mark.parametrize("method", [*ADAPTIVE, "rk4"])
