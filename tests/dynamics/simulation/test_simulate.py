@@ -5,6 +5,7 @@ import math
 import threading
 import warnings
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -285,12 +286,11 @@ def test_a_last_time_past_the_end_by_rounding_is_the_end() -> None:
 
 
 @stops
-def test_rows_that_fill_the_memory_end_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_rows_that_fill_the_memory_end_the_run() -> None:
     whole = dyn.simulate(oscillator(), [1.0], [0.0], 200.0, "dop853", max_step=1e-2)
     hundred = 3.0 * 24.0 * 100.0  # rows of time and state
-    monkeypatch.setattr("dynamics.simulation.prepared_motion.SMALL", 0.0)
-    monkeypatch.setattr("dynamics.simulation.prepared_motion.room", lambda: hundred)
-    run = dyn.simulate(oscillator(), [1.0], [0.0], 200.0, "dop853", max_step=1e-2)
+    with patch.multiple("dynamics.simulation.prepared_motion", SMALL=0.0, room=lambda: hundred):
+        run = dyn.simulate(oscillator(), [1.0], [0.0], 200.0, "dop853", max_step=1e-2)
     assert run.stats.message.startswith("stopped at t = ")
     assert "the rows fill the memory; t_eval records fewer" in run.stats.message
     assert not run.stats.success

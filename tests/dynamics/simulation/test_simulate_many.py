@@ -3,9 +3,9 @@
 import math
 import warnings
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
-import pytest
 from hypothesis import given, strategies as st
 from pytest import approx, mark, raises
 
@@ -100,11 +100,10 @@ def test_t_eval_chooses_the_rows(times: Any) -> None:
     assert result.q[1, :, 0] == approx(2.0 * np.cos(math.sqrt(1.5) * result.t), abs=RK4_ERROR)
 
 
-def test_many_steps_come_in_many_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_many_steps_come_in_many_blocks() -> None:
     whole = [simulate_many(*arms(9), 0.2, "rk4", t_eval=times) for times in (None, [0.05, 0.2], [0.15, 0.2])]
-    monkeypatch.setattr("dynamics.simulation.ensembles.task.WORK", 5000)
-    monkeypatch.setattr("dynamics.simulation.ensembles.task.NUMBERS", 200)
-    blocks = [simulate_many(*arms(9), 0.2, "rk4", t_eval=times) for times in (None, [0.05, 0.2], [0.15, 0.2])]
+    with patch.multiple("dynamics.simulation.ensembles.task", WORK=5000, NUMBERS=200):
+        blocks = [simulate_many(*arms(9), 0.2, "rk4", t_eval=times) for times in (None, [0.05, 0.2], [0.15, 0.2])]
     assert all(map(same, whole, blocks))
 
 
