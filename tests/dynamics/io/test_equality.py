@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from pytest import approx, importorskip, mark, param, raises, warns
+from pytest import approx, importorskip, mark, raises, warns
 
 import cgraph as cg
 import dynamics as dyn
@@ -122,16 +122,11 @@ def test_what_is_soft_inactive_or_off_is_said() -> None:
 @mark.parametrize(
     ("equality", "message"),
     [
-        param(
+        (
             GEAR + GEAR.replace('"gear"', '"other"').replace("/>", ' polycoef="0.1 1 0 0 0"/>'),
             "^the given text: the constraints cannot be met: no state was seen where '(gear|other)' is 0$",
-            id="together",
         ),
-        param(
-            '<connect name="x" site1="on c" site2="also on c"/>',
-            "^equality constraint x holds the body 'c' to itself$",
-            id="itself",
-        ),
+        ('<connect name="x" site1="on c" site2="also on c"/>', "^equality constraint x holds the body 'c' to itself$"),
     ],
 )
 def test_what_cannot_be_closed_is_one_sentence(equality: str, message: str) -> None:

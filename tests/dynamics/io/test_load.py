@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from pytest import approx, importorskip, mark, param, raises, warns
+from pytest import approx, importorskip, mark, raises, warns
 
 import cgraph as cg
 import dynamics as dyn
@@ -263,34 +263,22 @@ FREE = f'<body name="f" pos="0 0 2"><freejoint name="root"/>{INERTIAL}{HINGE}</b
 TENDON = '<tendon><fixed name="string" stiffness="3"><joint joint="j" coef="1"/></fixed></tendon>'
 HELD_TENDON = TENDON.replace(' stiffness="3"', "") + '<equality><tendon tendon1="string"/></equality>'
 NOT_MODELLED = [
-    param(
-        mjcf(BALL.replace('type="ball"', 'type="free"')),
-        "springs of free joints, or of turned ball joints (ball)",
-        id="spring",
-    ),
-    param(
-        mjcf(HINGE).replace("</mujoco>", TENDON + "</mujoco>"),
-        "tendons with a spring, damper or mass (string)",
-        id="tendon",
-    ),
-    param(
-        mjcf(HINGE).replace("</mujoco>", f"{HELD_TENDON}</mujoco>"),
-        "equality constraints of the type tendon (number 0)",
-        id="equality",
-    ),
-    param(mjcf(HINGE, '<option density="1.2"/>'), "a fluid (density or viscosity)", id="fluid"),
-    param(mjcf(f'<body gravcomp="1"><joint/>{INERTIAL}</body>'), "gravity compensation", id="gravcomp"),
+    (mjcf(BALL.replace('type="ball"', 'type="free"')), "springs of free joints, or of turned ball joints (ball)"),
+    (mjcf(HINGE).replace("</mujoco>", TENDON + "</mujoco>"), "tendons with a spring, damper or mass (string)"),
+    (mjcf(HINGE).replace("</mujoco>", f"{HELD_TENDON}</mujoco>"), "equality constraints of the type tendon (number 0)"),
+    (mjcf(HINGE, '<option density="1.2"/>'), "a fluid (density or viscosity)"),
+    (mjcf(f'<body gravcomp="1"><joint/>{INERTIAL}</body>'), "gravity compensation"),
 ]
 
 
-@mark.parametrize(("text", "what"), NOT_MODELLED)
+@each_row(("text", "what"), NOT_MODELLED)
 def test_what_is_not_modelled_is_refused_by_name(text: str, what: str) -> None:
     message = f"a mechanism cannot have {what} (the option ignore leaves this out)"
     with raises(MechanismError, match=f"^{re.escape(message)}$"):
         dyn.load_mjcf(text)
 
 
-@mark.parametrize(("text", "what"), NOT_MODELLED)
+@each_row(("text", "what"), NOT_MODELLED)
 def test_what_is_not_modelled_is_left_out_on_request(text: str, what: str) -> None:
     with warns(dyn.MechanismWarning, match=f"^the given text: left out {re.escape(what)}$"):
         mechanism = dyn.load_mjcf(text, ignore=True)

@@ -3,54 +3,29 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 from pytest import approx, mark, param, raises
 
 import dynamics as dyn
-from cgraph import Graph
-from dynamics.multibody.algebra.spatial import from_quaternion
 from dynamics.systems.system import System
 from dynamics.verification.certificate import certify
-from tests.dynamics.models import Array
+from tests.dynamics import mechanisms
+from tests.dynamics.mechanisms import for_peers
+from tests.dynamics.models import Array, run as values
 
 ROUNDING = 1e-12  # of the largest of its kind, in some hundred sums
 
 
 def random_tree(seed: int, base: str = "free", most: int = 5) -> dyn.Mechanism:
     """A tree of ball joints, hinges, slides and welds on a base of that kind, with springs, damping and armature."""
-    rng = np.random.default_rng(seed)
-    bodies = []
-    for i in range(int(rng.integers(1, most + 1))):
-        kind = str(rng.choice(["ball", "revolute", "prismatic", "fixed"], p=(0.3, 0.3, 0.3, 0.1))) if i else base
-        points = rng.normal(size=(6, 3))
-        free = kind.startswith("free")
-        joint = dyn.Joint(
-            kind,
-            axis=rng.normal(size=3),
-            position=np.zeros(3) if free else rng.normal(size=3),
-            orientation=np.eye(3) if free else from_quaternion(rng.normal(size=4)),
-            damping=float(rng.uniform(0.0, 0.3)),
-            armature=0.0 if "axes" in kind else float(rng.uniform(0.0, 0.1)),
-        )
-        if joint.type.sprung:
-            stiffness, reference = rng.uniform(0.0, 0.5, 2).tolist()
-            joint = replace(joint, stiffness=stiffness, spring_reference=reference * (kind != "ball"))
-        inertia = 0.1 * sum([(p @ p) * np.eye(3) - np.outer(p, p) for p in points])
-        parent = f"b{rng.integers(max(0, i - 2), i)}" if i else "world"
-        bodies.append(dyn.Body(f"b{i}", joint, parent, float(rng.uniform(0.5, 2.0)), 0.3 * rng.normal(size=3), inertia))
-    return dyn.Mechanism(bodies, gravity=(0.3, -0.2, -9.81))
+    return for_peers(mechanisms.random_tree(seed, most - seed % most, base=base), seed)
 
 
 def state(system: System, seed: int, **more: int) -> dict[str, float]:
     rng = np.random.default_rng(seed)
     sizes = {"q": system.nq, "qd": system.n} | dict.fromkeys(more, system.n)
     return {f"{name}{i}": float(x) for name, size in sizes.items() for i, x in enumerate(rng.normal(size=size))}
-
-
-def values(graph: Graph, at: dict[str, float]) -> Array:
-    return np.array(list(graph.evaluate({name: at[name] for name in graph.input_names}).values()))
 
 
 def near(a: Array, b: Array) -> bool:

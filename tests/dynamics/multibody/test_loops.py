@@ -19,6 +19,7 @@ from tests.slow import slow
 
 from ..linkages import bar, four_bar, scaled_four_bar, squeezer
 from ..mechanisms import random_body, random_joint, random_rotation
+from ..models import run as values
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 TIGHT = 1e-12  # of the largest entry: what a dense solve of the same equations leaves
@@ -28,10 +29,6 @@ def state_of(model: Any, seed: int = 0) -> dict[str, float]:
     rng, system = np.random.default_rng(seed), dyn.as_system(model)
     names = [str(node.name) for node in (*system.q, *system.qd, *system.tau)]
     return {name: float(rng.normal()) for name in names}
-
-
-def values(graph: cg.Graph, at: dict[str, Any]) -> Array:
-    return np.array(list(graph.evaluate({name: at[name] for name in graph.input_names}).values()))
 
 
 def dense_kkt(model: Any, at: dict[str, float], rate: cg.Graph) -> tuple[Array, Array]:

@@ -11,7 +11,7 @@ from types import FrameType
 from typing import Any
 
 import numpy as np
-from pytest import approx, mark, param, raises, warns
+from pytest import approx, mark, raises, warns
 
 import cgraph as cg
 import dynamics as dyn
@@ -25,6 +25,7 @@ from tests.dynamics.mechanisms import (
     turned_tree,
 )
 from tests.dynamics.models import Array, at, error, run, states
+from tests.each_row import each_row
 from tests.tolerances import LAST_BITS, SOLVED
 
 TURNED_30 = turned_arm(30)
@@ -198,86 +199,57 @@ LEAF = [Body("a", hinge(), mass=1.0), Body("leaf", hinge(), "a")]
 AND_NO_MORE = "carries no mass, and its joint has no armature"
 SKEW = [[1.0, 0.2, 0.0], [0.1, 1.0, 0.0], [0.0, 0.0, 1.0]]
 BAD = [
-    param([Body("a", hinge(), "c", mass=1.0)], "body 'a' has the unknown parent 'c'", id="unknown parent"),
-    param([point("a", "b"), point("b", "a")], "body 'b' is its own ancestor, by way of 'a'", id="cycle"),
-    param([point("a", "a")], "body 'a' is its own ancestor, by way of 'a'", id="own parent"),
-    param([point("a"), point("b"), point("a")], "two bodies have the name 'a'", id="name twice"),
-    param([point("world")], "a body needs a name other than 'world'", id="world"),
-    param([point("")], "the name of a body must not be empty", id="no name"),
-    param(
-        {"joint": hinge(orientation=2.0 * np.eye(3))}, "body 'a': orientation must be a rotation matrix", id="scaled"
-    ),
-    param({"joint": hinge(orientation=-np.eye(3))}, "body 'a': orientation must be a rotation matrix", id="mirror"),
-    param({"joint": hinge(axis=(0, 0, 0))}, "body 'a': axis must not be zero", id="no axis"),
-    param({"joint": hinge(axis=(0, 1))}, "body 'a': axis must be (3,) finite numbers, got (0, 1)", id="short axis"),
-    param({"joint": hinge(damping=-0.1)}, "body 'a': damping must be finite and at least 0, got -0.1", id="damping"),
-    param(
-        {"joint": hinge(stiffness=-1.0)}, "body 'a': stiffness must be finite and at least 0, got -1.0", id="stiffness"
-    ),
-    param({"joint": hinge(armature=-1.0)}, "body 'a': armature must be finite and at least 0, got -1.0", id="armature"),
-    param(
-        {"joint": hinge(spring_reference=np.nan)}, "body 'a': spring_reference must be finite", id="spring_reference"
-    ),
-    param({"joint": hinge(position=(0, np.inf, 0))}, "body 'a': position must be (3,) finite numbers", id="position"),
-    param({"mass": -0.8}, "body 'a': mass must be finite and at least 0, got -0.8 kg", id="mass"),
-    param({"mass": np.nan}, "body 'a': mass must be finite and at least 0, got nan kg", id="mass nan"),
-    param(
-        {"center": (np.nan, 0.0, 0.0)}, "body 'a': center must be (3,) finite numbers, got (nan, 0.0, 0.0)", id="center"
-    ),
-    param({"inertia": (1.0, 1.0, np.nan)}, "body 'a': inertia must be (3,) finite numbers", id="inertia nan"),
-    param({"inertia": [[1.0], [2.0, 3.0]]}, "body 'a': inertia must be (3, 3) finite numbers", id="inertia ragged"),
-    param({"inertia": SKEW}, "body 'a': inertia must be symmetric", id="asymmetric"),
-    param(
-        {"inertia": (-1.0, 1.0, 1.0)},
-        "body 'a': inertia must not be negative, its principal moments are [-1.0",
-        id="negative",
-    ),
-    param({"name": 7}, "the name of a body must be a string, got int: 7", id="name a number"),
-    param({"parent": None}, "body 'a': parent must be the name of a body or 'world', got None", id="no parent"),
-    param({"joint": "revolute"}, "body 'a': joint must be of the type Joint, got str: 'revolute'", id="joint text"),
-    param([GOOD], "bodies must be of the type Body, got dict: {'name': 'a'", id="body a dict"),
-    param(Body("a", hinge()), "bodies must be a sequence of Body, got Body: Body(name='a'", id="one body"),
-    param(
-        {"mass": "too heavy"}, "the name of a parameter of body 'a': mass must be without white space", id="mass text"
-    ),
-    param({"mass": np.inf}, "body 'a': mass must be finite and at least 0, got inf kg", id="mass infinite"),
-    param({"center": "middle"}, "body 'a': center must be (3,) finite numbers, got 'middle'", id="center text"),
-    param({"inertia": 0.1}, "body 'a': inertia must be (3, 3) finite numbers, got 0.1", id="inertia a number"),
-    param({"joint": hinge(damping=np.nan)}, "body 'a': damping must be finite and at least 0, got nan", id="damp nan"),
-    param(
-        {"joint": hinge(stiffness=np.inf)}, "body 'a': stiffness must be finite and at least 0, got inf", id="stiff inf"
-    ),
-    param({"joint": hinge(axis=(0, np.nan, 1))}, "body 'a': axis must be (3,) finite numbers", id="axis nan"),
-    param(
-        {"joint": hinge(orientation=np.full((3, 3), np.nan))},
-        "body 'a': orientation must be (3, 3) finite numbers",
-        id="orientation nan",
-    ),
-    param(
+    ([Body("a", hinge(), "c", mass=1.0)], "body 'a' has the unknown parent 'c'"),
+    ([point("a", "b"), point("b", "a")], "body 'b' is its own ancestor, by way of 'a'"),
+    ([point("a", "a")], "body 'a' is its own ancestor, by way of 'a'"),
+    ([point("a"), point("b"), point("a")], "two bodies have the name 'a'"),
+    ([point("world")], "a body needs a name other than 'world'"),
+    ([point("")], "the name of a body must not be empty"),
+    ({"joint": hinge(orientation=2.0 * np.eye(3))}, "body 'a': orientation must be a rotation matrix"),
+    ({"joint": hinge(orientation=-np.eye(3))}, "body 'a': orientation must be a rotation matrix"),
+    ({"joint": hinge(axis=(0, 0, 0))}, "body 'a': axis must not be zero"),
+    ({"joint": hinge(axis=(0, 1))}, "body 'a': axis must be (3,) finite numbers, got (0, 1)"),
+    ({"joint": hinge(damping=-0.1)}, "body 'a': damping must be finite and at least 0, got -0.1"),
+    ({"joint": hinge(stiffness=-1.0)}, "body 'a': stiffness must be finite and at least 0, got -1.0"),
+    ({"joint": hinge(armature=-1.0)}, "body 'a': armature must be finite and at least 0, got -1.0"),
+    ({"joint": hinge(spring_reference=np.nan)}, "body 'a': spring_reference must be finite"),
+    ({"joint": hinge(position=(0, np.inf, 0))}, "body 'a': position must be (3,) finite numbers"),
+    ({"mass": -0.8}, "body 'a': mass must be finite and at least 0, got -0.8 kg"),
+    ({"mass": np.nan}, "body 'a': mass must be finite and at least 0, got nan kg"),
+    ({"center": (np.nan, 0.0, 0.0)}, "body 'a': center must be (3,) finite numbers, got (nan, 0.0, 0.0)"),
+    ({"inertia": (1.0, 1.0, np.nan)}, "body 'a': inertia must be (3,) finite numbers"),
+    ({"inertia": [[1.0], [2.0, 3.0]]}, "body 'a': inertia must be (3, 3) finite numbers"),
+    ({"inertia": SKEW}, "body 'a': inertia must be symmetric"),
+    ({"inertia": (-1.0, 1.0, 1.0)}, "body 'a': inertia must not be negative, its principal moments are [-1.0"),
+    ({"name": 7}, "the name of a body must be a string, got int: 7"),
+    ({"parent": None}, "body 'a': parent must be the name of a body or 'world', got None"),
+    ({"joint": "revolute"}, "body 'a': joint must be of the type Joint, got str: 'revolute'"),
+    ([GOOD], "bodies must be of the type Body, got dict: {'name': 'a'"),
+    (Body("a", hinge()), "bodies must be a sequence of Body, got Body: Body(name='a'"),
+    ({"mass": "too heavy"}, "the name of a parameter of body 'a': mass must be without white space"),
+    ({"mass": np.inf}, "body 'a': mass must be finite and at least 0, got inf kg"),
+    ({"center": "middle"}, "body 'a': center must be (3,) finite numbers, got 'middle'"),
+    ({"inertia": 0.1}, "body 'a': inertia must be (3, 3) finite numbers, got 0.1"),
+    ({"joint": hinge(damping=np.nan)}, "body 'a': damping must be finite and at least 0, got nan"),
+    ({"joint": hinge(stiffness=np.inf)}, "body 'a': stiffness must be finite and at least 0, got inf"),
+    ({"joint": hinge(axis=(0, np.nan, 1))}, "body 'a': axis must be (3,) finite numbers"),
+    ({"joint": hinge(orientation=np.full((3, 3), np.nan))}, "body 'a': orientation must be (3, 3) finite numbers"),
+    (
         {"mass": 1e308, "center": (1.0, 1.0, 1.0)},
         "body 'a': inertia about the joint is beyond float64, with 0 kg m^2 about its center and inf kg m^2 by that",
-        id="mass beyond float64",
     ),
-    param(
-        {"inertia": (1e308, 1e308, 1e308)}, "body 'a': inertia about the joint is beyond float64", id="moments beyond"
-    ),
-    param(
+    ({"inertia": (1e308, 1e308, 1e308)}, "body 'a': inertia about the joint is beyond float64"),
+    (
         [Body("a", hinge()), *[Body(f"b{k}", Joint("fixed"), "a", 9e307, (0.9, 0.9, 0.0)) for k in range(2)]],
         "body 'a': its inertia about the joint is beyond float64, with all welded to it",
-        id="a sum beyond float64",
     ),
-    param(LEAF, f"body 'leaf' has no mass, {AND_NO_MORE}", id="leaf without mass"),
-    param({"center": (0.0, 0.0, 0.5)}, f"body 'a' has no inertia about its axis, {AND_NO_MORE}", id="mass on the axis"),
-    param(
+    (LEAF, f"body 'leaf' has no mass, {AND_NO_MORE}"),
+    ({"center": (0.0, 0.0, 0.5)}, f"body 'a' has no inertia about its axis, {AND_NO_MORE}"),
+    (
         {"joint": hinge(axis=(1, 2, -2)), "center": (-0.1, -0.2, 0.2)},
         f"body 'a' has no inertia about its axis, {AND_NO_MORE}",
-        id="mass on a slanting axis",
     ),
-    param(
-        {"joint": Joint("prismatic"), "mass": 0.0, "inertia": (1.0, 1.0, 1.0)},
-        f"body 'a' has no mass, {AND_NO_MORE}",
-        id="a slide without mass",
-    ),
+    ({"joint": Joint("prismatic"), "mass": 0.0, "inertia": (1.0, 1.0, 1.0)}, f"body 'a' has no mass, {AND_NO_MORE}"),
 ]
 
 
@@ -294,7 +266,7 @@ def test_a_mass_of_any_size_has_a_mass_matrix_or_is_beyond_float64() -> None:
                     Mechanism([body])
 
 
-@mark.parametrize(("bodies", "message"), BAD)
+@each_row(("bodies", "message"), BAD)
 def test_what_cannot_be_is_refused_by_name(bodies: Any, message: str) -> None:
     with raises(MechanismError, match="^" + re.escape(message)) as caught:
         Mechanism([Body(**(GOOD | bodies))] if isinstance(bodies, dict) else bodies)
