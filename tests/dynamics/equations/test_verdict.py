@@ -85,30 +85,10 @@ NAMED: dict[str, tuple[dyn.System, tuple[bool, bool]]] = {  # and whether by def
         (False, False),
     ),
     "ball": (dyn.System(lambda q, qd, t: 0.5 * (qd[0] ** 2 + qd[1] ** 2) - 9.81 * q[1], "x y"), (True, False)),
-    "incline": (
-        dyn.System(
-            lambda q, qd, t, p: 0.5 * p["m"] * qd[0] ** 2 - p["m"] * 9.81 * q[0] * cg.sin(p["slope"]),
-            ["s"],
-            {"m": 2.0, "slope": 0.5},
-        ),
-        (True, False),
-    ),
-    "hoist": (
-        dyn.System(
-            lambda q, qd, t: 0.5 * 3.0 * qd[0] ** 2 + 0.5 * 2.0 * (0.4 * qd[0]) ** 2 - 2.0 * 9.81 * 0.4 * q[0], ["drum"]
-        ),
-        (True, False),
-    ),
     "charge": (dyn.System(lambda q, qd, t: 0.5 * (qd[0] ** 2 + qd[1] ** 2) + q[0] * qd[1], "x y"), (True, True)),
-    "free": (dyn.System(lambda q, qd, t: 0.5 * (qd[0] ** 2 + 3.0 * qd[1] ** 2), "x y"), (False, False)),
     "circle": (
         dyn.System(lambda q, qd, t: 0.5 * (cg.sin(q[0]) ** 2 + cg.cos(q[0]) ** 2) * qd[0] ** 2, ["phi"]),
         (False, False),
-    ),
-    "spring": (dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 - 2.0 * q[0] ** 2, ["x"]), (True, False)),
-    "planet": (
-        dyn.System(lambda q, qd, t: 0.5 * (qd[0] ** 2 + (q[0] * qd[1]) ** 2) + 1.0 / q[0], "r phi"),
-        (True, True),
     ),
 }
 
