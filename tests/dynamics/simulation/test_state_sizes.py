@@ -27,8 +27,8 @@ def cart_pole(length: float, second: float) -> dyn.System:
     return dyn.System(lagrangian, ["x", "angle"])
 
 
-UNITS = ((2.0**40, 1.0), (2.0**-20, 2.0**30))
-MORE_UNITS = ((2.0**-40, 1.0), (1.0, 2.0**-30))
+UNITS = ((2.0**-20, 2.0**30),)
+MORE_UNITS = ((2.0**40, 1.0), (2.0**-40, 1.0), (1.0, 2.0**-30))
 
 
 @mark.parametrize("method", ADAPTIVE)

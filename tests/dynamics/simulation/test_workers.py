@@ -37,8 +37,8 @@ def case(method: str) -> tuple[tuple[Any, ...], dict[str, Any]]:
 @stops
 @mark.parametrize(
     ("backend", "method"),
-    [("llvm", "rk4"), ("llvm", "midpoint"), ("llvm", "dop853"), ("python", "rk4")]
-    + slow(("python", "midpoint"), ("python", "dop853")),
+    [("llvm", "rk4"), ("llvm", "midpoint"), ("python", "rk4")]
+    + slow(("llvm", "dop853"), ("python", "midpoint"), ("python", "dop853")),
 )
 def test_threads_and_chunks_change_nothing(backend: str, method: str) -> None:
     if backend == "llvm":
@@ -154,8 +154,7 @@ def test_dask_changes_nothing() -> None:
 
 
 @mark.usefixtures("ctrl_c")
-@mark.parametrize("workers", [1, 3])
-@mark.parametrize("method", ["rk4", "midpoint"])
+@mark.parametrize(("workers", "method"), [(1, "midpoint"), (3, "rk4"), *slow((1, "rk4"), (3, "midpoint"))])
 def test_ctrl_c_comes_back_and_leaves_no_thread(workers: int, method: str) -> None:
     before, main = set(threading.enumerate()), threading.main_thread().ident
     assert main is not None
