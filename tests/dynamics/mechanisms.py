@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 
 import dynamics as dyn
+from dynamics import Body, Joint, Mechanism
 from dynamics.multibody.algebra.spatial import rotation
 from dynamics.multibody.bodies.joint_coordinates import places
-from dynamics.multibody.trees.mechanism import WORLD, Body, Joint, Mechanism
+from dynamics.multibody.trees.mechanism import WORLD
 from tests.slow import slow
 
 Array = np.ndarray[Any, np.dtype[np.float64]]

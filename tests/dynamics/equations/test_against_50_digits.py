@@ -5,7 +5,7 @@ from pytest import approx, mark
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.systems.model import as_system
+from dynamics import as_system
 from tests.dynamics.lagrange_by_mpmath import Terms, floats, lagrange
 from tests.dynamics.models import MODELS, Array, at, random_arm, run, states
 from tests.each_row import each_row

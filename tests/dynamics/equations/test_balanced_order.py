@@ -12,8 +12,9 @@ import cgraph as cg
 import dynamics as dyn
 from cgraph.autodiff.balanced import dissection
 from cgraph.extend import solve_nodes
+from dynamics import as_system
 from dynamics.experiments.speed.bench_scenes import chain
-from dynamics.systems.model import as_ode, as_system
+from dynamics.systems.model import as_ode
 from tests import high_precision
 from tests.each_row import each_row
 from tests.slow import slow

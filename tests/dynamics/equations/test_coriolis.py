@@ -8,10 +8,8 @@ from pytest import approx
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.equations.coriolis import coriolis
-from dynamics.equations.equations_of_motion import damping_force
+from dynamics import as_system, coriolis, damping_force
 from dynamics.equations.states.evaluate import evaluate
-from dynamics.systems.model import as_system
 from tests.dynamics.mechanisms import EVERY_FAMILY, FAMILIES
 from tests.dynamics.models import MODELS, Array, magnetic, random_arm, relativistic, states
 

@@ -6,7 +6,7 @@ import numpy as np
 from pytest import approx, fixture, mark
 
 import dynamics as dyn
-from cgraph.writing.structure_hash import structure_hash
+from cgraph import structure_hash
 from tests.dynamics.mechanisms import FAMILIES, turned_arm
 from tests.each_row import each_row
 

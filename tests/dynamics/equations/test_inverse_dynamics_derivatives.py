@@ -15,7 +15,7 @@ from mpmath import mp, mpf
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.systems.model import as_system
+from dynamics import as_system
 from tests import high_precision
 from tests.dynamics.mechanisms import TREES, Array, random_mechanism, turned_arm
 from tests.dynamics.models import MODELS, random_arm

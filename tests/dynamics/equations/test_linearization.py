@@ -10,11 +10,10 @@ import pytest
 from pytest import approx
 
 import dynamics as dyn
+from dynamics import as_system, linearize, state_space
 from dynamics.equations.linearization import linearize_many as many
-from dynamics.equations.linearization.linearization import linearize, state_space
 from dynamics.equations.linearization.linearization_parts import linearization_parts
 from dynamics.equations.states.evaluate import evaluate
-from dynamics.systems.model import as_system
 from tests.dynamics.equations.test_hamiltonian import rotor
 from tests.dynamics.mechanisms import random_mechanism, turned_arm
 from tests.dynamics.models import MODELS, Array, at, random_arm, states

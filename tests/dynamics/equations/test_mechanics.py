@@ -7,9 +7,8 @@ from pytest import approx, fixture, mark
 
 import cgraph as cg
 import dynamics as dyn
+from dynamics import System, as_system
 from dynamics.multibody.builders.planar_arm import planar_links
-from dynamics.systems.model import as_system
-from dynamics.systems.system import System
 from tests import high_precision
 from tests.dynamics.models import MODELS, Array, at, cart_pendulum, error, inputs, random_arm, run, states
 

@@ -9,8 +9,9 @@ import numpy as np
 import cgraph as cg
 import dynamics as dyn
 from cgraph import structure_hash
+from dynamics import Body, Joint, Mechanism
 from dynamics.equations.formulations.formulations import SMALL
-from dynamics.multibody.trees.mechanism import WORLD, Body, Joint, Mechanism
+from dynamics.multibody.trees.mechanism import WORLD
 from tests.dynamics.mechanisms import (
     TREES as MODELS,
     random_state,

@@ -10,8 +10,9 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
+from cgraph.extend import Array
 from dynamics.equations.states.consistent_state import nearest_state
-from dynamics.equations.states.evaluate import Array, evaluate
+from dynamics.equations.states.evaluate import evaluate
 from tests.dynamics.linkages import four_bar, scaled_four_bar
 from tests.slow import slow
 

@@ -11,9 +11,9 @@ import pytest
 import cgraph as cg
 import dynamics as dyn
 from cgraph.extend import Array, Builder
+from dynamics import as_system
 from dynamics.equations.linearization.momentum_parts import momentum_parts
 from dynamics.equations.momentum.hamiltonian import velocities
-from dynamics.systems.model import as_system
 from tests.slow import slow
 
 from ..linkages import four_bar

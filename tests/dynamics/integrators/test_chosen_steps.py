@@ -10,7 +10,8 @@ from pytest import approx, mark
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.integrators import METHODS, derive
+from dynamics import METHODS
+from dynamics.integrators import derive
 from dynamics.integrators.dop853 import DOP853
 from dynamics.integrators.tableau import DOPRI5, EULER, real_stability
 from dynamics.simulation.run_options import RunOptions

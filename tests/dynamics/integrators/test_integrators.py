@@ -10,11 +10,11 @@ from pytest import approx, mark, raises
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.integrators import METHODS, derive, mechanics
+from dynamics import METHODS, System
+from dynamics.integrators import derive, mechanics
 from dynamics.integrators.step_control import LARGEST
 from dynamics.integrators.symplectic_tableaus import COMPOSITIONS, PARTITIONED
 from dynamics.simulation.run_options import SCIPY_SOLVERS
-from dynamics.systems.system import System
 from tests.dynamics.planet import PERIHELION, cart, planet, position
 from tests.dynamics.step_options import EVERY_METHOD, step
 from tests.early_end import stops

@@ -13,7 +13,8 @@ from pytest import approx, mark, raises
 import cgraph as cg
 import dynamics as dyn
 from cgraph.extend import Call, Map
-from dynamics.integrators import METHODS, Method, Problem, Step, measured
+from dynamics import METHODS
+from dynamics.integrators import Method, Problem, Step, measured
 from tests.dynamics.planet import PERIHELION, planet, position
 from tests.each_row import each_row
 from tests.registered import registered

@@ -12,7 +12,8 @@ from pytest import approx, mark
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.integrators import METHODS, runge_kutta
+from dynamics import METHODS
+from dynamics.integrators import runge_kutta
 from dynamics.integrators.dop853 import DOP853
 from dynamics.integrators.radau import _A, _POWERS, _T, _T_INVERSE
 from dynamics.integrators.rosenbrock import RODAS5P

@@ -15,7 +15,8 @@ import cgraph as cg
 import dynamics as dyn
 from cgraph.core.node import apply
 from cgraph.extend import OPS
-from dynamics.integrators import METHODS, taylor
+from dynamics import METHODS
+from dynamics.integrators import taylor
 
 ROUNDINGS = 2e-14  # of a few dozen steps
 SERIES: dict[str, tuple[Callable[..., Any], Callable[..., Any]]] = {

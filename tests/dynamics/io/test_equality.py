@@ -9,8 +9,8 @@ from pytest import approx, importorskip, mark, raises, warns
 
 import cgraph as cg
 import dynamics as dyn
+from dynamics import Mechanism, MechanismError
 from dynamics.equations.states.consistent_state import nearest_state
-from dynamics.multibody.trees.mechanism import Mechanism, MechanismError
 from tests.slow import slow
 
 mujoco = importorskip("mujoco")

@@ -14,7 +14,7 @@ from pytest import approx, importorskip, mark, raises, warns
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.multibody.trees.mechanism import Body, Joint, Mechanism, MechanismError
+from dynamics import Body, Joint, Mechanism, MechanismError
 from tests.dynamics.models import error
 from tests.each_row import each_row
 from tests.tolerances import EQUATIONS

@@ -6,7 +6,8 @@ import numpy as np
 from pytest import approx, mark, warns
 
 import dynamics as dyn
-from dynamics.io.mujoco_twin import MujocoTwin, mujoco, to_mjcf
+from dynamics import to_mjcf
+from dynamics.io.mujoco_twin import MujocoTwin, mujoco
 from dynamics.multibody.builders.planar_arm import planar_links
 from tests.dynamics.models import Array, random_arm
 

@@ -11,10 +11,10 @@ from pytest import approx, importorskip, mark, raises, warns
 
 import cgraph as cg
 import dynamics as dyn
+from dynamics import Body, Joint, Mechanism, MechanismError
 from dynamics.io.load import compiled
 from dynamics.io.read_urdf import from_rpy
 from dynamics.multibody.algebra.spatial import rotation
-from dynamics.multibody.trees.mechanism import Body, Joint, Mechanism, MechanismError
 from tests.dynamics.mechanisms import random_inertia
 from tests.dynamics.models import error
 from tests.each_row import each_row

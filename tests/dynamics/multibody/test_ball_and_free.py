@@ -8,8 +8,7 @@ import numpy as np
 from pytest import approx, mark, param, raises
 
 import dynamics as dyn
-from dynamics.systems.system import System
-from dynamics.verification.certificate import certify
+from dynamics import System, certify
 from tests.dynamics import mechanisms
 from tests.dynamics.mechanisms import for_peers
 from tests.dynamics.models import Array, run as values

@@ -7,10 +7,9 @@ from pytest import approx, mark, raises
 
 import dynamics as dyn
 from tests.dynamics.mechanisms import random_body, random_inertia
-from tests.tolerances import CONDITIONED, EQUATIONS, LAST_BITS, LONG_SUM, SHORT_SUM, SUMS
+from tests.tolerances import EQUATIONS, LAST_BITS, LONG_SUM, SHORT_SUM, SOLVED, SUMS
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
-STEP = 1e-5  # of central differences: error about STEP^2
 
 
 def arm(n: int = 3, seed: int = 0, gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)) -> dyn.Mechanism:
@@ -34,22 +33,12 @@ def values(graph: Any, **groups: Array) -> dict[str, Any]:
     return {name: float(value) for name, value in graph.evaluate(given).items()}
 
 
-def pose(mechanism: dyn.Mechanism, body: str, at: Any, q: Array) -> tuple[Array, Array]:
-    """Where a point is, and the body's axes, by positions of four points: (3,), (3, 3)."""
-    places = [np.array(list(values(mechanism.position(body, each), q=q).values()))
-              for each in (at, *(np.asarray(at) + axis for axis in np.eye(3)))]  # fmt: skip
-    return places[0], np.column_stack([each - places[0] for each in places[1:]])
-
-
-def jacobian(mechanism: dyn.Mechanism, body: str, at: Any, q: Array) -> Array:
-    """(6, n) of velocity and angular velocity, by differences."""
-    _, turn = pose(mechanism, body, at, q)
-    columns = []
-    for step in STEP * np.eye(len(q)):
-        (ahead, turned), (behind, back) = (pose(mechanism, body, at, q + each) for each in (step, -step))
-        spin = (turned - back) / (2 * STEP) @ turn.T
-        columns.append([*(ahead - behind) / (2 * STEP), spin[2, 1], spin[0, 2], spin[1, 0]])
-    return np.array(columns).T
+def placed(mechanism: dyn.Mechanism, body: str, at: Any, q: Array) -> dict[str, Array]:
+    """Where a point is, the body's axes, and the Jacobian of both."""
+    frame = mechanism, body, at
+    return dyn.arrays_at(mechanism, dyn.frame_placement(*frame), q) | dyn.arrays_at(
+        mechanism, dyn.frame_jacobian(*frame), q
+    )
 
 
 def kinetic(mechanism: dyn.Mechanism, q: Array, qd: Array) -> float:
@@ -85,14 +74,14 @@ def test_the_energy_lost_is_that_of_an_inelastic_impact(seed: int) -> None:
     found = dyn.attach_with_impact(holder, q, qd, body, velocity=v, omega=w)
     place = np.asarray(body.joint.position) + np.asarray(body.center)
     m = np.array(list(values(dyn.mass_matrix(holder), q=q, qd=qd).values())).reshape(3, 3)
-    j = jacobian(holder, "b2", place, q)
-    r = pose(holder, "b2", place, q)[1]
+    where = placed(holder, "b2", place, q)
+    j, r = where["J"], where["R"]
     own = np.block([[body.mass * np.eye(3), np.zeros((3, 3))],
                     [np.zeros((3, 3)), r @ np.asarray(body.inertia) @ r.T]])  # fmt: skip
     difference = j @ qd - np.concatenate([v, w])
     resists = np.linalg.inv(j @ np.linalg.solve(m, j.T) + np.linalg.inv(own))
-    assert found.energy == approx(difference @ resists @ difference / 2.0, rel=CONDITIONED)
-    assert found.qd == approx(qd - np.linalg.solve(m, j.T @ resists @ difference), rel=CONDITIONED, abs=CONDITIONED)
+    assert found.energy == approx(difference @ resists @ difference / 2.0, rel=SOLVED)
+    assert found.qd == approx(qd - np.linalg.solve(m, j.T @ resists @ difference), rel=SOLVED, abs=SOLVED)
     free = (body.mass * v @ v + w @ own[3:, 3:] @ w) / 2.0
     assert kinetic(holder, q, qd) + free - kinetic(found.mechanism, q, found.qd) == approx(found.energy, rel=SUMS)
 
@@ -103,11 +92,10 @@ def test_a_body_that_is_let_go_leaves_with_the_velocity_of_the_hand() -> None:
     found = dyn.release(holder, q, qd, "load")
     assert (found.q.tolist(), found.qd.tolist()) == (q.tolist(), qd.tolist())
     assert [body.name for body in found.mechanism.bodies] == ["b0", "b1", "b2"]
-    twist = jacobian(holder, "load", load().center, q) @ qd
-    assert np.concatenate([found.body.velocity, found.body.omega]) == approx(twist, abs=CONDITIONED)
-    place, axes = pose(holder, "load", load().center, q)
-    assert found.body.position == approx(place, abs=SHORT_SUM)
-    assert found.body.orientation == approx(axes, abs=SHORT_SUM)
+    where = placed(holder, "load", load().center, q)
+    assert np.concatenate([found.body.velocity, found.body.omega]) == approx(where["J"] @ qd, abs=LONG_SUM)
+    assert found.body.position == approx(where["p"], abs=SHORT_SUM)
+    assert found.body.orientation == approx(where["R"], abs=SHORT_SUM)
     again = dyn.attach_with_impact(found.mechanism, q, qd, load(), velocity=found.body.velocity, omega=found.body.omega)
     assert (again.qd, again.energy) == (approx(qd, rel=EQUATIONS), approx(0.0, abs=EQUATIONS))
 

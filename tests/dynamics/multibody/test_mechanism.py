@@ -15,8 +15,8 @@ from pytest import approx, mark, raises, warns
 
 import cgraph as cg
 import dynamics as dyn
+from dynamics import Body, Joint, Mechanism, MechanismError
 from dynamics.multibody.algebra.spatial import from_quaternion, rotation, to_quaternion
-from dynamics.multibody.trees.mechanism import Body, Joint, Mechanism, MechanismError
 from tests.dynamics.mechanisms import (
     FAMILIES,
     random_body,

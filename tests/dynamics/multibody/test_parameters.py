@@ -13,8 +13,8 @@ from pytest import approx, mark, param, raises
 import cgraph as cg
 import dynamics as dyn
 from cgraph import Graph
+from dynamics import Body, Joint, Mechanism, MechanismError
 from dynamics.multibody.algebra.spatial import from_quaternion
-from dynamics.multibody.trees.mechanism import Body, Joint, Mechanism, MechanismError
 from tests.dynamics.mechanisms import FAMILIES, random_body, random_tree
 from tests.dynamics.models import Array, run as values
 from tests.dynamics.parametrized import parametrized

@@ -8,8 +8,8 @@ from mpmath import mp, mpf
 from pytest import approx, mark
 
 import dynamics as dyn
+from dynamics import as_system
 from dynamics.multibody.builders.planar_arm import planar_links
-from dynamics.systems.model import as_system
 from tests.dynamics.models import at, random_arm, run, states
 from tests.tolerances import LAST_BITS
 

@@ -7,7 +7,7 @@ import numpy as np
 from pytest import approx, mark, raises
 
 import dynamics as dyn
-from cgraph.writing.structure_hash import structure_hash
+from cgraph import structure_hash
 from dynamics.multibody.bodies.body import WORLD
 from tests.dynamics.mechanisms import random_body, random_mechanism
 from tests.each_row import each_row

@@ -10,8 +10,8 @@ from pytest import approx
 
 import cgraph as cg
 import dynamics as dyn
+from dynamics import inertial_parameters, regressor
 from dynamics.equations.states.evaluate import evaluate
-from dynamics.multibody.quantities.regressor import inertial_parameters, regressor
 from tests.dynamics.mechanisms import EVERY_FAMILY, FAMILIES, turned_arm
 from tests.dynamics.models import Array, at, states
 

@@ -11,12 +11,12 @@ from pytest import fixture, mark, raises
 
 import cgraph as cg
 import dynamics as dyn
+from dynamics import certify
 from dynamics.multibody.algebra import spatial
 from dynamics.multibody.algebra.spatial import Triple
 from dynamics.multibody.algebra.spatial_vectors import Twist
 from dynamics.multibody.joints import TYPES, SpatialJoint
 from dynamics.multibody.joints.consistency import contradiction
-from dynamics.verification.certificate import certify
 from tests.dynamics.mechanisms import random_body
 from tests.dynamics.models import Array
 from tests.dynamics.units import Units, in_units

@@ -9,9 +9,9 @@ from pytest import approx, mark
 
 import cgraph as cg
 import dynamics as dyn
+from dynamics import METHODS
 from dynamics.experiments.trust.cascades import CASCADES, KINDS, judge_balls, random_balls
 from dynamics.experiments.trust.trust import RIGHT, SILENT
-from dynamics.integrators import METHODS
 from tests.slow import slow
 
 G = 9.81  # m/s^2

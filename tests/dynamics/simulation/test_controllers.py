@@ -9,7 +9,8 @@ from pytest import approx, mark, raises
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.integrators import METHODS, derive
+from dynamics import METHODS
+from dynamics.integrators import derive
 from tests.dynamics.models import Array, random_arm
 from tests.dynamics.step_options import EVERY_METHOD, step
 

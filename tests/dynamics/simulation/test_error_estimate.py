@@ -11,7 +11,7 @@ from pytest import approx, mark, raises, warns
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.integrators import METHODS
+from dynamics import METHODS
 from dynamics.simulation.steps.equal_steps import doubled, equal_steps, joined
 from tests.dynamics.models import random_arm
 from tests.dynamics.step_options import LIKE_OTHERS

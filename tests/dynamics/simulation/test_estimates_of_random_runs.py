@@ -17,7 +17,7 @@ from pytest import mark
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.integrators import METHODS
+from dynamics import METHODS
 from tests.dynamics.models import Array
 from tests.slow import slow
 

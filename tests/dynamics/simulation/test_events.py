@@ -9,7 +9,7 @@ from pytest import approx, mark, raises
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.integrators import METHODS
+from dynamics import METHODS
 from tests.dynamics.planet import ECCENTRICITY, PERIHELION, planet, position
 from tests.dynamics.step_options import step
 from tests.slow import slow

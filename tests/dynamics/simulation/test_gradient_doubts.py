@@ -15,7 +15,7 @@ from pytest import approx, mark, raises
 import cgraph as cg
 import dynamics as dyn
 from cgraph.util.caches import kept_results
-from dynamics.integrators import METHODS
+from dynamics import METHODS
 from tests.each_row import each_row
 from tests.slow import slow
 

@@ -12,9 +12,9 @@ from pytest import approx, mark
 import cgraph as cg
 import dynamics as dyn
 from cgraph.util.caches import kept_results
+from dynamics import simulate_many
 from dynamics.simulation.ensembles import lanes, task
 from dynamics.simulation.ensembles.lanes import FEW, fits_lanes
-from dynamics.simulation.ensembles.simulate_many import simulate_many
 from dynamics.simulation.steps.step_program import StepProgram
 from tests.dynamics.ensembles import same
 from tests.dynamics.models import oscillator, random_arm
@@ -219,7 +219,8 @@ def test_as_many_steps_as_alone() -> None:
 
 
 def test_what_cannot_go_in_lanes_goes_one_by_one() -> None:
-    from dynamics.integrators import METHODS, derive
+    from dynamics import METHODS
+    from dynamics.integrators import derive
     from dynamics.simulation.run_options import RunOptions
     from dynamics.simulation.steps.step_program import step_program
 

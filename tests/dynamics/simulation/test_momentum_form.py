@@ -9,8 +9,8 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
+from dynamics import as_system
 from dynamics.equations.states.consistent_state import nearest_state
-from dynamics.systems.model import as_system
 
 from ...slow import slow
 from ..equations.test_hamiltonian import random_tree, rotor

@@ -12,13 +12,13 @@ from pytest import approx, mark, raises
 
 import cgraph as cg
 import dynamics as dyn
+from dynamics import METHODS, System
 from dynamics.equations.states.consistent_state import nearest_state
 from dynamics.experiments.speed import bench_scenes
-from dynamics.integrators import METHODS, derive
+from dynamics.integrators import derive
 from dynamics.simulation.gradients import motion_run
 from dynamics.simulation.gradients.motion_equations import motion_equations, sharing
 from dynamics.simulation.gradients.rate_pullback import rate_pullback
-from dynamics.systems.system import System
 from tests.dynamics.mechanisms import random_mechanism
 from tests.dynamics.models import driven_pendulum, magnetic, random_arm, relativistic
 from tests.dynamics.parametrized import parametrized

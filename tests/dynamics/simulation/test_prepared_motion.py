@@ -13,7 +13,7 @@ import pytest
 from pytest import mark
 
 import dynamics as dyn
-from dynamics.integrators import METHODS
+from dynamics import METHODS
 from tests.dynamics.mechanisms import random_state, random_tree
 from tests.dynamics.models import oscillator
 from tests.dynamics.simulation.test_simulate import ARGUMENTS

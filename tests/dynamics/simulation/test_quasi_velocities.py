@@ -8,7 +8,7 @@ import pytest
 from pytest import mark
 
 import dynamics as dyn
-from dynamics.integrators import METHODS
+from dynamics import METHODS
 from dynamics.integrators.symplectic_tableaus import COMPOSITIONS
 
 IN_TURN = ("symplectic_euler", "verlet")  # they step coordinates and momenta in turn

@@ -7,7 +7,7 @@ import numpy as np
 from pytest import approx, mark, raises
 
 import dynamics as dyn
-from dynamics.integrators import METHODS
+from dynamics import METHODS
 from tests.early_end import stops
 
 G = 9.81  # m/s^2

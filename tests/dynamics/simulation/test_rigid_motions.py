@@ -6,7 +6,8 @@ from numpy.typing import ArrayLike
 from pytest import mark
 
 import dynamics as dyn
-from dynamics.multibody.algebra.spatial import Array, from_quaternion, rotation
+from cgraph.extend import Array
+from dynamics.multibody.algebra.spatial import from_quaternion, rotation
 from dynamics.multiprecision.closed_forms import free_rigid_body
 
 MOMENTS = [1.0, 2.0, 3.0]  # kg m^2, of the rotor

@@ -13,9 +13,9 @@ from pytest import approx, mark, raises
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.integrators import METHODS, derive
+from dynamics import METHODS, System
+from dynamics.integrators import derive
 from dynamics.simulation.run_options import RunOptions
-from dynamics.systems.system import System
 from tests.dynamics.models import oscillator, random_arm
 from tests.dynamics.step_options import step
 from tests.each_row import each_row

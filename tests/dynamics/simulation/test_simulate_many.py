@@ -10,11 +10,8 @@ from hypothesis import given, strategies as st
 from pytest import approx, mark, raises
 
 import dynamics as dyn
-from dynamics.integrators import METHODS
-from dynamics.simulation.ensembles.simulate_many import simulate_many
+from dynamics import METHODS, System, as_system, simulate_many
 from dynamics.simulation.steps.equal_steps import EqualSteps, even_steps
-from dynamics.systems.model import as_system
-from dynamics.systems.system import System
 from tests.dynamics.ensembles import arms, same
 from tests.dynamics.models import oscillator, random_arm
 from tests.dynamics.step_options import LIKE_OTHERS, step

@@ -9,7 +9,7 @@ from pytest import mark
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.integrators import METHODS
+from dynamics import METHODS
 from tests.slow import slow
 
 ADAPTIVE = [name for name, method in METHODS.items() if method.adaptive]

@@ -6,7 +6,7 @@ from pytest import mark
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.integrators import METHODS
+from dynamics import METHODS
 from tests.dynamics.mechanisms import random_body, random_joint
 from tests.dynamics.units import Units, in_units
 from tests.slow import slow

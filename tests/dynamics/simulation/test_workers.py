@@ -18,8 +18,8 @@ import pytest
 from pytest import mark, raises
 
 from cgraph.codegen import llvm_engine
+from dynamics import simulate_many
 from dynamics.simulation.ensembles import task, workers as workers_module
-from dynamics.simulation.ensembles.simulate_many import simulate_many
 from tests.dynamics.ensembles import arms, same
 from tests.dynamics.models import random_arm
 from tests.dynamics.step_options import step
