@@ -95,11 +95,12 @@ def _spring(joint: Any, x: Any) -> Any:
 
 def _terms(tree: Mechanism, q: Any, qd: Any) -> tuple[Any, Any, Any]:
     """M (n, n), bias and braking (n,)."""
-    n, still = len(qd), exactly(np.zeros(3))
-    states: dict[str, Any] = {"world": (exactly(np.eye(3)), still, still, -exactly(tree.gravity), [])}
+    n, still, none = len(qd), exactly(np.zeros(3)), exactly(np.zeros((0, 3)))
+    nowhere = np.zeros(0, int), none, none  # which velocities move a body, their angular and their linear parts
+    states: dict[str, Any] = {"world": (exactly(np.eye(3)), still, still, -exactly(tree.gravity), *nowhere)}
     mass, bias, braking = (exactly(np.zeros(shape)) for shape in ((n, n), n, n))
     for body, place in zip(tree.moving, places(tree.moving), strict=True):
-        turn, w, alpha, a, columns = states[body.parent]
+        turn, w, alpha, a, which, S, T = states[body.parent]
         u, first, joint = qd[place.u], place.u.start, body.joint
         axes, shift, angular, linear = _joint(joint, turn @ exactly(joint.orientation), q[place.q])
         r = turn @ exactly(joint.position) + shift
@@ -108,18 +109,17 @@ def _terms(tree: Mechanism, q: Any, qd: Any) -> tuple[Any, Any, Any]:
         a = a + np.cross(alpha, r) + np.cross(w, np.cross(w, r) + slide)
         a = a + np.cross(after if joint.kind == "free (body axes)" else w, slide)
         alpha = alpha + np.cross(w, spin)
-        columns = [(i, s, t + np.cross(s, r)) for i, s, t in columns]
-        columns += [(first + k, s, t) for k, (s, t) in enumerate(zip(angular, linear, strict=True))]
-        states[body.name] = axes, after, alpha, a, columns
+        which = np.append(which, np.arange(first, place.u.stop))
+        T = np.concatenate([T + np.cross(S, r), linear]) if len(S) else np.array(linear)
+        S = np.concatenate([S, angular]) if len(S) else np.array(angular)
+        states[body.name] = axes, after, alpha, a, which, S, T
         c, m = axes @ exactly(body.center), arb(float(body.mass))
         inertia = axes @ exactly(body.inertia) @ axes.T
         force = m * (a + np.cross(alpha, c) + np.cross(after, np.cross(after, c)))
         torque = inertia @ alpha + np.cross(after, inertia @ after)
-        moved = [(i, s, t + np.cross(s, c)) for i, s, t in columns]
-        for i, s, t in moved:
-            bias[i] += t @ force + s @ torque
-            for j, other, along in moved:
-                mass[i, j] += m * (t @ along) + (inertia @ s) @ other
+        at_center = T + np.cross(S, c)
+        bias[which] += at_center @ force + S @ torque
+        mass[np.ix_(which, which)] += m * (at_center @ at_center.T) + S @ inertia @ S.T
         rows = range(first, place.u.stop)
         mass[rows, rows] += arb(float(joint.armature))
         braking[place.u] = arb(float(joint.damping)) * u

@@ -188,6 +188,7 @@ def off(kind: str, n: int, spread: float, method: str = "recursive") -> float:
     return float(np.abs(found - exact).max() / np.abs(exact).max())
 
 
+@pytest.mark.timeout(1800)
 @pytest.mark.parametrize("n", [10, *slow(100, 300)])
 @each_row("kind, spread", [(kind, spread) for kind in KINDS for spread in (0.1, math.pi)])
 def test_chains_lose_nothing_to_the_condition_of_their_mass_matrix(kind: str, spread: float, n: int) -> None:
