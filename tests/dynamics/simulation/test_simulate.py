@@ -110,6 +110,15 @@ def test_a_run_that_leaves_the_numbers_keeps_its_rows_and_says_where() -> None:
 
 
 @stops
+def test_a_run_that_stops_before_the_first_recorded_instant_has_the_row_where_it_stopped() -> None:
+    result = dyn.simulate(runaway(), [0.0, 0.0], [0.0, 1.0], 2.0, "rk4", dt=0.01, t_eval=[1.5, 2.0])
+    every = dyn.simulate(runaway(), [0.0, 0.0], [0.0, 1.0], 2.0, "rk4", dt=0.01)
+    assert (result.stats.success, result.t.tolist()) == (False, [every.t[-1]])
+    assert (result.q[-1].tolist(), result.qd[-1].tolist()) == (every.q[-1].tolist(), every.qd[-1].tolist())
+    assert "stopped at t = 1.0" in result.stats.message
+
+
+@stops
 @pytest.mark.filterwarnings("error")
 @mark.parametrize("parameters", [{"m": 0.0}, {"m": 1e-300}])
 def test_an_infinite_acceleration_stops_the_run_without_a_warning(parameters: dict[str, float]) -> None:
