@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Callable
 from types import TracebackType
 
 QUIET = 1.0  # s: a run shorter than this prints nothing
@@ -12,18 +13,20 @@ QUIET = 1.0  # s: a run shorter than this prints nothing
 class Progress:
     """`with Progress("simulate", total=10.0) as progress: progress(3.2)`; writes to standard error.
 
-    show: None writes only where standard error is a terminal; True and False say so.
+    show: None writes only where standard error is a terminal; True and False say so.  clock: the time [s].
     """
 
-    def __init__(self, what: str, total: float, show: bool | None = None) -> None:
-        self.what, self.total = what, total
+    def __init__(
+        self, what: str, total: float, show: bool | None = None, clock: Callable[[], float] = time.perf_counter
+    ) -> None:
+        self.what, self.total, self.clock = what, total, clock
         self.show = sys.stderr.isatty() if show is None else show
-        self.start = self.last = time.perf_counter()
+        self.start = self.last = clock()
         self.written = False
 
     def __call__(self, done: float) -> None:
         """Say how far the run is, at most ten times a second."""
-        now = time.perf_counter()
+        now = self.clock()
         if not self.show or now - self.start < QUIET or now - self.last < 0.1:
             return
         self.last, self.written = now, True

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from dynamics.simulation.ensembles.ensemble import Ensemble
+from dynamics import Ensemble
 from tests.dynamics.models import random_arm
 
 

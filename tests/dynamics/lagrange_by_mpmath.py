@@ -9,7 +9,7 @@ import numpy as np
 from mpmath import mp, mpf
 
 import cgraph as cg
-from dynamics.systems.model import as_system
+from dynamics import as_system
 from tests import high_precision
 from tests.dynamics.models import Array, named
 

@@ -42,25 +42,6 @@ def peaucellier() -> dyn.Mechanism:
     return dyn.Mechanism(bars, loops=loops)
 
 
-def stewart_platform() -> dyn.Mechanism:
-    """A free platform of 2 kg on six legs: a universal joint on the ground, a slide, and a ball in the platform."""
-    plate = dyn.Body("plate", dyn.Joint("free", position=(0.0, 0.0, 0.8)), "world", 2.0, (0, 0, 0), (0.1, 0.1, 0.2))
-    bodies, loops = [plate], []
-    for k in range(6):
-        foot, hand = (
-            np.array([r * np.cos(a), r * np.sin(a), 0.0]) for r, a in ((0.6, k * 1.05), (0.4, k * 1.05 + 0.3))
-        )
-        bodies += [
-            dyn.Body(f"yoke {k}", dyn.Joint("revolute", (1.0, 0.0, 0.0), foot), "world", 0.1, inertia=(1e-3,) * 3),
-            dyn.Body(f"barrel {k}", dyn.Joint("revolute", ACROSS), f"yoke {k}", 0.5, (0, 0, 0.2), (1e-2, 1e-2, 1e-3)),
-            dyn.Body(
-                f"rod {k}", dyn.Joint("prismatic", (0, 0, 1.0)), f"barrel {k}", 0.3, (0, 0, 0.5), (1e-2, 1e-2, 1e-3)
-            ),
-        ]
-        loops.append(dyn.Loop("point", f"rod {k}", "plate", at=(0.0, 0.0, 0.7), to_at=hand, name=f"leg {k}"))
-    return dyn.Mechanism(bodies, loops=loops)
-
-
 def four_bar(kind: str = "point", *, cut: int = 3) -> dyn.Mechanism:
     """Bars of 0.3, 0.8 and 0.6 m on hinges 0.9 m apart, closed between the second and the third, or at the ground."""
     loop = dyn.Loop(kind, "coupler", "rocker", at=(0.8, 0, 0), to_at=(0.6, 0, 0), axis=ACROSS, to_axis=ACROSS)

@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 
 import dynamics as dyn
+from dynamics import Body, Joint, Mechanism
 from dynamics.multibody.algebra.spatial import rotation
 from dynamics.multibody.bodies.joint_coordinates import places
-from dynamics.multibody.trees.mechanism import WORLD, Body, Joint, Mechanism
+from dynamics.multibody.trees.mechanism import WORLD
 from tests.slow import slow
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
@@ -98,14 +99,15 @@ TREE_KINDS = ["revolute", "prismatic", "ball", "fixed"]
 EVERY_KIND = [*TREE_KINDS, "screw", "cylindrical", "universal", "planar"]
 
 
-def random_tree(seed: int, n: int, among: Sequence[str] = TREE_KINDS) -> Mechanism:
-    """n bodies of some kinds on chains, branches or all on one, two in five on a base that is free.
+def random_tree(seed: int, n: int, among: Sequence[str] = TREE_KINDS, base: str | None = None) -> Mechanism:
+    """n bodies of some kinds on chains, branches or all on one, on that base, else two in five on one that is free.
 
     Joints have damping, armature where they can, and springs where they can have any.
     """
     rng = np.random.default_rng((seed, n))
     kinds = ["revolute", *rng.permutation(among)[: rng.integers(1, 4)].tolist()]
-    base = rng.choice(["free", "free (body axes)", "", "", ""])
+    drawn = rng.choice(["free", "free (body axes)", "", "", ""])
+    base = drawn if base is None else base
     reach, bodies = int(rng.choice([1, 2, 4, n])), []
     for i in range(n):
         kind = str(base or "revolute") if i == 0 else str(rng.choice(kinds))
@@ -116,6 +118,19 @@ def random_tree(seed: int, n: int, among: Sequence[str] = TREE_KINDS) -> Mechani
             others["axis"], others["second_axis"] = random_rotation(rng)[:2]
         bodies.append(random_body(f"b{i}", kind, parent, rng, joint=random_joint(kind, rng, **others)))
     return Mechanism(bodies, 5.0 * rng.normal(size=3))
+
+
+def for_peers(tree: Mechanism, seed: int) -> Mechanism:
+    """With springs at balls; free bodies stand at the origin of the world, in its axes, as MuJoCo has them."""
+    rng, bodies = np.random.default_rng(seed), []
+    for body in tree.bodies:
+        joint = body.joint
+        if joint.kind == "ball":
+            joint = replace(joint, stiffness=float(rng.uniform(0.0, 0.5)))
+        if joint.kind.startswith("free"):
+            joint = replace(joint, position=np.zeros(3), orientation=np.eye(3))
+        bodies.append(replace(body, joint=joint))
+    return replace(tree, bodies=bodies)
 
 
 def random_state(tree: Mechanism, seed: int) -> tuple[Array, Array, Array, Array]:

@@ -9,7 +9,7 @@ import numpy as np
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.systems.model import as_system
+from dynamics import as_system
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

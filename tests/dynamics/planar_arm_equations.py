@@ -16,8 +16,8 @@ from typing import NamedTuple
 import numpy as np
 
 from cgraph.extend import Array
+from dynamics import Mechanism
 from dynamics.multibody.builders.planar_arm import planar_links
-from dynamics.multibody.trees.mechanism import Mechanism
 from dynamics.multiprecision.chain_equations import Pair, bounded
 from dynamics.multiprecision.flint_numbers import Number, flint
 

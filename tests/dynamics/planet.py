@@ -3,7 +3,7 @@
 import math
 
 import cgraph as cg
-from dynamics.systems.system import System
+from dynamics import System
 
 ECCENTRICITY = 0.3
 PERIHELION = ([1.0 - ECCENTRICITY, 0.0], [0.0, math.sqrt((1.0 + ECCENTRICITY) / (1.0 - ECCENTRICITY))])

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from dynamics.integrators import METHODS
+from dynamics import METHODS
 from dynamics.integrators.symplectic_tableaus import COMPOSITIONS
 from tests.slow import slow
 

@@ -1,9 +1,13 @@
-"""Trees of bodies in 66 digits, in the world's axes, by the velocities of centers of mass: no graph, no derivative."""
+"""Trees of bodies in 66 digits, in the world's axes, by the velocities of centers of mass: no graph, no derivative.
+
+Their slopes are central differences. Arrays hold numbers of python-flint, and are rounded at last.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any, NamedTuple
 
 import numpy as np
 from flint import arb, arb_mat, ctx
@@ -12,126 +16,152 @@ from dynamics import Mechanism
 from dynamics.multibody.bodies.joint_coordinates import places
 from tests.dynamics.mechanisms import Array
 
-Vector = list[Any]
 DIGITS = 230  # bits
+STEP = arb(2.0**-56)  # of central differences, which are right to its square
 
 
-def _numbers(values: object) -> Vector:
-    return [arb(float(value)) for value in np.asarray(values, dtype=np.float64).ravel()]
-
-
-def _matrix(values: object) -> list[Vector]:
-    return [_numbers(row) for row in np.asarray(values, dtype=np.float64)]
-
-
-def _dot(a: Vector, b: Vector) -> Any:
-    return sum([x * y for x, y in zip(a, b, strict=True)], arb(0))
-
-
-def _times(matrix: Sequence[Vector], vector: Vector) -> Vector:
-    return [_dot(row, vector) for row in matrix]
-
-
-def _transposed(matrix: Sequence[Vector]) -> list[Vector]:
-    return [list(column) for column in zip(*matrix, strict=True)]
-
-
-def _product(a: Sequence[Vector], b: Sequence[Vector]) -> list[Vector]:
-    return [[_dot(row, column) for column in _transposed(b)] for row in a]
-
-
-def _sum(*vectors: Vector) -> Vector:
-    return [sum(entries, arb(0)) for entries in zip(*vectors, strict=True)]
-
-
-def _scaled(factor: Any, vector: Vector) -> Vector:
-    return [factor * x for x in vector]
-
-
-def _cross(a: Vector, b: Vector) -> Vector:
-    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-
-
-def _unit(vector: Vector) -> Vector:
-    return [x / _dot(vector, vector).sqrt() for x in vector]
-
-
-def _rotation(axis: Vector, angle: Any) -> list[Vector]:
-    c, s, (x, y, z) = angle.cos(), angle.sin(), axis
-    cross = [[arb(0), -z, y], [z, arb(0), -x], [-y, x, arb(0)]]
-    square = _product(cross, cross)
-    return [[arb(int(i == j)) + s * cross[i][j] + (1 - c) * square[i][j] for j in range(3)] for i in range(3)]
-
-
-def _of_quaternion(quaternion: Vector) -> list[Vector]:
-    w, x, y, z = _unit(quaternion)
-    return [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-    ]
-
-
-def _joint(joint: Any, before: list[Vector], q: Vector) -> tuple[list[Vector], Vector, list[Vector], list[Vector]]:
-    """The body's axes as columns, its shift, and of its velocities the angular and the linear part."""
-    still, kind = [arb(0)] * 3, joint.kind
-    if kind in ("revolute", "prismatic", "screw"):
-        own = _unit(_numbers(joint.axis))
-        axis = _times(before, own)
-        turns, slides = arb(int(kind != "prismatic")), arb(1 if kind == "prismatic" else float(joint.pitch))
-        axes = _product(before, _rotation(own, turns * q[0]))
-        return axes, _scaled(slides * q[0], axis), [_scaled(turns, axis)], [_scaled(slides, axis)]
-    axes = _product(before, _of_quaternion(q[-4:]))
-    if kind == "ball":
-        return axes, still, _transposed(axes), [still] * 3
-    along = _transposed(before) if kind == "free" else _transposed(axes)
-    return axes, _times(before, q[:3]), [still] * 3 + _transposed(axes), along + [still] * 3
-
-
-def tree_in_digits(tree: Mechanism, q: Array, qd: Array, qdd: Array, tau: Array) -> dict[str, Array]:
-    """M (n, n), bias, torques and accelerations (n,), with springs of axial joints and dampers, rounded at last."""
+@contextmanager
+def digits() -> Iterator[None]:
     before, ctx.prec = ctx.prec, DIGITS
     try:
-        return _tree(tree, _numbers(q), _numbers(qd), _numbers(qdd), _numbers(tau))
+        yield
     finally:
         ctx.prec = before
 
 
-def _tree(tree: Mechanism, q: Vector, qd: Vector, qdd: Vector, tau: Vector) -> dict[str, Array]:
-    n, still = len(qd), [arb(0)] * 3
-    states: dict[str, Any] = {
-        "world": (_matrix(np.eye(3)), still, still, still, _scaled(arb(-1), _numbers(tree.gravity)), [])
-    }
-    mass, bias, braking = [[arb(0)] * n for _ in range(n)], [arb(0)] * n, [arb(0)] * n
+exactly = np.vectorize(arb, otypes=[object])
+floats = np.vectorize(lambda x: float(x.mid()), otypes=[np.float64])
+
+
+def _solved(matrix: Any, right: Any) -> Any:
+    solved = arb_mat(matrix.tolist()).solve(arb_mat(right.reshape(len(matrix), -1).tolist()))
+    return np.array(solved.entries()).reshape(right.shape)
+
+
+def _unit(vector: Any) -> Any:
+    return vector / (vector @ vector).sqrt()
+
+
+def _skew(a: Any) -> Any:
+    return np.cross(a, exactly(np.eye(3))).T
+
+
+def _rotation(axis: Any, angle: Any) -> Any:
+    return exactly(np.eye(3)) + angle.sin() * _skew(axis) + (1 - angle.cos()) * _skew(axis) @ _skew(axis)
+
+
+def _of_quaternion(quaternion: Any) -> Any:
+    w, *v = _unit(quaternion)
+    return exactly(np.eye(3)) + 2 * (w * _skew(np.array(v)) + _skew(np.array(v)) @ _skew(np.array(v)))
+
+
+def _joint(joint: Any, before: Any, q: Any) -> tuple[Any, Any, Any, Any]:
+    """The body's axes as columns, its shift, and the angular and the linear part of each of its velocities."""
+    still, kind = exactly(np.zeros((3, 3))), joint.kind
+    if kind in ("revolute", "prismatic", "screw"):
+        own = _unit(exactly(joint.axis))
+        axis = before @ own
+        turns, slides = arb(int(kind != "prismatic")), arb(1 if kind == "prismatic" else float(joint.pitch))
+        return before @ _rotation(own, turns * q[0]), slides * q[0] * axis, [turns * axis], [slides * axis]
+    axes = before @ _of_quaternion(q[-4:])
+    if kind == "ball":
+        return axes, still[0], axes.T, still
+    return axes, before @ q[:3], [*still, *axes.T], [*(before if kind == "free" else axes).T, *still]
+
+
+def _moved(tree: Mechanism, q: Any, u: Any, step: Any) -> Any:
+    """The coordinates a step along velocities u later, to first order."""
+    later = q.copy()
     for body, place in zip(tree.moving, places(tree.moving), strict=True):
-        turn, w, v, alpha, a, columns = states[body.parent]
-        x, u, first, joint = q[place.q], qd[place.u], place.u.start, body.joint
-        axes, shift, angular, linear = _joint(joint, _product(turn, _matrix(joint.orientation)), x)
-        r = _sum(_times(turn, _numbers(joint.position)), shift)
-        spin, slide = (_sum(still, *map(_scaled, u, columns_)) for columns_ in (angular, linear))
-        alpha, a = _sum(alpha, _cross(w, spin)), _sum(a, _cross(alpha, r), _cross(w, _sum(_cross(w, r), slide)))
-        v = _sum(v, _cross(w, r), slide)
-        w_after = _sum(w, spin)
-        a = _sum(a, _cross(w_after if joint.kind == "free (body axes)" else w, slide))
-        columns = [(i, s, _sum(t, _cross(s, r))) for i, s, t in columns]
-        columns += [(first + k, s, t) for k, (s, t) in enumerate(zip(angular, linear, strict=True))]
-        states[body.name] = axes, w_after, v, alpha, a, columns
-        c, m = _times(axes, _numbers(body.center)), arb(float(body.mass))
-        inertia = _product(_product(axes, _matrix(body.inertia)), _transposed(axes))
-        force = _scaled(m, _sum(a, _cross(alpha, c), _cross(w_after, _cross(w_after, c))))
-        torque = _sum(_times(inertia, alpha), _cross(w_after, _times(inertia, w_after)))
-        moved = [(i, s, _sum(t, _cross(s, c))) for i, s, t in columns]
-        for i, s, t in moved:
-            bias[i] += _dot(t, force) + _dot(s, torque)
-            for j, other, along in moved:
-                mass[i][j] += m * _dot(t, along) + _dot(_times(inertia, s), other)
-        for k in range(first, place.u.stop):
-            mass[k][k] += arb(float(joint.armature))
-            braking[k] = arb(float(joint.damping)) * qd[k]
-        if joint.type.sprung and joint.kind != "ball":
-            bias[first] += arb(float(joint.stiffness)) * (x[0] - arb(float(joint.spring_reference)))
-    rhs = [[t - b - d] for t, b, d in zip(tau, bias, braking, strict=True)]
-    solved = arb_mat(mass).solve(arb_mat(rhs))
-    torques = _sum(_times(mass, qdd), bias, braking)
-    rows = {"mass": mass, "bias": bias, "torques": torques, "accelerations": [solved[i, 0] for i in range(n)]}
-    return {name: np.vectorize(lambda x: float(x.mid()), otypes=[float])(row) for name, row in rows.items()}
+        x, v = q[place.q], u[place.u]
+        if len(x) == len(v):
+            later[place.q] = x + step * v
+            continue
+        w, e = v[-3:], x[-4:]
+        rate = [-(e[1:] @ w), *(e[0] * w + np.cross(e[1:], w))]
+        along = v[:-3] if body.joint.kind != "free (body axes)" else _of_quaternion(e) @ v[:-3]
+        later[place.q] = x + step * np.array([*along, *[0.5 * each for each in rate]])
+    return later
+
+
+def _spring(joint: Any, x: Any) -> Any:
+    """The torques, (k,), by which a spring pulls back."""
+    if joint.kind != "ball":
+        return arb(float(joint.stiffness)) * (x - arb(float(joint.spring_reference)))
+    length = (x[1:] @ x[1:]).sqrt()
+    assert x[0] > 0, "a rotation vector of more than half a turn"
+    return arb(float(joint.stiffness)) * 2 * (length / x[0]).atan() / length * x[1:]
+
+
+def _terms(tree: Mechanism, q: Any, qd: Any) -> tuple[Any, Any, Any]:
+    """M (n, n), bias and braking (n,)."""
+    n, still, none = len(qd), exactly(np.zeros(3)), exactly(np.zeros((0, 3)))
+    nowhere = np.zeros(0, int), none, none  # which velocities move a body, their angular and their linear parts
+    states: dict[str, Any] = {"world": (exactly(np.eye(3)), still, still, -exactly(tree.gravity), *nowhere)}
+    mass, bias, braking = (exactly(np.zeros(shape)) for shape in ((n, n), n, n))
+    for body, place in zip(tree.moving, places(tree.moving), strict=True):
+        turn, w, alpha, a, which, S, T = states[body.parent]
+        u, first, joint = qd[place.u], place.u.start, body.joint
+        axes, shift, angular, linear = _joint(joint, turn @ exactly(joint.orientation), q[place.q])
+        r = turn @ exactly(joint.position) + shift
+        spin, slide = (sum([x * s for x, s in zip(u, part, strict=True)], still) for part in (angular, linear))
+        after = w + spin
+        a = a + np.cross(alpha, r) + np.cross(w, np.cross(w, r) + slide)
+        a = a + np.cross(after if joint.kind == "free (body axes)" else w, slide)
+        alpha = alpha + np.cross(w, spin)
+        which = np.append(which, np.arange(first, place.u.stop))
+        T = np.concatenate([T + np.cross(S, r), linear]) if len(S) else np.array(linear)
+        S = np.concatenate([S, angular]) if len(S) else np.array(angular)
+        states[body.name] = axes, after, alpha, a, which, S, T
+        c, m = axes @ exactly(body.center), arb(float(body.mass))
+        inertia = axes @ exactly(body.inertia) @ axes.T
+        force = m * (a + np.cross(alpha, c) + np.cross(after, np.cross(after, c)))
+        torque = inertia @ alpha + np.cross(after, inertia @ after)
+        at_center = T + np.cross(S, c)
+        bias[which] += at_center @ force + S @ torque
+        mass[np.ix_(which, which)] += m * (at_center @ at_center.T) + S @ inertia @ S.T
+        rows = range(first, place.u.stop)
+        mass[rows, rows] += arb(float(joint.armature))
+        braking[place.u] = arb(float(joint.damping)) * u
+        if joint.type.sprung and joint.stiffness:
+            bias[place.u] += _spring(joint, q[place.q])
+    return mass, bias, braking
+
+
+def tree_in_digits(tree: Mechanism, q: Array, qd: Array, qdd: Array, tau: Array) -> dict[str, Array]:
+    """M (n, n), bias, torques and accelerations (n,), with springs, dampers and armatures."""
+    with digits():
+        mass, bias, braking = _terms(tree, exactly(q), exactly(qd))
+        torques = mass @ exactly(qdd) + bias + braking
+        accelerations = _solved(mass, exactly(tau) - bias - braking)
+        rows = {"mass": mass, "bias": bias, "torques": torques, "accelerations": accelerations}
+        return {name: floats(row) for name, row in rows.items()}
+
+
+class Slopes(NamedTuple):
+    """Of torques at a motion, and of accelerations at torques, (n, 3n): by displacements, qd, and qdd or tau.
+
+    sides: what M times the latter is.
+    """
+
+    torques: Any
+    accelerations: Any
+    sides: Any = None
+
+
+def slopes_in_digits(tree: Mechanism, q: Array, qd: Array, qdd: Array, tau: Array) -> Slopes:
+    """The slopes, not rounded."""
+    with digits():
+        at, u, n = exactly(q), exactly(qd), len(qd)
+        mass, bias, braking = _terms(tree, at, u)
+        solved, units = _solved(mass, exactly(tau) - bias - braking), exactly(np.eye(n))
+        columns: tuple[list[Any], list[Any]] = ([], [])
+        pairs = [[(_moved(tree, at, unit, s * STEP), u) for s in (1, -1)] for unit in units]
+        pairs += [[(at, u + s * STEP * unit) for s in (1, -1)] for unit in units]
+        for pair in pairs:
+            ahead, behind = (_terms(tree, *state) for state in pair)
+            by_mass, *forces = [(a - b) / (2 * STEP) for a, b in zip(ahead, behind, strict=True)]
+            for column, motion in zip(columns, (exactly(qdd), solved), strict=True):
+                column.append(by_mass @ motion + forces[0] + forces[1])
+        sides = np.hstack([-np.array(columns[1]).T, units])
+        return Slopes(np.hstack([np.array(columns[0]).T, mass]), _solved(mass, sides), sides)

@@ -5,9 +5,10 @@ from pytest import approx, mark
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.systems.model import as_system
+from dynamics import as_system
 from tests.dynamics.lagrange_by_mpmath import Terms, floats, lagrange
 from tests.dynamics.models import MODELS, Array, at, random_arm, run, states
+from tests.each_row import each_row
 from tests.formulations import WITHOUT_STEP
 
 STATES = 20
@@ -53,29 +54,15 @@ def test_torque_is_lagrange_s_equation(name: str, formulation: str) -> None:
         assert run(graph, state) == approx(floats(terms.tau), rel=0.0, abs=ROUNDING * terms.largest)
 
 
-@mark.parametrize("name", MODELS)
-def test_momentum_is_dl_dqd(name: str) -> None:
-    model = MODELS[name]()
-    state = at(states(model, 1), 0)
-    assert run(dyn.momentum(model), state) == approx(
-        floats(lagrange(model, state).momentum), rel=ROUNDING, abs=ROUNDING
-    )
-
-
-@mark.parametrize("name", MODELS)
-def test_momentum_rate_is_its_derivative_along_the_motion(name: str) -> None:
-    model = MODELS[name]()
-    state = at(states(model, 1), 0)
-    terms = lagrange(model, state)
-    expected = approx(floats(terms.momentum_rate), rel=0.0, abs=ROUNDING * terms.largest)
-    assert run(dyn.momentum_rate(model), state) == expected
-
-
-@mark.parametrize("name", MODELS)
-def test_gravity_force_is_dp_dq(name: str) -> None:
+@each_row("name", MODELS)
+def test_momentum_its_rate_and_the_gravity_force_are_dl_dqd_its_rate_and_dp_dq(name: str) -> None:
     """At rest, d/dt dL/dqd has no part of P, and for a Lagrangian without time or B is zero; then tau = dP/dq."""
     system = as_system(MODELS[name]())
     state = at(states(system, 1), 0)
+    terms = lagrange(system, state)
+    assert run(dyn.momentum(system), state) == approx(floats(terms.momentum), rel=ROUNDING, abs=ROUNDING)
+    expected = approx(floats(terms.momentum_rate), rel=0.0, abs=ROUNDING * terms.largest)
+    assert run(dyn.momentum_rate(system), state) == expected
     rest = {**state, "qd": np.zeros(system.n), "qdd": np.zeros(system.n)}
     terms = lagrange(system, rest)
     of_p = floats(lagrange(system, rest, energy=system.potential).gradient)

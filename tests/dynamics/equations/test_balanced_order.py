@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -11,9 +12,12 @@ import cgraph as cg
 import dynamics as dyn
 from cgraph.autodiff.balanced import dissection
 from cgraph.extend import solve_nodes
+from dynamics import as_system
 from dynamics.experiments.speed.bench_scenes import chain
-from dynamics.systems.model import as_ode, as_system
+from dynamics.systems.model import as_ode
 from tests import high_precision
+from tests.each_row import each_row
+from tests.slow import slow
 from tests.tolerances import SOLVED
 
 from .test_hamiltonian import CASES, EQUAL, near, point, random_tree, values
@@ -73,34 +77,26 @@ def test_it_loses_no_digits() -> None:
             assert np.abs(found - exact).max() < EQUAL * np.abs(exact).max()
 
 
-def equal_by_both_orders(model: Any, seed: int = 1) -> None:
+def equal_by_both_orders(model: Any, leaf: float, seed: int = 1) -> None:
+    """In pieces of so many variables."""
     for derive in (dyn.forward_dynamics, dyn.hamilton_equations):
-        graphs = [derive(model, method) for method in ("recursive", "balanced")]
+        with patch.object(dissection, "LEAF", leaf):
+            graphs = [derive(model, method) for method in ("recursive", "balanced")]
         at = point(model, graphs, seed)
         first, second = (values(graph, at, "qdd" if derive is dyn.forward_dynamics else "") for graph in graphs)
         near(second, first, SOLVED / EQUAL * np.abs(first).max())
 
 
-@pytest.mark.parametrize("name", CASES)
-def test_models_move_alike(monkeypatch: pytest.MonkeyPatch, name: str) -> None:
-    """In pieces of one variable."""
-    monkeypatch.setattr(dissection, "LEAF", 0.2)
+@each_row("name", CASES)
+def test_models_move_alike(name: str) -> None:
     model = CASES[name]()
     if as_ode(model) is None and not len(as_system(model).constraints):
-        equal_by_both_orders(model)
+        equal_by_both_orders(model, 0.2)
 
 
-@pytest.mark.parametrize("seed", [2])
-def test_random_trees_move_alike_in_pieces_of_one_body(monkeypatch: pytest.MonkeyPatch, seed: int) -> None:
-    monkeypatch.setattr(dissection, "LEAF", 0.2)
-    equal_by_both_orders(random_tree(seed))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(200))
-def test_many_random_trees_move_alike(monkeypatch: pytest.MonkeyPatch, seed: int) -> None:
-    monkeypatch.setattr(dissection, "LEAF", (0.2, 0.5, 1.8)[seed % 3])
-    equal_by_both_orders(random_tree(seed, 12))
+@pytest.mark.parametrize("seed", [2, *slow(*range(3, 200))])
+def test_random_trees_move_alike(seed: int) -> None:
+    equal_by_both_orders(random_tree(seed, 6 if seed == 2 else 12), (0.5, 1.8, 0.2)[seed % 3], seed)
 
 
 def test_constraints_have_no_balanced_order() -> None:

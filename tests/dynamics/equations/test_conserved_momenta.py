@@ -10,7 +10,7 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.systems.model import as_system
+from dynamics import as_system
 
 from ..linkages import four_bar
 from ..mechanisms import random_mechanism

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -82,27 +81,6 @@ def test_a_crank_that_is_a_little_longer_does_not_hold_a_parallelogram_in_silenc
     texts = [str(each.message) for each in caught]
     assert np.abs(qd - along).max() < 1e-9 + 10.0 * longer or any("moved onto them" in text for text in texts)
     assert longer > 1e-12 or any("follows from the others and is left out" in text for text in texts)
-
-
-@pytest.mark.parametrize("seed", [0, *slow(*range(1, 20))])
-def test_a_parallelogram_of_rows_on_three_cranks_moves_as_its_one_freedom_does(seed: int) -> None:
-    """From rest, (d2L/dv2) vdot = dL/dq along the motion."""
-    system, angles, unit = parallelogram(np.random.default_rng(seed), 3, 6.0 if seed % 2 else 0.0)
-    along = angles / unit
-    q = 0.7 * along
-    with pytest.warns(dyn.ConstraintWarning, match="follows from the others and is left out"):
-        found = dyn.arrays_at(system, dyn.forward_dynamics(system), q=q, qd=0.0 * q)["qdd"]
-    free = dyn.System(system_energy(system), list(system.coordinates))
-    mass = dyn.arrays_at(free, dyn.mass_matrix(free), q=q)["M"]
-    pulled = mass @ dyn.arrays_at(free, dyn.forward_dynamics(free), q=q, qd=0.0 * q)["qdd"]
-    expected = along * (along @ pulled) / (along @ mass @ along)
-    assert unit * found == pytest.approx(unit * expected, rel=1e-9, abs=1e-12)  # of about 10 rad/s^2
-
-
-def system_energy(system: dyn.System) -> Callable[..., Any]:
-    """L of a system as a function of other nodes."""
-    graph = cg.Graph([*system.q, *system.qd], {"L": system.lagrangian})
-    return lambda q, qd, t: graph(*q, *qd)["L"]
 
 
 def random_rows(seed: int) -> dyn.System:

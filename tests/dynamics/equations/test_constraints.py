@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
+from tests.each_row import each_row
 from viz import cli
 
 
@@ -40,12 +42,6 @@ def test_chaplygins_sleigh_has_its_known_accelerations() -> None:
     assert along == pytest.approx(a * w * w, rel=1e-14)
     assert found["qdd2"] == pytest.approx(-m * a * v * w / (inertia + m * a * a), rel=1e-14)
     assert dyn.integrable_rows(sleigh()) == {"blade": False}
-
-
-def test_a_sleigh_ends_up_running_straight() -> None:
-    run = dyn.simulate(sleigh(), [0.0, 0.0, 0.0], [-1.0, 0.0, 0.05], 60.0, rtol=1e-10)
-    assert abs(run.qd[-1, 2]) < 1e-6
-    assert run.energy == pytest.approx(run.energy[0], rel=1e-7)
 
 
 def test_integrability_is_not_judged_of_rows_that_depend_on_time() -> None:
@@ -81,35 +77,19 @@ def test_the_lint_tells_vakonomic_from_nonholonomic() -> None:
     assert str(dyn.lint_constraints(dyn.planar_arm([1.0], [1.0]))) == ""
 
 
-def test_the_command_line_says_so(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    scene = dyn.Scene("sleigh", "a blade", sleigh(), (0.0,) * 3, (0.0,) * 3, 1.0)
-    monkeypatch.setattr("viz.commands.lint.scene_of", lambda options: scene)
-    assert cli.main(["lint", "sleigh"]) == 0
+def test_the_command_line_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "own.py").write_text(f"from {__name__} import sleigh\n")
+    assert cli.main(["lint", f"{tmp_path / 'own.py'}:sleigh"]) == 0
     assert "velocity constraint 'blade' is not integrable" in capsys.readouterr().out
 
 
-def test_integrable_rows_of_velocities_are_told_from_others() -> None:
-    """Rates of functions, also times a factor, or only together; a rolling coin is neither."""
+@each_row("scale", [1e-15, 1e-6, 1.0, 1e6, 1e15])
+def test_integrable_rows_are_told_from_others_in_any_units(scale: float) -> None:
+    """Rates of functions, also times a factor, or only together; a rolling coin is neither. Each row by itself."""
 
     def rows(q: Any, qd: Any, t: Any) -> Any:
-        return {"circle": cg.exp(q[2]) * (q[0] * qd[0] + q[1] * qd[1]), "turn": qd[2] - qd[0] * 0.5}
-
-    assert dyn.integrable_rows(dyn.System(plane, "x y a", velocity_constraints=rows)) == {"circle": True, "turn": True}
-
-    def coin(q: Any, qd: Any, t: Any) -> Any:
-        return {"x": qd[0] - 0.5 * cg.cos(q[2]) * qd[3], "y": qd[1] - 0.5 * cg.sin(q[2]) * qd[3]}
-
-    upright = dyn.System(lambda q, qd, t: 0.5 * sum(x * x for x in qd), "x y heading roll", velocity_constraints=coin)
-    assert dyn.integrable_rows(upright) == {"x": False, "y": False}
-    assert dyn.integrable_rows(dyn.System(plane, "x y a")) == {}
-
-
-@pytest.mark.parametrize("scale", [1e-15, 1e-6, 1e6, 1e15])
-def test_integrability_is_free_of_the_rows_units(scale: float) -> None:
-    """Each row by itself: a row of small numbers counts beside one of large ones."""
-
-    def rows(q: Any, qd: Any, t: Any) -> Any:
-        return {"circle": scale * (q[0] * qd[0] + q[1] * qd[1]), "turn": qd[2] - qd[0] * 0.5}
+        factor = cg.exp(q[2]) if scale == 1.0 else scale
+        return {"circle": factor * (q[0] * qd[0] + q[1] * qd[1]), "turn": qd[2] - qd[0] * 0.5}
 
     assert dyn.integrable_rows(dyn.System(plane, "x y a", velocity_constraints=rows)) == {"circle": True, "turn": True}
 
@@ -126,6 +106,7 @@ def test_integrability_is_free_of_the_rows_units(scale: float) -> None:
         "twist": True,
         "rail": True,
     }
+    assert dyn.integrable_rows(dyn.System(plane, "x y a")) == {}
 
 
 def test_brackets_of_quasi_velocities_count() -> None:

@@ -8,18 +8,14 @@ from pytest import approx
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.equations.coriolis import coriolis
-from dynamics.equations.equations_of_motion import damping_force
+from dynamics import as_system, coriolis, damping_force
 from dynamics.equations.states.evaluate import evaluate
-from dynamics.multibody.builders.planar_arm import planar_links
-from dynamics.systems.model import as_system
 from tests.dynamics.mechanisms import EVERY_FAMILY, FAMILIES
 from tests.dynamics.models import MODELS, Array, magnetic, random_arm, relativistic, states
 
 STEP = 1e-3  # of differences of fourth order: they are right to some 1e-11
 DIFFERENCES = 1e-9  # of the largest entry: their rounding, magnified by 1 / STEP
 ROUNDING = 1e-12  # of the largest entry
-EPSILON = 1e-15  # of entries that are zero but for rounding, in units of the problem, which are of the order of one
 
 MECHANISMS = {name: lambda make=make: make(5) for name, make in FAMILIES.items()}
 SCLERONOMIC = {name: MODELS[name] for name in ("arm of 1", "arm of 3", "coupled springs", "cart pendulum", "magnetic")}
@@ -44,17 +40,6 @@ def test_its_entries_are_christoffel_s_symbols_times_the_velocities(name: str) -
     symbols = 0.5 * (slopes + np.swapaxes(slopes, 2, 3) - np.moveaxis(slopes, 3, 1))  # i, j, k
     expected = np.einsum("sijk,sk->sij", symbols, qd)
     assert matrix(coriolis(mechanism), mechanism, q=q, qd=qd) == approx(expected, abs=DIFFERENCES * abs(expected).max())
-
-
-def test_of_two_links_it_is_the_textbook_s() -> None:
-    arm = random_arm(2)
-    given = states(arm, 10)
-    q, qd = given["q"], given["qd"]
-    one, two = planar_links(arm)
-    h = -two.mass * one.length * two.center * np.sin(q[:, 1])
-    rows = [[h * qd[:, 1], h * (qd[:, 0] + qd[:, 1])], [-h * qd[:, 0], 0 * h]]
-    found = matrix(coriolis(arm), arm, q=q, qd=qd)
-    assert found == approx(np.moveaxis(np.array(rows), 2, 0), rel=ROUNDING, abs=EPSILON)
 
 
 @pytest.mark.parametrize("name", [*MECHANISMS, *SCLERONOMIC])

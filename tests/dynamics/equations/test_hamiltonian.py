@@ -11,7 +11,8 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.systems.model import as_ode, as_system
+from dynamics import as_system
+from dynamics.systems.model import as_ode
 
 from ..linkages import four_bar
 from ..mechanisms import random_body, random_joint, turned_arm

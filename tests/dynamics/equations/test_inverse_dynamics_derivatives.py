@@ -15,9 +15,9 @@ from mpmath import mp, mpf
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.systems.model import as_system
+from dynamics import as_system
 from tests import high_precision
-from tests.dynamics.mechanisms import EVERY_FAMILY, FAMILIES, TREES, Array, random_mechanism, turned_arm
+from tests.dynamics.mechanisms import TREES, Array, random_mechanism, turned_arm
 from tests.dynamics.models import MODELS, random_arm
 from tests.dynamics.parametrized import parametrized
 
@@ -159,24 +159,6 @@ def test_the_inverse_of_the_mass_matrix() -> None:
         inverse: Array = dyn.arrays_at(model, dyn.inverse_mass_matrix(model), q=q)["Minv"]
         assert np.abs(inverse - inverse.T).max() == 0.0
         assert np.abs(mass @ inverse - np.eye(system.n)).max() < 1e-14 * np.linalg.cond(mass)
-
-
-@pytest.mark.parametrize("family", EVERY_FAMILY)
-def test_pinocchio_s_derivatives_of_rnea_are_the_same(family: str) -> None:
-    pinocchio = pytest.importorskip("pinocchio", reason="the bench extra has it")
-    from tests.dynamics.pinocchio_twin import PinocchioTwin
-
-    mechanism = FAMILIES[family](8)
-    twin, n = PinocchioTwin(mechanism), mechanism.system.n
-    square = np.ix_(twin.order, twin.order)
-    for seed in range(5):
-        q, qd, qdd = np.random.default_rng(seed).normal(size=(3, n))
-        pinocchio.computeRNEADerivatives(twin.model, twin.data, *map(twin._theirs, (q, qd, qdd)))
-        found = dyn.arrays_at(mechanism, dyn.inverse_dynamics_derivatives(mechanism), q=q, qd=qd, qdd=qdd)
-        by_q = twin.data.dtau_dq[square] + np.diag(twin.stiffness)
-        by_qd = twin.data.dtau_dv[square] + np.diag(twin.damping)
-        for name, expected in (("dtau_dq", by_q), ("dtau_dqd", by_qd), ("M", twin.crba(q))):
-            assert np.abs(found[name] - expected).max() < ROUNDING * np.abs(expected).max()
 
 
 def test_straight_chains_are_linearized_to_the_last_digits() -> None:

@@ -80,20 +80,6 @@ def test_they_are_the_same_to_the_last_bit_in_other_units() -> None:
     assert (scaled[2] == action / unit * plain[2]).all()
 
 
-def test_their_slopes_are_the_inverse_of_the_mass_matrix() -> None:
-    """Also where a momentum is the one at rest, and the iteration has nothing to do."""
-    charged = dyn.System(lambda q, qd, t: -cg.sqrt(1.0 - qd[0] ** 2 - qd[1] ** 2) + q[0] * qd[1] - q[1] * qd[0], "x y")
-    rates = cg.jacobian(dyn.hamilton_equations(charged, iterations=24), ["p0", "p1"])
-    for qd in ([0.0, 0.0], [0.6, -0.3], [0.7, 0.714]):
-        q = {"q0": 0.4, "q1": 0.1}
-        at = q | {"qd0": qd[0], "qd1": qd[1]}
-        p = dyn.momentum(charged).evaluate(at)
-        M = np.reshape([*dyn.mass_matrix(charged).evaluate(at).values()], (2, 2))
-        values = {**q, "p0": p["p0"], "p1": p["p1"], "tau0": 0.0, "tau1": 0.0}
-        slopes = [*rates.evaluate({name: values[name] for name in rates.input_names}).values()]
-        assert M @ np.reshape(slopes[:4], (2, 2)) == pytest.approx(np.eye(2), abs=1e-10)
-
-
 def test_the_energy_of_a_fast_particle_is_that_of_its_momentum() -> None:
     """H = sqrt(1 + (p - A)^2), of momenta of any size; and it says what is missing."""
     particle = dyn.System(lambda q, qd, t: -cg.sqrt((1.0 - qd[0]) * (1.0 + qd[0])) + 0.5 * qd[0], "x")

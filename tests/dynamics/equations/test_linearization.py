@@ -2,24 +2,24 @@
 
 from __future__ import annotations
 
+from typing import Any
+from unittest.mock import patch
+
 import numpy as np
 import pytest
 from pytest import approx
 
 import dynamics as dyn
+from dynamics import as_system, linearize, state_space
 from dynamics.equations.linearization import linearize_many as many
-from dynamics.equations.linearization.linearization import linearize, state_space
 from dynamics.equations.linearization.linearization_parts import linearization_parts
 from dynamics.equations.states.evaluate import evaluate
-from dynamics.peers.translate import translated
-from dynamics.systems.model import as_system
-from tests.dynamics.mechanisms import FAMILIES, random_mechanism, turned_arm
+from tests.dynamics.equations.test_hamiltonian import rotor
+from tests.dynamics.mechanisms import random_mechanism, turned_arm
 from tests.dynamics.models import MODELS, Array, at, random_arm, states
-from tests.slow import slow
 
 STEP = 1e-3  # of the differences, in units of the state
 DIFFERENCES = 1e-7  # fourth order at that step, of what M^-1 magnifies
-ROUNDING = 1e-11  # of the largest entry, which M^-1 has magnified
 ONE_BY_ONE = 1e-9  # arrays and floats: sine and cosine of NumPy and of the C library, magnified by M^-1
 
 
@@ -30,13 +30,6 @@ def differences(rate: object, x: Array) -> Array:
         v = {s: rate(x + s * STEP * unit) for s in (-2, -1, 1, 2)}  # type: ignore[operator]
         columns.append((8 * (v[1] - v[-1]) - (v[2] - v[-2])) / (12 * STEP))
     return np.stack(columns, axis=1)
-
-
-def test_of_a_pendulum_it_is_the_textbook_s() -> None:
-    arm = dyn.planar_arm([3.0], [2.0], damping=0.5)
-    a, b = linearize(arm, [0.4], [7.0], [1.0])
-    assert a == approx(np.array([[0.0, 1.0], [-29.43 * np.cos(0.4) / 4.0, -0.5 / 4.0]]))
-    assert b == approx(np.array([[0.0], [0.25]]))
 
 
 @pytest.mark.parametrize("name", MODELS)
@@ -54,47 +47,6 @@ def test_it_is_the_slope_of_forward_dynamics(name: str) -> None:
     assert found == approx(expected, abs=DIFFERENCES * abs(expected).max())
 
 
-@pytest.mark.parametrize("name", ["mixed", *slow("planar", "arm")])
-def test_it_is_the_slope_of_mujoco_s_accelerations(name: str) -> None:
-    pytest.importorskip("mujoco")
-    from dynamics.io.mujoco_twin import MujocoTwin
-
-    model = {"planar": random_arm(3), "arm": turned_arm(4), "mixed": FAMILIES["mixed"](4)}[name]
-    twin, n, state = MujocoTwin(model), as_system(model).n, at(states(model, 1, 2), 0)
-    names = [twin.model.joint(i).name for i in range(n)]
-    wanted = [name.replace(" ", "") if name not in names else name for name in as_system(model).coordinates]
-    order = np.array([names.index(name) for name in wanted])
-
-    def rate(x: Array) -> Array:
-        given = [np.empty(n) for _ in range(3)]
-        for row, part in zip(given, np.split(x, 3), strict=True):
-            row[order] = part
-        return twin.accelerations(*given)[order]
-
-    expected = differences(rate, np.concatenate([state["q"], state["qd"], state["tau"]]))
-    a, b = linearize(model, state["q"], state["qd"], state["tau"])
-    assert np.hstack([a, b])[n:] == approx(expected, abs=DIFFERENCES * abs(expected).max())
-
-
-@pytest.mark.parametrize("family", FAMILIES)
-def test_pinocchio_s_derivatives_of_aba_are_the_same(family: str) -> None:
-    pinocchio = pytest.importorskip("pinocchio", reason="the bench extra has it")
-    from tests.dynamics.pinocchio_twin import PinocchioTwin
-
-    mechanism = FAMILIES[family](6)
-    twin, state, n = PinocchioTwin(mechanism), at(states(mechanism, 1, 3), 0), mechanism.system.n
-    q, qd, tau = (state[name] for name in ("q", "qd", "tau"))
-    theirs, square = twin._theirs, np.ix_(twin.order, twin.order)
-    pinocchio.computeABADerivatives(twin.model, twin.data, theirs(q), theirs(qd), theirs(tau - twin._passive(q, qd)))
-    upper = np.triu(twin.data.Minv)
-    inverse = (upper + np.triu(upper, 1).T)[square]
-    by_q = twin.data.ddq_dq[square] - inverse * twin.stiffness
-    by_qd = twin.data.ddq_dv[square] - inverse * twin.damping
-    a, b = linearize(mechanism, q, qd, tau)
-    for found, expected in ((a[n:, :n], by_q), (a[n:, n:], by_qd), (b[n:], inverse)):
-        assert found == approx(expected, abs=ROUNDING * abs(expected).max())
-
-
 def test_the_graph_takes_many_states_and_is_smaller_than_that_of_forward_dynamics_differentiated() -> None:
     arm = turned_arm(5)
     graph = state_space(arm)
@@ -110,45 +62,38 @@ FEW = {
     "planar": lambda: random_arm(2),
     "ball": lambda: random_mechanism(1, ["ball"], 1),
     "driven": MODELS["driven pendulum"],
+    "undamped": lambda: random_arm(3, damped=False),
+    "rotor": rotor,
 }
 
 
 @pytest.mark.parametrize("columns", [False, True])
-@pytest.mark.parametrize("name", FEW)
-def test_many_states_are_linearized_as_one(name: str, columns: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Written out, and column by column."""
-    monkeypatch.setattr(many, "WRITTEN_OUT", 0 if columns else many.WRITTEN_OUT)
-    model, rng, count = FEW[name](), np.random.default_rng(0), 131
-    system = as_system(model)
+@pytest.mark.parametrize(
+    ("name", "form"),
+    [(name, "velocity") for name in FEW if name != "rotor"] + [(name, "momentum") for name in FEW if name != "ball"],
+)
+def test_many_states_are_linearized_as_one(name: str, form: Any, columns: bool) -> None:
+    """Written out, and column by column; B, and J A where nothing brakes, symmetric to the last bit."""
+    with patch.object(many, "WRITTEN_OUT", 0 if columns else many.WRITTEN_OUT):
+        require_alike(FEW[name](), form, symmetric=name == "undamped")
+
+
+def require_alike(model: Any, form: Any, *, symmetric: bool) -> None:
+    rng, count, system = np.random.default_rng(0), 131, as_system(model)
     q = np.array(system.kinematics.neutral) + rng.uniform(-1.0, 1.0, (count, system.nq))
     qd, tau = rng.normal(size=(count, system.n)), rng.normal(size=system.n)
-    a, b = dyn.linearize_many(model, q, qd, tau, t=0.3)
-    again = dyn.linearize_many(model, q, qd, tau, t=0.3, threads=2)
+    a, b = dyn.linearize_many(model, q, qd, tau, t=0.3, form=form)
+    again = dyn.linearize_many(model, q, qd, tau, t=0.3, form=form, threads=2)
     assert all(map(np.array_equal, (a, b), again))
+    assert a.strides[2] == b.strides[2] == 8  # as linear algebra takes them
     for k in (0, count - 1):
-        for found, expected in zip((a[k], b[k]), linearize(model, q[k], qd[k], tau, t=0.3), strict=True):
+        for found, expected in zip((a[k], b[k]), linearize(model, q[k], qd[k], tau, t=0.3, form=form), strict=True):
             assert np.abs(found - expected).max() < 1e-13 * np.abs(expected).max()
-
-
-@pytest.mark.parametrize("columns", [False, True])
-def test_many_states_have_the_slopes_of_complex_steps(columns: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Written out, and column by column; B symmetric to the last bit, matrices as linear algebra takes them."""
-    monkeypatch.setattr(many, "WRITTEN_OUT", 0 if columns else many.WRITTEN_OUT)
-    arm, n, step = turned_arm(3), 3, 1e-30
-    accelerations, given = dyn.forward_dynamics(arm), states(arm, 9)
-    x = np.hstack([given[name] for name in ("q", "qd", "tau")])
-    a, b = dyn.linearize_many(arm, *np.split(x, 3, axis=1))
-    for k in (0, 8):
-        columns_of_k = []
-        for unit in np.eye(3 * n):
-            at = dict(zip(accelerations.inputs, x[k] + 1j * step * unit, strict=True))
-            values = translated(accelerations.nodes, at, np)
-            columns_of_k.append([values[node].imag / step for node in accelerations.outputs.values()])
-        expected = np.array(columns_of_k).T
-        assert np.hstack([a[k], b[k]])[n:] == approx(expected, abs=1e-13 * abs(expected).max())
-        assert np.array_equal(b[k, n:], b[k, n:].T)
-        assert np.array_equal(a[k, :n], np.eye(n, 2 * n, n))
-    assert a.strides[2] == b.strides[2] == 8
+        if symmetric:
+            n = system.n
+            forces, matrix = b[k, n:], np.vstack([a[k, n:], -a[k, :n]])
+            assert np.array_equal(forces, forces.T)
+            assert form == "velocity" or np.array_equal(matrix, matrix.T)
 
 
 def test_of_no_states_there_are_no_matrices_and_one_state_is_refused() -> None:

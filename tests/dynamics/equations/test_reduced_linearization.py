@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,17 +10,14 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
+from cgraph.extend import Array
 from dynamics.equations.states.consistent_state import nearest_state
-from dynamics.equations.states.evaluate import Array, evaluate
+from dynamics.equations.states.evaluate import evaluate
 from tests.dynamics.linkages import four_bar, scaled_four_bar
-from tests.dynamics.mechanisms import random_body
 from tests.slow import slow
 
 DIFFERENCES = 1e-7  # of second order at a step of 1e-4
 MODES = 1e-9  # of the fastest mode
-COUNT = 3  # bodies of a ring
-LAST = f"b{COUNT - 1}"
-POLYNOMIALS = 1e-12  # of the characteristic polynomial in units of the fastest mode
 
 
 def test_a_mass_on_a_rod_is_a_pendulum() -> None:
@@ -68,54 +64,6 @@ def test_a_four_bar_is_its_differences_along_the_loop() -> None:
     moved, rates = (np.array(part)[:, chosen].T for part in zip(*map(along, reduced.displacements.T), strict=True))
     expected = rates @ np.linalg.inv(moved)
     assert pytest.approx(expected, abs=DIFFERENCES * np.abs(expected).max()) == reduced.A
-
-
-def ring(seed: int) -> tuple[dyn.Mechanism, dyn.Mechanism]:
-    """A tree of springy hinges at rest, two bodies of it pinned, and the same with a hinge cut: a free body, held."""
-    rng = np.random.default_rng(seed)
-    parents = ["world", *[f"b{rng.integers(0, i)}" for i in range(1, COUNT)]]
-    bodies = [random_body(f"b{i}", "revolute", parent, rng) for i, parent in enumerate(parents)]
-    bodies = [replace(each, joint=replace(each.joint, spring_reference=0.0, armature=0.0)) for each in bodies]
-    cut = int(rng.integers(1, COUNT))
-    bodies[cut] = replace(bodies[cut], joint=replace(bodies[cut].joint, stiffness=0.0, damping=0.0))
-    still = dyn.Mechanism(bodies, (0.0, 0.0, 0.0))
-
-    def placed(name: str) -> tuple[Array, Array]:
-        values = still.motion(name).evaluate({f"{kind}{i}": 0.0 for kind in ("q", "qd") for i in range(COUNT)})
-        numbers = np.array(list(values.values()))
-        return numbers[:3], numbers[9:].reshape(3, 3)
-
-    (place, turn), (other, turned) = placed(LAST), placed("b0")
-    at = rng.normal(size=3)
-    pin = dyn.Loop(
-        "distance", LAST, "b0", at=at, to_at=turned.T @ (place + turn @ at - other) + [0, 0, 0.7], length=0.7
-    )
-    joint, (position, orientation) = bodies[cut].joint, placed(f"b{cut}")
-    free = dyn.Joint("free", position=position, orientation=orientation)
-    hinge = dyn.Loop(
-        "hinge",
-        f"b{cut}",
-        bodies[cut].parent,
-        to_at=joint.position,
-        axis=joint.axis,
-        to_axis=np.array(joint.orientation) @ joint.axis,
-        name="cut",
-    )
-    apart = [replace(each, parent="world", joint=free) if i == cut else each for i, each in enumerate(bodies)]
-    return replace(still, loops=[pin]), dyn.Mechanism(apart, still.gravity, loops=[pin, hinge])
-
-
-@pytest.mark.parametrize("seed", slow(*range(20)))
-def test_a_joint_cut_to_a_loop_leaves_the_modes(seed: int) -> None:
-    found = []
-    for model in ring(seed):
-        system = model.system
-        reduced = dyn.reduced_linearization(model, system.kinematics.neutral, np.zeros(system.n))
-        assert reduced.A.shape == (2 * COUNT - 2,) * 2
-        found.append(reduced.A)
-    fastest = np.abs(np.linalg.eigvals(found[0])).max()
-    first, second = (np.poly(matrix / fastest) for matrix in found)  # modes of multiplicity are split by rounding
-    assert first == pytest.approx(second, abs=POLYNOMIALS * np.abs(first).max())
 
 
 @pytest.mark.parametrize("speed", slow(5.0, 0.0))

@@ -10,8 +10,9 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.equations.equations_of_motion import SOLUTIONS, forward_dynamics
-from dynamics.equations.mass_matrix.singular_mass_matrix import SingularMassMatrixError, raise_if_singular
+from dynamics import SingularMassMatrixError, forward_dynamics, raise_if_singular
+from dynamics.equations.equations_of_motion import SOLUTIONS
+from tests.each_row import each_row
 from tests.slow import slow
 from tests.tolerances import CONDITIONED, LAST_BITS
 
@@ -26,23 +27,6 @@ def accelerations(system: dyn.System, method: str, **values: float) -> dict[str,
     return result
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_an_inertia_that_vanishes_at_one_state_is_found_there(method):
-    system = dyn.System(lambda q, qd, t: 0.5 * qd[0] * qd[0] * q[0], ["slider"])
-    assert accelerations(system, method, q0=0.5, tau0=1.0)["qdd0"] == 2.0
-    for place in (0.0, -0.5, math.nan):
-        with pytest.raises(SingularMassMatrixError, match="not positive definite: coordinate 'slider'"):
-            accelerations(system, method, q0=place, tau0=1.0)
-
-
-@pytest.mark.parametrize("method", METHODS)
-def test_a_negative_inertia_is_found_though_the_result_is_finite(method):
-    system = dyn.System(lambda q, qd, t: 0.5 * qd[0] * qd[0] * cg.cos(q[0]), ["joint"])
-    accelerations(system, method, q0=1.5)
-    with pytest.raises(SingularMassMatrixError, match="joint"):
-        accelerations(system, method, q0=1.6)
-
-
 def two_points(inner: float) -> dyn.System:
     """A double pendulum of two points, the inner of the given mass, on rods of 1 m; q1 is relative to the first rod."""
 
@@ -55,19 +39,33 @@ def two_points(inner: float) -> dyn.System:
     return dyn.System(lagrangian, ["shoulder", "elbow"], {"inner": inner})
 
 
-@pytest.mark.parametrize("method", METHODS)
-def test_a_massless_point_on_a_straight_rod_has_no_acceleration(method):
-    bent = accelerations(two_points(0.0), method, q1=1.0, tau0=1.0)
-    assert math.isfinite(bent["qdd0"])
-    with pytest.raises(SingularMassMatrixError, match="shoulder"):
-        accelerations(two_points(0.0), method, tau0=1.0)
-    assert accelerations(two_points(0.5), method, tau0=1.0)["qdd0"] == 2.0
+SLIDER = dyn.System(lambda q, qd, t: 0.5 * qd[0] * qd[0] * q[0], ["slider"])
+JOINT = dyn.System(lambda q, qd, t: 0.5 * qd[0] * qd[0] * cg.cos(q[0]), ["joint"])
+MASSLESS = two_points(0.0)
 
 
 @pytest.mark.parametrize("method", METHODS)
-def test_a_negative_mass_is_found(method):
-    with pytest.raises(SingularMassMatrixError, match="shoulder"):
-        accelerations(two_points(-0.1), method, q1=0.1)
+@each_row(
+    ("system", "state", "result"),
+    [
+        (SLIDER, {"q0": 0.5, "tau0": 1.0}, 2.0),
+        *[(SLIDER, {"q0": place, "tau0": 1.0}, "slider") for place in (0.0, -0.5, math.nan)],
+        (JOINT, {"q0": 1.5}, 0.0),
+        (JOINT, {"q0": 1.6}, "joint"),  # though the result is finite
+        (MASSLESS, {"q1": 1.0}, 0.0),
+        (MASSLESS, {"tau0": 1.0}, "shoulder"),  # of a straight rod
+        (two_points(0.5), {"tau0": 1.0}, 2.0),
+        (two_points(-0.1), {"q1": 0.1}, "shoulder"),
+    ],
+)
+def test_an_inertia_that_is_not_positive_is_found_where_it_is(
+    system: dyn.System, state: dict[str, float], result: float | str, method: str
+) -> None:
+    if isinstance(result, float):
+        assert accelerations(system, method, **state)["qdd0"] == result
+    else:
+        with pytest.raises(SingularMassMatrixError, match=f"not positive definite: coordinate '{result}'"):
+            accelerations(system, method, **state)
 
 
 def string(n: int) -> dyn.System:
@@ -301,15 +299,6 @@ def test_slides_in_more_directions_than_there_are_have_no_inertia(seed: int) -> 
     else:
         with pytest.raises(SingularMassMatrixError):
             forward_dynamics(dyn.Mechanism(bodies))
-
-
-@pytest.mark.parametrize("kinds", [("prismatic", "free"), ("ball", "ball"), ("free", "prismatic"), ("free", "free")])
-def test_a_massless_body_on_a_joint_that_the_next_one_repeats_is_refused(kinds: tuple[str, str]) -> None:
-    first = dyn.Body("first", dyn.Joint(kinds[0]))
-    second = dyn.Joint(kinds[1], position=(0.0, 0.0, 1.0))
-    bodies = [first, dyn.Body("second", second, "first", 1.0, (0.1, 0.2, 0.3), (0.1, 0.2, 0.25))]
-    with pytest.raises(SingularMassMatrixError, match=r"a motion of .*'first.* has no inertia"):
-        forward_dynamics(dyn.Mechanism(bodies))
 
 
 @pytest.mark.parametrize("held", [False, True])

@@ -10,11 +10,10 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
-from cgraph.extend import Array, Builder, cotangents
-from dynamics.equations.linearization import linearize_many as many
+from cgraph.extend import Array, Builder
+from dynamics import as_system
 from dynamics.equations.linearization.momentum_parts import momentum_parts
 from dynamics.equations.momentum.hamiltonian import velocities
-from dynamics.systems.model import as_system
 from tests.slow import slow
 
 from ..linkages import four_bar
@@ -65,12 +64,6 @@ def square(graph: cg.Graph, at: dict[str, float], stem: str = "A") -> Array:
     return found.reshape(rows, -1)
 
 
-def along(system: dyn.System) -> Array:
-    """J of A = J H''."""
-    n = system.n
-    return np.block([[np.zeros((n, n)), np.eye(n)], [-np.eye(n), np.zeros((n, n))]])
-
-
 def slopes(model: Any, graph: cg.Graph, at: dict[str, float]) -> Array:
     """The derivative of a graph's outputs by displacements and momenta, column by column in forward mode."""
     system = as_system(model)
@@ -86,16 +79,11 @@ def slopes(model: Any, graph: cg.Graph, at: dict[str, float]) -> Array:
     return np.array(columns).T
 
 
-def brackets(system: dyn.System, at: dict[str, float]) -> tuple[Array, Array, Array]:
-    """C of the velocities, and P of the momenta and of their rates: xi_dot = dqd + C xi, P_kj = p . c(e_j, e_k)."""
-    n, p = system.n, cg.variables([f"p{i}" for i in range(system.n)])
+def brackets(system: dyn.System, at: dict[str, float]) -> Array:
+    """C of the velocities: xi_dot = dqd + C xi."""
     rows = system.kinematics.brackets(Builder())
-    terms = system.kinematics.structure(p, Builder())
-    twist = [cotangents({term: cg.constant(1.0)}, system.qd) for term in terms]
     c = cg.Graph(system.qd, {f"{i}": x for i, x in enumerate([x for row in rows for x in row])})
-    bent = cg.Graph([*system.qd, *p], {f"{i}": x for i, x in enumerate([x for row in twist for x in row])})
-    rates = {f"p{i}": at[f"p{i}_dot"] for i in range(n)}
-    return tuple([values(graph, each).reshape(n, n) for graph, each in ((c, at), (bent, at), (bent, at | rates))])
+    return values(c, at).reshape(system.n, system.n)
 
 
 def state(model: Any, equations: cg.Graph, moving: cg.Graph, seed: int) -> dict[str, float]:
@@ -108,29 +96,18 @@ def state(model: Any, equations: cg.Graph, moving: cg.Graph, seed: int) -> dict[
 
 
 def assert_linear(model: Any, seed: int) -> None:
-    """A is the derivative of the rates; without damping and forces it has the structure of a Hamiltonian."""
+    """A is the derivative of the rates, B that by forces."""
     system, n = as_system(model), as_system(model).n
     graph = dyn.state_space(model, form="momentum")
     equations, moving = dyn.hamilton_equations(model, iterations=12), velocities(system)
     at = state(model, equations, moving, seed)
     found = square(graph, at)
-    c, p, p_rate = brackets(system, at)
+    c = brackets(system, at)
     top = slopes(model, moving, at)
     top[:, :n] += c
     expected = np.vstack([top, slopes(model, equations, at)[system.nq :]])
     assert np.abs(found - expected).max() <= EQUAL * np.abs(expected).max()
     assert np.array_equal(square(graph, at, "B"), np.eye(2 * n)[:, n:])
-    if any(node.value != 0.0 for node in system.forces) or any(
-        x.value != 0.0 for x in map(cg.constant, system.damping)
-    ):
-        return
-    if system.kinematics.quasi is None:
-        matrix = along(system) @ found
-        assert np.array_equal(matrix, matrix.T)
-    to, rate = np.eye(2 * n), np.zeros((2 * n, 2 * n))  # of dp + P xi / 2, which are canonical
-    to[n:, :n], rate[n:, :n] = 0.5 * p, 0.5 * p_rate
-    matrix = along(system) @ (to @ found + rate) @ np.linalg.inv(to)
-    assert np.abs(matrix - matrix.T).max() <= EQUAL * np.abs(matrix).max()
 
 
 @pytest.mark.parametrize("name", [*[name for name in SMALL if name not in RARE], *slow(*RARE)])
@@ -143,59 +120,6 @@ def test_it_is_the_slope_of_hamilton_s_equations(name: str) -> None:
 def test_it_is_that_of_random_trees() -> None:
     for seed in range(200):
         assert_linear(random_tree(seed, 4), seed)
-
-
-@pytest.mark.parametrize("name", ["planar", "driven", "relativistic", "springs"])
-def test_it_is_that_of_velocities_in_other_variables(name: str) -> None:
-    """(dq, dp) = T (dq, dqd) along the motion: A of one form is (T A + dT/dt) T^-1 of the other."""
-    model, n = SMALL[name](), as_system(SMALL[name]()).n
-    momentum, lagrange = dyn.momentum(model), dyn.state_equation(model)
-    wrt = [*[f"q{i}" for i in range(n)], *[f"qd{i}" for i in range(n)]]
-    change = cg.jacobian(momentum, wrt)
-    rated = cg.jvp(change, [*wrt, *["t"] * ("t" in change.input_names)])
-    at = point(model, [lagrange, momentum], 5)
-    dots = lagrange.evaluate({name: at[name] for name in lagrange.input_names}) | {"t_dot": 1.0}
-    to, rate = np.eye(2 * n), np.zeros((2 * n, 2 * n))
-    to[n:], rate[n:] = values(change, at).reshape(n, -1), values(rated, at | dots).reshape(n, -1)
-    given = {name: [at[f"{name}{i}"] for i in range(n)] for name in ("q", "qd", "tau")}
-    a, b = dyn.linearize(model, **given, t=at["t"])
-    found, by_tau = dyn.linearize(model, **given, t=at["t"], form="momentum")
-    expected = (to @ a + rate) @ np.linalg.inv(to)
-    assert np.abs(found - expected).max() <= EQUAL * np.abs(expected).max()
-    assert np.abs(to @ b - by_tau).max() <= EQUAL
-
-
-@pytest.mark.parametrize("name", ["undamped", "cart", "magnetic"])
-def test_modes_come_in_pairs_and_at_rest_are_those_of_the_motion(name: str) -> None:
-    model, n = SMALL[name](), as_system(SMALL[name]()).n
-    q, still = np.zeros(n), np.zeros(n)
-    moving = np.poly(dyn.linearize(model, q + 0.4, still + 0.7, form="momentum")[0])
-    assert np.abs(moving[1::2]).max() <= EQUAL * np.abs(moving).max()  # even: with every mode its negative
-    assert np.abs(moving[2::2]).max() > 0.1
-    found, expected = (np.poly(dyn.linearize(model, q, still, form=form)[0]) for form in ("momentum", "velocity"))
-    assert np.abs(found - expected).max() <= EQUAL * np.abs(expected).max()
-
-
-def test_units_and_the_order_of_coordinates_are_no_part_of_it() -> None:
-    """In units that are powers of 2 to the last bit: dq = c dq', dp = dp' / c."""
-
-    def other(scale: Array, order: list[int]) -> dyn.System:
-        def lagrangian(q: Any, qd: Any, t: Any) -> cg.Node:
-            x, v = ([scale[k] * each[order.index(k)] for k in range(3)] for each in (q, qd))
-            planar = 0.5 * (v[0] ** 2 + (2.0 + cg.sin(x[0])) * v[1] ** 2) + v[1] * v[2] * cg.cos(x[0] * x[2])
-            return planar + 3.0 * v[2] ** 2 - x[0] ** 2 * x[1] + x[2] ** 4
-
-        return dyn.System(lagrangian, [f"x{k}" for k in order])
-
-    q, qd, plain, order = np.array([0.3, -0.4, 1.1]), np.array([0.7, 0.2, -0.5]), np.ones(3), [2, 0, 1]
-    expected = dyn.linearize(other(plain, [0, 1, 2]), q, qd, form="momentum")[0]
-    scale = np.array([2.0**40, 2.0**-30, 2.0**9])
-    found = dyn.linearize(other(scale, [0, 1, 2]), q / scale, qd / scale, form="momentum")[0]
-    units = np.concatenate([scale, 1.0 / scale])
-    assert np.array_equal(found * units[:, None] / units, expected)
-    found = dyn.linearize(other(plain, order), q[order], qd[order], form="momentum")[0]
-    places = [*order, *[3 + k for k in order]]
-    assert np.abs(found - expected[np.ix_(places, places)]).max() <= EQUAL * np.abs(expected).max()
 
 
 def test_of_a_chain_it_keeps_the_digits_whatever_the_condition_of_its_mass_matrix() -> None:
@@ -211,25 +135,6 @@ def test_of_a_chain_it_keeps_the_digits_whatever_the_condition_of_its_mass_matri
     for rows in (slice(n), slice(n, None)):
         for columns in (slice(n), slice(n, None)):
             assert wrong[rows, columns].max() < 5e-13 * np.abs(expected[rows, columns]).max()
-
-
-@pytest.mark.parametrize(("name", "columns"), [("arm", False), ("planar", True), ("rotor", True)])
-def test_many_states_are_linearized_as_one(name: str, columns: bool, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Written out, and column by column; and where nothing brakes, J A symmetric to the last bit in machine code."""
-    monkeypatch.setattr(many, "WRITTEN_OUT", 0 if columns else many.WRITTEN_OUT)
-    monkeypatch.setattr(many, "MATRICES", 3)
-    model, rng = SMALL[name](), np.random.default_rng(0)
-    system = as_system(model)
-    q = np.array(system.kinematics.neutral) + rng.uniform(-1.0, 1.0, (5, system.nq))
-    qd = rng.normal(size=(5, system.n))
-    a, b = dyn.linearize_many(model, q, qd, t=0.3, form="momentum")
-    for k in range(len(q)):
-        expected, by_tau = dyn.linearize(model, q[k], qd[k], t=0.3, form="momentum")
-        assert np.abs(a[k] - expected).max() < 1e-13 * np.abs(expected).max()
-        assert np.array_equal(b[k], by_tau)
-        if name == "arm":
-            matrix = along(system) @ a[k]
-            assert np.array_equal(matrix, matrix.T)
 
 
 def bead(q: Any, qd: Any, t: Any) -> cg.Node:

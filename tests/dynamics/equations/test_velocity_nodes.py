@@ -7,9 +7,10 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
-from cgraph.core.builder import Builder, folded
+from cgraph.core.builder import folded
 from cgraph.core.traversal import topological
-from dynamics.equations.equations_of_motion import bias
+from cgraph.extend import Builder
+from dynamics import bias
 from dynamics.equations.velocity_nodes import velocity_nodes
 from tests import high_precision
 

@@ -2,6 +2,7 @@
 
 import itertools
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
@@ -12,8 +13,11 @@ from pytest import approx, mark, raises
 import cgraph as cg
 import dynamics as dyn
 from cgraph.extend import Call, Map
-from dynamics.integrators import METHODS, Method, Problem, Step, measured
+from dynamics import METHODS
+from dynamics.integrators import Method, Problem, Step, measured
 from tests.dynamics.planet import PERIHELION, planet, position
+from tests.each_row import each_row
+from tests.registered import registered
 
 OWN, EQUAL = "own", "own, equal"
 DRIVEN = dyn.OdeSystem(lambda x, t, p: [x[1], cg.cos(t) - p["k"] * cg.sin(x[0])], ["a", "b"], {"k": 2.0})
@@ -46,9 +50,9 @@ def parabola(problem: Problem) -> Step:
 
 
 @pytest.fixture(autouse=True)
-def own(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(METHODS, OWN, Method(2, parabola, adaptive=True, degree=2))
-    monkeypatch.setitem(METHODS, EQUAL, Method(2, parabola))
+def own() -> Iterator[None]:
+    with registered(METHODS, **{OWN: Method(2, parabola, adaptive=True, degree=2), EQUAL: Method(2, parabola)}):
+        yield
 
 
 def exact(k: float = 2.0, start: Any = START) -> Any:
@@ -91,52 +95,51 @@ def test_derivatives(method: str) -> None:
     assert result["k"] == approx((loss(exact(2.0 + d)) - loss(exact(2.0 - d))) / (2 * d), rel=1e-3)
 
 
-def test_without_dense_output_of_its_own_it_is_the_cubic_through_states_and_rates(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_without_dense_output_of_its_own_it_is_the_cubic_through_states_and_rates() -> None:
     method = Method(2, lambda problem: replace(parabola(problem), dense=()), adaptive=True)
-    monkeypatch.setitem(METHODS, "cubic", method)
     times = np.linspace(0.0, 1.0, 14)
-    runs = [
-        dyn.simulate(planet(), *PERIHELION, 1.0, name, rtol=1e-7, atol=1e-7, t_eval=times) for name in (OWN, "cubic")
-    ]
+    with registered(METHODS, cubic=method):
+        runs = [
+            dyn.simulate(planet(), *PERIHELION, 1.0, name, rtol=1e-7, atol=1e-7, t_eval=times)
+            for name in (OWN, "cubic")
+        ]
     assert [run.stats.steps for run in runs] == [runs[0].stats.steps] * 2
     truth = np.array([position(t) for t in times])
     assert abs(runs[1].q - truth).max() < 1e-4
     assert abs(runs[1].q - runs[0].q)[1:-1].max() < 1e-4
 
 
-@mark.parametrize("lacking", [{"error": ()}, {"estimate": 0}])
-def test_a_step_without_an_estimate_cannot_be_chosen(lacking: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(METHODS, "blind", Method(2, lambda problem: replace(parabola(problem), **lacking), True))
-    with raises(ValueError, match="needs their error"):
-        dyn.simulate(DRIVEN, START, None, 1.0, "blind")
+NOTHING_NEW = [Map(cg.Graph([cg.variable("x")], {"y": cg.variable("x")}), ("x",), ("x",))]
 
 
-@mark.parametrize("body", [[], [Map(cg.Graph([cg.variable("x")], {"y": cg.variable("x")}), ("x",), ("x",))]])
-def test_a_step_that_does_not_make_x_new_is_refused(body: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(METHODS, EQUAL, Method(2, lambda problem: replace(parabola(problem), body=body)))
-    for run in (dyn.simulate, lambda *given: dyn.gradient(given[0], lambda x, t: x[0], *given[1:])):
-        with raises(ValueError, match="a step has to write register 'x_new'"):
-            run(DRIVEN, START, None, 1.0, EQUAL)
+@each_row(
+    ("changes", "message", "adaptive"),
+    [
+        ({"error": ()}, "needs their error", True),
+        ({"estimate": 0}, "needs their error", True),
+        ({"body": []}, "a step has to write register 'x_new'", False),
+        ({"body": NOTHING_NEW}, "a step has to write register 'x_new'", False),
+        ({"lengths": {"status": 1}}, "a step cannot have a register 'status'", True),
+        ({"lengths": {"count": 1}}, "a step cannot have a register 'count'", False),
+    ],
+)
+def test_a_step_that_cannot_be_is_refused(changes: dict[str, Any], message: str, adaptive: bool) -> None:
+    def wrong(problem: Problem) -> Step:
+        right = parabola(problem)
+        return replace(right, **changes | {"lengths": right.lengths | changes.get("lengths", {})})
 
-
-@mark.parametrize(("taken", "method"), [("status", OWN), ("count", EQUAL)])
-def test_a_register_of_the_run_s_name_is_refused(taken: str, method: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    def clash(problem: Problem) -> Step:
-        step = parabola(problem)
-        return replace(step, lengths={**step.lengths, taken: 1})
-
-    monkeypatch.setitem(METHODS, method, replace(METHODS[method], step=clash))
-    with raises(ValueError, match=f"a step cannot have a register '{taken}'"):
-        dyn.simulate(DRIVEN, START, None, 1.0, method, dt=None if method == OWN else 0.1)
+    with registered(METHODS, wrong=Method(2, wrong, adaptive)):
+        for run in (dyn.simulate, lambda *given: dyn.gradient(given[0], lambda x, t: x[0], *given[1:])):
+            with raises(ValueError, match=message):
+                run(DRIVEN, START, None, 1.0, "wrong")
 
 
 @mark.parametrize("name", ADAPTIVE)
-def test_equal_steps_of_a_method_that_chooses_them(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_equal_steps_of_a_method_that_chooses_them(name: str) -> None:
     """Its order, of the one step; Taylor's method then takes the highest that it has."""
-    monkeypatch.setitem(METHODS, "equal", Method(METHODS[name].order, METHODS[name].step))
-    runs = [dyn.simulate(DRIVEN, START, None, 1.0, "equal", dt=dt, estimate_error=False).q[-1] for dt in (0.25, 0.125)]
+    given: dict[str, Any] = {"method": "equal", "estimate_error": False}
+    with registered(METHODS, equal=Method(METHODS[name].order, METHODS[name].step)):
+        runs = [dyn.simulate(DRIVEN, START, None, 1.0, dt=dt, **given).q[-1] for dt in (0.25, 0.125)]
     errors = [abs(each - exact()).max() for each in runs]
     order = math.log2(errors[0] / errors[1]) if errors[1] > 1e-13 else math.inf
     assert order > METHODS[name].order - 0.5
@@ -144,16 +147,11 @@ def test_equal_steps_of_a_method_that_chooses_them(name: str, monkeypatch: pytes
 
 
 @mark.parametrize("name", [OWN, *ADAPTIVE])
-def test_equal_steps_see_forces_that_change_between_them(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_equal_steps_see_forces_that_change_between_them(name: str) -> None:
     """The slope at the end of a step is not the first of the next, whose forces are others."""
-    monkeypatch.setitem(METHODS, "equal", Method(METHODS[name].order, METHODS[name].step))
     arm = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 + cg.cos(q[0]), ["a"])
     forces = {"tau": dyn.SampledController(lambda q, qd, t: [-40.0 * q[0] - 4.0 * qd[0]], 0.1)}
-    runs = [
-        dyn.simulate(arm, [1.0], [0.0], 1.0, method, **options, **forces).q[-1, 0]
-        for method, options in (
-            ("dop853", {"rtol": 1e-12, "atol": 1e-12}),
-            ("equal", {"dt": 2e-3, "estimate_error": False}),
-        )
-    ]
-    assert runs[1] == approx(runs[0], abs=1e-5)  # of a parabola; a slope from before the change is off by 1e-3
+    exact = dyn.simulate(arm, [1.0], [0.0], 1.0, "dop853", rtol=1e-12, atol=1e-12, **forces).q[-1, 0]
+    with registered(METHODS, equal=Method(METHODS[name].order, METHODS[name].step)):
+        run = dyn.simulate(arm, [1.0], [0.0], 1.0, "equal", dt=2e-3, estimate_error=False, **forces)
+    assert run.q[-1, 0] == approx(exact, abs=1e-5)  # of a parabola; a slope from before the change is off by 1e-3

@@ -1,6 +1,7 @@
 """Tableaus: the numbers of methods meet the conditions of their orders, and a new tableau is a new method."""
 
 import math
+from collections.abc import Iterator
 from fractions import Fraction
 from functools import partial
 from typing import Any
@@ -11,13 +12,15 @@ from pytest import approx, mark
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.integrators import METHODS, runge_kutta
+from dynamics import METHODS
+from dynamics.integrators import runge_kutta
 from dynamics.integrators.dop853 import DOP853
 from dynamics.integrators.radau import _A, _POWERS, _T, _T_INVERSE
 from dynamics.integrators.rosenbrock import RODAS5P
 from dynamics.integrators.symplectic_tableaus import PARTITIONED, Partitioned, gauss
 from dynamics.integrators.tableau import TABLEAUS, Tableau
 from tests.dynamics.planet import PERIHELION, planet, position
+from tests.registered import registered
 
 FITTED_ORDER = 0.05  # of a fitted order: what the next order adds at these steps
 EXACT = Fraction(1, 10**40)
@@ -141,15 +144,21 @@ def test_the_numbers_of_rodas() -> None:
         assert run.q[-1, 0] == approx(1.0 / (power + 1), abs=COEFFICIENTS), power
 
 
-def test_a_tableau_alone_is_a_method_of_equal_steps(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(METHODS, "ralston", runge_kutta(RALSTON))
-    ends = [dyn.simulate(planet(), *PERIHELION, 1.0, "ralston", dt=h).q[-1] for h in (1e-2, 5e-3)]
+def test_a_tableau_alone_is_a_method_of_equal_steps() -> None:
+    with registered(METHODS, ralston=runge_kutta(RALSTON)):
+        ends = [dyn.simulate(planet(), *PERIHELION, 1.0, "ralston", dt=h).q[-1] for h in (1e-2, 5e-3)]
     errors = [np.abs(end - position(1.0)).max() for end in ends]
     assert math.log2(errors[0] / errors[1]) == approx(RALSTON.order, abs=FITTED_ORDER)
 
 
-def test_a_tableau_with_an_estimate_chooses_its_steps_and_has_dense_output(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(METHODS, "bs23", runge_kutta(BOGACKI_SHAMPINE))
+@pytest.fixture
+def own() -> Iterator[None]:
+    with registered(METHODS, bs23=runge_kutta(BOGACKI_SHAMPINE)):
+        yield
+
+
+@pytest.mark.usefixtures("own")
+def test_a_tableau_with_an_estimate_chooses_its_steps_and_has_dense_output() -> None:
     options: dict[str, Any] = {"rtol": 1e-8, "atol": 1e-8, "backend": "auto"}
     plain = dyn.simulate(planet(), *PERIHELION, 1.0, "bs23", **options)
     times = np.linspace(0.0, 1.0, 101)

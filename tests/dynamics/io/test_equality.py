@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from pytest import approx, importorskip, mark, param, raises, warns
+from pytest import approx, importorskip, mark, raises, warns
 
 import cgraph as cg
 import dynamics as dyn
+from dynamics import Mechanism, MechanismError
 from dynamics.equations.states.consistent_state import nearest_state
-from dynamics.multibody.trees.mechanism import Mechanism, MechanismError
 from tests.slow import slow
 
 mujoco = importorskip("mujoco")
@@ -35,13 +35,13 @@ CONSTRAINTS = {
     "joints": '<joint joint1="jb" joint2="ja" polycoef="0.1 -0.4 0.3 0.2 -0.1"/><joint joint1="jz" joint2="jd"/>',
     "one joint": '<joint joint1="ja" polycoef="0.1 3 4 5 6"/>',
     "connect": '<connect body1="tool" body2="d" anchor="0.1 0.2 0.3"/>',
-    "connect sites": '<connect site1="on tool" site2="on c"/>',
     "connect a site of the world": '<connect site1="world site" site2="on c"/>',
     "weld of the world": '<weld body1="world" body2="c" relpose="0.1 0.2 0.8 1 0.3 0.5 0"/>',
-    "weld sites": '<weld site1="on tool" site2="on c"/>',
     "weld of points": '<weld body1="b" body2="c" anchor="0.3 0.1 0.2" torquescale="0"/>',
 }
 OTHERS = {
+    "connect sites": '<connect site1="on tool" site2="on c"/>',
+    "weld sites": '<weld site1="on tool" site2="on c"/>',
     "weld": '<weld body1="b2" body2="d" anchor="0.3 0.1 0.2" torquescale="0.2"/>',
     "connect to the world": '<connect body1="d" anchor="0.1 0.2 0.3"/>',
     "weld at origins": '<weld body1="b" body2="d"/>',
@@ -122,16 +122,11 @@ def test_what_is_soft_inactive_or_off_is_said() -> None:
 @mark.parametrize(
     ("equality", "message"),
     [
-        param(
+        (
             GEAR + GEAR.replace('"gear"', '"other"').replace("/>", ' polycoef="0.1 1 0 0 0"/>'),
             "^the given text: the constraints cannot be met: no state was seen where '(gear|other)' is 0$",
-            id="together",
         ),
-        param(
-            '<connect name="x" site1="on c" site2="also on c"/>',
-            "^equality constraint x holds the body 'c' to itself$",
-            id="itself",
-        ),
+        ('<connect name="x" site1="on c" site2="also on c"/>', "^equality constraint x holds the body 'c' to itself$"),
     ],
 )
 def test_what_cannot_be_closed_is_one_sentence(equality: str, message: str) -> None:

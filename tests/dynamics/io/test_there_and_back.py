@@ -12,10 +12,10 @@ import pytest
 from pytest import mark, raises
 
 import dynamics as dyn
+from dynamics import Body, Joint, Loop, Mechanism, MechanismError
 from dynamics.io.mujoco_twin import MujocoTwin
 from dynamics.io.stand_ins import STAND_IN
-from dynamics.multibody.loops import Loop
-from dynamics.multibody.trees.mechanism import WORLD, Body, Joint, Mechanism, MechanismError
+from dynamics.multibody.trees.mechanism import WORLD
 from tests.dynamics.mechanisms import FAMILIES, random_inertia, random_rotation
 from tests.each_row import each_row
 

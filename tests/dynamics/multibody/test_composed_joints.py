@@ -13,7 +13,7 @@ from pytest import importorskip, mark, raises
 import cgraph as cg
 import dynamics as dyn
 from dynamics.multibody.algebra.spatial import rotation, unit
-from tests.dynamics.mechanisms import random_body, random_mechanism
+from tests.dynamics.mechanisms import random_body
 from tests.dynamics.models import Array, error, run, states
 from tests.slow import slow
 from tests.tolerances import LONG_SUM, TORQUES
@@ -93,32 +93,6 @@ def test_a_plane_across_z_has_the_axes_x_and_y() -> None:
     puck = dyn.Mechanism([dyn.Body("puck", dyn.Joint("planar", damping=0.5), mass=1.0, inertia=(1.0, 1.0, 1.0))])
     assert placed(puck, "puck", [0.3, 0.4, 0.0])[1].tolist() == [0.3, 0.4, 0.0]
     assert puck.system.damping == (0.5, 0.5, 0.5)
-
-
-@mark.parametrize("kinds", [("cylindrical", "screw"), ("universal",), ("planar", "revolute")])
-def test_their_newton_euler_bias_is_lagrange_s(kinds: tuple[str, ...]) -> None:
-    mechanism = random_mechanism(4, kinds, 2)
-    system, given = mechanism.system, states(mechanism, 5)
-    derived = dyn.System(lambda q, qd, t: list(system.partial_lagrangians), system.coordinates)
-    assert error(run(dyn.bias(mechanism), given), run(dyn.bias(derived), given)) < TORQUES
-
-
-@mark.parametrize("kind", KINDS)
-def test_locked_it_is_the_weld_that_it_stands_at(kind: str) -> None:
-    mechanism, count = on_joint(kind), len(KINDS[kind])
-    at = [0.3, -0.5, 0.8][:count]
-    locked = mechanism.lock("b1", at)
-    assert locked.coordinates == ("b0", "b2")
-    for ours, theirs in zip(placed(locked, "b2", [0.2, 0.9]), placed(mechanism, "b2", [0.2, *at, 0.9]), strict=True):
-        assert np.abs(ours - theirs).max() < LONG_SUM
-    q, qd = mechanism.map_state_from(locked, [0.2, 0.9], [1.0, 2.0])
-    assert q.tolist() == [0.2, *at, 0.9]
-    assert qd.tolist() == [1.0, *[0.0] * count, 2.0]
-    assert mechanism.lock("b1").unlock("b1").coordinates == mechanism.coordinates
-    with raises(dyn.MechanismError, match=rf"joint of body 'b1': .* must be \({count},\) finite numbers"):
-        _ = mechanism.lock("b1", 0.3).coordinates
-    with raises(dyn.MechanismError, match=r"there is no body 'b1\.shift' to lock"):
-        _ = on_joint("cylindrical").lock("b1.shift", 0.1).coordinates
 
 
 @mark.parametrize("kind", KINDS)

@@ -1,20 +1,20 @@
-"""Forces on bodies: against MuJoCo, virtual work by differences, gravity by another name, and what cannot be one."""
+"""Forces on bodies: virtual work by differences, what they are made of, and what cannot be one."""
 
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import pytest
 from pytest import approx, mark, raises
 
 import cgraph as cg
 import dynamics as dyn
 from dynamics import Body, Force, Joint, Mechanism, MechanismError
 from dynamics.multibody.algebra.spatial import from_quaternion
-from tests.dynamics.mechanisms import FAMILIES, turned_arm
+from tests.dynamics.mechanisms import FAMILIES, PLAIN, turned_arm
 from tests.dynamics.models import Array, at, error, inputs, run, states
 from tests.slow import slow
 from tests.tolerances import EQUATIONS, SHORT_SUM, SOLVED
@@ -62,55 +62,40 @@ def work(graphs: list[cg.Graph], q: Array, value: Array, torque: Array, step: fl
 # --- by other means
 
 
+MODELS: dict[str, Callable[[], Mechanism]] = {name: lambda make=make: make(7) for name, make in FAMILIES.items()} | {
+    "a turned slide across two axes": lambda: Mechanism(
+        [Body("cart", Joint("prismatic", (1.0, 1.0, 0.0), orientation=from_quaternion([1, 2, 3, 4])), mass=1.0)]
+    )
+}
+
+
 @mark.parametrize("frame", ["world", "body"])
-@mark.parametrize("family", ["mixed", "welded", *slow("serial", "branched")])
-def test_a_force_does_the_virtual_work_of_its_point(family: str, frame: str) -> None:
-    mechanism = FAMILIES[family](7)
-    q = states(mechanism, 1)["q"][0]
-    for body in ("b0", "b4", mechanism.bodies[-1].name):
+@mark.parametrize("name", [*[name for name in MODELS if name not in PLAIN], *slow(*PLAIN)])
+def test_a_force_does_the_virtual_work_of_its_point(name: str, frame: str) -> None:
+    """Of numbers, and of nodes of the state and the time, whose own dependence is not differentiated."""
+    mechanism, (first, speed, t) = MODELS[name](), cg.variables("q0 qd0 t")
+    state = at(states(mechanism, 1), 0)
+    q, value = state["q"], [VALUE[0] - 0.3 * speed, VALUE[1] + 0.5 * cg.sin(first), VALUE[2] * t]
+    pushes = VALUE - [0.3 * state["qd"][0], -0.5 * np.sin(q[0]), (1.0 - state["t"]) * VALUE[2]]
+    for body in {
+        mechanism.bodies[0].name,
+        mechanism.bodies[len(mechanism.bodies) // 2].name,
+        mechanism.bodies[-1].name,
+    }:
         graphs = points(mechanism, body)
         axes = pose(graphs, q)[1] if frame == "body" else np.eye(3)
-        expected = work(graphs, q, axes @ VALUE, axes @ TORQUE)
-        ours = generalized(pushed(mechanism, body, frame), at(states(mechanism, 1), 0))
-        assert np.abs(ours - expected).max() < DIFFERENCES * np.abs(expected).max()
+        for given, force in ((VALUE, VALUE), (value, pushes)):
+            expected = work(graphs, q, axes @ force, axes @ TORQUE)
+            ours = generalized(pushed(mechanism, body, frame, value=given), state)
+            assert np.abs(ours - expected).max() < DIFFERENCES * np.abs(expected).max(), body
 
 
-@mark.parametrize("family", ["mixed", "welded", *slow("serial", "branched")])
-def test_a_force_at_every_centre_of_mass_is_gravity(family: str) -> None:
-    """m a at the centre of each body, welded ones too, is what a further gravity a does; in every function."""
-    mechanism, extra = FAMILIES[family](4), np.array([1.0, -2.0, 3.0])
-    heavier = replace(mechanism, gravity=np.asarray(mechanism.gravity) + extra)
-    pulled = replace(mechanism, forces=[Force(b.name, b.mass * extra, b.center) for b in mechanism.bodies])
+def test_accelerations_take_the_force_that_torques_do() -> None:
+    mechanism = pushed(FAMILIES["welded"](4), "b3")
     given = states(mechanism, 5)
-    for make in (dyn.inverse_dynamics, dyn.forward_dynamics, lambda m: dyn.forward_dynamics(m, "dense")):
-        assert error(run(make(pulled), given), run(make(heavier), given)) < ROUNDING
-    start = np.full((2, mechanism.system.n), 0.1)
-    ours, theirs = (dyn.simulate(each, *start, 0.1, "rk4", dt=0.01).q[-1] for each in (pulled, heavier))
-    assert error(ours, theirs) < ROUNDING
-
-
-def test_a_spring_to_a_fixed_point_has_the_slope_of_its_energy() -> None:
-    """A force that depends on q: its own dependence is not differentiated."""
-    arm, anchor, stiffness = turned_arm(4), (0.4, -0.1, 0.8), 7.0
-    place = arm.position("link 4", HAND)
-    stretch = [p - a for p, a in zip(place.outputs.values(), anchor, strict=True)]
-    sprung = replace(arm, forces=[Force("link 4", [-stiffness * s for s in stretch], HAND)])
-    energy = cg.Graph(arm.system.q, {"V": 0.5 * stiffness * (stretch[0] ** 2 + stretch[1] ** 2 + stretch[2] ** 2)})
-    given = at(states(arm, 1), 0)
-    slope = run(cg.gradient(energy), given)
-    assert generalized(sprung, given) == approx(-slope, rel=EQUATIONS)
-
-
-def test_a_drag_takes_the_power_it_says() -> None:
-    """A force of the velocity: f . v = -c v . v, with v the rate of the position."""
-    arm = turned_arm(3)
-    place = cg.jvp(arm.position("link 3", HAND))
-    rename = dict(zip([node.name for node in place.inputs], [*arm.system.q, *arm.system.qd], strict=True))
-    velocity = list(place(*[rename[node.name] for node in place.inputs]).values())
-    dragged = replace(arm, forces=[Force("link 3", [-0.3 * v for v in velocity], HAND)])
-    given = at(states(arm, 1), 0)
-    speed = run(cg.Graph([*arm.system.q, *arm.system.qd], dict(zip("xyz", velocity, strict=True))), given)
-    assert generalized(dragged, given) @ given["qd"] == approx(-0.3 * speed @ speed, rel=EQUATIONS)
+    for method in ("auto", "recursive", "dense"):
+        qdd = run(dyn.forward_dynamics(mechanism, method), given)
+        assert error(run(dyn.inverse_dynamics(mechanism), given | {"qdd": qdd}), given["tau"]) < AGREEMENT
 
 
 def test_a_pendulum_pushed_at_its_tip_by_hand() -> None:
@@ -126,76 +111,6 @@ def test_a_pendulum_pushed_at_its_tip_by_hand() -> None:
     assert graph.evaluate({"q0": q, "qd0": 0.3, "qdd0": 1.5, "fx": 3.0})["tau0"] == approx(expected, rel=SHORT_SUM)
     place = pendulum.position("rod", tip).evaluate({"q0": q})
     assert list(place.values()) == approx([-0.8 * np.sin(q), 0.0, -0.8 * np.cos(q)], rel=SHORT_SUM)
-
-
-# --- against MuJoCo
-
-
-MODEL = """<mujoco><option gravity="1 2 -9"><flag contact="disable"/></option><worldbody>
-<body name="post" pos="0.3 0.1 0.2" quat="1 2 3 4">
-  <body name="shoulder" pos="0.1 0 0.3" euler="10 20 30">
-    <joint axis="0 1 1" damping="0.3"/><geom size="0.1" pos="0.1 0 0"/>
-    <body name="rail" pos="0.2 0.1 0">
-      <joint type="slide" axis="1 0 2" stiffness="3"/><geom type="box" size="0.1 0.2 0.3"/>
-      <body name="elbow" pos="0 0 0.4" euler="0 90 0">
-        <joint axis="1 2 3" pos="0.1 0.2 0"/><geom size="0.1" pos="0 0.3 0"/>
-        <body name="hand" pos="0 0.2 0.1" euler="40 0 50"><geom type="box" size="0.1 0.05 0.02" pos="0.1 0 0"/></body>
-      </body>
-      <body name="finger"><joint axis="0 0 1"/><geom size="0.05" pos="0.3 0 0" mass="0.4"/></body>
-    </body>
-  </body>
-</body></worldbody></mujoco>"""
-
-
-@mark.parametrize("body", ["post", "shoulder", "rail", "elbow", "hand", "finger"])
-@mark.parametrize("frame", ["world", "body"])
-def test_mujoco_s_applied_force_agrees(body: str, frame: str) -> None:
-    """`mj_applyFT` at a point, and `xfrc_applied` at the centre of mass, on welded bodies too."""
-    mujoco = pytest.importorskip("mujoco")
-    model = mujoco.MjModel.from_xml_string(MODEL)
-    data, mechanism = mujoco.MjData(model), dyn.load_mjcf(model)
-    free = pushed(mechanism, body, frame, value=("fx", "fy", "fz"), torque=("mx", "my", "mz"))
-    centre = replace(free, forces=[replace(free.forces[0], at=_center(mechanism, body))])
-    graphs = [dyn.forward_dynamics(each) for each in (free, centre)]
-    compiled = [cg.compile(graph, "python") for graph in graphs]
-    place = cg.compile(mechanism.position(body, HAND), "python")
-    index = model.body(body).id
-    given_states = states(mechanism, 20)
-    for row in range(20):
-        state = at(given_states, row)
-        rng = np.random.default_rng(row)
-        value, torque = rng.normal(size=(2, 3))
-        given = [[*state["q"], *state["qd"], *state["tau"], *(_ordered(graph, value, torque))] for graph in graphs]
-        mujoco.mj_resetData(model, data)
-        data.qpos[:], data.qvel[:] = state["q"], state["qd"]
-        mujoco.mj_forward(model, data)
-        axes = data.xmat[index].reshape(3, 3)
-        point = data.xpos[index] + axes @ HAND if body != "elbow" else data.xpos[index] + axes @ _shifted(HAND)
-        assert place(state["q"]) == approx(point, abs=EQUATIONS)
-        if frame == "body":
-            value, torque = axes @ value, axes @ torque
-        data.qfrc_applied[:] = state["tau"]
-        mujoco.mj_applyFT(model, data, value, torque, point, index, data.qfrc_applied)
-        mujoco.mj_forward(model, data)
-        assert error(compiled[0](given[0]), np.array(data.qacc)) < AGREEMENT
-        data.qfrc_applied[:] = state["tau"]
-        data.xfrc_applied[index] = [*value, *torque]
-        mujoco.mj_forward(model, data)
-        assert error(compiled[1](given[1]), np.array(data.qacc)) < AGREEMENT
-
-
-def _ordered(graph: cg.Graph, value: Array, torque: Array) -> list[float]:
-    named = dict(zip(("fx", "fy", "fz", "mx", "my", "mz"), [*value, *torque], strict=True))
-    return [named[name] for name in graph.input_names if name in named]
-
-
-def _center(mechanism: Mechanism, body: str) -> Any:
-    return next(each.center for each in mechanism.bodies if each.name == body)
-
-
-def _shifted(point: Any) -> Array:
-    """A point of the elbow, whose frame is at its joint, in MuJoCo's frame of it."""
-    return np.asarray(point) + (0.1, 0.2, 0.0)
 
 
 # --- graphs
@@ -273,18 +188,6 @@ def test_every_formulation_takes_the_force_off(formulation: str) -> None:
     assert difference == approx(expected, rel=SOLVED)
 
 
-def test_a_turned_body_s_axes_turn_its_force() -> None:
-    """A body frame given by a quaternion: the two frames differ by the rotation at q = 0."""
-    turn = from_quaternion([1.0, 2.0, 3.0, 4.0])
-    joint = Joint("prismatic", (1.0, 1.0, 0.0), orientation=turn)
-    cart = Mechanism([Body("cart", joint, mass=1.0)])
-    given = at(states(cart, 1), 0)
-    in_body = generalized(pushed(cart, "cart", "body"), given)
-    assert in_body == approx([VALUE @ (1.0, 1.0, 0.0) / np.sqrt(2.0)], rel=SHORT_SUM)
-    in_world = generalized(pushed(cart, "cart"), given)
-    assert in_world == approx([VALUE @ turn @ (1.0, 1.0, 0.0) / np.sqrt(2.0)], rel=SHORT_SUM)
-
-
 def test_bodies_and_forces_may_come_from_iterators() -> None:
     arm = turned_arm(3)
     read = Mechanism(iter(arm.bodies), forces=iter([Force("link 3", VALUE, HAND)]))
@@ -293,13 +196,6 @@ def test_bodies_and_forces_may_come_from_iterators() -> None:
     for each in (read, replace(read)):
         assert error(run(dyn.inverse_dynamics(each), given), run(dyn.inverse_dynamics(listed), given)) < ROUNDING
     assert len(read.bodies) == 3
-
-
-def test_components_whose_rates_are_one_node_add_up() -> None:
-    """Of a slide along x and y alike, both velocities are the same node."""
-    cart = Mechanism([Body("cart", Joint("prismatic", (1.0, 1.0, 0.0)), mass=1.0)])
-    felt = generalized(pushed(cart, "cart"), at(states(cart, 1), 0))
-    assert felt == approx([(VALUE[0] + VALUE[1]) / np.sqrt(2.0)], rel=SHORT_SUM)
 
 
 # --- what cannot be

@@ -13,12 +13,12 @@ from pytest import approx, mark, param, raises
 import cgraph as cg
 import dynamics as dyn
 from cgraph import Graph
+from dynamics import Body, Joint, Mechanism, MechanismError
 from dynamics.multibody.algebra.spatial import from_quaternion
-from dynamics.multibody.trees.mechanism import Body, Joint, Mechanism, MechanismError
-from dynamics.verification.certificate import certify
-from tests.dynamics.mechanisms import FAMILIES, random_body, random_inertia, random_rotation
-from tests.dynamics.models import Array
+from tests.dynamics.mechanisms import FAMILIES, random_body, random_tree
+from tests.dynamics.models import Array, run as values
 from tests.dynamics.parametrized import parametrized
+from tests.each_row import each_row
 from viz.models.inspection import inspection
 
 ROUNDING = 1e-12  # of the largest of its kind, in some hundred sums
@@ -47,28 +47,11 @@ def slow_cases() -> list[Any]:
     return [param(base, seed, marks=mark.slow) for base in ("revolute", "ball", "free") for seed in range(4, 40)]
 
 
-def tree(seed: int, base: str = "revolute", count: int = 5) -> Mechanism:
-    """A tree of all types of joints and welds, on that one."""
-    rng = np.random.default_rng(seed)
-    bodies = [Body("b0", Joint(base), mass=1.5, center=0.2 * rng.normal(size=3), inertia=random_inertia(rng))]
-    for i in range(1, count):
-        kind = str(rng.choice(["ball", "revolute", "prismatic", "fixed", "fixed"]))
-        several = {"stiffness": 0.0, "armature": 0.1} if kind == "ball" else {}
-        body = random_body(f"b{i}", kind, f"b{rng.integers(max(0, i - 2), i)}", rng)
-        joint = replace(body.joint, orientation=random_rotation(rng), **several)
-        bodies.append(replace(body, joint=joint))
-    return Mechanism(bodies, 5.0 * rng.normal(size=3))
-
-
 def state(mechanism: Mechanism, seed: int = 0) -> dict[str, float]:
     system, rng = mechanism.system, np.random.default_rng(seed)
     sizes = {"q": system.nq, "qd": system.n, "qdd": system.n, "tau": system.n}
     drawn = {f"{name}{i}": float(x) for name, size in sizes.items() for i, x in enumerate(rng.normal(size=size))}
     return drawn | mechanism.parameter_values
-
-
-def values(graph: Graph, at: dict[str, float]) -> Array:
-    return np.array(list(graph.evaluate({name: at[name] for name in graph.input_names}).values()))
 
 
 def same(a: Graph, b: Graph) -> bool:
@@ -85,7 +68,7 @@ def near(a: Array, b: Array) -> bool:
 )
 def test_every_graph_is_that_of_the_numbers(base: str, seed: int) -> None:
     """Welded bodies among them: masses, centers and parallel axes are then nodes."""
-    numbers = tree(seed, base, 3 if seed < 4 else 5)
+    numbers = random_tree(seed, 3 if seed < 4 else 5, base=base)
     mechanism = parametrized(numbers, seed, 0.7)
     at = state(mechanism, seed)
     for name, graph in GRAPHS.items():
@@ -210,11 +193,6 @@ def test_simulate_many_varies_them() -> None:
         assert many.q[k, -1] == approx(alone.q[-1], rel=ROUNDING)
 
 
-def test_the_certificate_holds() -> None:
-    certificate = certify(pendulums(), states=3)
-    assert certificate.passed, str(certificate)
-
-
 def test_pruning_takes_their_parameters_away() -> None:
     result = dyn.prune(pendulums(), effects=["armature", "forces"], values={"load": 0.0})
     kept = {"mass", "center", "length", "inertia", "load", "rotor"}
@@ -285,52 +263,38 @@ def test_they_are_read_by_their_names() -> None:
 
 ROD: dict[str, Any] = {"joint": Joint("revolute"), "inertia": (1.0, 1.0, 1.0)}
 BAD = [
-    param({"mass": "m"}, {}, "body 'rod': mass has the parameter 'm', which needs a value in `parameters`", id="none"),
-    param({"mass": cg.variable("q0")}, {}, "body 'rod': mass has the parameter 'q0', which needs a value", id="state"),
-    param(
-        {"mass": "m"},
-        {"m": -1.0},
-        "body 'rod': mass must be finite and at least 0, got -1.0 kg, where m = -1.0",
-        id="mass",
-    ),
-    param(
+    ({"mass": "m"}, {}, "body 'rod': mass has the parameter 'm', which needs a value in `parameters`"),
+    ({"mass": cg.variable("q0")}, {}, "body 'rod': mass has the parameter 'q0', which needs a value"),
+    ({"mass": "m"}, {"m": -1.0}, "body 'rod': mass must be finite and at least 0, got -1.0 kg, where m = -1.0"),
+    (
         {"mass": 1.0 - cg.variable("m")},
         {"m": 3.0},
         "body 'rod': mass must be finite and at least 0, got -2.0 kg, where m = 3.0",
-        id="formula",
     ),
-    param(
+    (
         {"inertia": ("a", "b", 2.0)},
         {"a": -1.0, "b": 2.0},
         "body 'rod': inertia must not be negative, its principal moments are [-1.0, 2.0, 2.0], where a = -1.0, b = 2.0",
-        id="inertia",
     ),
-    param(
+    (
         {"center": (0.0, 1.0 / cg.variable("a"), 0.0)},
         {"a": 0.0},
         "body 'rod': center must be (3,) finite numbers, got [0.0, inf, 0.0], where a = 0.0",
-        id="infinite",
     ),
-    param(
+    (
         {"joint": Joint("revolute", damping="c")},
         {"c": -1.0},
         "body 'rod': damping must be finite and at least 0, got -1.0, where c = -1.0",
-        id="damping",
     ),
-    param(
-        {"joint": Joint("free", stiffness="k")},
-        {"k": 1.0},
-        "body 'rod': a joint of the kind 'free' has no spring",
-        id="free",
-    ),
-    param({"center": ("a", 0.0)}, {"a": 1.0}, "body 'rod': center must be (3,) finite numbers, got", id="shape"),
-    param({"mass": "a b"}, {}, "the name of a parameter of body 'rod': mass must be without white space", id="name"),
-    param({"mass": "m"}, {"m": 1.0, "n": 1.0}, "the mechanism has no body, joint or force that uses", id="unused"),
-    param({"mass": "m", "inertia": (0, 0, 0)}, {"m": 0.0}, "body 'rod' has no mass, carries no mass", id="massless"),
+    ({"joint": Joint("free", stiffness="k")}, {"k": 1.0}, "body 'rod': a joint of the kind 'free' has no spring"),
+    ({"center": ("a", 0.0)}, {"a": 1.0}, "body 'rod': center must be (3,) finite numbers, got"),
+    ({"mass": "a b"}, {}, "the name of a parameter of body 'rod': mass must be without white space"),
+    ({"mass": "m"}, {"m": 1.0, "n": 1.0}, "the mechanism has no body, joint or force that uses"),
+    ({"mass": "m", "inertia": (0, 0, 0)}, {"m": 0.0}, "body 'rod' has no mass, carries no mass"),
 ]
 
 
-@mark.parametrize(("fields", "parameters", "message"), BAD)
+@each_row(("fields", "parameters", "message"), BAD)
 def test_a_parameter_that_cannot_be_is_refused(fields: Any, parameters: dict[str, float], message: str) -> None:
     with raises(ValueError, match=f"^{re.escape(message)}"):
         Mechanism([Body("rod", **(ROD | fields))], parameters=parameters)

@@ -8,8 +8,8 @@ from mpmath import mp, mpf
 from pytest import approx, mark
 
 import dynamics as dyn
+from dynamics import as_system
 from dynamics.multibody.builders.planar_arm import planar_links
-from dynamics.systems.model import as_system
 from tests.dynamics.models import at, random_arm, run, states
 from tests.tolerances import LAST_BITS
 
@@ -88,28 +88,12 @@ def test_a_link_is_what_its_model_says(model: str, center: float, inertia: float
     assert link.inertia == approx(inertia, rel=LAST_BITS)
 
 
-def test_one_damping_is_for_all_joints() -> None:
-    assert dyn.planar_arm([1.0, 1.0], [1.0, 1.0], damping=0.2).system.damping == (0.2, 0.2)
-    assert dyn.planar_arm([1.0, 1.0], [1.0, 1.0], damping=[0.1, 0.3]).system.damping == (0.1, 0.3)
-
-
 def test_a_graph_has_inputs_in_the_order_of_the_links() -> None:
     arm = random_arm(11)
     names = [f"{x}{i}" for x in ("q", "qd", "qdd") for i in range(11)]
     assert list(dyn.inverse_dynamics(arm).input_names) == names
     assert list(dyn.inverse_dynamics(arm).outputs) == [f"tau{i}" for i in range(11)]
     assert list(dyn.mass_matrix(random_arm(2)).outputs) == ["M_0_0", "M_0_1", "M_1_0", "M_1_1"]
-
-
-@mark.parametrize("name", dyn.scenes.names())
-def test_a_scene_runs_from_its_start(name: str) -> None:
-    scene = dyn.scenes.load(name)
-    assert (scene.name, len(scene.q), len(scene.qd)) == (name, scene.system.n, scene.system.n)
-    assert scene.t_end > 0.0
-    assert scene.about
-    result = dyn.simulate(scene, scene.q, scene.qd, 0.02)
-    assert result.stats.success
-    assert (result.q[-1] != result.q[0]).any()
 
 
 def test_the_triple_pendulum_is_the_paper_s() -> None:

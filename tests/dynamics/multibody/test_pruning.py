@@ -9,7 +9,7 @@ from pytest import approx, importorskip, mark, raises
 
 import cgraph as cg
 import dynamics as dyn
-from cgraph.writing.structure_hash import structure_hash
+from cgraph import structure_hash
 from dynamics.equations.formulations.formulations import torques
 from dynamics.equations.mass_matrix.accelerations import accelerations
 from tests.dynamics.mechanisms import FAMILIES, random_inertia, random_rotation, turned_arm
@@ -93,17 +93,6 @@ def test_the_lagrangian_is_the_energy_in_the_world_s_axes(seed: int, regrouped: 
         assert energy.evaluate(state)["E"] == approx(kinetic + potential, abs=AGREEMENT * scale)
 
 
-@mark.parametrize("seed", [*range(3), *slow(*range(3, 12))])
-def test_torques_in_planes_are_those_body_by_body(seed: int) -> None:
-    mechanism = in_planes(seed)
-    n = len(mechanism.moving)
-    for model in (mechanism, replace(mechanism, base_parameters=True)):
-        run, graph = dyn.RecursiveInverseDynamics(model), dyn.inverse_dynamics(mechanism)
-        q, qd, qdd = np.random.default_rng(seed).normal(size=(3, n))
-        expected = np.array(list(graph.evaluate(dict(zip(graph.input_names, [*q, *qd, *qdd], strict=True))).values()))
-        assert run(q, qd, qdd) == approx(expected, abs=AGREEMENT * max(1.0, np.abs(expected).max()))
-
-
 @mark.parametrize("family", ["mixed", "welded", *slow("serial", "branched")])
 @mark.parametrize("equations", BOTH)
 def test_regrouped_inertia_moves_alike_in_no_more_nodes(family: str, equations: Equations) -> None:
@@ -120,12 +109,12 @@ def test_regrouped_inertia_moves_alike_in_no_more_nodes(family: str, equations: 
 def test_by_default_pruning_costs_no_digit(n: int) -> None:
     """Nothing is switched off, so the graph is that of the model; regrouped, it has lost some."""
     importorskip("flint")
-    from tests.dynamics.planar_arm_equations import accelerations
+    from tests.dynamics.tree_in_digits import tree_in_digits
 
     rng = np.random.default_rng(n)
     model = dyn.planar_arm(rng.uniform(0.5, 1.5, n).tolist(), rng.uniform(0.5, 1.5, n).tolist())
     q, qd, tau = rng.uniform(-3.0, 3.0, n), rng.normal(size=n), 5.0 * rng.normal(size=n)
-    exact = accelerations(model, q, qd, tau).high
+    exact = tree_in_digits(model, q, qd, tau, tau)["accelerations"]
     kept, regrouped = (dyn.prune(model, dyn.forward_dynamics, regroup=each).graph for each in (False, True))
     assert structure_hash(dyn.prune(model, dyn.forward_dynamics).graph) == structure_hash(kept)
     errors = [error(run(graph, {"q": q, "qd": qd, "tau": tau}), exact) for graph in (kept, regrouped)]
@@ -145,12 +134,6 @@ def test_what_regrouping_saves() -> None:
 
 
 # --- the paper's scene
-
-
-def test_the_paper_s_arm_prunes_to_fewer_nodes_that_compute_the_same() -> None:
-    assert nodes(dyn.gravity_force(PAPER)) == 16
-    for equations in BOTH:
-        assert_alike(dyn.prune(PAPER, equations).graph, equations(PAPER))
 
 
 # --- effects

@@ -12,8 +12,8 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
+from cgraph.extend import Array
 from dynamics.equations.states.consistent_state import nearest_state
-from dynamics.equations.states.evaluate import Array
 from dynamics.simulation.gradients.sensitivities import Sensitivities
 
 from ..linkages import bar, four_bar

@@ -112,7 +112,7 @@ def test_mujoco_finds_the_same(seed: int) -> None:
 @mark.parametrize("base", ["free", "free (body axes)"])
 def test_momentum_of_a_free_tree_changes_by_weight_alone(base: str) -> None:
     """dp/dt = m g and dL/dt = c x m g, whatever the joints do inside; about the center of mass L is constant."""
-    tree = random_tree(8, base)
+    tree = random_tree(10, base)
     bodies = [replace(body, joint=replace(body.joint, armature=0.0, damping=0.0)) for body in tree.bodies]
     mechanism = dyn.Mechanism(bodies, tree.gravity)
     at = state(mechanism, 3)
@@ -159,7 +159,7 @@ def test_terms_of_a_lagrangian_that_are_linear_in_velocities_are_no_energy() -> 
 
 
 def test_base_parameters_move_no_mass_in_space() -> None:
-    plain = random_tree(9, "revolute")
+    plain = random_tree(6, "revolute")
     regrouped = replace(plain, base_parameters=True)
     at = state(plain, 5)
     for graph in (dyn.center_of_mass, dyn.center_of_mass_jacobian, dyn.spatial_momentum):

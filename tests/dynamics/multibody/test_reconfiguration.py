@@ -1,14 +1,16 @@
 """Structure that changes: joints locked and freed, bodies hung on and taken off, and what carries over."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from pytest import approx, mark, raises
 
 import dynamics as dyn
-from cgraph.writing.structure_hash import structure_hash
+from cgraph import structure_hash
 from dynamics.multibody.bodies.body import WORLD
-from tests.dynamics.mechanisms import random_mechanism
+from tests.dynamics.mechanisms import random_body, random_mechanism
+from tests.each_row import each_row
 from tests.slow import slow
 from tests.tolerances import EQUATIONS, LONG_SUM, SHORT_SUM, TORQUES
 
@@ -34,25 +36,37 @@ def torque(mechanism: dyn.Mechanism, q: np.ndarray, qd: np.ndarray, qdd: np.ndar
     return np.array(list(graph.evaluate(values).values()))
 
 
-@mark.parametrize("joint", [0, 2, 4])
-def test_a_locked_joint_is_the_limit_of_one_held_by_force(joint: int) -> None:
-    """The torques of the others are those of the free arm with the joint at rest where it is locked."""
-    free = arm(5)
-    q, qd, qdd = np.random.default_rng(1).normal(size=(3, 5))
-    qd[joint] = qdd[joint] = 0.0
-    others = [i for i in range(5) if i != joint]
-    held = free.lock(f"link {joint + 1}", at=float(q[joint]))
-    assert [body.name for body in held.moving] == [f"link {i + 1}" for i in others]
-    assert torque(held, q[others], qd[others], qdd[others]) == approx(torque(free, q, qd, qdd)[others], rel=TORQUES)
+LOCKED: dict[str, tuple[float, ...]] = {
+    "revolute": (0.7,),
+    "prismatic": (-0.3,),
+    "screw": (0.7,),
+    "ball": (2.0, 0.6, -0.4, 0.2),
+    "free": (0.1, 0.2, -0.3, 2.0, 0.6, -0.4, 0.2),
+    "cylindrical": (0.3, -0.5),
+    "universal": (0.3, -0.5),
+    "planar": (0.3, -0.5, 0.8),
+}
 
 
-def test_a_locked_slide_stands_where_it_was() -> None:
-    rail = dyn.Body("rail", dyn.Joint("prismatic", (1.0, 1.0, 0.0), orientation=np.diag([1.0, -1.0, -1.0])), mass=1.0)
-    swing = dyn.Body("swing", dyn.Joint("revolute", (0.0, 1.0, 0.0)), "rail", 0.5, (0.0, 0.0, -0.3), (0.01, 0.01, 0.01))
-    free = dyn.Mechanism([rail, swing])
-    held = free.lock("rail", 0.7)
-    at = free.position("swing", (0.1, 0.2, 0.3)).evaluate({"q0": 0.7, "q1": 0.4})
-    assert held.position("swing", (0.1, 0.2, 0.3)).evaluate({"q0": 0.4}) == approx(at, abs=SHORT_SUM)
+@each_row("kind, where", [*LOCKED.items()])
+def test_a_locked_joint_is_the_limit_of_one_held_by_force(kind: str, where: tuple[float, ...]) -> None:
+    """The torques of the others are those of the free mechanism with the joint at rest where it is locked."""
+    rng = np.random.default_rng(2)
+    first, middle, last = (random_body(f"b{i}", "revolute", f"b{i - 1}" if i else "world", rng) for i in range(3))
+    across = {"second_axis": np.cross(middle.joint.axis, (1.0, 2.0, 3.0))} if kind in ("universal", "planar") else {}
+    frame = {"position": middle.joint.position, "orientation": middle.joint.orientation}
+    joint = dyn.Joint(kind, middle.joint.axis, pitch=0.3 * (kind == "screw"), **frame, **across)
+    free = dyn.Mechanism([first, replace(middle, joint=joint), last])
+    held = free.lock("b1", where[0] if len(where) == 1 else where)
+    count, (q, qd, qdd) = free.system.n - 2, rng.normal(size=(3, 2))
+    whole = [[q[0], *where, q[1]], *([rate[0], *[0.0] * count, rate[1]] for rate in (qd, qdd))]
+    assert held.coordinates == ("b0", "b2")
+    assert torque(held, q, qd, qdd) == approx(torque(free, *whole)[[0, -1]], rel=TORQUES)
+    assert [part.tolist() for part in free.map_state_from(held, q, qd)] == whole[:2]
+    assert free.lock("b1").unlock("b1").coordinates == free.coordinates
+    if len(where) > 1:
+        with raises(dyn.MechanismError, match=rf"joint of body 'b1': .* must be \({len(where)},\) finite numbers"):
+            _ = free.lock("b1", 0.3).coordinates
 
 
 def test_a_locked_last_joint_leaves_no_more_nodes_than_a_shorter_arm_has() -> None:

@@ -1,14 +1,17 @@
-"""The regressor against inverse dynamics, and against Pinocchio's."""
+"""The regressor against inverse dynamics."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from pytest import approx
 
+import cgraph as cg
 import dynamics as dyn
+from dynamics import inertial_parameters, regressor
 from dynamics.equations.states.evaluate import evaluate
-from dynamics.multibody.quantities.regressor import inertial_parameters, regressor
 from tests.dynamics.mechanisms import EVERY_FAMILY, FAMILIES, turned_arm
 from tests.dynamics.models import Array, at, states
 
@@ -45,41 +48,6 @@ def test_of_a_pendulum_it_is_the_textbook_s() -> None:
     assert inertial_parameters(arm)[0] == approx(np.array([3, 0, 0, -3, 4, 0, 4, 0, 0, 0]))
 
 
-@pytest.mark.parametrize("family", EVERY_FAMILY)
-def test_it_is_pinocchio_s(family: str) -> None:
-    pinocchio = pytest.importorskip("pinocchio", reason="the bench extra has it")
-    from tests.dynamics.pinocchio_twin import PinocchioTwin
-
-    mechanism = FAMILIES[family](6)
-    twin, state, n = PinocchioTwin(mechanism), at(states(mechanism, 1, 3), 0), mechanism.system.n
-    motion = [twin._theirs(state[name]) for name in ("q", "qd", "qdd")]
-    joints = [twin.joints[name] for name in mechanism.system.coordinates]
-    theirs = pinocchio.computeJointTorqueRegressor(twin.model, twin.data, *motion).reshape(n, n, 10)
-    theirs = theirs[np.ix_(twin.order, [joint - 1 for joint in joints])]
-    parameters = np.array([twin.model.inertias[joint].toDynamicParameters() for joint in joints])
-    assert value(mechanism, state)[0] == approx(theirs, abs=ROUNDING * abs(theirs).max())
-    assert inertial_parameters(mechanism) == approx(parameters, abs=ROUNDING)
-
-
-@pytest.mark.parametrize("family", EVERY_FAMILY)
-def test_pinocchio_s_coriolis_matrix_and_gravity_are_ours(family: str) -> None:
-    """Its matrix is that of Christoffel's symbols too, entry by entry."""
-    pinocchio = pytest.importorskip("pinocchio", reason="the bench extra has it")
-    from dynamics.equations.coriolis import coriolis
-    from tests.dynamics.pinocchio_twin import PinocchioTwin
-
-    mechanism = FAMILIES[family](6)
-    twin, state, n = PinocchioTwin(mechanism), at(states(mechanism, 1, 3), 0), mechanism.system.n
-    q, qd = (twin._theirs(state[name]) for name in ("q", "qd"))
-    matrix = pinocchio.computeCoriolisMatrix(twin.model, twin.data, q, qd)[np.ix_(twin.order, twin.order)]
-    weight = pinocchio.computeGeneralizedGravity(twin.model, twin.data, q)[twin.order]
-    weight = weight + twin.stiffness * (state["q"] - twin.spring_reference)
-    found = evaluate(mechanism.system, coriolis(mechanism), state).reshape(n, n)
-    assert found == approx(matrix, abs=ROUNDING * abs(matrix).max())
-    gravity = evaluate(mechanism.system, dyn.gravity_force(mechanism), state)
-    assert gravity == approx(weight, abs=ROUNDING * abs(weight).max())
-
-
 def test_it_is_small_and_free_of_the_parameters() -> None:
     graph = regressor(turned_arm(7))
     assert graph.input_names == tuple(f"{kind}{i}" for kind in ("q", "qd", "qdd") for i in range(7))
@@ -89,3 +57,26 @@ def test_it_is_small_and_free_of_the_parameters() -> None:
 def test_another_model_is_refused() -> None:
     with pytest.raises(dyn.MechanismError, match="a regressor takes rigid bodies, a Mechanism or a scene of one"):
         regressor(dyn.OdeSystem(lambda x, t: [-x[0]], ["x"]))
+
+
+@pytest.mark.parametrize("family", EVERY_FAMILY)
+def test_its_columns_are_the_slopes_of_torques_by_the_numbers_of_bodies(family: str) -> None:
+    """Numbers as parameters: c = h / m, and J = I - (h h 1 - h h^T) / m about the center."""
+    mechanism = FAMILIES[family](4)
+    names, bodies = [], []
+    for i, body in enumerate(mechanism.moving):
+        own = [f"{name}{i}" for name in ("m", "x", "y", "z", "xx", "xy", "yy", "xz", "yz", "zz")]
+        m, *h = cg.variables(own[:4])
+        xx, xy, yy, xz, yz, zz = cg.variables(own[4:])
+        square = h[0] * h[0] + h[1] * h[1] + h[2] * h[2]
+        about = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]
+        inertia = [[about[j][k] - (square * (j == k) - h[j] * h[k]) / m for k in range(3)] for j in range(3)]
+        bodies.append(replace(body, mass=m, center=[each / m for each in h], inertia=inertia))
+        names += own
+    values = dict(zip(names, inertial_parameters(mechanism).ravel().tolist(), strict=True))
+    named = dyn.Mechanism(bodies, mechanism.gravity, parameters=values)
+    slopes, state = cg.jacobian(dyn.inverse_dynamics(named), names), at(states(mechanism, 1, 3), 0)
+    point = values | {f"{kind}{i}": x for kind in ("q", "qd", "qdd") for i, x in enumerate(state[kind])}
+    found = np.array([*slopes.evaluate({name: point[name] for name in slopes.input_names}).values()])
+    expected = value(mechanism, state)[0].ravel()
+    assert found == approx(expected, abs=10.0 * ROUNDING * abs(expected).max())

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable
-from dataclasses import replace
 
 import numpy as np
 from pytest import mark, param
@@ -12,25 +11,11 @@ from pytest import mark, param
 import dynamics as dyn
 from dynamics.peers import PEERS
 from dynamics.peers.peer import PeerModel
-from tests.dynamics.mechanisms import EVERY_KIND, random_state, random_tree
+from tests.dynamics.mechanisms import EVERY_KIND, for_peers, random_state, random_tree
 from tests.dynamics.models import run
 
 PEER = 1e-14  # of the sums of sizes that an answer comes from
 INSTALLED = [name for name in ("mujoco", "pinocchio") if PEERS[name].installed]
-
-
-def tree_with_sprung_balls(seed: int) -> dyn.Mechanism:
-    """Up to seven bodies; free ones stand at the origin of the world, in its axes, as MuJoCo has them."""
-    tree, rng = random_tree(seed, 1 + seed % 7, EVERY_KIND), np.random.default_rng(seed)
-    bodies = []
-    for body in tree.bodies:
-        joint = body.joint
-        if joint.kind == "ball":
-            joint = replace(joint, stiffness=float(rng.uniform(0.0, 0.5)))
-        if joint.kind == "free":
-            joint = replace(joint, position=np.zeros(3), orientation=np.eye(3))
-        bodies.append(replace(body, joint=joint))
-    return replace(tree, bodies=bodies)
 
 
 def errors(mechanism: dyn.Mechanism, seed: int) -> dict[str, float]:
@@ -66,7 +51,7 @@ def errors(mechanism: dyn.Mechanism, seed: int) -> dict[str, float]:
 def test_peers_find_the_same(count: int, record_property: Callable[[str, object], None]) -> None:
     worst, trees = dict[str, float](), Counter[str]()
     for seed in range(100, 100 + count):
-        found = errors(tree_with_sprung_balls(seed), seed)
+        found = errors(for_peers(random_tree(seed, 1 + seed % 7, EVERY_KIND), seed), seed)
         trees.update({name.split()[0] for name in found})
         for name, error in found.items():
             worst[name] = max(error, worst.get(name, 0.0))

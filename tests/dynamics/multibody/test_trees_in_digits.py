@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -11,12 +13,25 @@ import dynamics as dyn
 from cgraph import Graph
 from dynamics.multibody.algebra.spatial import rotation
 from dynamics.multibody.sweeps.equation_links import equation_links
-from tests.dynamics.mechanisms import EVERY_KIND, Array, random_inertia, random_mechanism, random_state, random_tree
+from tests.dynamics.mechanisms import (
+    EVERY_KIND,
+    FAMILIES,
+    Array,
+    random_body,
+    random_inertia,
+    random_mechanism,
+    random_state,
+    random_tree,
+    turned_arm,
+    turned_tree,
+)
+from tests.dynamics.multibody.test_units import random_tree as units_tree
+from tests.each_row import each_row
 from tests.slow import slow
 
 # Of the sums of sizes that an answer comes from: what some ten to thirty roundings leave.
-OF_SIZES = {"mass": 2e-15, "bias": 4e-15, "torques": 4e-15, "chain rule": 1e-14}
-OF_SIZES |= {"recursive": 3e-15, "dense": 6e-15, "auto": 6e-15}
+OF_SIZES = {"mass": 2e-15, "bias": 4e-15, "torques": 4e-15, "by velocities": 4e-15, "chain rule": 1e-14}
+OF_SIZES |= {"body by body": 1e-14, "regrouped": 1e-13, "recursive": 3e-15, "dense": 6e-15, "auto": 6e-15}
 MASS, RECURSIVE, DENSE = 2e-15, 4e-15, 1e-14  # of the largest entry, which may be what is left of larger ones
 CANCELLED = 3e-14  # of the largest entry, over hundreds of trees
 
@@ -45,14 +60,19 @@ def errors(tree: dyn.Mechanism, seed: int) -> tuple[dict[str, float], dict[str, 
         "mass": (dyn.mass_matrix(tree), "mass"),
         "bias": (dyn.bias(tree), "bias"),
         "torques": (dyn.inverse_dynamics(tree), "torques"),
+        "by velocities": (dyn.inverse_dynamics(tree, "newton_euler"), "torques"),
         "chain rule": (dyn.inverse_dynamics(tree, "chain_rule"), "torques"),
         "recursive": (dyn.forward_dynamics(tree, "recursive"), "accelerations"),
         "dense": (dyn.forward_dynamics(tree, "dense"), "accelerations"),
         "auto": (dyn.forward_dynamics(tree), "accelerations"),
     }
     at = {"q": q, "qd": qd, "qdd": qdd, "tau": tau}
-    off = {name: np.abs(values(graph, at) - exact[of].ravel()).max() for name, (graph, of) in rows.items()}
-    over = [{name: float(off[name] / np.abs(by[of]).max()) for name, (_, of) in rows.items()} for by in (sizes, exact)]
+    found = {name: (values(graph, at), of) for name, (graph, of) in rows.items()}
+    regrouped = replace(tree, base_parameters=True)
+    found["body by body"] = (dyn.RecursiveInverseDynamics(tree)(q, qd, qdd), "torques")
+    found["regrouped"] = (values(dyn.inverse_dynamics(regrouped), at), "torques")
+    off = {name: np.abs(row - exact[of].ravel()).max() for name, (row, of) in found.items()}
+    over = [{name: float(off[name] / np.abs(by[of]).max()) for name, (_, of) in found.items()} for by in (sizes, exact)]
     return over[0], over[1]
 
 
@@ -107,6 +127,88 @@ def test_trees_of_every_joint(count: int) -> None:
 
 def named(figures: dict[str, float]) -> str:
     return ", ".join([f"{name} {x:.1e}" for name, x in figures.items()])
+
+
+def in_a_plane_and_out() -> dyn.Mechanism:
+    """Slides and hinges in one plane, then bodies that leave it, on both sides of a parallel axis the other way."""
+    rng = np.random.default_rng(5)
+
+    def body(name: str, kind: str, parent: str, axis: tuple[float, float, float]) -> dyn.Body:
+        joint = dyn.Joint(kind, axis, 0.3 * rng.normal(size=3), stiffness=0.7, spring_reference=0.2, armature=0.1)
+        return replace(random_body(name, kind, parent, rng), joint=joint)
+
+    x, y, z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+    return dyn.Mechanism([
+        body("rail", "prismatic", "world", x), body("a", "revolute", "rail", y),
+        body("b", "revolute", "a", (0, -1.0, 0)), body("c", "prismatic", "b", z), body("d", "revolute", "c", y),
+        body("out", "revolute", "b", z), body("slide", "prismatic", "out", x), body("last", "revolute", "slide", y),
+        body("along", "prismatic", "last", y),
+    ], (1.0, 2.0, -9.0))  # fmt: skip
+
+
+SPECIAL: dict[str, Callable[[], dyn.Mechanism]] = {
+    "slides first": lambda: random_mechanism(7, ["prismatic", "prismatic", "revolute"], 2),
+    "welded": lambda: FAMILIES["welded"](6),
+    "quarter turns": lambda: turned_arm(5),
+    "tree": lambda: turned_tree(7),
+    "plane and out": in_a_plane_and_out,
+    "no gravity": lambda: replace(FAMILIES["mixed"](5), gravity=(0.0, 0.0, 0.0)),
+    "links without mass": lambda: units_tree(6, 5),
+    "rotors in a line": lambda: units_tree(9, 5),
+    "planar arm": lambda: dyn.planar_arm([1.0, 0.8, 0.7, 0.9], [1.0, 0.8, 0.7, 0.4], damping=0.1),
+    "planar arm of points": lambda: dyn.planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7], mass_model="point", gravity=-3.0),
+}
+
+
+@each_row("name", SPECIAL)
+def test_trees_whose_structure_is_used(name: str) -> None:
+    of_sizes, _ = errors(SPECIAL[name](), 2)
+    assert {each: x for each, x in of_sizes.items() if x >= 3.0 * OF_SIZES[each]} == {}
+
+
+# Errors of elimination grow slowly, some eps n; the dense factorisation of M loses what cond(M), about n^4, takes.
+CHAINS = {10: 1e-14, 100: 1e-12, 300: 1e-12}
+KINDS: dict[str, Callable[[int], dyn.Mechanism]] = {
+    "planar": lambda n: dyn.planar_arm(
+        [0.2 + 0.05 * (i % 3) for i in range(n)], [0.2 + 0.1 * (i % 2) for i in range(n)], damping=0.1
+    ),
+    "3D": turned_arm,
+}
+
+
+def off(kind: str, n: int, spread: float, method: str = "recursive") -> float:
+    """The largest error of an acceleration at joint angles within +-spread, relative to the largest of them."""
+    pytest.importorskip("flint")
+    from tests.dynamics.tree_in_digits import tree_in_digits
+
+    model, rng = KINDS[kind](n), np.random.default_rng(n)
+    at = {"q": rng.uniform(-spread, spread, n), "qd": rng.normal(size=n), "tau": rng.normal(size=n)}
+    exact = tree_in_digits(model, at["q"], at["qd"], 0.0 * at["q"], at["tau"])["accelerations"]
+    found = values(dyn.forward_dynamics(model, method), at)
+    return float(np.abs(found - exact).max() / np.abs(exact).max())
+
+
+@pytest.mark.timeout(1800)
+@pytest.mark.parametrize("n", [10, *slow(100, 300)])
+@each_row("kind, spread", [(kind, spread) for kind in KINDS for spread in (0.1, math.pi)])
+def test_chains_lose_nothing_to_the_condition_of_their_mass_matrix(kind: str, spread: float, n: int) -> None:
+    assert off(kind, n, spread) < CHAINS[n]
+
+
+def test_a_dense_solve_is_seen_to_be_less_accurate() -> None:
+    """Test the test: an error of 1e-12 does not pass for none."""
+    assert off("planar", 15, 0.1, "dense") > 10 * CHAINS[10] > 10 * off("planar", 15, 0.1)
+
+
+def test_what_bodies_state_takes_fewer_nodes_than_their_lagrangian_and_says_what_gravity_does() -> None:
+    for model in (turned_arm(5), turned_tree(7), SPECIAL["planar arm"]()):
+        system = model.system
+        derived = dyn.System(lambda q, qd, t, system=system: list(system.partial_lagrangians), system.coordinates)
+        assert len(dyn.bias(model).nodes) < 0.9 * len(dyn.bias(derived).nodes)
+        tags = {tag for node in dyn.bias(model).nodes for tag in node.tags}
+        assert {"kinetic", "potential"} < tags
+        still = replace(model, gravity=(0.0, 0.0, 0.0))
+        assert "potential" not in {tag for node in dyn.bias(still).nodes for tag in node.tags}
 
 
 @pytest.mark.parametrize("angle", [1e-2, 1e-4, 1e-8, 1e-12])

@@ -2,25 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from functools import reduce
+from unittest.mock import patch
 
 import numpy as np
-from pytest import MonkeyPatch, fixture, mark, raises
+from pytest import fixture, mark, raises
 
 import cgraph as cg
 import dynamics as dyn
+from dynamics import certify
 from dynamics.multibody.algebra import spatial
 from dynamics.multibody.algebra.spatial import Triple
 from dynamics.multibody.algebra.spatial_vectors import Twist
 from dynamics.multibody.joints import TYPES, SpatialJoint
 from dynamics.multibody.joints.consistency import contradiction
-from dynamics.verification.certificate import certify
+from tests.dynamics.mechanisms import random_body
 from tests.dynamics.models import Array
 from tests.dynamics.units import Units, in_units
+from tests.registered import registered
 from tests.slow import slow
 
-ROUNDING = 1e-12  # of the largest of its kind, in some hundred sums
 ZERO, ONE = cg.constant(0.0), cg.constant(1.0)
 X, Y, Z = range(3)
 Nodes = Sequence[cg.Node]
@@ -188,11 +190,10 @@ WRONG = {
 
 
 @mark.parametrize("joint", WRONG, ids=lambda joint: joint.kind)
-def test_a_type_that_contradicts_itself_is_refused_in_a_sentence(joint: Angles, monkeypatch: MonkeyPatch) -> None:
-    monkeypatch.setitem(TYPES, joint.kind, joint)
-    body = dyn.Body("b", dyn.Joint(joint.kind), mass=1.0, inertia=(1.0, 1.0, 1.0))
-    with raises(dyn.MechanismError, match="body 'b': the type of joints of the kind") as said:
-        dyn.Mechanism([body])
+def test_a_type_that_contradicts_itself_is_refused_in_a_sentence(joint: Angles) -> None:
+    said_of_b = raises(dyn.MechanismError, match="body 'b': the type of joints of the kind")
+    with registered(TYPES, **{joint.kind: joint}), said_of_b as said:
+        dyn.Mechanism([dyn.Body("b", dyn.Joint(joint.kind), mass=1.0, inertia=(1.0, 1.0, 1.0))])
     assert WRONG[joint] in str(said.value)
 
 
@@ -212,80 +213,23 @@ def test_a_type_is_judged_where_its_coordinates_are_defined_and_in_any_unit(radi
 
 
 @fixture(autouse=True)
-def registered(monkeypatch: MonkeyPatch) -> None:
-    for joint in (Angles(), Polar(), Still(), Constant()):
-        monkeypatch.setitem(TYPES, joint.kind, joint)
+def own_types() -> Iterator[None]:
+    with registered(TYPES, **{joint.kind: joint for joint in (Angles(), Polar(), Still(), Constant())}):
+        yield
 
 
-def twins(kind: str, seed: int) -> tuple[dyn.Mechanism, dyn.Mechanism]:
-    """A random chain with such a joint in it, and the same with a chain of massless bodies in its place."""
-    rng = np.random.default_rng(seed)
-
-    def numbers() -> dict[str, object]:
-        points = rng.normal(size=(6, 3))
-        inertia = 0.1 * sum([(p @ p) * np.eye(3) - np.outer(p, p) for p in points])
-        return {"mass": float(rng.uniform(0.5, 2.0)), "center": 0.3 * rng.normal(size=3), "inertia": inertia}
-
-    def other(name: str, parent: str) -> dyn.Body:
-        joint = dyn.Joint(str(rng.choice(["revolute", "prismatic", "ball"])), rng.normal(size=3), rng.normal(size=3))
-        return dyn.Body(name, joint, parent, **numbers())
-
-    before = [other("base", "world")] if rng.integers(2) else []
-    parent = "base" if before else "world"
-    own, place = numbers(), rng.normal(size=3)
-    orientation = spatial.from_quaternion(rng.normal(size=4))
-    after = [other("end", "b")] if rng.integers(2) else []
-    whole = dyn.Body("b", dyn.Joint(kind, position=place, orientation=orientation), parent, **own)
-    chain = []
-    for k, (part, axis) in enumerate(TYPES[kind].hinges):
-        last = k == 2
-        placed = {} if k else {"position": place, "orientation": orientation}
-        joint = dyn.Joint(part, np.eye(3)[axis], **placed)
-        chain.append(dyn.Body("b" if last else f"b{k}", joint, f"b{k - 1}" if k else parent, **(own if last else {})))
-    return dyn.Mechanism([*before, whole, *after]), dyn.Mechanism([*before, *chain, *after])
-
-
-def compared(make: Callable[[dyn.Mechanism], Sequence[Array]], pair: tuple[dyn.Mechanism, dyn.Mechanism]) -> float:
-    """The largest difference, of the largest number of its kind and row."""
-    worst = 0.0
-    for a, b in zip(*map(make, pair), strict=True):
-        scale = np.abs(b).max(axis=-1, keepdims=True)
-        worst = max(worst, float((np.abs(a - b) / np.where(scale > 0.0, scale, 1.0)).max()))
-    return worst
-
-
-@mark.parametrize("kind", ["angles", "polar"])
-@mark.parametrize("seed", [7, *slow(*[k for k in range(40) if k != 7])])
-def test_every_equation_is_that_of_its_joints_of_one_axis(kind: str, seed: int) -> None:
-    pair = twins(kind, seed)
-    n, nq = pair[0].system.n, pair[0].system.nq
-    rng = np.random.default_rng(seed + 100)
-    q, qd, x = rng.uniform(0.3, 1.0, nq), rng.normal(size=n), rng.normal(size=n)
-
-    def arrays(derive: Callable[..., cg.Graph], **more: Array) -> Callable[[dyn.Mechanism], Sequence[Array]]:
-        return lambda model: [*dyn.arrays_at(model, derive(model), q=q, qd=qd, **more).values()]
-
-    def hamilton(model: dyn.Mechanism) -> Sequence[Array]:
-        named = {f"q{k}": v for k, v in enumerate(q)} | {f"p{k}": v for k, v in enumerate(x)}
-        values = dyn.hamilton_equations(model).evaluate(named | {f"tau{k}": 0.0 for k in range(n)})
-        return [np.array(list(values.values()))]
-
-    for make in (
-        arrays(dyn.bias),
-        arrays(dyn.forward_dynamics, tau=x),
-        arrays(dyn.inverse_dynamics_derivatives, qdd=x),
-        lambda model: dyn.linearize(model, q, qd, x),
-        lambda model: dyn.linearize(model, q, qd, x, form="momentum"),
-        hamilton,
-    ):
-        assert compared(make, pair) < ROUNDING
+def with_joint(kind: str) -> dyn.Mechanism:
+    """A body on such a joint, anywhere."""
+    rng = np.random.default_rng(11)
+    joint = dyn.Joint(kind, position=rng.normal(size=3), orientation=spatial.from_quaternion(rng.normal(size=4)))
+    return dyn.Mechanism([random_body("b", kind, "world", rng, joint=joint)])
 
 
 @mark.parametrize("length", [2.0**-20, *slow(2.0**20)])
 @mark.parametrize("kind", ["angles", "polar"])
 def test_nothing_depends_on_the_unit_of_length(kind: str, length: float) -> None:
     """To the last bit, of a power of two."""
-    first = twins(kind, 11)[0]
+    first = with_joint(kind)
     rng, size = np.random.default_rng(0), np.array([length if u == "m" else 1.0 for u in TYPES[kind].units])
     q, qd, qdd = rng.uniform(0.3, 1.0, 3), rng.normal(size=3), rng.normal(size=3)
     here, there = (
@@ -297,11 +241,11 @@ def test_nothing_depends_on_the_unit_of_length(kind: str, length: float) -> None
         assert np.array_equal(there[name], factor * array)
 
 
-def test_the_certificate_looks_at_bias_and_derivatives(monkeypatch: MonkeyPatch) -> None:
+@patch("dynamics.multibody.bodies.body.contradiction", lambda joint: "")
+def test_the_certificate_looks_at_bias_and_derivatives() -> None:
     """Of a type of joint that is wrong about itself, and was not refused, each finds its own."""
-    monkeypatch.setattr("dynamics.multibody.bodies.body.contradiction", lambda joint: "")
     said = {
-        kind: {each.equation.partition(" ")[0] for each in certify(twins(kind, 11)[0], 2).residuals if not each.passed}
+        kind: {each.equation.partition(" ")[0] for each in certify(with_joint(kind), 2).residuals if not each.passed}
         for kind in ("angles", "polar", "still", "constant")
     }
     assert said["angles"] == said["polar"] == set()

@@ -11,8 +11,7 @@ import pytest
 from pytest import mark, raises, warns
 
 import dynamics as dyn
-from dynamics import scenes
-from dynamics.multibody.trees.mechanism import MechanismError
+from dynamics import MechanismError, scenes
 from tests.each_row import each_row
 
 INERTIAL = '<inertial pos="0.1 0.2 -0.3" mass="1.3" diaginertia="0.3 0.4 0.5"/>'

@@ -9,9 +9,9 @@ from pytest import approx, mark
 
 import cgraph as cg
 import dynamics as dyn
+from dynamics import METHODS
 from dynamics.experiments.trust.cascades import CASCADES, KINDS, judge_balls, random_balls
 from dynamics.experiments.trust.trust import RIGHT, SILENT
-from dynamics.integrators import METHODS
 from tests.slow import slow
 
 G = 9.81  # m/s^2
@@ -128,14 +128,6 @@ def test_three_balls_that_are_squeezed_without_restitution_come_to_rest(method: 
     run = moved([-1.0, 0.0, 1.0], [1.0, 0.0, -1.0], [contact(0, e=0.0), contact(1, e=0.0)], 1.5, method)
     assert (run.stats.success, len(run.events["contact 0"].t) > 10) == (True, True)
     assert run.q[-1] == approx([0.0, 0.0, 0.0], abs=EXACT)
-
-
-@mark.slow
-def test_a_ball_without_room_between_two_walls_stops_the_run_with_their_names() -> None:
-    opposite = dyn.Event("opposite", lambda q, qd, t: -q[0], -1, reset=lambda q, qd, t: (q, [-qd[0]]))
-    with pytest.warns(dyn.SimulationWarning, match="the run stopped at t = 0 s"):
-        message = moved([0.0], [1.0], [wall(0), opposite], 1.0).stats.message
-    assert message.startswith("stopped at t = 0 s: events 'wall 0', 'opposite' reset the state again and again")
 
 
 ORDERS = [

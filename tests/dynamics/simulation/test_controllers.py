@@ -9,7 +9,8 @@ from pytest import approx, mark, raises
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.integrators import METHODS, derive
+from dynamics import METHODS
+from dynamics.integrators import derive
 from tests.dynamics.models import Array, random_arm
 from tests.dynamics.step_options import EVERY_METHOD, step
 
@@ -169,25 +170,6 @@ def test_the_work_of_held_forces_is_the_change_of_energy() -> None:
     work = (run.tau[:-1] * np.diff(run.q, axis=0)).sum()
     assert abs(work) > 0.1
     assert run.energy[-1] - run.energy[0] == approx(work, abs=RUN_ERROR)
-
-
-@mark.parametrize("method", ["rk4", "dop853"])
-def test_a_held_run_does_not_depend_on_the_unit_of_time(method: str) -> None:
-    """Bit for bit, in units that are powers of 2."""
-
-    def run(scale: float) -> dyn.Trajectory:
-        def control(q: Array, qd: Array, t: float) -> Array:
-            return (0.1 * math.sin(t / scale) - 3.0 * q - 1.0 * qd * scale) / scale**2
-
-        start = {"q": START["q"], "qd": [0.0, 0.125 / scale], "t_end": scale, "method": method}
-        controller = dyn.SampledController(control, 0.125 * scale)
-        limit = {"dt": 0.03125 * scale, "estimate_error": False} if method == "rk4" else {}
-        return dyn.simulate(springs(scale=scale), **start, tau=controller, **limit)
-
-    one, other = run(1.0), run(2.0**-30)
-    assert (other.t == one.t * 2.0**-30).all()
-    assert (other.q == one.q).all()
-    assert (other.tau == one.tau * 2.0**60).all()
 
 
 @mark.parametrize("method", ["dop853", "radau", "rk4"])

@@ -12,7 +12,7 @@ from pytest import mark
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.integrators import METHODS
+from dynamics import METHODS
 from tests.slow import slow
 
 USUAL = "dop853 radau rk4 verlet".split()

@@ -11,7 +11,7 @@ from pytest import approx, mark, raises, warns
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.integrators import METHODS
+from dynamics import METHODS
 from dynamics.simulation.steps.equal_steps import doubled, equal_steps, joined
 from tests.dynamics.models import random_arm
 from tests.dynamics.step_options import LIKE_OTHERS
@@ -70,17 +70,6 @@ def test_times_that_second_steps_step_over_have_an_estimate(method: str, t_eval:
     assert many.stats.error_at_end[0] == approx(one.stats.error_at_end, rel=1e-3)
     early = dyn.Event("early", lambda q, qd, t: t - 0.07, terminal=True)
     assert dyn.simulate(spring(), [1.0], [0.0], 2.5, method, events=early, **options).stats.error is None
-
-
-def test_the_error_is_no_less_than_that_at_the_end() -> None:
-    """Where a force jumps, and the longest steps are off by too much to tell of the run, though not of its end."""
-
-    def push(q: list[cg.Node], qd: list[cg.Node], t: cg.Node) -> list[cg.Node]:
-        return [cg.where(t > 1.0, 1.0, 0.0)]
-
-    with warns(dyn.SimulationWarning, match="the state is off by an estimated"):
-        stats = dyn.simulate(spring(), [0.0], [0.0], 3.0, "midpoint", dt=0.07, tau=push).stats
-    assert stats.error >= stats.error_at_end > 0.0
 
 
 @mark.parametrize("method", EQUAL)
@@ -214,55 +203,6 @@ def in_silence(*arguments: Any, **options: Any) -> dyn.Trajectory:
         return dyn.simulate(*arguments, **options)
 
 
-def test_an_error_between_the_rows_counts() -> None:
-    """A spring of 1000 rad/s has lost its swing by the end, with steps of any length."""
-    run = in_silence(of(lambda q, qd, t: 0.5 * qd[0] ** 2 - 5e5 * q[0] ** 2), [1.0], [0.0], 1.0, "rk4", t_eval=[1.0])
-    true = abs(run.q[0, 0] - math.cos(1000.0))
-    assert 0.1 * true <= run.stats.error <= 10.0 * true
-    assert run.stats.warnings
-
-
-@mark.parametrize("method", ["rk4", *slow("gauss4", "gauss8", "gauss12", "verlet")])
-@mark.parametrize("dt", [0.05, 0.013])
-def test_no_order_is_taken_for_granted_across_kinks(method: str, dt: float) -> None:
-    """A spring of 1 N/m to one side and 7 N/m to the other: half turns of two lengths."""
-    left, right = math.sqrt(7.0), 1.0
-    bent = of(lambda q, qd, t: 0.5 * qd[0] ** 2 - 0.5 * cg.where(q[0] > 0.0, right**2, left**2) * q[0] ** 2)
-    run = in_silence(bent, [1.0], [0.0], 20.0, method, dt=dt)
-    t = np.mod(run.t + 0.5 * math.pi / right, math.pi / right + math.pi / left)
-    turn = t - math.pi / right
-    true = np.abs(run.q[:, 0] - np.where(turn < 0.0, np.sin(right * t), -np.sin(left * turn) / left)).max()
-    assert 0.1 * true <= run.stats.error <= 100.0 * true
-    many = dyn.simulate_many(bent, [[1.0]], [0.0], 20.0, method, dt=dt, rtol=LOOSE)
-    assert many.stats.error[0] == approx(run.stats.error, rel=1e-6)
-
-
-WEDGES: list[Any] = [
-    cg.abs,
-    lambda x: cg.maximum(x, -x),
-    lambda x: -cg.minimum(x, -x),
-    lambda x: x * cg.sign(x),
-    lambda x: cg.where(x < 0.0, -x, x),
-    lambda x: x * (2.0 * (x > 0.0) - 1.0),
-    lambda x: x + 2.0 * cg.maximum(-x, 0.0),
-]
-
-
-@mark.parametrize("wedge", WEDGES[:1] + slow(*WEDGES[1:]))
-@mark.parametrize("method", ["midpoint", *slow("verlet", "gauss4", "gauss8", "yoshida6", "rk4")])
-@mark.parametrize("dt", [0.07, *slow(0.05, 0.013)])
-def test_steps_that_agree_across_a_kink_are_not_taken_for_exact(wedge: Any, method: str, dt: float) -> None:
-    """Steps of h, 2h and 4h turn round together, where the speed is a whole number of all of them."""
-    run = in_silence(
-        of(lambda q, qd, t: 0.5 * qd[0] ** 2 - wedge(q[0])), [1.0], [0.0], 7.0 * math.sqrt(2.0), method, dt=dt
-    )
-    quarter = math.sqrt(2.0)
-    turn = np.mod(run.t + quarter, 4.0 * quarter) - quarter
-    after = turn - 2.0 * quarter
-    true = np.abs(run.q[:, 0] - np.where(turn < quarter, 1.0 - 0.5 * turn**2, 0.5 * after**2 - 1.0)).max()
-    assert 0.1 * true <= run.stats.error <= 1e3 * true
-
-
 def test_a_parameter_may_have_any_name() -> None:
     """Also that of a number by which the two sides of a kink are told apart."""
     names = ["branch0", "branch_", "phase0"]
@@ -300,20 +240,6 @@ def test_what_roundings_grow_to_near_a_separatrix_is_part_of_the_error(dt: float
     run = in_silence(pendulum, [math.pi - aside], [0.0], 80.0, "gauss6", dt=dt)
     assert run.stats.error > 0.1
     assert run.stats.warnings
-
-
-@mark.parametrize("scale", [1.0, *slow(1e-6, 1e6)])
-@mark.parametrize("method", ["rk4", *slow("euler", "verlet", "gauss4")])
-def test_the_estimate_goes_on_across_resets(method: str, scale: float) -> None:
-    """A spring that a wall turns back after a third of a turn, again and again; in other units of length."""
-    wall = dyn.Event("wall", lambda q, qd, t: q[0] + 0.5 * scale, -1, reset=lambda q, qd, t: (q, [-qd[0]]))
-    dt, half = {"euler": 1e-3}.get(method, 0.02), 2.0 * math.pi / 3.0
-    run = in_silence(spring(), [scale], [0.0], 12.0, method, dt=dt, events=wall, rtol=1e-9, t_eval=[1.0, 11.5, 12.0])
-    true = np.abs(run.q[:, 0] / scale - np.cos(np.mod(run.t + half, 2.0 * half) - half)).max()
-    assert len(run.events["wall"].t) == 3
-    assert 0.1 * true <= run.stats.error <= 100.0 * true
-    assert run.stats.error_at_end > 0.0
-    assert "the state is off by an estimated" in run.stats.warnings[0]
 
 
 def test_a_run_beside_with_other_resets_says_that_nothing_is_known() -> None:

@@ -9,20 +9,16 @@ from pytest import approx, mark, raises
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.integrators import METHODS
-from dynamics.systems.system import System
+from dynamics import METHODS
 from tests.dynamics.planet import ECCENTRICITY, PERIHELION, planet, position
 from tests.dynamics.step_options import step
 from tests.slow import slow
 
 FIXED = [name for name, method in METHODS.items() if not method.adaptive]
-ADAPTIVE = [name for name, method in METHODS.items() if method.adaptive]
 KINDS = ["dop853", "rk4", "scipy:DOP853"]  # with dense output of their own, by Hermite, of SciPy
 SHARP = 1e-12  # relative, of an instant found to the last bit
 CROSSING = {1: 2e-2, 2: 2e-5}  # s, by the order of the method: the error of a motion at dt = 1 ms
 CROSSING_FINE = 1e-8  # s, at order 4 and more, and for steps within 1e-11
-EQUAL_CROSSING = 2e-4  # s: crossings are where the cubic of a step of 0.1 or 0.2 s has them
-CHOSEN_CROSSING = 1e-6  # s: steps within 1e-9
 TIGHT: dict[str, Any] = {"rtol": 1e-10, "atol": 1e-10}
 EQUAL: dict[str, Any] = {"dt": 0.03}
 MOTION = 1e-6  # s, of instants of a motion integrated with TIGHT, or by rk4 with EQUAL
@@ -57,28 +53,6 @@ def test_events_are_found_where_they_are(method: str) -> None:
     assert (run.t[-1], run.stats.message) == (approx(11.0, rel=SHARP), "event 'late' at t = 11 s")
     assert run.q[-1] == approx(position(11.0 - 2 * np.pi), abs=tolerance)
     assert (run.stats.success, run.stats.status) == (True, 1)
-
-
-def test_an_event_between_the_times_asked_for() -> None:
-    ground = dyn.Event("ground", lambda q, qd, t, p: q[0] - p["floor"], terminal=True)
-    ball = System(lambda q, qd, t, p: 0.5 * qd[0] ** 2 - 9.81 * q[0], ["height"], {"floor": 0.5})
-    there = math.sqrt(2 * 0.5 / 9.81)
-    for method in ("rk4", "dop853"):
-        run = dyn.simulate(ball, [1.0], [0.0], 1.0, method, **step(method, 0.01), t_eval=[0.0, 0.3, 0.9], events=ground)
-        assert run.t == approx([0.0, 0.3, there], rel=SHARP)
-        assert run.events["ground"].t == approx([there], rel=SHARP)
-        assert run.events["ground"].qd[0] == approx([-math.sqrt(2 * 9.81 * 0.5)], rel=SHARP)
-
-
-@mark.parametrize("method", ["dop853", "dopri5", "taylor", "rk4", "radau", "gauss6"])
-def test_two_crossings_in_one_step_are_both_found(method: str) -> None:
-    """x = sin t touches 0.999 and goes back 0.09 s later; steps are longer."""
-    over = dyn.Event("over", lambda x, t: x[0] - 0.99)
-    steps = {"rk4": {"dt": 0.1}, "gauss6": {"dt": 0.2}}.get(method, {"rtol": 1e-9, "atol": 1e-9})
-    run = dyn.simulate(CIRCLE, [0.0, 1.0], None, 10.0, method, **steps, events=[over])
-    peak = np.arccos(0.99)
-    expected = [turn * 2.0 * np.pi + 0.5 * np.pi + side * peak for turn in (0, 1) for side in (-1, 1)]
-    assert run.events["over"].t == approx(expected, abs=EQUAL_CROSSING if method in FIXED else CHOSEN_CROSSING)
 
 
 GRAZING: dict[str, Any] = {
@@ -195,21 +169,6 @@ def test_units_of_a_quantity_and_of_the_time_change_nothing() -> None:
             assert run.events[f"{k}"].t / unit == approx(found[f"1.0 {k}"].t, abs=MOTION)
 
 
-@mark.parametrize("method", ["rk4", "scipy:DOP853"])
-def test_a_run_back_in_time_has_the_events_of_the_run_forward_in_turn(method: str) -> None:
-    events = [
-        dyn.Event("up", lambda x, t: x[0] - 0.5, direction=1),
-        dyn.Event("down", lambda x, t: x[0] - 0.5, direction=-1),
-        dyn.Event("touch", lambda x, t: (x[0] - 0.5) ** 2),
-    ]
-    forward = circle(events, 8.0, method)
-    chosen = EQUAL if method in FIXED else TIGHT
-    back = dyn.simulate(CIRCLE, forward.q[-1], None, 0.0, method, t0=8.0, events=events, **chosen)
-    for there, here in (("up", "down"), ("down", "up"), ("touch", "touch")):
-        assert len(forward.events[there].t)
-        assert back.events[here].t == approx(forward.events[there].t[::-1], abs=10 * MOTION)
-
-
 def test_instants_do_not_depend_on_the_rows_the_engine_or_the_company_of_other_events() -> None:
     ask = dyn.Event("ask", lambda x, t: (x[0] - 0.5) * (x[1] - 0.25) ** 2)
     other = dyn.Event("other", lambda x, t: cg.sin(40.0 * t))
@@ -228,16 +187,6 @@ def test_instants_do_not_depend_on_the_rows_the_engine_or_the_company_of_other_e
                 continue  # other steps
             assert circle([ask], method=method, **options).events["ask"].t == approx(first, rel=SHARP)
         assert circle([ask, other], method=method).events["ask"].t == approx(first, rel=SHARP)
-
-
-def test_with_scipy_s_solvers_events_and_rows_are_as_exact_as_its_steps() -> None:
-    """By their own dense output; the cubic of Hermite loses five digits in steps as long as these."""
-    event = dyn.Event("half", lambda x, t: x[0] - 0.5)
-    times = np.linspace(0.0, 10.0, 37)
-    for name, tolerance in (("DOP853", 1e-9), ("RK45", 1e-8), ("LSODA", 1e-7)):
-        run = circle([event], method=f"scipy:{name}", t_eval=times)
-        assert run.events["half"].t == approx([TURN, 2 * np.pi - TURN, 2 * np.pi + TURN], abs=tolerance), name
-        assert run.q[:, 0] == approx(np.cos(times), abs=tolerance), name
 
 
 def test_an_event_is_what_it_says() -> None:

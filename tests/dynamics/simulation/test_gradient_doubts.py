@@ -1,9 +1,12 @@
 """Gradients are of the default method of `simulate`, or of equal steps that say how far off they are."""
 
+import _thread
+import threading
 import warnings
 from collections.abc import Callable
 from functools import partial
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -12,9 +15,8 @@ from pytest import approx, mark, raises
 import cgraph as cg
 import dynamics as dyn
 from cgraph.util.caches import kept_results
-from dynamics.integrators import METHODS
-from dynamics.simulation.gradients import motion_run
-from dynamics.simulation.steps.stepping import NativeIntegration
+from dynamics import METHODS
+from tests.each_row import each_row
 from tests.slow import slow
 
 SLOPES = 1e-3  # relative: of what 1e-9 in every step leaves of the slopes of a motion through a pericentre
@@ -197,9 +199,9 @@ def test_a_loss_that_is_no_number_is_said() -> None:
         assert words == ["2 of 3 motions doubtful: motion 1: the loss is nan of a motion that is finite"]
 
 
-def test_a_motion_that_does_not_arrive_is_told_with_time_and_coordinate(monkeypatch: pytest.MonkeyPatch) -> None:
+@patch("dynamics.simulation.gradients.motion_run.PIECE", 16)
+def test_a_motion_that_does_not_arrive_is_told_with_time_and_coordinate() -> None:
     """`gradient` raises, in the words of `simulate`; `gradient_many` gives NaN, and the others are as alone."""
-    monkeypatch.setattr("dynamics.simulation.gradients.motion_run.PIECE", 16)
 
     def end(x: Any, t: Any) -> Any:
         return x[0]
@@ -225,23 +227,20 @@ def test_a_motion_that_does_not_arrive_is_told_with_time_and_coordinate(monkeypa
             assert (many.value[k], many["q"][k].tolist()) == (approx(alone.value), approx(alone["q"].tolist()))
         for array in (many.value, many["q"], many.q):
             assert np.isnan(array[[1, 3]]).all()
-    assert motion_run.PIECE == 16
 
 
+@pytest.mark.usefixtures("ctrl_c")
 @mark.parametrize("method", ["dop853", "rk4"])
-@mark.parametrize("derive", [dyn.gradient, dyn.gradient_many, dyn.sensitivities])
-def test_ctrl_c_is_a_keyboard_interrupt(method: str, derive: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    def advance(*args: Any, **options: Any) -> Any:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(NativeIntegration, "_advance", advance)
-    ball = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 - 9.81 * q[0], ["height"])
-    loss = [] if derive is dyn.sensitivities else [lambda q, qd, t: q[0]]
-    events = {} if derive is dyn.gradient_many else {"events": dyn.Event("half", lambda q, qd, t: q[0] - 0.5)}
-    if derive is dyn.gradient_many and method == "rk4":
-        monkeypatch.setattr("cgraph.program.derivatives.tape.run_passes", advance)
+@each_row("derive", [dyn.gradient, dyn.gradient_many, dyn.sensitivities])
+def test_ctrl_c_is_a_keyboard_interrupt(derive: Any, method: str) -> None:
+    loss = [] if derive is dyn.sensitivities else [end]
+    start = [[1.0]] if derive is dyn.gradient_many else [1.0]
+    events = {} if derive is dyn.gradient_many else {"events": dyn.Event("late", lambda q, qd, t: t - 500.0)}
+    timer = threading.Timer(0.3, _thread.interrupt_main)
+    timer.start()
     with raises(KeyboardInterrupt):
-        derive(ball, *loss, [[1.0]] if derive is dyn.gradient_many else [1.0], [0.0], 0.4, method, **events)
+        derive(SPRING, *loss, start, [0.0], 1e3 if method == "rk4" else 1e5, method, backend="python", **events)
+    timer.join()
 
 
 @mark.parametrize("given", [{}, {"method": "rk4", "dt": 1e-3, "estimate_error": False}])

@@ -1,7 +1,9 @@
 """Trajectories by chosen steps in lanes: each is to the bit what it is alone, whatever its neighbors do."""
 
 import warnings
+from collections.abc import Iterator
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -9,9 +11,9 @@ from pytest import approx, mark
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.simulation.ensembles import task
+from dynamics import simulate_many
+from dynamics.simulation.ensembles import lanes, task
 from dynamics.simulation.ensembles.lanes import FEW, fits_lanes
-from dynamics.simulation.ensembles.simulate_many import simulate_many
 from dynamics.simulation.steps.step_program import StepProgram
 from tests.dynamics.ensembles import same
 from tests.dynamics.models import oscillator, random_arm
@@ -22,14 +24,14 @@ COUNT = FEW + 5  # more than one vector, and not a whole number of them
 TIMES = [0.0, 0.11, 0.12, 0.5, 1.0]
 COMPARED = (0, 3, 8, COUNT - 1)
 TOP = np.diag([0.1, 0.2, 0.25])  # kg m^2
-ROUNDING = 1e-12  # of equal steps, whose lengths between rows are rounded otherwise alone
 LANES = ("dop853", "dopri5", "rodas", "taylor")
 
 
 @pytest.fixture(autouse=True)
-def _lanes_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def _lanes_at_once() -> Iterator[None]:
     """No trajectory goes alone first."""
-    monkeypatch.setattr(task, "MAKING", 0.0)
+    with patch.object(task, "MAKING", 0.0):
+        yield
 
 
 def spring() -> dyn.System:
@@ -59,23 +61,20 @@ def starts(model: Any, seed: int) -> tuple[Any, Any]:
     return rng.normal(size=(COUNT, nq)) + 1.0 * (nq > n), rng.normal(size=(COUNT, n))
 
 
-def require_lanes(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Let a trajectory that is run alone be seen."""
+def in_lanes(*arguments: Any, **options: Any) -> dyn.Ensemble:
+    """An ensemble, of which no trajectory may be run alone."""
     pytest.importorskip("llvmlite")
-
-    def alone(*arguments: Any) -> None:
-        raise AssertionError("a trajectory is run alone")
-
-    monkeypatch.setattr("dynamics.simulation.ensembles.task.integration", alone)
+    with patch.object(task, "integration", side_effect=AssertionError("a trajectory is run alone")):
+        return simulate_many(*arguments, **options)
 
 
 def each_is_alone(model: Any, fan: dyn.Ensemble, q: Any, qd: Any, t_end: float, method: str, **options: Any) -> None:
-    """What they are one by one, and, unless parameters that differ are inputs, by `simulate`."""
-    with pytest.MonkeyPatch.context() as patched:
-        patched.setattr("dynamics.simulation.ensembles.simulate_many.fits_lanes", lambda *_: False)
-        assert same(fan, simulate_many(model, q, qd, t_end, method, **options))
-    for k in () if options.pop("parameters", {}) else COMPARED:
-        one = dyn.simulate(model, q[k], None if qd is None else qd[k], t_end, method, **options)
+    """To the bit; parameters that differ are inputs of both."""
+    varied, t_eval, t0 = options.pop("parameters", {}), options.pop("t_eval"), options.pop("t0", 0.0)
+    motion = dyn.prepare(model, method, varied=list(varied), **options)
+    for k in range(COUNT):
+        given = {name: values[k] for name, values in varied.items()}
+        one = motion(q[k], None if qd is None else qd[k], t_end, t0, t_eval=t_eval, parameters=given)
         assert np.array_equal(one.q, fan.q[k])
         assert np.array_equal(one.qd, fan.qd[k])
         for name in ("steps", "rejected", "nfev", "dt", "status", "message"):
@@ -105,14 +104,12 @@ MODELS: dict[str, Any] = {
         *slow(*[(name, method) for name in MODELS for method in LANES]),
     ],
 )
-def test_each_has_the_bits_that_it_has_alone(name: str, method: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_each_has_the_bits_that_it_has_alone(name: str, method: str) -> None:
     model = MODELS[name]
     q, qd = starts(model, 1)
     vary = {"spring": "k", "lone": "g", "oscillator": "k"}.get(name)
     parameters = {} if vary is None else {vary: np.linspace(1.0, 30.0, COUNT)}
-    with monkeypatch.context() as patched:
-        require_lanes(patched)
-        fan = simulate_many(model, q, qd, 1.0, method, t_eval=TIMES, parameters=parameters)
+    fan = in_lanes(model, q, qd, 1.0, method, t_eval=TIMES, parameters=parameters)
     each_is_alone(model, fan, q, qd, 1.0, method, t_eval=TIMES, parameters=parameters)
 
 
@@ -129,14 +126,12 @@ def test_each_has_the_bits_that_it_has_alone(name: str, method: str, monkeypatch
         {"t_eval": [3.5, 4.0], "t0": 3.0, "t_end": 4.0},
     ],
 )
-def test_options_are_those_of_a_run_alone(options: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_options_are_those_of_a_run_alone(options: dict[str, Any]) -> None:
     model = spring()
     q, qd = starts(model, 2)
     options = dict(options)
     t_end = options.pop("t_end", 1.0)
-    with monkeypatch.context() as patched:
-        require_lanes(patched)
-        fan = simulate_many(model, q, qd, t_end, **options)
+    fan = in_lanes(model, q, qd, t_end, **options)
     each_is_alone(model, fan, q, qd, t_end, "dop853", **options)
     if "form" in options:
         assert fan.p is not None
@@ -156,13 +151,12 @@ def test_workers_and_chunks_change_no_bit(method: str) -> None:
     assert all(same(whole, other) for other in others)
 
 
-def test_lanes_that_are_interrupted_go_on_with_the_same_bits(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_lanes_that_are_interrupted_go_on_with_the_same_bits() -> None:
     model = random_arm(2)
     q, qd = starts(model, 4)
     whole = simulate_many(model, q, qd, 2.0, t_eval=[1.0, 2.0])
-    monkeypatch.setattr("dynamics.simulation.ensembles.lanes.PASSES", 3)
-    monkeypatch.setattr("dynamics.simulation.ensembles.task.BLOCK_TIME", 0.0)
-    assert same(whole, simulate_many(model, q, qd, 2.0, t_eval=[1.0, 2.0]))
+    with patch.object(lanes, "PASSES", 3), patch.object(task, "BLOCK_TIME", 0.0):
+        assert same(whole, simulate_many(model, q, qd, 2.0, t_eval=[1.0, 2.0]))
 
 
 @stops
@@ -224,7 +218,8 @@ def test_as_many_steps_as_alone() -> None:
 
 
 def test_what_cannot_go_in_lanes_goes_one_by_one() -> None:
-    from dynamics.integrators import METHODS, derive
+    from dynamics import METHODS
+    from dynamics.integrators import derive
     from dynamics.simulation.run_options import RunOptions
     from dynamics.simulation.steps.step_program import step_program
 
@@ -246,44 +241,14 @@ def test_what_cannot_go_in_lanes_goes_one_by_one() -> None:
     each_is_alone(spring(), in_python, q, qd, 0.05, "dop853", t_eval=[0.05], backend="python")
 
 
-@mark.parametrize("times", [[1.0], [0.0, 0.5, 1.0], [0.25, 0.5, 0.75], None])
-@mark.parametrize("method", ["rk4", "verlet"])
-def test_equal_steps_are_the_same_with_an_estimate_and_without(method: str, times: Any) -> None:
-    model = random_arm(2)
-    q, qd = starts(model, 8)
-    options = {"dt": 0.02, "t_eval": times}
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", dyn.SimulationWarning)
-        beside = simulate_many(model, q, qd, 1.0, method, **options)
-    assert same(beside, simulate_many(model, q, qd, 1.0, method, estimate_error=False, **options))
-    assert same(beside, simulate_many(model, q, qd, 1.0, method, estimate_error=False, workers=2, chunk=10, **options))
-
-
-@stops
-def test_one_of_equal_steps_that_fails_says_what_it_says_alone() -> None:
-    model = dyn.OdeSystem(lambda x, t: [x[0] ** 2], ["x"])
-    x = np.full((COUNT, 1), -1.0)
-    x[7], x[20] = 1.0, 1e200
-    options = {"dt": 0.01, "t_eval": np.linspace(0.0, 2.0, 11), "estimate_error": False}
-    fan = simulate_many(model, x, None, 2.0, "rk4", **options)
-    assert fan.stats.success.tolist() == [k not in (7, 20) for k in range(COUNT)]
-    for k in (0, 7, 20):
-        one = dyn.simulate(model, x[k], None, 2.0, "rk4", **options)
-        rows = int((fan.t <= one.t[-1]).sum())
-        assert fan.q[k, :rows] == approx(one.q[:rows], rel=ROUNDING)
-        assert (fan.stats.message[k], fan.stats.steps[k]) == (one.stats.message, one.stats.steps)
-
-
-@mark.parametrize("seconds", [1e-4, 1e9])  # after one trajectory alone, or never
-def test_lanes_are_made_once_trajectories_alone_took_as_long(monkeypatch: pytest.MonkeyPatch, seconds: float) -> None:
+def test_lanes_are_made_once_trajectories_alone_took_as_long() -> None:
+    """After one trajectory alone, or never."""
     model, rng = random_arm(2), np.random.default_rng(5)
-    q, qd = rng.normal(size=(2, COUNT, 2))
-    arguments = (model, q, qd, 1.0, "dop853")
-    in_lanes = simulate_many(*arguments, t_eval=TIMES)
-    cg.clear_caches()
-    made: list[StepProgram] = []
-    make = task.lanes_of
-    monkeypatch.setattr(task, "lanes_of", lambda program, backend: made.append(program) or make(program, backend))
-    monkeypatch.setattr(task, "MAKING", seconds)
-    assert same(in_lanes, simulate_many(*arguments, t_eval=TIMES))
-    assert bool(made) == (seconds < 1.0)
+    arguments = (model, *rng.normal(size=(2, COUNT, 2)), 1.0, "dop853")
+    at_once, made = simulate_many(*arguments, t_eval=TIMES), []
+    for seconds in (1e-4, 1e9):
+        cg.clear_caches()
+        with patch.object(task, "MAKING", seconds), patch.object(task, "lanes_of", wraps=task.lanes_of) as making:
+            assert same(at_once, simulate_many(*arguments, t_eval=TIMES))
+        made.append(making.called)
+    assert made == [True, False]

@@ -9,9 +9,8 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
+from dynamics import as_system
 from dynamics.equations.states.consistent_state import nearest_state
-from dynamics.systems.model import as_system
-from tests.early_end import stops
 
 from ...slow import slow
 from ..equations.test_hamiltonian import random_tree, rotor
@@ -74,12 +73,6 @@ def test_a_symplectic_method_makes_the_same_steps(method: str, make: Any) -> Non
     plain, canonical = runs(make(), 0.5, method, dt=0.05)
     assert canonical.stats.success
     assert canonical.q == pytest.approx(plain.q, rel=1e-12, abs=1e-12)
-
-
-@pytest.mark.parametrize("method", ["rodas", "rk4", *slow("radau")])
-def test_other_methods_step_momenta_too(method: str) -> None:
-    plain, canonical = runs(random_arm(2), 1.0, method, **({"dt": 1e-3} if method == "rk4" else {"rtol": 1e-10}))
-    assert canonical.q[-1] == pytest.approx(plain.q[-1], rel=1e-8, abs=1e-8)
 
 
 @pytest.mark.parametrize("method", ["gauss4", *slow("midpoint", "yoshida6")])
@@ -147,29 +140,6 @@ def test_a_sampled_controller_sees_velocities(method: str) -> None:
     assert_same(canonical.events["brake"].t, plain.events["brake"].t)
 
 
-@pytest.mark.parametrize("method", ["dop853", *slow("verlet", "rk4")])
-def test_trajectories_of_an_ensemble_are_those_alone(method: str) -> None:
-    """One by one and side by side, with parameters of their masses, and with events."""
-    model, starts, masses = oscillator(), np.array([[0.3], [0.9]]), [0.5, 2.0]
-    how = {"t_eval": [0.0, 0.4, 1.0], "method": method}
-    how |= {"backend": "python"} if method == "dop853" else {"dt": 1e-3}
-    for events in ((), [dyn.Event("fall", lambda q, qd, t, p: qd[0] + 0.5 * p["m"])]):
-        fan = dyn.simulate_many(
-            model, starts, [0.2], 1.0, parameters={"m": masses}, form="momentum", events=events, **how
-        )
-        for k, mass in enumerate(masses):
-            alone = dyn.simulate(
-                model, starts[k], [0.2], 1.0, parameters={"m": mass}, form="momentum", events=events, **how
-            )
-            for column in ("q", "qd", "p"):
-                assert_same(getattr(fan, column)[k], getattr(alone, column), 1e-12)
-            for event in events:
-                for here, there in zip(fan.events[event.name][k], alone.events[event.name], strict=True):
-                    assert_same(here, there, 1e-12)
-            assert fan.p[k] == pytest.approx(mass * fan.qd[k], rel=1e-14)
-    assert dyn.simulate_many(model, starts, [0.2], 1.0, **how).p is None
-
-
 def test_gradients_of_a_motion_are_the_same() -> None:
     """By the start, where p depends on q, and by a parameter that the first momentum depends on; through events."""
     start, how = ([0.5], [0.2]), {"t_end": 1.0, "method": "dop853", "rtol": 1e-12, "backend": "python"}
@@ -182,50 +152,6 @@ def test_gradients_of_a_motion_are_the_same() -> None:
         assert_same(forward[1][name][-1], forward[0][name][-1])
         assert_same(forward[1].times[name][-1], forward[0].times[name][-1])
     assert_same(forward[1].qd[-1], forward[0].qd[-1])
-
-
-def test_gradients_of_many_motions_are_those_alone() -> None:
-    model, starts = oscillator(), [[0.3], [0.9], [-0.4]]
-
-    def running(q: Any, qd: Any, tau: Any, t: Any) -> Any:
-        return qd[0] ** 2 + tau[0] * q[0]
-
-    how = {"t_end": 0.5, "running": running, "wrt": ["q", "qd", "tau", "m"], "dt": 0.01, "tau": [0.4]}
-    fan = dyn.gradient_many(model, None, starts, [0.2], form="momentum", **how)
-    for k, q in enumerate(starts):
-        alone = dyn.gradient(model, None, q, [0.2], form="momentum", **how)
-        for name in how["wrt"]:
-            assert_same(fan[name][k], alone[name], 1e-12)
-        assert_same(fan.qd[k], alone.qd, 1e-12)
-
-
-WRONG = {
-    "a reset of another length": {"events": dyn.Event("e", lambda q, qd, t: q[0], reset=lambda q, qd, t: (q, []))},
-    "an event of nothing known": {"events": dyn.Event("e", lambda q, qd, t: dyn.Event)},
-    "a controller back in time": {"tau": dyn.SampledController(lambda q, qd, t: qd, 0.1), "t_end": -1.0},
-    "forces of another shape": {"tau": dyn.SampledController(lambda q, qd, t: [1.0, 2.0], 0.1)},
-    "a tolerance": {"rtol": -1.0},
-}
-
-
-@pytest.mark.parametrize("name", WRONG)
-def test_what_is_wrong_is_said_in_the_same_words(name: str) -> None:
-    said = []
-    for form in FORMS:
-        with pytest.raises((TypeError, ValueError)) as error:
-            dyn.simulate(oscillator(), [1.0], [0.5], **({"t_end": 1.0} | WRONG[name]), form=form)
-        said.append(str(error.value))
-    assert said[0] == said[1]
-
-
-@stops
-def test_what_ends_a_run_is_said_in_the_same_words() -> None:
-    lost = dyn.Event("lost", lambda q, qd, t: q[0] - 0.25, reset=lambda q, qd, t: (q, [qd[0] / (q[0] - q[0])]))
-    for how in ({"max_steps": 3, "rtol": 1e-12}, {"events": lost}):
-        plain, canonical = runs(oscillator(), 1.0, "dop853", backend="python", **how)
-        texts = [run.stats.message.replace("momentum of", "velocity of") for run in (plain, canonical)]
-        assert texts[0].split("=")[-1] == texts[1].split("=")[-1]
-        assert plain.stats.status == canonical.stats.status == -1
 
 
 def test_what_the_momentum_form_has_not_is_said() -> None:

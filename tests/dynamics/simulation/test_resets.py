@@ -4,11 +4,10 @@ import math
 from typing import Any
 
 import numpy as np
-import pytest
 from pytest import approx, mark, raises
 
 import dynamics as dyn
-from dynamics.integrators import METHODS
+from dynamics import METHODS
 from tests.early_end import stops
 
 G = 9.81  # m/s^2
@@ -109,21 +108,3 @@ def test_what_a_reset_has_to_be() -> None:
     result = run(lambda q, qd, t: (q, [qd[0] * 1e308 * 1e308]))
     assert "velocity of 'height' is -inf after the reset of event 'bounce'" in result.stats.message
     assert np.isfinite(result.qd[:-1]).all()
-
-
-def test_ctrl_c_in_a_later_leg_keeps_the_legs_before(monkeypatch: pytest.MonkeyPatch) -> None:
-    from dynamics.simulation.events.event_log import EventLog
-
-    real, calls = EventLog.__call__, []
-
-    def call(self: EventLog, block: Any) -> Any:
-        calls.append(None)
-        if len(calls) == 3:
-            raise KeyboardInterrupt
-        return real(self, block)
-
-    monkeypatch.setattr(EventLog, "__call__", call)
-    run = fall(bounce(0.8), 2.5)
-    assert run.stats.message.startswith("interrupted after t = ")
-    assert len(run.events["bounce"].t) == 2
-    assert len(run.t) == len(run.q) == len(run.energy)

@@ -8,7 +8,7 @@ from pytest import approx, mark, raises
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.integrators import METHODS
+from dynamics import METHODS
 from tests.dynamics.models import oscillator, random_arm
 from tests.dynamics.step_options import LIKE_OTHERS, step
 from tests.slow import slow

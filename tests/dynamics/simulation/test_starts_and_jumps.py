@@ -10,7 +10,7 @@ from pytest import mark
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.integrators import METHODS
+from dynamics import METHODS
 from tests.slow import slow
 
 ADAPTIVE = [name for name, method in METHODS.items() if method.adaptive]
@@ -77,9 +77,9 @@ def test_a_jump_where_steps_of_one_length_end_is_passed(method: str, t0: float, 
     np.testing.assert_allclose(run.q[-1], exact, rtol=0.0, atol=JUMPS)
 
 
-@mark.parametrize("before", [-1.0, 0.5, *slow(0.0, 0.9, 3.0)])
+@mark.parametrize("before", [-1.0, *slow(0.0, 0.5, 0.9, 3.0)])
 @mark.parametrize("span", [1.0, *slow(-1.0, 1e-2, 1e5)])
-@mark.parametrize("t0", [0.0, 1.0, *slow(-3.0)])
+@mark.parametrize("t0", [1.0, *slow(0.0, -3.0)])
 @mark.parametrize("method", [name for name in ADAPTIVE if name != "taylor"])
 def test_a_force_that_jumps_as_the_run_starts_is_passed(method: str, t0: float, span: float, before: float) -> None:
     """As a square wave does: one value at t0 itself, another right after."""

@@ -6,7 +6,7 @@ from pytest import mark
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.integrators import METHODS
+from dynamics import METHODS
 from tests.dynamics.mechanisms import random_body, random_joint
 from tests.dynamics.units import Units, in_units
 from tests.slow import slow
@@ -27,8 +27,8 @@ def cart_pole(length: float, second: float) -> dyn.System:
     return dyn.System(lagrangian, ["x", "angle"])
 
 
-UNITS = ((2.0**40, 1.0), (2.0**-20, 2.0**30))
-MORE_UNITS = ((2.0**-40, 1.0), (1.0, 2.0**-30))
+UNITS = ((2.0**-20, 2.0**30),)
+MORE_UNITS = ((2.0**40, 1.0), (2.0**-40, 1.0), (1.0, 2.0**-30))
 
 
 @mark.parametrize("method", ADAPTIVE)
@@ -44,18 +44,6 @@ def test_results_do_not_depend_on_units(method: str, units: tuple[tuple[float, f
         steps.append(run.stats.steps)
     np.testing.assert_allclose(ends, np.broadcast_to(ends[0], np.shape(ends)), rtol=AS_WELL)
     assert max(steps) < 1.5 * min(steps)
-
-
-def test_one_unit_of_all_lengths_changes_no_bit() -> None:
-    def end(unit: float) -> list[float]:
-        def lagrangian(q, qd, t):
-            square = (q[0] ** 2 + q[1] ** 2) / unit**2
-            return 0.5 * (qd[0] ** 2 + qd[1] ** 2) + unit**2 / cg.sqrt(square)
-
-        planet = dyn.System(lagrangian, ["x", "y"])
-        return (dyn.simulate(planet, [unit, 0.0], [0.0, 0.8 * unit], 5.0).q[-1] / unit).tolist()
-
-    assert end(1.0) == end(2.0**-60) == end(2.0**60)
 
 
 @mark.parametrize("method", ADAPTIVE)

@@ -4,16 +4,13 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-import pytest
 from pytest import approx, mark
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.integrators import METHODS
-from dynamics.simulation.steps.stepping import NativeIntegration
+from dynamics import METHODS
 from tests.dynamics.models import oscillator
 from tests.dynamics.step_options import EVERY_METHOD, LIKE_OTHERS, step
-from tests.early_end import stops
 from tests.slow import slow
 
 EQUAL = [name for name, method in METHODS.items() if not method.adaptive]
@@ -53,21 +50,6 @@ def test_a_run_goes_to_t_end_whatever_is_recorded(method: str) -> None:
         assert many.stats.steps.tolist() == [20, 20]
         assert many.q[0] == approx(whole.q, abs=ROUNDING)
         assert many.t.tolist() == [0.0, 0.25]
-
-
-@stops
-@mark.parametrize("method", ["rk4", "gauss4", "scipy:DOP853"])
-def test_what_goes_wrong_after_the_last_recorded_time_is_said(method: str) -> None:
-    """v' = v^2 leaves the numbers at t = 1."""
-    blow = dyn.OdeSystem(lambda x, t: [x[0] * x[0]], ["v"])
-    run = dyn.simulate(blow, [1.0], None, 3.0, method, t_eval=[0.5], **step(method, 0.01))
-    assert not run.stats.success
-    assert run.stats.message.startswith("stopped at t = ")
-    assert run.t[-1] == approx(1.0, abs=0.1)
-    if method in METHODS:
-        many = dyn.simulate_many(blow, [[1.0], [0.1]], None, 3.0, method, t_eval=[0.5], **step(method, 0.01))
-        assert many.stats.success.tolist() == [False, True]
-        assert many.stats.message[0] == run.stats.message
 
 
 @mark.parametrize("method", [*[name for name in EQUAL if name not in LIKE_OTHERS], "scipy:DOP853", *slow(*LIKE_OTHERS)])
@@ -120,26 +102,3 @@ def test_many_from_any_time_to_any_other_are_each_the_one(times: list[float], me
             assert many.t == approx(one.t, abs=ROUNDING)
             assert many.q[k] == approx(one.q, abs=ROUNDING)
             assert many.stats.steps[k] == one.stats.steps
-
-
-@mark.parametrize("method", ["rk4", "gauss6"])
-def test_ctrl_c_says_where_a_run_of_few_rows_was(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also between the times of t_eval; the state there is the last row, and the progress line has moved."""
-    real, calls, seen = NativeIntegration._advance, [], []
-
-    def advance(*args: Any, **options: Any) -> Any:
-        calls.append(None)
-        if len(calls) > 3:
-            raise KeyboardInterrupt
-        return real(*args, **options)
-
-    whole = dyn.simulate(oscillator(), [1.0], [0.0], 10.0, method, dt=0.01)
-    monkeypatch.setattr("dynamics.simulation.steps.stepping.BLOCK_TIME", 0.0)
-    monkeypatch.setattr("dynamics.simulation.progress_bar.Progress.__call__", lambda self, done: seen.append(done))
-    monkeypatch.setattr(NativeIntegration, "_advance", advance)
-    run = dyn.simulate(oscillator(), [1.0], [0.0], 10.0, method, dt=0.01, t_eval=[0.0, 10.0])
-    assert run.stats.message == "interrupted after t = 0.34 s"  # 32 steps, and one by one
-    assert not run.stats.success
-    assert run.t == approx([0.0, 0.34], rel=ROUNDING)
-    assert (run.q[-1] == whole.q[34]).all()
-    assert seen == approx([0.32, 0.33, 0.34], rel=ROUNDING)

@@ -10,9 +10,9 @@ from pytest import mark, raises
 
 import cgraph as cg
 import dynamics as dyn
+from dynamics import System
 from dynamics.equations.formulations.formulations import INERTIAL
 from dynamics.io import mujoco_twin as mujoco_io
-from dynamics.systems.system import System
 
 
 def mass(q: Any, qd: Any, t: Any) -> cg.Node:

@@ -5,8 +5,8 @@ from pytest import approx, mark, raises
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.equations.state_equation import state_equation, state_inputs
-from dynamics.systems.ode_system import OdeSystem
+from dynamics import OdeSystem, state_equation
+from dynamics.equations.state_equation import state_inputs
 from tests.dynamics.models import MODELS, at, inputs, states
 
 ROUNDING = 1e-15  # relative: the same three operations in another order
