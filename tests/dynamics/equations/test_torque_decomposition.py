@@ -9,8 +9,9 @@ import pytest
 from pytest import approx
 
 import dynamics as dyn
-from dynamics import TorqueTable, torque_by_joint_motion, torque_by_link
+from dynamics import torque_by_joint_motion, torque_by_link
 from dynamics.equations.states.evaluate import evaluate
+from dynamics.equations.torque_parts.torque_table import TorqueTable
 from dynamics.multibody.builders.planar_arm import planar_links
 from tests.dynamics.mechanisms import FAMILIES, PLAIN, turned_tree
 from tests.dynamics.models import MODELS, Array, at, random_arm, states
