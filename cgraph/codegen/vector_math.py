@@ -180,7 +180,7 @@ def _sine_cosine(to: _Vectors, x: str, names: Iterable[str]) -> list[str]:
 
 
 def _exp(to: _Vectors, x: str) -> str:
-    """For -708 <= x <= 709: x = k ln 2 + r."""
+    """Exponential for -708 <= x <= 709: x = k ln 2 + r."""
     shifted = to.f("fadd", to.f("fmul", x, 1.44269504088896338700, exact=True), MAGIC, exact=True)
     k = to.f("fsub", shifted, MAGIC, exact=True)
     high = to.f("fsub", x, to.f("fmul", k, LN2[0], exact=True), exact=True)
@@ -197,7 +197,7 @@ def _exp(to: _Vectors, x: str) -> str:
 
 
 def _log(to: _Vectors, x: str) -> str:
-    """For positive normal numbers: x = 2**k (1 + f), sqrt(1/2) <= 1 + f < sqrt(2), and s = f / (2 + f)."""
+    """Logarithm of positive normal numbers: x = 2**k (1 + f), sqrt(1/2) <= 1 + f < sqrt(2), and s = f / (2 + f)."""
     bits = to.cast(x)
     root_half = 0x3FE6A09E667F3BCD
     exponent = to.n("ashr", to.n("sub", bits, root_half), 52)

@@ -48,7 +48,7 @@ class Table(NamedTuple):
         return "\n".join([*filter(None, [self.title]), *table(self.header, self.rows, self.left)])
 
     def to_dict(self) -> dict[str, object]:
-        """For JSON."""
+        """Dictionary for JSON."""
         return {"title": self.title, "header": list(self.header), "rows": [list(row) for row in self.rows]}
 
 

@@ -45,7 +45,7 @@ def spent(run: Callable[[], Made]) -> Spent[Made]:
 
 
 def nothing() -> None:
-    """Nothing to do."""
+    """Do nothing."""
 
 
 @dataclass

@@ -46,7 +46,7 @@ class MotionSteps:
 
     @property
     def t(self) -> float:
-        """Where the motion is [s]."""
+        """Time that the motion has reached [s]."""
         return self._run.t
 
     @property

@@ -42,7 +42,7 @@ class NodeScaling:
 def node_scaling(
     counts: Sequence[int] = COUNTS, report: Callable[[float], None] = lambda done: None
 ) -> list[NodeScaling]:
-    """Each formulation of `SCALED` over arms of `counts` links. report: called with the share done."""
+    """Sizes of each formulation of `SCALED` over arms of `counts` links. report: called with the share done."""
     rows = []
     total = len(SCALED) * sum(n * n for n in counts)
     done = 0

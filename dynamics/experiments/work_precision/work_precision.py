@@ -117,7 +117,7 @@ class Target:
 
 
 def targets(curves: Sequence[Curve], errors: Sequence[float] = TARGETS) -> list[Target]:
-    """For each error, ours first."""
+    """Targets for each error, ours first."""
     fastest_runs = []
     for error in errors:
         ours = None

@@ -41,7 +41,7 @@ RATES = "m/s^2, then rad/s^2"
 
 @body_quantity(Equation("q qd", Output("R_{}_{}", ("3", "3")), Output("p_{}", ("3",), "m")), FRAME, NO_BODY)
 def frame_placement(mechanism: Mechanism, body: str, at: ArrayLike = ORIGIN) -> Iterator[Node]:
-    """Where a body's frame is in the world, moved to a point of the body.
+    """Placement of a body's frame in the world, moved to a point of the body.
 
     Returns
     -------

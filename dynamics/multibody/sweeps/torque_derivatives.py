@@ -55,7 +55,7 @@ class Column(NamedTuple):
 
 
 class Frame(NamedTuple):
-    """How a body is placed and moves, by its origin.
+    """Placement and motion of a body, by its origin.
 
     offset: from the parent's origin.  before, turn: the axes are `before` turned so, in a tree in a
     plane by the sum of all angles.
@@ -71,7 +71,7 @@ class Frame(NamedTuple):
 
 
 def frames_of(states: Sequence[LinkState], up: Triple, tags: Tags) -> list[Frame]:
-    """How all links, parents first, are placed and move.
+    """Placements and motions of all links, parents first.
 
     up: the acceleration of the world against free fall.  tags: the energies that accelerations come of.
     """
@@ -86,7 +86,7 @@ def frames_of(states: Sequence[LinkState], up: Triple, tags: Tags) -> list[Frame
 
 
 def trees_in_a_plane(states: Sequence[LinkState]) -> list[bool]:
-    """For each link whether all axes of its tree are parallel."""
+    """Flags of the links, true where all axes of the tree are parallel."""
     roots: list[int] = []
     flat: dict[int, bool] = {}
     for i, at in enumerate(states):

@@ -217,7 +217,7 @@ class VectorizedIntegration:
         self.end(f"{INTERRUPTED} after t = {self._reached:.6g} s")
 
     def end(self, status: str = "", errors: ErrorEstimates | None = None) -> None:
-        """Those that have not failed end, at their end or for a reason.  errors: of all, if they are estimated."""
+        """End the runs that have not failed, at their end or for a reason.  errors: of all, if they are estimated."""
         evaluations = self.runner.read(self._memories, "evaluations")[0]
         live, runs = np.flatnonzero(self._live), self.part.runs
         columns: dict[str, Any] = {}

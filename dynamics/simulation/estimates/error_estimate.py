@@ -191,7 +191,7 @@ class Estimator:
                 difference.lose(beside.t)
 
     def estimates(self) -> ErrorEstimates:
-        """Of each run, and whether it is as good as it was asked to be; NaN where nothing could be compared."""
+        """Estimate of each run, and whether the run is as good as asked; NaN where nothing could be compared."""
         self._compare()
         first, count = self._differences[0], len(self._size)
         if not first.compared and np.isnan(first.lost).all():

@@ -114,7 +114,7 @@ def as_events(events: Event | Iterable[Event]) -> tuple[Event, ...]:
 
 @dataclass(frozen=True, eq=False)
 class WatchedEvent:
-    """What the location of an event reads of it, with its quantity g over the states x, t and parameters p as graphs.
+    """Event as its location reads it, with its quantity g over the states x, t and parameters p as graphs.
 
     values: g.  slopes: g_dot, with the tangents of x and t for inputs besides.  errors: a bound of the rounding of g,
     with the errors of x and t for inputs besides.  reset: the state after it, if it changes.
@@ -143,7 +143,7 @@ class WatchedEvent:
         return g
 
     def error(self, t: Array, x: Array, p: Sequence[float], x_error: Array, t_error: Array) -> Array:
-        """What g is off by, (k,), from some roundings, where x and t are off by x_error (k, m) and t_error (k,)."""
+        """Errors of g, (k,), from some roundings, where x and t are off by x_error (k, m) and t_error (k,)."""
         g: Array = values_of(self.errors, [*x.T, t, *p, *x_error.T, t_error], len(t))[0]
         return ROUNDINGS * g
 

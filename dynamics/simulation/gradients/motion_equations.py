@@ -209,7 +209,7 @@ class RatePullback:
 
     @property
     def residuals(self) -> int:
-        """How many of the last outputs of the rate are there for this rule alone."""
+        """Number of the last outputs of the rate that are there for this rule alone."""
         return len(self.shared)
 
     def __call__(self, wrt: Sequence[Node]) -> Graph:
@@ -269,7 +269,7 @@ def _factored(system: System, rhs: Sequence[Node]) -> list[Node]:
 
 
 def _more_than(rate: Graph, nodes: Sequence[Node]) -> int:
-    """How many nodes these take besides those of the rate, whose solution they may share."""
+    """Number of nodes of these besides those of the rate, whose solution they may share."""
     copies = folded([*rate.outputs.values(), *nodes], Builder())
     return len(topological(copies)) - len(topological(copies[: len(rate.outputs)]))
 

@@ -74,7 +74,7 @@ class AdaptiveIntegration(NativeIntegration):
                 return
 
     def _last(self, most: int) -> Array:
-        """Some passes, at most so many: the row of the last step, if there is one."""
+        """Make passes, at most so many: the row of the last step, if there is one."""
         self._piece(most)
         if self._number("longest_made") == 0.0:
             return np.empty((0, 2 + len(self.x)))
@@ -103,13 +103,13 @@ class AdaptiveIntegration(NativeIntegration):
         self.to_end()
 
     def to_end(self) -> None:
-        """All steps."""
+        """Take all steps."""
         self._go()
         if self._numbers[self._stop] != DONE or self.flat.rows is not None:
             self._see()
 
     def step(self) -> None:
-        """One step more on the way to t_end."""
+        """Take one step on the way to t_end."""
         numbers, row, status = self._numbers, self._at["row"], self._at["status"]
         self._towards(numbers[self._at[END]])
         self._go(1)
@@ -180,7 +180,7 @@ class AdaptiveIntegration(NativeIntegration):
         self.warnings += self.flat.look(rows, self._number("farthest"), self.parameters)
 
     def too_small(self) -> str:
-        """Why a run stopped whose step became too small."""
+        """Reason why a run stopped whose step became too small."""
         t, x = self.t, self.x
         where = f"stopped at t = {t:.6g} s: "
         rate = values_of(self.program.rate, [*x.tolist(), t, *self.parameters])

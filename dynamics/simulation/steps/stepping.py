@@ -125,7 +125,7 @@ class NativeIntegration(Integration):
 
     @property
     def t(self) -> float:
-        """Where the run is [s]."""
+        """Time that the run has reached [s]."""
         return self._number("t")
 
     def set_parameters(self, p: Sequence[float]) -> None:
@@ -166,14 +166,14 @@ class NativeIntegration(Integration):
 
     @abstractmethod
     def step(self) -> None:
-        """One step more on the way to t_end."""
+        """Take one step on the way to t_end."""
 
     @cached_property
     def _unrecorded(self) -> Callable[[int], None]:
         return self.runner.advancing(self._memory)
 
     def _go(self, most: int = 2**62) -> None:
-        """So many passes, or until the program stops, in pieces of bounded time: Ctrl-C ends them in between."""
+        """Make so many passes, or until the program stops, in pieces of bounded time: Ctrl-C ends them in between."""
         self._unrecorded(min(FIRST_PASSES, most))
         most -= FIRST_PASSES
         while most > 0 and self._numbers[self._stop] == RUNNING:
@@ -190,7 +190,7 @@ class NativeIntegration(Integration):
         return passes
 
     def _advance(self, most: int, *, whole: bool = False) -> tuple[Array, int]:
-        """Some passes, at most so many: their rows (the last alone, with `whole`), and how many."""
+        """Make passes, at most so many: their rows (the last alone, with `whole`), and how many."""
         if self.run.stopped():
             raise StoppedError
         passes, begin = min(self._passes, most), time.perf_counter()
@@ -274,11 +274,11 @@ class FixedStepIntegration(NativeIntegration):
         self._left = 0
 
     def to_end(self) -> None:
-        """All steps."""
+        """Take all steps."""
         self.until(self._t_end)
 
     def step(self) -> None:
-        """One step more on the way to t_end."""
+        """Take one step on the way to t_end."""
         if not self._left:
             self._enter(equal_steps([self.t, self._t_end], self.options.step)[0])
         self._steps(1)
@@ -346,7 +346,7 @@ class FixedStepIntegration(NativeIntegration):
         return with_hermite(block, self.program.rate, self.parameters, states)
 
     def failure(self, before: Array) -> str:
-        """Why the step from a state (m,) failed."""
+        """Reason why the step from a state (m,) failed."""
         singular = self._number("singular") if "singular" in self._at else 0.0
         return failed_step(self.components, self.t, before, self.x, int(singular))
 
