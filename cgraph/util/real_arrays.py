@@ -27,6 +27,8 @@ def real_array(what: str, value: object) -> Array:
     """
     if type(value) is np.ndarray and value.dtype == np.float64:
         return value
+    if type(value) in (list, tuple) and {*map(type, value)} == {float}:  # type: ignore[call-overload]
+        return np.array(value)
     if np.ma.is_masked(value) or (isinstance(value, list | tuple) and any([each is np.ma.masked for each in value])):
         raise TypeError(f"{what} must be real numbers, got an array with masked values")
     try:

@@ -59,6 +59,13 @@ class MotionEnd(NamedTuple):
     qd: Array
 
 
+def _floats(values: Any) -> Any:
+    """Numbers as an array where they are a list of floats, which needs no more checks than an array; else as they are."""
+    if type(values) in (list, tuple) and {*map(type, values)} == {float}:
+        return np.array(values)
+    return values
+
+
 class PreparedMotion:
     """Motions of one model by one method, all but start, end and parameter values fixed; made by `prepare`.
 
@@ -157,6 +164,7 @@ class PreparedMotion:
         timely = type(t0) is float and type(t_end) is float and self._options.spans(t0, t_end)
         if self._varied:
             alone.set_parameters(moving.values(parameters))
+        q, qd = _floats(q), _floats(qd)
         plain = timely and moving.plain and type(q) is np.ndarray and (qd is None or type(qd) is np.ndarray)
         if not (plain and alone.begins(q, qd, t0, t_end)):  # see what is wrong
             alone.begin(self._start(moving, q, qd, t0, t_end, parameters), float(t0), float(t_end))
