@@ -8,12 +8,12 @@ from heapq import heappop, heappush
 from ..core.node import Node
 from .rotation_pairs import Rotation
 
-Step = Node | list[Rotation]
+EliminationStep = Node | list[Rotation]
 
 
 def elimination_steps(
     arguments: Mapping[Node, Collection[Node]], rotations: Mapping[Node, Rotation], *, fewest: bool = False
-) -> list[Step]:
+) -> list[EliminationStep]:
     """Steps from the output down: a node, or rotations by one angle, once all nodes that use them are done.
 
     arguments: {node: those that its row of W t = b passes to}, arguments first. A rotation is there once, by its first
@@ -55,7 +55,7 @@ def elimination_steps(
             make_ready(arg)
 
     done: set[Node] = set()
-    result: list[Step] = []
+    result: list[EliminationStep] = []
     for node in ordered:
         if not uses[node]:
             make_ready(node)
@@ -78,6 +78,6 @@ def elimination_steps(
     return result
 
 
-def nodes_of(step: Step) -> list[Node]:
+def nodes_of(step: EliminationStep) -> list[Node]:
     """The nodes of a step."""
     return [node for r in step for node in (r.first, r.second)] if isinstance(step, list) else [step]

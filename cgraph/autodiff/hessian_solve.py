@@ -15,7 +15,7 @@ from ..core.scope import building
 from ..core.traversal import topological
 from ..util.explain_failure import explain_failure
 from ..util.require import require_choice, require_flag, require_graph, require_sequence
-from .elimination_order import Step, elimination_steps, nodes_of
+from .elimination_order import EliminationStep, elimination_steps, nodes_of
 from .schur_elimination import EdgePushing
 
 Order = Literal["recursive", "balanced"]
@@ -202,7 +202,7 @@ def _solved(
     return equations
 
 
-def _run(equations: EdgePushing, plan: Sequence[Step], build: Builder) -> None:
+def _run(equations: EdgePushing, plan: Sequence[EliminationStep], build: Builder) -> None:
     """Take the steps out, and give their nodes the tangents."""
     with building(build) as set_label:
         for step in plan:

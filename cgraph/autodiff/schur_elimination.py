@@ -24,7 +24,7 @@ from ..core.row import Row
 from ..core.scope import building
 from ..core.traversal import topological
 from ..util.caches import OPERATIONS, memo
-from .elimination_order import Step
+from .elimination_order import EliminationStep
 from .rotation_pairs import Rotation, rotations
 from .symmetric_elimination import SymmetricElimination
 from .symmetric_matrix import ZERO
@@ -85,7 +85,7 @@ class EdgePushing(SymmetricElimination):
         """Unknown that a node stands for in the step at hand."""
         return node
 
-    def reduce(self, step: Step) -> None:
+    def reduce(self, step: EliminationStep) -> None:
         """Take the nodes of a step out of W t = b."""
         if isinstance(step, list):
             self.push_rotations(step)
@@ -96,7 +96,7 @@ class EdgePushing(SymmetricElimination):
         else:
             self.push_adjoint(step)
 
-    def substitute(self, step: Step) -> None:
+    def substitute(self, step: EliminationStep) -> None:
         """The tangents of a step's nodes, from those of the steps that were reduced after it."""
         dots = self.dots
         if isinstance(step, list):  # (p, q) = R (x, y), R = [[c, s], [-s, c]]

@@ -19,7 +19,7 @@ from .llvm_ir import instructions, preamble
 
 MEMORY = 2**18  # bytes for inputs and outputs of a tile: a part of a core's second cache
 VECTORS = 16  # in a tile, at most
-FEW = 48  # inputs and outputs that a cache holds wherever they lie
+FEW_PLACES = 48  # inputs and outputs that a cache holds wherever they lie
 
 
 class Batch(NamedTuple):
@@ -48,7 +48,7 @@ def batch_ir(graph: Graph, lanes: int, flags: str = "", registers: int = REGISTE
     """The module for a graph, in vectors of so many lanes."""
     arithmetic = Arithmetic(flags, lanes, registers)
     n_in, n_out = len(graph.inputs), len(graph.outputs)
-    tiled = n_in + n_out > FEW
+    tiled = n_in + n_out > FEW_PLACES
 
     def address(base: str, name: str, row: int) -> list[str]:
         if tiled:

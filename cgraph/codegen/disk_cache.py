@@ -15,7 +15,7 @@ from ..util.require import require_path
 
 FORMAT = "cgraph machine code, 1"  # part of every name: entries of another format are other entries
 SUFFIX, UNFINISHED = ".code", ".unfinished"
-LARGEST = 2**28  # bytes of an entry; the machine code of a million nodes takes a tenth
+LARGEST_ENTRY = 2**28  # bytes of an entry; the machine code of a million nodes takes a tenth
 
 
 class Cache:
@@ -110,7 +110,7 @@ def _read(path: Path) -> bytes | None:
     try:
         with open(path, "rb", opener=_open_at_once) as file:
             status = os.fstat(file.fileno())
-            if not stat.S_ISREG(status.st_mode) or status.st_size > LARGEST or not _ours(status):
+            if not stat.S_ISREG(status.st_mode) or status.st_size > LARGEST_ENTRY or not _ours(status):
                 return None
             checksum, content = file.read(32), file.read()
     except OSError:
@@ -124,8 +124,8 @@ def _open_at_once(name: str, flags: int) -> int:
 
 
 def _write(path: Path, content: bytes) -> None:
-    if len(content) > LARGEST:
-        raise OSError(f"{len(content)} bytes are more than the {LARGEST} of an entry")
+    if len(content) > LARGEST_ENTRY:
+        raise OSError(f"{len(content)} bytes are more than the {LARGEST_ENTRY} of an entry")
     path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
     unfinished = path.with_suffix(f".{os.urandom(8).hex()}{UNFINISHED}")
     try:

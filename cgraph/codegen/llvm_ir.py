@@ -12,7 +12,7 @@ from ..operations.texts import LLVM_ONE_OR_ZERO, LLVM_WHERE
 from .arithmetic import REGISTERS, Arithmetic, bits, words_of
 from .function_writer import FunctionWriter
 from .parts import Parts
-from .schedule import Joined, Merged, Step, joined_calls, products_of, schedule
+from .schedule import Joined, Merged, Scheduled, joined_calls, products_of, schedule
 from .vector_math import POLYNOMIAL, helpers
 from .vector_sums import Sums, Vectors, vector_sums
 
@@ -312,13 +312,13 @@ def _product_and_sum(node: Node, product: Node, r: str, args: list[str], arithme
 
 
 def _results_behind_calls(
-    steps: Mapping[Step, tuple[Step, ...]], calls: Mapping[Node, Joined]
-) -> dict[Step, tuple[Step, ...]]:
+    steps: Mapping[Scheduled, tuple[Scheduled, ...]], calls: Mapping[Node, Joined]
+) -> dict[Scheduled, tuple[Scheduled, ...]]:
     """The steps, the nodes that a joined call gives right behind it."""
     results: dict[Joined, list[Node]] = {}
     for node, call in calls.items():
         results.setdefault(call, []).append(node)
-    order: dict[Step, tuple[Step, ...]] = {}
+    order: dict[Scheduled, tuple[Scheduled, ...]] = {}
     for step, reads in steps.items():
         if step not in calls:
             order[step] = reads

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from heapq import heappop, heappush
 
 from ..core.node import Node
-from .schedule import Joined, Step
+from .schedule import Joined, Scheduled
 from .vector_sums import Vectors
 
 STEPS = 400  # in a function
@@ -30,7 +30,7 @@ class Parts:
 
     def __init__(
         self,
-        steps: Mapping[Step, tuple[Step, ...]],
+        steps: Mapping[Scheduled, tuple[Scheduled, ...]],
         calls: Mapping[Node, Joined],
         kind: str,
         size: int,
@@ -41,13 +41,13 @@ class Parts:
         self.kind, self.size, self.places = kind, size, vectors.places
         self._leaf, self._registers = leaf, registers
         self.starts = _starts(steps, calls)
-        self._uses: dict[Step, list[int]] = {}  # numbers of the steps that will need a value, the next one last
+        self._uses: dict[Scheduled, list[int]] = {}  # numbers of the steps that will need a value, the next one last
         for number, reads in zip(range(len(steps) - 1, -1, -1), reversed(list(steps.values())), strict=True):
             for arg in reads:
                 self._uses.setdefault(arg, []).append(number)
-        self._names: dict[Step, str] = {}
-        self._latest: list[tuple[int, int, Step]] = []  # heap by the next use, latest first; some outdated
-        self._slots: dict[Step, int] = {}
+        self._names: dict[Scheduled, str] = {}
+        self._latest: list[tuple[int, int, Scheduled]] = []  # heap by the next use, latest first; some outdated
+        self._slots: dict[Scheduled, int] = {}
         self._fixed: dict[Node, int] = {node: slots[0] for node, slots in vectors.slots.items()}
         self._free: list[int] = []
         self._count = 0  # of names
@@ -58,7 +58,7 @@ class Parts:
         self._names, self._latest = {}, []
         return lines
 
-    def read(self, steps: Sequence[Step]) -> tuple[list[str], list[str]]:
+    def read(self, steps: Sequence[Scheduled]) -> tuple[list[str], list[str]]:
         """The names of values for the next step, and the lines that bring them from memory."""
         lines: list[str] = []
         names = []
@@ -74,7 +74,7 @@ class Parts:
             self._used(step)
         return names, lines
 
-    def write(self, step: Step, name: str) -> list[str]:
+    def write(self, step: Scheduled, name: str) -> list[str]:
         """A step's value has a name; the lines that make room for it."""
         self._names[step] = name
         self._used(step)
@@ -86,7 +86,7 @@ class Parts:
                 del self._names[latest]
         return lines
 
-    def _used(self, step: Step) -> None:
+    def _used(self, step: Scheduled) -> None:
         """Move a step on to its next use; after the last one it goes."""
         if uses := self._uses.get(step):
             self._count += 1
@@ -96,14 +96,14 @@ class Parts:
         if step in self._slots:
             self._free.append(self._slots.pop(step))
 
-    def _fetch(self, step: Step) -> tuple[str, list[str]]:
+    def _fetch(self, step: Scheduled) -> tuple[str, list[str]]:
         self._count += 1
         name = f"%w{self._count}"
         if isinstance(step, Node) and not step.args:
             return self._leaf(step, name)
         return name, [*self._address(step, name), f"  {name} = load {self.kind}, ptr {name}.at, align {self.size}"]
 
-    def _keep(self, step: Step) -> list[str]:
+    def _keep(self, step: Scheduled) -> list[str]:
         """The lines that put a value into memory, if it is to be there and is not."""
         if step in self._slots or step in self._fixed or (isinstance(step, Node) and not step.args):
             return []
@@ -118,12 +118,12 @@ class Parts:
             f"  store {self.kind} {self._names[step]}, ptr {name}.at, align {self.size}",
         ]
 
-    def _address(self, step: Step, name: str) -> list[str]:
+    def _address(self, step: Scheduled, name: str) -> list[str]:
         slot = self._fixed[step] if isinstance(step, Node) and step in self._fixed else self._slots[step]
         return [f"  {name}.at = getelementptr {self.kind}, ptr %w, i64 {slot}"]
 
 
-def _starts(steps: Iterable[Step], calls: Mapping[Node, Joined]) -> set[int]:
+def _starts(steps: Iterable[Scheduled], calls: Mapping[Node, Joined]) -> set[int]:
     """Numbers of the steps where parts begin, without the first."""
     starts: set[int] = set()
     begin = 0

@@ -35,10 +35,10 @@ class Merged(NamedTuple):
     sums: Mapping[Node, Sums] = MappingProxyType({})
 
 
-Step = Node | Joined | Sums
+Scheduled = Node | Joined | Sums
 
 
-def schedule(graph: Graph, merged: Merged) -> dict[Step, tuple[Step, ...]]:
+def schedule(graph: Graph, merged: Merged) -> dict[Scheduled, tuple[Scheduled, ...]]:
     """Every operation once and what it reads, arguments first, and before the results of a joined call the call.
 
     Calls of library functions come as early as they can, since a call empties the registers and at first there is
@@ -49,10 +49,10 @@ def schedule(graph: Graph, merged: Merged) -> dict[Step, tuple[Step, ...]]:
     """
     depth = _depth(graph)
     early = [merged.calls.get(node, node) for node in graph.nodes if node.args and columns(node.op).calls_library]
-    order: dict[Step, tuple[Step, ...]] = {}
-    waiting: dict[Step, tuple[Step, ...]] = {}
+    order: dict[Scheduled, tuple[Scheduled, ...]] = {}
+    waiting: dict[Scheduled, tuple[Scheduled, ...]] = {}
     results = [node for node in graph.outputs.values() if node.args]
-    stack: list[Step] = [*reversed(results), *reversed(early)]
+    stack: list[Scheduled] = [*reversed(results), *reversed(early)]
     while stack:
         step = stack[-1]
         if step in order:
@@ -70,11 +70,11 @@ def schedule(graph: Graph, merged: Merged) -> dict[Step, tuple[Step, ...]]:
     return order
 
 
-def _leaf(step: Step) -> bool:
+def _leaf(step: Scheduled) -> bool:
     return isinstance(step, Node) and not step.args
 
 
-def needed(step: Step, merged: Merged) -> tuple[Step, ...]:
+def needed(step: Scheduled, merged: Merged) -> tuple[Scheduled, ...]:
     """Arguments of a step, or the joined call that gives the node; of a product that it takes in, the factors.
 
     In their place, as in a * b + c and in c - a * b.
@@ -105,9 +105,9 @@ def products_of(graph: Graph) -> dict[Node, Node]:
     }
 
 
-def _depth(graph: Graph) -> dict[Step, int]:
+def _depth(graph: Graph) -> dict[Scheduled, int]:
     """Operations on the longest way from an input or a constant to a node."""
-    depth: dict[Step, int] = {}
+    depth: dict[Scheduled, int] = {}
     for node in graph.nodes:
         depth[node] = 1 + max([depth[arg] for arg in node.args], default=-1)
     return depth

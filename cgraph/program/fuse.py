@@ -19,13 +19,13 @@ from .statements.call import Call, Map, Sum, elements, products_in, several
 from .statements.control import If
 
 # Operations of one call: it compiles in some tens of milliseconds, and a short run gains no more.
-MOST = 1000
+MOST_OPERATIONS = 1000
 # Operations by which the code of a graph that several statements call may grow. Beyond, as of the rate in the stages
 # of a step, a call of code that is there once takes no longer, and compiles sooner.
 COPIES = 100
 # Elements of a `Map` or `Sum` that becomes straight code, and operations of them all. In vectors fewer instructions do
 # more of them, but a vector of numbers that have just been written one by one waits until the last is in the cache.
-FEW, STRAIGHT = 8, 200
+FEW_ELEMENTS, STRAIGHT = 8, 200
 
 
 def fused(program: Program, *, alike: bool = False) -> Program:
@@ -49,10 +49,10 @@ def _fused(
         work = _work(statement, program, uses)
         if alike and isinstance(statement, Map | Sum) and not _as_before([statement]):
             work = math.inf
-        if size + work > MOST or (alike and not _as_before([*run, statement])):
+        if size + work > MOST_OPERATIONS or (alike and not _as_before([*run, statement])):
             done += _one_call(program, run)
             run, size = [], 0.0
-        if isinstance(statement, Call | Map | Sum) and work <= MOST:
+        if isinstance(statement, Call | Map | Sum) and work <= MOST_OPERATIONS:
             run.append(statement)
             size += work
             continue
@@ -79,7 +79,7 @@ def _work(statement: Statement, program: Program, uses: Counter[int]) -> float:
     count = elements(statement, program.registers)
     if several(statement, program.registers):
         return math.inf
-    return size * count if count <= FEW and size * count <= STRAIGHT else math.inf
+    return size * count if count <= FEW_ELEMENTS and size * count <= STRAIGHT else math.inf
 
 
 def _one_call(program: Program, run: Sequence[Call | Map | Sum]) -> Sequence[Call | Map | Sum]:

@@ -17,7 +17,7 @@ from .mass_matrix.accelerations import accelerations
 from .mass_matrix.mass_matrix_solve import inverse, mass_solve, smaller_solution
 from .substitute import substitute
 
-FEW = 2  # coordinates up to which a bias is also derived from the Lagrangian
+FEW_COORDINATES = 2  # coordinates up to which a bias is also derived from the Lagrangian
 INERTIA, FORCE = "kg m^2, kg m or kg", "N m or N"
 
 
@@ -85,7 +85,7 @@ def bias(system: System) -> Iterator[list[Node]]:
     """
     free = system.without_constraints  # whose tags shared nodes would have
     yield bias_terms(free).bias(free, Builder())
-    if system.n <= FEW:  # of a joint or two the energy has no more than the bodies
+    if system.n <= FEW_COORDINATES:  # of a joint or two the energy has no more than the bodies
         yield from [bias_terms_of_lagrangian(form).bias(free, Builder()) for form in free.forms]
 
 

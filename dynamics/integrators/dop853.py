@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .tableau import Row, Tableau
+from .tableau import RowOfWeights, Tableau
 
 _Sparse = dict[int, float]
 
@@ -69,11 +69,11 @@ _D: tuple[_Sparse, ...] = (
 # fmt: on
 
 
-def _row(weights: _Sparse, length: int) -> Row:
+def _row(weights: _Sparse, length: int) -> RowOfWeights:
     return tuple([weights.get(k, 0.0) for k in range(length)])
 
 
-def _dense() -> tuple[Row, ...]:
+def _dense() -> tuple[RowOfWeights, ...]:
     """Weights of the slopes in the powers of s, from the nested form that the program evaluates.
 
     x + s (F0 + (1 - s) (F1 + s (F2 + (1 - s) (F3 + s (F4 + (1 - s) (F5 + s F6)))))), with F0 the whole step, F1 and F2

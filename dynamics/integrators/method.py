@@ -14,8 +14,8 @@ from .problem import Problem
 from .step import Step, arriving, rate_calls, with_registers
 from .step_control import HERMITE, chosen, first_pass, nonfinite
 
-KEPT = 32  # methods of an order
-ROUNDING = 16.0 * 2.0**-52  # of the sums of a step
+KEPT_METHODS = 32  # methods of an order
+SUM_ROUNDING = 16.0 * 2.0**-52  # of the sums of a step
 
 
 @dataclass(frozen=True)
@@ -87,7 +87,7 @@ class Method:
     step: Callable[..., Step]
     adaptive: bool = False
     degree: int = HERMITE
-    finest: float = ROUNDING
+    finest: float = SUM_ROUNDING
     starts: bool = False
     order_at: Callable[[float], int] | None = None
 
@@ -116,7 +116,7 @@ class Method:
         return f"<Method of order {self.order}, {'steps by error' if self.adaptive else 'equal steps'}>"
 
 
-@memo(KEPT)
+@memo(KEPT_METHODS)
 def _of_order(method: Method, order: int) -> Method:
     """The method of one order; the same object for the same, since problems keep programs by it."""
     step = partial(method.step, order=order)

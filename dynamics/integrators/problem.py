@@ -19,7 +19,7 @@ from ..systems.arguments import TIME, Parameters, call_user_function
 from ..systems.model import Equations, Model, as_equations
 from ..systems.system import System
 
-KEPT = 16  # problems that stay for another run, with what was derived from them
+KEPT_PROBLEMS = 16  # problems that stay for another run, with what was derived from them
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +134,7 @@ class _Request:
     bound: Mapping[str, float] = field(compare=False)
 
 
-@memo(KEPT)
+@memo(KEPT_PROBLEMS)
 def _derived(request: _Request) -> Problem:
     model, bound = request.model, dict(request.bound)
     inputs, system = state_inputs(model), model.system

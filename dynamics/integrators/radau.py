@@ -22,7 +22,7 @@ from .jacobian_statements import jacobian_statements
 from .problem import Problem
 from .step import Step
 from .step_control import SCALE, count, measured, nonfinite, scale
-from .tableau import Row
+from .tableau import RowOfWeights
 
 _R6 = math.sqrt(6.0)
 _C = ((4.0 - _R6) / 10.0, (4.0 + _R6) / 10.0, 1.0)
@@ -39,16 +39,16 @@ _ERROR = ((-13 - 7 * _R6) / 3, (-13 + 7 * _R6) / 3, -1 / 3)  # weights of Z / h 
 HALVES = (0.9 / 0.5) ** 4  # the error at which a step of estimate h^4 is halved
 TURNS = 8.0  # of Newton's iteration, at most
 MOST_TURNS = 100.0  # where it goes on to rounding
-ROUNDING = 2.0**-52  # relative
+EPSILON = 2.0**-52  # relative
 STALLS = 3.0  # turns that come no nearer: the rest is rounding
 FAST = 1e-3  # rate of convergence, below which the Jacobian serves the next step, too (section IV.8)
-LONGER = 1.1  # times as long as the one before: a step up to which is as long, since that saves its factorization
-SAME = 1e-10  # relative: lengths of steps that are the same but for the rounding of the time
-SMALL = 1e-6  # of the largest coordinate or velocity, below which a component is measured by it
+LONGER_STEP = 1.1  # times as long as the one before: a step up to which is as long, since that saves its factorization
+SAME_LENGTH = 1e-10  # relative: lengths of steps that are the same but for the rounding of the time
+SMALL_COMPONENT = 1e-6  # of the largest coordinate or velocity, below which a component is measured by it
 CHANGES = ("right0", "F1", "F2")  # of W in a turn
 
 
-def _transformation() -> tuple[list[Row], list[Row]]:
+def _transformation() -> tuple[list[RowOfWeights], list[RowOfWeights]]:
     """T and its inverse: columns the real eigenvector of A^-1, and the real and imaginary part of the complex one."""
     inverse = np.linalg.inv(_A)
     columns = []
@@ -126,7 +126,7 @@ def _renewed() -> Call:
 def _factored() -> Call:
     """Whether the matrices are made and factored: for another Jacobian, or a step of another length."""
     h, before, renewed = inputs = cg.variables("h before renewed")
-    other = abs(h - before) > SAME * abs(h)
+    other = abs(h - before) > SAME_LENGTH * abs(h)
     return Call(Graph(inputs, {"y": cg.maximum(renewed, other)}), ("h", "h_factored", "renewed"), ("factored",))
 
 
@@ -134,7 +134,7 @@ def _keeping() -> Call:
     """Statements after an accepted step: whether the Jacobian serves the next, its factors, too, if hardly longer."""
     theta, h, wanted = inputs = cg.variables("theta h next")
     slow, same = theta > FAST, abs(h)
-    alike = (1.0 - slow) * (wanted >= same) * (wanted <= LONGER * same)
+    alike = (1.0 - slow) * (wanted >= same) * (wanted <= LONGER_STEP * same)
     outputs: dict[str, Node | float] = {"slow": slow, "current": 0.0, "next": cg.where(alike, same, wanted)}
     return Call(Graph(inputs, outputs), ("theta", "h", "next"), tuple(outputs))
 
@@ -157,7 +157,7 @@ def _sizes(problem: Problem) -> Call:
     scales: list[Node] = []
     for kind in kinds:
         most = reduce(cg.maximum, [largest[k] for k in kind], cg.constant(0.0))
-        scales += [ROUNDING * cg.maximum(largest[k], SMALL * most) for k in kind]
+        scales += [EPSILON * cg.maximum(largest[k], SMALL_COMPONENT * most) for k in kind]
     outputs = {f"{k}": node for k, node in enumerate([*largest, *scales])}
     return Call(Graph([*size, *x, *rate, h], outputs), (*names, "h"), ("size", "least"))
 
@@ -200,7 +200,7 @@ def _begin() -> Call:
     Without a tolerance, where the step cannot be halved: beside rounding, after as many turns as it takes.
     """
     rtol = cg.variable("rtol")
-    newton = cg.maximum(10.0 * ROUNDING / rtol, cg.minimum(0.03, cg.sqrt(rtol)))
+    newton = cg.maximum(10.0 * EPSILON / rtol, cg.minimum(0.03, cg.sqrt(rtol)))
     outputs: dict[str, Node | float] = {
         "going": 1.0,
         "turns": 0.0,

@@ -20,7 +20,7 @@ from .jacobian_statements import jacobian_statements
 from .problem import Problem, time_derivative
 from .step import Step
 from .step_control import measured, nonfinite
-from .tableau import Row
+from .tableau import RowOfWeights
 
 
 @dataclass(frozen=True)
@@ -32,11 +32,11 @@ class Rosenbrock:
 
     order: int
     gamma: float
-    c: Row
-    d: Row
-    a: tuple[Row, ...]
-    slopes: tuple[Row, ...]  # C
-    dense: tuple[Row, ...]
+    c: RowOfWeights
+    d: RowOfWeights
+    a: tuple[RowOfWeights, ...]
+    slopes: tuple[RowOfWeights, ...]  # C
+    dense: tuple[RowOfWeights, ...]
 
 
 # Steinebach, BIT Numerical Mathematics 63 (2023) 27: order 5, stiffly accurate and L-stable.
@@ -122,7 +122,7 @@ def _stages(method: Rosenbrock, problem: Problem) -> list[Statement]:
     return [*body, added("at", f"U{last}", "x_new")]
 
 
-def _state(weights: Row) -> Map:
+def _state(weights: RowOfWeights) -> Map:
     """at = x + sum of weight * U."""
     x = cg.variable("x")
     nodes, parts, names = used(weights, "U")

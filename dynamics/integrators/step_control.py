@@ -36,7 +36,7 @@ from .problem import Problem
 from .step import SHARED, Step, rate_calls, with_registers
 
 RUNNING, DONE, TOO_SMALL = 0.0, 1.0, 2.0  # register `status`
-SAFETY, SMALLEST, LARGEST = 0.9, 0.2, 5.0  # factors from one step to the next
+SAFETY, SMALLEST_FACTOR, LARGEST_FACTOR = 0.9, 0.2, 5.0  # factors from one step to the next
 MEMORY = 0.04  # weight of the estimate before in the choice of the next step (Gustafsson's PI control)
 RESOLUTION = 4.0 * 2.0**-52  # steps below this share of t hardly move t
 SCALE = ("x", "x_new", "rtol", "atol", "leap")
@@ -102,7 +102,7 @@ def control(evaluations: int) -> Call:
         "status": cg.where(accepted, cg.where(arrives, DONE, RUNNING), cg.where(able, RUNNING, TOO_SMALL)),
         "rejected": rejected + (1.0 - accepted),
         "evaluations": done + float(evaluations),
-        "largest": cg.where(before, LARGEST, 1.0),  # no growth after a rejection
+        "largest": cg.where(before, LARGEST_FACTOR, 1.0),  # no growth after a rejection
         "row": row,
         "longest_made": cg.where(row, cg.maximum(made, abs(h)), made),
         "trials": trials + 1.0,
@@ -116,7 +116,7 @@ def _grown(order: int) -> Call:
     names = ("error", "error_old", "tried", "next", "largest")
     error, old, tried, wanted, largest = inputs = cg.variables(names)
     growth = SAFETY * error ** -(1.0 / order - 0.75 * MEMORY) * cg.maximum(old, 1e-4) ** MEMORY
-    after = tried * cg.minimum(cg.maximum(growth, SMALLEST), largest)
+    after = tried * cg.minimum(cg.maximum(growth, SMALLEST_FACTOR), largest)
     after = cg.where(tried < wanted, cg.maximum(wanted, after), after)  # a step cut short says less
     return Call(Graph(inputs, {"next": after, "error_old": error}), names, ("next", "error_old"))
 
@@ -124,7 +124,7 @@ def _grown(order: int) -> Call:
 def _shrunk(order: int) -> Call:
     """The step after a rejected one."""
     error, tried = inputs = cg.variables("error tried")
-    shrink = cg.where(error < 1e300, cg.maximum(SAFETY * error ** (-1.0 / order), SMALLEST), 0.1)
+    shrink = cg.where(error < 1e300, cg.maximum(SAFETY * error ** (-1.0 / order), SMALLEST_FACTOR), 0.1)
     return Call(Graph(inputs, {"next": tried * shrink}), ("error", "tried"), ("next",))
 
 

@@ -30,11 +30,11 @@ from .momenta import Mechanics, mechanics
 from .problem import Problem, reaches
 from .step import Step
 from .step_control import count
-from .symplectic_tableaus import MIDPOINT, SYMPLECTIC_EULER, VERLET, Composition, Partitioned, Row, over
+from .symplectic_tableaus import MIDPOINT, SYMPLECTIC_EULER, VERLET, Composition, Fractions, Partitioned, over
 
 TURNS = 60.0  # of the iteration for the stages, at most
-ENOUGH = 2.0**-53  # a change below this, relative, is rounding
-LOOSE = 1e-9  # one above this, when the turns are over, is no convergence: the step is too long
+CONVERGED = 2.0**-53  # a change below this, relative, is rounding
+DIVERGED = 1e-9  # one above this, when the turns are over, is no convergence: the step is too long
 REPEATS = 8  # Newton steps for the velocity of a momentum that is not linear in it
 ONCE = Composition(2, (1.0,))
 
@@ -160,7 +160,7 @@ def _in_turn(composition: Composition, body: list[Statement]) -> list[Statement]
     return [*result, copied("whole_h", "h")]
 
 
-def _stage(weights: Row, base: str, slope: str, target: str) -> Map:
+def _stage(weights: Fractions, base: str, slope: str, target: str) -> Map:
     """target = base + h * (sum of weight * slope)."""
     used = [k for k, weight in enumerate(weights) if weight]
     x, h, *slopes = cg.variables(["x", "h", *(f"s{k}" for k in used)])
@@ -206,8 +206,8 @@ def _judged(stages: int) -> Call:
     change, speed = (sum(cg.variables(names)[1:], cg.variable(names[0])) for names in (changes, speeds))
     turns, old, done = cg.variables("turns change_old evaluations")
     nearer = cg.maximum(change < old, turns < 2.0)
-    going = (change > ENOUGH * ENOUGH * speed) * nearer * (turns + 1.0 < TURNS)
-    settled = change <= LOOSE * LOOSE * speed + 2.0**-1000
+    going = (change > CONVERGED * CONVERGED * speed) * nearer * (turns + 1.0 < TURNS)
+    settled = change <= DIVERGED * DIVERGED * speed + 2.0**-1000
     outputs = {
         "going": going,
         "turns": turns + 1.0,
@@ -219,7 +219,7 @@ def _judged(stages: int) -> Call:
     return Call(Graph(cg.variables(inputs), outputs), inputs, tuple(outputs))
 
 
-def _added(base: str, slope: str, weights: Row) -> Map:
+def _added(base: str, slope: str, weights: Fractions) -> Map:
     """base += h * (sum of weight * slope), with what rounding took off kept for the next step."""
     x, before, h, *slopes = cg.variables(["x", "rounding", "h", *(f"s{k}" for k in range(len(weights)))])
     change, rest = _change(h, slopes, weights)

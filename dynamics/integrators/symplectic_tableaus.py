@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from fractions import Fraction
 
-Row = tuple[Fraction, ...]
+Fractions = tuple[Fraction, ...]
 
 DIGITS = 50  # of the numbers of Gauss's methods
 NEWTON = 8  # steps that make 50 digits of a guess that has two or three
@@ -18,10 +18,10 @@ class Partitioned:
     """The numbers: q's a_ij, p's b_ij, weights w_i, and the times c_i of the stages. The same a and b: Gauss."""
 
     order: int
-    a: tuple[Row, ...]
-    b: tuple[Row, ...]
-    w: Row
-    c: Row
+    a: tuple[Fractions, ...]
+    b: tuple[Fractions, ...]
+    w: Fractions
+    c: Fractions
 
 
 def gauss(stages: int) -> Partitioned:
@@ -69,7 +69,7 @@ def _rounded(x: Fraction) -> Fraction:
     return Fraction(round(x * 10**DIGITS), 10**DIGITS)
 
 
-def over(denominator: int, *numerators: int) -> Row:
+def over(denominator: int, *numerators: int) -> Fractions:
     """The numerators, each over the denominator."""
     return tuple([Fraction(numerator, denominator) for numerator in numerators])
 

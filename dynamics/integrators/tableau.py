@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from cgraph.extend import kept_by_first
 
-Row = tuple[float, ...]
+RowOfWeights = tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -56,16 +56,16 @@ class Tableau:
     """
 
     order: int
-    c: Row
-    a: tuple[Row, ...]
-    b: Row
-    error: tuple[Row, ...] = ()
+    c: RowOfWeights
+    a: tuple[RowOfWeights, ...]
+    b: RowOfWeights
+    error: tuple[RowOfWeights, ...] = ()
     estimate: int = 0
-    dense: tuple[Row, ...] = ()
-    extra: tuple[tuple[float, Row], ...] = ()
+    dense: tuple[RowOfWeights, ...] = ()
+    extra: tuple[tuple[float, RowOfWeights], ...] = ()
 
     @property
-    def interpolant(self) -> tuple[Row, ...]:
+    def interpolant(self) -> tuple[RowOfWeights, ...]:
         """`dense`, or in its place the weights of Hermite's cubic, a row for each slope, that at the end included.
 
         x + s h f0 + s^2 (3 D - h (2 f0 + f1)) + s^3 (h (f0 + f1) - 2 D), with D = h sum_k b_k slope_k.

@@ -36,7 +36,9 @@ from .problem import Problem
 from .step import Step
 from .step_control import count
 
-SHORT = 24_000  # operations of all coefficients, before folding: more take a second to compile, a third less to run
+SHORT_CODE = (
+    24_000  # operations of all coefficients, before folding: more take a second to compile, a third less to run
+)
 CHECKED = 2.0**-46  # relative: rounding of the rates, below which a defect says nothing
 # Units in a step, inverse: a shorter one is tried again in a unit of its own, for what starts at 0 is measured by its
 # first change, which is that of a whole unit.
@@ -47,7 +49,7 @@ SHORTEST = 2.0**-10  # units: the first try where terms say nothing, as of what 
 def taylor_step(problem: Problem, order: int) -> Step:
     """The step of an order."""
     m, graphs, c = problem.size, _jets(problem), _names("c", order)
-    if order * (len(graphs.order.nodes) + graphs.sums * order) <= SHORT:
+    if order * (len(graphs.order.nodes) + graphs.sums * order) <= SHORT_CODE:
         series: list[Statement] = [Call(straight(graphs, order), ("rate", "unit", "zeros"), tuple(c))]
         lengths: dict[str, int] = {}
     else:

@@ -22,7 +22,7 @@ from .left_out import follows_itself, listed, present, refused_or_left_out
 from .smooth_forces import NONE, Smooth
 
 GRAVITY = (0.0, 0.0, -9.81)  # m/s^2, where the file says nothing
-FAR = 1e9  # m: a limit of a slide that `to_urdf` writes because URDF asks for one; it stands for none
+FAR_LIMIT = 1e9  # m: a limit of a slide that `to_urdf` writes because URDF asks for one; it stands for none
 _OTHERS = {"revolute": "revolute", "planar": "planar"}  # beside the words of joint types: a hinge with limits, three
 _ENTRIES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _KNOWN = {
@@ -276,7 +276,7 @@ def _limits(joint: Element, name: str) -> tuple[float, float] | None:
     if limit is None or joint.get("type") not in ("revolute", "prismatic"):
         return None
     lower, upper = (_numbers(limit, where, side, 1, "0")[0] for side in ("lower", "upper"))
-    return None if (lower, upper) == (-FAR, FAR) else (lower, upper)
+    return None if (lower, upper) == (-FAR_LIMIT, FAR_LIMIT) else (lower, upper)
 
 
 def _friction(joint: Element, name: str) -> float:

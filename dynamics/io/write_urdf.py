@@ -14,7 +14,7 @@ from ..multibody.parameters import vanishes
 from ..multibody.quantities.body_quantity import of_bodies
 from ..multibody.trees.mechanism import WORLD, Body, MechanismError, require_mechanism
 from ..systems.model import Model
-from .read_urdf import FAR, GRAVITY
+from .read_urdf import FAR_LIMIT, GRAVITY
 from .write_loops import mimic_lines, numbers
 
 
@@ -97,13 +97,13 @@ def _joint_lines(body: Body, name: str, mimic: str) -> list[str]:
     dynamics = f'<dynamics damping="{joint.damping!r}"/>'
     if not joint.type.has_axis:
         return [opened, ends, place, f"    {dynamics}", "  </joint>"]
-    limits = f'lower="{-FAR!r}" upper="{FAR!r}" ' if joint.type.limited else ""
+    limits = f'lower="{-FAR_LIMIT!r}" upper="{FAR_LIMIT!r}" ' if joint.type.limited else ""
     return [
         opened,
         ends,
         place,
         f'    <axis xyz="{numbers(joint.axis)}"/>{dynamics}{mimic}',
-        f'    <limit {limits}effort="{FAR!r}" velocity="{FAR!r}"/>',
+        f'    <limit {limits}effort="{FAR_LIMIT!r}" velocity="{FAR_LIMIT!r}"/>',
         "  </joint>",
     ]
 

@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 GUARD = 40  # digits of arithmetic beyond the tolerance: a stiff rate is a small difference of large terms
 SETTLED = 24  # digits beyond the tolerance to which the stages are solved for: a stiff rate loses most of them
 NEWTON = 40  # iterations before a step is halved
-LEAST = 0.85  # growth of the next step below which this one is refused: its last terms are too large
-SMALLEST = 1e-300  # s
+LEAST_GROWTH = 0.85  # growth of the next step below which this one is refused: its last terms are too large
+SMALLEST_STEP = 1e-300  # s
 
 
 @dataclass(frozen=True)
@@ -112,11 +112,11 @@ def collocation(
                 size = number(time) - t if h >= last else number(last / math.ceil(last / h) if last < 2 * h else h)
                 rates = _stages(series, slopes, method, weights, x, t, size, guess, digits)
                 growth = 0.5 if rates is None else _growth(method, rates, x, size, digits)
-                if rates is None or growth < LEAST:
+                if rates is None or growth < LEAST_GROWTH:
                     refused += 1
                     h = float(size) * max(0.1, growth * 0.9)
                     guess = [series.rate(x, t)] * stages
-                    if h < SMALLEST:
+                    if h < SMALLEST_STEP:
                         raise ReferenceFailedError(f"the steps shrink to nothing at t = {float(t):.17g}")
                     continue
                 x = _moved(method, x, rates, size)[-1]

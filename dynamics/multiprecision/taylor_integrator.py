@@ -19,7 +19,7 @@ from cgraph.extend import NoSeriesError, columns, jets, topological
 from ..systems.arguments import TIME
 from .flint_numbers import Number, log2_size, sign, value, working
 
-Step = tuple[int, Callable[..., Number], list[int]]  # where the result goes, of which function, of the numbers where
+Entry = tuple[int, Callable[..., Number], list[int]]  # where the result goes, of which function, of the numbers where
 
 
 class Series:
@@ -126,7 +126,7 @@ class _Evaluation:
         value_of: Callable[[Node], Callable[..., Number]],
     ) -> None:
         self._numbers: list[Number] = []
-        self._steps: list[Step] = []
+        self._steps: list[Entry] = []
         places: dict[Node, int] = {}
         moving: set[int] = set()
         for node in (*graph.inputs, *topological(graph.outputs.values())):
@@ -161,7 +161,7 @@ GUARD = 12  # digits of arithmetic beyond the tolerance
 SAMPLES = 16  # places in a step at which a switch is looked for
 STUCK = 3  # steps of no length one after another
 PROBE, MANY = 50, 1e6  # steps between looks at how many there will be, and how many are too many
-SMALLEST = -1000.0  # log2 of a step that no motion needs
+SMALLEST_STEP = -1000.0  # log2 of a step that no motion needs
 
 
 class ReferenceFailedError(ArithmeticError):
@@ -233,7 +233,7 @@ def step_size(coefficients: Sequence[Sequence[Number]], digits: int, t: float) -
         return math.inf
     k = np.arange(1, size.shape[1] + 1)
     tolerance = -digits * math.log2(10.0)
-    low, high = 2 * SMALLEST, -2 * SMALLEST
+    low, high = 2 * SMALLEST_STEP, -2 * SMALLEST_STEP
     while high - low > 0.01:
         middle = 0.5 * (low + high)
         terms = size + k * middle
@@ -241,7 +241,7 @@ def step_size(coefficients: Sequence[Sequence[Number]], digits: int, t: float) -
             low = middle
         else:
             high = middle
-    if low < SMALLEST:
+    if low < SMALLEST_STEP:
         raise ReferenceFailedError(f"the steps shrink to nothing at t = {t:.17g}: there is a singularity")
     return math.exp2(min(low, 1000.0))
 

@@ -11,7 +11,7 @@ import numpy as np
 from cgraph.extend import Array, counted
 
 from .estimates.error_estimate import RunEstimate
-from .run_options import SMALL, TABLES, RunOptions, room
+from .run_options import SMALL_MEMORY, TABLES, RunOptions, room
 from .steps.dense_output import StepBlock
 from .steps.stepping import Integration, StoppedError
 from .trajectory import Stats
@@ -19,7 +19,7 @@ from .trajectory import Stats
 IMPLICIT = ("radau", "rodas")
 OTHERS = ("radau", "dop853")  # of the rate the first takes no derivative by the time, and the second none at all
 TRIED = 1000  # trials of steps of a method, at most
-LONGER = 4.0  # times as long as those of the run are steps that are worth a word
+LONGER_STEPS = 4.0  # times as long as those of the run are steps that are worth a word
 REACHED = "reached t_end"
 INTERRUPTED = "interrupted"  # what the message of a run that Ctrl-C ended begins with
 
@@ -137,14 +137,14 @@ def _noted(
     report: Callable[[float], None],
 ) -> Iterator[StepBlock]:
     """The blocks of a run, until rows and steps fill the memory."""
-    kept, most = 0, SMALL
+    kept, most = 0, SMALL_MEMORY
     for block in run.blocks(x):
         if steps is not None:
             steps.append(block if block.dense is not None else run.with_dense(block))
             kept += steps[-1].nbytes
         yield block if steps is None else steps[-1]
         if recorder.size + kept > most:
-            most = room() / TABLES if most == SMALL else most
+            most = room() / TABLES if most == SMALL_MEMORY else most
             if recorder.size + kept > most:
                 last = f"{recorder.last:.6g} s"
                 run.status = f"stopped at t = {last}: the rows fill the memory; t_eval records fewer"
@@ -164,7 +164,7 @@ def advise(
     """
     if not (run.stiff or run.slope) or again is None:
         return
-    length = LONGER * abs(reached - options.t0) / max(run.steps, 1)
+    length = LONGER_STEPS * abs(reached - options.t0) / max(run.steps, 1)
     for name in OTHERS if run.slope else IMPLICIT:
         trial, t = again(replace(options, method=name, t_eval=None, max_steps=TRIED)), options.t0
         try:

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from .motion_steps import MotionSteps
 
 ANY = 1.0  # s: the span of options, in place of which each run has its own
-KEPT = 16  # sets of parameter values, whose equations a motion keeps
+KEPT_PARAMETERS = 16  # sets of parameter values, whose equations a motion keeps
 
 
 class MotionEnd(NamedTuple):
@@ -60,7 +60,7 @@ class MotionEnd(NamedTuple):
 
 
 def _floats(values: Any) -> Any:
-    """Numbers as an array where they are a list of floats, which needs no more checks than an array; else as they are."""
+    """A list of floats as an array, which needs no more checks; other values as they are."""
     if type(values) in (list, tuple) and {*map(type, values)} == {float}:
         return np.array(values)
     return values
@@ -270,7 +270,7 @@ class PreparedMotion:
         key = None if parameters is None else _key(parameters)
         if (found := self._known.get(key)) is None:
             found = self._make(parameters)
-            if len(self._known) >= KEPT:
+            if len(self._known) >= KEPT_PARAMETERS:
                 self._known.pop(next(iter(self._known)), None)
             self._known[key] = found
         return found

@@ -23,10 +23,10 @@ from .steps.equal_steps import step_count
 METHOD = "dop853"  # unless another is asked for
 RTOL, ATOL = 1e-9, 1e-10  # of chosen steps
 STEP = 1e-3  # s, of methods of equal steps
-BOUND = 1e-3  # of the estimated error of equal steps, relative
+ERROR_BOUND = 1e-3  # of the estimated error of equal steps, relative
 TABLES = 3  # that the rows are in at most at once, while they are put together
-SMALL = 2.0**24  # bytes, below which nobody asks how many are free
-SHARE = 0.9  # of the free memory
+SMALL_MEMORY = 2.0**24  # bytes, below which nobody asks how many are free
+MEMORY_SHARE = 0.9  # of the free memory
 SCIPY = "scipy:"
 SCIPY_SOLVERS = ("Radau", "BDF", "LSODA", "DOP853", "RK45")
 
@@ -159,7 +159,7 @@ class RunOptions:
     @property
     def relative(self) -> float:
         """rtol, or what it is by default."""
-        return (RTOL if self.adaptive else BOUND) if self.rtol is None else self.rtol
+        return (RTOL if self.adaptive else ERROR_BOUND) if self.rtol is None else self.rtol
 
     @property
     def absolute(self) -> float | Array:
@@ -262,13 +262,13 @@ def time_span(t_end: float | None, t0: float, t_span: ArrayLike | None) -> tuple
 
 def require_room(size: float, what: str, instead: str) -> None:
     """Raises MemoryError where results of so many bytes would not fit, with what to do instead."""
-    if size > SMALL and size > (free := room()):
+    if size > SMALL_MEMORY and size > (free := room()):
         raise MemoryError(f"{what} take {size / 2**30:.3g} GiB, and {free / 2**30:.3g} GiB are free: {instead}")
 
 
 def room() -> float:
     """Bytes that a result may take."""
-    return SHARE * _free()
+    return MEMORY_SHARE * _free()
 
 
 def _free() -> float:

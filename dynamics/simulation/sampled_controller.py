@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from cgraph.extend import Array, real_array, real_number
 
-from .steps.equal_steps import SAME
+from .steps.equal_steps import SAME_INSTANT
 
 
 @dataclass(frozen=True)
@@ -157,4 +157,4 @@ class Hold:
 
 def _rounding(t: float | Array) -> float | Array:
     """Largest difference of two times that are meant to be the same [s]."""
-    return SAME * np.spacing(np.abs(t))
+    return SAME_INSTANT * np.spacing(np.abs(t))

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 ASKED = 4  # states at which a disagreement is explained
 TAKEN = 2  # terms at most that are taken out together
-TINY = 2.0**-40  # of the heaviest body: a mass that weighs nothing beside what is left
+TINY_MASS = 2.0**-40  # of the heaviest body: a mass that weighs nothing beside what is left
 
 
 class NotComparableError(Exception):
@@ -51,7 +51,7 @@ def sizes_of(mechanism: Mechanism) -> Sizes:
     """The sizes that go with a mechanism."""
     bodies = [(float(body.mass), np.asarray(body.center), np.asarray(body.inertia)) for body in mechanism.moving]
     inertia = max(float(np.abs(moments).max() + mass * center @ center) for mass, center, moments in bodies)
-    return Sizes(TINY * max(float(body.mass) for body in mechanism.bodies), inertia)
+    return Sizes(TINY_MASS * max(float(body.mass) for body in mechanism.bodies), inertia)
 
 
 def _as_it_is(part: Any, *_: Sizes) -> Any:

@@ -13,7 +13,7 @@ from collections.abc import Collection, Iterator, Sequence
 LEAF = (
     1.85  # variables of a last piece for each unknown that crosses, at least 2: longer are deeper, shorter more nodes
 )
-NEAR = 0.2  # of the variables of a piece: how far from its middle a cut may be
+NEAR_MIDDLE = 0.2  # of the variables of a piece: how far from its middle a cut may be
 
 
 class Piece:
@@ -92,7 +92,7 @@ def _halves(
     whole = count[-1]
 
     def best(middle: float) -> int | None:
-        near = [i for i in range(1, len(path)) if abs(count[i] - middle) <= NEAR * whole]
+        near = [i for i in range(1, len(path)) if abs(count[i] - middle) <= NEAR_MIDDLE * whole]
         return min(near, key=lambda i: (crossing[path[i - 1]], abs(count[i] - middle)), default=None)
 
     cut = best(whole / 2)

@@ -19,7 +19,7 @@ from typing import NamedTuple
 
 from ...core.builder import Builder
 from ...core.node import Node, as_node, variable
-from ..elimination_order import Step, nodes_of
+from ..elimination_order import EliminationStep, nodes_of
 from ..schur_elimination import ONE, EdgePushing
 from ..symmetric_elimination import PivotRow
 from ..symmetric_matrix import ZERO, SymmetricMatrix
@@ -46,7 +46,7 @@ class BalancedElimination(EdgePushing):
         rhs: dict[Node, Node],
         at: Mapping[Node, Node],
         order: Sequence[Node],
-        plan: Sequence[Step],
+        plan: Sequence[EliminationStep],
         rows: Sequence[Collection[Node]],
     ) -> None:
         super().__init__(build, output, rhs, at, order)
@@ -69,10 +69,10 @@ class BalancedElimination(EdgePushing):
         """Whether there is more than one piece."""
         return bool(self._copies)
 
-    def _is_variable(self, step: Step) -> bool:
+    def _is_variable(self, step: EliminationStep) -> bool:
         return not isinstance(step, list) and (step in self.sums or step in self.position)
 
-    def _cut(self, plan: Sequence[Step], rows: Sequence[Collection[Node]], pieces: Sequence[Piece]) -> None:
+    def _cut(self, plan: Sequence[EliminationStep], rows: Sequence[Collection[Node]], pieces: Sequence[Piece]) -> None:
         """Copies of the nodes that steps of other pieces pass to, and where they leave."""
         within: dict[Node, Piece | None] = {}  # the piece that holds the node and all that pass to it
         for step, row, piece in zip(plan, rows, pieces, strict=True):
@@ -89,7 +89,7 @@ class BalancedElimination(EdgePushing):
         for nodes in self._leaving.values():
             nodes.sort(key=lambda node: -(within[node] or pieces[0]).depth)
 
-    def _passed_to(self, step: Step) -> Iterable[Node]:
+    def _passed_to(self, step: EliminationStep) -> Iterable[Node]:
         if isinstance(step, list):
             return [node for r in step for node in (r.x, r.y)]
         return [arg for arg in step.args if arg in self.depends]
@@ -100,7 +100,7 @@ class BalancedElimination(EdgePushing):
         here = self._piece[node]
         return node if copy is None or self._here is None or self._here.common(here) is here else copy.copy
 
-    def reduce(self, step: Step) -> None:
+    def reduce(self, step: EliminationStep) -> None:
         """Take the nodes of a step out, and after it the pairs between pieces that are done."""
         nodes = nodes_of(step)
         self._here, k = self._piece[nodes[0]], self._place[nodes[0]]
@@ -116,7 +116,7 @@ class BalancedElimination(EdgePushing):
             self.retry()
         self._after[k] = list(self.pivot_rows)[before:]
 
-    def substitute(self, step: Step) -> None:
+    def substitute(self, step: EliminationStep) -> None:
         """The tangents of what left with a step."""
         nodes = nodes_of(step)
         self._here, k = self._piece[nodes[0]], self._place[nodes[0]]
@@ -195,7 +195,7 @@ class WrittenMatrix(SymmetricMatrix):
         super().add(a, b, value)
 
 
-def written_rows(equations: EdgePushing, plan: Sequence[Step]) -> list[set[Node]]:
+def written_rows(equations: EdgePushing, plan: Sequence[EliminationStep]) -> list[set[Node]]:
     """The unknowns that each step leaves entries of W with, when all leave in the order of the plan."""
     equations.matrix = matrix = WrittenMatrix()
     rows = []

@@ -11,7 +11,7 @@ from ..statements.call import Call, Map, added, zeroed
 from .products import Products
 from .single_assignment import Assignment, Registers, flat
 
-HEAVY = 4  # operations of a graph for each of its outputs, from which on these are kept and not computed again
+HEAVY_GRAPH = 4  # operations of a graph for each of its outputs, from which on these are kept and not computed again
 
 
 class Replayed(NamedTuple):
@@ -131,4 +131,4 @@ def _heavy(statement: Statement) -> bool:
     if not isinstance(statement, Call):
         return False
     graph = statement.graph
-    return sum(1 for node in graph.nodes if node.args) > HEAVY * len(graph.outputs)
+    return sum(1 for node in graph.nodes if node.args) > HEAVY_GRAPH * len(graph.outputs)

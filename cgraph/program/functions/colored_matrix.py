@@ -23,8 +23,8 @@ from ..statements.call import Call, Map
 from ..statements.memory import Scatter
 from .bound_function import BoundFunction
 
-LEAST = 64  # points in a block, a multiple of every processor's vectors
-LARGE = 2**16  # numbers in a matrix, of which no copy is kept for another call
+LEAST_BLOCK = 64  # points in a block, a multiple of every processor's vectors
+LARGE_MATRIX = 2**16  # numbers in a matrix, of which no copy is kept for another call
 
 
 class Derivative(NamedTuple):
@@ -44,7 +44,7 @@ class Derivative(NamedTuple):
         return Derivative(self.guarded or self.split)
 
 
-class Part(NamedTuple):
+class MatrixPart(NamedTuple):
     """Entries that one derivative along sums of unit vectors gives.
 
     colors: of each unit vector the sum that it is in.  color, result: of each entry, the sum and the number in its
@@ -81,7 +81,7 @@ class ColoredMatrix:
     def __init__(
         self,
         entries: Pattern,
-        source: Graph | Sequence[Part],
+        source: Graph | Sequence[MatrixPart],
         points: int,
         lanes: int,
         ready: Callable[[Program], Runner],
@@ -104,12 +104,12 @@ class ColoredMatrix:
         if not dense:
             return self._entries(x)
         m, n = self.entries.shape
-        return self._dense(x) if m * n <= LARGE else self._filled(self._entries(x))
+        return self._dense(x) if m * n <= LARGE_MATRIX else self._filled(self._entries(x))
 
     def many(self, points: Array, dense: bool, threads: int) -> Array:
         """`values` of each of the points (N, n)."""
         m, n = self.entries.shape
-        whole = dense and m * n <= LARGE
+        whole = dense and m * n <= LARGE_MATRIX
         values = np.empty((len(points), m, n) if whole else (len(points), len(self.entries.rows)))
         self.write(points, values, threads)
         return self._filled(values) if dense and not whole else values
@@ -149,7 +149,7 @@ class ColoredMatrix:
         rows = values.reshape(len(points), -1)
         width, columns = self._runner(values.ndim == 3, careful, 1)._columns("x", self._seeds(1))
         directions = sum([part.directions(1) for part in self._parts])
-        write_batch(max(width // (1 + directions) // LEAST, 1) * LEAST, columns, points.T, rows.T, threads)
+        write_batch(max(width // (1 + directions) // LEAST_BLOCK, 1) * LEAST_BLOCK, columns, points.T, rows.T, threads)
         if not careful and any([part.derivative.guarded for part in self._parts]):
             mend(values, lambda at, found: self.write(points[at], found, threads, careful=True))
 
@@ -234,7 +234,7 @@ def _nonfinite(count: int) -> Graph:
 
 def jacobian_parts(
     entries: Pattern, coloring: Coloring, forward: Callable[[], Derivative], reverse: Callable[[], Derivative]
-) -> list[Part]:
+) -> list[MatrixPart]:
     """The Jacobian: forward along sums of columns, reverse along sums of rows, asked for where needed."""
     parts = []
     for make, colors, mine, keys, others in (
@@ -243,11 +243,11 @@ def jacobian_parts(
     ):
         numbers = np.flatnonzero(mine)
         if len(numbers):
-            parts.append(Part(make(), colors, np.array(colors)[keys[numbers]], others[numbers], numbers))
+            parts.append(MatrixPart(make(), colors, np.array(colors)[keys[numbers]], others[numbers], numbers))
     return parts
 
 
-def hessian_parts(entries: Pattern, derivative: Derivative) -> list[Part]:
+def hessian_parts(entries: Pattern, derivative: Derivative) -> list[MatrixPart]:
     """A Hessian, symmetric, by products with sums of its columns."""
     n = entries.shape[1]
     if not len(entries.rows):
@@ -258,4 +258,4 @@ def hessian_parts(entries: Pattern, derivative: Derivative) -> list[Part]:
     company = np.bincount(entries.rows * count + colors[entries.columns], minlength=n * count)  # of a color in a row
     alone = company[rows * count + colors[columns]] == 1
     row, color = np.where(alone, rows, columns), np.where(alone, colors[columns], colors[rows])
-    return [Part(derivative, colors.tolist(), color, row, np.arange(len(row)))]
+    return [MatrixPart(derivative, colors.tolist(), color, row, np.arange(len(row)))]

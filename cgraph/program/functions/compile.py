@@ -22,7 +22,7 @@ from ..runners.python_runner import PythonRunner
 from .compiled import Compiled, Options
 
 BACKENDS = ("auto", "python", "numpy", "llvm")
-LARGE = 1_000_000  # nodes; beyond, making machine code takes longer than most callers gain
+LARGE_GRAPH = 1_000_000  # nodes; beyond, making machine code takes longer than most callers gain
 
 
 def compile(
@@ -90,10 +90,10 @@ def compile(
     require_choice("backend", backend, BACKENDS)
     require_graph("compile", graph)
     options: Options = {"fast": require_flag("fast", fast), "fma": require_flag("fma", fma), "cache": _place(cache)}
-    large = backend == "auto" and len(graph.nodes) > LARGE
+    large = backend == "auto" and len(graph.nodes) > LARGE_GRAPH
     if large:
         warnings.warn(
-            f"a graph of {len(graph.nodes)} nodes is compiled to generated Python, as it has more than {LARGE}; "
+            f"a graph of {len(graph.nodes)} nodes is compiled to generated Python, as it has more than {LARGE_GRAPH}; "
             "backend='llvm' makes machine code of it",
             RuntimeWarning,
             stacklevel=2,

@@ -27,7 +27,7 @@ from ...util.require import require_flag
 from ...util.threads import thread_count
 from ..program import Program
 from ..runners.runner import Runner
-from .colored_matrix import ColoredMatrix, Derivative, Part, hessian_parts, jacobian_parts
+from .colored_matrix import ColoredMatrix, Derivative, MatrixPart, hessian_parts, jacobian_parts
 from .direction_products import DirectionProducts
 
 CHECK = 256  # operations that take as long as to look whether slopes are infinite
@@ -267,7 +267,7 @@ class Differentiable:
         derivatives = partial(self._forward, chosen), partial(self._reverse, chosen)
         return self._colored(entries, jacobian_parts(entries, coloring, *derivatives), self.n_in)
 
-    def _colored(self, entries: Pattern, source: Graph | Sequence[Part], points: int) -> ColoredMatrix:
+    def _colored(self, entries: Pattern, source: Graph | Sequence[MatrixPart], points: int) -> ColoredMatrix:
         return ColoredMatrix(entries, source, points, self.lanes, self._ready)
 
     @_once

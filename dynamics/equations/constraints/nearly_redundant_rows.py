@@ -23,7 +23,7 @@ from .row_numbers import RowNumbers, equilibrated, factors, row_numbers
 NAMED = 1e-2  # of the largest row of its loop: a row of which no more is left is named, though it is kept
 STATES = 6
 SPREADS = (1.0, 0.3, 3.0, 0.1, 2.0, 0.5, 1.5, 0.03)  # of random starts about the neutral coordinates
-FAR = 1e3  # of the gap that a row was left out with
+FAR_GAP = 1e3  # of the gap that a row was left out with
 OPEN, WORSE = 1e-1, 30.0  # of a loop, at most, once it has arrived; and of the state that closes best
 EXACT = 1e-12  # of a row that is a sum of others but for the rounding of axes and lengths
 ALIKE = 0.5  # of the largest row: one that is as good
@@ -106,7 +106,7 @@ def opened(constraints: Constraints, q: Array, t: float, parameters: Mapping[str
         return ""
     numbers = row_numbers(constraints.whole)
     gaps, names = np.abs(numbers.gaps(numbers.point(q, {"t": t, **parameters}))), constraints.names
-    most = FAR * max(constraints.left_out.values())
+    most = FAR_GAP * max(constraints.left_out.values())
     open_rows = [k for k in constraints.left_out if k < len(gaps) and gaps[k] > most]
     rows = [f"{names[k]!r} by {gaps[k]:.1e}" for k in open_rows]
     return (

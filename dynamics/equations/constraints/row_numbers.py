@@ -20,12 +20,12 @@ from ..substitute import substitute
 SPREADS = (0.3, 1.0, 0.1, 3.0, 0.01, 0.001, 10.0, 0.0001) * 3  # of random starts about the neutral coordinates
 ITERATIONS, HALVINGS = 50, 12  # of Newton's method for such a state
 TRUNCATED = 4e-3  # of the largest singular value: what it does not close in `nearly_closed`
-LAST, LONGEST = 1e-9, 0.5  # steps there, of displacements
-SMALL = 1e-6  # of the first gap: what Newton's method closes to rounding in a step or two
+LAST_STEP, LONGEST_STEP = 1e-9, 0.5  # steps there, of displacements
+SMALL_GAP = 1e-6  # of the first gap: what Newton's method closes to rounding in a step or two
 OPEN = 0.5  # certain digits of a row that is not 0
 FOLLOWS = 4.0  # more digits of one that follows from others: the rounding of axes and lengths that it has in common
 ROUNDS = 4  # of scaling
-NEAR = 3  # states about another one, at which rows are as large as they usually are
+NEAR_STATES = 3  # states about another one, at which rows are as large as they usually are
 SIZES = 10.0 ** np.arange(-10.0, 11.0)  # of displacements
 BENT, TURNED = 1e-3, 0.3  # of a row of J, by which it changes if it is not constant; of that, by which it has changed
 Indices = NDArray[np.intp]
@@ -101,9 +101,9 @@ class RowNumbers:
                 left = rows[: len(phi)] * phi
                 step = -np.linalg.lstsq((rows[:, None] * matrix * columns)[: len(phi)], left, rcond=TRUNCATED)[0]
                 size = float(np.linalg.norm(step))
-                shorter = min(1.0, LONGEST / size) if size else 1.0
+                shorter = min(1.0, LONGEST_STEP / size) if size else 1.0
                 point = self.point(self.moved_by(point, shorter * columns * step), point)
-                if size < LAST:
+                if size < LAST_STEP:
                     return float(np.abs(rows[: len(phi)] * self.gaps(point)).max(initial=0.0)), point
         return np.inf, point
 
@@ -127,7 +127,7 @@ class RowNumbers:
                 rows, columns = factors(self.constraints, matrix)
                 whole = -columns * np.linalg.lstsq(rows[:, None] * matrix * columns, rows * phi, rcond=1e-10)[0]
                 size = float(np.abs(rows * phi).max())
-                looked = looked or SMALL * size
+                looked = looked or SMALL_GAP * size
                 for halved in range(HALVINGS):
                     shorter = whole * 0.5**halved
                     trial = self.point(self.moved_by(point, shorter), shown)
@@ -161,7 +161,7 @@ class RowNumbers:
     def reach(self) -> Array:
         """The displacement along each velocity, in its unit, that turns the rows: J changes by as much as it is."""
         rng, neutral = np.random.default_rng(0), np.array(self.constraints.kinematics.neutral)
-        for spread in SPREADS[:NEAR]:
+        for spread in SPREADS[:NEAR_STATES]:
             closing = self.closed(neutral + spread * rng.uniform(-1.0, 1.0, self.nq), float(rng.uniform(0.3, 1.2)))
             if closing.worst is None:
                 break
@@ -183,7 +183,7 @@ class RowNumbers:
     def typical(self, point: dict[str, float], reach: Array) -> Array:
         """Sizes of the entries of J about a state, (m, n), where the rows need not be met."""
         rng = np.random.default_rng(1)
-        places = [point, *[self.displaced(point, reach, rng) for _ in range(NEAR)]]
+        places = [point, *[self.displaced(point, reach, rng) for _ in range(NEAR_STATES)]]
         near = [np.abs(self.matrix(each)) for each in places]
         return np.asarray(np.max([x for x in near if np.isfinite(x).all()] or near[:1], axis=0))
 

@@ -37,8 +37,8 @@ from .momentum_parts import momentum_parts
 WRITTEN_OUT = 20_000
 # Times as many, where else products of matrices would be left to NumPy: 83 000 nodes are made in 11 s, not 8, and take
 # 19 us a state, not 91.
-LONGER = 5
-SHARE = 3  # of the nodes of all entries, at most one in so many is forward dynamics
+LONGER_TIMES = 5
+FORWARD_SHARE = 3  # of the nodes of all entries, at most one in so many is forward dynamics
 MATRICES = 1024  # states whose parts are in memory at a time, before they are matrices
 BLOCK = 64  # states that are run between looks at the keyboard, and that a thread takes at a time
 
@@ -117,7 +117,7 @@ def _writer(system: System, form: str) -> tuple[list[str], Write]:
 def _way(system: System) -> tuple[Sequence[Node], Write]:
     """The inputs, and what writes: by entries where they are few, else by columns."""
     rates = system.kinematics.quasi is None and not len(system.constraints)
-    if rates and len(forward_dynamics(system).nodes) >= WRITTEN_OUT // SHARE:
+    if rates and len(forward_dynamics(system).nodes) >= WRITTEN_OUT // FORWARD_SHARE:
         return _by_jacobian(system)
     parts = linearization_parts(system)
     if parts.size < WRITTEN_OUT:
@@ -127,7 +127,7 @@ def _way(system: System) -> tuple[Sequence[Node], Write]:
 
 def _momentum_way(system: System) -> tuple[Sequence[Node], Write]:
     parts = momentum_parts(system)
-    return parts.inputs, _written_out(parts) if parts.size < LONGER * WRITTEN_OUT else _assembled(parts)
+    return parts.inputs, _written_out(parts) if parts.size < LONGER_TIMES * WRITTEN_OUT else _assembled(parts)
 
 
 def _assembled(parts: LinearizationParts) -> Write:

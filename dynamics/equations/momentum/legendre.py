@@ -16,7 +16,10 @@ from ...systems.kinematics import ONE, ZERO
 from ...systems.system import System
 from ..mass_matrix.singular_mass_matrix import SingularMassMatrixError, no_inertia, require_inertia
 
-SHORTER, LONGER = 1.0 / 16.0, 2.0  # times the share of Newton's step after one that went too far, and after a good one
+SHORTER_SHARE, LONGER_SHARE = (
+    1.0 / 16.0,
+    2.0,
+)  # times the share of Newton's step after one that went too far, and after a good one
 OVERSHOOT = 0.5  # of a slope at the start of a step, the other way at its end, and the step went too far
 SETTLED = 1e-16  # step M step over u (p - b) where the step is 1e-8 of the velocities: the next one is rounding
 
@@ -128,7 +131,7 @@ class Legendre:
                 good = cg.where(settled, 1.0, good) * cg.less(cg.abs(lagrangian), math.inf)
                 there = _Iterate(velocities, missing, step)
                 here = _Iterate(*[_chosen(good, new, old) for new, old in zip(there, here, strict=True)])
-                share = cg.where(good, cg.minimum(LONGER * share, 1.0), SHORTER * share)
+                share = cg.where(good, cg.minimum(LONGER_SHARE * share, 1.0), SHORTER_SHARE * share)
         return here.velocities
 
     def _step(self, velocities: list[Node], missing: list[Node]) -> list[Node]:

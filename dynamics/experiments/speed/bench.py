@@ -23,7 +23,7 @@ from .worker import Load, Prepared, Worker
 
 OURS = "ours"
 AGREES = 1e-8  # largest relative difference that passes without a flag: rounding on a long chain, and no more
-FEWEST, LONG = 3, 5.0  # turns of a peer that takes longer than so many seconds for all of its turns
+FEWEST_TURNS, LONG_TURNS = 3, 5.0  # turns of a peer that takes longer than so many seconds for all of its turns
 QUICK: dict[str, Any] = {"scenes": ("planar 3", "planar 7", "arm 7"), "repeats": 5, "budget": 20.0}
 CONTAINS = {"rk4": "forward", "gradient": "motion"}  # who is late with the second is not asked for the first
 
@@ -126,7 +126,7 @@ def _row(case: PeerModel, task: str, mode: str, pool: WorkerPool, repeats: int) 
     samples: dict[str, list[float]] = {peer: [] for peer in ready}
     used = dict.fromkeys(ready, 0.0)
     for turn in range(repeats):  # in turns, so that all share the machine's moods
-        for peer in [each for each in ready if turn < FEWEST or used[each] < LONG]:
+        for peer in [each for each in ready if turn < FEWEST_TURNS or used[each] < LONG_TURNS]:
             begin = time.perf_counter()
             try:
                 samples[peer].append(1e6 * pool.workers[peer].turn(task, mode))

@@ -37,19 +37,19 @@ def known_solution(case: StabilityCase) -> Reference | None:
 
 SECTION = "Cases"
 STIFF, SMOOTH = ("radau", "rodas"), ("dop853", "dopri5")
-LONG = ("dop853",)  # of a large case
+LARGE_CASE_METHODS = ("dop853",)  # of a large case
 EQUAL_STEPS: dict[str, dict[str, float]] = {  # case: method: step [s]
     "angle of 1e+15 rad": {"verlet": 1e-3},
 }
-LARGE = 400  # states; beyond, one method is enough of a wait
+LARGE_CASE = 400  # states; beyond, one method is enough of a wait
 MOST_STEPS = 3 * 10**6
 BLOCK = 4096  # rows whose invariants are taken at once
 
 
 def methods_of(case: StabilityCase) -> tuple[str, ...]:
     """The integrators to run a case with: two that choose their steps, and what `EQUAL_STEPS` has beside them."""
-    if len(case.start) > LARGE:
-        return LONG
+    if len(case.start) > LARGE_CASE:
+        return LARGE_CASE_METHODS
     return (STIFF if case.stiff else SMOOTH) + tuple(EQUAL_STEPS.get(case.name, ()))
 
 

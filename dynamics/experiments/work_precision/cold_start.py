@@ -23,7 +23,7 @@ from .trajectory_peers import MOST_STEPS, casadi_equations, heyoka_derivatives, 
 from .trajectory_runs import problem_of
 
 RTOL = 1e-9  # of all but heyoka, whose default is the resolution of float64
-LONG = 5.0  # s; what takes longer is started once
+LONG_START = 5.0  # s; what takes longer is started once
 
 
 @dataclass(frozen=True)
@@ -128,7 +128,7 @@ def cold_starts(
     loading, status = dict.fromkeys(asked, 0.0), dict.fromkeys(asked, "")
     for turn in range(turns):
         for each in asked:
-            if status[each] or (turn and min(times[each]) > LONG):
+            if status[each] or (turn and min(times[each]) > LONG_START):
                 continue
             if not turn:
                 say(f"{name}: cold start, {each}")

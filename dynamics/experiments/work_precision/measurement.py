@@ -34,8 +34,8 @@ def group(name: str) -> str:
 
 
 CHUNK = 5e-3  # s, of runs that are timed in one turn
-FLOOR = 5e-12  # an error that is rounding
-ENOUGH = 0.5  # s of timed runs of a knob, after which three runs are enough
+FLOOR_ERROR = 5e-12  # an error that is rounding
+ENOUGH_TIME = 0.5  # s of timed runs of a knob, after which three runs are enough
 STALLED = 2  # knobs in a row without a smaller error, after which no finer one is tried
 
 
@@ -120,7 +120,7 @@ def sweep(
         entry.tried.append(tried)
         stalled = 0 if tried.error < 0.5 * best else stalled + 1
         best = min(best, tried.error)
-        if stalled >= STALLED and best < FLOOR:
+        if stalled >= STALLED and best < FLOOR_ERROR:
             entry.stopped = "rounding"
             break
         if took > limit:
@@ -160,4 +160,4 @@ def attempt(solver: EndSolver, metrics: EndMetrics, knob: float) -> Attempt:
 
 def time_in_turns(tried: Iterable[Tried], turns: int) -> None:
     """Time every run in turns; short runs several times a turn, long ones three times in all."""
-    in_turns([each.run for each in tried], turns, CHUNK, ENOUGH)
+    in_turns([each.run for each in tried], turns, CHUNK, ENOUGH_TIME)

@@ -14,7 +14,7 @@ from cgraph.extend import Array
 
 from ...integrators import METHODS
 from ...peers.heyoka import heyoka
-from ...simulation.ensembles.lanes import FEW
+from ...simulation.ensembles.lanes import FEW_TRAJECTORIES
 from ...simulation.ensembles.simulate_many import simulate_many
 from ...simulation.ensembles.task import MAKING
 from ...simulation.prepared_motion import prepare
@@ -84,7 +84,7 @@ class Many(EndSolver):
         run = partial(simulate_many, self.task.model, q, velocities, method=self.name)
         short, begin = COMPILES * self.task.t_end, time.perf_counter()
         run(t_end=short, **(options | {"t_eval": [short]}))
-        while len(q) >= FEW and time.perf_counter() - begin < 2.0 * MAKING:  # alone before lanes are made
+        while len(q) >= FEW_TRAJECTORIES and time.perf_counter() - begin < 2.0 * MAKING:  # alone before lanes are made
             run(t_end=short, **(options | {"t_eval": [short]}))
         return Run(partial(run, t_end=self.task.t_end, **options), read=read)
 

@@ -37,7 +37,7 @@ STIFF = ("rodas", "radau")  # methods that only stiff equations are given to
 ASKED = {False: ("DOP853", "Adams", "Dopri8", "RK4"), True: ("LSODA", "Radau", "BDF", "Kvaerno5")}  # of peers, by stiff
 TURNS, LIMIT = 9, 3.0  # turns of each run; s of a run, after which no finer tolerance is tried
 COUNT = 4096  # motions of an ensemble, fewer where one motion is long
-LONG = 0.5  # s of all motions of an ensemble together, by the fastest way to compute one
+LONG_ENSEMBLE = 0.5  # s of all motions of an ensemble together, by the fastest way to compute one
 ASIDE = 1e-2  # how far the starts of an ensemble lie apart, in sizes
 QUICK: dict[str, Any] = {
     "scenes": ("double pendulum", "kepler 0.9", "van der Pol 100"),
@@ -53,7 +53,7 @@ COARSER = tuple([10.0**-k for k in range(3, 15, 2)] + [2.0**-52])  # each is com
 STEPS = tuple([2.0**k for k in range(24)])  # of MuJoCo
 SLOW = 0.2  # s of the processor: the first run of what takes so long is its time
 HOPELESS = 4.0  # times the first run of another of its group: what takes longer is not timed
-ROUNDING = 1e-13  # an error that is no cause to doubt
+ROUNDING_ERROR = 1e-13  # an error that is no cause to doubt
 TOGETHER = 1.0 / 30.0  # of their errors: ends of two solvers that agree so much better than with the exact one
 
 
@@ -190,7 +190,7 @@ def doubted(entries: Sequence[Entry[EndSolver]], error: float, size: Array) -> s
     """Doubt of the exact end: three solvers, ours and peers, agree far better with each other; or nothing."""
     finest = [(entry.solver, min(entry.tried, key=lambda each: each.error)) for entry in entries if entry.tried]
     for one, ours in finest:
-        if not one.ours or ours.error < ROUNDING or error > TOGETHER * ours.error:
+        if not one.ours or ours.error < ROUNDING_ERROR or error > TOGETHER * ours.error:
             continue
         apart = {
             other: float(np.max(np.abs(ours.outcome.x - theirs.outcome.x) / size)) / min(ours.error, theirs.error)
@@ -270,7 +270,7 @@ def _ensemble(
 ) -> Iterator[Row]:
     """Rows of motions from starts whose velocities, or states of first order, lie a hundredth of their sizes apart."""
     single = min([cell.processor for row in once for cell in row.cells.values()], default=math.inf)
-    n = min(count, int(LONG / single))
+    n = min(count, int(LONG_ENSEMBLE / single))
     if n < FEWEST:
         say(f"{task.name}: no ensemble, a motion takes {single:.2g} s")
         return
@@ -283,7 +283,7 @@ def _ensemble(
         warnings.simplefilter("ignore")
         tightest = Many("radau" if task.stiff else "taylor", task, starts).ready(TIGHTEST)()
     metrics = ManyEnds(tightest.x, np.where(size > 0.0, size, 1.0))
-    entries = [_swept(solver, metrics, 4.0 * LONG, say) for solver in many]
+    entries = [_swept(solver, metrics, 4.0 * LONG_ENSEMBLE, say) for solver in many]
     rows = [Row(task.name, task.t_end, row.error, n) for row in once]
     _fill(rows, entries, min(turns, 2))
     yield from rows

@@ -20,7 +20,7 @@ from ..accuracy_task import AccuracyTask
 from ..text_table import check_names, csv_text
 from ..timing import exponent, load as load_of_machine, machine, spent
 from .cold_start import STARTS, ColdStart, cold_starts
-from .measurement import FLOOR, OURS, PATIENCE, PEERS, Entry, ErrorMetrics, Tried, group, sweep, time_in_turns
+from .measurement import FLOOR_ERROR, OURS, PATIENCE, PEERS, Entry, ErrorMetrics, Tried, group, sweep, time_in_turns
 from .named_tasks import load
 from .trajectory_peers import offers
 from .trajectory_runs import EQUAL, Ours, Solver, problem_of
@@ -29,7 +29,7 @@ LIMIT = 0.3  # s; no finer knob is tried after a run of this length
 
 
 TARGETS = (1e-3, 1e-6, 1e-9, 1e-12)
-WORST = 1e-1  # the largest error from which an order is fitted: above is none yet, below `FLOOR` is rounding
+WORST = 1e-1  # the largest error from which an order is fitted: above is none yet, below `FLOOR_ERROR` is rounding
 FITTED = 3  # points of equal steps, the finest between those bounds: the coarser are no order yet
 
 
@@ -208,7 +208,7 @@ def fitted_order(steps: Sequence[float], errors: Sequence[float], finest: int | 
 
     steps: [s], positive.
     """
-    kept = sorted({(h, e) for h, e in zip(steps, errors, strict=True) if FLOOR < e < WORST})[:finest]
+    kept = sorted({(h, e) for h, e in zip(steps, errors, strict=True) if FLOOR_ERROR < e < WORST})[:finest]
     return exponent(*zip(*kept, strict=True)) if len(kept) >= 3 else None
 
 

@@ -26,7 +26,7 @@ from ..algebra.turns import NEXT, UNIT, Axes, AxisTurn, Turn, constant_turns
 from .links import Link, LinkState
 from .outward import KINETIC
 
-FEW = 6  # freedoms in a row; up to so many, columns in the axes of the first body are not tried
+FEW_FREEDOMS = 6  # freedoms in a row; up to so many, columns in the axes of the first body are not tried
 Carriable = TypeVar("Carriable", Inertia, Wrench)
 
 
@@ -41,10 +41,10 @@ class Shift(NamedTuple):
         return Wrench((a + y * h - z * g, b + z * f - x * h, c + x * g - y * f), old.force)
 
 
-Step = Turn | Shift
+FrameStep = Turn | Shift
 
 
-def carried(value: Carriable, steps: Sequence[Step]) -> Carriable:
+def carried(value: Carriable, steps: Sequence[FrameStep]) -> Carriable:
     """An inertia or a wrench after these steps outwards."""
     for step in steps:
         if not isinstance(step, Shift):
@@ -54,7 +54,7 @@ def carried(value: Carriable, steps: Sequence[Step]) -> Carriable:
     return value
 
 
-class Carried(NamedTuple):
+class PlacedLink(NamedTuple):
     """A link with the planes that it and its parent move in, see `Motion`."""
 
     at: LinkState
@@ -68,15 +68,15 @@ class Carried(NamedTuple):
         return alone.turned(self.plane) if self.plane else alone
 
     @property
-    def turn(self) -> list[Step]:
+    def turn(self) -> list[FrameStep]:
         """Steps from its axes to those of its joint; none where S is the same in both."""
         return [] if self.plane or self.at.turn.still else [self.at.turn]
 
     @property
-    def outwards(self) -> list[Step]:
+    def outwards(self) -> list[FrameStep]:
         """Steps from the axes of its joint, about its origin, to those of its parent's motion, about the parent's."""
         plane, link = self.before, self.at.link
-        steps: list[Step] = [Shift(self.at.shift), *constant_turns(link.turn)]
+        steps: list[FrameStep] = [Shift(self.at.shift), *constant_turns(link.turn)]
         if plane and self.plane:
             return [*steps, Shift(plane.out(link.place))]
         return [*steps, Shift(link.place), plane] if plane else [*steps, Shift(link.place)]
@@ -93,7 +93,7 @@ def rigid(link: Link) -> Inertia:
     return Inertia(as_node(link.mass), link.moment, symmetric(second), full[2][2])
 
 
-def mass_matrix_columns(bodies: Sequence[Carried], n: int) -> list[list[Node]]:
+def mass_matrix_columns(bodies: Sequence[PlacedLink], n: int) -> list[list[Node]]:
     """The lower triangle of M, (n, n), rows.  bodies: parents first, with armatures."""
     lower = [[ZERO] * (i + 1) for i in range(n)]
     ways = [bodies, [body._replace(plane=None, before=None) for body in bodies]]
@@ -103,7 +103,7 @@ def mass_matrix_columns(bodies: Sequence[Carried], n: int) -> list[list[Node]]:
     ):  # a short chain in a plane takes less with its bodies' axes than with the plane's
         columns = _columns(way, lower)
         filled.append(_by_bodies(way, columns, [list(row) for row in lower]))
-        if _longest(bodies) > FEW:
+        if _longest(bodies) > FEW_FREEDOMS:
             filled.append(_by_first_bodies(way, columns, [list(row) for row in lower]))
     return min(filled, key=size_of)
 
@@ -113,7 +113,7 @@ def size_of(rows: Sequence[Sequence[Node]]) -> int:
     return len(topological([entry for row in rows for entry in row]))
 
 
-def _columns(bodies: Sequence[Carried], lower: list[list[Node]]) -> list[list[Wrench]]:
+def _columns(bodies: Sequence[PlacedLink], lower: list[list[Node]]) -> list[list[Wrench]]:
     """I S of all freedoms, in the axes of their joints; their own entries go into the matrix."""
     composites: list[Inertia | None] = [None] * len(bodies)
     columns: list[list[Wrench]] = [[] for _ in bodies]
@@ -140,11 +140,11 @@ def _columns(bodies: Sequence[Carried], lower: list[list[Node]]) -> list[list[Wr
 
 
 def _by_bodies(
-    bodies: Sequence[Carried], columns: Sequence[Sequence[Wrench]], lower: list[list[Node]]
+    bodies: Sequence[PlacedLink], columns: Sequence[Sequence[Wrench]], lower: list[list[Node]]
 ) -> list[list[Node]]:
     """The other entries, each in the axes of the body between."""
     for i, wrenches in enumerate(columns):
-        body, turn = bodies[i], list[Step]()
+        body, turn = bodies[i], list[FrameStep]()
         while body.at.parent >= 0:
             with cg.tag(body.at.name, KINETIC):
                 wrenches = [carried(wrench, [*turn, *body.outwards]) for wrench in wrenches]
@@ -158,10 +158,10 @@ def _by_bodies(
 
 
 def _by_first_bodies(
-    bodies: Sequence[Carried], columns: Sequence[Sequence[Wrench]], lower: list[list[Node]]
+    bodies: Sequence[PlacedLink], columns: Sequence[Sequence[Wrench]], lower: list[list[Node]]
 ) -> list[list[Node]]:
     """The other entries, in the axes of the body on the world, about its origin."""
-    frames: list[Frame] = []
+    frames: list[BaseFrame] = []
     twists: list[list[Twist]] = []
     for body, wrenches in zip(bodies, columns, strict=True):
         at = body.at
@@ -178,13 +178,13 @@ def _by_first_bodies(
     return lower
 
 
-class Frame(NamedTuple):
+class BaseFrame(NamedTuple):
     """Axes as columns, and an origin, in those of the body on the world."""
 
     axes: Axes
     origin: Triple
 
-    def of(self, steps: Sequence[Step]) -> Frame:
+    def of(self, steps: Sequence[FrameStep]) -> BaseFrame:
         """The frame from which these steps lead to this one."""
         axes, origin = self
         for step in reversed(steps):
@@ -192,7 +192,7 @@ class Frame(NamedTuple):
                 origin = plus(origin, combined(axes, step.offset))
             else:
                 axes = step.columns(axes)
-        return Frame(axes, origin)
+        return BaseFrame(axes, origin)
 
     def twist(self, own: Twist) -> Twist:
         """Twist in these axes, about the origin of the body on the world."""
@@ -204,10 +204,10 @@ class Frame(NamedTuple):
         return Wrench(combined(self.axes, own.torque), combined(self.axes, own.force)).about(self.origin)
 
 
-FIRST = Frame(UNIT, STILL)
+FIRST = BaseFrame(UNIT, STILL)
 
 
-def _longest(bodies: Sequence[Carried]) -> int:
+def _longest(bodies: Sequence[PlacedLink]) -> int:
     """The most freedoms from the world to a tip."""
     counts: list[int] = []
     for at in [body.at for body in bodies]:

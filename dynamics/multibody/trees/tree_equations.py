@@ -19,7 +19,7 @@ from ..joints import JointType
 from ..sweeps.base_parameters import base_parameter_links, without_axial_moments
 from ..sweeps.equation_links import equation_links
 from ..sweeps.links import Link, LinkState, link_states, parents_of
-from ..sweeps.mass_matrix import Carried, mass_matrix_columns, size_of
+from ..sweeps.mass_matrix import PlacedLink, mass_matrix_columns, size_of
 from ..sweeps.outward import Acceleration, Motion, base_acceleration, ground, propagate_acceleration, wrench
 from ..sweeps.subtree_momentum import (
     COMPOSITE,
@@ -160,7 +160,7 @@ class TreeEquations:
             planes = [moved.motion.plane for moved in self._moved(q, qd, links)]
             states = self.states(q, qd, links)
             carried = [
-                Carried(at, plane, planes[at.parent] if at.parent >= 0 else None)
+                PlacedLink(at, plane, planes[at.parent] if at.parent >= 0 else None)
                 for at, plane in zip(states, planes, strict=True)
             ]
             columns = mass_matrix_columns(carried, len(qd))

@@ -24,7 +24,7 @@ from ..steps.first_step import TOLERANCE
 from ..steps.integration import HELD, beginning, over, tolerance
 from ..steps.step_program import StepProgram
 
-FEW = 32  # trajectories: fewer are done one by one before the machine code of lanes is made
+FEW_TRAJECTORIES = 32  # trajectories: fewer are done one by one before the machine code of lanes is made
 PASSES = 64  # of the first block, before it is known how long one takes
 RESULTS = ("status", "t", "trials", "rejected", "evaluations", "at_limit", "longest_made")
 
@@ -64,7 +64,7 @@ def fits_lanes(program: StepProgram, options: RunOptions, count: int) -> bool:
     for one another; with constraints, near whose flat positions a run is watched step by step; and tolerances below the
     rounding of a step, of which a warning tells. Equal steps whose error is estimated go side by side, all at once.
     """
-    if count < FEW or iterates(program):
+    if count < FEW_TRAJECTORIES or iterates(program):
         return False
     if not program.adaptive:
         return not options.estimated

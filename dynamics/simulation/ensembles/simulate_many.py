@@ -35,8 +35,8 @@ from .task import Chunk, Part, Task, not_begun
 from .workers import Map, Workers, checked, finished
 
 VECTOR = 8  # lanes, or a multiple of them, of every processor: a chunk of trajectories side by side is whole vectors
-LARGEST = 256  # trajectories in a chunk, unless asked for
-LONGEST = 4096  # of those in lanes, of which a chunk's rows of steps have no more than ..
+LARGEST_CHUNK = 256  # trajectories in a chunk, unless asked for
+LONGEST_CHUNK = 4096  # of those in lanes, of which a chunk's rows of steps have no more than ..
 NUMBERS = 2**22  # .. so many numbers
 SHORT = 2**20  # equal steps of all trajectories, which take some hundredths of a second: a chunk for each worker
 SHARES = 4  # chunks for each worker, so that workers of unlike speed finish together
@@ -263,7 +263,7 @@ def _chunks(
     rows: numbers in the rows of steps that a trajectory keeps in its lane, 0 where it is in none.
     grids: of trajectories side by side, whose chunks are of whole vectors, so that each has the same neighbors in any.
     """
-    largest = min(LONGEST, max(VECTOR, NUMBERS // rows)) if rows else LARGEST
+    largest = min(LONGEST_CHUNK, max(VECTOR, NUMBERS // rows)) if rows else LARGEST_CHUNK
     if rows and chunk is not None:
         chunk = min(chunk, largest)
     if chunk is None:

@@ -20,14 +20,14 @@ from cgraph.extend import Array
 
 from ..run_options import RunOptions
 from ..steps.dense_output import StepBlock
-from ..steps.equal_steps import SAME, EqualSteps, equal_steps
+from ..steps.equal_steps import SAME_INSTANT, EqualSteps, equal_steps
 from ..steps.step_program import StepProgram
 from ..steps.stepping import FixedStepIntegration, Integration
 from .runs_beside import LATE, SHARE, Course, Difference, Law, States, courses, even, together
 from .state_sizes import off_by
 from .unresolved import missed, turning, unresolved
 
-LEAST = 2.0  # times a difference that of steps twice as long is, at least, where the error has a law
+LEAST_RATIO = 2.0  # times a difference that of steps twice as long is, at least, where the error has a law
 LAWLESS = 0.1  # of the size of a component: a difference above it follows no power of the step
 UNIT = 2.0**-52  # the last bit of a number near 1
 NUDGE = 8.0 * UNIT  # of each component, by which runs beside start aside: what roundings grow to is part of the error
@@ -170,7 +170,7 @@ class Estimator:
 
     def _until(self, beside: _Beside, end: float, resets: int) -> Iterator[States]:
         """States of a run beside until it is at `end` after so many resets, unless it takes another course."""
-        direction, rounding, course = self.options.direction, SAME * np.spacing(abs(end)), beside.course
+        direction, rounding, course = self.options.direction, SAME_INSTANT * np.spacing(abs(end)), beside.course
         while not beside.lost and beside.resets <= resets:
             ahead = direction * (beside.t - end)
             if ahead >= -rounding if beside.resets == resets else ahead > course.late:
@@ -236,7 +236,7 @@ class Estimator:
         first = changes[0]
         if len(changes) == 1:
             return first * self._law.share
-        (ratio, share), least = self._law, min(LEAST, self._law.ratio)
+        (ratio, share), least = self._law, min(LEAST_RATIO, self._law.ratio)
         with np.errstate(all="ignore"):
             measured = self._differences[1].largest / self._differences[0].largest
         measured = np.where(np.isfinite(measured), np.clip(measured, least, ratio), least)

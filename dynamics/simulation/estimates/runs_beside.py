@@ -11,10 +11,10 @@ import numpy as np
 from cgraph.extend import Array
 
 from ..steps.dense_output import Indices
-from ..steps.equal_steps import SAME, EqualSteps, doubled, halved, joined
+from ..steps.equal_steps import SAME_INSTANT, EqualSteps, doubled, halved, joined
 from .state_sizes import Flags
 
-APART = 1.5  # the ratio of errors from which a difference of two runs tells them
+APART_RATIO = 1.5  # the ratio of errors from which a difference of two runs tells them
 LATE, SHARE = 2.0, 0.1  # steps, or of the time since the last reset: a run so much later resets takes another course
 
 
@@ -52,7 +52,7 @@ class Course:
         sign = math.copysign(1.0, h[0])
         part = np.maximum(np.searchsorted(sign * begins, sign * t) - 1, 0)
         ends = begins[part] + np.rint((t - begins[part]) / h[part]) * h[part]
-        same: Flags = np.abs(ends - t) <= SAME * np.spacing(np.abs(t))
+        same: Flags = np.abs(ends - t) <= SAME_INSTANT * np.spacing(np.abs(t))
         return same
 
     def steps(self, t: float) -> list[EqualSteps]:
@@ -73,7 +73,7 @@ def courses(stretches: Sequence[EqualSteps], order: int, *, shorter: bool = Fals
             for each in (stretches, longer, doubled(longer))
         ]
         one, two, four = sums
-        if two >= APART * one and four - two >= APART * (two - one):
+        if two >= APART_RATIO * one and four - two >= APART_RATIO * (two - one):
             return [Course(1), Course(2)], Law((four - two) / (two - one), one / (two - one))
     return [Course(-1)], Law(1.0, 1.0 / (1.0 - 0.5**order))
 
@@ -93,7 +93,7 @@ def matches(times: Array, others: Array) -> tuple[Indices, Indices]:
     near = np.clip(near, 0, len(times) - 1)
     before = np.maximum(near - 1, 0)
     near = np.where(np.abs(times[before] - others) < np.abs(times[near] - others), before, near)
-    same = np.flatnonzero(np.abs(times[near] - others) <= SAME * np.spacing(np.abs(others)))
+    same = np.flatnonzero(np.abs(times[near] - others) <= SAME_INSTANT * np.spacing(np.abs(others)))
     return near[same], same
 
 

@@ -16,7 +16,7 @@ from cgraph.extend import Array
 Flags = np.ndarray[Any, np.dtype[np.bool_]]
 
 OTHERS = 1e-4  # of the largest component of its kind, below which one counts as no smaller: it may be rounding
-ROUNDING = 1e-10  # of the largest component of its kind: where one is that small, rounding is no error of it
+ROUNDING_SIZE = 1e-10  # of the largest component of its kind: where one is that small, rounding is no error of it
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +41,7 @@ class StateKinds:
     def scale(self, size: Array) -> Array:
         """Scale of errors of components that have been so large, (.., m)."""
         alike = replace(self, kinds=(0,) * len(self.kinds)) if self.ordinary else self
-        result: Array = size + ROUNDING * alike.largest_of_kind(size)
+        result: Array = size + ROUNDING_SIZE * alike.largest_of_kind(size)
         return result
 
     @cached_property

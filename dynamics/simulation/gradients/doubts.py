@@ -19,7 +19,7 @@ from .motion_run import MotionRun
 from .segments import MotionSegments
 
 LOOKS = 64  # at least, if there are so many steps, at which two motions are compared
-LOOSE = 1e-3  # a relative tolerance above it tells of a motion's growth no more than this
+LOOSE_TOLERANCE = 1e-3  # a relative tolerance above it tells of a motion's growth no more than this
 ASIDE = 1.0 + 2.0**-52  # by which the other motion starts aside: what a rounding grows to is part of the error
 
 
@@ -68,7 +68,7 @@ def _grown(segments: MotionSegments, start: Array, end: Array) -> list[list[str]
     start, end: slopes of the loss by the state there. Of a loss along the way alone, its value is compared.
     """
     motion, options = segments.motion, segments.motion.options
-    left = min(options.relative, LOOSE) if motion.method.adaptive else ASIDE - 1.0
+    left = min(options.relative, LOOSE_TOLERANCE) if motion.method.adaptive else ASIDE - 1.0
     with np.errstate(all="ignore"):
         change = left * (np.abs(start) * np.maximum(np.abs(motion.x), np.abs(segments.end))).sum(axis=0)
         slope, loss = np.abs(end), np.abs(segments.loss)

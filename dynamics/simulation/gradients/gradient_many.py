@@ -21,8 +21,8 @@ from .doubts import doubts
 from .gradient import Loss, differentiated
 from .motion import START, TORQUE, VELOCITY, MotionRequest, motion_of
 
-FEW = 4  # motions: fewer by a method that iterates are done sooner one by one
-WIDE = 16  # motions side by side: whole vectors of any processor, of which what is recorded stays in its caches
+FEW_MOTIONS = 4  # motions: fewer by a method that iterates are done sooner one by one
+WIDE_BLOCK = 16  # motions side by side: whole vectors of any processor, of which what is recorded stays in its caches
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,8 +163,8 @@ def gradient_many(
 def _parts(motions: MotionRequest) -> list[range]:
     """The motions that go one by one, or side by side, of which a last one goes with those before it."""
     count = motions.many
-    alone = motions.options.adaptive or (count < FEW and motions.method.step(motions.problem).iterates)
-    begins = [*(range(count) if alone else range(0, max(1, count - 1), WIDE)), count]
+    alone = motions.options.adaptive or (count < FEW_MOTIONS and motions.method.step(motions.problem).iterates)
+    begins = [*(range(count) if alone else range(0, max(1, count - 1), WIDE_BLOCK)), count]
     return [range(begin, end) for begin, end in itertools.pairwise(begins)]
 
 

@@ -20,7 +20,7 @@ from .motion_programs import LOSS, MotionPrograms, WithDerivative
 
 MOST_RECORDED = 128 * 2**20  # bytes of what is recorded of steps; of more, checkpoints are kept
 PIECE = 4096  # passes between two looks at Python
-FEW = 4  # directions: of fewer, iterations one after another are done sooner than a vector of them
+FEW_DIRECTIONS = 4  # directions: of fewer, iterations one after another are done sooner than a vector of them
 
 
 class MotionRun:
@@ -191,7 +191,7 @@ class MotionRun:
 
 def _run_all(ready: Runner, memories: Array, feed: Array) -> Array:
     """The rows (passes, width, k) of k memories that are fed the same."""
-    if memories.ndim == 1 or ready.masked is ready.program or memories.shape[1] >= FEW:
+    if memories.ndim == 1 or ready.masked is ready.program or memories.shape[1] >= FEW_DIRECTIONS:
         return run_passes(ready, memories, len(feed), 1, feed).rows
     rows = np.empty((len(feed), ready.program.width, memories.shape[1]))
     for k in range(memories.shape[1]):

@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-SAME = 8.0  # units of the last bit of the time, by which instants that are meant to be the same may differ
+SAME_INSTANT = 8.0  # units of the last bit of the time, by which instants that are meant to be the same may differ
 EVEN = 4.0  # units of the last bit of the time, by which instants may miss an even spacing
-ENOUGH = 1.5  # times the longest of the steps that make up one twice as long
+ENOUGH_LONGER = 1.5  # times the longest of the steps that make up one twice as long
 
 
 class EqualSteps(NamedTuple):
@@ -95,7 +95,7 @@ def _doubled(stretches: Sequence[EqualSteps]) -> Iterable[EqualSteps]:
             longest = max(longest, abs(part.h))
             if pairs:
                 yield EqualSteps(begin, 2.0 * part.h, pairs, at)
-            elif abs(at - begin) >= ENOUGH * longest:
+            elif abs(at - begin) >= ENOUGH_LONGER * longest:
                 yield EqualSteps(begin, at - begin, 1, at)
             else:
                 continue
@@ -108,7 +108,7 @@ def _merged(stretches: Iterable[EqualSteps]) -> list[EqualSteps]:
     """Stretches of the same step, but for rounding of the times, as one."""
     result: list[EqualSteps] = []
     for part in stretches:
-        if result and abs(part.h - result[-1].h) <= SAME * np.spacing(max(abs(part.begin), abs(part.end))):
+        if result and abs(part.h - result[-1].h) <= SAME_INSTANT * np.spacing(max(abs(part.begin), abs(part.end))):
             before = result.pop()
             steps = before.steps + part.steps
             part = EqualSteps(before.begin, (part.end - before.begin) / steps, steps, part.end)

@@ -15,10 +15,10 @@ from cgraph.extend import Array
 from ..row_values import values_of
 from .step_program import StepProgram
 
-NEAR = 0.1  # of the least singular value at the start: one that is less is on its way to 0
+NEAR_SINGULAR = 0.1  # of the least singular value at the start: one that is less is on its way to 0
 LOST = 1e-6  # of the largest: one that is 0, wherever the run has started
-KEPT = 16  # of the last steps, the shortest: among these one ended near
-FAR = 1e3  # tolerances of a step, by which constraints may move what it arrives at
+KEPT_STEPS = 16  # of the last steps, the shortest: among these one ended near
+FAR_TOLERANCES = 1e3  # tolerances of a step, by which constraints may move what it arrives at
 CREEP, SHARE = 2000, 0.1  # steps that together come less far than so much of the longest one
 PART = 0.3  # of the largest entry of the singular vector: a row that takes part
 
@@ -42,8 +42,8 @@ class FlatPosition:
 
         way: by how many tolerances of a step constraints moved one so far, at most.
         """
-        self._ends = rows[np.abs(rows[:, 1]).argsort()[:KEPT], : 2 + len(self.components)].copy()
-        if self._far or not way > FAR:
+        self._ends = rows[np.abs(rows[:, 1]).argsort()[:KEPT_STEPS], : 2 + len(self.components)].copy()
+        if self._far or not way > FAR_TOLERANCES:
             return []
         self._far = True
         text = f"by t = {rows[-1, 0]:.6g} s the constraints moved the state by {way:.3g} times the tolerance of a "
@@ -66,7 +66,7 @@ class FlatPosition:
             return ""
         found = [(*self._singular(float(end[0]), end[2:], parameters), end[2:]) for end in self._ends]
         least, shares, x = min(found, key=lambda each: each[0] if np.isfinite(each[0]) else np.inf)
-        if not least < max(NEAR * self.least, LOST):
+        if not least < max(NEAR_SINGULAR * self.least, LOST):
             return ""
         taking_part = zip(self.rows.outputs, shares >= PART * shares.max(), strict=True)
         rows = [repr(name) for name, part in taking_part if part]

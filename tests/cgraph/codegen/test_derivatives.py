@@ -301,7 +301,7 @@ def test_a_bound_jacobian_needs_memory_that_it_can_use(backend):
 
 def test_large_matrices_are_filled_in(backend, monkeypatch):
     expected = compiled(example(), backend).jacobian(POINT)
-    monkeypatch.setattr(colored_matrix, "LARGE", 1)
+    monkeypatch.setattr(colored_matrix, "LARGE_MATRIX", 1)
     function = compiled(example(), backend)
     assert np.array_equal(function.jacobian(POINT), expected)
     assert np.array_equal(function.jacobian(POINT, sparse=True).toarray(), expected)

@@ -63,7 +63,7 @@ def test_random_graphs_at_many_points_are_those_at_each(case, count, cost, seed)
 @pytest.mark.parametrize("cost", [LANES, WRITTEN])
 @pytest.mark.parametrize("wrt", [None, ["z", "x"], ["unused"]])
 def test_threads_and_chosen_inputs_change_no_bit(backend, cost, wrt, monkeypatch):
-    monkeypatch.setattr(colored_matrix, "LEAST", 8)
+    monkeypatch.setattr(colored_matrix, "LEAST_BLOCK", 8)
     monkeypatch.setattr(direction_products, "PANEL_NUMBERS", 40)
     function = compiled(example(), backend, cost, fma=False)
     points = np.random.default_rng(0).uniform(0.1, 1.0, (21, 4))
@@ -89,7 +89,7 @@ def test_sparse_and_dense_matrices_of_many_points(backend, n, sparse):
 
 
 def test_large_matrices_of_many_points_are_filled_in(backend, monkeypatch):
-    monkeypatch.setattr(colored_matrix, "LARGE", 1)
+    monkeypatch.setattr(colored_matrix, "LARGE_MATRIX", 1)
     check(compiled(rows(5, sparse=True), backend, LANES, fma=False), np.random.default_rng(0).normal(size=(9, 5)))
 
 

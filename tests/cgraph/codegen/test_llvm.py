@@ -110,13 +110,13 @@ def test_the_bits_do_not_depend_on_how_code_is_divided_and_optimized(monkeypatch
     whole, function = results()
     assert "@part1" not in function.batch_source()
     assert "@point.part1" not in function.source
-    settings = {"steps": (parts, "STEPS", 7), "level": (llvm_engine, "QUICK", 3), "tiles": (batch_ir, "FEW", -1)}
+    settings = {"steps": (parts, "STEPS", 7), "level": (llvm_engine, "QUICK", 3), "tiles": (batch_ir, "FEW_PLACES", -1)}
     settings["tiles of two"] = batch_ir, "VECTORS", 2
     for name, (module, setting, value) in settings.items():
         with monkeypatch.context() as patch:
             patch.setattr(module, setting, value)
             if name == "tiles of two":
-                patch.setattr(batch_ir, "FEW", -1)
+                patch.setattr(batch_ir, "FEW_PLACES", -1)
             other, function = results()
             assert all(map(same, other, whole)), name
             assert name != "steps" or ("@part1" in function.batch_source() and "@point.part1" in function.source)
@@ -166,7 +166,7 @@ def test_a_batch_in_which_rows_lie_apart_by_a_power_of_two():
 
 
 def test_auto_says_when_a_graph_is_too_large_for_machine_code(monkeypatch):
-    monkeypatch.setattr(sys.modules["cgraph.program.functions.compile"], "LARGE", 5)
+    monkeypatch.setattr(sys.modules["cgraph.program.functions.compile"], "LARGE_GRAPH", 5)
     with pytest.warns(RuntimeWarning, match=r"has more than 5; backend='llvm' makes machine code"):
         function = cg.compile(chain())
     assert function.source == cg.compile(chain(), "python").source

@@ -57,7 +57,7 @@ def test_a_fused_program_has_the_bits_of_its_statements(monkeypatch, fma, copies
         return [run.run(run.memory(START), 20).rows, many.run_many(starts, 20).rows]
 
     fused = results()
-    monkeypatch.setattr(fuse, "MOST", 0)
+    monkeypatch.setattr(fuse, "MOST_OPERATIONS", 0)
     assert called(fuse.fused(program)) == called(program)
     assert all(map(same, fused, results()))
     if not fma:
@@ -111,7 +111,7 @@ def test_a_call_may_write_what_it_reads():
 def test_a_map_behind_a_call_reads_what_it_wrote(count, monkeypatch):
     """Whose numbers were written one by one, and whose vectors may end behind the last."""
     monkeypatch.setattr(fuse, "STRAIGHT", 0)
-    monkeypatch.setattr(fuse, "MOST", 0)
+    monkeypatch.setattr(fuse, "MOST_OPERATIONS", 0)
     x, y = cg.variables([f"x{k}" for k in range(count)]), cg.variables("a b")
     turned = Call(cg.Graph(x, {f"{k}": 2.0 * node for k, node in enumerate(reversed(x))}), ("x",), ("y",))
     program = Program(

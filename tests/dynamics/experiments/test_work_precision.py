@@ -18,7 +18,7 @@ import dynamics as dyn
 from dynamics.experiments.accuracy_task import INTERVALS, AccuracyTask
 from dynamics.experiments.work_precision import measurement
 from dynamics.experiments.work_precision.cold_start import cold_starts
-from dynamics.experiments.work_precision.measurement import FLOOR, Entry, ErrorMetrics
+from dynamics.experiments.work_precision.measurement import FLOOR_ERROR, Entry, ErrorMetrics
 from dynamics.experiments.work_precision.named_tasks import load, names
 from dynamics.experiments.work_precision.trajectory_peers import EPSILON, Mujoco, heyoka_derivatives, offers
 from dynamics.experiments.work_precision.trajectory_runs import (
@@ -150,7 +150,7 @@ def test_an_order_is_fitted_above_rounding_alone() -> None:
     assert fitted_order(steps, errors, 3) == approx(3.0, abs=1e-3)
     assert fitted_order(steps, [50.0 * h**3 * (1 + 20 * h) for h in steps], 3) == approx(3.0, abs=0.05)
     assert fitted_order(steps[:2], errors[:2]) is None
-    assert fitted_order(steps, [FLOOR / 2] * len(steps)) is None
+    assert fitted_order(steps, [FLOOR_ERROR / 2] * len(steps)) is None
 
 
 def point(error: float, seconds: float, knob: float = 1e-6) -> Point:

@@ -64,9 +64,9 @@ def test_the_order_follows_the_tolerance_and_the_time_has_no_unit() -> None:
 def test_all_orders_at_once_and_one_after_another_are_the_same(tolerance: float) -> None:
     """Whether the coefficients are one graph, as of small systems, or a loop, steps and states agree to rounding."""
     runs = []
-    for short in (taylor.SHORT, 0):
+    for short in (taylor.SHORT_CODE, 0):
         arm = dyn.planar_arm([1.0, 0.8], [1.0, 0.8])
-        with patch.object(taylor, "SHORT", short):
+        with patch.object(taylor, "SHORT_CODE", short):
             runs.append(dyn.simulate(arm, [1.0, 0.5], [0.0, 0.3], 3.0, "taylor", rtol=tolerance, atol=tolerance))
         cg.clear_caches()
     one, other = runs

@@ -13,14 +13,14 @@ import cgraph as cg
 import dynamics as dyn
 from dynamics import simulate_many
 from dynamics.simulation.ensembles import lanes, task
-from dynamics.simulation.ensembles.lanes import FEW, fits_lanes
+from dynamics.simulation.ensembles.lanes import FEW_TRAJECTORIES, fits_lanes
 from dynamics.simulation.steps.step_program import StepProgram
 from tests.dynamics.ensembles import same
 from tests.dynamics.models import oscillator, random_arm
 from tests.early_end import stops
 from tests.slow import slow
 
-COUNT = FEW + 5  # more than one vector, and not a whole number of them
+COUNT = FEW_TRAJECTORIES + 5  # more than one vector, and not a whole number of them
 TIMES = [0.0, 0.11, 0.12, 0.5, 1.0]
 COMPARED = (0, 3, 8, COUNT - 1)
 TOP = np.diag([0.1, 0.2, 0.25])  # kg m^2
@@ -229,11 +229,11 @@ def test_what_cannot_go_in_lanes_goes_one_by_one() -> None:
         return step_program(problem, METHODS[method], dense=False)
 
     fine = RunOptions(1.0)
-    assert fits_lanes(program("dop853"), fine, FEW)
-    assert not fits_lanes(program("dop853"), fine, FEW - 1)
-    assert not fits_lanes(program("radau"), RunOptions(1.0, "radau"), FEW)
-    assert not fits_lanes(program("rk4"), RunOptions(1.0, "rk4"), FEW)
-    assert not fits_lanes(program("dop853"), RunOptions(1.0, rtol=1e-16), FEW)
+    assert fits_lanes(program("dop853"), fine, FEW_TRAJECTORIES)
+    assert not fits_lanes(program("dop853"), fine, FEW_TRAJECTORIES - 1)
+    assert not fits_lanes(program("radau"), RunOptions(1.0, "radau"), FEW_TRAJECTORIES)
+    assert not fits_lanes(program("rk4"), RunOptions(1.0, "rk4"), FEW_TRAJECTORIES)
+    assert not fits_lanes(program("dop853"), RunOptions(1.0, rtol=1e-16), FEW_TRAJECTORIES)
     q, qd = starts(spring(), 7)
     one_by_one = simulate_many(spring(), q, qd, 0.3, "radau", t_eval=[0.3])
     each_is_alone(spring(), one_by_one, q, qd, 0.3, "radau", t_eval=[0.3])
