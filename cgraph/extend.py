@@ -108,7 +108,12 @@ if TYPE_CHECKING:  # shared by the three packages alone: no promise is made for 
     from .util.extras import install as install, scipy_module as scipy_module
     from .util.html_text import html_lines as html_lines, html_table as html_table, render_html as render_html
     from .util.json_type import Json as Json
-    from .util.real_arrays import is_finite as is_finite, real_array as real_array, real_number as real_number
+    from .util.real_arrays import (
+        floats as floats,
+        is_finite as is_finite,
+        real_array as real_array,
+        real_number as real_number,
+    )
     from .util.require import (
         require_choice as require_choice,
         require_flag as require_flag,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import numbers
+from typing import Any
 
 import numpy as np
 
@@ -25,10 +26,9 @@ def real_array(what: str, value: object) -> Array:
     Traceback (most recent call last):
     TypeError: q must be real numbers, got complex numbers
     """
+    value = floats(value)
     if type(value) is np.ndarray and value.dtype == np.float64:
         return value
-    if type(value) in (list, tuple) and {*map(type, value)} == {float}:  # type: ignore[call-overload]
-        return np.array(value)
     if np.ma.is_masked(value) or (isinstance(value, list | tuple) and any([each is np.ma.masked for each in value])):
         raise TypeError(f"{what} must be real numbers, got an array with masked values")
     try:
@@ -47,6 +47,11 @@ def real_array(what: str, value: object) -> Array:
         return array.astype(np.float64)
     except OverflowError:
         raise ValueError(f"{what} must be real numbers, got one that is too large for float64") from None
+
+
+def floats(value: Any) -> Any:
+    """A list or tuple of floats as an array, which needs no more checks; any other value as it is."""
+    return np.array(value) if type(value) in (list, tuple) and {*map(type, value)} == {float} else value
 
 
 def real_number(what: str, value: object) -> float:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import Array, require_choice, require_flag, require_sequence
+from cgraph.extend import Array, floats, require_choice, require_flag, require_sequence
 
 from ..equations.state_equation import FORMS
 from ..equations.states.initial_value import other_inputs
@@ -57,13 +57,6 @@ class MotionEnd(NamedTuple):
     t: float
     q: Array
     qd: Array
-
-
-def _floats(values: Any) -> Any:
-    """A list of floats as an array, which needs no more checks; other values as they are."""
-    if type(values) in (list, tuple) and {*map(type, values)} == {float}:
-        return np.array(values)
-    return values
 
 
 class PreparedMotion:
@@ -164,7 +157,7 @@ class PreparedMotion:
         timely = type(t0) is float and type(t_end) is float and self._options.spans(t0, t_end)
         if self._varied:
             alone.set_parameters(moving.values(parameters))
-        q, qd = _floats(q), _floats(qd)
+        q, qd = floats(q), floats(qd)
         plain = timely and moving.plain and type(q) is np.ndarray and (qd is None or type(qd) is np.ndarray)
         if not (plain and alone.begins(q, qd, t0, t_end)):  # see what is wrong
             alone.begin(self._start(moving, q, qd, t0, t_end, parameters), float(t0), float(t_end))
