@@ -22,7 +22,7 @@ TEXT, LINE = "#1A1A1A", "#4D4D4D"
 DARK_TEXT, DARK_LINE, DARK_PAGE = "#E8E8E4", "#B4B4AE", "#17181A"
 # A formulation has one color on every page; the one that is wrong everywhere has that of what is wrong.
 FORMULATIONS = {
-    "euler_embedded": SPURIOUS,
+    "by_definition": SPURIOUS,
     "kinetic_only": ORANGE,
     "chain_rule": BLUE,
     "chain_rule_literal": PURPLE,

@@ -41,7 +41,7 @@ def eager_evaluations(system: System, formulations: Iterable[str]) -> dict[str, 
         import torch
     except ImportError:
         return {}
-    ways = {"euler_embedded": _embedded(torch, system, system.lagrangian), "chain_rule": _chain_rule(torch, system)}
+    ways = {"by_definition": _embedded(torch, system, system.lagrangian), "chain_rule": _chain_rule(torch, system)}
     ways["kinetic_only"] = _embedded(torch, system, system.kinetic)
     return {name: ways[name] for name in formulations}
 

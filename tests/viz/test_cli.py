@@ -44,7 +44,7 @@ def test_scenes_are_listed_with_the_sizes_of_their_graphs(capsys):
 @each_row("suffix", [".dot", ".txt", ".svg", ".png"])
 def test_a_scene_is_drawn_or_listed(tmp_path, capsys, suffix):
     target = tmp_path / f"graph{suffix}"
-    assert cli.main(["draw", "spring_mass", "--formulation", "euler_embedded", "--out", str(target)]) == 0
+    assert cli.main(["draw", "spring_mass", "--formulation", "by_definition", "--out", str(target)]) == 0
     assert "nodes" in capsys.readouterr().out
     start = {".dot": b"digraph", ".txt": b"inputs q0_old", ".svg": b"<svg", ".png": b"\x89PNG"}[suffix]
     assert target.read_bytes().lstrip(b"/ \n").startswith(start) or start in target.read_bytes()[:400]

@@ -10,11 +10,11 @@ import dynamics as dyn
 from cgraph import extend
 
 from . import library
-from .arguments import FORMULATIONS, answer, positive, say, started, takes_a_scene, takes_a_start
+from .arguments import FORMULATIONS, answer, formulation, positive, say, started, takes_a_scene, takes_a_start
 from .command import Command
 
-DRIVEN = ("euler_embedded", "chain_rule")
-WORDS = {"euler_embedded": "by definition", "chain_rule": "by the chain rule"}  # others by their names
+DRIVEN = ("by_definition", "chain_rule")
+WORDS = {"by_definition": "by definition", "chain_rule": "by the chain rule"}  # others by their names
 
 
 def add(parser: Command) -> None:
@@ -29,6 +29,7 @@ def add(parser: Command) -> None:
     parser.add_argument(
         "--formulations",
         nargs=2,
+        type=formulation,
         choices=FORMULATIONS,
         metavar=("LEFT", "RIGHT"),
         help=f"with --driven: whose torques (default: {' '.join(DRIVEN)})",

@@ -22,13 +22,14 @@ from .command import Command
 from .signals import settled
 
 FORMULATIONS = (
+    "by_definition",
     "chain_rule",
     "chain_rule_literal",
-    "euler_embedded",
     "kinetic_only",
     "kinetic_only_exact",
     "newton_euler",
 )
+FORMER_NAMES = {"euler_embedded": "by_definition"}  # of formulations, as `dynamics` takes them, too
 MOMENTUM_FORM = "Hamilton's equations, q_dot and p_dot of q and the momenta p"
 READING = ("ignore", "floating")  # options of `scenes.of_file`
 IN_PYTHON = "file.py:name, a model of a Python file, which is executed"
@@ -138,7 +139,11 @@ def takes_equations(command: argparse.ArgumentParser) -> None:
     """The arguments that `equations_of` reads, of which one may be given."""
     which = command.add_mutually_exclusive_group()
     which.add_argument(
-        "--formulation", default="chain_rule", choices=FORMULATIONS, help="of inverse dynamics (chain_rule)"
+        "--formulation",
+        type=formulation,
+        default="chain_rule",
+        choices=FORMULATIONS,
+        help="of inverse dynamics (chain_rule)",
     )
     which.add_argument("--forward", action="store_true", help="forward dynamics, with outputs such as qdd0")
     which.add_argument("--momentum", action="store_true", help=f"{MOMENTUM_FORM}, with outputs such as p0_dot")
@@ -171,6 +176,11 @@ def equations_of(
 def listed(text: str) -> tuple[str, ...]:
     """Names between commas, for argparse."""
     return tuple(filter(None, text.split(",")))
+
+
+def formulation(text: str) -> str:
+    """The name of a formulation, a former one as it is called now, for argparse."""
+    return FORMER_NAMES.get(text, text)
 
 
 def whole(text: str) -> int:

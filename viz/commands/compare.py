@@ -17,6 +17,7 @@ from .arguments import (
     answer_and_draw,
     check_picture,
     filled,
+    formulation,
     may_draw_and_print,
     scene_of,
     size_data,
@@ -35,10 +36,11 @@ def add(parser: Command) -> None:
     which.add_argument(
         "--formulations",
         nargs=2,
-        default=("euler_embedded", "chain_rule"),
+        default=("by_definition", "chain_rule"),
+        type=formulation,
         choices=FORMULATIONS,
         metavar=("LEFT", "RIGHT"),
-        help=f"two of {', '.join(FORMULATIONS)} (default: euler_embedded chain_rule)",
+        help=f"two of {', '.join(FORMULATIONS)} (default: by_definition chain_rule)",
     )
     which.add_argument("--momentum", action="store_true", help=f"the state equation and {MOMENTUM_FORM}")
     may_draw_and_print(parser)

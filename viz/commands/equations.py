@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from . import library
-from .arguments import FORMULATIONS, MOMENTUM_FORM, answer, counting, scene_of, takes_a_scene, verdict_of
+from .arguments import FORMULATIONS, MOMENTUM_FORM, answer, counting, formulation, scene_of, takes_a_scene, verdict_of
 from .command import Command
 
 
@@ -14,7 +14,11 @@ def add(parser: Command) -> None:
     takes_a_scene(parser)
     which = parser.add_mutually_exclusive_group()
     which.add_argument(
-        "--formulation", default="chain_rule", choices=FORMULATIONS, help="of the torque (default: chain_rule)"
+        "--formulation",
+        type=formulation,
+        default="chain_rule",
+        choices=FORMULATIONS,
+        help="of the torque (default: chain_rule)",
     )
     which.add_argument("--momentum", action="store_true", help=f"{MOMENTUM_FORM}, in place of the torque")
     parser.add_argument("--lines", type=counting, default=40, metavar="N", help="of each block, at most (default: 40)")

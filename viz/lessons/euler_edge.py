@@ -24,7 +24,7 @@ DRAWN = 60  # nodes, at most, of a graph that is drawn
 def euler_edge(subject: Subject) -> Screen:
     """The screen of a system."""
     right = inverse_dynamics(subject.system, "chain_rule")
-    verdict = formulation_verdict(subject.scene, "euler_embedded")
+    verdict = formulation_verdict(subject.scene, "by_definition")
     wrong = verdict.graph
     torque = subject.evaluate(right)
     errors = [(dt, _after_a_step(subject, wrong, dt) - torque) for dt in STEPS]
@@ -45,7 +45,7 @@ def euler_edge(subject: Subject) -> Screen:
             {"right": right, "wrong": wrong},
             sliders=subject.sliders(),
             joints=subject.joints[:SHOWN],
-            colors=[theme.FORMULATIONS["chain_rule"], theme.FORMULATIONS["euler_embedded"]],
+            colors=[theme.FORMULATIONS["chain_rule"], theme.FORMULATIONS["by_definition"]],
         ),
         f"At dt = 1e-6 s the largest error is {number(last)}. {_expected(stays, verdict)} Listen for “but velocity does move position!” True along a motion, and the chain "
         "rule uses it; not in ∂L/∂q̇, where a state is varied that nothing has moved yet.",
@@ -128,7 +128,7 @@ def _second_try(subject: Subject, right: np.ndarray) -> str:
 def _drawing(subject: Subject) -> str:
     """The inertial term by definition and by the chain rule, where they are small enough for a picture."""
     pictures = ""
-    for formulation in ("euler_embedded", "chain_rule"):
+    for formulation in ("by_definition", "chain_rule"):
         graph, (wrong, edges, _) = blamed(subject.system, INERTIAL_TERM, formulation)
         if len(graph.nodes) > DRAWN:
             return ""

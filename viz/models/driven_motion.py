@@ -76,7 +76,7 @@ def driven(model: Model, formulation: str = "chain_rule", t_end: float | None = 
     >>> import viz
     >>> arm = dyn.planar_arm([1.0], [1.0])
     >>> errors = []
-    >>> for formulation in ("chain_rule", "euler_embedded"):
+    >>> for formulation in ("chain_rule", "by_definition"):
     ...     run, wanted = viz.driven(arm, formulation, t_end=1.0)
     ...     errors.append(float(abs(run.q - wanted(run.t)).max()))
     >>> errors[0] < 1e-6, errors[1] > 0.1

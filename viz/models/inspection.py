@@ -42,7 +42,7 @@ from .node_classes import (
     formulation_classes,
 )
 
-FORMULATIONS = ("euler_embedded", "kinetic_only", "chain_rule")  # those of the paper, the flawed ones first
+FORMULATIONS = ("by_definition", "kinetic_only", "chain_rule")  # those of the paper, the flawed ones first
 FRAMES, RATE = 150, 30.0  # most instants shown, and how many a second
 # Rows of the picture by classes of both forms. Of what is solved for, the way back out is a row above the way in.
 INWARD, OUTWARD, TOP = "eliminated", "back out", "rates"

@@ -10,7 +10,7 @@ from .. import theme
 from .document import Table
 
 TITLES = {
-    "euler_embedded": "by definition",
+    "by_definition": "by definition",
     "kinetic_only": "kinetic only",
     "chain_rule": "chain rule",
     "chain_rule_literal": "chain rule, literal",

@@ -44,9 +44,9 @@ class EmbeddingError:
 def embedding_error(
     model: Model, q: Array, qd: Array, qdd: Array, formulation: str, steps: Sequence[float] = STEPS
 ) -> EmbeddingError:
-    """The error at the state (q, qd, qdd), each (n,), for "euler_embedded" or "kinetic_only"."""
+    """The error at the state (q, qd, qdd), each (n,), for "by_definition" or "kinetic_only"."""
     system = as_system(model)
-    energy = {"euler_embedded": system.lagrangian, "kinetic_only": system.kinetic}[formulation]
+    energy = {"by_definition": system.lagrangian, "kinetic_only": system.kinetic}[formulation]
     parameters = list(system.parameters.values())
     true = cg.compile(inverse_dynamics(system, "chain_rule"))(np.concatenate([q, qd, qdd, parameters]))
     slopes = cg.jacobian(system.graph({"E": energy}, system.q, system.qd), wrt=system.q)
@@ -68,7 +68,7 @@ def embedding_errors(counts: Sequence[int] = (1, 2, 3, 6), seed: int = 0) -> lis
     for n in counts:
         arm = planar_arm(rng.uniform(0.5, 1.5, n).tolist(), rng.uniform(0.5, 1.5, n).tolist())
         q, qd, qdd = rng.uniform(-1.0, 1.0, (3, n))
-        errors += [embedding_error(arm, q, qd, qdd, formulation) for formulation in ("euler_embedded", "kinetic_only")]
+        errors += [embedding_error(arm, q, qd, qdd, formulation) for formulation in ("by_definition", "kinetic_only")]
     return errors
 
 

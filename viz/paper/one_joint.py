@@ -57,12 +57,12 @@ def _terms(graph: Graph) -> Polynomial:
 
 def equations() -> Part:
     """Equation (3), read off the graphs term by term."""
-    forms = [equation3(name) for name in ("euler_embedded", "kinetic_only", "chain_rule")]
+    forms = [equation3(name) for name in ("by_definition", "kinetic_only", "chain_rule")]
     same = forms[0].terms == PAPER
     lines = [f"{'paper, Eq. (3)':16} d/dt dL/dqd = {format_polynomial(PAPER)}"]
     lines += [f"{TITLES[form.formulation]:16} d/dt dL/dqd = {form}" for form in forms]
     lines.append(f"By definition, the graph has the paper's terms, all of them and no other: {'yes' if same else 'NO'}")
-    torques = {name: format_polynomial(torque_terms(name)) for name in ("euler_embedded", "kinetic_only", "chain_rule")}
+    torques = {name: format_polynomial(torque_terms(name)) for name in ("by_definition", "kinetic_only", "chain_rule")}
     lines += ["", "The torque is what Lagrange's equation asks for, tau = d/dt dL/dqd - dL/dq:"]
     lines += [f"{TITLES[name]:16} tau = {torque}" for name, torque in torques.items()]
     text = "\n".join(lines) + "\n"
@@ -88,7 +88,7 @@ def equations() -> Part:
 FIGURES = {  # name: heading, formulation, caption
     "fig1": (
         "Figure 1: by definition",
-        "euler_embedded",
+        "by_definition",
         (
             "Figure 1. By definition, with the Euler relation embedded. {spurious_nodes} of {nodes} nodes and {spurious_edges} "
             "of {edges} edges (in vermillion) are there by mistake: the spring's energy is attached to the momentum through "

@@ -20,7 +20,7 @@ from .part import Part, plotted
 
 COUNTS = (1, 2, 3, 4, 6, 8, 10, 14, 20, 28, 40)
 FITTED_FROM = 6  # links; below, the fixed part of the graph bends the curve
-SCALED = ("euler_embedded", "kinetic_only", "chain_rule", "chain_rule_literal")
+SCALED = ("by_definition", "kinetic_only", "chain_rule", "chain_rule_literal")
 
 
 @dataclass(frozen=True)

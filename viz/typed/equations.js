@@ -35,8 +35,8 @@ function embedded(system, energyOf, through) {
   return { inputs: [...qOld, ...qdOld, ...qdd, dt], q: qNew, qd: qdNew, rate, gradient };
 }
 /** What is differentiated by qd through q = qd dt + q_old, by the formulations that do that. */
-const THROUGH_STEP = { euler_embedded: ({ lagrangian }) => lagrangian, kinetic_only: (system) => kineticEnergy(system) };
-const FORMULATIONS = ["euler_embedded", "kinetic_only", "chain_rule"];
+const THROUGH_STEP = { by_definition: ({ lagrangian }) => lagrangian, kinetic_only: (system) => kineticEnergy(system) };
+const FORMULATIONS = ["by_definition", "kinetic_only", "chain_rule"];
 
 /** K: the terms of L that depend on velocities. */
 function kineticEnergy({ lagrangian, qd }) {

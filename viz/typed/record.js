@@ -2,7 +2,7 @@
 
 const KINDS = { q: "q", qd: "q\u0307", qdd: "q\u0308", tau: "τ" };
 const LONGEST = 24; // letters of a name for which a box has room
-const ABOUT = { euler_embedded: "", kinetic_only: "of the kinetic energy " };
+const ABOUT = { by_definition: "", kinetic_only: "of the kinetic energy " };
 
 /** A name in mathematical letters: theta1 is θ₁. */
 const pretty = (name) => name.replace(/(?<![A-Za-z0-9])([A-Za-z]+)([0-9]*)(?![A-Za-z0-9])/g, (_, word, digits) => (

@@ -88,7 +88,7 @@ def spurious_nodes(graph: Graph) -> frozenset[Node]:
     --------
     >>> import dynamics as dyn
     >>> spring = dyn.scenes.load("spring_mass")
-    >>> [len(dyn.spurious_nodes(dyn.momentum_rate(spring, name))) for name in ("chain_rule", "euler_embedded")]
+    >>> [len(dyn.spurious_nodes(dyn.momentum_rate(spring, name))) for name in ("chain_rule", "by_definition")]
     [0, 13]
     """
     require_graph("spurious_nodes", graph)

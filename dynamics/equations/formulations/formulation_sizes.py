@@ -15,7 +15,7 @@ from .blame import Blame, blame
 from .formulations import inverse_dynamics, momenta, momentum_rate, torques
 from .verdict import formulation_verdict
 
-PAPER = ("euler_embedded", "kinetic_only", "chain_rule")  # of Figures 1 to 3, in this order
+PAPER = ("by_definition", "kinetic_only", "chain_rule")  # of Figures 1 to 3, in this order
 INERTIAL_TERM, TORQUE = "p and dp/dt", "tau"
 TERMS: dict[str, tuple[Callable[[Model, str], Graph], Callable[[System, str, Node], Graph]]] = {
     INERTIAL_TERM: (partial(momentum_rate, keep_momentum=True), momenta),  # drawn in Figures 1 to 3
@@ -70,7 +70,7 @@ def formulation_sizes(model: Model) -> dict[tuple[str, str], FormulationSize]:
     --------
     >>> import dynamics as dyn
     >>> sizes = dyn.formulation_sizes(dyn.scenes.load("spring_mass"))
-    >>> [(term, size.spurious_nodes, size.nodes) for (term, name), size in sizes.items() if name == "euler_embedded"]
+    >>> [(term, size.spurious_nodes, size.nodes) for (term, name), size in sizes.items() if name == "by_definition"]
     [('p and dp/dt', 10, 20), ('tau', 4, 18)]
     """
     return {

@@ -5,7 +5,8 @@ Equations and figures named here are those of T. Kusaka and T. Tanaka, Robotics 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import warnings
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import NamedTuple
 
 import cgraph as cg
@@ -69,7 +70,7 @@ def chain_rule_literal(system: System) -> LagrangeTerms:
     return LagrangeTerms([*system.q, *system.qd, *system.qdd], system.q, system.qd, momentum, rate, gradient)
 
 
-def euler_embedded(system: System) -> LagrangeTerms:
+def by_definition(system: System) -> LagrangeTerms:
     """The definition, eq. (3) and Figure 1: dL/dqd is taken through q = qd dt + q_old, which is wrong."""
     return _embedded(system, system.lagrangian)
 
@@ -110,15 +111,25 @@ def newton_euler(system: System) -> LagrangeTerms:
 
 FORMULATIONS: dict[str, Callable[[System], LagrangeTerms]] = {
     formulation.__name__: formulation
-    for formulation in (chain_rule, chain_rule_literal, euler_embedded, kinetic_only, kinetic_only_exact, newton_euler)
+    for formulation in (chain_rule, chain_rule_literal, by_definition, kinetic_only, kinetic_only_exact, newton_euler)
 }
 """Formulations of Lagrange's equation by name, right and wrong ones: what `inverse_dynamics` takes."""
+FORMER_NAMES = {"euler_embedded": "by_definition"}  # as versions before this one called them
 INERTIAL = tuple([name for name in FORMULATIONS if name != newton_euler.__name__])  # those that form d/dt dL/dqd
 SMALL = (chain_rule.__name__, newton_euler.__name__)  # right ones, of which the other may be the smaller
 THROUGH_STEP: dict[str, Callable[[System], Node]] = {
-    "euler_embedded": lambda system: system.lagrangian,
+    "by_definition": lambda system: system.lagrangian,
     "kinetic_only": lambda system: system.kinetic,
 }  # the formulations that differentiate by qd through q = qd dt + q_old, and what they differentiate
+
+
+def formulation_name(name: str, among: Collection[str] = FORMULATIONS) -> str:
+    """The name of a formulation, checked; a former name is taken for the present one, with a warning."""
+    if isinstance(name, str) and name in FORMER_NAMES:
+        present = FORMER_NAMES[name]
+        warnings.warn(f"the formulation {name!r} is called {present!r} now", FutureWarning, stacklevel=3)
+        name = present
+    return require_choice("formulation", name, among)
 
 
 @Equation("q qd qdd", Output("tau{}", ("n",), "N m or N")).describes
@@ -130,7 +141,7 @@ def inverse_dynamics(model: Model, formulation: str | None = None, *, simplify: 
     formulation : str, optional
         By default the smaller graph of "chain_rule", which is the paper's, and "newton_euler", which takes the
         velocities in L in place of qd. "chain_rule_literal" is the first with every gradient written out.
-        "euler_embedded", "kinetic_only" and "kinetic_only_exact" have the Euler relation in the graph; the first two
+        "by_definition", "kinetic_only" and "kinetic_only_exact" have the Euler relation in the graph; the first two
         are wrong, as the paper has them.
     simplify : bool
         False leaves the graph as derived.
@@ -152,11 +163,11 @@ def inverse_dynamics(model: Model, formulation: str | None = None, *, simplify: 
     >>> dyn.inverse_dynamics(block).evaluate({"q0": 0.0, "qd0": 2.0, "qdd0": 3.0})
     {'tau0': 13.0}
     >>> list(dyn.FORMULATIONS)
-    ['chain_rule', 'chain_rule_literal', 'euler_embedded', 'kinetic_only', 'kinetic_only_exact', 'newton_euler']
+    ['chain_rule', 'chain_rule_literal', 'by_definition', 'kinetic_only', 'kinetic_only_exact', 'newton_euler']
     """
     system = as_system(model)
     if formulation is not None:
-        require_choice("formulation", formulation, FORMULATIONS)
+        formulation = formulation_name(formulation)
     require_flag("simplify", simplify)
     if formulation is None:
         formulation, graph = _smaller(system)
@@ -244,7 +255,7 @@ def momentum_rate(
 
 def momenta(system: System, formulation: str, through: Node = ONE, *, keep_momentum: bool = True) -> Graph:
     """The inertial term, with or without the momenta, as derived.  through: as of `torques`."""
-    require_choice("formulation", formulation, INERTIAL)
+    formulation = formulation_name(formulation, INERTIAL)
     terms = _lagrange_terms(system, formulation, through)
     outputs = {f"p{i}": p for i, p in enumerate(terms.momentum or ())} if keep_momentum else {}
     outputs |= {f"p{i}_dot": rate for i, rate in enumerate(terms.momentum_rate)}
@@ -254,7 +265,7 @@ def momenta(system: System, formulation: str, through: Node = ONE, *, keep_momen
 def _lagrange_terms(system: System, formulation: str, through: Node = ONE) -> LagrangeTerms:
     if through is not ONE:
         return _embedded(system, THROUGH_STEP[formulation](system), through)
-    return FORMULATIONS[require_choice("formulation", formulation, FORMULATIONS)](system)
+    return FORMULATIONS[formulation_name(formulation)](system)
 
 
 def _forces(system: System, terms: LagrangeTerms) -> list[Node]:

@@ -22,7 +22,7 @@ from ...systems.model import Model, as_system
 from ...systems.system import System
 from ..equation import documented
 from .blame import blame
-from .formulations import THROUGH_STEP, inverse_dynamics, torques
+from .formulations import THROUGH_STEP, formulation_name, inverse_dynamics, torques
 
 if TYPE_CHECKING:
     from cgraph.extend import Json
@@ -84,7 +84,7 @@ class Verdict:
     --------
     >>> import dynamics as dyn
     >>> ball = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 - 9.81 * q[0], ["y"])
-    >>> print(dyn.formulation_verdict(ball, "euler_embedded"))
+    >>> print(dyn.formulation_verdict(ball, "by_definition"))
     This is not the torque of the chain rule, however small dt is. Too much in it:
       tau.y  dL/dq.y = -9.81
     In tau.y this cancels a right term, and no edge is left to be marked. Missing: -dL/dq.y = 9.81.
@@ -199,7 +199,7 @@ class Verdict:
 
 
 @documented
-def formulation_verdict(model: Model, formulation: str = "euler_embedded") -> Verdict:
+def formulation_verdict(model: Model, formulation: str = "by_definition") -> Verdict:
     """Whether the torque by a formulation is that of the chain rule, by how much it is off, and what is to blame.
 
     Parameters
@@ -228,11 +228,12 @@ def formulation_verdict(model: Model, formulation: str = "euler_embedded") -> Ve
     Holds: this is the torque of the chain rule: dK/dq is 0, so nothing comes through q = qd dt + q_old.
     """
     system, names = as_system(model), display_names(model)
+    formulation = formulation_name(formulation)
     graph = inverse_dynamics(model, formulation)
     if formulation not in THROUGH_STEP:
         return Verdict(formulation, graph, reason="no derivative in it is taken through a step of time", names=names)
     terms, quasi = _terms(system, formulation), system.kinematics.quasi is not None
-    slope = f"{'G^T ' * quasi}{'dL/dq' if formulation == 'euler_embedded' else 'dK/dq'}"
+    slope = f"{'G^T ' * quasi}{'dL/dq' if formulation == 'by_definition' else 'dK/dq'}"
     alike = Verdict(formulation, graph, names=names, terms=terms)
     if all([node.value == 0.0 for node in terms.outputs.values()]):
         return replace(alike, reason=f"{slope} is 0, so nothing comes through q = qd dt + q_old")

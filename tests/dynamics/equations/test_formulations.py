@@ -1,14 +1,15 @@
 """The formulations beside one another: signatures, values where they should agree, and what is spurious."""
 
-from pytest import approx, mark
+from pytest import approx, mark, warns
 
+import cgraph as cg
 import dynamics as dyn
 from dynamics.equations.formulations.formulations import INERTIAL
 from tests.dynamics.models import MODELS, before, error, random_arm, run, states
 from tests.formulations import SEEN, SMALL, WRONG
 
 ROUNDING = 1e-12  # two orders of summation of the same terms, which may cancel tenfold
-EMBEDDED = ("euler_embedded", "kinetic_only", "kinetic_only_exact")
+EMBEDDED = ("by_definition", "kinetic_only", "kinetic_only_exact")
 
 
 @mark.parametrize("name", MODELS)
@@ -71,3 +72,13 @@ def test_the_nodes_of_the_torque_say_which_link_they_come_from(n: int) -> None:
     tags = dyn.inverse_dynamics(random_arm(n)).counts().by_tag
     assert {name for name in tags if name.startswith("link")} == {f"link {i + 1}" for i in range(n)}
     assert tags["damping"] == 2 * n  # damping * qd, added
+
+
+@mark.parametrize("former", ["euler_embedded"])
+def test_a_former_name_is_taken_with_a_warning(former):
+    scene = dyn.scenes.load("spring_mass")
+    for of in (dyn.inverse_dynamics, dyn.momentum_rate, lambda model, name: dyn.formulation_verdict(model, name).graph):
+        with warns(FutureWarning, match=f"{former!r} is called 'by_definition' now"):
+            found = of(scene, former)
+        assert cg.structure_hash(found) == cg.structure_hash(of(scene, "by_definition"))
+    assert "euler_embedded" not in dyn.FORMULATIONS

@@ -62,7 +62,7 @@ def test_tags_of_the_author_change_no_count_and_no_class(seed: int, formulation:
 
 
 def test_lint_counts_them_too() -> None:
-    graphs = [dyn.inverse_dynamics(random_system(0, (0, 1), tagged), "euler_embedded") for tagged in (0.0, 1.0)]
+    graphs = [dyn.inverse_dynamics(random_system(0, (0, 1), tagged), "by_definition") for tagged in (0.0, 1.0)]
     lint = [str(cg.lint(graph, independent=("q0 q1", "qd0 qd1"), function="L")) for graph in graphs]
     assert lint[0] == lint[1]
     assert f"{len(dyn.spurious_nodes(graphs[0]))} nodes of {len(graphs[0].nodes)} serve nothing else." in lint[0]
@@ -103,7 +103,7 @@ def test_without_its_spurious_nodes_the_graph_is_the_rate_of_the_momentum_at_an_
 def test_only_the_relations_are_euler_edges() -> None:
     """qd = qdd dt + qd_old and q = qd dt + q_old, four nodes; the rate of q serves only what is spurious."""
     pendulum = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 + 9.81 * cg.cos(q[0]), ["x"])
-    verdict = dyn.formulation_verdict(pendulum, "euler_embedded")
+    verdict = dyn.formulation_verdict(pendulum, "by_definition")
     graph, name = verdict.graph, formulation_classes([verdict])(verdict.graph)
     edges = [node for node in graph.nodes if name(node) == "Euler edge"]
     assert [node.name or node.op.name for node in edges] == ["mul", "qd0", "mul", "q0"]

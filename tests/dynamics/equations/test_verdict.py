@@ -153,21 +153,21 @@ def test_a_named_system_is_judged_right_by_lint(name: str, formulation: str, tmp
 
 
 def test_what_has_cancelled_is_said_to_be_missing() -> None:
-    verdict = dyn.formulation_verdict(NAMED["ball"][0], "euler_embedded")
+    verdict = dyn.formulation_verdict(NAMED["ball"][0], "by_definition")
     assert (verdict.nodes, verdict.edges, list(verdict.missing)) == (frozenset(), frozenset(), ["tau1"])
     assert str(verdict.excess["tau1"]) == "dL/dq.y = -9.81"
     assert str(verdict.missing["tau1"]) == "-dL/dq.y = 9.81"
 
 
 def test_where_an_edge_alone_is_wrong_it_is_blamed_and_by_how_much_is_said() -> None:
-    verdict = dyn.formulation_verdict(NAMED["atwood"][0], "euler_embedded")
+    verdict = dyn.formulation_verdict(NAMED["atwood"][0], "by_definition")
     assert (len(verdict.nodes), len(verdict.edges), verdict.missing) == (0, 1, {})
     excess = verdict.excess["tau0"]
     assert (excess.formula, excess.value, verdict.at) == ("9.81 * (a - b)", 9.81, {"a": 2.0, "b": 1.0})
 
 
 def test_that_it_holds_is_proved_or_said_not_to_be() -> None:
-    circle = dyn.formulation_verdict(NAMED["circle"][0], "euler_embedded")
+    circle = dyn.formulation_verdict(NAMED["circle"][0], "by_definition")
     assert circle.proved  # by an identity
     hidden = dyn.System(
         lambda q, qd, t: 0.5 * qd[0] ** 2 * cg.cos(cg.acos(cg.tanh(q[0])) - cg.acos(cg.tanh(q[0])) * 1.0), "x"
@@ -175,7 +175,7 @@ def test_that_it_holds_is_proved_or_said_not_to_be() -> None:
     tangled = dyn.System(
         lambda q, qd, t: 0.5 * (qd[0] * (cg.exp(cg.log(2.0 + cg.sin(q[0]))) - cg.sin(q[0]))) ** 2, ["x"]
     )
-    assert dyn.formulation_verdict(hidden, "euler_embedded").differs is False
+    assert dyn.formulation_verdict(hidden, "by_definition").differs is False
     verdict = dyn.formulation_verdict(tangled, "kinetic_only")
     assert (verdict.differs, verdict.proved, verdict.nodes) == (False, False, frozenset())
     assert "0 to rounding at all 24 states tried" in str(verdict)
@@ -183,7 +183,7 @@ def test_that_it_holds_is_proved_or_said_not_to_be() -> None:
 
 def test_where_no_state_is_finite_nothing_is_said_to_hold() -> None:
     nowhere = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 + cg.sqrt(-1.0 - q[0] ** 2), ["x"])
-    verdict = dyn.formulation_verdict(nowhere, "euler_embedded")
+    verdict = dyn.formulation_verdict(nowhere, "by_definition")
     assert (verdict.differs, verdict.proved, verdict.excess) == (True, False, {})
     assert str(verdict).startswith("This is not shown to be the torque of the chain rule: dL/dq is finite at none")
 

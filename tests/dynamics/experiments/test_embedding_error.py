@@ -45,13 +45,13 @@ def slope(errors: Array) -> float:
 
 
 def test_by_definition_the_torque_tends_to_tau_and_dl_dq(case: Case) -> None:
-    errors = case.errors("euler_embedded", case.tau + case.dl_dq)
+    errors = case.errors("by_definition", case.tau + case.dl_dq)
     assert slope(errors) == approx(1.0, abs=SLOPE)
     assert errors[-1] < 1e-4 * np.linalg.norm(case.dl_dq)
 
 
 def test_by_definition_the_error_does_not_vanish_with_dt(case: Case) -> None:
-    errors = case.errors("euler_embedded", case.tau)
+    errors = case.errors("by_definition", case.tau)
     assert errors == approx(np.linalg.norm(case.dl_dq), rel=FIRST_ORDER)
     assert np.linalg.norm(case.dl_dq) > 0.1  # N m: so the line above says something
 
@@ -98,7 +98,7 @@ def test_the_limits_hold_for_any_lagrangian(name: str) -> None:
     state = at(states(model, 1, seed=6), 0)
     of_l, of_k = lagrange(model, state), lagrange(model, state, energy=as_system(model).kinetic)
     limits = {
-        "euler_embedded": floats(of_l.tau) + floats(of_l.gradient),
+        "by_definition": floats(of_l.tau) + floats(of_l.gradient),
         "kinetic_only": floats(of_l.tau) + floats(of_k.gradient),
         "kinetic_only_exact": floats(of_l.tau),
     }
@@ -127,5 +127,5 @@ def test_the_right_torque_is_not_what_the_flawed_ones_give_at_a_large_step() -> 
         expected = [
             float(sum(a * b * lagrangian(i, a, b) for a in (1, -1) for b in (1, -1)) / (4 * h * h)) for i in range(2)
         ]
-    found = run(dyn.momentum_rate(system, "euler_embedded"), old)
+    found = run(dyn.momentum_rate(system, "by_definition"), old)
     assert found == approx(np.array(expected), rel=1e-12)

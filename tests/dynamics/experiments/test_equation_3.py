@@ -28,13 +28,13 @@ def rate(formulation: str, values: dict[str, np.ndarray], **options: bool) -> np
 def test_by_definition_the_inertial_term_gains_a_spring_force(simplify: bool) -> None:
     terms = STIFFNESS * np.array([QDD * DT**2, 2 * QD * DT, Q_OLD])
     largest = np.abs([*terms, INERTIA * QDD]).max(axis=0)
-    gained = rate("euler_embedded", BEFORE, simplify=simplify) - INERTIA * QDD
+    gained = rate("by_definition", BEFORE, simplify=simplify) - INERTIA * QDD
     assert (np.abs(gained + terms.sum(axis=0)) / largest).max() < ROUNDING
 
 
 def test_each_term_of_equation_3_is_there_alone() -> None:
     """With two of qdd dt^2, 2 qd dt and q_old made zero, the third is left, exactly."""
-    graph = dyn.momentum_rate(SPRING_MASS, "euler_embedded")
+    graph = dyn.momentum_rate(SPRING_MASS, "by_definition")
     alone = {"I": 0.0, "k": 3.0}
     moving = {"q0_old": 0.0, "qd0_old": 0.0, "qdd0": 0.5, "dt": 0.25, **alone}  # here qd = qdd dt too
     assert graph.evaluate({**moving, "q0_old": 0.5, "qdd0": 0.0}) == {"p0_dot": -3.0 * 0.5}
@@ -63,7 +63,7 @@ def test_the_torque_is_the_inertial_term_and_the_spring(formulation: str) -> Non
 
 def test_equation_3_is_the_derivative_of_the_embedded_lagrangian() -> None:
     """d/d(dt) of dL/dqd taken through q = qd dt + q_old, by differences of L at 60 digits: the paper's definition."""
-    graph = dyn.momentum_rate(SPRING_MASS, "euler_embedded")
+    graph = dyn.momentum_rate(SPRING_MASS, "by_definition")
     with mp.workdps(60):
         h = mpf(10) ** -15
         for row in range(5):
@@ -82,7 +82,7 @@ def test_equation_3_is_the_derivative_of_the_embedded_lagrangian() -> None:
 
 
 def test_the_flawed_graph_of_equation_3_reads_as_the_paper_has_it() -> None:
-    assert dyn.momentum_rate(SPRING_MASS, "euler_embedded").counts().by_operation == {
+    assert dyn.momentum_rate(SPRING_MASS, "by_definition").counts().by_operation == {
         "mul": 6,  # I qdd, qdd dt, qd dt, k qd_sum, dt (..), k q
         "variable": 6,
         "add": 4,  # qd, q, qdd dt + qd, the two terms of the spring
@@ -92,7 +92,7 @@ def test_the_flawed_graph_of_equation_3_reads_as_the_paper_has_it() -> None:
 
 def test_spurious_is_the_branch_of_the_spring() -> None:
     """Of the 17 nodes by definition, the right inertial term has I, qdd and I qdd; a subtraction joins the rest on."""
-    graph = dyn.momentum_rate(SPRING_MASS, "euler_embedded")
+    graph = dyn.momentum_rate(SPRING_MASS, "by_definition")
     gone = dyn.spurious_nodes(graph)
     kept = [node for node in graph.nodes if node not in gone]
     assert (len(graph.nodes), len(gone)) == (17, 13)
@@ -109,7 +109,7 @@ def test_nothing_is_spurious_in_a_right_formulation_of_one_joint(formulation: st
 
 
 def test_spurious_is_seen_before_simplification_too() -> None:
-    graph = dyn.momentum_rate(SPRING_MASS, "euler_embedded", simplify=False)
+    graph = dyn.momentum_rate(SPRING_MASS, "by_definition", simplify=False)
     kept = [node for node in graph.nodes if node not in dyn.spurious_nodes(graph)]
     assert sorted(node.name or node.op.name for node in kept) == ["I", "mul", "qdd0", "sub"]
 

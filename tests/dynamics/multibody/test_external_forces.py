@@ -177,7 +177,7 @@ def test_a_force_on_what_is_welded_to_the_world_does_nothing() -> None:
     assert free.position("base", (0.0, 2.0, 0.0)).evaluate({"q0": 0.3}) == {"x": 1.0, "y": 2.0, "z": 0.0}
 
 
-@mark.parametrize("formulation", ["chain_rule_literal", "euler_embedded", "kinetic_only_exact"])
+@mark.parametrize("formulation", ["chain_rule_literal", "by_definition", "kinetic_only_exact"])
 def test_every_formulation_takes_the_force_off(formulation: str) -> None:
     arm = turned_arm(3)
     given = at(states(arm, 1), 0)

@@ -284,7 +284,7 @@ GRAPHS: dict[str, tuple[Callable[[dyn.Mechanism], cg.Graph], Rows]] = {
     "jacobian rate": (lambda m: dyn.frame_jacobian_rate(m, LAST(m), AT), _columns),
     "motion": (lambda m: m.motion(LAST(m), AT), _alike),
 }
-EMBEDDED = ("euler_embedded", "kinetic_only", "kinetic_only_exact")  # in the velocities of the coordinates alone
+EMBEDDED = ("by_definition", "kinetic_only", "kinetic_only_exact")  # in the velocities of the coordinates alone
 
 
 def _error(value: Array, reference: Array) -> float:

@@ -15,7 +15,7 @@ from tests.each_row import each_row
 from viz import cli, theme
 from viz.commands.arguments import filled
 
-RIGHT, FLAWED = ("chain_rule", "chain_rule_literal"), ("euler_embedded", "kinetic_only", "kinetic_only_exact")
+RIGHT, FLAWED = ("chain_rule", "chain_rule_literal"), ("by_definition", "kinetic_only", "kinetic_only_exact")
 MODEL = """<mujoco><compiler angle="radian"/><worldbody>
 <body name="a"><joint name="slide" type="slide" axis="1 0 0"/><geom size="0.1" contype="0"/>
 <body name="b"><joint name="hinge" axis="0 1 0"/><geom size="0.1" pos="0 0 -0.5" contype="0"/></body></body>
@@ -48,7 +48,7 @@ def test_lint_blames_the_edges_of_the_embedding(figures, formulation):
     exact = formulation == "kinetic_only_exact"  # embedded, but no derivative is taken through it
     found = figures("lint", "triple_pendulum", "--formulation", formulation, status=int(not exact))
     (finding,) = found["findings"]
-    energy = "L" if formulation == "euler_embedded" else "K"
+    energy = "L" if formulation == "by_definition" else "K"
     assert [cut["text"] for cut in finding["cut"]] == [f"qd.joint {i} * dt -> q.joint {i}" for i in (1, 2, 3)]
     assert [each["gains"] for each in finding["corrupted"]] == [f"dt * d{energy}/dq.joint {i}" for i in (1, 2, 3)]
     assert found["verdict"]["differs"] == (len(found["verdict"]["edges"]) == 3) == (not found["ok"]) == (not exact)
@@ -60,7 +60,7 @@ def test_a_file_with_a_coordinate_that_nothing_uses_and_with_forces_and_torques(
     model, page = tmp_path / "cart.xml", tmp_path / "page.html"
     model.write_text(MODEL)
     assert "Holds" in said("lint", str(model))
-    found = figures("lint", str(model), "--formulation", "euler_embedded", status=1)
+    found = figures("lint", str(model), "--formulation", "by_definition", status=1)
     assert found["scene"] == "cart"
     assert "qd.hinge * dt -> q.hinge" in [cut["text"] for cut in found["findings"][0]["cut"]]
     found = figures("compare", str(model), status=1)
@@ -155,13 +155,13 @@ def test_compare_has_totals_that_add_up_and_a_class_for_every_node(said, figures
         assert sum(found[f"{side}_classes"].values()) == len(only)
     assert set(found["left_classes"]) == {"needed", "spurious adjoint", "takes in what is spurious", "Euler edge"}
     assert {name: each["differs"] for name, each in found["verdicts"].items()} == {
-        "euler_embedded": True,
+        "by_definition": True,
         "chain_rule": False,
     }
     assert set(found["right_classes"]) == {"needed"}
     arm = dyn.scenes.load("triple_pendulum")
-    assert found["left_nodes"] == len(dyn.inverse_dynamics(arm, "euler_embedded").nodes)
-    assert found["left_classes"]["spurious adjoint"] == len(dyn.formulation_verdict(arm, "euler_embedded").nodes)
+    assert found["left_nodes"] == len(dyn.inverse_dynamics(arm, "by_definition").nodes)
+    assert found["left_classes"]["spurious adjoint"] == len(dyn.formulation_verdict(arm, "by_definition").nodes)
     text = said("compare", "triple_pendulum", "--formulations", "chain_rule", "chain_rule_literal", status=1)
     assert text.startswith("left: chain_rule, 171 nodes = ")
     assert "spurious" not in text
@@ -190,14 +190,14 @@ def test_an_edge_that_is_wrong_by_itself_is_seen_by_every_command(tmp_path, said
     model, page = f"{tmp_path / 'own.py'}:atwood", str(tmp_path / "page.html")
     found = figures("compare", model, status=1)
     assert found["left_classes"] == {"takes in what is spurious": 2}
-    assert [found["verdicts"][name]["differs"] for name in ("euler_embedded", "chain_rule")] == [True, False]
+    assert [found["verdicts"][name]["differs"] for name in ("by_definition", "chain_rule")] == [True, False]
     assert "This is not the torque of the chain rule" in said("compare", model, status=1)
     versions = figures("inspect", model, "--t-end", "0.1", "--out", page)["versions"]
     shown = [(each["spurious"], each["spurious_edges"], each["differs"]) for each in versions.values()]
     assert shown == [(0, 1, True), (0, 0, False), (0, 0, False)]
     assert "Holds: this is the torque of the chain rule: dK/dq is 0" in Path(page).read_text(encoding="utf-8")
     ball = f"{tmp_path / 'own.py'}:ball"
-    assert "Missing: -dL/dq.y = 9.81." in said("lint", ball, "--formulation", "euler_embedded", status=1)
+    assert "Missing: -dL/dq.y = 9.81." in said("lint", ball, "--formulation", "by_definition", status=1)
     versions = figures("inspect", ball, "--t-end", "0.1", "--out", page)["versions"]
     assert [each["differs"] for each in versions.values()] == [True, False, False]
     assert "Missing: -dL/dq.y = 9.81." in Path(page).read_text(encoding="utf-8")
@@ -260,7 +260,7 @@ def test_the_ten_lines_of_the_readme_are_a_page(own, figures):
     assert len([line for line in lines.splitlines() if line]) <= 10
     sizes = figures("inspect", "pendulum.py:system", "--out", "a.html")
     assert sizes["bytes"] == Path("a.html").stat().st_size < 500_000
-    assert sizes["versions"]["chain_rule"]["spurious"] == 0 < sizes["versions"]["euler_embedded"]["spurious"]
+    assert sizes["versions"]["chain_rule"]["spurious"] == 0 < sizes["versions"]["by_definition"]["spurious"]
     assert dyn.scenes.load("pendulum.py:system").coordinates == ("shoulder", "elbow")
 
 
@@ -308,7 +308,7 @@ def test_a_motion_cut_short_is_a_finding(own, figures, capsys):
 @each_row(
     ("arguments", "status", "colors"),
     [
-        (["lint", "spring_mass", "--formulation", "euler_embedded"], 1, theme.MARKS[:1]),
+        (["lint", "spring_mass", "--formulation", "by_definition"], 1, theme.MARKS[:1]),
         (["why", "spring_mass", "tau0", "q0"], 0, theme.MARKS[:1]),
         (["why", "spring_mass", "tau0", "qd0"], 0, theme.MARKS[1:]),
         (["compare", "spring_mass"], 1, theme.MARKS),
@@ -328,13 +328,13 @@ def test_the_answer_is_drawn(tmp_path, said):
     said("compare", "spring_mass", "--svg", str(target), status=1)
     svg = target.read_text(encoding="utf-8")
     assert svg.startswith("<svg")
-    assert "only euler_embedded" in svg
+    assert "only by_definition" in svg
     assert "only chain_rule" in svg
 
 
 def test_a_point_keeps_parameters_and_is_always_the_same():
     scene = dyn.scenes.load("spring_mass")
-    graph = dyn.inverse_dynamics(scene, "euler_embedded")
+    graph = dyn.inverse_dynamics(scene, "by_definition")
     at = filled(graph, scene, {"qdd0": 2.0})
     assert at == filled(graph, scene, {"qdd0": 2.0})
     assert set(at) == set(graph.input_names)

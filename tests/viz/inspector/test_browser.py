@@ -14,7 +14,7 @@ from tests.each_row import each_row
 from tests.hostile_texts import HOSTILE, hostile_page
 from viz import cli, theme
 
-EMBEDDED = "euler_embedded"
+EMBEDDED = "by_definition"
 
 
 @pytest.fixture(scope="module")
@@ -141,7 +141,7 @@ def test_an_input_is_edited_once_for_all_versions_and_reset(show):
     state = page.evaluate("inspector.state()")
     assert state["qd0_old"] == pytest.approx(state["qd0"] - state["dt"] * 2.5)
     results = page.evaluate("inspector.results()")
-    for name in ("euler_embedded", "kinetic_only", "chain_rule"):
+    for name in ("by_definition", "kinetic_only", "chain_rule"):
         graph = dyn.inverse_dynamics(scene, name)
         expected = graph.evaluate({each: state[each] for each in graph.input_names})["tau0"]
         assert results[name.replace("_", " ")]["tau0"] == pytest.approx(expected)
@@ -341,7 +341,7 @@ def test_the_keyboard_alone_does_everything(show):
     """Versions as radio buttons, a walk over nodes, folding, values, playing, asking, letting go."""
     page = show()
     page.keyboard.press("Tab")
-    assert page.evaluate("document.activeElement.textContent") == "euler embedded"
+    assert page.evaluate("document.activeElement.textContent") == "by definition"
     page.keyboard.press("ArrowRight")
     page.keyboard.press("ArrowRight")
     assert page.evaluate("document.activeElement.textContent") == "chain rule"

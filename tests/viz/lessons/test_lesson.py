@@ -198,7 +198,7 @@ def test_the_page_computes_what_the_graphs_do(subject, screens, v8):
     assert len(graphs) == 6
     direct = [
         dyn.inverse_dynamics(subject.system, "chain_rule"),
-        dyn.inverse_dynamics(subject.system, "euler_embedded"),
+        dyn.inverse_dynamics(subject.system, "by_definition"),
         dyn.inverse_dynamics(subject.system, "chain_rule"),
         dyn.mass_matrix(subject.system),
     ]

@@ -28,10 +28,10 @@ def test_the_page_on_the_paper_has_the_table() -> None:
 def test_lint_and_the_inspector_count_what_the_table_has(name: str) -> None:
     scene = dyn.scenes.load(name)
     sizes = {formulation: size for (term, formulation), size in dyn.formulation_sizes(scene).items() if term == TORQUE}
-    graph = dyn.inverse_dynamics(scene, "euler_embedded")
+    graph = dyn.inverse_dynamics(scene, "by_definition")
     n = scene.system.n
     report = cg.lint(graph, independent=[([f"q{i}" for i in range(n)], [f"qd{i}" for i in range(n)])])
-    size = sizes["euler_embedded"]
+    size = sizes["by_definition"]
     assert len(report.findings[0].data["nodes_for_this_alone"]) == size.spurious_nodes
     assert f"{size.spurious_nodes} nodes of {size.nodes} serve nothing else" in str(report)
     versions = inspection(scene, t_end=0.1).versions
@@ -51,7 +51,7 @@ def test_an_edge_that_is_there_by_mistake_starts_at_such_a_node_or_enters_what_i
             if model is not atwood:
                 assert wrong.nodes == dyn.spurious_nodes(graph)
                 assert {edge.source for edge in mistakes} <= wrong.nodes
-    size = dyn.formulation_sizes(atwood)[TORQUE, "euler_embedded"]
+    size = dyn.formulation_sizes(atwood)[TORQUE, "by_definition"]
     assert (size.spurious_nodes, size.spurious_edges) == (0, 1)
 
 
@@ -68,7 +68,7 @@ def test_every_formulation_has_a_name_and_a_color_of_its_own() -> None:
 
 
 def test_inner_nodes_are_called_what_they_are() -> None:
-    graph = dyn.momentum_rate(dyn.scenes.load("spring_mass"), "euler_embedded", keep_momentum=True)
+    graph = dyn.momentum_rate(dyn.scenes.load("spring_mass"), "by_definition", keep_momentum=True)
     formulas = short_formulas(graph, theme.ONE_JOINT)
     assert {"I α", "I ω", "k θ", "ω dt", "k θ dt"} <= set(formulas.values())
     assert all(len(text) <= 10 and node.name is None for node, text in formulas.items())

@@ -53,15 +53,15 @@ def test_there_is_a_progress_line_for_each_part(paper):
 def test_equation_3_is_read_off_the_graph(paper):
     folder, data, _ = paper
     assert data["equations"]["equal_to_paper"] is True
-    assert data["equations"]["euler_embedded"] == "I*qdd0 - k*q0_old - 2*dt*k*qd0 - dt^2*k*qdd0"
+    assert data["equations"]["by_definition"] == "I*qdd0 - k*q0_old - 2*dt*k*qd0 - dt^2*k*qdd0"
     assert data["equations"]["chain_rule"] == data["equations"]["kinetic_only"] == "I*qdd0"
     torques = data["equations"]["torques"]  # by definition the spring is gone but for dt, by the chain rule it is there
     assert torques == {
-        "euler_embedded": "I*qdd0 - dt*k*qd0 - dt^2*k*qdd0",
+        "by_definition": "I*qdd0 - dt*k*qd0 - dt^2*k*qdd0",
         "kinetic_only": "I*qdd0 + k*q0_old + dt*k*qd0",
         "chain_rule": "I*qdd0 + k*q0",
     }
-    assert data["equations"]["euler_embedded"] in (folder / "equations.txt").read_text()
+    assert data["equations"]["by_definition"] in (folder / "equations.txt").read_text()
 
 
 def test_the_spurious_branch_is_half_of_figure_1_and_absent_elsewhere(paper):
@@ -143,12 +143,12 @@ def test_one_interruption_moves_no_time():
 
 def test_the_law_is_drawn_beside_a_line_of_slope_one():
     steps = np.array([1e-2, 1e-4])
-    law = EmbeddingError("euler_embedded", 2, steps, np.array([3.0, 3.0]), 5.0 * steps, np.ones(2), 1.0)
+    law = EmbeddingError("by_definition", 2, steps, np.array([3.0, 3.0]), 5.0 * steps, np.ones(2), 1.0)
     errors, distances = _panels([law])
     guide = next(line for line in distances.lines if line.name == "slope 1")
     assert guide.color is None
     assert np.allclose(np.diff(np.log(guide.y)), np.diff(np.log(guide.x)))
-    assert errors.lines[0].color == distances.lines[0].color == theme.FORMULATIONS["euler_embedded"]
+    assert errors.lines[0].color == distances.lines[0].color == theme.FORMULATIONS["by_definition"]
 
 
 def test_the_page_is_self_contained(paper):

@@ -33,9 +33,9 @@ def typed(page, text):
 
 def test_an_own_lagrangian_is_derived_drawn_and_moving(show):
     page = show()
-    assert page.locator("#versions button").all_inner_texts() == ["euler embedded", "kinetic only", "chain rule"]
+    assert page.locator("#versions button").all_inner_texts() == ["by definition", "kinetic only", "chain rule"]
     typed(page, "m = 1, k = 4\nL = 1/2*m*x'^2 - 1/2*k*x^2\nx(0) = 1")
-    graph = dyn.inverse_dynamics(dyn.scenes.load("spring_mass"), "euler_embedded")  # the same, with other names
+    graph = dyn.inverse_dynamics(dyn.scenes.load("spring_mass"), "by_definition")  # the same, with other names
     counts = [len(graph.nodes), len(graph.edges), len(dyn.spurious_nodes(graph))]
     assert page.locator("#derived tbody tr").first.inner_text().split()[-3:] == list(map(str, counts))
     assert 0 < page.locator(".item.wrong").count() <= counts[-1]  # numbers are written where they are used

@@ -131,7 +131,7 @@ def point(graph: cg.Graph, numbers: list[float]) -> dict[str, float]:
 def test_typed_equations_are_those_of_the_library(case):
     n, tree = case
     text, system = both(tree, n)
-    expected = {name: dyn.inverse_dynamics(system, name) for name in ("euler_embedded", "kinetic_only")}
+    expected = {name: dyn.inverse_dynamics(system, name) for name in ("by_definition", "kinetic_only")}
     # By the chain rule the library also writes L anew by identities such as sin^2 + cos^2 = 1; the page does not.
     expected["chain_rule"] = cg.simplify(torques(system))
     at = {name: point(graph, [0.3, -0.7, 0.45, 0.9, -0.2]) for name, graph in expected.items()}
@@ -206,7 +206,7 @@ def test_where_an_edge_alone_is_wrong_or_gone_the_page_says_so(text: str) -> Non
     differs, edges, lacking = NAMED[text]
     found, shown = run_typed(
         """(text) => {
-          const system = parsed(text), { graph, ...found } = formulation(system, "euler_embedded");
+          const system = parsed(text), { graph, ...found } = formulation(system, "by_definition");
           return [found, TYPED.recordOf(system, TYPED.motionOf(system), false).versions];
         }""",
         text,

@@ -37,13 +37,13 @@ def test_a_system_written_as_text_means_the_same(name):
     system = SYSTEMS[name].system
     found = run_typed(
         """(text) => {
-          const system = parsed(text), { nodes, edges, graph } = formulation(system, "euler_embedded");
+          const system = parsed(text), { nodes, edges, graph } = formulation(system, "by_definition");
           const at = Object.fromEntries(graph.inputs.map(({ name }, i) => [name, [0.3, -0.7, 0.45][i % 3]]));
           return { nodes, edges, values: outputsAt(graph, at).at, names: [...system.parameters.keys()] };
         }""",
         viz.typed_text(system, q=[0.1] * system.n),
     )
-    graph = dyn.inverse_dynamics(system, "euler_embedded")
+    graph = dyn.inverse_dynamics(system, "by_definition")
     assert [found["nodes"], found["edges"]] == [len(graph.nodes), len(graph.edges)]
     assert len(found["names"]) == len(system.parameters)
     at = {name: [0.3, -0.7, 0.45][i % 3] for i, name in enumerate(graph.input_names)}

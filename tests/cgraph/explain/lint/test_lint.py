@@ -43,7 +43,7 @@ def test_by_definition_the_blame_is_one_edge_for_each_joint_and_by_the_chain_rul
         assert found.ok
         assert len(found.proofs) == 2
         assert all("no path leads" in proof for proof in found.proofs)
-    graph = dyn.inverse_dynamics(arm(n), "euler_embedded", simplify=simplify)
+    graph = dyn.inverse_dynamics(arm(n), "by_definition", simplify=simplify)
     found = lint(graph, independent=state(n), function="L")
     (finding,) = found.findings
     assert not found.ok
@@ -56,7 +56,7 @@ def test_by_definition_the_blame_is_one_edge_for_each_joint_and_by_the_chain_rul
 
 
 def test_the_report_on_one_joint():
-    found = lint(dyn.inverse_dynamics(arm(1), "euler_embedded"), independent=("q0", "qd0"), function="L")
+    found = lint(dyn.inverse_dynamics(arm(1), "by_definition"), independent=("q0", "qd0"), function="L")
     assert str(found) == (
         "q0 depends on qd0. Without this edge there is no path:\n"
         "  qd0 * dt -> q0  through it dL/dqd0 gains dt * dL/dq0\n"
@@ -183,7 +183,7 @@ def test_what_makes_no_sense_is_refused(given, error, words):
 
 
 def test_a_report_is_json():
-    graph = dyn.inverse_dynamics(arm(3), "euler_embedded")
+    graph = dyn.inverse_dynamics(arm(3), "by_definition")
     found = lint(
         graph,
         independent=state(3),
