@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import secrets
+import stat
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
@@ -28,12 +29,18 @@ def atomic_write(path: str | Path, data: str | bytes, *, mode: int = 0o666) -> P
 
 
 def write_files(files: Mapping[Path, str | bytes], *, mode: int = 0o666) -> None:
-    """Write several files, all or none: they take their places once all are written beside them. As `atomic_write`."""
+    """Write several files, all or none: they take their places once all are written beside them. As `atomic_write`.
+
+    A device or a pipe, such as /dev/null or /dev/stdout, is written to where it is, after the files.
+    """
     if not 0 <= mode <= 0o7777:
         raise ValueError(f"mode must be permissions from 0 to 0o7777, got {mode!r:.20}")
     with ExitStack() as temporaries:
-        written = []
+        written, others = [], []
         for path, data in files.items():
+            if _is_device(path):
+                others.append((path, data))
+                continue
             target = path.resolve()  # through a link, so that the link stays one
             temporary = temporaries.enter_context(_beside(target, mode))
             with _named(target):
@@ -44,6 +51,9 @@ def write_files(files: Mapping[Path, str | bytes], *, mode: int = 0o666) -> None
         for temporary, target in written:
             with _named(target):
                 temporary.replace(target)
+        for path, data in others:
+            with _named(path):
+                path.write_bytes(data.encode() if isinstance(data, str) else data)
 
 
 def check_writable(path: str | Path) -> None:
@@ -56,11 +66,22 @@ def check_writable(path: str | Path) -> None:
     Traceback (most recent call last):
     FileNotFoundError: [Errno 2] cannot write .../nowhere/at/all.svg: the folder .../nowhere/at does not exist
     """
+    if _is_device(Path(path)):
+        return  # opening a pipe would wait for its reader
     target = Path(path).resolve()
     if target.is_dir():
         raise _folder(target)
     with _beside(target, 0o600):
         pass
+
+
+def _is_device(path: Path) -> bool:
+    """Whether there is something that is neither a file nor a folder: a device, a pipe, a socket."""
+    try:
+        kind = path.stat().st_mode
+    except OSError:
+        return False
+    return not (stat.S_ISREG(kind) or stat.S_ISDIR(kind))
 
 
 def _folder(target: Path) -> OSError:

@@ -13,7 +13,7 @@ def install(extra: str) -> str:
 
     The argument of the command is quoted, since some shells expand brackets.
     """
-    return f"in a checkout of cgraph, pip install '.[{extra}]'"
+    return f"in a checkout of cgraph, pip install -e '.[{extra}]'"
 
 
 def scipy_module(name: str, what: str) -> ModuleType:

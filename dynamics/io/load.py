@@ -18,7 +18,7 @@ from .mujoco_twin import mujoco
 from .read_mjcf import compiled_mjcf, read_mjcf
 from .read_urdf import add_floating_base, origin_of, read_urdf
 from .smooth_forces import smooth
-from .source import called, root_of, urdf_root
+from .source import called, is_text, root_of, urdf_root
 
 if TYPE_CHECKING:
     from mujoco import MjModel
@@ -146,7 +146,7 @@ def load_at_start(
     Of MJCF these are the references of joints and the places of free bodies; of URDF they are neutral. Raises as
     `load_mjcf` and `load_urdf` do, and for `floating` of MJCF, which says itself what is free.
     """
-    if root_of(source) == "robot":
+    if root_of(source) == "robot" or (not is_text(source) and str(source).lower().endswith(".urdf")):
         mechanism = load_urdf(source, ignore=ignore, floating=floating)
         return mechanism, tuple(neutral(mechanism.moving))
     if require_flag("floating", floating):

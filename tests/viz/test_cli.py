@@ -355,7 +355,7 @@ def test_a_missing_package_is_an_error_that_names_its_extra(here, without, capsy
     assert cli.main(arguments.split()) == 2
     printed = capsys.readouterr()
     assert printed.out == ""
-    assert f"pip install '.[{extra}]'" in printed.err.splitlines()[-1]
+    assert f"pip install -e '.[{extra}]'" in printed.err.splitlines()[-1]
     assert [path.name for path in here.iterdir()] == ["robot.xml"]
 
 
@@ -364,8 +364,8 @@ def test_peers_that_a_figure_does_without_are_named_with_their_extra(without, ca
     without("pinocchio")
     assert cli.main(["bench", "agreement", "--links", "1", "--count", "1"]) == 0
     printed = capsys.readouterr().out
-    assert "MuJoCo is not installed: in a checkout of cgraph, pip install '.[mujoco]'" in printed
-    assert "Pinocchio is not installed: in a checkout of cgraph, pip install '.[bench]'" in printed
+    assert "MuJoCo is not installed: in a checkout of cgraph, pip install -e '.[mujoco]'" in printed
+    assert "Pinocchio is not installed: in a checkout of cgraph, pip install -e '.[bench]'" in printed
 
 
 LATE = """import dynamics as dyn

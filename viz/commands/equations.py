@@ -21,7 +21,9 @@ def add(parser: Command) -> None:
         help="of the torque (default: chain_rule)",
     )
     which.add_argument("--momentum", action="store_true", help=f"{MOMENTUM_FORM}, in place of the torque")
-    parser.add_argument("--lines", type=counting, default=40, metavar="N", help="of each block, at most (default: 40)")
+    parser.add_argument(
+        "--lines", type=counting, default=200, metavar="N", help="of each block, at most (default: 200)"
+    )
     parser.add_argument("--latex", action="store_true", help="print as LaTeX")
     parser.set_defaults(run=run, forward=False)
 

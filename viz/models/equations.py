@@ -22,9 +22,14 @@ def equation_graphs(scene: Scene, *, formulation: str = "chain_rule", momenta: b
     """The graphs of a scene's equations, {title: graph}: Lagrangian, momenta, and the torque or Hamilton's equations.
 
     A system of first order has its state equation alone. Of a mechanism the Lagrangian is that of the whole tree.
+    Raises for momenta of what has none.
     """
-    if scene.ode is not None:
-        return {"State equation": state_equation(scene)}
+    if scene.ode is not None:  # which has no momenta, as `hamilton_equations` says
+        return (
+            {"Hamilton's equations": hamilton_equations(scene)}
+            if momenta
+            else {"State equation": state_equation(scene)}
+        )
     system = scene.system
     graphs = {
         "Lagrangian": cg.simplify(system.graph({"L": system.lagrangian}, system.q, system.qd)),

@@ -242,7 +242,7 @@ def test_without_llvmlite_auto_is_generated_python(without):
     assert function.source == cg.compile(chain(), "python").source
     assert same(function([0.1, 0.2, 0.3]), evaluated(chain(), [[0.1, 0.2, 0.3]])[0])
     assert function.batch(np.ones((3, 4))).shape == (5, 4)
-    with pytest.raises(ImportError, match=r"pip install '\.\[native\]'"):
+    with pytest.raises(ImportError, match=r"pip install -e '\.\[native\]'"):
         cg.compile(chain(), "llvm")
 
 

@@ -96,3 +96,18 @@ def test_permissions_are_those_asked_for_less_the_umask(tmp_path: Path, mode: in
         os.umask(umask)
     assert written.stat().st_mode & 0o777 == expected
     assert [path.name for path in tmp_path.iterdir()] == ["a"]
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="pipes with names are of POSIX")
+def test_a_pipe_is_written_to_and_stays_one(tmp_path: Path) -> None:
+    pipe, beside = tmp_path / "pipe", tmp_path / "beside.txt"
+    os.mkfifo(pipe)
+    check_writable(pipe)
+    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    try:
+        write_files({pipe: "of the pipe", beside: b"of the file"})
+        assert os.read(reader, 100) == b"of the pipe"
+    finally:
+        os.close(reader)
+    assert pipe.is_fifo()
+    assert sorted(tmp_path.iterdir()) == [beside, pipe]

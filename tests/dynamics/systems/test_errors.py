@@ -182,5 +182,5 @@ def test_without_mujoco_the_error_names_the_extra(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setitem(sys.modules, "mujoco", None)
     arm = dyn.planar_arm([1.0], [1.0])
     assert "<mujoco" in mujoco_io.to_mjcf(arm)  # text needs no MuJoCo
-    with raises(ImportError, match=r"pip install '\.\[mujoco\]'"):
+    with raises(ImportError, match=r"pip install -e '\.\[mujoco\]'"):
         mujoco_io.MujocoTwin(arm)

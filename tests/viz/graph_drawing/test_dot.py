@@ -308,5 +308,5 @@ def test_the_picture_carries_the_ids() -> None:
 
 def test_without_graphviz_the_error_names_the_extra(without: Callable[[str], None]) -> None:
     without("graphviz")
-    with pytest.raises(ImportError, match=r"pip install '\.\[viz\]'"):
+    with pytest.raises(ImportError, match=r"pip install -e '\.\[viz\]'"):
         to_dot(spring())

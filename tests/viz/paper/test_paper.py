@@ -165,6 +165,6 @@ def test_the_page_is_self_contained(paper):
 def test_a_missing_package_is_found_before_anything_is_written(tmp_path, without, monkeypatch, missing):
     monkeypatch.setattr("shutil.which", lambda _: None)
     without(missing)
-    with pytest.raises((ImportError, RenderError), match=r"pip install '\.\[viz\]'"):
+    with pytest.raises((ImportError, RenderError), match=r"pip install -e '\.\[viz\]'"):
         module.paper(tmp_path / "out", lambda _: None)
     assert list(tmp_path.iterdir()) == []
