@@ -18,6 +18,7 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import (
     Call,
+    If,
     Jets,
     Map,
     NoSeriesError,
@@ -59,7 +60,7 @@ def taylor_step(problem: Problem, order: int) -> Step:
     share = Call(function("h unit", s=h / unit), ("h", "unit"), ("s",), exact=True)
     at_all = Call(function("unit h", unit=cg.where(unit, unit, h)), ("unit", "h"), ("unit",))  # where nothing is wished
     at_most = cg.minimum(cg.variable("next"), abs(cg.variable("end") - cg.variable("t")))
-    controls = ["unit", "last", "before", "next", "end", "rtol", "s", "at_t"]
+    controls = ["unit", "last", "before", "next", "end", "rtol", "s", "at_t", "starting"]
     lengths |= dict.fromkeys([*c, "rate", "rounding", "rounding_new", "slope", "atol", "weight"], m)
     lengths |= {"zeros": graphs.zeros} | dict.fromkeys(controls, 1)
     return Step(
@@ -67,8 +68,11 @@ def taylor_step(problem: Problem, order: int) -> Step:
         [share, _arrival(order)],
         [_rates(graphs, "x", "t"), count(1)],
         [at_all, *series, *_wish(order)],
-        [Call(function("next end t", unit=at_most), ("next", "end", "t"), ("unit",))],
-        kept=[copied("rounding_new", "rounding"), copied("h", "unit")],
+        [Call(function("next end t", unit=at_most, starting=1.0), ("next", "end", "t"), ("unit", "starting"))],
+        kept=[
+            copied("rounding_new", "rounding"),
+            Call(function("h", unit=h, starting=0.0), ("h",), ("unit", "starting")),
+        ],
         fixed=("rounding", "rounding_new", "atol", "weight", *controls),
         error=[stage_time("at_t", 1.0), _rates(graphs, "x_new", "at_t"), count(1), *_checked(m, order)],
         estimate=order,
@@ -119,21 +123,34 @@ def _wish(order: int) -> list[Statement]:
     That is y^(-1 / 2k) units, y the sum of squares of c_k over the tolerance, with a safety factor. Both are taken as a
     power of the higher order alone, which is the same for a step as long as the one before, and takes half the time.
     """
-    x, first, rtol, atol = inputs = cg.variables("x first rtol atol")
-    size = cg.maximum(abs(x), abs(first))  # what starts at 0 is as large as its first change
-    weight = Graph(inputs, {"weight": 1.0 / (atol + rtol * size)})
+    names = _names("c", order)
+    x, rtol, atol, *terms = inputs = cg.variables(["x", "rtol", "atol", *names])
+    size = cg.maximum(abs(x), abs(terms[0]))  # what starts at 0 is as large as its first change
+    weight = Graph(inputs[:4], {"weight": 1.0 / (atol + rtol * size)})
+    size = cg.where(size, size, _largest(terms))  # under a force that begins at 0 that is 0, too, but not its largest
+    of_start = Graph(inputs, {"weight": 1.0 / (atol + rtol * size)})
+    at_start, later = (Map(each, each.input_names, ("weight",)) for each in (of_start, weight))
     c, each = inputs = cg.variables("c weight")
     square = Graph(inputs, {"y": (c * each) * (c * each)})
     last, before, unit, wanted = inputs = cg.variables("last before unit next")
-    terms = cg.maximum(math.exp(1.4) * before, math.exp(4.0 + 1.4 * order / (order - 1.0)) * last)
-    share = terms ** (-0.5 / order)
+    both = cg.maximum(math.exp(1.4) * before, math.exp(4.0 + 1.4 * order / (order - 1.0)) * last)
+    share = both ** (-0.5 / order)
     h = abs(unit) * cg.where(share > SHORTEST, share, SHORTEST)
     graph = Graph(inputs, {"h": cg.where(h < wanted, h, wanted)})
     return [
-        Map(weight, ("x", "c1", "rtol", "atol"), ("weight",)),
+        If("starting", (at_start,), (later,)),
         *[Sum(square, (f"c{k}", "weight"), name) for name, k in (("last", order), ("before", order - 1))],
         Call(graph, ("last", "before", "unit", "next"), ("next",)),
     ]
+
+
+def _largest(c: Sequence[Node]) -> Node:
+    """The largest size, by halves side by side."""
+    sizes = [abs(each) for each in c]
+    while len(sizes) > 1:
+        pairs = zip(sizes[::2], sizes[1::2], strict=False)
+        sizes = [*[cg.maximum(one, other) for one, other in pairs], *sizes[len(sizes) // 2 * 2 :]]
+    return sizes[0]
 
 
 def _arrival(order: int) -> Map:
