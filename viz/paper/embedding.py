@@ -110,7 +110,7 @@ def embedding(links: Sequence[int] = LINKS) -> Part:
         }
         for law in laws
     }
-    return Part("law", "How large the error is, and why a smaller dt does not help", blocks, data)
+    return Part("law", "The error, and why a smaller dt does not help", blocks, data)
 
 
 def _panels(laws: Sequence[EmbeddingError]) -> list[PlotPanel]:
