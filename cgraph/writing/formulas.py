@@ -112,7 +112,8 @@ class Formulas:
             first, *same = dict.fromkeys(lefts or [""])
             equations.append((first, self._right(node)))
             equations += [(left, first) for left in same]
-        return Lines(equations, [(*named.get(node, ()), self.symbol.get(node, ""))[0] for node in queue[most:]])
+        left_out = sorted(queue[most:], key=self.places.__getitem__)
+        return Lines(equations, [(*named.get(node, ()), self.symbol.get(node, ""))[0] for node in left_out])
 
     def _inside(self, node: Node) -> list[Node]:
         """The nodes of a node's line, it first, and the nodes with lines that it refers to."""

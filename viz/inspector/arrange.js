@@ -136,7 +136,7 @@ function columnsIn(plan, folded, closed, aspect) {
         const { w, h, at } = cell(i, stage);
         for (const [c, dx, dy] of at) boxes[c] = { x: left[k] + (widths[i] - w) / 2 + dx, y: y + height - h + dy, ...sizes[c] };
       });
-      titles.push({ stage, x: left[0], y: y - 6 });
+      titles.push({ stage, x: left[0], y: y - 6, columns: own });
       y += height + CELL.gap;
     }
     y = Math.max(y, start + BODY.height + CELL.gap);

@@ -150,9 +150,10 @@ function makeInputs(app) {
     app.fields.set(name, shown);
     return tag("tr", {}, tag("td", {}, shownName(app, name, letters), ...unitOf(app, name)), tag("td", {}, shown));
   });
-  const from = state.derived ? state.derived.inputs.map(([name]) => shownName(app, name)).join(", ") : "";
+  const needed = state.derived ? state.derived.inputs.map(([name]) => shownName(app, name)) : [];
+  const from = needed.length > 6 ? `${needed.slice(0, 4).join(", ")} and ${needed.length - 4} more` : needed.join(", ");
   const told = follow.length ? [tag("details", {}, tag("summary", {}, `${follow.length} that follow`),
-    quiet(`Computed from ${fitted(from, 90)}; the other versions do not have them.`), scrolled(tag("table", {}, tag("tbody", {}, ...follow))))] : [];
+    quiet(`Computed from ${from}; the other versions do not have them.`), scrolled(tag("table", {}, tag("tbody", {}, ...follow))))] : [];
   byId("inputs").replaceChildren(quiet("One state for all versions."), scrolled(tag("table", {}, tag("tbody", {}, ...rows))), ...told);
   showInputs(app);
 }
@@ -211,7 +212,7 @@ function makeResults(app) {
   const [shown, cells] = numbers(app, versions.map((each) => each.name), app.names);
   app.cells = cells;
   byId("results").replaceChildren(shown, ...(app.right < 0 ? []
-    : [quiet(`In vermillion: differs from ${versions[app.right].name}. All at one state; 0 is what is below rounding.`)]));
+    : [quiet(`In vermillion: differs from ${versions[app.right].name}. All at the same state; values within rounding error are shown as 0.`)]));
   byId("statetables").replaceChildren();
   byId("wide").replaceChildren();
   tables.forEach((each) => showTable(app, each));
@@ -228,7 +229,7 @@ function showTable(app, each) {
     byId("wide").append(made);
     return;
   }
-  const unit = (name) => (app.units.has(name) ? ` [${app.units.get(name)}]` : "");
+  const unit = (name) => (app.units.has(name) ? ` [${app.units.get(name).replaceAll(" ", "\u00a0")}]` : "");
   const [inside, cells] = wide ? numbers(app, names.map(([name, words]) => words + unit(name)), each.header.map((head) => ["", head]))
     : numbers(app, each.header, names);
   each.cells = wide ? names.map((_, i) => cells.map((row) => row[i])) : cells;

@@ -50,7 +50,7 @@ function asLayout(drawing, version) {
 
 function drawTitles({ plan, layout, frames, version }) {
   const here = new Set(version.ops.map((_, node) => clusterOf(plan, version, node)).filter((c) => c >= 0));
-  const used = new Set([...here].map((c) => plan.clusters[c].column)), rows = new Set([...here].map((c) => plan.clusters[c].stage));
+  const used = new Set([...here].map((c) => plan.clusters[c].column)), rows = new Set([...here].map((c) => `${plan.columnOf[c]} ${plan.clusters[c].stage}`));
   for (const each of layout.titles) {
     if (each.column === undefined || !used.has(plan.columns[each.column])) continue; // an empty column is not drawn
     const name = plan.columns[each.column];
@@ -62,7 +62,8 @@ function drawTitles({ plan, layout, frames, version }) {
     element("title", {}, group).textContent = name;
   }
   for (const each of layout.titles) {
-    if (each.stage !== undefined && rows.has(each.stage)) element("text", { class: "stage", x: each.x, y: each.y }, frames).textContent = each.stage;
+    const { stage, x, y } = each; // an empty row is not named
+    if (each.columns?.some((column) => rows.has(`${column} ${stage}`))) element("text", { class: "stage", x, y }, frames).textContent = stage;
   }
 }
 

@@ -21,7 +21,7 @@ function stepTo(app, step) {
   app.sweep = Math.max(-1, Math.min(2 * n, step));
   byId("sweep").value = Math.max(0, app.sweep);
   const bars = showValues(app), node = nodeAtStep(app);
-  if (app.sweep < 0) byId("step").replaceChildren(quiet("Move the slider: values go up, then adjoints come down."));
+  if (app.sweep < 0) byId("step").replaceChildren(quiet("Move the slider: first values are computed upward, then adjoints downward."));
   else if (app.sweep === 0) byId("step").textContent = "Before the first node.";
   else if (app.sweep <= n) byId("step").textContent = `forward, ${app.sweep} of ${n}: ${told(app, node)} = ${brief(app.values[node], app.noise()[node])}`;
   else byId("step").textContent = `reverse, ${app.sweep - n} of ${n}: ${told(app, node)} has adjoint ${brief(bars[node])}`;

@@ -7,12 +7,13 @@ from html import escape
 import numpy as np
 
 from cgraph import Node
+from cgraph.extend import Array
 from dynamics import System, forward_dynamics, gravity_force
 
 from ..pages.document import Table
 from .subject import SHOWN, Screen, Subject, number
 
-ROUNDING = 1e-12  # of the largest weight: a force that is rounding
+ROUNDING = 1e-12  # of the largest weight, or acceleration: what is rounding
 
 
 def closed_loop(subject: Subject) -> Screen:
@@ -33,8 +34,9 @@ def closed_loop(subject: Subject) -> Screen:
     static = 0.0 if own or abs(weights[-1]) <= rounding else float(weights[-1])
     choices, right = _choices(first, static)
     many = subject.system.n > 1 and not own
-    rows = [[joint, number(a), number(answer[f"qdd{i}"])]
-            for i, (joint, a) in enumerate(zip(subject.joints[:SHOWN], free.tolist(), strict=False))]  # fmt: skip
+    still_held = np.array([answer[f"qdd{i}"] for i in range(subject.system.n)])
+    rows = [[joint, *map(number, pair)]
+            for joint, *pair in zip(subject.joints[:SHOWN], *_without_rounding(free, still_held), strict=False)]  # fmt: skip
     sliders = [] if own else subject.sliders()
     play = subject.play(
         "loop",
@@ -43,6 +45,7 @@ def closed_loop(subject: Subject) -> Screen:
         sliders=sliders,
         joints=subject.joints[:SHOWN],
         multipliers=dict(zip(names, shown, strict=True)),
+        rounding=ROUNDING,
     )
     return Screen(
         "closed-loop",
@@ -65,6 +68,13 @@ def closed_loop(subject: Subject) -> Screen:
         f"λ = {number(first)}."
         + (" While the other joints swing, it differs from the torque that holds the same place still." if many else ""),
     )  # fmt: skip
+
+
+def _without_rounding(free: Array, held: Array) -> list[list[float]]:
+    """Accelerations (n,), those that are rounding beside the largest as 0."""
+    both = np.stack([free[: len(held)], held])
+    both[np.abs(both) <= ROUNDING * np.abs(both).max()] = 0.0
+    return [row.tolist() for row in both]
 
 
 def _clamped(system: System) -> System:

@@ -23,9 +23,7 @@ ROUNDING_ERROR = 1e-12  # of the largest coordinate: an error that says nothing 
 SMALL_ERROR = 1e-5  # of the largest coordinate: an error that has not grown beyond its order
 
 
-_BRAKED = (
-    " This system is braked or driven, so its energy changes by right: the dashed line is what a method should follow."
-)
+_BRAKED = " This system is damped or driven, so its energy does change: the dashed line is what a method should follow."
 
 
 def energy_and_step(subject: Subject) -> Screen:
@@ -51,17 +49,17 @@ def energy_and_step(subject: Subject) -> Screen:
         "Energy and the step",
         4,
         "<p>Now the system moves on its own, step by step. Euler's method follows the slope at the start of a step; the "
-        "classical Runge-Kutta method, rk4, weighs four slopes. Where nothing brakes, energy must stay what it is, so its "
-        f"change is an error that everybody can see.{_BRAKED if braked else ''}</p>",
-        f"rk4 takes {steps} steps to t = {number(t_end)} s. We halve the step. The error of where "
-        "everything is then becomes smaller by a factor of about …",
+        "classical Runge-Kutta method, rk4, takes a weighted mean of four. Without damping and drive energy is conserved, so its "
+        f"change is an error that can be seen.{_BRAKED if braked else ''}</p>",
+        f"rk4 takes {steps} steps to t = {number(t_end)} s. We halve the step. The error of the positions "
+        "then becomes smaller by a factor of about …",
         (*map(str, FACTORS), "none of these"),
         measured.answer,
         f"<p>{measured.words} Euler's error is only halved.</p>"
         + Table("rk4: largest error of a coordinate", ["dt [s]", "at the end"], rows).html(),
         "Move the number of steps. Orange: Euler's energy over time; blue: that of rk4; dashed: that of rk4 with very small steps.",
         play,
-        "Of a braked system energy falls by right: the line to compare with is the dashed one.",
+        "In a damped system energy does fall: the line to compare with is the dashed one.",
     )
 
 
@@ -85,7 +83,7 @@ class Measured(NamedTuple):
     def words(self) -> str:
         """What is behind the answer."""
         order = (
-            "The slopes of rk4 are weighed so that all terms of the error up to dt⁴ cancel. So half the step leaves about a "
+            "The slopes of rk4 are weighted so that all terms of the error up to dt⁴ cancel. So half the step leaves about a "
             "sixteenth of the error, a tenth of the step a ten-thousandth."
         )
         if self.errors[1] <= self.rounding:

@@ -39,7 +39,7 @@ def euler_edge(subject: Subject) -> Screen:
         ("vanishes with dt", "tends to something that is not zero", "grows beyond all bounds"),
         1 if stays else 0,
         _reveal(subject, errors, stays, verdict) + _second_try(subject, torque),
-        "Move dt, and the state. Both torques are those of the graphs, computed in this page.",
+        "Move dt, and the state. Both torques are those of the graphs, computed in this page. Blue bars: the torque; orange: by definition.",
         subject.play(
             "step",
             {"right": right, "wrong": wrong},
@@ -77,25 +77,25 @@ def _story(subject: Subject) -> str:
         "<p>The Lagrangian, kinetic minus potential energy:</p>"
         + equations(lagrangian_graph(subject.system), subject.names)
         + "<p>Lagrange's equation asks for the torque <b>τ = dp/dt − ∂L/∂q</b> with the momentum p = ∂L/∂q̇. Its first "
-        "term dp/dt is the <b>inertial term</b>. But nothing in a graph of L is called “time”. So somebody writes into "
+        "term dp/dt is the <b>inertial term</b>. But the graph of L has no input for time. One way out is to write into "
         "the graph what a simulation does, q̇ = q̈ dt + q̇<sub>old</sub> and <b>q = q̇ dt + q<sub>old</sub></b>, and "
-        "differentiates by dt. The paper calls that the differentiation “by definition”.</p>"
+        "to differentiate with respect to dt. The paper calls this the differentiation “by definition”.</p>"
     )
 
 
 def _reveal(subject: Subject, errors: list[tuple[float, np.ndarray]], stays: bool, verdict: Verdict) -> str:
     said = (
-        "<p><b>B.</b> q = q̇ dt + q<sub>old</sub> is an edge from velocity to position. Turning the knob q̇ now turns q "
-        "as well, so p gains dt · ∂L/∂q. A small dt makes that small. But then we differentiate <em>by</em> dt, and the "
+        "<p><b>B.</b> q = q̇ dt + q<sub>old</sub> is an edge from velocity to position. A change of q̇ now changes q "
+        "as well, so p gains dt · ∂L/∂q. A small dt makes that small. But then we differentiate <em>with respect to</em> dt, and the "
         "derivative of dt · ∂L/∂q has a plain ∂L/∂q in it, at any step: the inertial term tends to dp/dt + ∂L/∂q. In the "
-        "whole torque this meets the −∂L/∂q of Lagrange's equation, which is right, and takes it away. Weight and "
+        "whole torque this cancels the correct −∂L/∂q of Lagrange's equation. Weight and "
         "springs are in ∂L/∂q: <b>at rest the arm weighs nothing.</b></p>"
         if stays
         else "<p><b>A.</b> The edge q̇ → q is there, and p gains dt · ∂L/∂q by it. What stays of the error at the smallest "
         "step is ∂L/∂q, and that is zero at this state.</p>"
     )
     joints = subject.joints[:SHOWN]
-    rows = [[f"{dt:g}", *[number(error) for error in each[: len(joints)]]] for dt, each in errors]
+    rows = [[number(dt), *[number(error) for error in each[: len(joints)]]] for dt, each in errors]
     steps = Table("Error of the torque by definition", ["dt [s]", *joints], rows).html()
     sizes = size_table(formulation_sizes(subject.system)).html()
     why = f"<p>{verdict.lacking or WHY_FEWER}</p>" * verdict.differs
@@ -109,19 +109,19 @@ def _second_try(subject: Subject, right: np.ndarray) -> str:
     error, torque = number(off), number(float(np.abs(right).max()))
     if verdict.excess_at(subject.values):
         told = (
-            f"Here the torque is then still off by {error} of {torque}: how hard a joint is to turn "
-            "depends on where the others are, so K contains positions, and the edge does its damage there."
+            f"Here the torque is then still off by {error} of {torque}: the inertia at a joint "
+            "depends on the positions of the others, so K contains positions, and the edge acts on them."
         )
     elif verdict.differs:
         told = (
             f"At this state the torque is then right, to {error} of {torque}. But K contains positions: "
-            "where its slope by them is not zero, the edge does its damage there."
+            "where its slope with respect to them is not zero, the torque is wrong."
         )
     else:
-        told = f"Here the torque is then right, to {error} of {torque}: K does not change with the place."
+        told = f"Here the torque is then right, to {error} of {torque}: K does not depend on position."
     return (
         "<p><b>A second try</b> keeps the step and takes the kinetic energy K alone for the momentum, since weight and springs "
-        f"have no place in it. {told} The chain rule needs neither trick.</p>"
+        f"are not in it. {told} The chain rule needs neither trick.</p>"
     )
 
 

@@ -43,7 +43,7 @@ function motion(rate, start, names, dt, steps, method) {
 }
 
 /** Four digits, with a minus that is one. */
-const digits = (x) => (Number.isFinite(x) ? String(+x.toPrecision(4)) : "—").replace("-", "−");
+const digits = (x) => (Number.isFinite(x) ? String(+x.toPrecision(4)) : "—").replaceAll("-", "−");
 
 /** A slider with its name and value. */
 function slider(board, shown, low, high, step, value, change, text = digits) {
@@ -179,9 +179,11 @@ const PLAYS = {
     sliders(board, play, at, redraw);
     const write = grid(board, ["", "free", "held"]);
     return () => {
-      const a = free(at), b = held(at);
-      write([...play.joints.map((name, i) => [name, digits(a[`qdd${i}`]), digits(b[`qdd${i}`])]),
-        ...Object.entries(play.multipliers).map(([name, shown]) => [`λ, ${shown}`, "", digits(b[name])])]);
+      const a = free(at), b = held(at), found = play.joints.flatMap((_, i) => [a[`qdd${i}`], b[`qdd${i}`]]);
+      const rounding = play.rounding * Math.max(0, ...found.map(Math.abs).filter(Number.isFinite));
+      const shown = (x) => digits(Math.abs(x) <= rounding ? 0 : x);
+      write([...play.joints.map((name, i) => [name, shown(a[`qdd${i}`]), shown(b[`qdd${i}`])]),
+        ...Object.entries(play.multipliers).map(([name, row]) => [`λ, ${row}`, "", digits(b[name])])]);
     };
   },
   energy(board, play, start, redraw) {

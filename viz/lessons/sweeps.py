@@ -12,7 +12,7 @@ from dynamics import inverse_dynamics
 
 from ..graph_drawing.dot import plain_drawing
 from ..graph_drawing.render import render_svg
-from .subject import Screen, Subject, inline, lagrangian_graph
+from .subject import Screen, Subject, inline, lagrangian_graph, number
 
 ROWS = 120  # nodes that the page walks through
 DRAWN = 40  # nodes, at most, of a graph that is drawn
@@ -35,11 +35,11 @@ def sweeps(subject: Subject) -> Screen:
         f"How many backward sweeps over the graph of L give all {n + subject.system.nq} slopes?",
         choices,
         0,
-        "<p><b>A.</b> Backward, every node hands its slope on to what it was made of, and what is used twice adds up. "
+        "<p><b>A.</b> Backward, every node passes its slope on to its arguments, and what reaches a node twice adds up. "
         "So one sweep arrives at all inputs at once. A second sweep, forward along (q̇, q̈), then gives all of dp/dt, "
         f"and no ∂p/∂q is ever written out. The whole torque takes {whole} nodes; with every gradient written out it "
         f"takes {literal}. q and q̇ stay two separate inputs: there is no dt and no earlier state.</p>",
-        "Step through both sweeps: values come from top to bottom, slopes from bottom to top."
+        "Step through both sweeps: values come down the table, slopes up."
         + (f" Of {len(graph.nodes)} nodes the last {ROWS} are shown." if len(graph.nodes) > ROWS else ""),
         {"kind": "sweeps", "rows": _rows(subject, graph)},
         "Forward mode would take a sweep for each input; backward mode one for each output, and L is one number.",
@@ -79,7 +79,7 @@ def _rows(subject: Subject, graph: Graph) -> list[dict[str, object]]:
 
 def _text(node: Node, called: Mapping[Node, str]) -> str:
     """The operation on its arguments, these by name or number."""
-    parts = [f"{arg.value:.4g}" if arg.value is not None else called.get(arg, "…") for arg in node.args]
+    parts = [number(arg.value) if arg.value is not None else called.get(arg, "…") for arg in node.args]
     if columns(node.op).infix:
         return f" {columns(node.op).symbol} ".join(parts)
     return f"{columns(node.op).symbol}{parts[0]}" if columns(node.op).signs else f"{node.op.name}({', '.join(parts)})"

@@ -48,9 +48,10 @@ def torque_parts(subject: Subject) -> Screen:
         f"Which part is the largest at <b>{name}</b> in this state?",
         PARTS,
         int(sizes.argmax()),
-        "<p>The same graph of the torque, asked three times: at rest without acceleration, then with q̈ alone, then with "
+        "<p>The same graph of the torque, evaluated three times: at rest without acceleration, then with q̈ alone, then with "
         f"q̇ alone. The three add up to the torque.</p>{table.html()}",
-        "Move the joints. Make the velocity part the largest; then find a place where holding still costs nothing.",
+        "Move the joints. Make the velocity part the largest; then find a position that is held without torque. Bars: inertia "
+        "light blue, velocity orange, position green.",
         play,
         f"At {name} the parts are {', '.join(number(value) for value in parts[:, joint])}.",
     )

@@ -20,7 +20,7 @@ function liveCourse(svg, words, machine, data, state) {
   const rest = positions - indices.length;
   words.replaceChildren(
     ...indices.map((i) => tag("span", { class: `live-course-${i}` }, data.inputs[i].called)),
-    `${rest ? `and ${rest} more ` : ""}over time. Thick: steps of dt. Thin and green: much shorter steps.`,
+    `${rest ? `and ${rest} more ` : ""}over time. Thick: with steps dt. Thin and green: with much shorter steps.`,
   );
   let end = 0, from = 0, across, up;
 

@@ -14,6 +14,8 @@ from dynamics.equations.state_equation import state_equation
 from dynamics.scenes import Scene
 from dynamics.systems.display_names import display_names
 
+from ..pages.mathml import few
+
 SUM, NEGATION, FUNCTION, LEAF = 1, 2, 3, 4  # how strongly a text binds, as in the rows of operations
 DIGITS = 12  # of numbers, in text
 
@@ -57,7 +59,8 @@ def _block(graph: Graph, names: dict[str, str], lines: int) -> str:
     found = Formulas(graph.nodes, graph.outputs, PLAIN, names).lines(list(graph.outputs.values()), lines)
     rows = [f"  {left} = {right}" for left, right in found.equations]
     if found.left_out:
-        rows.append(f"  ({len(found.left_out)} of {len(found.left_out) + len(rows)} lines are left out; see --lines)")
+        count, total = len(found.left_out), len(found.left_out) + len(rows)
+        rows.append(f"  ({count} of {total} lines are left out; see --lines: those of {few(found.left_out)})")
     return "\n".join(rows)
 
 

@@ -27,7 +27,7 @@ STYLE = f"""
 body {{ margin: 0 auto; padding: 1.5rem; max-width: 64rem; color: var(--text); background: var(--back);
   font: 17px/1.55 system-ui, "Segoe UI", "DejaVu Sans", sans-serif; }}
 h1 {{ font-size: 1.7rem; line-height: 1.25; }} h2 {{ margin-top: 2.6rem; border-top: 1px solid var(--line); padding-top: 1.2rem; }}
-nav a {{ margin-right: 1rem; white-space: nowrap; }} a {{ color: inherit; }}
+nav a {{ margin-right: 1rem; display: inline-block; }} a {{ color: inherit; }}
 figure {{ margin: 1.2rem 0; }} figcaption {{ font-size: 0.95rem; margin-top: 0.5rem; }}
 figure {{ overflow-x: auto; }} figcaption {{ position: sticky; left: 0; }}
 figure img {{ display: block; max-width: 100%; height: auto; margin: 0 auto; background: #FFFFFF; border-radius: 4px; }}

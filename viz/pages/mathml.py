@@ -11,6 +11,7 @@ from cgraph.extend import Formulas, Notation, Op
 from .. import theme
 
 SUM, FUNCTION, LEAF = 1, 3, 4  # how strongly a text binds, as in the rows of operations
+FEW = 8  # names that a sentence lists
 
 
 def equations(graph: Graph, names: Mapping[str, str], lines: int = 12) -> str:
@@ -27,9 +28,16 @@ def equations(graph: Graph, names: Mapping[str, str], lines: int = 12) -> str:
         f"<mtr><mtd>{left}</mtd><mtd><mo>=</mo></mtd><mtd>{right}</mtd></mtr>" for left, right in found.equations
     )
     total = len(found.equations) + len(found.left_out)
-    rest = f"<p>{len(found.left_out)} of {total} lines are left out.</p>" if found.left_out else ""
+    missing = few([f"<math>{left}</math>" for left in found.left_out])
+    rest = f"<p>{len(found.left_out)} of {total} lines are left out: those of {missing}.</p>" if found.left_out else ""
     table = f'<mtable columnalign="right center left">{rows}</mtable>'
     return f'<div class="scroll"><math display="block">{table}</math></div>{rest}'
+
+
+def few(texts: Sequence[str]) -> str:
+    """The first of some texts, and how many more there are."""
+    more = len(texts) - FEW
+    return ", ".join(texts) if more <= 0 else f"{', '.join(texts[:FEW])} and {more} more"
 
 
 def _names(names: Iterable[str]) -> dict[str, str]:

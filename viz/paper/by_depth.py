@@ -79,9 +79,9 @@ def _rows(sizes: Mapping[str, Mapping[str, Counts]]) -> list[tuple[str, ...]]:
 
 def _caption(number: str, what: str, forms: Mapping[str, Counts]) -> str:
     lagrange, hamilton = forms[LAGRANGE], forms[HAMILTON]
-    thick = "One of the longest ways is thick; outputs have a thick rim, and lines from constants are left out."
+    thick = "One of the longest paths is thick; outputs have a thick outline, and lines from constants are left out."
     return (
-        f"Figure {number}. Both forms of {what}, a row for each operation on the longest way to a node, the same rows for "
+        f"Figure {number}. Both forms of {what}, a row for each operation on the longest path to a node, the same rows for "
         f"both: {lagrange.depth} operations deep by accelerations, {hamilton.depth} by momenta. {thick}"
     )
 
@@ -102,8 +102,8 @@ def _cause(forms: Mapping[str, Counts]) -> str:
     return (
         "The cause can be seen. ∂L/∂q is taken at q̇, so q̇ has to be solved from p first, by the elimination that "
         f"otherwise gives the accelerations, {level} operations deep; the momenta of the links then go from the tip to the "
-        f"base once more, {forms[HAMILTON].depth - level} further. By accelerations the bias stands beside the factors of "
-        "the elimination, not on top of them. The order of the equation has no part in it: both are deep because links "
+        f"base once more, {forms[HAMILTON].depth - level} further. For accelerations the bias is computed in parallel with the factors of "
+        "the elimination, not after them. First or second order makes no difference: both are deep because links "
         "are eliminated one after another. A rotor alone has nothing to eliminate, and is less deep by momenta. Times "
         "and longer chains are in docs/hamiltonian.md, “The momentum graph”."
     )
@@ -119,8 +119,8 @@ def _remedy(orders: Mapping[str, Graph]) -> str:
     depths = {title: graph.counts().depth for title, graph in orders.items()}
     nodes = {title: len(graph.nodes) for title, graph in orders.items()}
     return (
-        "What makes the graph parallel is another order of elimination, of pieces of the chain at the same time, each seen "
-        "from its two ends, and of pairs of pieces. Either form is then as deep as the logarithm of the number of links: "
+        "A balanced order of elimination makes the graph parallel: it reduces pieces of the chain to their two ends, all at the "
+        "same time, and joins them in pairs. The depth of either form then grows as the logarithm of the number of links: "
         f"{depths['Lagrange, balanced']} and {depths['Hamilton, balanced']} operations in place of "
         f"{depths['Lagrange, recursive']} and {depths['Hamilton, recursive']}, for "
         f"{nodes['Lagrange, balanced'] / nodes['Lagrange, recursive']:.1f} and "
@@ -131,7 +131,7 @@ def _remedy(orders: Mapping[str, Graph]) -> str:
 def _silhouettes_caption(links: int) -> str:
     return (
         f"Figure 7c. A planar chain of {links} links in both forms and both orders of elimination. A row for each "
-        "operation on the longest way to a node, as wide as there are nodes on it: areas are numbers of nodes, in the "
+        "operation on the longest path to a node, as wide as there are nodes on it: areas are numbers of nodes, in the "
         "colors of Figure 7. Towers that are high and narrow leave a machine little to do at the same time."
     )
 

@@ -96,7 +96,7 @@ def embedding(links: Sequence[int] = LINKS) -> Part:
             point=True,
         ),
         plotted("law", labeled(_panels(laws), shared=False, room=0.5), caption),
-        Table("The law of the embedding", header, rows, file="law"),
+        Table("The error and its limit as dt tends to 0", header, rows, file="law"),
         Paragraph(
             "Kinetic only is exact for one joint, where K does not depend on q, and wrong for a real arm under this plain "
             "embedding. It is exact again if the momentum is taken before the relation is embedded. The paper calls its "
@@ -110,7 +110,7 @@ def embedding(links: Sequence[int] = LINKS) -> Part:
         }
         for law in laws
     }
-    return Part("law", "How wrong, and why dt does not help", blocks, data)
+    return Part("law", "The error, and why a smaller dt does not help", blocks, data)
 
 
 def _panels(laws: Sequence[EmbeddingError]) -> list[PlotPanel]:

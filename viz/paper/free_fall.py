@@ -27,7 +27,7 @@ def figures4_and_5() -> Part:
     ours = plot.snapshots(run.t, positions, instants.tolist())
     start = ", ".join(f"{angle:.4g}" for angle in scene.q)
     caption4 = (
-        "Figure 4. The three-link arm in free fall by RK4 on the equations of motion from its own graph, with the way of "
+        "Figure 4. The three-link arm in free fall by RK4 on the equations of motion from its own graph, with the path of "
         f"each joint. Start at rest at q = ({start}) rad, dt = 1e-3 s."
     )
     blocks: list[Block] = [plotted("fig4", ours, caption4)]
@@ -43,7 +43,7 @@ def figures4_and_5() -> Part:
     theirs = plot.snapshots(run.t, positions, instants.tolist(), dots=twin.arm_positions(q))
     caption5 = (
         f"Figure 5. The same arm in MuJoCo {version} (RK4, same step), as dots, over ours, as lines: joints at the "
-        "same instants, and their ways."
+        "same instants, and their paths."
     )
     differences = _largest_differences(run, q)
     header = ("up to t [s]", "largest |difference in q| [rad]")

@@ -75,8 +75,8 @@ def equations() -> Part:
         Listing(text),
         Paragraph(
             "All terms with k are wrong. They come from embedding q = qd dt + q_old in the graph: differentiating by the "
-            "velocity then also differentiates the spring's energy. In the whole torque the first of them, −k q_old, meets "
-            "the +k q of −∂L/∂q, which is right, and takes it away: without dt the spring is gone. An arm by definition "
+            "velocity then also differentiates the spring's energy. In the whole torque the first of them, −k q_old, cancels "
+            "the correct +k q of −∂L/∂q: as dt tends to 0 the spring is gone. In the same way an arm by definition "
             "weighs nothing.",
             point=True,
         ),

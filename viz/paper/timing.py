@@ -152,7 +152,7 @@ def _times(rows: Sequence[Row]) -> tuple[tuple[str, ...], list[tuple[str, ...]]]
         for way, timing in row.timings.items()
     ]
     table += [
-        (TITLES[name], "the paper: mean, ∓ one deviation", *(f"{t:.3g}" for t in (mean, mean - sd, mean + sd)), "ms")
+        (TITLES[name], "the paper: mean ± std. dev.", *(f"{t:.3g}" for t in (mean, mean - sd, mean + sd)), "ms")
         for name, (mean, sd) in PAPER_MS.items()
     ]
     return header, table

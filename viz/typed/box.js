@@ -116,9 +116,9 @@ function showDerived({ system, motion, record }) {
   byId("derived").replaceChildren(table(["", "nodes", "edges", "spurious"], rows), ...lint, ...(motion.error ? [] : motionWords(system, motion)));
 }
 function motionWords(system, motion) {
-  const [first, last] = [motion.energy[0], motion.energy.at(-1)], exact = Number.isFinite(motion.change) ? `; half the step changes it by ${brief(motion.change)} of its size` : "";
+  const [first, last] = [motion.energy[0], motion.energy.at(-1)], exact = Number.isFinite(motion.change) ? `; halving the step changes it by a relative ${brief(motion.change)}` : "";
   return [tag("h3", {}, "Motion"), curves(system, motion),
-    tag("p", {}, `${motion.steps} steps of Runge and Kutta${exact}. Energy ${brief(first)} at the start, ${brief(last)} at the end.`)];
+    tag("p", {}, `${motion.steps} Runge-Kutta steps${exact}. Energy ${brief(first)} at the start, ${brief(last)} at the end.`)];
 }
 /** Coordinates over time. */
 function curves({ coordinates }, { t, q }) {

@@ -80,6 +80,14 @@ def test_the_spurious_branch_is_seen_at_once_and_gone_by_the_chain_rule(show):
     assert titles == ["link 1", "link 2", "link 3", "damping"]  # no column for the Euler step, which is not in it
 
 
+def test_rows_without_nodes_are_not_named(show):
+    """On a tall page the column of the Euler step is alone in its band, and the chain rule has nothing in it."""
+    page = show(width=1400, height=2600)
+    page.keyboard.press("3")
+    highest = "Math.min(...Array.from(document.querySelectorAll('#scene .%s'), (e) => e.getBoundingClientRect().top))"
+    assert page.evaluate(highest % "stage") > page.evaluate(highest % "column-title")
+
+
 def test_hostile_names_stay_texts_in_the_browser(visit, tmp_path):
     """Every panel is filled, wide and narrow, light and dark; nothing runs, and the policy has nothing to refuse."""
     for text, width, scheme in ((HOSTILE[0], 1400, "light"), (HOSTILE[1], 390, "dark"), (HOSTILE[3], 390, "light")):

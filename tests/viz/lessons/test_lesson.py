@@ -157,6 +157,7 @@ def test_a_multiplier_holds_its_row(subject, screens):
     assert len(set(screen.choices)) == len(screen.choices) >= 2
     if len(subject.system.constraints):
         return
+    assert screen.reveal.count("<td>0</td>") >= 1  # of the held joint, without rounding
     n = subject.system.n
     still = {f"qd{i}": 0.0 for i in range(n)}
     force = float(screen.choices[screen.answer].replace("−", "-"))
@@ -279,12 +280,12 @@ def test_what_is_said_of_a_cart_does_not_hang_on_the_order_of_its_coordinates(or
     assert screen.answer == 1
     assert "K contains positions" in screen.reveal
     assert (
-        "energy changes by right" in energy_and_step(subject_of(dyn.System(energies, names, damping=[0.4, 0.0]))).story
+        "its energy does change" in energy_and_step(subject_of(dyn.System(energies, names, damping=[0.4, 0.0]))).story
     )
 
 
 def test_of_what_does_not_depend_on_its_place_the_first_answer_is_right_and_told_so() -> None:
     screen = euler_edge(subject_of(free_block()))
     assert screen.answer == 0
-    assert "K does not change with the place" in screen.reveal
+    assert "K does not depend on position" in screen.reveal
     assert "A is right of this system: ∂L/∂q is zero at every state." in screen.note

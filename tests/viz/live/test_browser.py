@@ -149,6 +149,8 @@ def test_narrow_and_dark_pages_have_all_of_it(command, scheme, show):
     if command == "inspect":
         page.click("#live > summary")
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    errors = page.locator(".live-errors").bounding_box()
+    assert errors["x"] + errors["width"] <= 390
     ink, back = (page.evaluate(f"getComputedStyle(document.body).{each}") for each in ("color", "backgroundColor"))
     assert ink != back
     assert page.locator("#live-picture").bounding_box()["width"] > 300
