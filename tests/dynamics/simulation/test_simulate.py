@@ -298,7 +298,7 @@ def test_a_last_time_past_the_end_by_rounding_is_the_end() -> None:
 def test_rows_that_fill_the_memory_end_the_run() -> None:
     whole = dyn.simulate(oscillator(), [1.0], [0.0], 200.0, "dop853", max_step=1e-2)
     hundred = 3.0 * 24.0 * 100.0  # rows of time and state
-    with patch.multiple("dynamics.simulation.outcome", SMALL=0.0, room=lambda: hundred):
+    with patch.multiple("dynamics.simulation.outcome", SMALL_MEMORY=0.0, room=lambda: hundred):
         run = dyn.simulate(oscillator(), [1.0], [0.0], 200.0, "dop853", max_step=1e-2)
     assert run.stats.message.startswith("stopped at t = ")
     assert "the rows fill the memory; t_eval records fewer" in run.stats.message
