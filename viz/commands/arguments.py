@@ -285,7 +285,7 @@ def point(text: str) -> dict[str, float]:
 def box(text: str) -> dict[str, tuple[float, float]]:
     """`q0=-1:1,qd0=0:2` as intervals by name, for argparse."""
     intervals = {}
-    for name, value in _pairs(text):
+    for name, value in _pairs(text, "NAME=LOW:HIGH"):
         low, colon, high = value.partition(":")
         if not colon:
             raise argparse.ArgumentTypeError(f"{name} needs an interval such as -1:1, got {value!r}")
@@ -347,12 +347,12 @@ def point_text(at: Mapping[str, float]) -> str:
     return ", ".join([*shown, *rest])
 
 
-def _pairs(text: str) -> list[tuple[str, str]]:
+def _pairs(text: str, form: str = "NAME=VALUE") -> list[tuple[str, str]]:
     pairs: dict[str, str] = {}
     for part in filter(None, text.split(",")):
         name, equals, value = part.partition("=")
         if not equals or not name.strip():
-            raise argparse.ArgumentTypeError(f"expected NAME=VALUE, separated by commas, got {part!r}")
+            raise argparse.ArgumentTypeError(f"expected {form}, separated by commas, got {part!r}")
         name = name.strip()
         if name in pairs:
             raise argparse.ArgumentTypeError(f"{name} is given twice, as {pairs[name]} and as {value}")

@@ -84,7 +84,8 @@ def run(options: argparse.Namespace) -> None:
         return
     written = {out.with_suffix(end): content for end, content in files.items()}
     sizes = ", ".join(f"{path}: {len(content)} bytes" for path, content in written.items())
-    places = f"; inputs at byte 0, {len(graph.inputs)}, outputs at byte {8 * len(graph.inputs)}, {len(graph.outputs)}"
+    inputs, outputs = extend.counted(len(graph.inputs), "input"), extend.counted(len(graph.outputs), "output")
+    places = f"; {inputs} from byte 0, {outputs} from byte {8 * len(graph.inputs)}"
     answer(f"{sizes}{places if options.language == 'wasm' else ''}", written)
 
 

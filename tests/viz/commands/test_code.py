@@ -49,7 +49,7 @@ def test_operations_that_python_lacks_are_taken_from_the_table():
 def test_wasm_has_steps_with_the_state_equation(tmp_path, capsys):
     out = tmp_path / "arm.wasm"
     assert cli.main(["code", "triple_pendulum", "--wasm", "--what", "state_equation", "--out", str(out)]) == 0
-    assert "inputs at byte 0, 9, outputs at byte 72, 6" in capsys.readouterr().out
+    assert "9 inputs from byte 0, 6 outputs from byte 72" in capsys.readouterr().out
     graph = dyn.state_equation(SCENE)
     made = Instance(out.read_bytes(), graph)
     assert made(*point(graph)) == pytest.approx(
