@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import errno
+import os
 import secrets
 import stat
 from collections.abc import Iterator, Mapping
@@ -67,7 +68,9 @@ def check_writable(path: str | Path) -> None:
     FileNotFoundError: [Errno 2] cannot write .../nowhere/at/all.svg: the folder .../nowhere/at does not exist
     """
     if _is_device(Path(path)):
-        return  # opening a pipe would wait for its reader
+        if not os.access(path, os.W_OK):  # opening a pipe would wait for its reader
+            raise PermissionError(errno.EACCES, f"cannot write {path}: {os.strerror(errno.EACCES)}")
+        return
     target = Path(path).resolve()
     if target.is_dir():
         raise _folder(target)

@@ -37,9 +37,9 @@ from .problem import Problem
 from .step import Step
 from .step_control import count
 
-SHORT_CODE = (
-    24_000  # operations of all coefficients, before folding: more take a second to compile, a third less to run
-)
+# Operations of all coefficients, before folding, that are one straight graph: more take a second to compile, and would
+# run a third faster.
+SHORT_CODE = 24_000
 CHECKED = 2.0**-46  # relative: rounding of the rates, below which a defect says nothing
 # Units in a step, inverse: a shorter one is tried again in a unit of its own, for what starts at 0 is measured by its
 # first change, which is that of a whole unit.

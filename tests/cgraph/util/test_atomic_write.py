@@ -111,3 +111,11 @@ def test_a_pipe_is_written_to_and_stays_one(tmp_path: Path) -> None:
         os.close(reader)
     assert pipe.is_fifo()
     assert sorted(tmp_path.iterdir()) == [beside, pipe]
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo") or os.geteuid() == 0, reason="of POSIX, where permissions hold")
+def test_a_pipe_that_must_not_be_written_to_is_told_before_the_work(tmp_path: Path) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe, 0o400)
+    with pytest.raises(PermissionError, match=r"cannot write .*pipe: Permission denied"):
+        check_writable(pipe)
