@@ -33,7 +33,7 @@ class Version:
     about: a sentence or two.  marked: nodes in the one color of what is wrong.  steps: to be gone through one by one.
     rows: {title: nodes} of the rows of the picture from the bottom, alike in all versions; a node that is in none
     stands in the first. Without any, rows are the sweeps.  blamed: edges in that color.  flawed: whether the version is
-    wrong, which it may be with nothing left in it that could be marked.
+    wrong.  off: the outputs in which it is; without any, all that differ.
     """
 
     name: str
@@ -44,10 +44,13 @@ class Version:
     rows: Mapping[str, Collection[Node]] = field(default_factory=dict)
     blamed: Collection[Edge] = frozenset()
     flawed: bool = False
+    off: Collection[str] = ()
 
     def check(self) -> None:
         """Raises ValueError for a marked node, or one of a step, that is not in the graph."""
         known = set(self.graph.nodes)
+        if unknown := [name for name in self.off if name not in self.graph.outputs]:
+            raise ValueError(f"version {self.name!r}: {unknown[0]!r} is off, but no output of its graph")
         stepped = {node for step in self.steps for node in (*step.nodes, step.value)}
         for what, nodes in (("marked", set(self.marked)), ("in a step", stepped)):
             if strange := nodes - known:

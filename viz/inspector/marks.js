@@ -58,6 +58,28 @@ function digits(count) {
   return text.length <= 15 ? text : `${text[0]}.${text.slice(1, 3)}e+${text.length - 1}`;
 }
 
+/** How many nodes and edges of a version are spurious, in words; where neither is left, that a term is gone. */
+function spuriousIn({ marked, blamed, flawed }) {
+  const kinds = [[marked.size ?? marked.length, "node"], [blamed.length, "edge"]].filter(([many]) => many);
+  return kinds.map(([many, kind]) => counted(many, kind)).join(", ") || (flawed ? "a term is gone" : "none");
+}
+
+/** Whether an output of a version can be wrong: one of those that it names, or any of a flawed one that names none. */
+const wrongIn = ({ flawed, off }, name) => flawed && (!off.size || off.has(name));
+
+/** The wrong results beside the right ones at the state, of a version that is flawed.  found: {name: [value, noise]} of each version. */
+function tellNow(app, versions, found) {
+  const own = found[versions.indexOf(app.version)], right = found[app.right], { version } = app, unit = (name) => (app.units.has(name) ? ` ${app.units.get(name)}` : "");
+  if (!right || !version.flawed) { byId("now").textContent = ""; return; }
+  const shown = [...version.off].filter((name) => right.has(name)).map((name) => {
+    const [value, truth] = [own, right].map((each) => brief(...each.get(name)));
+    return value === truth ? "" : `${app.state.called.get(name) ?? name} is ${value}${unit(name)}, by the ${versions[app.right].name} ${truth}${unit(name)}`;
+  }).filter(Boolean);
+  const more = shown.length > AT_ONCE ? `, and ${shown.length - AT_ONCE} more` : "";
+  byId("now").textContent = version.off.size ? `Now ${shown.length ? `${shown.slice(0, AT_ONCE).join("; ")}${more}` : "both are the same"}.` : "";
+}
+const AT_ONCE = 3; // results that a sentence names
+
 const clear = (app, ...names) => names.forEach((name) => app.svg.querySelectorAll(`.${name}`).forEach((each) => each.classList.remove(name)));
 
 /** Give an element its part in the trace, "ancestor", "descendant", "on" or ""; only what changes is touched. */

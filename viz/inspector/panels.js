@@ -165,11 +165,6 @@ function showInputs(app) {
   byId("reset").hidden = byId("edited").hidden = !app.state.edited;
 }
 
-/** How many nodes are there by mistake; where there are none, what else is wrong. */
-function spuriousIn({ marked, blamed, flawed }) {
-  const nodes = marked.size ?? marked.length;
-  return nodes || (blamed.length ? counted(blamed.length, "edge") : flawed ? "a term gone" : 0);
-}
 function showCounts(app) {
   const { version } = app;
   const rows = app.state.versions.map((each) => tag("tr", {}, rowHead(each.name),
@@ -182,9 +177,10 @@ function showCounts(app) {
 }
 
 function showLegend(app) {
-  const kinds = [["input", "input"], ["primal", "as written"], ["adjoint", "adjoint: reverse"], ["tangent", "tangent: forward"], ["several", "several roles"], ["wrong", "spurious"]];
+  const kinds = [["input", "input"], ["primal", "as written"], ["adjoint", "adjoint: reverse"], ["tangent", "tangent: forward"], ["several", "several roles"], ["wrong", "spurious"], ["off", "wrong result"]];
   const present = new Set(app.version.labels.map(([, role]) => role));
   if (app.version.marked.size || app.version.blamed.length) present.add("wrong");
+  if (app.version.off.size) present.add("off");
   byId("legend").replaceChildren(...kinds.filter(([kind]) => present.has(kind)).map(([kind, words]) => tag("span", { class: kind }, words)));
 }
 
@@ -211,7 +207,7 @@ function makeResults(app) {
   app.right = versions.findLastIndex((each) => !each.flawed && versions.some((other) => other.flawed));
   const [shown, cells] = numbers(app, versions.map((each) => each.name), app.names);
   app.cells = cells;
-  byId("results").replaceChildren(shown, ...(app.right < 0 ? []
+  byId("results").replaceChildren(tag("p", { id: "now" }), shown, ...(app.right < 0 ? []
     : [quiet(`In vermillion: differs from ${versions[app.right].name}. All at the same state; values within rounding error are shown as 0.`)]));
   byId("statetables").replaceChildren();
   byId("wide").replaceChildren();
@@ -245,9 +241,10 @@ function showResults(app) {
   app.names.forEach(([name], row) => found.forEach((each, column) => {
     if (!each.has(name)) return;
     const [value, noise] = each.get(name), [truth, blur] = found[app.right]?.get(name) ?? [value, 0];
-    const off = Math.abs(value - truth) > noise + blur + OFF * Math.max(Math.abs(value), Math.abs(truth));
+    const off = wrongIn(each, name) && Math.abs(value - truth) > noise + blur + OFF * Math.max(Math.abs(value), Math.abs(truth));
     write(app.cells[row][column], brief(value, noise), off ? "off" : "");
   }));
+  tellNow(app, app.state.versions, found);
   for (const each of app.state.tables) {
     const values = app.state.evaluate(each), noise = noiseIn(app, each, values);
     each.rows.forEach(([, outputs], row) => outputs.forEach((out, column) => {

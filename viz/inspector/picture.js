@@ -172,11 +172,11 @@ function drawBundles(canvas, side, leaves) {
   for (const [key, names] of layout.bundles) {
     const own = names.filter((name) => node.has(name));
     if (key[0] !== side || !own.length) continue;
-    const kind = key.slice(1).replace("_old", " old").replace(/^q(d*)/, (_, dots) => `q${["", "\u0307", "\u0308"][dots.length]}`).replace("tau", "τ");
+    const kind = key.slice(1), off = side === "o" && own.some((name) => version.off.has(name));
     const at = layout[side === "i" ? "inputs" : "outputs"].get(key);
-    const item = shape(shapes, `k${key}`, at, side === "i" ? "box input" : "box output", `▸ ${kind}: ${counted(own.length, side === "i" ? "input" : "output")}`, "");
+    const item = shape(shapes, `k${key}`, at, side === "i" ? "box input" : off ? "box output off" : "box output", `▸ ${kind}: ${counted(own.length, side === "i" ? "input" : "output")}`, "");
     item.group.setAttribute("data-bundle", key);
-    item.group.setAttribute("aria-label", `${kind}, ${own.length}, folded`);
+    item.group.setAttribute("aria-label", `${kind}, ${own.length}, folded${off ? ", wrong" : ""}`);
     const nodes = own.map((name) => node.get(name));
     if (side === "i") keep(canvas, `k${key}`, item, nodes, "");
     else {
@@ -192,9 +192,9 @@ function drawOutputs(canvas) {
   for (const [name, pretty, node] of version.outputs) {
     const at = layout.outputs.get(name);
     if (!at) continue;
-    const item = shape(shapes, `o${name}`, at, "output", pretty, "");
+    const item = shape(shapes, `o${name}`, at, version.off.has(name) ? "output off" : "output", pretty, "");
     item.group.setAttribute("data-node", node);
-    item.group.setAttribute("aria-label", `output ${called.get(name) ?? name}`);
+    item.group.setAttribute("aria-label", `output ${called.get(name) ?? name}${version.off.has(name) ? ", wrong" : ""}`);
     element("title", {}, item.group).textContent = called.get(name) ?? name;
     canvas.items.set(`o${name}`, { ...item, nodes: [node], output: true, names: [name] });
   }

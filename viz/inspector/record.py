@@ -7,14 +7,15 @@
     derived               null, or a graph that computes other inputs of versions from the state
     stages                titles of the rows of the picture, from the bottom; [] leaves them to the page, by sweep
     columns               [[tag, tag of its parent or null]] in the order of the picture; [] leaves it to the page
-    versions              [{name, about, labels, label, marked, blamed, flawed, steps, drawing} and a graph], see below
+    versions              [{name, about, labels, label, marked, blamed, flawed, off, steps, drawing} and a graph]
     tables                [{caption, header, rows: [[name, [numbers of nodes]]]} and a graph]: they follow the state
     motion                null, or {t, points: null or [[[x, y]]], parents, joints, turns, places: null or a graph}
 
 A graph is that of `graph_data`, with outputs [[name, letters, number of a node]], and with names, {number of a node:
 [name, letters]}. labels are the [tags, role, row] that occur, label which of them a node
 has, marked the nodes in the color of what is wrong, blamed the edges [source, target] in it, flawed whether the version
-is wrong, steps [{words, nodes, value, joint}]. Where nodes stand is the page's business, but for a `drawing`.
+is wrong, off the names of the outputs in which it is, steps [{words, nodes, value, joint}]. Where nodes stand is the
+page's business, but for a `drawing`.
 """
 
 from __future__ import annotations
@@ -133,6 +134,7 @@ def _version(version: Version, letters: Letters) -> dict[str, Json]:
         "marked": [number[node] for node in version.graph.nodes if node in marked],
         "blamed": sorted([[number[edge.source], number[edge.target]] for edge in version.blamed]),
         "flawed": version.flawed or bool(marked),
+        "off": [name for name in version.graph.outputs if name in version.off],
         "steps": [
             {
                 "words": step.words,

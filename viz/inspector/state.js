@@ -14,7 +14,7 @@ function prepare(version) {
   const number = args.map((own) => (own.length ? ++operations : 0)); // as in Graph.listing(): %1 is the first operation
   const byNumber = new Map(number.map((each, node) => [each, node]).filter(([each]) => each));
   return { ...version, run: evaluator(version), ops, args, constants, users, edges, number, byNumber, operations, marked: new Set(version.marked),
-    crossed: new Set((version.blamed ?? []).map(([source, target]) => `${source} ${target}`)) };
+    off: new Set(version.off), crossed: new Set((version.blamed ?? []).map(([source, target]) => `${source} ${target}`)) };
 }
 
 const ROUNDING = 2 ** -53; // relative error of a rounded number

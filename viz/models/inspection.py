@@ -213,19 +213,23 @@ def _derived(system: System) -> Graph:
 
 def _version(scene: Scene, name: str) -> Version:
     verdict = formulation_verdict(scene, name)
-    wrong, edges, about = verdict.nodes, verdict.edges, verdict.summary
-    if verdict.differs:
-        through = "of the kinetic energy " if name == "kinetic_only" else ""
-        about += f" The velocity derivative {through}was taken through q = qd dt + q_old, so it reached q as well."
-        entries = f"the {len(edges)} edges" if len(edges) > 1 else "the edge"
-        nodes = f"{len(wrong)} of {len(verdict.graph.nodes)} nodes, and " if wrong else ""
-        about += f" Look at what is vermillion: {nodes}{entries} by which the surplus enters." if edges else ""
-        about += f" {verdict.lacking}" if verdict.missing else ""
-    elif scene.system.constraints:
-        about += " Nothing drives the joints here: these torques are those of the constraints alone."
-    else:
-        about += " Nothing drives the joints here, so the torques should be 0."
-    return Version(name.replace("_", " "), verdict.graph, about, wrong, blamed=edges, flawed=verdict.differs)
+    about = f"{verdict.summary} {verdict.explanation}".strip()
+    if not verdict.differs:
+        driven = (
+            "these torques are those of the constraints alone"
+            if scene.system.constraints
+            else "the torques should be 0"
+        )
+        about += f" Nothing drives the joints here: {driven}."
+    return Version(
+        name.replace("_", " "),
+        verdict.graph,
+        about,
+        verdict.nodes,
+        blamed=verdict.edges,
+        flawed=verdict.differs,
+        off=tuple(verdict.excess),
+    )
 
 
 def _named(**tables: Array) -> dict[str, float | Array]:

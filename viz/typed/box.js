@@ -110,8 +110,8 @@ function showDerived({ system, motion, record }) {
     return tag("tr", {}, rowHead(name), ...[nodes.length, edges, spuriousIn(version)].map((count, k) => tag("td", { class: k === 2 && flawed ? "off" : "" }, String(count))));
   });
   const lint = TYPED.FORMULATIONS.map((name) => {
-    const found = TYPED.verdict(system, name), words = found.differs ? "differs" : "holds";
-    return tag("details", {}, tag("summary", {}, `lint, ${name.replace("_", " ")}: ${words}`), tag("pre", {}, TYPED.lint(system, found).join("\n")));
+    const found = TYPED.verdict(system, name), words = found.differs ? "wrong" : "right";
+    return tag("details", {}, tag("summary", {}, `${name.replace("_", " ")}: ${words}`), tag("pre", {}, TYPED.lint(system, found).join("\n")));
   });
   byId("derived").replaceChildren(table(["", "nodes", "edges", "spurious"], rows), ...lint, ...(motion.error ? [] : motionWords(system, motion)));
 }

@@ -2,7 +2,6 @@
 
 const KINDS = { q: "q", qd: "q\u0307", qdd: "q\u0308", tau: "τ" };
 const LONGEST = 24; // letters of a name for which a box has room
-const ABOUT = { by_definition: "", kinetic_only: "of the kinetic energy " };
 
 /** A name in mathematical letters: theta1 is θ₁. */
 const pretty = (name) => name.replace(/(?<![A-Za-z0-9])([A-Za-z]+)([0-9]*)(?![A-Za-z0-9])/g, (_, word, digits) => (
@@ -61,7 +60,7 @@ function listed(graph, letters) {
   };
 }
 function versionOf(name, graph, letters, found) {
-  const { nodes: wrong, edges, differs } = found ?? { nodes: new Set(), edges: [], differs: false }, kinds = new Map();
+  const { nodes: wrong, edges, differs, off } = found ?? { nodes: new Set(), edges: [], differs: false, off: [] }, kinds = new Map();
   const number = new Map(graph.nodes.map((node, i) => [node, i]));
   const label = graph.nodes.map((node) => {
     const kind = [tagNames.filter((_, i) => node.label & (16 << i)), roleOf(node), stageOf(node)], key = JSON.stringify(kind);
@@ -69,8 +68,8 @@ function versionOf(name, graph, letters, found) {
     return kinds.get(key).i;
   });
   return {
-    name: name.replace("_", " "), about: aboutOf(name, graph, found), ...listed(graph, letters), label, labels: [...kinds.values()].map(({ kind }) => kind),
-    marked: graph.nodes.flatMap((node, i) => (wrong.has(node) ? [i] : [])), steps: [], flawed: differs,
+    name: name.replace("_", " "), about: aboutOf(graph, found), ...listed(graph, letters), label, labels: [...kinds.values()].map(({ kind }) => kind),
+    marked: graph.nodes.flatMap((node, i) => (wrong.has(node) ? [i] : [])), steps: [], flawed: differs, off,
     blamed: edges.map((edge) => edge.map((node) => number.get(node))),
   };
 }
@@ -83,13 +82,11 @@ function stageOf({ label }) {
   if (label & PRIMAL || !(label & (ADJOINT | TANGENT))) return "as written";
   return label & ADJOINT ? (label & TANGENT ? "both sweeps" : "reverse sweep") : "forward sweep";
 }
-function aboutOf(name, { nodes }, found) {
+function aboutOf({ nodes }, found) {
   if (!found) return `Accelerations from torques: the mass matrix is derived and eliminated, ${nodes.length} nodes.`;
-  const { differs, nodes: wrong, edges, sentence, summary, lacking } = found;
-  if (!differs) return `${summary} Nothing else drives it, so the torques should be 0.`;
-  const entries = edges.length > 1 ? `the ${edges.length} edges` : "the edge", of = wrong.size ? `${wrong.size} of ${nodes.length} nodes, and ` : "";
-  return [sentence, `The velocity derivative ${ABOUT[name]}was taken through q = qd dt + q_old, so it reached q as well.`,
-    ...(edges.length ? [`Look at what is vermillion: ${of}${entries} by which the surplus enters.`] : []), lacking].join(" ").trim();
+  const { differs, nodes: wrong, edges, sentence, why, lacking } = found;
+  if (!differs) return `${sentence} Nothing else drives the joints here: the torques should be 0.`;
+  return [sentence, why, ...(edges.length ? [`${spuriousText(nodes.length, wrong.size, edges.length)}.`] : []), lacking].filter(Boolean).join(" ");
 }
 function noticesOf(system, motion) {
   if (motion.error) return [motion.error];

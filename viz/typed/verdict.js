@@ -1,44 +1,76 @@
 // The verdict on a formulation: does it differ from the chain rule, by how much, and what in its graph is to blame; and lint in words.
 
 const STATES = 24, SMALLEST = 2 ** -53; // states tried, a third of size 1, the rest from 1e-6 to 1e6; a rounding
-const DIFFERS = "This is not the torque of the chain rule, however small dt is";
+const HOW = { by_definition: "By definition", kinetic_only: "Kinetic only", chain_rule: "By the chain rule" }; // how a sentence begins
+const ENERGIES = { by_definition: "L", kinetic_only: "K" }; // what is differentiated by qd through the step
+const STEP = "q = qd dt + q_old";
 
-/** With q = qd dt + q_old in it the momentum is p + dt c, c = dE/dq of E = L or K, so its rate has c too much at every dt.
- * It is the torque of the chain rule if and only if c is 0 at every state. */
+/** With q = qd dt + q_old in it the momentum is p + dt c, c = dE/dq of E = L or K, so its rate has c besides at every dt.
+ * It is the torque of the chain rule if and only if c is 0 at every state. Words are those of the library's verdict.py. */
 function verdict(system, formulation) {
-  const graph = inverseDynamics(system, formulation), energyOf = THROUGH_STEP[formulation], names = displayNames(system);
-  const energy = formulation === "kinetic_only" ? "K" : "L", slope = `d${energy}/dq`;
-  const alike = (reason) => ({ graph, energy, differs: false, summary: `Holds: this is the torque of the chain rule: ${reason}.`, lines: [], nodes: new Set(), edges: [], lacking: "" });
-  if (!energyOf) return alike("no derivative in it is taken through a step of time");
-  const build = new Builder(), [from] = folded([energyOf(system)], build);
+  const graph = inverseDynamics(system, formulation), energy = ENERGIES[formulation], slope = `d${energy}/dq`, begin = `${HOW[formulation]}, the torque is`;
+  const alike = (reason) => ({ formulation, graph, energy: energy ?? "L", differs: false, sentence: `${begin} right: ${reason}.`, lines: [`${begin} right: ${reason}.`],
+    nodes: new Set(), edges: [], off: [], missing: [], why: "", lacking: "" });
+  if (!energy) return alike("every derivative in it is taken at independent q and qd");
+  const build = new Builder(), [from] = folded([THROUGH_STEP[formulation](system)], build);
   const c = folded(cotangents(new Map([[from, ONE()]]), system.q, build));
-  if (c.every(({ value }) => value === 0)) return alike(`${slope} is 0, so nothing comes through q = qd dt + q_old`);
+  if (c.every(({ value }) => value === 0)) {
+    return alike(`${energy === "L" ? "L" : "the mass matrix"} does not depend on q, ${slope} is 0, and the derivative through ${STEP} adds nothing`);
+  }
   const { at, finite, excess } = stateOf(system, c);
   if (finite && !excess.length) return alike(`${slope} is 0 to rounding at all ${finite} states tried, though its form does not prove it`);
   if (!finite) {
-    const summary = `This is not shown to be the torque of the chain rule: ${slope} is finite at none of the ${STATES} states tried.`;
-    return { ...alike(""), differs: true, summary, sentence: summary };
+    const sentence = `${begin} not shown to be right: ${slope} is finite at none of the ${STATES} states tried.`;
+    return { ...alike(""), differs: true, sentence, lines: [sentence] };
   }
-  const { nodes, edges, cancelled } = blame(system, formulation, graph), used = new Set(topological(excess.map(([i]) => c[i])));
-  const shown = [...system.q, ...system.qd, ...system.extra].filter((node) => used.has(node));
-  const where = shown.map(({ name }) => `${names.get(name) ?? name}=${at.get(name)}`).join(", ");
-  const term = (i, value, sign) => `${sign < 0 ? "-" : ""}${slope}.${system.coordinates[i]} = ${+(sign * value).toPrecision(6)}`;
-  const missing = excess.filter(([i]) => cancelled.has(`tau${i}`)), output = ([i]) => names.get(`tau${i}`);
-  const lacking = missing.length ? `In ${missing.map(output).join(", ")} this cancels a right term, and no edge is left to be marked. `
-    + `Missing: ${missing.map(([i, value]) => term(i, value, -1)).join(", ")}.` : "";
-  const blamed = edges.length ? [`There by mistake: ${edges.length === 1 ? "an edge" : `${edges.length} edges`}, ${nodes.size
-    ? `with ${nodes.size} of ${graph.nodes.length} nodes, which serve${nodes.size === 1 ? "s" : ""} nothing else` : "and no node by itself"}.`] : [];
-  const lines = [...excess.map((each) => `  ${output(each)}  ${term(...each, 1)}`), ...blamed, ...(lacking ? [lacking] : [])];
-  const summary = `${DIFFERS}. Too much in it${where && ` at ${where}`}:`;
-  const symbols = excess.map((each) => `${output(each)} has ${slope}.${system.coordinates[each[0]]}`).join(", ");
-  return { graph, energy, differs: true, summary, lines, nodes, edges, lacking, sentence: `${DIFFERS}: ${symbols} too much.` };
+  const names = displayNames(system), { nodes, edges, cancelled, marked, through } = blame(system, formulation, graph);
+  const [wrong, right] = [1, 0].map((factor) => torquesAt(marked, new Map([...at, ["dt", 0], [through.name, factor]])));
+  const off = excess.map(([i]) => `tau${i}`), called = off.map((name) => names.get(name));
+  const used = new Set(topological(off.map((name) => graph.outputs.get(name))).map(({ name }) => name?.replace("_old", "")));
+  const shown = [...system.q, ...system.qd, ...system.qdd, ...system.extra].filter(({ name }) => used.has(name));
+  const where = shortList(shown.map(({ name }) => `${names.get(name) ?? name}=${sixDigits(at.get(name))}`));
+  const term = (i, value, sign) => `${sign < 0 ? "-" : ""}${slope}.${system.coordinates[i]} = ${sixDigits(sign * value)}`;
+  const values = excess.map(([i, value], k) => `  ${called[k]} is ${sixDigits(wrong.get(`tau${i}`))}, by the chain rule ${sixDigits(right.get(`tau${i}`))}: off by ${term(i, value, 1)}`);
+  const missing = excess.filter(([i]) => cancelled.has(`tau${i}`)), gone = missing.map(([i, value]) => term(i, value, -1));
+  const lacking = missing.length ? `In ${shortList(missing.map(([i]) => names.get(`tau${i}`)))} nothing spurious is left to be marked: a right term is gone with it. `
+    + `${shortList(gone)} ${gone.length > 1 ? "are" : "is"} missing.` : "";
+  const why = `Why: the derivative by qd went through ${STEP} as well. It adds dt ${slope} to the momentum and so, at every dt, ${slope} to its rate, `
+    + `which cancels the -${slope} of Lagrange's equation.`;
+  const terms = off.length > 1 ? `${shortList(called)} are off, each by its ${slope}` : `${called[0]} is off by ${slope}.${system.coordinates[excess[0][0]]}`;
+  const lines = [`${begin} wrong at every dt, however small. At ${where}:`, ...values, why,
+    ...(edges.length ? [`${spuriousText(graph.nodes.length, nodes.size, edges.length)}.`] : []), ...(lacking ? [lacking] : [])];
+  return { formulation, graph, energy, differs: true, sentence: `${begin} wrong at every dt, however small: ${terms}.`, lines, nodes, edges,
+    off, missing: missing.map(([i]) => `tau${i}`), why, lacking };
 }
 
-/** The first state at which c is not 0, else the last; at how many it was finite; and c there, [[i, value]]. */
-function stateOf(system, c) {
-  const inputs = [...system.q, ...system.qd, ...system.extra], inner = topological(c), { number, ...arrays } = numbered(inner, inputs);
-  const graph = { ops: opsOf(arrays), args: argsOf(arrays) }, run = evaluator(arrays);
+const SHOWN = 6; // texts that a list shows
+const shortList = (texts) => (texts.length > SHOWN ? [...texts.slice(0, SHOWN), `and ${texts.length - SHOWN} more`] : texts).join(", ");
+const sixDigits = (value) => String(+value.toPrecision(6));
+
+/** Words on how many edges and nodes of a graph of so many nodes are spurious. */
+function spuriousText(nodes, spurious, edges) {
+  const serve = `${spurious} of ${nodes} node${nodes === 1 ? "" : "s"} that serve${spurious === 1 ? "s" : ""} nothing else`;
+  return `Spurious in the graph: ${edges} edge${edges === 1 ? "" : "s"}, and ${spurious ? serve : "no node"}`;
+}
+
+/** A function from values of inputs to the values of nodes, and bounds of their rounding. */
+function bounded(inner, inputs) {
+  const { number, ...arrays } = numbered(inner, inputs), graph = { ops: opsOf(arrays), args: argsOf(arrays) }, run = evaluator(arrays);
   const rounded = inner.map(({ op, args, value }) => SMALLEST * (args.length ? ROWS[op].rounding : value === null ? 1 : 0));
+  return (given) => {
+    const values = run(given), errors = errorBounds(graph, slopesAt(graph, values), rounded.map((each, i) => each * Math.abs(values[i])));
+    return (node) => [values[number.get(node)], errors[number.get(node)]];
+  };
+}
+/** Outputs of a graph, {name: value}; what rounding alone made is 0. */
+function torquesAt(graph, at) {
+  const found = bounded(graph.nodes, graph.inputs)(graph.inputs.map(({ name }) => at.get(name.replace("_old", ""))));
+  return new Map([...graph.outputs].map(([name, node]) => { const [value, error] = found(node); return [name, Math.abs(value) >= 10 * error ? value : 0]; }));
+}
+
+/** The first state at which c is not 0, else the last, with accelerations; at how many it was finite; and c there, [[i, value]]. */
+function stateOf(system, c) {
+  const inputs = [...system.q, ...system.qd, ...system.extra], find = bounded(topological(c), inputs);
   let seed = 20250814, finite = 0, at, excess = [];
   const random = () => { seed = (seed * 16807) % 2147483647; return seed / 2147483647; }; // the same on every page
   for (let k = 0; k < STATES && !excess.length; k++) {
@@ -46,12 +78,12 @@ function stateOf(system, c) {
       const size = k < STATES / 3 ? 1 : 10 ** (12 * random() - 6), x = size * (k % 2 ? random() : 2 * random() - 1); // a root or a logarithm needs k % 2
       return [name, system.parameters.get(name) ?? +x.toPrecision(3)];
     }));
-    const values = run([...at.values()]), errors = errorBounds(graph, slopesAt(graph, values), rounded.map((each, i) => each * Math.abs(values[i])));
-    const found = c.map((node) => [values[number.get(node)], errors[number.get(node)]]);
+    const found = c.map(find([...at.values()]));
     if (!found.every(([value]) => Number.isFinite(value))) continue;
     finite += 1;
     excess = found.flatMap(([value, error], i) => (value && Math.abs(value) >= 10 * error ? [[i, value]] : []));
   }
+  system.qdd.forEach(({ name }) => at.set(name, +(2 * random() - 1).toPrecision(3)));
   return { at, finite, excess };
 }
 
@@ -60,7 +92,8 @@ function stateOf(system, c) {
  * All that comes through the step is multiplied by a variable. What folds to 0 when that is 0 is wrong, and the edges that
  * lead out of it are to blame; at 1 the graph is the formulation's, node by node. */
 function blame(system, formulation, graph) {
-  const through = variable("through the step"), marked = inverseDynamics(system, formulation, through);
+  const through = variable("through the step"), derived = inverseDynamics(system, formulation, through);
+  const marked = graphOf([...derived.inputs, through], derived.outputs);
   const [without, whole] = [0, 1].map((factor) => pairs(marked.nodes, folded(marked.nodes, new Builder(), new Map([[through, constant(factor)]]))));
   const wrong = new Set(marked.nodes.filter((node) => without.get(node).value === 0 && node.value !== 0));
   const all = topological([...graph.nodes, ...whole.values()]), { number, ...arrays } = numbered(all, []);
@@ -92,6 +125,7 @@ function blame(system, formulation, graph) {
     nodes: new Set(graph.nodes.filter((node) => !needed.has(node))),
     edges: [...cut].flatMap(([target, slots]) => [...new Set(slots)].map((slot) => [target.args[slot], target])),
     cancelled: new Set([...marked.outputs.keys()].filter((_, i) => touched & ~left & (1 << i))),
+    marked, through,
   };
 }
 
@@ -105,21 +139,21 @@ function displayNames({ coordinates }) {
 }
 
 /** Sentences as `cgraph lint` has them, for the verdict on a formulation of inverse dynamics. */
-function lint(system, { graph, summary, lines, energy }) {
+function lint(system, { graph, lines, energy }) {
   const names = displayNames(system), shown = (name) => names.get(name) ?? name;
   const byName = new Map([...graph.inputs, ...graph.nodes].filter(({ name }) => name).map((node) => [node.name, node]));
   const group = (nodes) => nodes.map(({ name }) => byName.get(name)).filter(Boolean);
   const q = group(system.q), qd = group(system.qd), called = (nodes) => joined(nodes.map(({ name }) => shown(name)));
   const used = new Set(graph.nodes), unused = graph.inputs.filter((node) => !used.has(node));
-  const first = [summary, ...lines], notes = unused.map(({ name }) => `Note: Nothing uses the input ${shown(name)}.`);
-  if (!q.length || !qd.length) return [...first, ...notes];
+  const notes = unused.map(({ name }) => `Note: Nothing uses the input ${shown(name)}.`);
+  if (!q.length || !qd.length) return [...lines, ...notes];
   const proof = (nodes, on) => {
     const start = `Holds: no path leads from ${called(on)} to ${called(nodes)}`;
     if (!nodes.some((node) => node.args.length)) return `${start}: ${called(nodes)} ${nodes.length > 1 ? "are inputs" : "is an input"}.`;
     const reached = new Set(topological(nodes));
     return `${start}, made from ${called(graph.inputs.filter((node) => reached.has(node)))} alone.`;
   };
-  if (!q[0].args.length) return [...first, proof(q, qd), proof(qd, q), ...notes];
+  if (!q[0].args.length) return [...lines, proof(q, qd), proof(qd, q), ...notes];
   const targets = graph.nodes.filter((node) => q.includes(node));
   const edges = targets.map((node) => [byName.get(node.name.replace("q", "qd")), node]);
   const through = graph.nodes.some(({ label }) => label & COUPLING && label & ADJOINT);
@@ -128,5 +162,5 @@ function lint(system, { graph, summary, lines, energy }) {
   edges.forEach(([from, to], i) => paths.push(
     `  ${texts[i].padEnd(width)}  through it d${energy}/d${shown(from.name)} ${through ? "gains" : "would gain"} dt * d${energy}/d${shown(to.name)}`));
   if (!through) paths.push("No derivative in this graph was taken that way.");
-  return [...first, ...paths, proof(qd, q), ...notes];
+  return [...lines, ...paths, proof(qd, q), ...notes];
 }

@@ -16,6 +16,8 @@ from ...systems.kinematics import ONE, ZERO
 from ...systems.system import System
 from .formulations import COUPLING, THROUGH_STEP
 
+Derive = Callable[[System, str, Node], Graph]
+
 
 class Blame(NamedTuple):
     """Nodes and edges that a graph has from the derivative through the step.
@@ -29,18 +31,30 @@ class Blame(NamedTuple):
     cancelled: tuple[str, ...] = ()
 
 
-def blame(system: System, formulation: str, derive: Callable[[System, str, Node], Graph], graph: Graph) -> Blame:
+class Split(NamedTuple):
+    """A graph by a formulation in which all that comes through the step is multiplied by the input `through`."""
+
+    graph: Graph
+    through: Node
+
+
+def split(system: System, formulation: str, derive: Derive) -> Split:
+    """The torques or momenta of a formulation of `THROUGH_STEP`: at 1 they are its own, at 0 those without the step."""
+    (through,) = new_variables("through", 1, system.parameters)
+    return Split(cg.simplify(derive(system, formulation, through)), through)
+
+
+def blame(system: System, formulation: str, derive: Derive, graph: Graph, known: Split | None = None) -> Blame:
     """Blame for what the graph has by the derivative through the step, whether its value is 0 or not.
 
-    derive: `torques` or `momenta`, of which `graph` is the simplified graph by this formulation.
+    derive: `torques` or `momenta`, of which `graph` is the simplified graph by this formulation.  known: its `split`.
 
     All that comes through the step is multiplied by a variable. What folds to 0 when that is 0 is wrong, and the edges
     that lead out of it are to blame; at 1 the graph is the formulation's, node by node.
     """
     if formulation not in THROUGH_STEP:
         return Blame()
-    (through,) = new_variables("through", 1, system.parameters)
-    marked = cg.simplify(derive(system, formulation, through))
+    marked, through = known or split(system, formulation, derive)
     without, whole = (
         dict(zip(marked.nodes, folded(marked.nodes, Builder(), {through: factor}), strict=True))
         for factor in (ZERO, ONE)

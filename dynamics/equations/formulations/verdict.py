@@ -14,14 +14,14 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from cgraph import Edge, Graph, Node, extend
-from cgraph.extend import Builder, Names, building, cotangents, folded, require_mapping, shortened
+from cgraph.extend import Builder, Names, building, cotangents, counted, folded, require_mapping, shortened
 
 from ...systems.display_names import display_names
 from ...systems.kinematics import ONE
 from ...systems.model import Model, as_system
 from ...systems.system import System
 from ..equation import documented
-from .blame import blame
+from .blame import Split, blame, split
 from .formulations import THROUGH_STEP, formulation_name, inverse_dynamics, torques
 
 if TYPE_CHECKING:
@@ -30,18 +30,29 @@ if TYPE_CHECKING:
 STATES = 24  # tried where c does not fold to 0: a third of size 1, the rest of sizes from 1e-6 to 1e6
 WRITTEN = 200  # nodes of c that identities are tried on
 SHOWN, FORMULA = 6, 60  # coordinates that the text lists, and characters of a formula in it
-_DIFFERS = "This is not the torque of the chain rule, however small dt is"
+HOW = {
+    "by_definition": "By definition",
+    "kinetic_only": "Kinetic only",
+    "kinetic_only_exact": "Kinetic only, exact",
+    "chain_rule": "By the chain rule",
+    "chain_rule_literal": "By the chain rule, written out",
+    "newton_euler": "By Newton and Euler",
+}  # how a sentence on a formulation begins
+ENERGIES = {"by_definition": "L", "kinetic_only": "K"}  # what is differentiated by qd through the step
 
 
 class Excess(NamedTuple):
-    """Excess in the torque of one velocity.
+    """What the torque of one velocity is off by.
 
     symbol: "dL/dq.y".  formula: in a person's names, empty where it is long.  value: at the state of the verdict.
+    torque, right: the torque there by the formulation as dt tends to 0, and by the chain rule [N m or N].
     """
 
     symbol: str
     formula: str
     value: float
+    torque: float
+    right: float
 
     def __str__(self) -> str:
         number = f"{self.value:.6g}"
@@ -65,19 +76,19 @@ class Verdict:
     reason : str
         Why it does not differ; empty where it does.
     excess : mapping of str to Excess
-        {"tau1": what it has too much}, of the outputs that differ at the state `at`, as dt tends to 0 [N m or N].
+        {"tau1": what it is off by}, of the outputs that differ at the state `at`, as dt tends to 0 [N m or N].
     missing : mapping of str to Excess
-        {"tau1": what it lacks}, of outputs in which the wrong term has cancelled a right one.
+        {"tau1": what it lacks}, of outputs in which the spurious term has cancelled a right one.
     at : mapping of str to float
-        The state of the numbers: the inputs that they depend on.
+        The state of the numbers: coordinates, velocities, accelerations, t and parameters that they depend on.
     nodes : frozenset of Node
-        Nodes of the graph that serve nothing but the excess.
+        Spurious nodes of the graph: they serve nothing but the excess.
     edges : frozenset of Edge
-        Edges by which it enters the rest; there may be some where there are no such nodes.
+        Spurious edges: by them it enters the rest; there may be some where there are no such nodes.
     names : mapping of str to str
         {name in the graph: what a person calls it}.
     terms : Graph, optional
-        c at any state: what each torque has too much as dt tends to 0, from q0.., qd0.., then t and parameters; None of
+        c at any state: what each torque is off by as dt tends to 0, from q0.., qd0.., then t and parameters; None of
         a formulation that takes no derivative through the step.
 
     Examples
@@ -85,9 +96,11 @@ class Verdict:
     >>> import dynamics as dyn
     >>> ball = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 - 9.81 * q[0], ["y"])
     >>> print(dyn.formulation_verdict(ball, "by_definition"))
-    This is not the torque of the chain rule, however small dt is. Too much in it:
-      tau.y  dL/dq.y = -9.81
-    In tau.y this cancels a right term, and no edge is left to be marked. Missing: -dL/dq.y = 9.81.
+    By definition, the torque is wrong at every dt, however small. At qdd.y=0.0236:
+      tau.y is 0.0236, by the chain rule 9.8336: off by dL/dq.y = -9.81
+    Why: the derivative by qd went through q = qd dt + q_old as well. It adds dt dL/dq to the momentum and so, at \
+every dt, dL/dq to its rate, which cancels the -dL/dq of Lagrange's equation.
+    In tau.y nothing spurious is left to be marked: a right term is gone with it. -dL/dq.y = 9.81 is missing.
     """
 
     formulation: str
@@ -104,7 +117,7 @@ class Verdict:
     terms: Graph | None = None
 
     def excess_at(self, at: Mapping[str, float]) -> dict[str, float]:
-        """{"tau1": what it has too much} at a state, of the outputs where that is not 0, as dt tends to 0.
+        """{"tau1": what it is off by} at a state, of the outputs where that is not 0, as dt tends to 0.
 
         Not 0 is what has a digit that rounding cannot have made, whatever its unit.
 
@@ -116,7 +129,7 @@ class Verdict:
         Returns
         -------
         dict of str to float
-            Empty where nothing is too much.
+            Empty where nothing is off.
 
         Raises
         ------
@@ -143,44 +156,64 @@ class Verdict:
         if not self.excess:
             return self.summary
         called = Names(self.graph, self.names)
-        where = _listed([f"{called.shown(name)}={value:g}" for name, value in self.at.items()])
-        lines = [f"{_DIFFERS}. Too much in it{where and f' at {where}'}:"]
-        width = max([len(called.shown(name)) for name in self.excess])
-        lines += [f"  {called.shown(name):<{width}}  {each}" for name, each in [*self.excess.items()][:SHOWN]]
+        where = _listed([f"{self.names.get(name, name)}={value:g}" for name, value in self.at.items()])
+        lines = [f"{HOW[self.formulation]}, the torque is wrong at every dt, however small. At {where}:"]
+        for name, each in [*self.excess.items()][:SHOWN]:
+            values = f"{each.torque:.6g}, by the chain rule {each.right:.6g}"
+            lines.append(f"  {called.shown(name)} is {values}: off by {each}")
         lines += [f"  and {len(self.excess) - SHOWN} more"] if len(self.excess) > SHOWN else []
-        return "\n".join([*lines, *[self._blamed(called)] * bool(self.edges), *[self.lacking] * bool(self.missing)])
+        more = self.why, self._spurious(called) if self.edges else "", self.lacking
+        return "\n".join([*lines, *filter(None, more)])
 
     @property
     def summary(self) -> str:
         """The verdict in a sentence, without numbers of a state."""
+        begin = f"{HOW[self.formulation]}, the torque is"
         if not self.differs:
-            return f"Holds: this is the torque of the chain rule: {self.reason}."
+            return f"{begin} right: {self.reason}."
         if not self.excess:
-            return f"This is not shown to be the torque of the chain rule: {self.reason}."
+            return f"{begin} not shown to be right: {self.reason}."
         called = Names(self.graph, self.names)
-        terms = [f"{called.shown(name)} has {each.symbol}" for name, each in self.excess.items()]
-        terms = [
-            f"{term}{each.formula and f' = {each.formula}'}"
-            for term, each in zip(terms, self.excess.values(), strict=True)
-        ]
-        return f"{_DIFFERS}: {_listed(terms)} too much."
+        names, terms = [called.shown(name) for name in self.excess], list(self.excess.values())
+        if len(terms) > 1:
+            off = f"{_listed(names)} are off, each by its {terms[0].symbol.partition('.')[0]}"
+        else:
+            off = f"{names[0]} is off by {terms[0].symbol}{terms[0].formula and f' = {terms[0].formula}'}"
+        return f"{begin} wrong at every dt, however small: {off}."
+
+    @property
+    def why(self) -> str:
+        """Sentences on why it differs; empty where it does not."""
+        if not self.excess:
+            return ""
+        slope = next(iter(self.excess.values())).symbol.partition(".")[0].strip("()")
+        return (
+            f"Why: the derivative by qd went through {_step(slope)} as well. It adds dt {slope} to the momentum and "
+            f"so, at every dt, {slope} to its rate, which cancels the -{slope} of Lagrange's equation."
+        )
 
     @property
     def lacking(self) -> str:
-        """Sentence on right terms that the wrong one has cancelled; empty where there are none."""
+        """Sentence on right terms that the spurious one has cancelled; empty where there are none."""
         if not self.missing:
             return ""
         called = Names(self.graph, self.names)
         outputs, terms = (_listed(each) for each in (map(called.shown, self.missing), map(str, self.missing.values())))
-        return f"In {outputs} this cancels a right term, and no edge is left to be marked. Missing: {terms}."
+        verb = "are" if len(self.missing) > 1 else "is"
+        return (
+            f"In {outputs} nothing spurious is left to be marked: a right term is gone with it. {terms} {verb} missing."
+        )
 
-    def _blamed(self, called: Names) -> str:
+    @property
+    def explanation(self) -> str:
+        """Sentences that follow the summary: why it differs, and how much of the graph is spurious; else empty."""
+        spurious = spurious_text(len(self.graph.nodes), len(self.nodes), len(self.edges))
+        return " ".join(filter(None, (self.why, f"{spurious}." if self.edges else "", self.lacking)))
+
+    def _spurious(self, called: Names) -> str:
         edges = [edge for edge in self.graph.edges if edge in self.edges]
         texts = _listed([f"{called.text(edge.source)} -> {called.text(edge.target)}" for edge in edges])
-        count = len(self.nodes)
-        alone = f"with {count} of {len(self.graph.nodes)} nodes, which serve{'s' * (count == 1)} nothing else"
-        what = "this edge" if len(edges) == 1 else f"these {len(edges)} edges"
-        return f"There by mistake: {what}, {alone if count else 'and no node by itself'}: {texts}."
+        return f"{spurious_text(len(self.graph.nodes), len(self.nodes), len(edges))}: {texts}."
 
     def to_dict(self) -> dict[str, Json]:
         """The verdict for JSON; nodes are numbered as in `graph.nodes`, an edge is [source, target, argument slot]."""
@@ -225,18 +258,24 @@ def formulation_verdict(model: Model, formulation: str = "by_definition") -> Ver
     >>> verdict.differs, verdict.excess["tau0"].formula
     (True, 'qd.y')
     >>> print(dyn.formulation_verdict(dyn.scenes.load("spring_mass"), "kinetic_only"))
-    Holds: this is the torque of the chain rule: dK/dq is 0, so nothing comes through q = qd dt + q_old.
+    Kinetic only, the torque is right: the mass matrix does not depend on q, dK/dq is 0, and the derivative through q \
+= qd dt + q_old adds nothing.
     """
     system, names = as_system(model), display_names(model)
     formulation = formulation_name(formulation)
     graph = inverse_dynamics(model, formulation)
     if formulation not in THROUGH_STEP:
-        return Verdict(formulation, graph, reason="no derivative in it is taken through a step of time", names=names)
-    terms, quasi = _terms(system, formulation), system.kinematics.quasi is not None
-    slope = f"{'G^T ' * quasi}{'dL/dq' if formulation == 'by_definition' else 'dK/dq'}"
+        return Verdict(
+            formulation, graph, reason="every derivative in it is taken at independent q and qd", names=names
+        )
+    terms, slope = _terms(system, formulation), f"d{ENERGIES[formulation]}/dq"
+    if system.kinematics.quasi is not None:
+        slope = f"G^T {slope}"
     alike = Verdict(formulation, graph, names=names, terms=terms)
     if all([node.value == 0.0 for node in terms.outputs.values()]):
-        return replace(alike, reason=f"{slope} is 0, so nothing comes through q = qd dt + q_old")
+        free = "L does not depend on q" if formulation == "by_definition" else "the mass matrix does not depend on q"
+        reason = f"{free}, {slope} is 0, and the derivative through {_step(slope)} adds nothing"
+        return replace(alike, reason=reason)
     at, finite = _state(system, alike)
     if not finite:
         reason = f"{slope} is finite at none of the {STATES} states tried"
@@ -245,26 +284,49 @@ def formulation_verdict(model: Model, formulation: str = "by_definition") -> Ver
     if not values:
         reason = f"{slope} is 0 to rounding at all {finite} states tried, though its form does not prove it"
         return replace(alike, proved=False, reason=reason)
-    nodes, edges, cancelled = blame(system, formulation, torques, graph)
+    marked = split(system, formulation, torques)
+    found = blame(system, formulation, torques, graph, marked)
+    wrong, right = (_torques(marked, at, through) for through in (1.0, 0.0))
     called = Names(terms, names)
 
     def term(name: str, sign: int) -> Excess:
         node, velocity = terms.outputs[name], system.velocities[int(name.removeprefix("tau"))]
-        symbol = f"{'-' * (sign < 0)}{f'({slope})' if quasi else slope}.{velocity}"
+        symbol = f"{'-' * (sign < 0)}{slope if slope[0] == 'd' else f'({slope})'}.{velocity}"
         with building(Builder()):
             text = called.text(node if sign > 0 else -node, FORMULA)
-        return Excess(symbol, "" if "%" in text or "?" in text else text, sign * values[name])
+        formula = "" if "%" in text or "?" in text else text
+        return Excess(symbol, formula, sign * values[name], wrong[name], right[name])
 
-    used = {node.name for node in Graph(terms.inputs, {name: terms.outputs[name] for name in values}).nodes}
+    off = Graph(graph.inputs, {name: graph.outputs[name] for name in values}).nodes
+    used = {str(node.name).removesuffix("_old") for node in off if not node.args}
     return replace(
         alike,
         differs=True,
         excess={name: term(name, 1) for name in values},
-        missing={name: term(name, -1) for name in values if name in cancelled},
-        at={name: at[name] for name in terms.input_names if name in used},
-        nodes=nodes,
-        edges=edges,
+        missing={name: term(name, -1) for name in values if name in found.cancelled},
+        at={name: number for name, number in at.items() if name in used},
+        nodes=found.nodes,
+        edges=found.edges,
     )
+
+
+def spurious_text(nodes: int, spurious: int, edges: int) -> str:
+    """Words on how many edges and nodes of a graph of so many nodes are spurious."""
+    serve = f"{spurious} of {counted(nodes, 'node')} that serve{'s' * (spurious == 1)} nothing else"
+    return f"Spurious in the graph: {counted(edges, 'edge')}, and {serve if spurious else 'no node'}"
+
+
+def _step(slope: str) -> str:
+    """The embedded relation, with G where there is one."""
+    return f"q = {'G ' * slope.startswith('G')}qd dt + q_old"
+
+
+def _torques(marked: Split, at: Mapping[str, float], through: float) -> dict[str, float]:
+    """The torques as dt tends to 0, with what comes through the step times a factor; what rounding alone made is 0."""
+    graph, given = marked.graph, {"dt": 0.0, str(marked.through.name): through}
+    known = {name: given[name] if name in given else at[name.removesuffix("_old")] for name in graph.input_names}
+    digits, values = extend.certain_digits(graph, known), graph.evaluate(known)
+    return {name: float(value) if digits[name] >= 1.0 else 0.0 for name, value in values.items()}
 
 
 def _terms(system: System, formulation: str) -> Graph:
@@ -284,7 +346,7 @@ def _state(system: System, verdict: Verdict) -> tuple[dict[str, float], int]:
     States are about the neutral one, always the same, of three digits, so that a person can type them again.
     """
     assert verdict.terms is not None
-    names = verdict.terms.input_names
+    names, accelerations = verdict.terms.input_names, [str(node.name) for node in system.qdd]
     rng, finite, at = np.random.default_rng(0), 0, dict[str, float]()
     neutral = {f"q{i}": number for i, number in enumerate(system.kinematics.neutral)}
     for k in range(STATES):
@@ -297,7 +359,10 @@ def _state(system: System, verdict: Verdict) -> tuple[dict[str, float], int]:
             finite += 1
             if verdict.excess_at(at):
                 break
-    return at, finite
+    drawn = np.random.default_rng(1).uniform(-1.0, 1.0, system.n)
+    qdd = {name: float(f"{x:.3g}") for name, x in zip(accelerations, drawn, strict=True)}
+    order = [*names[: system.nq + system.n], *qdd, *names[system.nq + system.n :]]
+    return {name: (at | qdd)[name] for name in order}, finite
 
 
 def _listed(texts: Iterable[str]) -> str:

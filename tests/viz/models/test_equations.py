@@ -68,8 +68,12 @@ def test_what_is_left_out_is_said_and_latex_has_every_block():
     "arguments, status, said",
     [
         ("equations spring_mass", 0, "tau.theta = I * qdd.theta + k * q.theta"),
-        ("equations spring_mass --formulation by_definition", 1, "This is not the torque of the chain rule"),
-        ("equations spring_mass --formulation euler_embedded --latex", 1, "% This is not the torque"),  # a former name
+        ("equations spring_mass --formulation by_definition", 1, "By definition, the torque is wrong"),
+        (
+            "equations spring_mass --formulation euler_embedded --latex",
+            1,
+            "% By definition, the torque is wrong",
+        ),  # a former name
         ("equations spring_mass --momentum", 0, "p_dot.theta = tau.theta - k * q.theta"),
     ],
 )

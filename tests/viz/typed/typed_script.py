@@ -29,7 +29,8 @@ function parsed(text) {
 const formulation = (system, name) => {
   const found = TYPED.verdict(system, name), { graph, nodes, differs, lines } = found;
   return { nodes: graph.nodes.length, edges: edges(graph), spurious: nodes.size, blamed: found.edges.length, differs,
-    lacking: found.lacking !== "", summary: found.summary, lines, lint: TYPED.lint(system, found), graph };
+    lacking: found.lacking !== "", off: found.off, words: [found.sentence, found.why], lines,
+    lint: TYPED.lint(system, found), graph };
 };
 /** Outputs of a graph at {input: number}, and the largest number on the way. */
 function outputsAt(graph, at) {
