@@ -31,10 +31,10 @@ if TYPE_CHECKING:
     from .equations.formulations.blame import spurious_nodes as spurious_nodes
     from .equations.formulations.formulation_sizes import formulation_sizes as formulation_sizes
     from .equations.formulations.formulations import (
-        FORMULATIONS as FORMULATIONS,
         inverse_dynamics as inverse_dynamics,
         momentum_rate as momentum_rate,
     )
+    from .equations.formulations.lagrange_terms import FORMULATIONS as FORMULATIONS
     from .equations.formulations.verdict import Verdict as Verdict, formulation_verdict as formulation_verdict
     from .equations.linearization.inverse_dynamics_derivatives import (
         inverse_dynamics_derivatives as inverse_dynamics_derivatives,

@@ -15,6 +15,7 @@ from typing import Protocol, TypeVar
 import cgraph as cg
 from cgraph import Graph, Node, extend
 
+from ..systems.display_names import display_names
 from ..systems.model import Model, as_system
 from ..systems.system import System
 
@@ -93,7 +94,8 @@ class Equation:
 
         def graph(model: Model) -> Graph:
             system = as_system(model)
-            return shortened(system, self._of(derivation)) if self.rewritten else self._of(derivation)(system)
+            graph = shortened(system, self._of(derivation)) if self.rewritten else self._of(derivation)(system)
+            return called(graph, model)
 
         update_wrapper(graph, derivation, ("__module__", "__name__", "__qualname__", "__doc__"))
         graph.__signature__ = signature(graph, follow_wrapped=False)  # type: ignore[attr-defined]
@@ -120,6 +122,11 @@ class Equation:
 
     def _of(self, derivation: Derivation) -> Callable[[System], Graph]:
         return lambda system: min([cg.simplify(self.graph(system, nodes)) for nodes in derivation(system)], key=_size)
+
+
+def called(graph: Graph, model: Model) -> Graph:
+    """The graph, which a notebook draws with the names that a person calls its inputs and outputs by."""
+    return extend.remarked(graph, lambda _: extend.Remarks(display_names(model)))
 
 
 def documented(

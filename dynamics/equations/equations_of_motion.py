@@ -12,7 +12,7 @@ from ..systems.model import Model, as_system
 from ..systems.system import System
 from .bias_terms import bias_terms, bias_terms_of_lagrangian
 from .constraints.constraints import require_no_constraints
-from .equation import Equation, Output, entries, mirrored, shortened
+from .equation import Equation, Output, called, entries, mirrored, shortened
 from .mass_matrix.accelerations import accelerations
 from .mass_matrix.mass_matrix_solve import inverse, mass_solve, smaller_solution
 from .substitute import substitute
@@ -199,4 +199,4 @@ def forward_dynamics(model: Model, method: str = "auto", *, check: bool = False)
         raise ValueError('check needs method="recursive" or "auto" where there are constraints, got "dense"')
     if method == "balanced":
         require_no_constraints(system)
-    return shortened(system, lambda form: accelerations(form, method, check))
+    return called(shortened(system, lambda form: accelerations(form, method, check)), model)

@@ -13,7 +13,7 @@ from ..systems.kinematics import ZERO
 from ..systems.model import Equations, Model, as_equations, as_system
 from ..systems.system import System
 from .constraints.constraints import leave_no_motion
-from .equation import Equation, Output
+from .equation import Equation, Output, called
 from .equations_of_motion import SOLUTIONS, forward_dynamics
 
 FORMS = ("velocity", "momentum")  # of a motion: states (q, qd) or (q, p)
@@ -54,7 +54,7 @@ def state_equation(model: Model, method: str = "auto") -> Graph:
     {'q0_dot': 2.0, 'qd0_dot': 2.0}
     """
     require_choice("method", method, SOLUTIONS)
-    return with_multipliers(as_equations(model), method)[0]
+    return called(with_multipliers(as_equations(model), method)[0], model)
 
 
 def with_multipliers(model: Equations, method: str = "auto") -> tuple[Graph, Graph | None]:

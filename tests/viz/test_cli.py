@@ -18,7 +18,7 @@ import cgraph as cg
 import dynamics as dyn
 import viz
 from dynamics import scenes
-from dynamics.equations.formulations import formulations
+from dynamics.equations.formulations import lagrange_terms
 from tests.each_row import each_row
 from tests.slow import slow
 from viz import cli
@@ -193,7 +193,7 @@ def test_every_command_is_in_the_help_and_has_help(capsys):
     assert {"inspect", "simulate", "animate", "lint", "why", "draw", "certify", "compare", "report"} <= set(taking)
     assert [name for name, said in taking.items() if IN_PYTHON not in said] == []
     assert list(FORMULATIONS) == sorted(dyn.FORMULATIONS)
-    assert FORMER_NAMES == formulations.FORMER_NAMES
+    assert FORMER_NAMES == lagrange_terms.FORMER_NAMES
     shown = {}
     for arguments in ([], *([name] for name in NAMES)):
         with pytest.raises(SystemExit) as stop:

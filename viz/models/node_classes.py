@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 
 from cgraph import Graph, Node
 from cgraph.extend import ADJOINT, TANGENT, topological
-from dynamics.equations.formulations.formulations import EULER, newton_euler
+from dynamics.equations.formulations.lagrange_terms import EULER, newton_euler
 from dynamics.equations.formulations.verdict import Verdict
 
 LEAVES, DAMPING = "inputs and numbers", "damping"

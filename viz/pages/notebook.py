@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from cgraph import Graph, Node
-from cgraph.extend import Array, counted, require_graph, topological
+from cgraph.extend import Array, counted, remarks_of, require_graph, topological
 
 from .. import theme
 from ..graph_drawing.dot import to_dot
@@ -33,6 +33,8 @@ class Rows(Protocol):
 def graph_html(graph: Graph) -> str:
     """The drawing of a graph, as wide as the cell at most; a large one folded by its tags, and the way to its page.
 
+    What is wrong in it, as whoever derived it knows, is painted, and said below.
+
     Raises RenderError where Graphviz is missing or does not end; the notebook shows the text form then.
     """
     require_graph("graph_html", graph)
@@ -42,8 +44,11 @@ def graph_html(graph: Graph) -> str:
     )
     if len(graph.nodes) > LARGE_GRAPH and not tags:
         return f"<p>{escape(repr(graph))}: {said}</p>"
-    svg = render_svg(to_dot(graph, collapse=tags), timeout=SECONDS)
-    note = f"<p>Folded by tags: {said}</p>" if tags else ""
+    known = remarks_of(graph)
+    drawing = to_dot(graph, names=known.names, marked=known.nodes, marked_edges=known.edges, collapse=tags)
+    svg = render_svg(drawing, timeout=SECONDS)
+    note = f"<p>{escape(known.words)}</p>" if known.words else ""
+    note += f"<p>Folded by tags: {said}</p>" if tags else ""
     return f'<div style="max-width:100%;overflow-x:auto;background:{theme.WHITE}">{_fitting(svg)}</div>{note}'
 
 

@@ -14,7 +14,7 @@ from cgraph.extend import Builder, folded, require_graph
 from ...systems.arguments import new_variables
 from ...systems.kinematics import ONE, ZERO
 from ...systems.system import System
-from .formulations import COUPLING, THROUGH_STEP
+from .lagrange_terms import COUPLING, THROUGH_STEP
 
 Derive = Callable[[System, str, Node], Graph]
 

@@ -12,7 +12,8 @@ from ...systems.model import Model, as_system
 from ...systems.system import System
 from ..equation import documented
 from .blame import Blame, blame
-from .formulations import inverse_dynamics, momenta, momentum_rate, torques
+from .formulations import inverse_dynamics, momentum_rate
+from .lagrange_terms import momenta, torques
 from .verdict import formulation_verdict
 
 PAPER = ("by_definition", "kinetic_only", "chain_rule")  # of Figures 1 to 3, in this order

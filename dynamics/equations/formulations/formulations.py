@@ -1,135 +1,21 @@
-"""The formulations of Lagrange's equation as graphs: by definition, kinetic only, by the chain rule, by velocities.
+"""The formulations of Lagrange's equation as graphs of a model: its torques, and the inertial term alone.
 
 Equations and figures named here are those of T. Kusaka and T. Tanaka, Robotics 2025, 14(9), 115.
 """
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable, Collection, Mapping, Sequence
-from typing import NamedTuple
+from functools import partial
 
 import cgraph as cg
-from cgraph import Graph, Node
-from cgraph.extend import TANGENT, Builder, building, cotangents, require_choice, require_flag, tangents
+from cgraph import Graph
+from cgraph.extend import remarked, require_flag
 
-from ...systems.kinematics import ONE, ZERO
 from ...systems.model import Model, as_system
 from ...systems.system import System
-from ..bias_terms import along_motion, bias_terms, state_rate
-from ..equation import LARGEST_REWRITTEN, Equation, Output, shortened
-from ..substitute import substitute
-
-EULER = "euler"  # tag of the embedded relations q = qd dt + q_old and qd = qdd dt + qd_old
-COUPLING = "q of qd"  # tag of the product qd dt in the first of them, through which dL/dqd reaches dL/dq
-LAGRANGIAN = "lagrangian"  # tag of what the author left untagged: derivatives of it would take a relation's tag instead
-
-
-class LagrangeTerms(NamedTuple):
-    """The two terms of tau = d/dt dL/dqd - dL/dq as one formulation writes them, and the state they are taken at."""
-
-    inputs: list[Node]
-    q: list[Node]
-    qd: list[Node]
-    momentum: list[Node] | None  # p = dL/dqd; None where it is not formed, but the two terms below are at fixed z
-    momentum_rate: list[Node]  # d/dt dL/dqd
-    gradient: list[Node]  # dL/dq; of quasi-velocities G^T dL/dq - ad(qd; p)
-
-
-def chain_rule(system: System) -> LagrangeTerms:
-    """Section 3: d/dt p = grad_x p . xdot for p = dL/dqd, x = (q, qd), contracted: one reverse sweep, one forward."""
-    momentum, rate, gradient = lagrange_sweeps(system, system.lagrangian, Builder())
-    return LagrangeTerms([*system.q, *system.qd, *system.qdd], system.q, system.qd, momentum, rate, gradient)
-
-
-def lagrange_sweeps(system: System, lagrangian: Node, build: Builder) -> tuple[list[Node], list[Node], list[Node]]:
-    """p = dL/dqd, d/dt p and dL/dq of a Lagrangian or a part of it."""
-    # The reverse sweep over L gives both dL/dq and p = dL/dqd; q and qd are independent inputs (Section 2.2).
-    bars = cotangents({lagrangian: ONE}, [*system.q, *system.qd], build)
-    momentum = bars[system.nq :]
-    gradient = system.kinematics.slopes(bars[: system.nq], momentum, build)
-    # Eq. (4) with y = p: a forward sweep along xdot = (qd, qdd) is the product grad_x p . xdot, never written out.
-    return momentum, along_motion(system, momentum, build, system.qdd), gradient
-
-
-def chain_rule_literal(system: System) -> LagrangeTerms:
-    """Eq. (4) read literally: the 2n partials of each momentum, a reverse sweep each, then products with xdot."""
-    bars = cotangents({system.lagrangian: ONE}, [*system.q, *system.qd])
-    momentum = bars[system.nq :]
-    gradient = system.kinematics.slopes(bars[: system.nq], momentum, Builder())
-    x_dot = state_rate(system, system.qdd)
-    rate = []
-    for p in momentum:
-        partials = cotangents({p: ONE}, list(x_dot))  # grad_x p, 2n nodes
-        with building(Builder()) as labelled:
-            labelled(p.label.derived(TANGENT))
-            total = ZERO
-            for partial, dot in zip(partials, x_dot.values(), strict=True):
-                total = total + partial * dot
-        rate.append(total)
-    return LagrangeTerms([*system.q, *system.qd, *system.qdd], system.q, system.qd, momentum, rate, gradient)
-
-
-def by_definition(system: System) -> LagrangeTerms:
-    """The definition, eq. (3) and Figure 1: dL/dqd is taken through q = qd dt + q_old, which is wrong."""
-    return _embedded(system, system.lagrangian)
-
-
-def kinetic_only(system: System) -> LagrangeTerms:
-    """Figure 2: the same embedding with K in place of L in the velocity derivative; right where K is free of q."""
-    return _embedded(system, system.kinetic)
-
-
-def kinetic_only_exact(system: System) -> LagrangeTerms:
-    """Kinetic only, exact: dK/dqd is taken at independent q and qd, and only then is the relation embedded.
-
-    d/dt goes through each embedded quantity at its own rate, qd of q and qdd of qd, not through dt, along which q would
-    move at qd + qdd dt.
-    """
-    momentum = cotangents({system.kinetic: ONE}, system.qd)
-    embedding = _Embedding(system)
-    lagrangian, *embedded = embedding.embed(system.lagrangian, *momentum)
-    gradient = cotangents({lagrangian: ONE}, embedding.q)
-    rates = [*embedding.embed(*system.q_dot), *system.qdd]
-    x_dot = dict(zip([*embedding.q, *embedding.qd], rates, strict=True))
-    return embedding.terms(embedded, gradient, x_dot)
-
-
-def newton_euler(system: System) -> LagrangeTerms:
-    """Newton's and Euler's equations of bodies; of any Lagrangian the same, d/dt dL/dz at its velocity nodes z.
-
-    tau = (dz/dqd)^T d/dt dL/dz - dL/dq at fixed z: what d/dt dL/dqd and dL/dq have in common is never formed. Slopes
-    dz/dqd are the partial velocities of T. R. Kane and D. A. Levinson, "Dynamics: Theory and Applications" (1985); of
-    bodies the forces at z are those of J. Y. S. Luh, M. W. Walker, R. P. C. Paul, "On-line computational scheme for
-    mechanical manipulators", J. Dyn. Sys. Meas. Control 102(2), 1980.
-    """
-    free = system.without_constraints  # whose tags shared nodes would have
-    terms = bias_terms(free, system.qdd)
-    forces = cotangents(terms.inertial, system.qd, Builder())
-    return LagrangeTerms([*system.q, *system.qd, *system.qdd], system.q, system.qd, None, forces, terms.gradient)
-
-
-FORMULATIONS: dict[str, Callable[[System], LagrangeTerms]] = {
-    formulation.__name__: formulation
-    for formulation in (chain_rule, chain_rule_literal, by_definition, kinetic_only, kinetic_only_exact, newton_euler)
-}
-"""Formulations of Lagrange's equation by name, right and wrong ones: what `inverse_dynamics` takes."""
-FORMER_NAMES = {"euler_embedded": "by_definition"}  # as versions before this one called them
-INERTIAL = tuple([name for name in FORMULATIONS if name != newton_euler.__name__])  # those that form d/dt dL/dqd
-SMALL = (chain_rule.__name__, newton_euler.__name__)  # right ones, of which the other may be the smaller
-THROUGH_STEP: dict[str, Callable[[System], Node]] = {
-    "by_definition": lambda system: system.lagrangian,
-    "kinetic_only": lambda system: system.kinetic,
-}  # the formulations that differentiate by qd through q = qd dt + q_old, and what they differentiate
-
-
-def formulation_name(name: str, among: Collection[str] = FORMULATIONS) -> str:
-    """The name of a formulation, checked; a former name is taken for the present one, with a warning."""
-    if isinstance(name, str) and name in FORMER_NAMES:
-        present = FORMER_NAMES[name]
-        warnings.warn(f"the formulation {name!r} is called {present!r} now", FutureWarning, stacklevel=3)
-        name = present
-    return require_choice("formulation", name, among)
+from ..equation import LARGEST_REWRITTEN, Equation, Output
+from .lagrange_terms import INERTIAL, chain_rule, finished, formulation_name, momenta, newton_euler, torques
+from .verdict import remarks
 
 
 @Equation("q qd qdd", Output("tau{}", ("n",), "N m or N")).describes
@@ -171,51 +57,11 @@ def inverse_dynamics(model: Model, formulation: str | None = None, *, simplify: 
     require_flag("simplify", simplify)
     if formulation is None:
         formulation, graph = _smaller(system)
-        return graph if simplify else torques(system, formulation)
-    return _finished(system, formulation) if simplify else torques(system, formulation)
-
-
-def _finished(system: System, formulation: str) -> Graph:
-    """Inverse dynamics by one formulation, simplified, and of the `SMALL` ones shortened."""
-    if formulation in SMALL:
-        return shortened(system, lambda form: cg.simplify(torques(form, formulation)))
-    return cg.simplify(torques(system, formulation))
-
-
-def _smaller(system: System) -> tuple[str, Graph]:
-    """Name of the `SMALL` formulation whose finished graph is the smaller, and this graph.
-
-    Of bodies the chain rule gave it in none of 1600 random trees beyond 58 nodes, unless most joints are slides, which
-    take 7 nodes each; so for large graphs, which take long, it is not asked.
-    """
-    by_velocities = newton_euler.__name__, _finished(system, newton_euler.__name__)
-    if system.body_terms is not None and len(by_velocities[1].nodes) > max(LARGEST_REWRITTEN, 10 * system.n):
-        return by_velocities
-    by_state = chain_rule.__name__, _finished(system, chain_rule.__name__)
-    return min(by_state, by_velocities, key=lambda pair: size(pair[1]))
-
-
-def size(graph: Graph) -> tuple[int, int]:
-    """Nodes, then edges: by which of two graphs of the same torques the smaller is taken."""
-    return len(graph.nodes), len(graph.edges)
-
-
-def torques(system: System, formulation: str = "chain_rule", through: Node = ONE) -> Graph:
-    """Inverse dynamics from the Lagrangian as it is written, not simplified. Raises as `inverse_dynamics`.
-
-    through: a factor of what `THROUGH_STEP` lets through q = qd dt + q_old; an input of the graph if it is a variable.
-    """
-    terms = _lagrange_terms(system, formulation, through)
-    applied = _forces(system, terms)
-    build = Builder()
-    outputs = {}
-    with building(build):
-        for i in range(system.n):
-            tau = terms.momentum_rate[i] - terms.gradient[i]
-            with cg.tag("damping"):
-                tau = tau + system.damping[i] * terms.qd[i]
-            outputs[f"tau{i}"] = tau - applied[i]
-    return system.graph(outputs, terms.inputs, [through] if through is not ONE else [])
+    elif simplify:
+        graph = finished(system, formulation)
+    if not simplify:
+        graph = torques(system, formulation)
+    return remarked(graph, partial(remarks, model, formulation, torques))
 
 
 @Equation("q qd qdd", Output("p{}_dot", ("n",), "N m or N")).describes
@@ -249,78 +95,26 @@ def momentum_rate(
     >>> dyn.momentum_rate(spring).evaluate({"q0": 1.0, "qd0": 2.0, "qdd0": 3.0})  # the spring has no part in it
     {'p0_dot': 12.0}
     """
-    graph = momenta(as_system(model), formulation, keep_momentum=require_flag("keep_momentum", keep_momentum))
-    return cg.simplify(graph) if require_flag("simplify", simplify) else graph
-
-
-def momenta(system: System, formulation: str, through: Node = ONE, *, keep_momentum: bool = True) -> Graph:
-    """The inertial term, with or without the momenta, as derived.  through: as of `torques`."""
     formulation = formulation_name(formulation, INERTIAL)
-    terms = _lagrange_terms(system, formulation, through)
-    outputs = {f"p{i}": p for i, p in enumerate(terms.momentum or ())} if keep_momentum else {}
-    outputs |= {f"p{i}_dot": rate for i, rate in enumerate(terms.momentum_rate)}
-    return system.graph(outputs, terms.inputs, [through] if through is not ONE else [])
+    derive = partial(momenta, keep_momentum=require_flag("keep_momentum", keep_momentum))
+    graph = derive(as_system(model), formulation)
+    graph = cg.simplify(graph) if require_flag("simplify", simplify) else graph
+    return remarked(graph, partial(remarks, model, formulation, derive))
 
 
-def _lagrange_terms(system: System, formulation: str, through: Node = ONE) -> LagrangeTerms:
-    if through is not ONE:
-        return _embedded(system, THROUGH_STEP[formulation](system), through)
-    return FORMULATIONS[formulation_name(formulation)](system)
+def _smaller(system: System) -> tuple[str, Graph]:
+    """Name of the `SMALL` formulation whose finished graph is the smaller, and this graph.
 
-
-def _forces(system: System, terms: LagrangeTerms) -> list[Node]:
-    """The system's forces at the state of the terms: itself, or the embedded one."""
-    if terms.q is system.q:
-        return list(system.forces)
-    return substitute(system.forces, dict(zip([*system.q, *system.qd], [*terms.q, *terms.qd], strict=True)))
-
-
-class _Embedding:
-    """The Euler relation of Section 2.1 as nodes: the state after a step from variables of the state before it."""
-
-    def __init__(self, system: System) -> None:
-        self.system = system
-        self.dt = cg.variable("dt")
-        q_old = cg.variables([f"q{i}_old" for i in range(system.nq)])
-        qd_old = cg.variables([f"qd{i}_old" for i in range(system.n)])
-        self.inputs = [*q_old, *qd_old, *system.qdd, self.dt]
-        q_dot = system.q_dot  # kept by the system once they are made: not in here, where they would be tagged
-        with cg.tag(EULER):
-            self.qd = [
-                cg.with_name(a * self.dt + old, f"qd{i}")
-                for i, (a, old) in enumerate(zip(system.qdd, qd_old, strict=True))
-            ]
-            rates = substitute(q_dot, dict(zip([*system.q, *system.qd], [*q_old, *self.qd], strict=True)))
-            with cg.tag(COUPLING):
-                moved = [rate * self.dt for rate in rates]
-            self.q = [cg.with_name(m + old, f"q{i}") for i, (m, old) in enumerate(zip(moved, q_old, strict=True))]
-
-    def embed(self, *nodes: Node) -> list[Node]:
-        """Nodes over (q, qd) as nodes over the embedded state, all of them with tags."""
-        state = dict(zip([*self.system.q, *self.system.qd], [*self.q, *self.qd], strict=True))
-        return substitute(nodes, state, LAGRANGIAN)
-
-    def terms(
-        self, momentum: Sequence[Node], gradient: list[Node], x_dot: Mapping[Node, Node] | None = None
-    ) -> LagrangeTerms:
-        """d/dt as the derivative with respect to dt, or along `x_dot`; and to t if the Lagrangian has it."""
-        time = {self.system.t: ONE} if self.system.t in self.system.extra_inputs else {}
-        dots = tangents({**(x_dot or {self.dt: ONE}), **time}, momentum)
-        rate = [dots.get(p, ZERO) for p in momentum]
-        slopes = self.system.kinematics.slopes(gradient, momentum, Builder())
-        if self.system.kinematics.quasi is not None:
-            slopes = self.embed(*slopes)
-        return LagrangeTerms(self.inputs, self.q, self.qd, list(momentum), rate, slopes)
-
-
-def _embedded(system: System, energy: Node, through: Node = ONE) -> LagrangeTerms:
-    """d/dt of d(energy)/dqd with the Euler relation in the graph, the middle of eq. (3), and dL/dq.
-
-    through: a factor of all that comes through q: 1 in the formulation, and at 0 the momentum is the right one.
+    Of bodies the chain rule gave it in none of 1600 random trees beyond 58 nodes, unless most joints are slides, which
+    take 7 nodes each; so for large graphs, which take long, it is not asked.
     """
-    embedding = _Embedding(system)
-    lagrangian, energy = embedding.embed(system.lagrangian, energy)
-    factors = dict.fromkeys(embedding.q, through)
-    momentum = cotangents({energy: ONE}, embedding.qd, through=factors)  # through q as well: the unwanted coupling
-    gradient = cotangents({lagrangian: ONE}, embedding.q)
-    return embedding.terms(momentum, gradient)
+    by_velocities = newton_euler.__name__, finished(system, newton_euler.__name__)
+    if system.body_terms is not None and len(by_velocities[1].nodes) > max(LARGEST_REWRITTEN, 10 * system.n):
+        return by_velocities
+    by_state = chain_rule.__name__, finished(system, chain_rule.__name__)
+    return min(by_state, by_velocities, key=lambda pair: size(pair[1]))
+
+
+def size(graph: Graph) -> tuple[int, int]:
+    """Nodes, then edges: by which of two graphs of the same torques the smaller is taken."""
+    return len(graph.nodes), len(graph.edges)

@@ -9,20 +9,32 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from cgraph import Edge, Graph, Node, extend
-from cgraph.extend import Builder, Names, building, cotangents, counted, folded, require_mapping, shortened
+from cgraph.extend import (
+    Builder,
+    Names,
+    Remarks,
+    building,
+    cotangents,
+    counted,
+    folded,
+    remarked,
+    require_mapping,
+    shortened,
+)
 
 from ...systems.display_names import display_names
 from ...systems.kinematics import ONE
 from ...systems.model import Model, as_system
 from ...systems.system import System
 from ..equation import documented
-from .blame import Split, blame, split
-from .formulations import THROUGH_STEP, formulation_name, inverse_dynamics, torques
+from .blame import Derive, Split, blame, split
+from .lagrange_terms import THROUGH_STEP, finished, formulation_name, torques
 
 if TYPE_CHECKING:
     from cgraph.extend import Json
@@ -68,7 +80,7 @@ class Verdict:
     formulation : str
         One of `FORMULATIONS`.
     graph : Graph
-        `inverse_dynamics` by it.
+        `inverse_dynamics` by it, which a notebook paints.
     differs : bool
         Whether there are states at which it is another torque than that of the chain rule, at every dt.
     proved : bool
@@ -215,6 +227,9 @@ every dt, dL/dq to its rate, which cancels the -dL/dq of Lagrange's equation.
         texts = _listed([f"{called.text(edge.source)} -> {called.text(edge.target)}" for edge in edges])
         return f"{spurious_text(len(self.graph.nodes), len(self.nodes), len(edges))}: {texts}."
 
+    def _repr_html_(self) -> str:
+        return f"{extend.html_lines(str(self))}{extend.render_html('graph', self.graph) or ''}"
+
     def to_dict(self) -> dict[str, Json]:
         """The verdict for JSON; nodes are numbered as in `graph.nodes`, an edge is [source, target, argument slot]."""
         number = {node: i for i, node in enumerate(self.graph.nodes)}
@@ -263,7 +278,7 @@ def formulation_verdict(model: Model, formulation: str = "by_definition") -> Ver
     """
     system, names = as_system(model), display_names(model)
     formulation = formulation_name(formulation)
-    graph = inverse_dynamics(model, formulation)
+    graph = remarked(finished(system, formulation), partial(remarks, model, formulation, torques))
     if formulation not in THROUGH_STEP:
         return Verdict(
             formulation, graph, reason="every derivative in it is taken at independent q and qd", names=names
@@ -308,6 +323,16 @@ def formulation_verdict(model: Model, formulation: str = "by_definition") -> Ver
         nodes=found.nodes,
         edges=found.edges,
     )
+
+
+def remarks(model: Model, formulation: str, derive: Derive, graph: Graph) -> Remarks:
+    """What a notebook shows of a graph of torques or momenta by a formulation: the verdict's words, nodes and edges."""
+    verdict, names = formulation_verdict(model, formulation), display_names(model)
+    if not verdict.differs:
+        return Remarks(names, verdict.summary if verdict.terms is not None else "")
+    nodes, edges, _ = blame(as_system(model), formulation, derive, graph)
+    spurious = f"{spurious_text(len(graph.nodes), len(nodes), len(edges))}." if edges else verdict.lacking
+    return Remarks(names, f"{verdict.summary} {spurious}", nodes, edges)
 
 
 def spurious_text(nodes: int, spurious: int, edges: int) -> str:

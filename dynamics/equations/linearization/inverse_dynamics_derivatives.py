@@ -12,7 +12,7 @@ from ...systems.body_terms import TorqueDerivatives
 from ...systems.kinematics import ONE
 from ...systems.system import System
 from ..equation import Equation, Output, entries, mirrored
-from ..formulations.formulations import torques
+from ..formulations.lagrange_terms import torques
 from ..substitute import substitute
 
 ROWS = ("n", "n")

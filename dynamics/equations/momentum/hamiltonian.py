@@ -11,7 +11,7 @@ from cgraph.extend import Builder, Order, building, cotangents, require_choice, 
 from ...systems.kinematics import ONE, ZERO
 from ...systems.model import Model, as_system
 from ...systems.system import System
-from ..equation import Equation, Output, shortened
+from ..equation import Equation, Output, called, shortened
 from .legendre import Legendre, dot
 
 ITERATIONS = 40  # Newton's, for a Lagrangian that is not quadratic in the velocities
@@ -71,7 +71,7 @@ def hamiltonian(model: Model, *, iterations: int = ITERATIONS, check: bool = Fal
         outputs = {"H": total} | (_missing(transform) if check else {})
         return cg.simplify(system.graph(outputs, system.q, p))
 
-    return shortened(as_system(model), derive)
+    return called(shortened(as_system(model), derive), model)
 
 
 @Equation("q p tau", Output("q{}_dot", ("nq",), "rad/s or m/s"), Output("p{}_dot", ("n",), "N m or N")).describes
@@ -116,7 +116,7 @@ def hamilton_equations(
     count = require_whole("iterations", iterations, 1)
     require_flag("check", check)
     order: Order = "balanced" if require_choice("method", method, get_args(Order)) == "balanced" else "recursive"
-    return shortened(as_system(model), lambda system: _equations(system, count, check, order))
+    return called(shortened(as_system(model), lambda system: _equations(system, count, check, order)), model)
 
 
 def velocities(system: System) -> Graph:

@@ -13,7 +13,7 @@ from ...systems.system import System
 from ..coriolis import coriolis_matrix, require_quadratic
 from ..equation import documented, mirrored
 from ..equations_of_motion import bias, gravity_force
-from ..formulations.formulations import lagrange_sweeps
+from ..formulations.lagrange_terms import lagrange_sweeps
 from .torque_table import TorqueTable
 
 _ENERGIES = {"kinetic", "potential"}

@@ -18,7 +18,8 @@ from cgraph.extend import (
     require_sequence,
 )
 
-from ...equations.formulations.formulations import SMALL, inverse_dynamics, size
+from ...equations.formulations.formulations import inverse_dynamics, size
+from ...equations.formulations.lagrange_terms import SMALL
 from ...systems.model import Model, as_system
 from ..trees.mechanism import as_mechanism
 from .switched_effects import EFFECTS as EFFECTS, absent_parts, has_effect, without_effect  # noqa: PLC0414 (public with `prune`)

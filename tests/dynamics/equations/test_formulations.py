@@ -4,7 +4,7 @@ from pytest import approx, mark, warns
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.equations.formulations.formulations import INERTIAL
+from dynamics.equations.formulations.lagrange_terms import INERTIAL
 from tests.dynamics.models import MODELS, before, error, random_arm, run, states
 from tests.formulations import SEEN, SMALL, WRONG
 

@@ -10,7 +10,7 @@ import cgraph as cg
 import dynamics as dyn
 from cgraph import structure_hash
 from dynamics import Body, Joint, Mechanism
-from dynamics.equations.formulations.formulations import SMALL
+from dynamics.equations.formulations.lagrange_terms import SMALL
 from dynamics.multibody.trees.mechanism import WORLD
 from tests.dynamics.mechanisms import (
     TREES as MODELS,

@@ -13,7 +13,7 @@ from pytest import approx, mark
 import cgraph as cg
 import dynamics as dyn
 from dynamics.equations.formulations.blame import blame
-from dynamics.equations.formulations.formulations import THROUGH_STEP, torques
+from dynamics.equations.formulations.lagrange_terms import THROUGH_STEP, torques
 from dynamics.equations.formulations.verdict import HOW
 from tests import high_precision
 from tests.slow import slow

@@ -5,7 +5,7 @@ from mpmath import mp, mpf
 from pytest import approx, mark
 
 import dynamics as dyn
-from dynamics.equations.formulations.formulations import INERTIAL
+from dynamics.equations.formulations.lagrange_terms import INERTIAL
 
 STATES = 200
 ROUNDING = 1e-13  # a dozen operations, relative to the largest term that is summed

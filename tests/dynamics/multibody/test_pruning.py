@@ -10,7 +10,7 @@ from pytest import approx, importorskip, mark, raises
 import cgraph as cg
 import dynamics as dyn
 from cgraph import structure_hash
-from dynamics.equations.formulations.formulations import torques
+from dynamics.equations.formulations.lagrange_terms import torques
 from dynamics.equations.mass_matrix.accelerations import accelerations
 from tests.dynamics.mechanisms import FAMILIES, random_inertia, random_rotation, turned_arm
 from tests.dynamics.models import error, run

@@ -11,7 +11,7 @@ from pytest import mark, raises
 import cgraph as cg
 import dynamics as dyn
 from dynamics import System
-from dynamics.equations.formulations.formulations import INERTIAL
+from dynamics.equations.formulations.lagrange_terms import INERTIAL
 from dynamics.io import mujoco_twin as mujoco_io
 
 

@@ -12,9 +12,12 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
+from cgraph.extend import remarks_of
+from viz import theme
 from viz.graph_drawing.render import LARGE_GRAPH
 from viz.pages.notebook import COLUMNS, graph_html, trajectory_html
 
+LINE = theme.MARKED.line.lower()
 EVIL = "<script>alert(1)</script>"
 
 
@@ -46,6 +49,7 @@ def results() -> dict[str, object]:
         "compiled": cg.compile(graph, "python"),
         "table": table,
         "table at a state": table.at([0.1, 0.2]),
+        "verdict": dyn.formulation_verdict(arm),
         "certificate": dyn.certify(dyn.scenes.load("spring_mass"), states=2),
     }
 
@@ -120,3 +124,22 @@ def test_a_graph_and_a_motion_find_what_draws_them():
     x = cg.variable("x")
     assert "<svg" in cg.Graph([x], {"y": x + 1.0})._repr_html_()
     assert "<svg" in dyn.simulate(dyn.planar_arm([1.0], [1.0]), [0.1], [0.0], 0.1)._repr_html_()
+
+
+@pytest.mark.parametrize("formulation", ["by_definition", "kinetic_only", "chain_rule"])
+def test_a_notebook_paints_what_the_verdict_blames_and_calls_coordinates_by_their_names(formulation):
+    scene = dyn.scenes.load("spring_mass")
+    verdict, graph = dyn.formulation_verdict(scene, formulation), dyn.inverse_dynamics(scene, formulation)
+    shown = graph_html(graph)
+    groups = re.findall(r'<g id="([^"]+)" class="(node|edge)">(.*?)</a>', shown, flags=re.DOTALL)
+    painted = {kind: [name for name, of, text in groups if of == kind and LINE in text] for kind in ("node", "edge")}
+    number = {node: i for i, node in enumerate(graph.nodes)}
+    known = remarks_of(graph)
+    assert len(known.nodes) == len(verdict.nodes)
+    assert {f"n{number[node]}" for node in known.nodes} == {
+        name for name in painted["node"] if name[0] == "n" and "-" not in name
+    }
+    assert {f"e{number[a]}-{number[b]}-{slot}" for a, b, slot in known.edges} <= set(painted["edge"])
+    assert bool(painted["edge"]) == verdict.differs
+    assert (f"<p>{verdict.summary}" in unescape(shown)) == (formulation != "chain_rule")
+    assert "q.theta" in shown

@@ -13,7 +13,7 @@ from hypothesis import given, settings, strategies as st
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.equations.formulations.formulations import torques
+from dynamics.equations.formulations.lagrange_terms import torques
 from tests.each_row import each_row
 from tests.strategies import examples
 from tests.viz.typed.typed_script import run_typed
