@@ -76,6 +76,7 @@ MOTION_WORDS = {  # what roles are in equations of motion that are solved, of ac
 }
 OUTPUT = Paint("output", WHITE, BLACK)
 COLLAPSED = Paint("collapsed part", tint(GRAY, 0.25), LINE)
+WRONG_OUTPUT = _paint("wrong result", SPURIOUS, 0.20)
 MARKED = _paint("spurious", SPURIOUS, 0.60)
 MARKS = (MARKED, _paint("marked", BLUE, 0.60))  # of several groups of marked nodes, the first and the second
 
@@ -140,11 +141,6 @@ _WORD = re.compile(r"(?<![A-Za-z0-9])([A-Za-z]+)([0-9]*)(?![A-Za-z0-9])")
 def pretty(name: str) -> str:
     """A name in mathematical letters: q0 is q₀, qdd1 is q̈₁, tau2 is τ₂, dL/dqd0 is dL/dq̇₀, and p0_dot is dp₀/dt."""
     return _WORD.sub(_pretty_word, _RATE.sub(r"d\1/dt", name))
-
-
-def called(names: Mapping[str, str]) -> dict[str, str]:
-    """Names such as those of `dynamics.display_names` as drawn: q̇.knee of qd.knee, dp/dt.knee of p_dot.knee."""
-    return {name: ".".join([pretty(kind), *rest]) for name, text in names.items() for kind, *rest in [text.split(".")]}
 
 
 def _pretty_word(match: re.Match[str]) -> str:

@@ -12,13 +12,15 @@ from ..core.node import Node
 class Remarks(NamedTuple):
     """Remarks on a graph.
 
-    names: {name in the graph: what a person calls it}.  words: a paragraph.  nodes, edges: to be painted as wrong.
+    names: {name in the graph: what a person calls it}.  words: a paragraph.  nodes, edges, and outputs by their names:
+    to be painted as wrong.
     """
 
     names: Mapping[str, str]
     words: str = ""
     nodes: Collection[Node] = frozenset()
     edges: Collection[Edge] = frozenset()
+    outputs: Collection[str] = ()
 
 
 def remarked(graph: Graph, remarks: Callable[[Graph], Remarks]) -> Graph:

@@ -27,11 +27,6 @@ def test_names_are_shown_in_mathematical_letters(name: str, shown: str) -> None:
     assert theme.pretty(name) == shown
 
 
-def test_rates_of_named_coordinates_are_shown_as_derivatives() -> None:
-    names = {"q0_dot": "q_dot.left knee", "qd0": "qd.left knee", "p0_dot": "p_dot.left knee"}
-    assert list(theme.called(names).values()) == ["dq/dt.left knee", "q̇.left knee", "dp/dt.left knee"]
-
-
 def test_different_names_of_the_dynamics_stay_different() -> None:
     names = [
         f"{word}{i}{end}" for word in ("q", "qd", "qdd", "tau", "p") for i in range(12) for end in ("", "_dot", "_bar")

@@ -236,7 +236,7 @@ def answer_and_draw(
     if not options.svg:
         answer(text)
         return
-    names = library.theme.called(dyn.display_names(scene))
+    names = dyn.display_names(scene)
     drawing = library.to_dot(graph, collapse=collapsed(graph), names=names, **marks)
     answer(text, {options.svg: library.render_svg(drawing)})
     say(f"drawn in {options.svg}")

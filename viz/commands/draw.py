@@ -44,7 +44,7 @@ def run(options: argparse.Namespace) -> None:
     verdict = verdict_of(options, scene)
     graph, what = equations_of(options, scene, verdict)
     caption = f"{scene.name}: {what}"
-    names = library.theme.called(dyn.display_names(scene))
+    names = dyn.display_names(scene)
     words = library.theme.MOTION_WORDS if options.momentum else {}
     drawn = (graph, kind, options.collapse, caption, names, words, verdict)
     content = _listed(graph, scene) if kind == ".txt" else _drawn(*drawn)
@@ -77,8 +77,16 @@ def _drawn(
         tags = [tag for each in collapse for tag in tags_of(each, graph)]
     legend = words or True
     wrong, edges = (verdict.nodes, verdict.edges) if verdict else (frozenset[cg.Node](), frozenset[cg.Edge]())
+    off = tuple(verdict.excess) if verdict else ()
     drawing = library.to_dot(
-        graph, marked=wrong, marked_edges=edges, names=names, collapse=tags, caption=caption, legend=legend
+        graph,
+        names=names,
+        marked=wrong,
+        marked_edges=edges,
+        wrong_outputs=off,
+        collapse=tags,
+        caption=caption,
+        legend=legend,
     )
     if kind == ".dot":
         return str(drawing.source)

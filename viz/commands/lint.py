@@ -91,6 +91,7 @@ def run(options: argparse.Namespace) -> int:
         .intersection(graph.nodes),
         marked_label="to blame",
         marked_edges=(verdict.edges | report.edges if verdict.differs else frozenset()) if verdict else report.edges,
+        wrong_outputs=tuple(verdict.excess) if verdict else (),
         caption=f"{scene.name}: {what}",
     )
     return 0 if ok and held.ok else 1

@@ -46,6 +46,7 @@ class _Subject:
     formulas: Mapping[Node, str]
     marks: Mapping[Node, Paint]
     marked_edges: frozenset[Edge]
+    wrong_outputs: frozenset[str]
     number: dict[Node, int]
     part: dict[Node, str]  # id of the collapsed box that a node is in
     listed: Names  # who has the %number of the listing
@@ -75,6 +76,7 @@ def plan_of(
     formulas: Mapping[Node, str],
     marks: Mapping[Node, Paint],
     marked_edges: frozenset[Edge],
+    wrong_outputs: frozenset[str],
     cluster_of: ClusterRule,
     collapse: tuple[str, ...],
 ) -> Plan:
@@ -83,7 +85,8 @@ def plan_of(
     strange = [node for node in marks if node not in number]
     if strange:
         raise ValueError(f"{len(strange)} of {len(marks)} marked nodes are not in the graph, such as {strange[0]!r}")
-    subject = _Subject(graph, names, formulas, marks, marked_edges, number, _parts(graph, collapse), Names(graph))
+    parts, listed = _parts(graph, collapse), Names(graph)
+    subject = _Subject(graph, names, formulas, marks, marked_edges, wrong_outputs, number, parts, listed)
     plan = Plan()
     plan.boxes.extend(_part_boxes(subject, collapse))
     for node in graph.nodes:
@@ -147,7 +150,8 @@ def _node_box(subject: _Subject, node: Node, box_id: str, cluster: str | None) -
 
 def _output_box(subject: _Subject, name: str, box_id: str) -> Box:
     about = f"output {name}, computed by {subject.told(subject.graph.outputs[name])}"
-    return Box(box_id, theme.OUTPUT, {**_OUTPUT, "label": subject.shown(name), "tooltip": about})
+    kind = theme.WRONG_OUTPUT if name in subject.wrong_outputs else theme.OUTPUT
+    return Box(box_id, kind, {**_OUTPUT, "label": subject.shown(name), "tooltip": about})
 
 
 def _weight(heavy: bool) -> Attributes:

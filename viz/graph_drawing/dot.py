@@ -38,6 +38,7 @@ def to_dot(
     marked: Collection[Node] | Mapping[str, Collection[Node]] = frozenset(),
     marked_label: str = theme.MARKED.words,
     marked_edges: Collection[Edge] = frozenset(),
+    wrong_outputs: Collection[str] = (),
     clusters: bool | Sequence[str] | ClusterRule = True,
     collapse: Sequence[str] = (),
     caption: str | None = None,
@@ -70,6 +71,8 @@ def to_dot(
         What the legend calls the marked nodes where there is one group.
     marked_edges : collection of Edge
         Edges to draw in the first color, too, such as those of a path or a cut.
+    wrong_outputs : collection of str
+        Names of outputs to draw in a tint of that color.
     clusters : bool, sequence of str, or function
         Frames around the nodes of a tag. True: by `main_tag`; tags: by these, a node with several of them in none;
         a function: the frame's title for a node, or None.
@@ -117,6 +120,7 @@ def to_dot(
         {} if formulas is None else require_mapping("formulas", formulas, "node: text"),
         _marks(marked, marked_label),
         frozenset(require_sequence("marked_edges", marked_edges, "edges", tuple)),
+        frozenset(require_sequence("wrong_outputs", wrong_outputs, "names", str)),
         _cluster_rule(clusters),
         require_sequence("collapse", collapse, "tags", str),
     )

@@ -7,7 +7,7 @@ from html import escape
 from string import Template
 
 from cgraph import Graph, Node, __version__
-from cgraph.extend import Array, Json, require_graph, require_mapping, require_sequence, require_texts
+from cgraph.extend import Array, Json, remarks_of, require_graph, require_mapping, require_sequence, require_texts
 
 from .. import theme
 from ..pages import html
@@ -52,14 +52,14 @@ def page(
     at : mapping of str to float or array (T,), optional
         {input: value}, or values along the motion: the one state of all versions. An input without a value is 0.5.
     marked : collection of Node
-        Nodes of one graph in the color of what is wrong.
+        Nodes of one graph in the color of what is wrong; by default what is known to be wrong in it.
     motion : Motion, optional
         Instants to play [s], and points that move beside the graph [m].
     tables : sequence of Table or StateTable
         Texts in rows, or numbers that follow the state, shown beside the graph.
     names : mapping of str to str, optional
         {name of an input, output or node: what a person calls it}, such as `dynamics.display_names(model)`. Tables and
-        panels show it, and boxes of small graphs; those of larger ones have letters, as q₀.
+        panels and boxes show it; without it boxes have letters, as q₀. By default what the graphs know of it.
     units : mapping of str to str, optional
         {name of an input or output: its unit}, shown beside the name.
     derived : Graph, optional
@@ -97,7 +97,7 @@ def page(
             raise TypeError(f"{what} of a page must be text, got {type(text).__name__}: {text!r:.60}")
     if at is not None:
         require_mapping("at", at, "input: value")
-    texts = require_texts("names", names), require_texts("units", units)
+    require_texts("names", names)
     nodes = frozenset(require_sequence("marked", marked, "nodes", Node))
     tables = require_sequence("tables", tables, "Table or StateTable", (Table, StateTable))
     notices = require_sequence("notices", notices, "texts", str)
@@ -112,10 +112,20 @@ def page(
         if not isinstance(motion, Motion):
             raise TypeError(f"motion must be a Motion, got {type(motion).__name__}: {motion!r:.60}")
         motion.check()
+    if names is None:
+        names = {name: text for version in versions for name, text in remarks_of(version.graph).names.items()}
     introduction = "" if isinstance(graph, Graph) else about
     data: dict[str, Json] = {"title": title, "introduction": introduction, "notices": list(notices)}
     live = [table for table in tables if isinstance(table, StateTable)]
-    data |= record(versions, motion, *texts, state=State(at or {}, derived), columns=columns, tables=live)
+    data |= record(
+        versions,
+        motion,
+        names,
+        require_texts("units", units),
+        state=State(at or {}, derived),
+        columns=columns,
+        tables=live,
+    )
     return compose(title, data, [table for table in tables if isinstance(table, Table)], panels)
 
 
@@ -143,7 +153,20 @@ def compose(title: str, data: Mapping[str, Json] | None, tables: Sequence[Table]
 def _versions(graph: Graph | Sequence[Version], about: str, marked: frozenset[Node]) -> list[Version]:
     """The versions to switch among, checked; a graph alone is one."""
     if isinstance(graph, Graph):
-        return [Version("graph", graph, about, marked)]
+        known = remarks_of(graph)
+        if marked or not known.outputs:
+            return [Version("graph", graph, about or known.words, marked)]
+        return [
+            Version(
+                "graph",
+                graph,
+                about or known.words,
+                known.nodes,
+                blamed=known.edges,
+                flawed=True,
+                off=known.outputs,
+            )
+        ]
     given: object = graph
     listed = isinstance(given, Sequence) and not isinstance(given, str)
     if not listed or not all(isinstance(each, Version) for each in graph):

@@ -64,7 +64,7 @@ def record(
     for table in tables:
         table.check(inputs)
     return {
-        "called": [[name, text] for name, text in theme.called(names or {}).items() if name in known],
+        "called": [[name, text] for name, text in (names or {}).items() if name in known],
         "units": [[name, text] for name, text in (units or {}).items() if name in known],
         "inputs": inputs,
         "rows": state.rows(inputs, len(motion.t) if motion else 1).tolist(),
@@ -102,9 +102,13 @@ def _motion(motion: Motion, letters: Letters) -> dict[str, Json]:
 
 
 def _letters(names: Mapping[str, str]) -> Letters:
-    """Label of a name in the picture: its display name, or letters where that is long."""
-    shown = {name: text for name, text in theme.called(names).items() if len(text) <= LONGEST_NAME}
-    return lambda name: shown.get(name) or theme.pretty(name)
+    """Label of a name in the picture: its display name, of a long one the ends; without one, its letters."""
+    return lambda name: _fitted(names[name]) if name in names else theme.pretty(name)
+
+
+def _fitted(text: str) -> str:
+    ends = LONGEST_NAME // 2
+    return text if len(text) <= LONGEST_NAME else f"{text[:ends]}…{text[1 - ends :]}"
 
 
 def _graph(graph: Graph, letters: Letters) -> dict[str, Json]:

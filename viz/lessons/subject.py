@@ -111,10 +111,10 @@ def _in_turn(values: Sequence[float], n: int) -> Array:
 
 
 def _letters(scene: Scene) -> dict[str, str]:
-    """Names in the letters of a textbook: those of the paper for one angle, else q with the coordinate's name."""
+    """Names in the paper's letters for one angle, else as everywhere."""
     if scene.coordinates == ("theta",):
         return dict(theme.ONE_JOINT)
-    return dict(theme.called(display_names(scene)))
+    return display_names(scene)
 
 
 def formula(graph: Graph, names: Mapping[str, str], lines: int = 12) -> str:

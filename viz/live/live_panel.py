@@ -60,18 +60,14 @@ class Live:
 
     def to_dict(self) -> dict[str, Json]:
         """Data for the script of the page."""
-        called = theme.called(self.names)
         return {
             "rate": base64.b64encode(cg.to_wasm(self.rate, self.methods, time=TIME)).decode(),
             "shown": base64.b64encode(cg.to_wasm(self.shown)).decode(),
             "shownCount": len(self.shown.outputs),
             "states": len(self.rate.outputs),
             "time": self.rate.input_names.index(TIME) if TIME in self.rate.input_names else -1,
-            "inputs": [self._input(name, called.get(name, name)) for name in self.rate.input_names],
-            "meters": [
-                {"called": theme.called({"": name})[""], "unit": unit, "group": group}
-                for name, unit, group in self.meters
-            ],
+            "inputs": [self._input(name, self.names.get(name, name)) for name in self.rate.input_names],
+            "meters": [{"called": name, "unit": unit, "group": group} for name, unit, group in self.meters],
             "energy": ENERGIES - 1,
             "parents": list(self.parents),
             "methods": list(self.methods),

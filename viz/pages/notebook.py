@@ -45,7 +45,14 @@ def graph_html(graph: Graph) -> str:
     if len(graph.nodes) > LARGE_GRAPH and not tags:
         return f"<p>{escape(repr(graph))}: {said}</p>"
     known = remarks_of(graph)
-    drawing = to_dot(graph, names=known.names, marked=known.nodes, marked_edges=known.edges, collapse=tags)
+    drawing = to_dot(
+        graph,
+        names=known.names,
+        marked=known.nodes,
+        marked_edges=known.edges,
+        wrong_outputs=known.outputs,
+        collapse=tags,
+    )
     svg = render_svg(drawing, timeout=SECONDS)
     note = f"<p>{escape(known.words)}</p>" if known.words else ""
     note += f"<p>Folded by tags: {said}</p>" if tags else ""

@@ -1,6 +1,5 @@
 // What the inspector is handed of a system: its graphs as viz/inspector/record.py describes them, one state, a motion.
 
-const KINDS = { q: "q", qd: "q\u0307", qdd: "q\u0308", tau: "τ" };
 const LONGEST = 24; // letters of a name for which a box has room
 
 /** A name in mathematical letters: theta1 is θ₁. */
@@ -21,7 +20,7 @@ function recordOf(system, motion, forward) {
   return {
     title: "Your Lagrangian", introduction: "",
     notices: noticesOf(system, motion),
-    called: [...calledOf(system)].filter(([name]) => known.has(name)),
+    called: [...displayNames(system)].filter(([name]) => known.has(name)),
     units: [["t", "s"], ["dt", "s"]].filter(([name]) => known.has(name)),
     inputs, rows: rowsOf(system, motion, inputs), columns: [], tables: [],
     derived: derived && listed(derived, letters),
@@ -39,16 +38,10 @@ function earlier({ q, qd, qdd }) {
   const dt = variable("dt"), back = (kind, from, rates) => from.map((x, i) => [`${kind}${i}_old`, sub(x, mul(dt, rates[i]))]);
   return graphOf([...q, ...qd, ...qdd, dt], new Map([...back("q", q, qd), ...back("qd", qd, qdd)]));
 }
-/** What a person calls the names of a graph: q̇.theta for qd0. */
-function calledOf(system) {
-  const shown = (text) => { const [kind, name] = text.split("."), [word, old] = kind.split("_"); return `${KINDS[word] ?? word}${old ? `_${old}` : ""}.${name}`; };
-  const more = system.coordinates.map((name, i) => [`qdd${i}`, `qdd.${name}`]);
-  return new Map([...displayNames(system), ...more].map(([name, text]) => [name, shown(text)]));
-}
-/** What the picture shows of a name: what a person calls it, or letters where that is long. */
+/** What the picture shows of a name: what a person calls it, of a long one the ends; without one, its letters. */
 function lettersOf(system) {
-  const called = calledOf(system);
-  return (name) => (called.get(name)?.length <= LONGEST ? called.get(name) : pretty(name));
+  const called = displayNames(system), ends = LONGEST / 2, whole = (text) => (text.length <= LONGEST ? text : `${text.slice(0, ends)}…${text.slice(1 - ends)}`);
+  return (name) => (called.has(name) ? whole(called.get(name)) : pretty(name));
 }
 
 function listed(graph, letters) {

@@ -332,7 +332,10 @@ def remarks(model: Model, formulation: str, derive: Derive, graph: Graph) -> Rem
         return Remarks(names, verdict.summary if verdict.terms is not None else "")
     nodes, edges, _ = blame(as_system(model), formulation, derive, graph)
     spurious = f"{spurious_text(len(graph.nodes), len(nodes), len(edges))}." if edges else verdict.lacking
-    return Remarks(names, f"{verdict.summary} {spurious}", nodes, edges)
+    outputs = [
+        name for tau in verdict.excess for name in (tau, tau.replace("tau", "p") + "_dot") if name in graph.outputs
+    ]
+    return Remarks(names, f"{verdict.summary} {spurious}", nodes, edges, outputs)
 
 
 def spurious_text(nodes: int, spurious: int, edges: int) -> str:

@@ -70,7 +70,7 @@ def test_a_file_with_a_coordinate_that_nothing_uses_and_with_forces_and_torques(
     assert found["left_classes"]["spurious adjoint"] > 0
     said("inspect", str(model), "--t-end", "0.1", "--out", str(page))
     text = page.read_text(encoding="utf-8")
-    for name, called, unit in (("tau0", "τ.slide", "N"), ("tau1", "τ.hinge", "N m")):
+    for name, called, unit in (("tau0", "tau.slide", "N"), ("tau1", "tau.hinge", "N m")):
         assert f'["{name}","{called}"]' in text
         assert f'["{name}","{unit}"]' in text
 

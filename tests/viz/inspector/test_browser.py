@@ -232,7 +232,7 @@ def test_sweeps_step_forward_and_back(show):
     for output, adjoint in (("tau2", "1"), ("tau0", "0")):  # tau0 does not depend on tau2
         page.select_option("#from", output)
         page.eval_on_selector("#sweep", move, len(graph.nodes) + 1)
-        assert page.inner_text("#step") == f"reverse, 1 of 249: τ.joint 3 (%{number}, +) has adjoint {adjoint}"
+        assert page.inner_text("#step") == f"reverse, 1 of 249: tau.joint 3 (%{number}, +) has adjoint {adjoint}"
     page.eval_on_selector("#sweep", move, 2 * len(graph.nodes))
     shown = page.inner_text("#step").partition("reverse, 249 of 249: q\u0308.joint 1 has adjoint ")[2]
     at = {name: value for name, value in page.evaluate("inspector.state()").items() if name in graph.input_names}

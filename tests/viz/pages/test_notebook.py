@@ -132,6 +132,7 @@ def test_a_notebook_paints_what_the_verdict_blames_and_calls_coordinates_by_thei
     verdict, graph = dyn.formulation_verdict(scene, formulation), dyn.inverse_dynamics(scene, formulation)
     shown = graph_html(graph)
     groups = re.findall(r'<g id="([^"]+)" class="(node|edge)">(.*?)</a>', shown, flags=re.DOTALL)
+    groups = [(unescape(name), of, text) for name, of, text in groups]
     painted = {kind: [name for name, of, text in groups if of == kind and LINE in text] for kind in ("node", "edge")}
     number = {node: i for i, node in enumerate(graph.nodes)}
     known = remarks_of(graph)
@@ -143,3 +144,4 @@ def test_a_notebook_paints_what_the_verdict_blames_and_calls_coordinates_by_thei
     assert bool(painted["edge"]) == verdict.differs
     assert (f"<p>{verdict.summary}" in unescape(shown)) == (formulation != "chain_rule")
     assert "q.theta" in shown
+    assert (theme.WRONG_OUTPUT.words in shown) == verdict.differs
