@@ -18,7 +18,7 @@ from ..writing.naming import with_name
 from .canonical import COEFFICIENT_ROUNDING, Canonical, Powers, Sum
 from .identities import LARGEST_REWRITTEN, shortest
 
-WORTH = 1.25  # so much longer may be what is written out
+WORTH = 1.6  # so much longer may be what is written out
 SHORT = 8  # symbols of what is written again where it is needed again
 FUNCTION, RATE = 2, 3  # ranks of factors: a function stands behind coordinates, before their rates
 RATIOS = (1.0, 2.0, 0.5)  # of two sums of which one is written, with the rates of both
@@ -57,6 +57,7 @@ class _Reader:
     def __init__(self, ranks: Mapping[str, int]) -> None:
         self.ranks = {name: (rank, place) for place, (name, rank) in enumerate(ranks.items())}
         self._made: dict[tuple[object, ...], Node] = {}
+        self._numbers: dict[Node, tuple[float, Node]] = {}  # products with a number before them
         self._rank: dict[Node, Rank] = {}
 
     def shorter(self, node: Node, tidy: Node) -> Node:
@@ -64,7 +65,8 @@ class _Reader:
         order = topological([node])
         if len(order) > LARGEST_REWRITTEN or any(each.name and each.args for each in order[:-1]):
             return tidy
-        out = _Writer(self, Canonical([node])).node(node)
+        forms = [_Writer(self, canonical([node])).node(node) for canonical in (_Expanded, Canonical)]
+        out = min(forms, key=ink)
         return out if ink(out) <= WORTH * ink(tidy) else tidy
 
     def make(self, name: str, *args: Node) -> Node:
@@ -101,7 +103,7 @@ class _Reader:
                 done[node] = (
                     with_name(Node(done[node].op, done[node].args), node.name) if done[node].args else done[node]
                 )
-            if node not in alone or node.op.name not in ARITHMETIC:
+            if node.value is None and (node not in alone or node.op.name not in ARITHMETIC):
                 sums[node], products[node] = [(False, node)], (1.0, {done[node]: 1})
         return [done[node] for node in nodes]
 
@@ -168,7 +170,8 @@ class _Reader:
         """Terms added up, a positive one first."""
         if not terms:
             return self.number(0.0)
-        order = sorted(terms, key=lambda term: -self.rank(term[1])[0])
+        ranks = {node: self.rank(node) for _, node in terms}
+        order = sorted(terms, key=lambda term: (-ranks[term[1]][0], ranks[term[1]][1]))
         first = next((i for i, (minus, _) in enumerate(order) if not minus), 0)
         order = [order[first], *order[:first], *order[first + 1 :]]
         minus, total = order[0]
@@ -179,16 +182,33 @@ class _Reader:
 
     def product(self, coefficient: float, powers: Mapping[Node, int]) -> Signed:
         """A product, its sign apart: a number, factors by rank, over those of negative powers."""
+        held: dict[Node, int] = {}
+        for node, power in powers.items():
+            number, rest = self._apart(node)
+            coefficient *= number**power
+            held[rest] = held.get(rest, 0) + power
+        powers = held
         factors = sorted(
             [(node, power) for node, power in powers.items() if power], key=lambda each: self.rank(each[0])
         )
         top = [self._power(node, power) for node, power in factors if power > 0]
         below = [self._power(node, -power) for node, power in factors if power < 0]
-        size = abs(coefficient)
-        if size != 1.0 or not top:
-            top.insert(0, self.number(size))
-        node = self._times(top)
-        return math.copysign(1.0, coefficient) < 0.0, self.make("div", node, self._times(below)) if below else node
+        size, minus = abs(coefficient), math.copysign(1.0, coefficient) < 0.0
+        node = self._times(top) if top else self.number(size)
+        if top and size != 1.0:
+            self._numbers[whole := self.make("mul", self.number(size), node)] = size, node
+            node = whole
+        return minus, self.make("div", node, self._times(below)) if below else node
+
+    def _apart(self, node: Node) -> tuple[float, Node]:
+        """The number before a product, and the rest."""
+        sign = 1.0
+        if node.op.name == "neg":
+            sign, node = -1.0, node.args[0]
+        if node in self._numbers:
+            number, node = self._numbers[node]
+            return sign * number, node
+        return sign, node
 
     def _times(self, factors: Sequence[Node]) -> Node:
         node = factors[0]
@@ -210,10 +230,17 @@ class _Reader:
     def _ranked(self, node: Node) -> Rank:
         if not node.args:
             return (-1, 0) if node.value is not None else self.ranks.get(str(node.name), (0, len(self.ranks)))
-        inner = max([self._rank[arg][0] for arg in node.args])
-        if inner >= RATE:
-            return inner, len(self.ranks) + 1
-        return (inner, -1) if node.op.name in ARITHMETIC else (FUNCTION, len(self.ranks))
+        inner = [self._rank[arg] for arg in node.args]
+        rank = max([each for each, _ in inner])
+        place = min([place for each, place in inner if each == rank])
+        return (rank, place) if rank >= RATE or node.op.name in ARITHMETIC else (FUNCTION, place)
+
+
+class _Expanded(Canonical):
+    """Canonical sums in which every product of sums is written out."""
+
+    def _factor(self, node: Node) -> Sum:
+        return self[node]
 
 
 class _Writer:

@@ -52,7 +52,7 @@ def latex(node: Node, *, names: Mapping[str, str] | None = None, lines: int = LI
     >>> import cgraph as cg
     >>> m, v = cg.variables("m v")
     >>> print(cg.latex(0.5 * m * v**2))
-    0.5 \, m \, {v}^{2}
+    \frac{1}{2} \, m \, {v}^{2}
     """
     if not isinstance(node, Node):
         raise TypeError(
