@@ -16,9 +16,11 @@ from ..operations.operation import OPS
 from ..util.explain_failure import explain_failure
 from ..writing.naming import with_name
 from .canonical import COEFFICIENT_ROUNDING, Canonical, Powers, Sum
-from .identities import LARGEST_REWRITTEN, shortest
+from .identities import shortest
 
+LARGEST, MOST = 120, 700  # nodes that are written out, of one and of all
 WORTH = 1.6  # so much longer may be what is written out
+PLAINER = 1.2  # and so much longer that in which every product of sums is written out, beside where sums are kept
 SHORT = 8  # symbols of what is written again where it is needed again
 FUNCTION, RATE = 2, 3  # ranks of factors: a function stands behind coordinates, before their rates
 RATIOS = (1.0, 2.0, 0.5)  # of two sums of which one is written, with the rates of both
@@ -57,16 +59,18 @@ class _Reader:
     def __init__(self, ranks: Mapping[str, int]) -> None:
         self.ranks = {name: (rank, place) for place, (name, rank) in enumerate(ranks.items())}
         self._made: dict[tuple[object, ...], Node] = {}
+        self.left = MOST  # nodes that may still be written out
         self._numbers: dict[Node, tuple[float, Node]] = {}  # products with a number before them
         self._rank: dict[Node, Rank] = {}
 
     def shorter(self, node: Node, tidy: Node) -> Node:
         """The node written out where that is short, else as it stands."""
         order = topological([node])
-        if len(order) > LARGEST_REWRITTEN or any(each.name and each.args for each in order[:-1]):
+        if len(order) > LARGEST or any(each.name and each.args for each in order[:-1]) or self.left < len(order):
             return tidy
-        forms = [_Writer(self, canonical([node])).node(node) for canonical in (_Expanded, Canonical)]
-        out = min(forms, key=ink)
+        self.left -= len(order)
+        expanded, kept = (_Writer(self, canonical([node])).node(node) for canonical in (_Expanded, Canonical))
+        out = expanded if ink(expanded) <= PLAINER * ink(kept) else kept
         return out if ink(out) <= WORTH * ink(tidy) else tidy
 
     def make(self, name: str, *args: Node) -> Node:
@@ -166,6 +170,18 @@ class _Reader:
 
     # Sums and products of what is made.
 
+    def operation(self, name: str, args: Sequence[Node]) -> Node:
+        """An operation on nodes that are made, a sum or a product in order."""
+        if name in ("add", "sub"):
+            return self.sum([self._signed(False, args[0]), self._signed(name == "sub", args[1])])
+        if name in ("mul", "div", "neg") and all(arg.value is None for arg in args):
+            powers = dict.fromkeys(args[:1], 1)
+            for arg in args[1:]:
+                powers[arg] = powers.get(arg, 0) + (1 if name == "mul" else -1)
+            minus, made = self.product(-1.0 if name == "neg" else 1.0, powers)
+            return self.make("neg", made) if minus else made
+        return self.make(name, *args)
+
     def sum(self, terms: Sequence[Signed]) -> Node:
         """Terms added up, a positive one first."""
         if not terms:
@@ -263,7 +279,7 @@ class _Writer:
                 inside = [self._sum(args)]
             else:
                 inside = [self._sum(self.canonical[arg]) if arg.args or arg.op is CONSTANT else arg for arg in args]
-            self._atoms[atom] = inside[0] if op is None else self.reader.make(op.name, *inside)
+            self._atoms[atom] = inside[0] if op is None else self.reader.operation(op.name, inside)
         return self._atoms[atom]
 
     def _sum(self, a: Sum) -> Node:
@@ -295,8 +311,10 @@ class _Writer:
             if rates == [(1.0, ())] and not any(self._rank(atom) == FUNCTION for atom in shared):
                 return [term for part in functions.values() for term in self._group(part, rates)]
             if not shared:
-                inner = [term for part in functions.values() for term in self._group(part, [(1.0, ())])]
-                return [self._with_rates(1.0, {self.reader.sum(inner): 1}, rates)]
+                terms = [term for part in functions.values() for term in self._group(part, [(1.0, ())])]
+                turn = all(minus for minus, _ in terms)
+                whole = {self.reader.sum([(minus != turn, node) for minus, node in terms]): 1}
+                return [self._with_rates(-1.0 if turn else 1.0, whole, rates)]
         sizes = {abs(value) for value in rest.values()}
         factor = next(iter(sizes)) if len(sizes) == 1 else 0.5 if all(each % 1.0 == 0.5 for each in sizes) else 1.0
         factor *= 1.0 if any(value > 0.0 for value in rest.values()) else -1.0

@@ -16,7 +16,6 @@ Side = Node | Sequence[Sequence[Node]]  # of a statement: a node, or a matrix by
 INLINE, LONG = 12, 90  # operations in a line, at most; more are told in lines of their own; of reading form
 WIDE = 26  # operations of a part of a sum, at most, that goes on in the next row
 SHORT = 6  # operations that are written again in reading form, wherever they are needed
-WIDEST_ROW = 44  # operations in a row of a matrix; one with a wider row is told entry by entry
 LINES = 40
 
 
@@ -138,9 +137,9 @@ class Formulas:
         return Lines(equations, [(*named.get(node, ()), self.symbol.get(node, ""))[0] for node in left_out])
 
     def needed(self, ends: Sequence[Node]) -> list[Node]:
-        """The nodes with lines that the formulas of some nodes refer to, those nearest to them first."""
+        """The nodes with lines that the formulas of some nodes are or refer to, those nearest to them first."""
         queue = list(dict.fromkeys(ends))
-        found: dict[Node, None] = {}
+        found: dict[Node, None] = dict.fromkeys([node for node in queue if node in self.lined])
         for node in queue:
             new = [arg for arg in self._inside(node)[1:] if arg in self.lined and arg not in found]
             found |= dict.fromkeys(new)
@@ -217,11 +216,18 @@ class Formulas:
 
 
 def statements(
-    given: Sequence[Sequence[Side]], notation: Notation, called: Mapping[str, str] | None = None, lines: int = LINES
+    given: Sequence[Sequence[Side]],
+    notation: Notation,
+    called: Mapping[str, str] | None = None,
+    lines: int = LINES,
+    *,
+    whole: bool = False,
 ) -> Lines:
     """Statements that sides are equal, of nodes in reading form, below the lines of what they need.
 
-    given: of each statement its sides from the left, two at least; a matrix stands on the right.
+    given: of each statement its sides from the left, two at least; a matrix stands on the right.  Those that have room
+    with all the lines that they need are told, from the first on.  whole: if none has, none is, in place of the first
+    with the lines nearest to it.
 
     >>> import cgraph as cg
     >>> from cgraph.writing.latex import LATEX
@@ -229,26 +235,48 @@ def statements(
     >>> statements([(p, v + w)], LATEX).equations
     [('p', 'v + w')]
     """
-    ends = [entry for sides in given for side in sides for entry in _entries(side)]
+    ends = [entry for sides in given for entry in _entries(sides)]
     found = Formulas(topological(ends), {}, notation, called, reading=True)
-    most = require_whole("lines", lines, 1)
-    kept = given[:most]
-    needed = found.needed([entry for sides in kept for side in sides for entry in _entries(side)])
-    shown = sorted(needed[: most - len(kept)], key=found.places.__getitem__)
-    equations = [row for node in shown for row in found.rows(found.symbol[node], node)]
+    kept, needed, all_needed = _fitting(given, found, require_whole("lines", lines, 1), whole)
+    equations = [row for node in needed for row in found.rows(found.symbol[node], node)]
     for *lefts, right in kept:
         left = notation.equals.join([found.formula(each) for each in lefts if isinstance(each, Node)])
         if isinstance(right, Node):
-            equations += found.rows(left, right) if right not in found.lined else [(left, found.symbol[right])]
+            equations += [(left, found.symbol[right])] if right in found.lined else found.rows(left, right)
         else:
-            equations.append((left, notation.matrix([[found.formula(entry) for entry in row] for row in right])))
-    left_out = [found.symbol[node] for node in sorted(needed[most - len(kept) :], key=found.places.__getitem__)]
-    left_out += [found.formula(sides[0]) for sides in given[most:] if isinstance(sides[0], Node)]
+            entries = [
+                [found.symbol.get(each, "") if each in found.lined else found.formula(each) for each in row]
+                for row in right
+            ]
+            equations.append((left, notation.matrix(entries)))
+    left_out = [found.symbol[node] for node in all_needed if node not in set(needed)]
+    left_out += [found.formula(sides[0]) for sides in given if sides not in kept and isinstance(sides[0], Node)]
     return Lines(equations, left_out)
 
 
-def _entries(side: Side) -> list[Node]:
-    return [side] if isinstance(side, Node) else [entry for row in side for entry in row]
+def _fitting(
+    given: Sequence[Sequence[Side]], found: Formulas, most: int, whole: bool
+) -> tuple[list[Sequence[Side]], list[Node], list[Node]]:
+    """The statements that so many lines have room for, the lines that they need, and all lines that any needs."""
+    place = found.places.__getitem__
+    kept: list[Sequence[Side]] = []
+    shown: set[Node] = set()
+    everything: set[Node] = set()
+    for sides in given:
+        needed = set(found.needed(_entries(sides)))
+        everything |= needed
+        if len(shown | needed) + len(kept) < most:
+            kept.append(sides)
+            shown |= needed
+    if not kept and given and not whole:
+        kept = [given[0]]
+        shown = set(found.needed(_entries(given[0]))[: most - 1])
+    return kept, sorted(shown, key=place), sorted(everything, key=place)
+
+
+def _entries(sides: Sequence[Side]) -> list[Node]:
+    """All nodes of a statement."""
+    return [entry for side in sides for row in ([[side]] if isinstance(side, Node) else side) for entry in row]
 
 
 def fraction(value: float) -> tuple[int, int] | None:

@@ -42,7 +42,7 @@ def typeset(
     given: of each statement its sides from the left; a matrix, by rows, stands on the right.  rest: HTML behind the
     sentence on what is left out, such as the command that prints all.
     """
-    found = statements(given, notation(digits), names, lines)
+    found = statements(given, notation(digits), names, lines, whole=True)
     rows = "".join(
         f"<mtr><mtd>{left}</mtd><mtd>{'<mo>=</mo>' if left else ''}</mtd><mtd>{right}</mtd></mtr>"
         for left, right in found.equations
@@ -52,7 +52,7 @@ def typeset(
     more = f"<p>{len(found.left_out)} of {total} lines are left out: those of {missing}.{rest and f' {rest}'}</p>"
     table = f'<mtable columnalign="right center left" displaystyle="true">{rows}</mtable>'
     box = '<div class="scroll" tabindex="0" role="group" aria-label="equations">'
-    return f'{box}<math display="block">{table}</math></div>{more if found.left_out else ""}'
+    return f'{box}<math display="block">{table}</math></div>' * bool(rows) + more * bool(found.left_out)
 
 
 def few(texts: Sequence[str]) -> str:
