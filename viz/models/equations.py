@@ -145,7 +145,7 @@ def _right(statement: tuple[Side, ...]) -> Node:
 
 
 def _torque(scene: Scene, formulation: str) -> list[Block]:
-    """The torque: written out where that is short, else by its matrices where these are few, else as the graph has it."""
+    """The torque: written out where that is short, else by its matrices if these are small, else as in the graph."""
     system, graph = scene.system, inverse_dynamics(scene, formulation)
     title = f"Torque, {formulation.replace('_', ' ')}"
     explicit = _statements(graph)
@@ -189,7 +189,7 @@ def _about(system: System, parts: Sequence[str], more: str = "") -> str:
 
 
 def _by_matrices(system: System) -> Block:
-    """tau = M qdd + c + g + d - Q: mass matrix, Coriolis and centrifugal force, gravity and springs, damping, forces."""
+    """tau = M qdd + c + g + d - Q: inertia, Coriolis and centrifugal force, gravity and springs, damping, forces."""
     n, forces = system.n, bias(system)
     gravity = list(gravity_force(system).outputs.values())
     coriolis = [whole - part for whole, part in zip(forces.outputs.values(), gravity, strict=True)]

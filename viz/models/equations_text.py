@@ -20,12 +20,16 @@ from cgraph.extend import (
     topological,
 )
 
+from dynamics.scenes.scenes import of_model
+from dynamics.systems.model import Model
+
 from ..pages.mathml import few, typeset
-from .equations import Block, Equations
+from .equations import Block, Equations, model_equations
 
 SUM, NEGATION, PRODUCT, FUNCTION, LEAF = 1, 2, 2, 3, 4  # how strongly a text binds, as in the rows of operations
 DIGITS = 6  # of numbers
 ALL_DIGITS = 17
+LARGEST = 10  # velocities of a model whose equations a notebook shows
 COMMAND = "<code>cgraph equations</code> prints all."
 
 
@@ -58,6 +62,16 @@ def equations_html(equations: Equations, lines: int = 12, titles: Sequence[str] 
         for block in shown
     ]
     return "".join([*parts, f"<p>{escape(equations.legend)}</p>" if equations.legend else ""])
+
+
+def model_html(model: Model) -> str:
+    """The Lagrangian and the torque of a model, or its state equation, as a notebook shows them; of a large one its text."""
+    scene = of_model(model)
+    said = f"<p>{escape(repr(model))}</p>"
+    if scene.ode is None and scene.system.n > LARGEST:
+        return f"{said}<p>Its equations are long: {COMMAND}</p>"
+    shown = equations_html(model_equations(scene), titles=("State", "Lagrangian", "Torque", "The same"), level=4)
+    return f'{said}<div style="max-width:100%;overflow-x:auto">{shown}</div>'
 
 
 def _text_block(block: Block, equations: Equations, lines: int, digits: int) -> str:
