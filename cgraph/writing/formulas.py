@@ -249,8 +249,9 @@ def statements(
                 for row in right
             ]
             equations.append((left, notation.matrix(entries)))
-    left_out = [found.symbol[node] for node in all_needed if node not in set(needed)]
-    left_out += [found.formula(sides[0]) for sides in given if sides not in kept and isinstance(sides[0], Node)]
+    told = set(needed)
+    left_out = [found.formula(sides[0]) for sides in given if sides not in kept and isinstance(sides[0], Node)]
+    left_out += [found.symbol[node] for node in all_needed if node not in told]
     return Lines(equations, left_out)
 
 

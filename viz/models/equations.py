@@ -33,7 +33,8 @@ LETTERS = {
 WORDS = {"M": "inertia", "c": "velocities", "g": "weight and springs", "d": "damping", "Q": "applied forces"}
 MASS = "M"
 PARTS = ("c", "g", "d", "Q")  # of the torque, beside M qdd
-EMBEDDED = {"by_definition": "L", "kinetic_only": "K"}  # formulations with Euler's step, and what is differentiated
+# Formulations with Euler's step: what is differentiated through it, and how the torque is said to be had.
+EMBEDDED = {"by_definition": ("L", "by definition"), "kinetic_only": ("K", "by the kinetic energy alone")}
 
 
 @dataclass(frozen=True)
@@ -226,18 +227,18 @@ def _spurious(scene: Scene, formulation: str) -> list[Block]:
     names = [name for name, node in verdict.terms.outputs.items() if node.value != 0.0]
     rights = reading_form([verdict.terms.outputs[name] for name in names], ranks(verdict.terms.input_names))
     held: list[tuple[Side, ...]] = []
+    energy, had = EMBEDDED[formulation]
     for name, right in zip(names, rights, strict=True):
         if right.value == 0.0:
             continue
         i = name.removeprefix("tau")
         left = variable(f"tau_def{i}") - variable(name)
-        slope = variable(f"∂{EMBEDDED[formulation]}") / variable(f"∂q{i}")
+        slope = variable(f"∂{energy}") / variable(f"∂q{i}")
         held.append((left, right) if system.kinematics.quasi is not None else (left, slope, right))
     if system.n > MATRICES and system.kinematics.quasi is None:
-        held.insert(0, (variable("tau_def") - variable("tau"), variable(f"∂{EMBEDDED[formulation]}") / variable("∂q")))
+        held.insert(0, (variable("tau_def") - variable("tau"), variable(f"∂{energy}") / variable("∂q")))
     about = (
-        f"What the torque {'by definition' if formulation == 'by_definition' else 'by the kinetic energy alone'}, τ_def, has too much, "
-        "however small the time step dt is: q = q̇ dt + q_old makes the momentum depend on q̇ through q as well. "
-        "A further part, dt times the rate of this one, tends to 0 with dt."
+        f"What the torque {had}, τ_def, has too much, however small the time step dt is: q = q̇ dt + q_old makes the "
+        "momentum depend on q̇ through q as well. A further part, dt times the rate of this one, tends to 0 with dt."
     )
     return [Block(f"Spurious term, {formulation.replace('_', ' ')}", held, about, wrong=True)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 from html import escape
 
@@ -19,11 +20,10 @@ from cgraph.extend import (
     statements,
     topological,
 )
-
 from dynamics.scenes.scenes import of_model
 from dynamics.systems.model import Model
 
-from ..pages.mathml import few, typeset
+from ..pages.mathml import STYLE, few, typeset
 from .equations import Block, Equations, model_equations
 
 SUM, NEGATION, PRODUCT, FUNCTION, LEAF = 1, 2, 2, 3, 4  # how strongly a text binds, as in the rows of operations
@@ -50,28 +50,27 @@ def equations_latex(equations: Equations, lines: int, digits: int = DIGITS) -> s
     return "\n\n".join([*blocks, *[f"% {text}" for text in (equations.legend, _rounded(equations, digits)) if text]])
 
 
-def equations_html(equations: Equations, lines: int = 12, titles: Sequence[str] | None = None, level: int = 3) -> str:
-    """The equations as HTML, a heading and MathML a block; what is wrong has the class of that.
-
-    titles: the first words of the blocks to show, by default all.  level: of the headings.
-    """
-    shown = [block for block in equations.blocks if titles is None or block.title.startswith(tuple(titles))]
-    parts = [
-        f'<div class="equations{" spurious" * block.wrong}"><h{level}>{escape(block.title)}</h{level}>'
-        f"{block.about and f'<p>{escape(block.about)}</p>'}{typeset(block.statements, equations.names, lines, rest=COMMAND)}</div>"
-        for block in shown
-    ]
+def equations_html(equations: Equations, lines: int = 12, level: int = 3) -> str:
+    """The equations as HTML, a heading of a level and MathML a block; what is wrong has the class of that."""
+    parts = []
+    for block in equations.blocks:
+        about = f"<p>{escape(block.about)}</p>" if block.about else ""
+        head = f"<h{level}>{escape(block.title)}</h{level}>{about}"
+        shown = typeset(block.statements, equations.names, lines, rest=COMMAND)
+        parts.append(f'<div class="equations{" spurious" * block.wrong}">{head}{shown}</div>')
     return "".join([*parts, f"<p>{escape(equations.legend)}</p>" if equations.legend else ""])
 
 
 def model_html(model: Model) -> str:
-    """The Lagrangian and the torque of a model, or its state equation, as a notebook shows them; of a large one its text."""
+    """The Lagrangian and the torque of a model, or its state equation, as a notebook shows them; not of a large one."""
     scene = of_model(model)
     said = f"<p>{escape(repr(model))}</p>"
     if scene.ode is None and scene.system.n > LARGEST:
         return f"{said}<p>Its equations are long: {COMMAND}</p>"
-    shown = equations_html(model_equations(scene), titles=("State", "Lagrangian", "Torque", "The same"), level=4)
-    return f'{said}<div style="max-width:100%;overflow-x:auto">{shown}</div>'
+    equations = model_equations(scene)
+    blocks = [block for block in equations.blocks if not block.title.startswith("Momenta")]
+    shown = equations_html(replace(equations, blocks=blocks), level=4)
+    return f'<style>{STYLE}</style>{said}<div style="max-width:100%">{shown}</div>'
 
 
 def _text_block(block: Block, equations: Equations, lines: int, digits: int) -> str:

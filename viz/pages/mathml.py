@@ -16,6 +16,12 @@ from .. import theme
 SUM, PRODUCT, FUNCTION, LEAF = 1, 2, 3, 4  # how strongly a text binds, as in the rows of operations
 FEW = 8  # names that a sentence lists
 DIGITS = 4  # of numbers
+# Of every page with equations; some browsers align the columns of a table by it, others by the attribute.
+STYLE = """
+div.scroll:has(> math) { overflow-x: auto; } div.scroll > math { width: max-content; margin: 2px 0 2px 1em; }
+mtable.aligned > mtr > mtd { text-align: left; padding: 3px 2px; }
+mtable.aligned > mtr > mtd:first-child { text-align: right; }
+"""
 _ACCENTS = {"dot": "\u02d9", "ddot": "\u00a8", "bar": "\u00af"}
 _DRAWN = {"q\u0308": "qdd", "q\u0307": "qd", "τ": "tau"}  # letters of names that are drawn, see `theme.called`
 
@@ -50,7 +56,7 @@ def typeset(
     total = sum([bool(left) for left, _ in found.equations]) + len(found.left_out)
     missing = few([f"<math>{left}</math>" for left in found.left_out])
     more = f"<p>{len(found.left_out)} of {total} lines are left out: those of {missing}.{rest and f' {rest}'}</p>"
-    table = f'<mtable columnalign="right center left" displaystyle="true">{rows}</mtable>'
+    table = f'<mtable class="aligned" columnalign="right center left" displaystyle="true">{rows}</mtable>'
     box = '<div class="scroll" tabindex="0" role="group" aria-label="equations">'
     return f'{box}<math display="block">{table}</math></div>' * bool(rows) + more * bool(found.left_out)
 
@@ -91,11 +97,7 @@ def _name(name: str) -> str:
     if found is None:
         return f"<mi>{escape(theme.pretty(name))}</mi>"
     text = f"<mi>{escape(GREEK.get(found.word, found.word))}</mi>"
-    text = (
-        f'<mover accent="true">{text}<mo stretchy="false">{_ACCENTS[found.accent]}</mo></mover>'
-        if found.accent
-        else text
-    )
+    text = f"<mover>{text}<mo>{_ACCENTS[found.accent]}</mo></mover>" if found.accent else text
     below = "<mo>,</mo>".join(
         [f"<mn>{each}</mn>" if each.isdigit() else f"<mi>{escape(_letter(each))}</mi>" for each in found.below]
     )
@@ -130,7 +132,9 @@ def _operation(op: Op, args: Sequence[tuple[str, int]]) -> tuple[str, int]:
     ]
     text = op.mathml.text.format(*inside)
     if op.name == "mul" and not inside[1].startswith(("<mn>", "<mfrac><mn>")):
-        text = "<mo>\u2062</mo>".join(inside)  # a product of letters has no sign
+        text = '<mo lspace="0" rspace="0.17em">\u2062</mo>'.join(inside)  # a product of letters has no sign
+    if inside[0] == "":  # what goes on from the row above
+        text = text.replace("<mo>", '<mo form="infix">', 1)
     return f"<mrow>{text}</mrow>", op.mathml.binding
 
 

@@ -266,7 +266,7 @@ def test_an_equation_is_that_of_a_textbook(model, line):
 
 def test_what_is_left_out_is_said():
     equations = equations_of("spatial arm of 7")
-    assert "lines are left out; see --lines: those of v" in equations_text(equations, 3)
+    assert "lines are left out; see --lines: those of " in equations_text(equations, 3)
     page = equations_html(equations, 3)
     assert "lines are left out: those of" in page
     assert "<code>cgraph equations</code> prints all." in page

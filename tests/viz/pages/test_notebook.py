@@ -143,7 +143,7 @@ def test_a_model_is_shown_by_its_lagrangian_and_torque():
         assert re.findall("<h4>(.*?)</h4>", shown) == titles
         assert shown.count("<math display") == len(titles)
         assert escape(repr(model)) in shown
-    assert '<mi>θ</mi><mo stretchy="false">¨</mo>' in model_html(pendulum)
+    assert "<mi>θ</mi><mo>¨</mo>" in model_html(pendulum)
     assert "<math" not in model_html(dyn.planar_arm([1.0] * 20, [1.0] * 20))  # whose equations are long
 
 
