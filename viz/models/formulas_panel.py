@@ -4,40 +4,70 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from cgraph import Node, variable
+from cgraph.extend import ink
 from dynamics.scenes import Scene
 
 from ..pages.html import Panel
-from .equations import model_equations
+from ..pages.mathml import inline
+from .equations import Block, Equations, model_equations
 from .equations_text import equations_html
 
 LINES = 12  # of each block, at most
+BRIEF = 20.0  # symbols of a formula in the heading
 STYLE = """
-#formulas { padding: 4px 14px; border-top: 1px solid var(--edge); max-height: 46vh; overflow-y: auto; flex: none; }
+#formulas:has(details[open]) { padding: 6px 14px; border-top: 1px solid var(--edge); flex: none; }
+#formulas:has(details[open]) { max-height: 55vh; overflow-y: auto; }
 #formulas h3 { font-size: 1rem; margin: 10px 0 2px; } #formulas p { font-size: 15px; max-width: 75em; }
-#formulas math { font-size: 1.05rem; }
+#formulas math { font-size: 1.05rem; } #formulas summary math { padding: 0; margin-left: .8em; }
 #formulas .spurious { border-left: 6px solid var(--wrong); padding-left: 10px; margin: 6px 0; }
-#formulas .spurious math, #formulas .spurious h3 { color: color-mix(in srgb, var(--wrong) 78%, var(--text)); }
-body:not(:has(#about.flawed)) #formulas > .spurious { display: none; }
+#formulas :is(.spurious math, .spurious h3, summary math) { color: color-mix(in srgb, var(--wrong) 78%, var(--text)); }
+body:not(:has(#about.flawed)) #formulas :is(.first, summary math) { display: none; }
 @media print { #formulas { max-height: none; overflow: visible; } }
 """
-# The formulas are those of the page's model: another record, of a typed system, has its own.
+# Closed, the panel is a line below the results; open, it is as wide as the page. It is of the page's model: a typed
+# system has formulas of its own.
 RUN = """
-const formulasOf = inspector.record();
-inspector.onState(() => { byId("formulas").hidden = inspector.record() !== formulasOf; });
-byId("formulas").querySelector("details").ontoggle = () => dispatchEvent(new Event("resize")); // of the picture's room
+const formulas = byId("formulas"), formulasOf = inspector.record(), wideFormulas = formulas.parentElement;
+const placeFormulas = (open) => {
+  if (open) wideFormulas.append(formulas); else byId("results").parentElement.after(formulas);
+};
+inspector.onState(() => { formulas.hidden = inspector.record() !== formulasOf; });
+formulas.querySelector("details").ontoggle = ({ target }) => {
+  placeFormulas(target.open);
+  formulas.querySelector("summary").focus();
+  dispatchEvent(new Event("resize")); // the picture has other room
+};
+placeFormulas(false);
 """
 
 
 def formulas_panel(scene: Scene, *, momenta: bool = False) -> Panel:
     """The panel of a scene.  momenta: Hamilton's equations in place of the torque.
 
-    What the torque by definition has too much stands apart, in the color of what is wrong, where the page shows that.
+    What the torque by definition has too much stands first, in the color of what is wrong, and in short beside the
+    heading, where the page shows a version that is wrong.
     """
     compare = () if momenta or scene.ode is not None else ("by_definition", "kinetic_only")
     equations = model_equations(scene, momenta=momenta, compare=compare)
     first = next((block for block in equations.blocks if block.wrong), None)
-    others = [block for block in equations.blocks if block is not first]
-    apart = equations_html(replace(equations, blocks=[first], indices={}), LINES) if first else ""
-    whole = equations_html(replace(equations, blocks=others), LINES)
-    body = f"<details><summary>Formulas</summary>{whole}</details>"
-    return Panel(end=f'<section id="formulas" aria-label="formulas">{apart}{body}</section>', style=STYLE, run=RUN)
+    others = equations_html(replace(equations, blocks=[each for each in equations.blocks if each is not first]), LINES)
+    if first is None:
+        return _panel("", others)
+    alone = replace(equations, blocks=[first], indices={})
+    return _panel(_in_short(first, equations), f'<div class="first">{equations_html(alone, LINES)}</div>{others}')
+
+
+def _panel(head: str, inside: str) -> Panel:
+    body = f"<details><summary>Formulas{head}</summary>{inside}</details>"
+    return Panel(end=f'<section id="formulas" aria-label="formulas" hidden>{body}</section>', style=STYLE, run=RUN)
+
+
+def _in_short(block: Block, equations: Equations) -> str:
+    """The one statement of a block, if it is short, else what all of them are."""
+    *lefts, right = block.statements[0]
+    if len(block.statements) == 1 and isinstance(right, Node) and ink(right) <= BRIEF:
+        return inline(block.statements[0], equations.names)
+    surplus = variable("tau_def") - variable("tau")
+    slopes = [each.args[0] / variable("∂q") for each in lefts[1:] if isinstance(each, Node)]
+    return inline([surplus, *slopes], equations.names)

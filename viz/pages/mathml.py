@@ -61,6 +61,12 @@ def typeset(
     return f'{box}<math display="block">{table}</math></div>' * bool(rows) + more * bool(found.left_out)
 
 
+def inline(sides: Sequence[Side], names: Mapping[str, str] | None = None) -> str:
+    """A statement in a line of text, of nodes in reading form; one side alone is a formula."""
+    found = statements([(variable("left"), each) for each in sides], notation(), names)
+    return f"<math>{'<mo>=</mo>'.join([right for _, right in found.equations])}</math>"
+
+
 def few(texts: Sequence[str]) -> str:
     """The first of some texts, and how many more there are."""
     more = len(texts) - FEW

@@ -10,16 +10,21 @@ def test_the_surplus_is_seen_of_a_wrong_version_alone_and_of_its_model(visit, tm
     model = dyn.scenes.load("triple_pendulum")
     viz.inspect(model, tmp_path / "arm.html", t_end=0.1)
     page = visit(tmp_path / "arm.html")
-    surplus, formulas = page.locator("#formulas > .spurious"), page.locator("#formulas")
-    assert surplus.is_visible()
-    assert surplus.locator("mtr").count() == 3
-    wrong = page.evaluate("getComputedStyle(document.querySelector('#formulas > .spurious math')).color")
+    formulas, short = page.locator("#formulas"), page.locator("#formulas summary math")
+    surplus = formulas.locator(".first")
+    assert short.is_visible()
+    assert short.text_content() == "τdef−τ=∂L∂q"
+    page.click("#formulas summary")
+    assert surplus.locator("mtable.aligned > mtr").count() == 3
+    wrong = page.evaluate("getComputedStyle(document.querySelector('#formulas .first math')).color")
     page.keyboard.press("3")
     assert not surplus.is_visible()
-    page.click("#formulas summary")
-    titles = page.locator("#formulas details h3").all_inner_texts()
+    assert not short.is_visible()
+    titles = page.locator("#formulas h3:visible").all_inner_texts()
     assert titles == ["Lagrangian", "Momenta, p = ∂L/∂q̇", "The same by matrices", "Spurious term, kinetic only"]
-    assert wrong != page.evaluate("getComputedStyle(document.querySelector('#formulas details math')).color")
+    assert wrong != page.evaluate(
+        "getComputedStyle(document.querySelector('#formulas .equations:not(.spurious) math')).color"
+    )
     assert "Indices: 1 is joint 1, 2 is joint 2, 3 is joint 3." in formulas.inner_text()
     page.click("#opentyped")
     page.fill("#text", "L = 1/2*x'^2 - 1/2*x^2, x(0) = 1")
