@@ -14,7 +14,7 @@ from .equations import Block, Equations, model_equations
 from .equations_text import equations_html
 
 LINES = 12  # of each block, at most
-BRIEF = 20.0  # symbols of a formula in the heading
+BRIEF = 12.0  # symbols of a formula in the heading
 STYLE = """
 #formulas:has(details[open]) { padding: 6px 14px; border-top: 1px solid var(--edge); flex: none; }
 #formulas:has(details[open]) { max-height: 55vh; overflow-y: auto; }
@@ -66,8 +66,8 @@ def _panel(head: str, inside: str) -> Panel:
 def _in_short(block: Block, equations: Equations) -> str:
     """The one statement of a block, if it is short, else what all of them are."""
     *lefts, right = block.statements[0]
-    if len(block.statements) == 1 and isinstance(right, Node) and ink(right) <= BRIEF:
+    surplus, general = variable("tau_def") - variable("tau"), len(lefts) == 1
+    if (general or len(block.statements) == 1) and isinstance(right, Node) and ink(right) <= BRIEF:
         return inline(block.statements[0], equations.names)
-    surplus = variable("tau_def") - variable("tau")
     slopes = [each.args[0] / variable("∂q") for each in lefts[1:] if isinstance(each, Node)]
     return inline([surplus, *slopes], equations.names)

@@ -19,7 +19,7 @@ from tests.each_row import each_row
 from viz import cli
 from viz.models.equations import Equations, model_equations
 from viz.models.equations_text import ALL_DIGITS, equations_html, equations_latex, equations_text, plain
-from viz.pages.mathml import typeset
+from viz.pages.mathml import notation, typeset
 
 FUNCTIONS = {name: getattr(math, name) for name in ("sin", "cos", "exp", "sqrt", "tanh")} | {"abs": abs}
 MANY = 10**6
@@ -110,7 +110,7 @@ def computed(found, known):
         ready = [row for row in rows if set(re.findall(r"[nv]_?\w+", row[1])) & {each[0] for each in rows} == set()]
         assert ready, rows
         for left, right in ready:
-            if left not in ("n_tau", "n_tau_def - n_tau"):  # the equation in general, of vectors
+            if left not in ("n_tau", "n_tau_def - n_tau", "n_tau_def-n_tau"):  # the equation in general, of vectors
                 known[left.split(" = ")[0]] = eval(
                     right.replace("^", "**"), {"__builtins__": {}, **FUNCTIONS, **MORE}, known
                 )
@@ -122,11 +122,46 @@ MORE = {"where": lambda c, a, b: a if c else b, "minimum": min, "sign": lambda a
 SYMBOLS = plain(ALL_DIGITS)._replace(names=lambda names: {name: "n_" + re.sub(r"\W", "_", name) for name in names})
 
 
-def values_of(equations: Equations, point: dict[str, float]) -> list[dict[str, float]]:
+MATHML = notation(ALL_DIGITS)._replace(
+    names=lambda names: {name: f"<mi>n_{re.sub(r'[^A-Za-z0-9_]', '_', name)}</mi>" for name in names},
+    unnamed="<mi>v{}</mi>".format,
+)
+SIGNS = {"−": "-", "·": "*", "\u2062": "*", "=": " = "}
+
+
+def python_of(element: ElementTree.Element) -> str:
+    """MathML as Python: what stands in the elements of a formula, and nothing else."""
+    inside = [python_of(child) for child in element]
+    if element.tag == "mo":
+        return SIGNS.get(element.text, element.text)
+    if element.tag in ("mi", "mn"):
+        return element.text
+    if element.tag == "mtable":
+        return ", ".join(inside)
+    if element.tag == "mtr":
+        return f"[{', '.join(inside)}]"
+    if inside and inside[0] == inside[-1] == "|":
+        return f"abs({''.join(inside[1:-1])})"
+    forms = {"mfrac": "(({})/({}))", "msup": "(({})**({}))", "msqrt": "sqrt({})"}
+    if element.tag in forms:
+        return forms[element.tag].format(*(inside if element.tag != "msqrt" else ["".join(inside)]))
+    assert element.tag in ("mrow", "mtd"), element.tag
+    text = "".join(inside)
+    return f"[{text[1:-1]}]" if element.tag == "mrow" and len(element) == 3 and element[1].tag == "mtable" else text
+
+
+def lines_of_mathml(block):
+    """The lines of a block as MathML has them, in Python."""
+    found = statements(block.statements, MATHML, lines=MANY)
+    read = [tuple(python_of(ElementTree.fromstring(f"<mrow>{side}</mrow>")) for side in row) for row in found.equations]
+    return found._replace(equations=read)
+
+
+def values_of(equations: Equations, point: dict[str, float], mathml: bool = False) -> list[dict[str, float]]:
     """What each block says at a point of the graphs' names; a left side has the name that the block gives it."""
     said = []
     for block in equations.blocks:
-        found = statements(block.statements, SYMBOLS, lines=MANY)
+        found = lines_of_mathml(block) if mathml else statements(block.statements, SYMBOLS, lines=MANY)
         assert not found.left_out
         said.append(computed(found, {f"n_{re.sub(r'[^A-Za-z0-9_]', '_', name)}": x for name, x in point.items()}))
     return said
@@ -156,8 +191,9 @@ def agrees(said, graph, point):
 @each_row("model", list(MODELS))
 def test_the_lines_compute_what_the_graphs_do(model):
     scene, equations = MODELS[model](), equations_of(model)
-    for point in points(scene):
-        blocks = {block.title: said for block, said in zip(equations.blocks, values_of(equations, point), strict=True)}
+    for point, mathml in zip(points(scene), (False, True), strict=True):
+        values = values_of(equations, point, mathml)
+        blocks = {block.title: said for block, said in zip(equations.blocks, values, strict=True)}
         if scene.ode is not None:
             agrees(blocks["State equation"], state_equation(scene), point)
             continue
