@@ -99,6 +99,7 @@ if TYPE_CHECKING:  # shared by the three packages alone: no promise is made for 
         expand as expand,
         format_polynomial as format_polynomial,
     )
+    from .simplification.reading_form import ink as ink, reading_form as reading_form
     from .simplification.rounding_growth import rounding_spread as rounding_spread
     from .util.atomic_write import (
         atomic_write as atomic_write,
@@ -127,6 +128,9 @@ if TYPE_CHECKING:  # shared by the three packages alone: no promise is made for 
     )
     from .util.threads import share as share, thread_count as thread_count
     from .util.words import counted as counted, or_nearest as or_nearest
+    from .writing.formulas import Side as Side, fraction as fraction, statements as statements
+    from .writing.latex import LATEX as LATEX, latex_block as latex_block, number_text as number_text
+    from .writing.symbols import GREEK as GREEK, is_letter as is_letter, symbol as symbol
 
 
 if not TYPE_CHECKING:  # a checker shall see a misspelt name

@@ -9,7 +9,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from cgraph import Node
-from cgraph.extend import ADJOINT, PRIMAL, TANGENT
+from cgraph.extend import ADJOINT, GREEK, PRIMAL, TANGENT
 
 # The palette of Okabe and Ito (2008), https://jfly.uni-koeln.de/color/
 BLACK, ORANGE, SKY_BLUE, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
@@ -114,14 +114,8 @@ def font_folder() -> Path | None:
     return folder if folder and folder.is_dir() else None
 
 
-_GREEK = dict(
-    zip(
-        "alpha beta gamma delta epsilon zeta eta theta kappa lambda mu nu xi rho sigma tau phi chi psi omega".split(),
-        "αβγδεζηθκλμνξρστφχψω",
-        strict=True,
-    )
-)
-LETTERS = {**_GREEK, "q": "q", "qd": "q\u0307", "qdd": "q\u0308"}  # the dots of a time derivative combine with q
+LETTERS = {word: letter for word, letter in GREEK.items() if word.islower() and word != "pi"}
+LETTERS |= {"q": "q", "qd": "q\u0307", "qdd": "q\u0308"}  # the dots of a time derivative combine with q
 # The paper's letters for one joint: angular velocity, angular acceleration, torque.
 ONE_JOINT = {
     "q0": "θ",

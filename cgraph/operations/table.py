@@ -10,7 +10,7 @@ import numpy as np
 from ..core.node import Node
 from . import bounds, double_double as dd, folding, series, texts, values
 from .functions import Function, function
-from .operation import FUNCTION, LEAF, OPS as OPS, PRODUCT, RELATION, SUM, MathML, Op, enter  # noqa: PLC0414
+from .operation import FUNCTION, OPS as OPS, PRODUCT, RELATION, SUM, MathML, Op, enter  # noqa: PLC0414
 from .values import ieee
 
 
@@ -107,7 +107,7 @@ _ROWS = (
        operator=operator.neg, domain=(_REAL,), interval=bounds.neg, rounding=0.0,
        python="-{}", numpy="-{}", llvm=("{r} = fneg {t} {0}",), c="-{0}", javascript="(a) => -a"),
     Op("pow", 2, math.pow, values.power_arrays, _pow_partials, ((0.6, -0.7), (1.7, 2.5)), arguments="base exponent", ufunc=np.power,
-       about="base ** exponent.", symbol="xʸ", mathml=MathML("<msup><mrow>{0}</mrow>{1}</msup>", (LEAF, 0), PRODUCT),
+       about="base ** exponent.", symbol="xʸ", mathml=MathML("<msup><mrow>{0}</mrow>{1}</msup>", (FUNCTION, 0), PRODUCT),
        fold=folding.pow, double_double=dd.pow, series=series.pow, operator=operator.pow, domain=(_POSITIVE, (-3.0, 3.0)),
        interval=bounds.pow, singular=bounds.power, c="{name}_pow({0}, {1})", c_helper=texts.C_POWER,
        # as in C: 1 to any power and anything to the power 0 are 1, NaN or not

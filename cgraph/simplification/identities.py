@@ -69,46 +69,7 @@ class _Writer:
 
     def node(self, a: Sum) -> Node:
         """The node of a sum."""
-        groups: dict[Powers, Sum] = {}
-        for powers, term in a.items():
-            plain = tuple([each for each in powers if each[0] not in self.canonical.turns])
-            turning = tuple([each for each in powers if each[0] in self.canonical.turns])
-            groups.setdefault(plain, {})[turning] = term
-        return self._sum(
-            [
-                (plain + turning, term)
-                for plain, part in groups.items()
-                for turning, term in self._shortest(part).items()
-            ]
-        )
-
-    def _shortest(self, a: Sum) -> Sum:
-        """The shortest form of a polynomial in sines and cosines: with cos^2 or sin^2, or of sums of angles."""
-        best = a
-        for angle in self.canonical.angles.values():  # cos^2 = 1 - sin^2 where that is shorter
-            cosine, sine = self.canonical.turning((angle,))
-            square = added(number(1.0), {((sine, 2),): Term(-1.0, 1.0)})
-            best = min(best, replaced(best, {cosine: (2, square)}), key=_length)
-        waves = self._fourier(a)
-        arguments = [self.canonical.made[atom][1] for powers in waves for atom, _ in powers]
-        angles = {frozenset([(powers, x.value) for powers, x in u.items()]) for u in arguments if isinstance(u, dict)}
-        return waves if _length(waves) + NEW_ANGLE * len(angles - self.canonical.written) < _length(best) else best
-
-    def _fourier(self, a: Sum) -> Sum:
-        """Sum of sines and cosines of sums of angles; a polynomial with negative powers as it is."""
-        if any([power < 0 for powers in a for _, power in powers]):
-            return a
-        result: Sum = {}
-        for wave, term in replaced(a, self.canonical.turns).items():  # of exp(i sum k angle)
-            angles = sorted([(self.canonical.angles[z], k) for z, k in wave])
-            if not angles:
-                result[()] = term._replace(value=term.value.real)
-            elif angles[0][1] > 0:  # the others are their conjugates
-                atoms = self.canonical.turning(tuple([(powers, k * unit) for (powers, unit), k in angles]))
-                for atom, part in zip(atoms, (term.value.real, -term.value.imag), strict=True):
-                    if abs(part) > COEFFICIENT_ROUNDING * term.size:
-                        result[((atom, 1),)] = Term(2.0 * part, term.size, term.label)
-        return result
+        return self._sum(list(shortest(self.canonical, a).items()))
 
     def _sum(self, products: list[Product]) -> Node:
         """Products added up, the factor or number that most of them share taken out first."""
@@ -186,6 +147,53 @@ class _Writer:
         """An argument, as it stands unless it depends on less when it is written anew: sums may lose digits."""
         new = self.node(self.canonical[node]) if node.args else node
         return new if leaves([new]) < leaves([node]) else node
+
+
+def shortest(canonical: Canonical, a: Sum, new_angle: int = NEW_ANGLE) -> Sum:
+    """The sum with what it has of sines and cosines in the shortest form, beside each product of other atoms.
+
+    new_angle: operations that the cosine or sine of an angle counts as, where none of it stands in the graph.
+    """
+    groups: dict[Powers, Sum] = {}
+    for powers, term in a.items():
+        plain = tuple([each for each in powers if each[0] not in canonical.turns])
+        turning = tuple([each for each in powers if each[0] in canonical.turns])
+        groups.setdefault(plain, {})[turning] = term
+    return {
+        plain + turning: term
+        for plain, part in groups.items()
+        for turning, term in _shortest(canonical, part, new_angle).items()
+    }
+
+
+def _shortest(canonical: Canonical, a: Sum, new_angle: int) -> Sum:
+    """The shortest form of a polynomial in sines and cosines: with cos^2 or sin^2, or of sums of angles."""
+    best = a
+    for angle in canonical.angles.values():  # cos^2 = 1 - sin^2 where that is shorter
+        cosine, sine = canonical.turning((angle,))
+        square = added(number(1.0), {((sine, 2),): Term(-1.0, 1.0)})
+        best = min(best, replaced(best, {cosine: (2, square)}), key=_length)
+    waves = _fourier(canonical, a)
+    arguments = [canonical.made[atom][1] for powers in waves for atom, _ in powers]
+    angles = {frozenset([(powers, x.value) for powers, x in u.items()]) for u in arguments if isinstance(u, dict)}
+    return waves if _length(waves) + new_angle * len(angles - canonical.written) < _length(best) else best
+
+
+def _fourier(canonical: Canonical, a: Sum) -> Sum:
+    """Sum of sines and cosines of sums of angles; a polynomial with negative powers as it is."""
+    if any([power < 0 for powers in a for _, power in powers]):
+        return a
+    result: Sum = {}
+    for wave, term in replaced(a, canonical.turns).items():  # of exp(i sum k angle)
+        angles = sorted([(canonical.angles[z], k) for z, k in wave])
+        if not angles:
+            result[()] = term._replace(value=term.value.real)
+        elif angles[0][1] > 0:  # the others are their conjugates
+            atoms = canonical.turning(tuple([(powers, k * unit) for (powers, unit), k in angles]))
+            for atom, part in zip(atoms, (term.value.real, -term.value.imag), strict=True):
+                if abs(part) > COEFFICIENT_ROUNDING * term.size:
+                    result[((atom, 1),)] = Term(2.0 * part, term.size, term.label)
+    return result
 
 
 def leaves(nodes: Sequence[Node]) -> set[Node]:

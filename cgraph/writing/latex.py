@@ -10,13 +10,10 @@ from ..core.node import Node
 from ..core.traversal import topological
 from ..operations.operation import FUNCTION, LEAF, PRODUCT, SUM, Op
 from ..util.caches import OPERATIONS, memo
-from .formulas import LINES, Formulas, Lines, Notation, Text
+from .formulas import LINES, Formulas, Lines, Notation, Text, fraction
+from .symbols import GREEK, symbol
 
-_GREEK = frozenset(
-    "alpha beta gamma delta epsilon zeta eta theta kappa lambda mu nu xi pi rho sigma tau phi chi psi omega".split()
-)
-_RATES = {"qd": r"\dot{q}", "qdd": r"\ddot{q}"}  # as the graphs of mechanics call the rates of a coordinate q
-_ENDINGS = {"dot": r"\dot{{{}}}", "bar": r"\bar{{{}}}"}  # of a tangent and of a cotangent
+_ACCENTS = {"dot": r"\dot{{{}}}", "ddot": r"\ddot{{{}}}", "bar": r"\bar{{{}}}"}
 _SIGNS = {"·": r"\cdot", "−": "-", "≤": r"\leq", "≠": r"\neq", "⌊": r"\lfloor", "⌋": r"\rfloor",
           "⌈": r"\lceil", "⌉": r"\rceil"}  # fmt: skip
 _FUNCTIONS = {name: f"\\{name}" for name in "sin cos tan sinh cosh tanh exp".split()}
@@ -55,7 +52,7 @@ def latex(node: Node, *, names: Mapping[str, str] | None = None, lines: int = LI
     >>> import cgraph as cg
     >>> m, v = cg.variables("m v")
     >>> print(cg.latex(0.5 * m * v**2))
-    0.5 \, m \, {v}^{2}
+    \frac{1}{2} \, m \, {v}^{2}
     """
     if not isinstance(node, Node):
         raise TypeError(
@@ -63,15 +60,16 @@ def latex(node: Node, *, names: Mapping[str, str] | None = None, lines: int = LI
             f"{'; of a graph, graph.latex()' if hasattr(node, 'latex') else ''}"
         )
     found = Formulas(topological([node]), {}, LATEX, names).lines([node], lines)
-    return found.equations[0][1] if len(found.equations) == 1 and not found.left_out else _block(found)
+    return found.equations[0][1] if len(found.equations) == 1 and not found.left_out else latex_block(found)
 
 
 def graph_latex(nodes: Sequence[Node], outputs: Mapping[str, Node], names: Mapping[str, str] | None, lines: int) -> str:
     """The equations of a graph's outputs as an aligned block."""
-    return _block(Formulas(nodes, outputs, LATEX, names).lines(list(outputs.values()), lines))
+    return latex_block(Formulas(nodes, outputs, LATEX, names).lines(list(outputs.values()), lines))
 
 
-def _block(lines: Lines) -> str:
+def latex_block(lines: Lines) -> str:
+    """Equations as an aligned block; a last line says how many are left out."""
     rows = [f"{left} &= {right}" if left else f"& {right}" for left, right in lines.equations]
     if lines.left_out:
         few = ", ".join(lines.left_out[:3]) + (r", \dots" if len(lines.left_out) > 3 else "")
@@ -95,31 +93,27 @@ def name_texts(names: Iterable[str]) -> dict[str, str]:
 
 
 def _name(name: str) -> str:
-    r"""q0 is q_{0}, qd.knee is \dot{q}_{knee}, M_0_1 is M_{0,1}, and p0_dot is \dot{p}_{0}."""
-    kind, dot, called = name.partition(".")
-    if dot and re.fullmatch(r"[A-Za-z]+(_[A-Za-z]+)*", kind) and called:
-        text, index = _name(kind), called if len(called) == 1 or called.isdigit() else literal(called)
-        return f"{text[:-1]},{index}}}" if "_{" in text else f"{text}_{{{index}}}"
-    match = re.fullmatch(r"([A-Za-z]+)(\d*)((?:_[A-Za-z0-9]+)*)", name)
-    if match is None:
+    r"""q0 is q_{0}, qd.knee is \dot{q}_{knee}, qd.theta is \dot{\theta}, M_0_1 is M_{0,1}, p0_dot is \dot{p}_{0}."""
+    found = symbol(name)
+    if found is None:
         return literal(name)
-    word, digits, rest = match.groups()
-    text = word if len(word) == 1 else _RATES.get(word) or (f"\\{word}" if word in _GREEK else literal(word))
-    below = [digits] if digits else []
-    for part in re.findall(r"[A-Za-z0-9]+", rest):
-        if part in _ENDINGS:
-            text = _ENDINGS[part].format(text)
-        else:
-            below.append(part if part.isdigit() or len(part) == 1 else literal(part))
+    word = found.word
+    text = word if len(word) == 1 else f"\\{word}" if word in GREEK else literal(word)
+    text = _ACCENTS[found.accent].format(text) if found.accent else text
+    text = rf"\partial {text}" if found.before else text
+    below = [each if len(each) == 1 or each.isdigit() else literal(each) for each in found.below]
     return f"{text}_{{{','.join(below)}}}" if below else text
 
 
-def number_text(value: float) -> Text:
-    """A number with all its digits."""
-    digits, _, power = f"{value!r}".removesuffix(".0").partition("e")
-    if digits.lstrip("-") in ("inf", "nan"):
-        return digits.replace("inf", r"\infty ").replace("nan", r"\mathrm{nan}"), LEAF if value > 0 else SUM
-    text = rf"{digits} \cdot 10^{{{int(power)}}}" if power else digits
+def number_text(value: float, digits: int = 17) -> Text:
+    """A number in so many digits, 17 of which are all."""
+    if (parts := fraction(value)) is not None:
+        return rf"\frac{{{parts[0]}}}{{{parts[1]}}}", PRODUCT
+    text = f"{value!r}".removesuffix(".0") if digits >= 17 else f"{value:.{digits}g}"
+    text, _, power = text.partition("e")
+    if text.lstrip("-") in ("inf", "nan"):
+        return text.replace("inf", r"\infty ").replace("nan", r"\mathrm{nan}"), LEAF if value > 0 else SUM
+    text = rf"{text} \cdot 10^{{{int(power)}}}" if power else text
     return text, SUM if value < 0.0 else PRODUCT if power else LEAF
 
 
@@ -181,4 +175,9 @@ def _places(text: str | None) -> str:
     return re.sub(r"{(\d)}", r"@\1@", text or "")
 
 
-LATEX = Notation(name_texts, number_text, operation_text, "v_{{{}}}".format)
+def _matrix(rows: Sequence[Sequence[str]]) -> str:
+    inside = r" \\ ".join([" & ".join(row) for row in rows])
+    return rf"\begin{{pmatrix}} {inside} \end{{pmatrix}}"
+
+
+LATEX = Notation(name_texts, number_text, operation_text, "v_{{{}}}".format, _matrix)

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 
 import cgraph as cg
-from cgraph import Graph, Node
+from cgraph import Graph, Node, extend
 from cgraph.extend import topological
 
 from .arguments import (
@@ -98,6 +98,10 @@ class OdeSystem:
         """The state equation as written: inputs the states, t if needed, parameters; outputs `<state>_dot`."""
         outputs = {f"{name}_dot": rate for name, rate in zip(self.states, self.rates, strict=True)}
         return Graph([*self.x, *self.extra_inputs], outputs)
+
+    def _repr_html_(self) -> str | None:
+        """The equations that a notebook shows as formulas, when a drawing package is installed (extra `viz`)."""
+        return extend.render_html("model", self)
 
     def __repr__(self) -> str:
         parameters = f", parameters {', '.join(self.parameters)}" if self.parameters else ""

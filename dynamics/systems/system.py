@@ -275,6 +275,10 @@ class System:
         parts = [require_sequence("state", part, "variables") for part in state]
         return Graph([node for part in parts for node in part] + self.extra_inputs, outputs)
 
+    def _repr_html_(self) -> str | None:
+        """The equations that a notebook shows as formulas, when a drawing package is installed (extra `viz`)."""
+        return extend.render_html("model", self)
+
     def __repr__(self) -> str:
         parameters = f", parameters {', '.join(self.parameters)}" if self.parameters else ""
         return f"<System of {self.nq} coordinate(s) {', '.join(self.coordinates[:6])}{parameters}>"

@@ -8,21 +8,22 @@ from . import library
 from .arguments import FORMULATIONS, MOMENTUM_FORM, answer, counting, formulation, scene_of, takes_a_scene, verdict_of
 from .command import Command
 
+DIGITS = 6
+
 
 def add(parser: Command) -> None:
     """The command's arguments."""
     takes_a_scene(parser)
     which = parser.add_mutually_exclusive_group()
     which.add_argument(
-        "--formulation",
-        type=formulation,
-        default="chain_rule",
-        choices=FORMULATIONS,
-        help="of the torque (default: chain_rule)",
+        "--formulation", type=formulation, choices=FORMULATIONS, help="of the torque (default: chain_rule)"
     )
     which.add_argument("--momentum", action="store_true", help=f"{MOMENTUM_FORM}, in place of the torque")
     parser.add_argument(
         "--lines", type=counting, default=200, metavar="N", help="of each block, at most (default: 200)"
+    )
+    parser.add_argument(
+        "--digits", type=counting, default=DIGITS, metavar="N", help=f"of numbers (default: {DIGITS}; 17 are all)"
     )
     parser.add_argument("--latex", action="store_true", help="print as LaTeX")
     parser.set_defaults(run=run, forward=False)
@@ -31,9 +32,12 @@ def add(parser: Command) -> None:
 def run(options: argparse.Namespace) -> int:
     """Print the equations, and of a formulation the verdict; 1 where it is not the torque of the chain rule."""
     scene = scene_of(options)
-    graphs = library.equation_graphs(scene, formulation=options.formulation, momenta=options.momentum)
+    if scene.ode is not None and options.formulation is not None:
+        raise ValueError(f"{scene.name} is a system of first order: it has no torque, so no --formulation of it")
+    options.formulation = options.formulation or "chain_rule"
+    equations = library.model_equations(scene, formulation=options.formulation, momenta=options.momentum)
     written = library.equations_latex if options.latex else library.equations_text
-    text = written(scene, graphs, options.lines)
+    text = written(equations, options.lines, options.digits)
     verdict = verdict_of(options, scene)
     differs = verdict is not None and verdict.differs
     if differs:

@@ -30,7 +30,8 @@ if TYPE_CHECKING:
     from ..graph_drawing.render import check_can_draw, render_png, render_svg, tags_to_collapse
     from ..lessons.lesson import SCREENS, lesson
     from ..models.driven_motion import driven
-    from ..models.equations import equation_graphs, equations_latex, equations_text
+    from ..models.equations import model_equations
+    from ..models.equations_text import equations_latex, equations_text
     from ..models.film import animate, frames
     from ..models.inspection import FRAMES, inspection
     from ..models.inspection_page import inspection_page

@@ -31,6 +31,7 @@ const fenced = (inside) => math("mrow", parenthesis("("), inside, parenthesis(")
 /** A node as an identifier: its name, or v with its number. */
 function symbol(version, node) {
   const name = version.names[node];
+  if (version.symbol) return version.symbol(node);
   return name ? math("mi", name[1]) : math("msub", math("mi", "v"), math("mn", String(node)));
 }
 

@@ -13,6 +13,7 @@ from ..inspector import page
 from ..pages.html import Page, html_target
 from ..paper.both_forms import HAMILTON
 from ..typed import box
+from .formulas_panel import formulas_panel
 from .inspection import Inspection, inspection
 from .live_motion import live_panel
 from .remarks import tree_alone
@@ -113,6 +114,7 @@ def inspection_page(scene: scenes.Scene, content: Inspection, moved: str = "", t
         panels=[
             box(text_or_none(scene, scene.q, scene.qd)),
             *([live_panel(scene, momentum=first == HAMILTON)] if lively else []),
+            formulas_panel(scene, momenta=first == HAMILTON),
         ],
     )
 

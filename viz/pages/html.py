@@ -17,6 +17,7 @@ from typing import NamedTuple
 from cgraph.extend import Json, check_writable, require_path
 
 from .. import theme
+from .mathml import STYLE as MATHML
 
 FRAME_HEIGHT = 760  # pixels in a notebook
 _COMMENT = re.compile(r"^ *(?://[^\n]*|/\*\*.*?\*/)\n", re.MULTILINE | re.DOTALL)  # that begins a line
@@ -99,6 +100,7 @@ def compose(
     body: HTML.  data: {id of an element: what scripts read there as JSON}.  allowed: what else scripts may do. A page
     without a script may have styles at its elements.
     """
+    style += MATHML if 'class="aligned"' in body else ""
     run = (
         f"script-src {_digest(script)} {allowed}; style-src {_digest(style)}" if script else "style-src 'unsafe-inline'"
     )

@@ -113,8 +113,42 @@ function showDerived({ system, motion, record }) {
     const found = TYPED.verdict(system, name), words = found.differs ? "wrong" : "right";
     return tag("details", {}, tag("summary", {}, `${name.replace("_", " ")}: ${words}`), tag("pre", {}, TYPED.lint(system, found).join("\n")));
   });
-  byId("derived").replaceChildren(table(["", "nodes", "edges", "spurious"], rows), ...lint, ...(motion.error ? [] : motionWords(system, motion)));
+  byId("derived").replaceChildren(...typedFormulas(system), table(["", "nodes", "edges", "spurious"], rows), ...lint, ...(motion.error ? [] : motionWords(system, motion)));
 }
+const LONGEST_FORMULA = 120; // symbols of a formula that is shown
+
+/** The Lagrangian, and the torques by the chain rule, as formulas; of a long one, that it is long. */
+function typedFormulas(system) {
+  const tau = [...TYPED.inverseDynamics(system, "chain_rule").outputs.values()];
+  const lefts = [math("mi", "L"), ...system.coordinates.map((name) => math("msub", math("mi", "τ"), indexed(name)))];
+  const rows = [system.lagrangian, ...tau].map((node, k) => {
+    const view = viewOf(node, system), last = view.ops.length - 1, sizes = [];
+    view.args.forEach((args, i) => { sizes[i] = args.reduce((sum, arg) => sum + sizes[arg], 1); });
+    const right = sizes[last] > LONGEST_FORMULA ? math("mtext", `a formula of ${sizes[last]} symbols`) : formula(view, last, Infinity, true)[0];
+    return scrolled(mathWith("math", { display: "block" }, math("mrow", lefts[k], math("mo", "="), right)));
+  });
+  return [tag("h3", {}, "L and τ as their graphs have them"), ...rows];
+}
+/** A node as panels.js writes formulas of a version, with coordinates in their letters. */
+function viewOf(node, system) {
+  const nodes = TYPED.topological([node]), number = new Map(nodes.map((each, i) => [each, i]));
+  return {
+    ops: nodes.map(({ op }) => op), args: nodes.map(({ args }) => args.map((arg) => number.get(arg))), names: [],
+    constants: new Map(nodes.flatMap(({ value }, i) => (value === null ? [] : [[i, value]]))),
+    symbol: (i) => lettered(nodes[i].name, system.coordinates),
+  };
+}
+/** A name in letters: qd0 is the first coordinate's with a dot. */
+function lettered(name, coordinates) {
+  const [, rate, place] = /^q(d*)(\d+)$/.exec(name) ?? [];
+  const text = TYPED.pretty(coordinates[place] ?? name), dots = { d: "\u02d9", dd: "\u00a8" }[rate];
+  const letter = place === undefined || isLetter(text) ? math("mi", text) : math("mi", "q");
+  const dotted = dots ? math("mover", letter, math("mo", dots)) : letter;
+  return place === undefined || isLetter(text) ? dotted : math("msub", dotted, math("mi", text));
+}
+const isLetter = (text) => [...text.replace(/[₀-₉]/g, "")].length === 1;
+const indexed = (name) => math("mi", TYPED.pretty(name));
+
 function motionWords(system, motion) {
   const [first, last] = [motion.energy[0], motion.energy.at(-1)], exact = Number.isFinite(motion.change) ? `; halving the step changes it by a relative ${brief(motion.change)}` : "";
   return [tag("h3", {}, "Motion"), curves(system, motion),

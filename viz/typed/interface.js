@@ -44,6 +44,6 @@ time = 20`],
 ]);
 
 return {
-  parse, explained, TextError, inverseDynamics, forwardDynamics, verdict, lint, motionOf, recordOf, rods, compiled,
+  parse, explained, TextError, inverseDynamics, forwardDynamics, verdict, lint, motionOf, recordOf, rods, compiled, pretty,
   ROWS, apply, constant, variable, folded, topological, FORMULATIONS, EXAMPLES,
 };

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import cgraph as cg
-from cgraph import Graph, Node
+from cgraph import Graph, Node, extend
 from cgraph.extend import Array, Builder, building, real_array, require_flag, require_mapping
 
 from ...systems.arguments import parameter_value
@@ -132,6 +132,10 @@ class Mechanism(Structure):
         for name, value in require_mapping("parameters", self.parameters, "name: value").items():
             parameter_value(name, value)  # before one is put in
         self._require_values(self.parameters, bodies)
+
+    def _repr_html_(self) -> str | None:
+        """The equations that a notebook shows as formulas, when a drawing package is installed (extra `viz`)."""
+        return extend.render_html("model", self)
 
     def __repr__(self) -> str:
         counted = (

@@ -1,17 +1,29 @@
 """The equations that a person reads mean the graphs: every line is computed again from its text."""
 
 import math
+import re
+from functools import cache
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
 import cgraph as cg
 import dynamics as dyn
+from cgraph.extend import LATEX, statements
+from dynamics.equations.equations_of_motion import momentum
+from dynamics.equations.formulations.formulations import inverse_dynamics
+from dynamics.equations.momentum.hamiltonian import hamilton_equations
+from dynamics.equations.state_equation import state_equation
 from tests.each_row import each_row
 from viz import cli
-from viz.models.equations import equation_graphs, equations_latex, equations_text
+from viz.models.equations import Equations, model_equations
+from viz.models.equations_text import ALL_DIGITS, equations_html, equations_latex, equations_text, plain
+from viz.pages.mathml import notation, typeset
 
 FUNCTIONS = {name: getattr(math, name) for name in ("sin", "cos", "exp", "sqrt", "tanh")} | {"abs": abs}
+MANY = 10**6
+CLOSE = 1e-9  # of values, and of the largest of them: a reading form adds in another order
 
 
 def pulley():
@@ -21,47 +33,279 @@ def pulley():
     return dyn.System(lagrangian, ["x"], {"m": 1.0, "M": 2.0, "g": 9.81}, damping=0.1)
 
 
-MODELS = {
-    "spring_mass": lambda: dyn.scenes.load("spring_mass"),
-    "triple_pendulum": lambda: dyn.scenes.load("triple_pendulum"),
-    "pulley": lambda: dyn.scenes.of_model(pulley()),
-    "first order": lambda: dyn.scenes.of_model(dyn.OdeSystem(lambda x, t: [x[1], -(cg.sin(x[0]) ** 3)], ["a", "b"])),
-}
+def cart_pole():
+    def lagrangian(q, qd, t, p):
+        pole = (qd[0] + p["l"] * cg.cos(q[1]) * qd[1]) ** 2 + (p["l"] * cg.sin(q[1]) * qd[1]) ** 2
+        return 0.5 * p["M"] * qd[0] ** 2 + 0.5 * p["m"] * pole - p["m"] * p["g"] * p["l"] * cg.cos(q[1])
+
+    return dyn.System(
+        lagrangian, ["x", "theta"], {"M": 2.0, "m": 0.5, "l": 0.7, "g": 9.81}, damping=[0.1, 0.0],
+        forces=lambda q, qd, t, p: [cg.sin(t) * p["l"], 0.0],
+    )  # fmt: skip
+
+
+def hoop():
+    def lagrangian(q, qd, t, p):
+        return 0.5 * p["m"] * p["R"] ** 2 * (qd[0] ** 2 + p["Omega"] ** 2 * cg.sin(q[0]) ** 2) + p["m"] * cg.cos(q[0])
+
+    return dyn.System(lagrangian, ["theta"], {"m": 1.0, "R": 2.0, "Omega": 3.0})
+
+
+def relativistic():
+    """Not quadratic in the velocities, depends on time, and has operations of every kind."""
+
+    def lagrangian(q, qd, t):
+        walls = cg.where(q[1] > 0.4, q[1] ** 1.5, cg.exp(-q[0])) + abs(q[0] - 3.0) + cg.minimum(q[0], q[1] / 3.0)
+        return -cg.sqrt(9.0 - qd[0] ** 2 - qd[1] ** 2) + q[0] * qd[1] * t - walls * (1.0 - 1e-9 * q[0])
+
+    return dyn.System(lagrangian, ["x", "y"])
+
+
+def spatial_arm(n):
+    axes = [(0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (1.0, 0.0, 0.0)]
+    bodies, parent = [], "world"
+    for i in range(n):
+        joint = dyn.Joint("revolute", axis=axes[i % 3], position=(0.0, 0.0, 0.3 * (i > 0)), name=f"joint{i + 1}")
+        center, inertia = (0.01 * i, 0.02, 0.15), (0.02, 0.03, 0.01)
+        bodies.append(dyn.Body(f"link {i + 1}", joint, parent=parent, mass=1.0 + i, center=center, inertia=inertia))
+        parent = f"link {i + 1}"
+    return dyn.Mechanism(bodies)
+
+
+def floating():
+    return dyn.Mechanism(
+        [dyn.Body("craft", dyn.Joint("free"), mass=2.0, center=(0.1, 0.0, 0.2), inertia=(0.3, 0.2, 0.1))]
+    )
+
+
+@cache
+def equations_of(model):
+    """With a block on what the formulation by definition has too much."""
+    return model_equations(MODELS[model](), compare=("by_definition",))
+
+
+MODELS = {name: lambda name=name: dyn.scenes.load(name) for name in dyn.scenes.names()} | {
+    make.__name__: lambda make=make: dyn.scenes.of_model(make())
+    for make in (pulley, cart_pole, hoop, relativistic, floating)
+} | {
+    "arm of 3": lambda: dyn.scenes.of_model(dyn.planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7])),
+    "spatial arm of 3": lambda: dyn.scenes.of_model(spatial_arm(3)),
+    "spatial arm of 7": lambda: dyn.scenes.of_model(spatial_arm(7)),
+    "first order": lambda: dyn.scenes.of_model(
+        dyn.OdeSystem(lambda x, t, p: [x[1] * p["k"], -(cg.sin(x[0]) ** 3) - x[1] / 3.0], ["a", "theta"], {"k": 2.0})
+    ),
+}  # fmt: skip
+
+
+def computed(found, known):
+    """The values of all left sides of lines of text; those of a matrix as lists."""
+    known = dict(known)
+    rows = []
+    for left, right in found.equations:
+        if left:
+            rows.append([left, right])
+        else:
+            rows[-1][1] += f" {right}"
+    while rows:  # a sum may stand above its parts
+        ready = [row for row in rows if set(re.findall(r"[nv]_?\w+", row[1])) & {each[0] for each in rows} == set()]
+        assert ready, rows
+        for left, right in ready:
+            if left not in ("n_tau", "n_tau_def - n_tau", "n_tau_def-n_tau"):  # the equation in general, of vectors
+                known[left.split(" = ")[0]] = eval(
+                    right.replace("^", "**"), {"__builtins__": {}, **FUNCTIONS, **MORE}, known
+                )
+        rows = [row for row in rows if row not in ready]
+    return known
+
+
+MORE = {"where": lambda c, a, b: a if c else b, "minimum": min, "sign": lambda a: math.copysign(1.0, a)}
+SYMBOLS = plain(ALL_DIGITS)._replace(names=lambda names: {name: "n_" + re.sub(r"\W", "_", name) for name in names})
+
+
+MATHML = notation(ALL_DIGITS)._replace(
+    names=lambda names: {name: f"<mi>n_{re.sub(r'[^A-Za-z0-9_]', '_', name)}</mi>" for name in names},
+    unnamed="<mi>v{}</mi>".format,
+)
+SIGNS = {"−": "-", "·": "*", "\u2062": "*", "=": " = "}
+
+
+def python_of(element: ElementTree.Element) -> str:
+    """MathML as Python: what stands in the elements of a formula, and nothing else."""
+    inside = [python_of(child) for child in element]
+    if element.tag == "mo":
+        return SIGNS.get(element.text, element.text)
+    if element.tag in ("mi", "mn"):
+        return element.text
+    if element.tag == "mtable":
+        return ", ".join(inside)
+    if element.tag == "mtr":
+        return f"[{', '.join(inside)}]"
+    if inside and inside[0] == inside[-1] == "|":
+        return f"abs({''.join(inside[1:-1])})"
+    forms = {"mfrac": "(({})/({}))", "msup": "(({})**({}))", "msqrt": "sqrt({})"}
+    if element.tag in forms:
+        return forms[element.tag].format(*(inside if element.tag != "msqrt" else ["".join(inside)]))
+    assert element.tag in ("mrow", "mtd"), element.tag
+    text = "".join(inside)
+    return f"[{text[1:-1]}]" if element.tag == "mrow" and len(element) == 3 and element[1].tag == "mtable" else text
+
+
+def lines_of_mathml(block):
+    """The lines of a block as MathML has them, in Python."""
+    found = statements(block.statements, MATHML, lines=MANY)
+    read = [tuple(python_of(ElementTree.fromstring(f"<mrow>{side}</mrow>")) for side in row) for row in found.equations]
+    return found._replace(equations=read)
+
+
+def values_of(equations: Equations, point: dict[str, float], mathml: bool = False) -> list[dict[str, float]]:
+    """What each block says at a point of the graphs' names; a left side has the name that the block gives it."""
+    said = []
+    for block in equations.blocks:
+        found = lines_of_mathml(block) if mathml else statements(block.statements, SYMBOLS, lines=MANY)
+        assert not found.left_out
+        said.append(computed(found, {f"n_{re.sub(r'[^A-Za-z0-9_]', '_', name)}": x for name, x in point.items()}))
+    return said
+
+
+def points(scene):
+    """Two random states, with all that graphs of the scene have as inputs."""
+    rng = np.random.default_rng(0)
+    if scene.ode is not None:
+        names = [*scene.coordinates, "t"]
+    else:
+        n, nq = scene.system.n, scene.system.nq
+        names = [f"q{i}" for i in range(nq)] + [f"{kind}{i}" for kind in ("qd", "qdd", "tau", "p") for i in range(n)]
+    for _ in range(2):
+        yield {
+            name: float(x) for name, x in zip([*names, "t"], rng.uniform(0.3, 1.0, len(names) + 1), strict=True)
+        } | dict(scene.parameters)
+
+
+def agrees(said, graph, point):
+    expected = graph.evaluate({name: point[name] for name in graph.input_names})
+    scale = max([abs(float(x)) for x in expected.values()])
+    for name, value in expected.items():
+        assert said[f"n_{name}"] == pytest.approx(float(value), rel=CLOSE, abs=CLOSE * scale), name
+
+
+@each_row("model", list(MODELS))
+def test_the_lines_compute_what_the_graphs_do(model):
+    scene, equations = MODELS[model](), equations_of(model)
+    for point, mathml in zip(points(scene), (False, True), strict=True):
+        values = values_of(equations, point, mathml)
+        blocks = {block.title: said for block, said in zip(equations.blocks, values, strict=True)}
+        if scene.ode is not None:
+            agrees(blocks["State equation"], state_equation(scene), point)
+            continue
+        system = scene.system
+        lagrangian = system.graph({"L": system.lagrangian}, system.q, system.qd)
+        said = blocks["Lagrangian"]
+        parts = [value for name, value in said.items() if re.fullmatch(r"n_L_\d+", name)]
+        whole = lagrangian.evaluate({name: point[name] for name in lagrangian.input_names})["L"]
+        assert said.get("n_L", sum(parts)) == pytest.approx(float(whole), rel=CLOSE, abs=CLOSE)
+        if parts:
+            assert sum(parts) == pytest.approx(float(whole), rel=CLOSE, abs=CLOSE)
+        agrees(blocks["Momenta, p = ∂L/∂q̇"], momentum(scene), point)
+        torque = inverse_dynamics(scene, "chain_rule")
+        if (title := "Torque, τ = dp/dt − ∂L/∂q") in blocks:
+            agrees(blocks[title], torque, point)
+        if (title := "The same by matrices") in blocks:
+            by_matrices(blocks[title], scene, torque, point)
+
+
+def by_matrices(said, scene, torque, point):
+    """tau = M qdd + c + g + d - Q, of what the block says."""
+    n, taken = scene.system.n, scene.parameters
+    letter = {name: next(f"n_{each}" for each in some if each not in taken) for name, some in
+              {"M": "MHA", "c": "cbC", "g": "gnG", "d": "dD", "Q": "QFu"}.items()}  # fmt: skip
+    if letter["M"] in said:
+        mass = np.array(said[letter["M"]])
+    else:
+        mass = np.array([[said[f"n_M_{max(i, j)}_{min(i, j)}"] for j in range(n)] for i in range(n)])
+    tau = mass @ [point[f"qdd{i}"] for i in range(n)]
+    for name, sign in (("c", 1.0), ("g", 1.0), ("d", 1.0), ("Q", -1.0)):
+        tau = tau + sign * np.ravel(said.get(letter[name], np.zeros(n)))
+    expected = torque.evaluate({name: point[name] for name in torque.input_names})
+    assert tau == pytest.approx([float(x) for x in expected.values()], rel=CLOSE, abs=CLOSE * np.abs(tau).max())
+
+
+@each_row("model", ["spring_mass", "cart_pole", "hoop", "arm of 3", "relativistic"])
+def test_the_spurious_term_is_what_the_formulations_differ_by_as_dt_tends_to_0(model):
+    """Against the graphs themselves at a small step, to the order of the step."""
+    scene = MODELS[model]()
+    system, right = scene.system, inverse_dynamics(scene, "chain_rule")
+    for formulation in ("by_definition", "kinetic_only"):
+        equations, wrong = model_equations(scene, formulation=formulation), inverse_dynamics(scene, formulation)
+        titles = [block.title for block in equations.blocks]
+        for point in points(scene):
+            held = point | {"dt": 1e-7}
+            held |= {f"q{i}_old": point[f"q{i}"] - 1e-7 * point[f"qd{i}"] for i in range(system.n)}
+            held |= {f"qd{i}_old": point[f"qd{i}"] - 1e-7 * point[f"qdd{i}"] for i in range(system.n)}
+            off, tau = (graph.evaluate({name: held[name] for name in graph.input_names}) for graph in (wrong, right))
+            differences = np.array([float(off[name]) - float(tau[name]) for name in tau])
+            said = np.zeros(system.n)
+            if equations.blocks[-1].wrong:
+                values = values_of(equations, held | {f"tau_def{i}": 0.0 for i in range(system.n)})[-1]
+                for i in range(system.n):
+                    said[i] = values.get(f"n_tau_def{i} - n_tau{i}", 0.0)
+            assert differences == pytest.approx(said, abs=1e-5 * max(1.0, np.abs(said).max())), titles
+
+
+@each_row("model", ["spring_mass", "triple_pendulum", "pulley"])
+def test_hamilton_s_equations_are_those_of_the_graph(model):
+    scene = MODELS[model]()
+    equations = model_equations(scene, momenta=True)
+    assert [block.title for block in equations.blocks][2:] == ["Hamilton's equations"]
+    for point in points(scene):
+        agrees(values_of(equations, point)[2], hamilton_equations(scene), point)
+
+
+@each_row("model", list(MODELS))
+def test_mathml_and_latex_have_the_lines_of_the_text(model):
+    """Alike in number, well formed, and short where a model is large."""
+    equations = equations_of(model)
+    page = equations_html(equations)
+    assert len(page) < 100_000
+    ElementTree.fromstring(f"<div>{page.replace('&nbsp;', ' ')}</div>")
+    text, latex = equations_text(equations, MANY), equations_latex(equations, MANY)
+    assert "left out" not in text
+    assert latex.count(r"\begin{aligned}") == len(equations.blocks)
+    for block in equations.blocks:
+        whole = typeset(block.statements, equations.names, MANY)
+        found = statements(block.statements, LATEX, equations.names, MANY)
+        assert whole.count("<mo>=</mo></mtd>") == sum([bool(left) for left, _ in found.equations])
+        assert whole.count("<math") == 1
+
+
+def test_a_sum_has_no_doubled_sign_and_a_name_no_space():
+    for name in MODELS:
+        text = equations_text(equations_of(name), 200)
+        lines = [line for line in text.splitlines() if line.startswith("  ") and not line.startswith("  (")]
+        assert not [line for line in lines if re.search(r"[-+] -|\+ \(-|\w \w", line.replace(" = ", "="))], name
 
 
 @each_row(
-    "model, momenta",
-    [(name, momenta) for name in MODELS for momenta in (False, True) if not (momenta and name == "first order")],
-)
-def test_lines_of_text_compute_what_the_graphs_do(model, momenta):
-    scene = MODELS[model]()
-    graphs = equation_graphs(scene, momenta=momenta)
-    called = dyn.display_names(scene)
-    text = equations_text(scene, graphs, 1000)
-    for k, name in enumerate(sorted(called.values(), key=len, reverse=True)):
-        text = text.replace(name, f"name_{k}_")
-    python = {shown: f"name_{k}_" for k, shown in enumerate(sorted(called.values(), key=len, reverse=True))}
-    for (title, graph), block in zip(graphs.items(), text.split("\n\n"), strict=True):
-        values = dict(
-            zip(graph.input_names, np.random.default_rng(0).uniform(0.3, 1.0, len(graph.inputs)), strict=True)
-        )
-        known = {python.get(called.get(name, name), name): value for name, value in values.items()}
-        heading, *lines = block.splitlines()
-        assert heading == title
-        for line in lines:
-            left, _, right = line.strip().partition(" = ")
-            known[left] = eval(right.replace("^", "**"), {"__builtins__": {}, **FUNCTIONS}, known)
-        for name, value in graph.evaluate(values).items():
-            found = known[python.get(called.get(name, name), name)]
-            assert found == pytest.approx(float(value), rel=1e-9), name
+    "model, line",
+    [
+        ("spring_mass", "  L = 0.5 * I * qd.theta^2 - 0.5 * k * q.theta^2"),
+        ("hoop", "  tau.theta = m * R^2 * qdd.theta - 0.5 * m * R^2 * Omega^2 * sin(2 * q.theta) + m * sin(q.theta)"),
+        ("cart_pole", "  p.x = (M + m) * qd.x + m * l * cos(q.theta) * qd.theta"),
+        ("cart_pole", "  tau.theta = m * l * cos(q.theta) * qdd.x + m * l^2 * qdd.theta - m * l * g * sin(q.theta)"),
+        ("cart_pole", "  H = [[M + m, m * l * cos(q.theta)], [m * l * cos(q.theta), m * l^2]]"),
+        ("first order", "  a_dot = k * theta"),
+        ("triple_pendulum", "Indices: 1 is joint 1, 2 is joint 2, 3 is joint 3."),
+    ],
+)  # fmt: skip
+def test_an_equation_is_that_of_a_textbook(model, line):
+    assert line in equations_text(equations_of(model), 200).splitlines()
 
 
-def test_what_is_left_out_is_said_and_latex_has_every_block():
-    scene = MODELS["triple_pendulum"]()
-    graphs = equation_graphs(scene)
-    assert "lines are left out; see --lines: those of v6, v9, " in equations_text(scene, graphs, 3)
-    assert "left out" not in equations_text(scene, graphs, 1000)
-    assert equations_latex(scene, graphs, 40).count(r"\begin{aligned}") == len(graphs) == 3
+def test_what_is_left_out_is_said():
+    equations = equations_of("spatial arm of 7")
+    assert "lines are left out; see --lines: those of " in equations_text(equations, 3)
+    page = equations_html(equations, 3)
+    assert "lines are left out: those of" in page
+    assert "<code>cgraph equations</code> prints all." in page
 
 
 @each_row(
@@ -69,14 +313,25 @@ def test_what_is_left_out_is_said_and_latex_has_every_block():
     [
         ("equations spring_mass", 0, "tau.theta = I * qdd.theta + k * q.theta"),
         ("equations spring_mass --formulation by_definition", 1, "By definition, the torque is wrong"),
+        ("equations spring_mass --formulation by_definition", 1, "tau.theta = dL / dq.theta = -k * q.theta"),
         (
             "equations spring_mass --formulation euler_embedded --latex",
             1,
             "% By definition, the torque is wrong",
         ),  # a former name
         ("equations spring_mass --momentum", 0, "p_dot.theta = tau.theta - k * q.theta"),
+        ("equations triple_pendulum --latex", 0, r"\begin{pmatrix}"),
+        ("equations triple_pendulum --digits 3", 0, "Numbers are rounded to 3 digits; see --digits."),
     ],
-)
+)  # fmt: skip
 def test_the_command_prints_equations_and_the_verdict(capsys, arguments, status, said):
     assert cli.main(arguments.split()) == status
     assert said in capsys.readouterr().out
+
+
+def test_a_first_order_system_has_no_formulations(capsys, tmp_path):
+    (tmp_path / "decay.py").write_text("import dynamics as dyn\nx = dyn.OdeSystem(lambda x, t: [-x[0]], ['x'])\n")
+    assert cli.main(["equations", f"{tmp_path / 'decay.py'}:x"]) == 0
+    assert "x_dot = -x" in capsys.readouterr().out
+    assert cli.main(["equations", f"{tmp_path / 'decay.py'}:x", "--formulation", "chain_rule"]) == 2
+    assert "is a system of first order: it has no torque, so no --formulation of it" in capsys.readouterr().err

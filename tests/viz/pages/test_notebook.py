@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
+import tomllib
 from functools import cache
-from html import unescape
+from html import escape, unescape
+from importlib import import_module
 from importlib.metadata import entry_points
 
 import numpy as np
@@ -13,8 +15,10 @@ import pytest
 import cgraph as cg
 import dynamics as dyn
 from cgraph.extend import remarks_of
+from tests.sources import ROOT
 from viz import theme
 from viz.graph_drawing.render import LARGE_GRAPH
+from viz.models.equations_text import model_html
 from viz.pages.notebook import COLUMNS, graph_html, trajectory_html
 
 LINE = theme.MARKED.line.lower()
@@ -118,6 +122,44 @@ def test_the_package_tells_notebooks_what_draws():
     assert installed["graph"] == "viz.pages.notebook:graph_html"
     assert installed["node"] == "viz.pages.notebook:node_html"
     assert installed["trajectory"] == "viz.pages.notebook:trajectory_html"
+
+
+def test_every_renderer_that_the_package_names_is_there():
+    named = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["entry-points"]["cgraph.renderers"]
+    for entry in named.values():
+        module, _, function = entry.partition(":")
+        assert callable(getattr(import_module(module), function))
+    assert named["model"] == "viz.models.equations_text:model_html"
+
+
+def test_a_model_is_shown_by_its_lagrangian_and_torque():
+    pendulum = dyn.System(
+        lambda q, qd, t, p: 0.5 * p["m"] * p["l"] ** 2 * qd[0] ** 2 + p["m"] * 9.81 * p["l"] * cg.cos(q[0]),
+        ["theta"], {"m": 1.0, "l": 2.0},
+    )  # fmt: skip
+    decay = dyn.OdeSystem(lambda x, t: [-x[0]], ["x"])
+    for model, titles in (
+        (pendulum, ["Lagrangian", "Torque, τ = dp/dt − ∂L/∂q"]),
+        (decay, ["State equation"]),
+        (dyn.planar_arm([1.0] * 3, [1.0] * 3), ["Lagrangian", "The same by matrices"]),
+    ):
+        shown = model_html(model)
+        assert re.findall("<h4>(.*?)</h4>", shown) == titles
+        assert shown.count("<math display") == len(titles)
+        assert escape(repr(model)) in shown
+    assert "<mi>θ</mi><mo>¨</mo>" in model_html(pendulum)
+    assert "<math" not in model_html(dyn.planar_arm([1.0] * 20, [1.0] * 20))  # whose equations are long
+
+
+def test_a_model_asks_for_what_draws_it(monkeypatch):
+    monkeypatch.setattr("cgraph.extend.render_html", lambda kind, what: f"{kind}: {what!r}")
+    body = dyn.Body("rotor", dyn.Joint("revolute"), inertia=(0.1, 0.1, 0.2))
+    for model in (
+        dyn.OdeSystem(lambda x, t: [-x[0]], ["x"]),
+        dyn.Mechanism([body]),
+        dyn.planar_arm([1.0], [1.0]).system,
+    ):
+        assert model._repr_html_() == f"model: {model!r}"
 
 
 def test_a_graph_and_a_motion_find_what_draws_them():

@@ -38,6 +38,7 @@ def test_an_own_lagrangian_is_derived_drawn_and_moving(show):
     graph = dyn.inverse_dynamics(dyn.scenes.load("spring_mass"), "by_definition")  # the same, with other names
     counts = [len(graph.nodes), len(graph.edges), len(dyn.spurious_nodes(graph))]
     assert page.locator("#derived tbody tr").first.inner_text().split()[-3:] == list(map(str, counts))
+    assert page.locator("#derived math").all_text_contents() == ["L=0.5·m·x˙2−0.5·k·x2", "τx=m·x¨+k·x"]
     assert 0 < page.locator(".item.wrong").count() <= counts[-1]  # numbers are written where they are used
     page.keyboard.press("Escape")
     page.click("#versions button >> nth=2")

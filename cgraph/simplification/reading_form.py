@@ -1,0 +1,390 @@
+"""Reading form: nodes of the same values as a person writes them, to be typeset and not to be computed.
+
+A sum has its products in order and no doubled signs, a product its number first and powers as powers. Where it is
+shorter, what stands is written out as a sum of products by the identities of `canonical`, collected by the rates in it,
+common factors taken out: (m + M) l^2 theta_dot^2 / 2 - m g l cos(theta).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+
+from ..core.node import CONSTANT, Node, constant
+from ..core.traversal import topological
+from ..operations.operation import OPS
+from ..util.explain_failure import explain_failure
+from ..writing.naming import with_name
+from .canonical import COEFFICIENT_ROUNDING, Canonical, Powers, Sum
+from .identities import shortest
+
+LARGEST, MOST = 120, 700  # nodes that are written out, of one and of all
+WORTH = 1.6  # so much longer may be what is written out
+PLAINER = 1.2  # and so much longer that in which every product of sums is written out, beside where sums are kept
+SHORT = 8  # symbols of what is written again where it is needed again
+FUNCTION, RATE = 2, 3  # ranks of factors: a function stands behind coordinates, before their rates
+RATIOS = (1.0, 2.0, 0.5)  # of two sums of which one is written, with the rates of both
+ARITHMETIC = ("add", "sub", "neg", "mul", "div", "pow")
+Rank = tuple[int, int]  # of a factor, and its place among those of that rank
+Signed = tuple[bool, Node]  # whether it is subtracted, and what
+
+
+@explain_failure
+def reading_form(nodes: Sequence[Node], ranks: Mapping[str, int] | None = None) -> list[Node]:
+    r"""Nodes of the same values, as a person writes them.
+
+    The nodes are not folded, and have the names that they had: `x**2` is a power, and a sum is a chain of + and - that
+    begins with a positive term, if there is one. Values differ by rounding. To be typeset by `statements`; a graph that
+    is computed is made by `cg.simplify`.
+
+    ranks: {name of a variable: its rank}, 0 of what is not named. In a product numbers stand first, then parameters
+    (0), coordinates (1), functions (2), and rates (3 and more), by which terms are collected; of one rank in the order
+    of `ranks`.
+
+    >>> import cgraph as cg
+    >>> from cgraph.extend import reading_form
+    >>> m, l, w = cg.variables("m l w")
+    >>> (y,) = reading_form([w * (l * (w * m)) * l + (-2.0) * m], {"w": 3})
+    >>> print(cg.latex(y))
+    m \, {l}^{2} \, {w}^{2} - 2 \, m
+    """
+    reader = _Reader(ranks or {})
+    plain = reader.tidied(nodes)
+    return [reader.shorter(node, tidy) for node, tidy in zip(nodes, plain, strict=True)]
+
+
+class _Reader:
+    """The maker of such nodes, each of them once."""
+
+    def __init__(self, ranks: Mapping[str, int]) -> None:
+        self.ranks = {name: (rank, place) for place, (name, rank) in enumerate(ranks.items())}
+        self._made: dict[tuple[object, ...], Node] = {}
+        self.left = MOST  # nodes that may still be written out
+        self._numbers: dict[Node, tuple[float, Node]] = {}  # products with a number before them
+        self._rank: dict[Node, Rank] = {}
+
+    def shorter(self, node: Node, tidy: Node) -> Node:
+        """The node written out where that is short, else as it stands."""
+        order = topological([node])
+        if len(order) > LARGEST or any(each.name and each.args for each in order[:-1]) or self.left < len(order):
+            return tidy
+        self.left -= len(order)
+        expanded, kept = (_Writer(self, canonical([node])).node(node) for canonical in (_Expanded, Canonical))
+        out = expanded if ink(expanded) <= PLAINER * ink(kept) else kept
+        return out if ink(out) <= WORTH * ink(tidy) else tidy
+
+    def make(self, name: str, *args: Node) -> Node:
+        """The one node of an operation."""
+        if (known := self._made.get((name, *args))) is None:
+            known = self._made[name, *args] = Node(OPS[name], args)
+        return known
+
+    def number(self, value: float) -> Node:
+        """The one node of a number."""
+        if (known := self._made.get((value,))) is None:
+            known = self._made[value,] = constant(value)
+        return known
+
+    # As it stands.
+
+    def tidied(self, nodes: Sequence[Node]) -> list[Node]:
+        """The nodes, sums and products in order, else as they stand; what is shared stays shared."""
+        order = topological(nodes)
+        ends = set(nodes)
+        uses: dict[Node, int] = dict.fromkeys(nodes, 1)
+        for node in order:
+            for arg in node.args:
+                uses[arg] = uses.get(arg, 0) + 1
+        size = _inks(order)
+        alone = {node for node in order if (uses[node] == 1 or size[node] <= SHORT) and not node.name}
+        sums: dict[Node, list[Signed]] = {}  # the terms of each node
+        products: dict[Node, tuple[float, dict[Node, int]]] = {}  # the factors of each node
+        done: dict[Node, Node] = {}
+        for node in order:
+            sums[node], products[node] = self._terms(node, sums, alone), self._factors(node, products, done, alone)
+            done[node] = self._written(node, sums[node], products[node], done)
+            if node.name and node.args and uses[node] > (node in ends):
+                done[node] = (
+                    with_name(Node(done[node].op, done[node].args), node.name) if done[node].args else done[node]
+                )
+            if node.value is None and (node not in alone or node.op.name not in ARITHMETIC):
+                sums[node], products[node] = [(False, node)], (1.0, {done[node]: 1})
+        return [done[node] for node in nodes]
+
+    def _terms(self, node: Node, sums: Mapping[Node, list[Signed]], alone: set[Node]) -> list[Signed]:
+        if node.op.name not in ("add", "sub", "neg"):
+            return [(False, node)]
+        negative = {"add": (False, False), "sub": (False, True), "neg": (True,)}[node.op.name]
+        return [
+            (minus != each, term)
+            for arg, minus in zip(node.args, negative, strict=True)
+            for each, term in (sums[arg] if arg in alone else [(False, arg)])
+        ]
+
+    def _factors(
+        self, node: Node, products: Mapping[Node, tuple[float, dict[Node, int]]], done: Mapping[Node, Node],
+        alone: set[Node],
+    ) -> tuple[float, dict[Node, int]]:  # fmt: skip
+        if node.value is not None:
+            return node.value, {}
+        name, args = node.op.name, node.args
+        power = args[1].value if name == "pow" else None
+        if name == "neg":
+            parts = [(args[0], 1)]
+        elif name in ("mul", "div"):
+            parts = [(args[0], 1), (args[1], 1 if name == "mul" else -1)]
+        elif power is not None and power == int(power) and args[0].value is None:
+            parts = [(args[0], int(power))]
+        else:
+            return 1.0, ({node: 1} if not args else {})
+        coefficient, powers = -1.0 if name == "neg" else 1.0, dict[Node, int]()
+        for arg, times in parts:
+            inner = products[arg] if arg in alone or arg.value is not None else (1.0, {done[arg]: 1})
+            if not inner[1] and arg.value is None:
+                inner = 1.0, {done[arg]: 1}
+            if (not 1e-100 < abs(inner[0]) < 1e100 and abs(times) > 1) or inner[0] == 0.0 > times:
+                inner = 1.0, {done[arg]: 1}
+            coefficient *= inner[0] ** times
+            for factor, count in inner[1].items():
+                powers[factor] = powers.get(factor, 0) + count * times
+        return coefficient, powers
+
+    def _written(
+        self, node: Node, terms: list[Signed], product: tuple[float, dict[Node, int]], done: Mapping[Node, Node]
+    ) -> Node:
+        if not node.args:
+            return node
+        if len(terms) > 1:
+            return self.sum([self._signed(minus, done.get(term, term)) for minus, term in terms])
+        if node.op.name in ("mul", "div", "neg", "pow") and (product[1] or product[0] != 1.0):
+            minus, made = self.product(*product)
+            return self.make("neg", made) if minus else made
+        return self.make(node.op.name, *[done[arg] for arg in node.args])
+
+    def _signed(self, minus: bool, node: Node) -> Signed:
+        if node.op.name == "neg":
+            return not minus, node.args[0]
+        if node.value is not None and node.value < 0.0:
+            return not minus, self.number(-node.value)
+        return minus, node
+
+    # Sums and products of what is made.
+
+    def operation(self, name: str, args: Sequence[Node]) -> Node:
+        """An operation on nodes that are made, a sum or a product in order."""
+        if name in ("add", "sub"):
+            return self.sum([self._signed(False, args[0]), self._signed(name == "sub", args[1])])
+        if name in ("mul", "div", "neg") and all(arg.value is None for arg in args):
+            powers = dict.fromkeys(args[:1], 1)
+            for arg in args[1:]:
+                powers[arg] = powers.get(arg, 0) + (1 if name == "mul" else -1)
+            minus, made = self.product(-1.0 if name == "neg" else 1.0, powers)
+            return self.make("neg", made) if minus else made
+        return self.make(name, *args)
+
+    def sum(self, terms: Sequence[Signed]) -> Node:
+        """Terms added up, a positive one first."""
+        if not terms:
+            return self.number(0.0)
+        ranks = {node: self.rank(node) for _, node in terms}
+        order = sorted(terms, key=lambda term: (-ranks[term[1]][0], ranks[term[1]][1]))
+        first = next((i for i, (minus, _) in enumerate(order) if not minus), 0)
+        order = [order[first], *order[:first], *order[first + 1 :]]
+        minus, total = order[0]
+        total = self.make("neg", total) if minus else total
+        for minus, node in order[1:]:
+            total = self.make("sub" if minus else "add", total, node)
+        return total
+
+    def product(self, coefficient: float, powers: Mapping[Node, int]) -> Signed:
+        """A product, its sign apart: a number, factors by rank, over those of negative powers."""
+        held: dict[Node, int] = {}
+        for node, power in powers.items():
+            number, rest = self._apart(node)
+            coefficient *= number**power
+            held[rest] = held.get(rest, 0) + power
+        powers = held
+        factors = sorted(
+            [(node, power) for node, power in powers.items() if power], key=lambda each: self.rank(each[0])
+        )
+        top = [self._power(node, power) for node, power in factors if power > 0]
+        below = [self._power(node, -power) for node, power in factors if power < 0]
+        size, minus = abs(coefficient), math.copysign(1.0, coefficient) < 0.0
+        node = self._times(top) if top else self.number(size)
+        if top and size != 1.0:
+            self._numbers[whole := self.make("mul", self.number(size), node)] = size, node
+            node = whole
+        return minus, self.make("div", node, self._times(below)) if below else node
+
+    def _apart(self, node: Node) -> tuple[float, Node]:
+        """The number before a product, and the rest."""
+        sign = 1.0
+        if node.op.name == "neg":
+            sign, node = -1.0, node.args[0]
+        if node in self._numbers:
+            number, node = self._numbers[node]
+            return sign * number, node
+        return sign, node
+
+    def _times(self, factors: Sequence[Node]) -> Node:
+        node = factors[0]
+        for factor in factors[1:]:
+            node = self.make("mul", node, factor)
+        return node
+
+    def _power(self, node: Node, power: int) -> Node:
+        return node if power == 1 else self.make("pow", node, self.number(float(power)))
+
+    def rank(self, node: Node) -> Rank:
+        """The place of a factor in a product: the rank of a name, of a rate in it, else that of a function."""
+        if node not in self._rank:
+            for each in topological([node]):
+                if each not in self._rank:
+                    self._rank[each] = self._ranked(each)
+        return self._rank[node]
+
+    def _ranked(self, node: Node) -> Rank:
+        if not node.args:
+            return (-1, 0) if node.value is not None else self.ranks.get(str(node.name), (0, len(self.ranks)))
+        inner = [self._rank[arg] for arg in node.args]
+        rank = max([each for each, _ in inner])
+        place = min([place for each, place in inner if each == rank])
+        return (rank, place) if rank >= RATE or node.op.name in ARITHMETIC else (FUNCTION, place)
+
+
+class _Expanded(Canonical):
+    """Canonical sums in which every product of sums is written out."""
+
+    def _factor(self, node: Node) -> Sum:
+        return self[node]
+
+
+class _Writer:
+    """Nodes written out as sums of products."""
+
+    def __init__(self, reader: _Reader, canonical: Canonical) -> None:
+        self.reader, self.canonical = reader, canonical
+        self._atoms: dict[int, Node] = {}
+        for atom in list(canonical.made):  # in the order in which they are made, arguments first
+            self._atom(atom)
+
+    def node(self, node: Node) -> Node:
+        """The node, written out."""
+        return self._sum(self.canonical[node])
+
+    def _atom(self, atom: int) -> Node:
+        if atom not in self._atoms:
+            op, args = self.canonical.made[atom]
+            if isinstance(args, dict):
+                inside = [self._sum(args)]
+            else:
+                inside = [self._sum(self.canonical[arg]) if arg.args or arg.op is CONSTANT else arg for arg in args]
+            self._atoms[atom] = inside[0] if op is None else self.reader.operation(op.name, inside)
+        return self._atoms[atom]
+
+    def _sum(self, a: Sum) -> Node:
+        """Products by the rates in them: (sum of the rest) * rates; one sum for rates that share it."""
+        parts: dict[Powers, dict[Powers, float]] = {}
+        for powers, term in shortest(self.canonical, a, new_angle=0).items():
+            rates = tuple([each for each in powers if self._rank(each[0]) >= RATE])
+            others = tuple([each for each in powers if each not in rates])
+            parts.setdefault(rates, {})[others] = term.value.real
+        alike: list[tuple[dict[Powers, float], list[tuple[float, Powers]]]] = []
+        for rates, rest in parts.items():
+            ratio, known = next(
+                ((ratio, known) for first, known in alike if (ratio := _ratio(rest, first))), (1.0, None)
+            )
+            if known is None:
+                alike.append((rest, [(1.0, rates)]))
+            else:
+                known.append((ratio, rates))
+        return self.reader.sum([term for rest, rates in alike for term in self._group(rest, rates)])
+
+    def _group(self, rest: dict[Powers, float], rates: list[tuple[float, Powers]]) -> list[Signed]:
+        """(sum of the rest) * (sum of the rates), factors of all terms taken out; without rates, terms by function."""
+        shared = _shared(rest)
+        functions: dict[Powers, dict[Powers, float]] = {}
+        for powers, value in rest.items():
+            kind = tuple([each for each in powers if self._rank(each[0]) == FUNCTION])
+            functions.setdefault(kind, {})[powers] = value
+        if len(functions) > 1:
+            if rates == [(1.0, ())] and not any(self._rank(atom) == FUNCTION for atom in shared):
+                return [term for part in functions.values() for term in self._group(part, rates)]
+            if not shared:
+                terms = [term for part in functions.values() for term in self._group(part, [(1.0, ())])]
+                turn = all(minus for minus, _ in terms)
+                whole = {self.reader.sum([(minus != turn, node) for minus, node in terms]): 1}
+                return [self._with_rates(-1.0 if turn else 1.0, whole, rates)]
+        sizes = {abs(value) for value in rest.values()}
+        factor = next(iter(sizes)) if len(sizes) == 1 else 0.5 if all(each % 1.0 == 0.5 for each in sizes) else 1.0
+        factor *= 1.0 if any(value > 0.0 for value in rest.values()) else -1.0
+        inner = [
+            self._product(value / factor, [(atom, power - shared.get(atom, 0)) for atom, power in powers])
+            for powers, value in rest.items()
+        ]
+        if len(rest) > 1 and not shared and factor in (1.0, -1.0) and rates == [(1.0, ())]:
+            return [(minus != (factor < 0.0), node) for minus, node in inner]
+        whole = {self._atom(atom): power for atom, power in shared.items()}
+        if len(rest) > 1:
+            node = self.reader.sum(inner)
+            whole[node] = whole.get(node, 0) + 1
+        return [self._with_rates(factor, whole, rates)]
+
+    def _with_rates(self, factor: float, whole: dict[Node, int], rates: list[tuple[float, Powers]]) -> Signed:
+        """Factors times the sum of the rates, of which factors of all are taken out."""
+        shared = _shared([powers for _, powers in rates])
+        for atom, power in shared.items():
+            whole[self._atom(atom)] = whole.get(self._atom(atom), 0) + power
+        if len(rates) > 1:
+            moved = [
+                self._product(ratio, [(atom, power - shared.get(atom, 0)) for atom, power in powers])
+                for ratio, powers in rates
+            ]
+            whole[self.reader.sum(moved)] = 1
+        return self.reader.product(factor, whole)
+
+    def _rank(self, atom: int) -> int:
+        return self.reader.rank(self._atom(atom))[0]
+
+    def _product(self, value: float, powers: Sequence[tuple[int, int]]) -> Signed:
+        held: dict[Node, int] = {}
+        for atom, power in powers:
+            held[self._atom(atom)] = held.get(self._atom(atom), 0) + power
+        return self.reader.product(value, held)
+
+
+def _shared(products: Iterable[Powers]) -> dict[int, int]:
+    """The powers of atoms that all products have."""
+    first, *others = map(dict, products)
+    shared = dict(first)
+    for powers in others:
+        shared = {
+            atom: min(power, powers[atom], key=abs) for atom, power in shared.items() if powers.get(atom, 0) * power > 0
+        }
+    return shared
+
+
+def _ratio(a: Mapping[Powers, float], b: Mapping[Powers, float]) -> float:
+    """The number that b times is a, where that is a small one and there is more than a number; else 0."""
+    if a.keys() != b.keys():
+        return 0.0
+    found = {a[powers] / b[powers] for powers in b}
+    first = next(iter(found))
+    same = all(abs(each - first) <= COEFFICIENT_ROUNDING * abs(first) for each in found)
+    ratios = RATIOS if b.keys() != {()} else RATIOS[:1] * (abs(b[()]) != 1.0)
+    near = next((each for each in ratios if abs(abs(first) - each) <= COEFFICIENT_ROUNDING * each), 0.0)
+    return math.copysign(near, first) if same else 0.0
+
+
+def ink(node: Node) -> float:
+    """Symbols of a node that is written without lines of its own."""
+    return _inks(topological([node]))[node]
+
+
+def _inks(order: Sequence[Node]) -> dict[Node, float]:
+    size: dict[Node, float] = {}
+    for each in order:
+        size[each] = (
+            1.0 + sum([size[arg] for arg in each.args]) - (each.op.name in ("mul", "pow")) if each.args else 1.0
+        )
+    return size
