@@ -62,7 +62,7 @@ class _Subject:
         return [
             each
             for each in edges
-            if only is None or each.target in only and (each.source in only or each.source.value is not None)
+            if only is None or (each.target in only and (each.source in only or each.source.value is not None))
         ]
 
     @property

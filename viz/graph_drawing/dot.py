@@ -128,6 +128,7 @@ def to_dot(
     drawing = digraph(rankdir)
     if caption is not None:
         counts = f"{counted(len(graph.nodes), 'node')}, {counted(len(graph.edges), 'edge')}"
+        counts = counts if only is None else f"{len(set(only))} of {counts}"
         drawing.attr(label=literal(f"{caption}\n{counts}" if caption else counts), labelloc="b", fontsize="16")
     draw_boxes(drawing, plan.boxes)
     if legend is not False:

@@ -129,7 +129,8 @@ def test_of_the_embedded_formulations_what_is_spurious_is_a_cause(formulation, s
     spurious = [k for k, name in enumerate(table.rows) if name.startswith("spurious")]
     terms = dyn.formulation_verdict(tree, formulation).terms
     if formulation == "kinetic_only_exact":
-        assert not spurious and terms is None
+        assert not spurious
+        assert terms is None
         return
     state = {name.replace("_old", ""): value for name, value in at.items()}
     excess = terms.evaluate({name: state[name] for name in terms.input_names})
@@ -147,7 +148,8 @@ def test_terms_of_a_potential_energy_are_told_by_their_formulas():
     pendulum = dyn.System(lagrangian, "r theta", {"m": 2.0, "g": 10.0, "k": 30.0}, forces=lambda q, qd, t: [0.0, -3.0])
     table = torque_by_cause(pendulum).at([1.5, 0.0], [0.0, 2.0], [1.0, 0.0])
     assert table.rows[2:] == ("Coriolis", "inertia", "applied forces")
-    assert table.rows[0].startswith("potential -m * g * q.r") and table.rows[1].startswith("potential 0.5 * k")
+    assert table.rows[0].startswith("potential -m * g * q.r")
+    assert table.rows[1].startswith("potential 0.5 * k")
     # -m g cos theta; k (r - 1); -m r thetad^2; m rdd; the force, which tau has to hold
     assert table.values[:, 0] == pytest.approx([-20.0, 15.0, -12.0, 2.0, 0.0], rel=LONG_SUM)
     assert table.values[:, 1] == pytest.approx([0.0, 0.0, 0.0, 0.0, 3.0], abs=LONG_SUM)
@@ -158,7 +160,8 @@ def test_base_parameters_change_no_cause():
     q, qd, qdd, _ = random_state(arm, 0)
     fewest = replace(arm, base_parameters=True)
     own, same = (torque_by_cause(each).at(q, qd, qdd) for each in (arm, fewest))
-    assert own.rows == same.rows and np.array_equal(own.values, same.values)
+    assert own.rows == same.rows
+    assert np.array_equal(own.values, same.values)
 
 
 def test_an_embedded_table_has_the_state_before_the_step():
