@@ -296,7 +296,6 @@ class PreparedMotion:
         if stats.message != REACHED:  # where it ended is its last row, also between the times of t_eval
             recorder.add_last()
         rows = recorder.table()
-
         # Put the result together
         if missed := unreached_momenta(stepped, *rows, values, start=(options.t0, start, x)):
             stats = replace(stats, warnings=(*stats.warnings, *missed))

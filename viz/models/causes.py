@@ -50,7 +50,7 @@ class Causes:
             (cause, sum(bodies.values()), sorted(bodies.items(), key=lambda each: -abs(each[1])))
             for cause, bodies in groups.items()
         ]
-        return sorted(found, key=lambda each: -max(abs(part) for _, part in each[2]))
+        return sorted(found, key=lambda each: -abs(each[1]))
 
     def rows(self) -> list[tuple[str, float]]:
         """Lines of the list: causes, and under one of several bodies these."""
