@@ -12,6 +12,7 @@ from ..core.node import Node, constant
 from ..core.reverse import cotangents
 from ..util.html_text import html_lines
 from ..util.json_type import Json, json_number
+from ..util.real_arrays import real_number
 from ..util.require import require_graph, require_mapping
 from .names import Name, Names, joined
 from .reachability import between
@@ -160,7 +161,10 @@ def why_nan(
     require_graph("why_nan", graph)
     known = Names(graph, names)
     point = _point(known, at)
-    sinks = dict(graph.outputs) if output is None else {known.called(output): known.output(output)}
+    sinks = dict(graph.outputs)
+    if output is not None:
+        sink = known.output(output, "output")
+        sinks = {known.called(output): sink}
     nodes = list(dict.fromkeys([*graph.inputs, *graph.nodes]))
     values = dict(zip(nodes, _values(graph, nodes, point), strict=True))
     for name, sink in sinks.items():
@@ -179,12 +183,10 @@ def why_nan(
 
 def _point(names: Names, at: Mapping[str, float]) -> dict[str, float]:
     given = names.inputs_of("at", require_mapping("at", at, "input: value"))
-    for name, value in given.items():
-        if isinstance(value, bool) or not hasattr(value, "__float__"):
-            raise TypeError(f"at: input {names.shown(name)!r} must be a number, got {value!r:.60}")
+    point = {name: real_number(f"at: input {names.shown(name)!r}", value) for name, value in given.items()}
     if missing := [names.shown(name) for name in names.graph.input_names if name not in given]:
         raise GraphError(f"at: no value for input {', '.join(missing)}")
-    return {name: float(value) for name, value in given.items()}
+    return point
 
 
 def _values(graph: Graph, nodes: Sequence[Node], point: Mapping[str, float]) -> list[float]:

@@ -31,8 +31,8 @@ from ...systems.kinematics import ONE, ZERO
 from ...systems.model import Model, as_system
 from ...systems.system import System
 from ..changes.switched_effects import without_effect
-from ..forces.external_force import Force
-from ..forces.joint_force import JointForce
+from ..forces.external_force import Force, generalized_forces
+from ..forces.joint_force import JointForce, add_joint_forces
 from ..trees.mechanism import Mechanism, as_mechanism
 
 SPURIOUS = "spurious"  # what a derivative through q = qd dt + q_old adds
@@ -72,12 +72,14 @@ def torque_by_cause(model: Model, formulation: str = "chain_rule") -> TorqueTabl
     >>> import dynamics as dyn
     >>> arm = dyn.planar_arm(masses=[1.0, 1.0], lengths=[1.0, 1.0], gravity=10.0, damping=0.5)
     >>> print(dyn.torque_by_cause(arm).at([1.5707963267948966, 0.0], qd=[1.0, 0.0]))
-                        joint 1   joint 2
-    gravity of link 1         5         ·
-    gravity of link 2        15         5
-    Coriolis of link 2        0         0
-    damping                 0.5         0
-    tau                    20.5         5
+                        joint 1  joint 2
+    gravity of link 1         5        ·
+    gravity of link 2        15        5
+    Coriolis of link 2        0        0
+    inertia of link 1         0        ·
+    inertia of link 2         0        0
+    damping                 0.5        0
+    tau                    20.5        5
     """
     formulation = formulation_name(formulation)
     mechanism = as_mechanism(model)
@@ -185,10 +187,18 @@ def _of_forces(system: System, mechanism: Mechanism | None, build: Builder) -> I
         for force in mechanism.forces:
             kind = type(force).__name__.removeprefix("Joint").lower()
             together.setdefault(f"{kind} {'on' if isinstance(force, Force) else 'of'} {force.body}", []).append(force)
-        forces = {name: tuple(mechanism.generalized_forces(each)) for name, each in together.items()}
+        forces = {name: tuple(_along_velocities(mechanism, each)) for name, each in together.items()}
     for name, given in forces.items():
         with building(build):
             yield name, [-each for each in folded(given, build)]
+
+
+def _along_velocities(mechanism: Mechanism, forces: Sequence[Force | JointForce]) -> list[Node]:
+    """Some forces of a mechanism as generalized ones."""
+    given = {name: cg.variable(name) for name in mechanism.parameter_values}
+    q, qd = mechanism.system.q, mechanism.system.qd
+    on_bodies = [(force, mechanism.chain(force.body)) for force in forces if isinstance(force, Force)]
+    return add_joint_forces(generalized_forces(on_bodies, qd, given), forces, mechanism.moving, (q, qd), given)
 
 
 def _of_step(

@@ -227,19 +227,9 @@ class Mechanism(Structure):
             require_values(self.parts if bodies is None else bodies, self.gravity, values)
 
     def _generalized_forces(self, q: list[Node], qd: list[Node], t: Node, p: dict[str, Node]) -> list[Node]:
-        return self._sum_of(self.forces, q, qd, p)
-
-    def generalized_forces(self, forces: Sequence[Force | JointForce]) -> list[Node]:
-        """What some of its forces do along the velocities, (n,) nodes [N m or N]."""
-        given = {name: cg.variable(name) for name in self.parameter_values}
-        return self._sum_of(forces, self.system.q, self.system.qd, given)
-
-    def _sum_of(
-        self, forces: Sequence[Force | JointForce], q: Sequence[Node], qd: Sequence[Node], p: Mapping[str, Node]
-    ) -> list[Node]:
-        on_bodies = [force for force in forces if isinstance(force, Force)]
+        on_bodies = [force for force in self.forces if isinstance(force, Force)]
         total = generalized_forces([(force, self._chain(force.body, q, qd)) for force in on_bodies], qd, p)
-        return add_joint_forces(total, forces, self.moving, (q, qd), p)
+        return add_joint_forces(total, self.forces, self.moving, (q, qd), p)
 
     def _chain(self, body: str, q: Sequence[Node], qd: Sequence[Node]) -> KinematicChain:
         ends = [self.carriers[name] for name in (body, WORLD)]
