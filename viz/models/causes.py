@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -43,7 +44,7 @@ class Causes:
         least = ROUNDING * math.fsum(map(abs, self.parts.values()))
         groups: dict[str, dict[str, float]] = {}
         for name, part in self.parts.items():
-            cause, _, _ = name.partition(" of ") if " of " in name else name.partition(" on ")
+            cause = _cause(name)
             if abs(part) > least:
                 groups.setdefault(cause, {})[name.removeprefix(cause).strip()] = part
         found = [
@@ -82,8 +83,10 @@ class Causes:
 
     def _blame(self) -> list[str]:
         wrong = math.fsum([part for name, part in self.parts.items() if name.startswith(SPURIOUS)])
-        right = f"without it {self.what} would be {self.value - wrong:.6g}"
-        return [f"  What is spurious is no physics, but a mistake of the formulation: {right}."] if wrong else []
+        right = self.value - wrong
+        right = right if abs(right) > ROUNDING * (abs(self.value) + abs(wrong)) else 0.0
+        told = f"without it {self.what} would be {right:.6g}"
+        return [f"  What is spurious is no physics, but a mistake of the formulation: {told}."] if wrong else []
 
     def to_dict(self) -> dict[str, Json]:
         """Dictionary for JSON."""
@@ -166,7 +169,7 @@ class CauseTable:
 
     def causes(self) -> list[str]:
         """What can be asked for beside torques: "gravity", "Coriolis", .."""
-        return list(dict.fromkeys([name.partition(" of ")[0].partition(" on ")[0] for name in self.table.rows]))
+        return list(dict.fromkeys(map(_cause, self.table.rows)))
 
     def of(self, output: str, by: str = "", rows: Sequence[str] = ()) -> Causes:
         """Causes of an output, or of its derivative by an input or a named node; some of the rows or all of them.
@@ -186,7 +189,7 @@ class CauseTable:
             whole = tangents({source: cg.constant(1.0)}, [whole]).get(whole, cg.constant(0.0))
             what = f"d {what} / d {self.names.called(by)}"
             beside = self.units.get(str(source.name), "")
-            unit = f"{unit} per {beside}" if unit and beside else ""
+            unit = unit if beside == "1" else f"{unit} per {beside}" if unit and beside else ""
         values = Graph(self.table.graph.inputs, {str(k): node for k, node in enumerate(chosen.values())}).evaluate(
             self.at
         )
@@ -209,13 +212,17 @@ class CauseTable:
         return CauseInAll(_words(rows), sorted(there, key=lambda each: -abs(each.sum)))
 
 
+def _cause(name: str) -> str:
+    """`gravity` of "gravity of link 2"."""
+    return re.split(" of | on ", name, maxsplit=1)[0]
+
+
 def _words(rows: Sequence[str]) -> str:
-    """What rows have in common: their cause, or the one row."""
-    causes = {name.partition(" of ")[0] for name in rows}
-    bodies = {name.partition(" of ")[2] for name in rows}
+    """What rows have in common: their cause, or the body, or the one row."""
     if len(rows) == 1:
         return rows[0]
-    return causes.pop() if len(causes) == 1 else f"what {bodies.pop()} does"
+    causes = {_cause(name) for name in rows}
+    return causes.pop() if len(causes) == 1 else f"what {rows[0].removeprefix(_cause(rows[0]))[4:]} does"
 
 
 class Slopes:

@@ -9,6 +9,8 @@ function tangentsOf({ args }, slopes, seeds) {
   return dots;
 }
 
+const LEAST = 1e-13; // of the largest number of all outputs: what is smaller is rounding, and told as 0
+
 /** {output: number} of a graph of the state; with `by`, a node of the version, the derivatives by it; null where it comes after the state. */
 function numbersOf(app, graph, by) {
   const values = app.state.evaluate(graph);
@@ -31,23 +33,27 @@ function causesOf(app, output, by, whole) {
   const found = row && numbersOf(app, causes, by);
   if (!found) return null;
   const parts = causes.header.map((cause, i) => [cause, found.get(causes.outputs[row[1][i]][0])]);
-  const { excess } = app.version;
+  const { excess } = app.version, least = LEAST * largestOf([...found.values()]);
   if (excess) {
     parts.push([SPURIOUS, numbersOf(app, excess, by)?.get(output) ?? 0]);
-    parts.push([STEP, whole - parts.reduce((sum, [, part]) => sum + part, 0)]); // it vanishes with dt
+    parts.push([STEP, whole - addedUp(parts)]); // it vanishes with dt
   }
-  return parts;
+  return parts.map(([cause, part]) => [cause, Math.abs(part) > least ? part : 0]);
 }
+
+const causeIn = (name) => name.split(/ of (?!dt$)| on /)[0]; // "gravity" of "gravity of link 2"
+const addedUp = (parts) => parts.reduce((sum, [, part]) => sum + part, 0);
+const sizeOf = (parts) => parts.reduce((sum, [, part]) => sum + Math.abs(part), 0);
 
 /** Parts by cause, the largest first, [[cause, part, [[body, part]]]], without what is rounding. */
 function groupedCauses(parts) {
-  const least = 1e-13 * parts.reduce((sum, [, part]) => sum + Math.abs(part), 0), groups = new Map();
+  const least = LEAST * sizeOf(parts), groups = new Map();
   for (const [name, part] of parts) {
     if (!(Math.abs(part) > least)) continue;
-    const [cause] = name.split(/ of (?!dt$)| on /);
+    const cause = causeIn(name);
     if (!groups.has(cause)) groups.set(cause, []);
     groups.get(cause).push([name.slice(cause.length).trim(), part]);
   }
-  return [...groups].map(([cause, bodies]) => [cause, bodies.reduce((sum, [, part]) => sum + part, 0),
+  return [...groups].map(([cause, bodies]) => [cause, addedUp(bodies),
     bodies.sort((one, other) => Math.abs(other[1]) - Math.abs(one[1]))]).sort((one, other) => Math.abs(other[1]) - Math.abs(one[1]));
 }

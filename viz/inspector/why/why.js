@@ -23,14 +23,15 @@ function causeTable(what, unit, parts, whole) {
     if (one) continue;
     const rest = bodies.slice(BODIES);
     bodies.slice(0, BODIES).forEach(([body, part]) => rows.push(causeRow("ofbody", body, part, longest)));
-    if (rest.length) rows.push(causeRow("ofbody", `of ${rest.length} more`, rest.reduce((sum, [, part]) => sum + part, 0), longest));
+    if (rest.length) rows.push(causeRow("ofbody", `of ${rest.length} more`, addedUp(rest), longest));
   }
-  const sum = parts.reduce((all, [, part]) => all + part, 0), size = parts.reduce((all, [, part]) => all + Math.abs(part), 0);
-  rows.push(causeRow("sum", "sum", Math.abs(sum) > 1e-13 * size ? sum : 0, null));
-  const off = Math.abs(sum - whole) > 1e-9 * size ? quiet(`They add up to ${brief(sum)}, and it is ${brief(whole)}.`) : "";
+  const size = sizeOf(parts), told = (value) => brief(value, LEAST * size);
+  if (!size) return [tag("p", {}, tag("b", {}, what), " is 0, and so is every part of it here.")];
+  rows.push(causeRow("sum", "sum", Math.abs(addedUp(parts)) > LEAST * size ? addedUp(parts) : 0, null));
+  const off = Math.abs(addedUp(parts) - whole) > 1e-9 * size ? quiet(`They add up to ${told(addedUp(parts))}, and it is ${told(whole)}.`) : "";
   const wrong = groups.find(([cause]) => cause === SPURIOUS);
-  const said = wrong ? tag("p", { class: "off" }, `What is spurious is no physics, but a mistake of the formulation. Without it: ${brief(whole - wrong[1])}${unit}.`) : "";
-  return [tag("p", {}, tag("b", {}, what), ` is ${brief(Math.abs(whole) > 1e-13 * size ? whole : 0)}${unit}, the sum of`),
+  const said = wrong ? tag("p", { class: "off" }, `What is spurious is no physics, but a mistake of the formulation. Without it: ${told(whole - wrong[1])}${unit}.`) : "";
+  return [tag("p", {}, tag("b", {}, what), ` is ${told(whole)}${unit}, the sum of`),
     tag("table", { class: "causes" }, tag("tbody", {}, ...rows)), off, said].filter(Boolean);
 }
 
@@ -40,7 +41,7 @@ function oneCause(app, cause, by) {
   for (const [name, letters, node] of version.outputs) {
     const whole = by < 0 ? app.values[node] : adjoints(version, slopes, node)[by];
     const parts = causesOf(app, name, by, whole);
-    const part = parts?.filter(([each]) => each === cause || each.split(/ of (?!dt$)| on /)[0] === cause).reduce((sum, [, each]) => sum + each, 0);
+    const part = addedUp(parts?.filter(([each]) => each === cause || causeIn(each) === cause) ?? []);
     if (part) rows.push([`${by < 0 ? "" : "∂"}${shownName(app, name, letters)}`, part]);
   }
   const longest = Math.max(0, ...rows.map(([, part]) => Math.abs(part)));
@@ -53,7 +54,7 @@ function askWhy(app) {
   const { version, state } = app, option = (value, words) => tag("option", { value }, words);
   const outputs = version.outputs.map(([name, letters, node]) => option(String(node), shownName(app, name, letters)));
   const kinds = state.causes && version.outputs.some(([name]) => state.causes.rows.some(([row]) => row === name))
-    ? [...new Set([...state.causes.header.flatMap((name) => [name.split(/ of (?!dt$)| on /)[0], name]), ...(version.excess ? [SPURIOUS] : [])])] : [];
+    ? [...new Set([...state.causes.header.flatMap((name) => [causeIn(name), name]), ...(version.excess ? [SPURIOUS] : [])])] : [];
   const what = tag("select", { "aria-label": "what to explain" }, option("", "…"), ...outputs,
     ...(kinds.length ? [tag("optgroup", { label: "causes" }, ...kinds.map((kind) => option(`=${kind}`, kind)))] : []));
   const named = new Map([...Object.entries(version.names).map(([node, [name]]) => [name, +node]), ...version.inputs]);
@@ -86,8 +87,8 @@ function showWhy(app) {
   }
   const bars = adjoints(version, app.partials(), b), whole = a < 0 ? app.values[b] : bars[a];
   const parts = output && causesOf(app, output[0], a, whole);
-  const units = [b, a].map((node) => node >= 0 && app.units.get(node === b ? output?.[0] : version.names[node]?.[0])).filter(Boolean);
-  const unit = units.length && (a < 0 || units.length === 2) ? ` ${units.join(" per ")}` : "";
+  const units = [output?.[0], version.names[a]?.[0]].map((each) => app.units.get(each));
+  const unit = units[0] && (a < 0 || units[1]) ? ` ${units[0]}${a < 0 || units[1] === "1" ? "" : ` per ${units[1]}`}` : "";
   const name = a < 0 ? nameOf(app, b) : `∂${nameOf(app, b)} by ${nameOf(app, a)}`;
   answer.replaceChildren(...(parts ? causeTable(name, unit, parts, whole) : []));
   if (a < 0) {
