@@ -19,6 +19,7 @@ from dynamics.scenes import Scene
 BAR, BODIES, ZEROS = 24, 6, 6  # characters of the longest bar; bodies listed of a cause; names listed of what is 0
 ROUNDING = 1e-14  # of the sum of all sizes: what is smaller is told as 0
 MEANT = {"centrifugal": "coriolis", "weight": "gravity"}  # {what a person may ask for: the cause that has it}
+POTENTIAL = ("gravity", "spring", "springs")  # which a Lagrangian that is no body's does not tell apart
 
 
 @dataclass(frozen=True)
@@ -108,9 +109,8 @@ class CauseInAll:
         for each in self.causes:
             ends[len(rows)] = f"of {each.value:.4g} {each.unit}".rstrip()
             rows.append((each.what, each.sum))
-            inside = each.rows()
-            inside = inside[1:] if len(each.grouped()) == 1 else [(f"  {name}", part) for name, part in inside]
-            rows += inside
+            alone = len({_cause(name) for name in each.parts}) == 1  # which the head names
+            rows += each.rows()[1:] if alone else [(f"  {name}", part) for name, part in each.rows()]
         longest = max([abs(part) for _, part in rows])
         return "\n".join([f"{self.name}, in each of", *_listed(rows, ends, longest)])
 
@@ -161,11 +161,12 @@ class CauseTable:
         first, *rest = asked.split(" ", 1)
         asked = " ".join([MEANT.get(first, first), *rest])
         rows = {name: name.lower() for name in self.table.rows}
-        return (
+        found = (
             [name for name, row in rows.items() if row == asked]
             or [name for name, row in rows.items() if row.startswith(f"{asked} ")]
             or [name for name, row in rows.items() if row.endswith((f" of {asked}", f" on {asked}"))]
         )
+        return found or (self.rows("potential") if asked in POTENTIAL else [])
 
     def causes(self) -> list[str]:
         """What can be asked for beside torques: "gravity", "Coriolis", .."""
@@ -202,13 +203,11 @@ class CauseTable:
         rows = self.rows(text)
         if not rows:
             outputs = [self.names.shown(name) for name in self.graph.outputs]
-            known = [*outputs, *self.causes(), *self.table.rows]
-            raise GraphError(
-                f"there is no torque and no cause {text!r:.80}; {or_nearest(text, known)}; "
-                f"causes are {', '.join(self.causes())}, and each of a body, as in {self.table.rows[0]!r}"
-            )
+            known = list(dict.fromkeys([*self.causes(), *outputs, *self.table.rows]))
+            raise GraphError(f"there is no torque and no cause {text!r:.80}; {or_nearest(text, known)}")
         found = [self.of(output, by, rows) for output in self.graph.outputs if output.startswith("tau")]
-        there = [each for each in found if any(each.parts.values())]
+        least = ROUNDING * max([abs(part) for each in found for part in each.parts.values()], default=0.0)
+        there = [each for each in found if any(abs(part) > least for part in each.parts.values())]
         return CauseInAll(_words(rows), sorted(there, key=lambda each: -abs(each.sum)))
 
 
