@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from .explain.compare import compare as compare
     from .explain.lint.lint import lint as lint
     from .explain.why import why as why
+    from .explain.why_nan import why_nan as why_nan
     from .explain.why_not import why_not as why_not
     from .operations import abs as abs, round as round
     from .operations.table import (

@@ -89,6 +89,7 @@ if TYPE_CHECKING:  # shared by the three packages alone: no promise is made for 
     from .core.label import UNLABELLED as UNLABELLED
     from .explain.lint.lint import Lint as Lint
     from .explain.remarks import Remarks as Remarks, remarked as remarked, remarks_of as remarks_of
+    from .explain.why_nan import WhyNan as WhyNan
     from .operations.operation import columns as columns
     from .program.derivatives.linearization import Linearization as Linearization, Linearized as Linearized
     from .program.derivatives.tape import Tape as Tape, run_passes as run_passes

@@ -81,6 +81,7 @@ if TYPE_CHECKING:
     )
     from .multibody.quantities.recursive_inverse_dynamics import RecursiveInverseDynamics as RecursiveInverseDynamics
     from .multibody.quantities.regressor import inertial_parameters as inertial_parameters, regressor as regressor
+    from .multibody.quantities.torque_causes import torque_by_cause as torque_by_cause
     from .multibody.quantities.whole_body import (
         center_of_mass as center_of_mass,
         center_of_mass_jacobian as center_of_mass_jacobian,

@@ -145,6 +145,7 @@ CALLS = {
     "cg.variable": call(cg.variable, "x"),
     "cg.variables": call(cg.variables, "x y"),
     "cg.why": call(cg.why, GRAPH, "r", "x", at=None, k=10, names=None),
+    "cg.why_nan": call(cg.why_nan, GRAPH, {"x": 0.3, "y": 0.4}, "r", "x", names=None),
     "cg.why_not": call(cg.why_not, cg.Graph([X, Y], {"r": X}), "r", "y", names=None),
     "cg.with_name": call(cg.with_name, X * Y, "n"),
     "cg.Graph": call(cg.Graph, [X, Y], {"r": X * Y}),
@@ -183,6 +184,7 @@ CALLS = {
     "dyn.formulation_sizes": call(dyn.formulation_sizes, ARM),
     "dyn.formulation_verdict": call(dyn.formulation_verdict, ARM, formulation="chain_rule"),
     "dyn.momentum_rate": call(dyn.momentum_rate, ARM, "chain_rule", simplify=True, keep_momentum=False),
+    "dyn.torque_by_cause": call(dyn.torque_by_cause, ARM, "chain_rule"),
     "dyn.reduced_linearization": call(dyn.reduced_linearization, SYSTEM, [0.0], [0.0], None, t=0.0, parameters=None),
     "dyn.state_space": call(dyn.state_space, ARM, form="velocity"),
     "dyn.linearize": call(dyn.linearize, SYSTEM, [0.0], [0.0], None, form="momentum", t=0.0, parameters=None),
@@ -301,7 +303,7 @@ CALLS = {
     "viz.live_page": call(viz.live_page, ARM, None, start=[0.1, 0.0]),
     "viz.page": call(
         viz.page, GRAPH, title="t", about="", at=None, marked=(), motion=None, tables=(), names=None, units=None,
-        derived=None, columns={"link 1": "base"}, notices=["n"], panels=()
+        derived=None, columns={"link 1": "base"}, notices=["n"], panels=(), causes=None
     ),
     "viz.typed_page": call(viz.typed_page, "L = x'^2"),
     "viz.typed_text": call(viz.typed_text, ARM, [0.1], [0.0]),
@@ -309,7 +311,7 @@ CALLS = {
     "viz.render_png": call(viz.render_png, "<svg xmlns='http://www.w3.org/2000/svg' width='1' height='1'/>", scale=2.0),
     "viz.to_dot": call(
         viz.to_dot, GRAPH, names=None, formulas=None, marked=frozenset(), marked_label="", marked_edges=frozenset(),
-        clusters=True, collapse=(), caption=None, legend=True, rankdir="BT"
+        clusters=True, collapse=(), only=None, caption=None, legend=True, rankdir="BT"
     ),
 }  # fmt: skip
 
@@ -585,6 +587,7 @@ GRAPH_FIRST = [
     (cg.to_wasm, ()),
     (cg.vjp, ()),
     (cg.why, ("y", "x")),
+    (cg.why_nan, ({},)),
     (cg.why_not, ("y", "x")),
     (dyn.spurious_nodes, ()),
     (viz.page, ()),

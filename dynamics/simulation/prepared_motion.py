@@ -25,10 +25,11 @@ from .progress_bar import Progress
 from .row_values import converted, unreached_momenta
 from .run_options import METHOD, RunOptions
 from .sampled_controller import SampledController
+from .solution import Solution
 from .steps.dense_output import StepBlock
 from .steps.integration import integration_of
 from .steps.stepping import NativeIntegration
-from .trajectory import SimulationWarning, Solution, Trajectory
+from .trajectory import SimulationWarning, Trajectory
 
 if TYPE_CHECKING:
     from .motion_steps import MotionSteps
@@ -295,7 +296,6 @@ class PreparedMotion:
         if stats.message != REACHED:  # where it ended is its last row, also between the times of t_eval
             recorder.add_last()
         rows = recorder.table()
-
         # Put the result together
         if missed := unreached_momenta(stepped, *rows, values, start=(options.t0, start, x)):
             stats = replace(stats, warnings=(*stats.warnings, *missed))

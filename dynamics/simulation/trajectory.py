@@ -4,20 +4,24 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Graph, extend
-from cgraph.extend import Array, counted, or_nearest, real_array
+from cgraph.extend import Array, counted, or_nearest
 
-from .row_values import converted, row_values
+from .not_finite import origin
+from .row_values import row_values
 from .sampled_controller import HeldForces
-from .steps.dense_output import StepBlock
+from .solution import Solution
+
+if TYPE_CHECKING:
+    from cgraph.extend import WhyNan
 
 _ROWS = 10_000  # of a text, written at once
 
@@ -122,45 +126,6 @@ class Crossings(NamedTuple):
     t: Array
     q: Array
     qd: Array
-
-
-@dataclass(frozen=True, eq=False)
-class Solution:
-    """The state at any time of a run that began with x at t0 and made these steps; the first nq numbers of it are q.
-
-    velocities: qd of states (q, p), see Problem.
-    """
-
-    t0: float
-    x: Array
-    steps: Sequence[StepBlock]
-    nq: int
-    velocities: Graph | None = None
-
-    def __call__(self, t: ArrayLike) -> tuple[Array, Array]:
-        """q and qd at a time, or at times (k,). Raises ValueError for a time that the run did not come to."""
-        times = real_array("t", t)
-        if times.ndim > 1:
-            raise ValueError(f"t must be a number or times, (k,), got shape {times.shape}")
-        wanted = times.reshape(-1)
-        end = float(self.steps[-1].t[-1]) if self.steps else self.t0
-        inside = (min(self.t0, end) <= wanted) & (wanted <= max(self.t0, end))
-        if not inside.all():
-            first = float(wanted[~inside][0])
-            raise ValueError(f"t must be between {self.t0:g} and {end:g} s, where the run was, got {first!r} s")
-        states = converted(self.velocities, wanted, self._states(wanted)).reshape(*times.shape, len(self.x))
-        return states[..., : self.nq], states[..., self.nq :]
-
-    def _states(self, times: Array) -> Array:
-        states = np.tile(self.x, (len(times), 1))
-        direction = 1.0 if self.steps and self.steps[-1].t[-1] > self.t0 else -1.0
-        ends = np.array([block.t[-1] for block in self.steps])
-        block_of = np.searchsorted(direction * ends, direction * times)
-        later = times != self.t0
-        for number in np.unique(block_of[later]):
-            here = later & (block_of == number)
-            states[here] = self.steps[number].at(times[here])
-        return states
 
 
 @dataclass(frozen=True)
@@ -344,6 +309,39 @@ class Trajectory:
     def tau(self) -> Array:
         """Applied forces at the rows, (T, n); of a SampledController those held from there on."""
         return self._rows("tau")
+
+    def why_nan(self) -> WhyNan:
+        """Where a rate that is not finite comes from, or of finite rates a derivative of one; `print` it for the words.
+
+        The first row is looked at where a rate is not finite; of a run that stopped, then half a step and a step beyond
+        its last row, which a trial of a step may have come to; and then the first row with such a derivative by the
+        state. Numbers of the run, such as parameters, stand in the formulas as numbers.
+
+        Returns
+        -------
+        WhyNan
+            As of `cgraph.why_nan`; its `node` is None where all is finite.
+
+        Examples
+        --------
+        >>> import warnings
+        >>> import cgraph as cg
+        >>> import dynamics as dyn
+        >>> melt = dyn.OdeSystem(lambda x, t: [-cg.sqrt(x[0]) - 0.1], "depth")
+        >>> with warnings.catch_warnings(action="ignore", category=dyn.SimulationWarning):
+        ...     run = dyn.simulate(melt, [0.01], None, 1.0, "rk4", dt=0.05)
+        >>> print(run.why_nan())
+        depth_dot is nan at depth = -0.00201144 and t = 0.075.
+        It begins with %1 = sqrt(depth), which is nan, where depth = -0.00201144.
+        On its way: %1 -> %2 -> %3 -> depth_dot.
+        """
+        graph = self.graphs["rate"]
+        kinds = {"q": self.coordinates, "qd": self.velocities} if self.velocities else {}
+        names = {f"{kind}{i}{end}": f"{kind}{end}.{name}" for kind, known in kinds.items()
+                 for i, name in enumerate(known) for end in ("", "_dot")}  # fmt: skip
+        states = self.q if not self.velocities else np.concatenate([self.q, self.qd], axis=1)
+        held = () if self.held is None else self.held.at(self.t)
+        return origin(graph, self.t, states, held, names, 0.0 if self.success else self.stats.dt)
 
     def _rows(self, name: str) -> Array:
         if name not in self.graphs:

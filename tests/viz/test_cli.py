@@ -98,7 +98,9 @@ def test_a_model_file_stands_where_a_scene_s_name_does(tmp_path, capsys):
         ("paper --out a_file", "cannot write into the folder a_file: a_file is a file"),
         ("certify nowhere.xml", "there is no file 'nowhere.xml'"),
         ("why triple_pendulum tau0 q9", "nothing in the graph is called 'q9'"),
-        ("why triple_pendulum tau9 q0", "nothing in the graph is called 'tau9'"),
+        ("why triple_pendulum tau9 q0", "there is no torque and no cause 'tau9'; it has gravity, Coriolis, inertia, damping, tau.joint 1"),
+        ("why triple_pendulum", "why needs to know WHAT: a torque, such as tau0, or a cause, such as gravity"),
+        ("why triple_pendulum weigth", "there is no torque and no cause 'weigth'"),
         ("why spring_mass tau0 q0 --at zz=1", "the graph has no input zz"),
         ("lint spring_mass --box zz=0:1", "the graph has no input zz"),
         ("inspect spring_mass --out x.html --t-end 1e9", "--t-end must be at most 1000 s"),
@@ -144,7 +146,8 @@ def test_the_exit_status_of_a_process_is_the_command_s():
     assert done.stderr == "cgraph: error: there is no file 'nowhere.xml'\n"
 
 
-USAGE = """paint|draw|draw chain --out x.dot --formulation f|lint|why spring_mass tau0|why spring_mass tau0 q0 --k -1
+USAGE = """paint|draw|draw chain --out x.dot --formulation f|lint|why
+why spring_mass tau0 q0 --k 0|why spring_mass tau0 q0 --k -1
 why spring_mass tau0 q0 --at q0|why spring_mass tau0 q0 --at q0=nan|why spring_mass tau0 q0 --at q0=1,q0=2
 lint spring_mass --box q0=0:1,q0=0:2|certify spring_mass --seed -1|bench --budget -1|lesson
 inspect spring_mass --out x.html --t-end 0|why spring_mass tau0 q0 --svg answer.png

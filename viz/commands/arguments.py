@@ -237,7 +237,8 @@ def answer_and_draw(
         answer(text)
         return
     names = dyn.display_names(scene)
-    drawing = library.to_dot(graph, collapse=collapsed(graph), names=names, **marks)
+    collapse = [] if "only" in marks else collapsed(graph)
+    drawing = library.to_dot(graph, collapse=collapse, names=names, **marks)
     answer(text, {options.svg: library.render_svg(drawing)})
     say(f"drawn in {options.svg}")
 

@@ -17,6 +17,7 @@ class Command(argparse.ArgumentParser):
 
     names: what `{scenes}` in a help stands for, asked for when the help is shown: the library takes a second to load,
     and a wrong argument is told before.
+    late: optional arguments without a dash that may also stand after options, which argparse alone does not take there.
     """
 
     file = ""  # of the command, beside this one, until it is loaded
@@ -24,6 +25,7 @@ class Command(argparse.ArgumentParser):
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
         self.names: dict[str, Callable[[], Iterable[str]]] = {}
+        self.late: tuple[str, ...] = ()
 
     def load(self) -> None:
         """Add the command's arguments."""
@@ -42,7 +44,11 @@ class Command(argparse.ArgumentParser):
     def parse_known_args(self, args: Sequence[str] | None = None, namespace: Any = None) -> Any:  # type: ignore[override]
         """Options of a command, loaded first; argparse asks this of the command that is named."""
         self.load()
-        return super().parse_known_args(args, namespace)
+        options, rest = super().parse_known_args(args, namespace)
+        for name in self.late:
+            if rest and not rest[0].startswith("-") and getattr(options, name) is None:
+                setattr(options, name, rest.pop(0))
+        return options, rest
 
     def format_help(self) -> str:
         """Help of a command, completed first."""
@@ -66,7 +72,7 @@ COMMANDS = {
     "animate": "a film of a scene in motion (GIF, APNG or MP4); status 1 for a motion cut short",
     "type": "a page that a Lagrangian is typed into: derived, checked, drawn, moving",
     "lint": "check that a scene's equations are those of the chain rule; status 1 and the blame if they are not",
-    "why": "the paths by which an output depends on an input, and what they weigh",
+    "why": "what makes a torque, by cause and body; why it depends on an input; where a NaN comes from",
     "compare": "compare two formulations of a scene's equations, node by node; status 1 where they differ",
     "lesson": "a page for a class, on any scene: predict, reveal, play; with answers",
     "completion": "a script that lets the Tab key complete commands and options",

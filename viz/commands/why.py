@@ -1,8 +1,9 @@
-"""`cgraph why`: along which paths an output of a scene's equations depends on an input, or why it does not."""
+"""`cgraph why`: what makes a torque, by cause and body, and by which paths of the graph it depends on an input."""
 
 from __future__ import annotations
 
 import argparse
+from typing import TYPE_CHECKING
 
 import cgraph as cg
 import dynamics as dyn
@@ -13,6 +14,7 @@ from .arguments import (
     REST,
     answer_and_draw,
     check_picture,
+    counting,
     equations_of,
     filled,
     may_draw_and_print,
@@ -22,60 +24,142 @@ from .arguments import (
     takes_a_scene,
     takes_equations,
     unless_json,
-    whole,
+    verdict_of,
 )
 from .command import Command
+
+if TYPE_CHECKING:
+    from ..models.causes import CauseTable
+
+PATHS = 5  # that are listed and drawn where nothing else is said
 
 
 def add(parser: Command) -> None:
     """The command's arguments."""
     takes_a_scene(parser)
-    parser.add_argument("output", metavar="OUTPUT", help="such as tau0, or tau.knee of a joint by its name")
-    parser.add_argument("input", metavar="INPUT", help="such as q2, or q.hip")
+    parser.add_argument(
+        "output",
+        metavar="WHAT",
+        nargs="?",
+        help="a torque, such as tau0 or tau.knee of a joint by its name; or a cause: gravity, 'inertia of LINK'",
+    )
+    parser.add_argument("input", metavar="INPUT", nargs="?", help="why it depends on this, such as q2, or q.hip")
+    parser.late = "output", "input"
     takes_equations(parser)
-    parser.add_argument("--k", type=whole, default=10, metavar="K", help="paths to list, heaviest first (default: 10)")
-    parser.add_argument("--at", type=point, default={}, metavar="A=1,B=2", help=f"where paths are weighed; {REST}")
+    parser.add_argument(
+        "--nan", action="store_true", help="where a value that is not finite, or a derivative by INPUT, comes from"
+    )
+    parser.add_argument(
+        "--k", type=counting, default=PATHS, metavar="K", help=f"paths to list, heaviest first (default: {PATHS})"
+    )
+    parser.add_argument("--at", type=point, default={}, metavar="A=1,B=2", help=f"at which state; {REST}")
     may_draw_and_print(parser)
     parser.set_defaults(run=run)
 
 
-def run(options: argparse.Namespace) -> None:
-    """Print the paths and what they add up to; of two that are not connected, where the chain stops."""
+def run(options: argparse.Namespace) -> int | None:
+    """Print causes, then paths and what they add up to; of two that are not connected, where the chain stops."""
+    if not options.output and not options.nan:
+        raise ValueError("why needs to know WHAT: a torque, such as tau0, or a cause, such as gravity")
     check_picture(options)
     scene = scene_of(options)
-    graph, _ = equations_of(options, scene)
+    verdict = verdict_of(options, scene)
+    graph, _ = equations_of(options, scene, verdict)
     names = extend.Names(graph, dyn.display_names(scene))
     at = filled(graph, scene, options.at)
-    found = cg.why(graph, options.output, options.input, at=at, k=options.k, names=dyn.display_names(scene))
+    state = f"At {point_text({names.shown(name): value for name, value in at.items()})}:"
+    if options.nan:
+        return _nan(options, scene, names, at)
+    table = None if verdict is None else library.CauseTable(scene, graph, verdict.formulation, at)
+    output = (table and table.named(options.output)) or names.meant(options.output)
+    if output in graph.outputs or output in names.by_name or table is None:
+        if options.input is None:
+            _value(options, scene, names, table, output, at, state)
+        else:
+            _dependence(options, scene, names, verdict, table, output, at, state)
+        return None
+    causes = table.in_all(options.output, options.input or "")
+    data = {"at": at} | causes.to_dict()
+    answer_and_draw(options, unless_json(options, data, f"{state}\n{causes}"), graph, scene)
+    return None
+
+
+def _value(
+    options: argparse.Namespace,
+    scene: dyn.scenes.Scene,
+    names: extend.Names,
+    table: CauseTable | None,
+    output: str,
+    at: dict[str, float],
+    state: str,
+) -> None:
+    """Causes of an output; of one that is no torque, its derivatives."""
+    graph = names.graph
+    if table is not None and output in graph.outputs:
+        causes = table.of(output)
+        text, data = f"{causes}\n{library.tree_alone(scene)}".rstrip(), causes.to_dict()
+    else:
+        slopes = library.Slopes(names, output, at)
+        text, data = str(slopes), slopes.to_dict()
+    answer_and_draw(options, unless_json(options, {"at": at} | data, f"{state}\n{text}"), graph, scene)
+
+
+def _dependence(
+    options: argparse.Namespace,
+    scene: dyn.scenes.Scene,
+    names: extend.Names,
+    verdict: dyn.Verdict | None,
+    table: CauseTable | None,
+    output: str,
+    at: dict[str, float],
+    state: str,
+) -> None:
+    """Causes of a derivative, then the heaviest paths, in the listing's numbers, with a picture of these alone."""
+    graph = names.graph
+    found = cg.why(graph, output, options.input, at=at, k=options.k, names=dyn.display_names(scene))
     if not found.count:
-        _not_connected(options, scene, names)
+        _not_connected(options, scene, names, output)
         return
     assert found.derivative is not None
+    causes = table.of(output, options.input) if table is not None and output in graph.outputs else None
     all_listed = len(found.paths) == found.count
     total = sum([path.value or 0.0 for path in found.paths]) if all_listed else found.derivative
-    derivative = _by_reverse_sweep(names, options.output, options.input, at)
-    shown = {names.shown(name): value for name, value in at.items()}
+    derivative = _by_reverse_sweep(names, output, options.input, at)
     gap = abs(total - derivative)
     balance = {"sum_over_all_paths": total, "derivative_by_reverse_sweep": derivative, "difference": gap}
     what = "sum of path products" if all_listed else f"sum over all {found.count} path products"
-    alone = "" if options.forward else library.tree_alone(scene)
-    text = f"At {point_text(shown)}:\n{found}\n|{what} - derivative by a reverse sweep| = {gap:.2g}"
-    text = f"{text}\n{alone}" if alone else text
+    alone = "" if table is None else library.tree_alone(scene)
+    text = [state, *([str(causes)] if causes else []), str(found)]
+    text += [f"|{what} - derivative by a reverse sweep| = {gap:.2g}", *([alone] if alone else [])]
+    data = {"depends": True, "of_the_tree": bool(alone), "at": at} | found.to_dict() | balance
+    data |= {"causes": causes.to_dict()} if causes else {}
+    wrong = verdict is not None and verdict.differs
     answer_and_draw(
         options,
-        unless_json(options, {"depends": True, "of_the_tree": bool(alone), "at": at} | found.to_dict() | balance, text),
+        unless_json(options, data, "\n".join(text)),
         graph,
         scene,
-        marked_edges=found.edges,
+        only=found.nodes,
+        formulas={node: names.line(node).partition("  ")[0] for node in found.nodes if node.args},
+        marked=found.nodes & verdict.nodes if verdict else (),
+        marked_edges=found.edges & verdict.edges if verdict and wrong else found.edges,
         caption=f"{found.output} depends on {found.input}: {len(found.paths)} of {found.count} paths",
     )
 
 
-def _not_connected(options: argparse.Namespace, scene: dyn.scenes.Scene, names: extend.Names) -> None:
+def _nan(options: argparse.Namespace, scene: dyn.scenes.Scene, names: extend.Names, at: dict[str, float]) -> int:
+    """Print where a number that is not finite comes from; status 1 where there is one."""
+    output = options.output and names.meant(options.output)
+    found = cg.why_nan(names.graph, at, output or None, options.input, names=dyn.display_names(scene))
+    answer_and_draw(options, unless_json(options, found.to_dict(), found), names.graph, scene)
+    return 1 if found.what else 0
+
+
+def _not_connected(options: argparse.Namespace, scene: dyn.scenes.Scene, names: extend.Names, output: str) -> None:
     graph = names.graph
-    stops = cg.why_not(graph, options.output, options.input, names=dyn.display_names(scene))
+    stops = cg.why_not(graph, output, options.input, names=dyn.display_names(scene))
     alone = "" if options.forward else library.tree_alone(scene)
-    constant = _constant(scene, names, options) if options.momentum else ""
+    constant = _constant(scene, names, options, output) if options.momentum else ""
     here = set(graph.nodes)  # an input that nothing uses is none of the graph's nodes
     answer_and_draw(
         options,
@@ -96,9 +180,9 @@ def _not_connected(options: argparse.Namespace, scene: dyn.scenes.Scene, names: 
     )
 
 
-def _constant(scene: dyn.scenes.Scene, names: extend.Names, options: argparse.Namespace) -> str:
+def _constant(scene: dyn.scenes.Scene, names: extend.Names, options: argparse.Namespace, output: str) -> str:
     """Sentence on a constant momentum whose rate was asked for, or whose coordinate the rate was asked by; or ""."""
-    output, source = names.meant(options.output), names.meant(options.input)
+    source = names.meant(options.input)
     told = [
         library.constant_momentum(name)
         for i, name in enumerate(scene.velocities)

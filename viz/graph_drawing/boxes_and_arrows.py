@@ -50,6 +50,27 @@ class _Subject:
     number: dict[Node, int]
     part: dict[Node, str]  # id of the collapsed box that a node is in
     listed: Names  # who has the %number of the listing
+    only: frozenset[Node] | None = None  # nodes that are drawn, with the numbers that they use; None for all
+
+    @property
+    def nodes(self) -> list[Node]:
+        return [node for node in self.graph.nodes if self.only is None or node in self.only]
+
+    @property
+    def edges(self) -> list[Edge]:
+        only = self.only
+        edges = self.graph.edges
+        return [
+            each
+            for each in edges
+            if only is None or (each.target in only and (each.source in only or each.source.value is not None))
+        ]
+
+    @property
+    def outputs(self) -> list[tuple[int, str, Node]]:
+        """(its number, name, node) of every output that is drawn."""
+        outputs = enumerate(self.graph.outputs.items())
+        return [(i, name, node) for i, (name, node) in outputs if self.only is None or node in self.only]
 
     def id(self, node: Node) -> str:
         return self.part.get(node, f"n{self.number[node]}")
@@ -79,25 +100,28 @@ def plan_of(
     wrong_outputs: frozenset[str],
     cluster_of: ClusterRule,
     collapse: tuple[str, ...],
+    only: frozenset[Node] | None = None,
 ) -> Plan:
-    """The boxes and arrows of a graph. Raises ValueError for a marked node or a collapsed tag that it does not have."""
+    """The boxes and arrows of a graph. Raises ValueError for a node or a collapsed tag that it does not have."""
     number = {node: i for i, node in enumerate(graph.nodes)}
-    strange = [node for node in marks if node not in number]
-    if strange:
-        raise ValueError(f"{len(strange)} of {len(marks)} marked nodes are not in the graph, such as {strange[0]!r}")
+    for what, nodes in (("marked", list(marks)), ("drawn", list(only or ()))):
+        if strange := [node for node in nodes if node not in number]:
+            raise ValueError(
+                f"{len(strange)} of {len(nodes)} {what} nodes are not in the graph, such as {strange[0]!r}"
+            )
     parts, listed = _parts(graph, collapse), Names(graph)
-    subject = _Subject(graph, names, formulas, marks, marked_edges, wrong_outputs, number, parts, listed)
+    subject = _Subject(graph, names, formulas, marks, marked_edges, wrong_outputs, number, parts, listed, only)
     plan = Plan()
     plan.boxes.extend(_part_boxes(subject, collapse))
-    for node in graph.nodes:
+    for node in subject.nodes:
         if node.value is None and node not in subject.part:
             plan.boxes.append(_node_box(subject, node, subject.id(node), cluster_of(node)))
-    for edge in graph.edges:
+    for edge in subject.edges:
         if edge.source.value is None or edge.target in subject.part:  # a number that a collapsed part uses is inside it
             continue
         copy = f"n{number[edge.source]}-{number[edge.target]}-{edge.slot}"
         plan.boxes.append(_node_box(subject, edge.source, copy, cluster_of(edge.target)))
-    for i, (name, node) in enumerate(graph.outputs.items()):
+    for i, name, node in subject.outputs:
         if node.value is not None:
             plan.boxes.append(_node_box(subject, node, f"n{number[node]}-o{i}", None))
         plan.boxes.append(_output_box(subject, name, f"o{i}"))
@@ -174,7 +198,7 @@ def _about(subject: _Subject, node: Node) -> str:
 
 def _arrows(subject: _Subject) -> Iterator[Arrow]:
     merged: dict[tuple[str, str], list[Edge]] = {}
-    for edge in subject.graph.edges:
+    for edge in subject.edges:
         tail, head = subject.id(edge.source), subject.id(edge.target)
         if edge.source in subject.part or edge.target in subject.part:
             if tail != head and edge.source.value is None:
@@ -189,7 +213,7 @@ def _arrows(subject: _Subject) -> Iterator[Arrow]:
         if len(edges) > 1:
             attributes["label"] = f"×{len(edges)}"
         yield Arrow(tail, head, {**attributes, **_line(mark)})
-    for i, node in enumerate(subject.graph.outputs.values()):
+    for i, _, node in subject.outputs:
         number = subject.number[node]
         tail = subject.id(node) if node.value is None else f"n{number}-o{i}"
         yield Arrow(tail, f"o{i}", {"id": f"e{number}-o{i}", **_line(subject.marks.get(node))})

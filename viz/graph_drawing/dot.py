@@ -41,6 +41,7 @@ def to_dot(
     wrong_outputs: Collection[str] = (),
     clusters: bool | Sequence[str] | ClusterRule = True,
     collapse: Sequence[str] = (),
+    only: Collection[Node] | None = None,
     caption: str | None = None,
     legend: bool | Mapping[str, str] = True,
     rankdir: Literal["BT", "TB", "LR", "RL"] = "BT",
@@ -79,6 +80,9 @@ def to_dot(
     collapse : sequence of str
         Tags whose nodes become one box, "link 2 (34 nodes)"; an edge at it says how many it stands for. A node with
         several of these tags belongs to the first.
+    only : collection of Node, optional
+        The nodes to draw, such as those of a few paths, with the edges among them and the numbers that they use; by
+        default all.
     caption : str, optional
         A line below the drawing; a second line then counts the graph's nodes and edges.
     legend : bool or mapping of str to str
@@ -93,8 +97,8 @@ def to_dot(
     Raises
     ------
     ValueError
-        For a collapsed tag that no node carries, a marked node that the graph does not have or that is in both groups,
-        a third group, or an unknown direction.
+        For a collapsed tag that no node carries, a node that the graph does not have, a marked one in both groups, a
+        third group, or an unknown direction.
     ImportError
         When the Python package graphviz is missing.
 
@@ -123,10 +127,12 @@ def to_dot(
         frozenset(require_sequence("wrong_outputs", wrong_outputs, "names", str)),
         _cluster_rule(clusters),
         require_sequence("collapse", collapse, "tags", str),
+        None if only is None else frozenset(require_sequence("only", only, "nodes", Node)),
     )
     drawing = digraph(rankdir)
     if caption is not None:
         counts = f"{counted(len(graph.nodes), 'node')}, {counted(len(graph.edges), 'edge')}"
+        counts = counts if only is None else f"{len(set(only))} of {counts}"
         drawing.attr(label=literal(f"{caption}\n{counts}" if caption else counts), labelloc="b", fontsize="16")
     draw_boxes(drawing, plan.boxes)
     if legend is not False:

@@ -33,7 +33,8 @@ class Version:
     about: a sentence or two.  marked: nodes in the one color of what is wrong.  steps: to be gone through one by one.
     rows: {title: nodes} of the rows of the picture from the bottom, alike in all versions; a node that is in none
     stands in the first. Without any, rows are the sweeps.  blamed: edges in that color.  flawed: whether the version is
-    wrong.  off: the outputs in which it is; without any, all that differ.
+    wrong.  off: the outputs in which it is; without any, all that differ.  excess: what its outputs have too much, by
+    their names, a graph of inputs of the state.
     """
 
     name: str
@@ -45,6 +46,7 @@ class Version:
     blamed: Collection[Edge] = frozenset()
     flawed: bool = False
     off: Collection[str] = ()
+    excess: Graph | None = None
 
     def check(self) -> None:
         """Raises ValueError for a marked node, or one of a step, that is not in the graph."""

@@ -18,8 +18,8 @@ from .content import Motion, State, StateTable, Version
 from .record import record
 
 SCRIPTS = (
-    "state.js", "places.js", "arrange.js", "picture.js", "marks.js", "panels.js", "steps.js", "motion.js", "keys.js",
-    "app.js",
+    "state.js", "places.js", "arrange.js", "picture.js", "marks.js", "panels.js", "why/causes.js",
+    "why/why.js", "steps.js", "motion.js", "keys.js", "app.js",
 )  # fmt: skip
 
 
@@ -38,6 +38,7 @@ def page(
     columns: Mapping[str, str | None] | None = None,
     notices: Sequence[str] = (),
     panels: Sequence[Panel] = (),
+    causes: StateTable | None = None,
 ) -> Page:
     """The page on which a graph is looked at: it folds by tags, and shows values, paths, sweeps and equations.
 
@@ -72,6 +73,9 @@ def page(
         What stands above everything, such as what a model lacks of its file.
     panels : sequence of Panel
         Parts that other modules add, such as the box of `viz.typed_page`.
+    causes : StateTable, optional
+        What the outputs of versions are the sums of, a column for each cause, as of `dynamics.torque_by_cause`: what
+        the page answers to "why".
 
     Returns
     -------
@@ -116,6 +120,8 @@ def page(
         names = {name: text for version in versions for name, text in remarks_of(version.graph).names.items()}
     introduction = "" if isinstance(graph, Graph) else about
     data: dict[str, Json] = {"title": title, "introduction": introduction, "notices": list(notices)}
+    if not isinstance(causes, StateTable | None):
+        raise TypeError(f"causes must be a StateTable, got {type(causes).__name__}: {causes!r:.60}")
     live = [table for table in tables if isinstance(table, StateTable)]
     data |= record(
         versions,
@@ -125,6 +131,7 @@ def page(
         state=State(at or {}, derived),
         columns=columns,
         tables=live,
+        causes=causes,
     )
     return compose(title, data, [table for table in tables if isinstance(table, Table)], panels)
 

@@ -28,11 +28,11 @@ const number = (value) => math("mn", Number.isFinite(value) ? String(+value.toPr
 const parenthesis = (text) => mathWith("mo", { stretchy: "false" }, text);
 const fenced = (inside) => math("mrow", parenthesis("("), inside, parenthesis(")"));
 
-/** A node as an identifier: its name, or v with its number. */
+/** A node as an identifier: its name, or v with its number in the listing. */
 function symbol(version, node) {
   const name = version.names[node];
   if (version.symbol) return version.symbol(node);
-  return name ? math("mi", name[1]) : math("msub", math("mi", "v"), math("mn", String(node)));
+  return name ? math("mi", name[1]) : math("msub", math("mi", "v"), math("mn", String(version.number[node])));
 }
 
 /** The node's equation, `depth` operations deep. */
@@ -72,7 +72,7 @@ function formula(version, node, depth, whole) {
   return [fill(template), binding];
 }
 
-const PATHS = 5, DEPTH = 4;
+const DEPTH = 4;
 
 const shownName = (app, name, letters) => app.state.called.get(name) ?? letters ?? name;
 const unitOf = (app, name) => (app.units.has(name) ? [" ", tag("span", { class: "unit" }, `[${app.units.get(name)}]`)] : []);
@@ -102,31 +102,6 @@ function showNode(app, bars) {
     byId("node").replaceChildren(scrolled(equation(version, node, DEPTH)), tag("p", {}, ...words));
   }
   showWhy(app);
-}
-
-function showWhy(app) {
-  const [a, b] = [app.before, app.picked].sort((one, other) => one - other);
-  if (a < 0) {
-    byId("why").replaceChildren(quiet("Click two nodes, such as an input and an output: how many paths lead from one to the other, and which weigh most?"));
-    return;
-  }
-  const { version } = app, count = pathCount(version, a, b);
-  const head = tag("p", {}, tag("b", {}, nameOf(app, a)), " → ", tag("b", {}, nameOf(app, b)), `: ${digits(count)} path${count === 1n ? "" : "s"}`);
-  byId("why").replaceChildren(head);
-  if (!count) { head.append("; the one does not depend on the other."); return; }
-  const bars = adjoints(version, app.partials(), b);
-  const found = heaviest(version, app.partials(), a, b, PATHS);
-  head.append(`. The derivative here is ${brief(bars[a])}, the sum of their products of partials.`,
-    ` ${found.length ? "The heaviest:" : "Here a partial on each is zero."}`);
-  const alike = (nodes) => found.filter((each) => each.nodes.join() === nodes.join()).length > 1;
-  found.forEach(({ nodes, slots, product }) => {
-    const words = nodes.map((node, i) => (i && alike(nodes) ? `argument ${slots[i - 1] + 1} of ` : "") + told(app, node));
-    const crossed = nodes.filter((node) => version.marked.has(node)).length, on = app.path?.join() === nodes.join();
-    const button = tag("button", { type: "button", class: `path${on ? " on" : ""}` },
-      `${brief(product)}: ${words.join(" → ")}${crossed ? `  (${crossed} spurious)` : ""}`);
-    button.onclick = () => { app.path = on ? null : nodes; paintPath(app); showWhy(app); };
-    byId("why").append(button);
-  });
 }
 
 /** Fields for the inputs of the state, and what follows from them: the same for all versions. */

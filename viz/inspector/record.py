@@ -7,15 +7,17 @@
     derived               null, or a graph that computes other inputs of versions from the state
     stages                titles of the rows of the picture, from the bottom; [] leaves them to the page, by sweep
     columns               [[tag, tag of its parent or null]] in the order of the picture; [] leaves it to the page
-    versions              [{name, about, labels, label, marked, blamed, flawed, off, steps, drawing} and a graph]
+    versions              [{name, about, labels, label, marked, blamed, flawed, off, excess, steps, drawing} and a
+                          graph], see below
     tables                [{caption, header, rows: [[name, [numbers of nodes]]]} and a graph]: they follow the state
+    causes                null, or such a table: parts of outputs that add up to them, a column for each cause
     motion                null, or {t, points: null or [[[x, y]]], parents, joints, turns, places: null or a graph}
 
 A graph is that of `graph_data`, with outputs [[name, letters, number of a node]], and with names, {number of a node:
 [name, letters]}. labels are the [tags, role, row] that occur, label which of them a node
 has, marked the nodes in the color of what is wrong, blamed the edges [source, target] in it, flawed whether the version
-is wrong, off the names of the outputs in which it is, steps [{words, nodes, value, joint}]. Where nodes stand is the
-page's business, but for a `drawing`.
+is wrong, off the names of the outputs in which it is, excess null or a graph of what its outputs have too much, steps
+[{words, nodes, value, joint}]. Where nodes stand is the page's business, but for a `drawing`.
 """
 
 from __future__ import annotations
@@ -46,6 +48,7 @@ def record(
     state: State | None = None,
     columns: Mapping[str, str | None] | None = None,
     tables: Sequence[StateTable] = (),
+    causes: StateTable | None = None,
 ) -> dict[str, Json]:
     """All that the page's script reads, as JSON can hold it.
 
@@ -61,7 +64,7 @@ def record(
     drawings = _drawings(graphs, letters)
     for version in versions:
         version.check()
-    for table in tables:
+    for table in (*tables, *([causes] if causes else [])):
         table.check(inputs)
     return {
         "called": [[name, text] for name, text in (names or {}).items() if name in known],
@@ -76,6 +79,7 @@ def record(
             for version, drawing in zip(versions, drawings, strict=True)
         ],
         "tables": [_table(table, letters) for table in tables],
+        "causes": None if causes is None else _table(causes, letters),
         "motion": None if motion is None else _motion(motion, letters),
     }
 
@@ -139,6 +143,7 @@ def _version(version: Version, letters: Letters) -> dict[str, Json]:
         "blamed": sorted([[number[edge.source], number[edge.target]] for edge in version.blamed]),
         "flawed": version.flawed or bool(marked),
         "off": [name for name in version.graph.outputs if name in version.off],
+        "excess": None if version.excess is None else _graph(version.excess, letters),
         "steps": [
             {
                 "words": step.words,

@@ -13,7 +13,7 @@ function prepare(version) {
   let operations = 0;
   const number = args.map((own) => (own.length ? ++operations : 0)); // as in Graph.listing(): %1 is the first operation
   const byNumber = new Map(number.map((each, node) => [each, node]).filter(([each]) => each));
-  return { ...version, run: evaluator(version), ops, args, constants, users, edges, number, byNumber, operations, marked: new Set(version.marked),
+  return { ...version, excess: version.excess ? prepare(version.excess) : null, run: evaluator(version), ops, args, constants, users, edges, number, byNumber, operations, marked: new Set(version.marked),
     off: new Set(version.off), crossed: new Set((version.blamed ?? []).map(([source, target]) => `${source} ${target}`)) };
 }
 
@@ -44,6 +44,7 @@ const KINDS = /^(qdd|qd|q|tau|lambda|p)\d+(_old|_dot)?$/; // of inputs and outpu
 /** The state of a record, and its graphs made ready.  told: called whenever a value has changed. */
 function makeState(record, told = () => {}) {
   const versions = record.versions.map((each, index) => ({ ...prepare(each), index })), tables = (record.tables ?? []).map(prepare);
+  const causes = record.causes ? prepare(record.causes) : null;
   const derived = record.derived ? prepare(record.derived) : null;
   const called = new Map(record.called), meant = new Map(record.called.map(([name, text]) => [text, name]));
   const solved = record.inputs.some((name) => KINDS.exec(name)?.[1] === "qdd");
@@ -93,7 +94,7 @@ function makeState(record, told = () => {}) {
   }
   settle(atFrame());
   return {
-    versions, tables, derived, called, solved, errorsOf, set, show, names: record.inputs,
+    versions, tables, causes, derived, called, solved, errorsOf, set, show, names: record.inputs,
     get frame() { return frame; },
     get edited() { return edited; },
     get: (name) => values.get(name),

@@ -19,6 +19,7 @@ from dynamics.equations.momentum.legendre import is_quadratic
 from dynamics.equations.state_equation import state_equation
 from dynamics.equations.torque_parts.torque_decomposition import torque_by_link
 from dynamics.multibody.bodies.joint_coordinates import display_units
+from dynamics.multibody.quantities.torque_causes import torque_by_cause
 from dynamics.multibody.trees.joint_positions import skeleton
 from dynamics.scenes import Scene
 from dynamics.simulation.simulate import simulate
@@ -61,7 +62,7 @@ class Inspection:
     q0_old = q0 - dt q_dot0 and qd0_old = qd0 - dt qdd0; None where there are none.
     shares: what each partial Lagrangian takes of the torques, None for one part.  carried: see `carried`.
     stopped: why the motion ends before its time, empty where it does not.
-    units: {name in the graphs: unit}, where they are known.
+    units: {name in the graphs: unit}, where they are known.  causes: what adds up to the torques.
     """
 
     versions: Mapping[str, Version]
@@ -72,6 +73,7 @@ class Inspection:
     carried: Table | None = None
     stopped: str = ""
     units: Mapping[str, str] = field(default_factory=dict)
+    causes: StateTable | None = None
 
 
 def inspection(
@@ -126,7 +128,7 @@ def inspection(
         derived, shares = _derived(system), _shares(scene)
     stopped = "" if run.stats.success else run.stats.message
     shown = _along(scene, run, versions, state | {"dt": DT}, derived, shares, stopped=stopped)
-    return shown if forward else replace(shown, carried=carried(scene))
+    return shown if forward else replace(shown, carried=carried(scene), causes=_causes(scene))
 
 
 def _along(
@@ -229,6 +231,7 @@ def _version(scene: Scene, name: str) -> Version:
         blamed=verdict.edges,
         flawed=verdict.differs,
         off=tuple(verdict.excess),
+        excess=verdict.terms if verdict.differs else None,
     )
 
 
@@ -246,6 +249,13 @@ def _shares(scene: Scene) -> StateTable | None:
     outputs = {part: table.graph.outputs[f"{tau}_{k}"] for tau, row in rows.items() for k, part in enumerate(row[:-1])}
     graph = Graph(whole.inputs, outputs | {row[-1]: whole.outputs[tau] for tau, row in rows.items()})
     return StateTable("Torques and forces that each part takes", graph, (*table.rows, "all"), rows)
+
+
+def _causes(scene: Scene) -> StateTable:
+    """Torques and forces by cause and body, by the chain rule."""
+    table = torque_by_cause(scene)
+    rows = {f"tau{i}": [f"tau{i}_{k}" for k in range(len(table.rows))] for i in range(scene.system.n)}
+    return StateTable("Torques and forces by cause", table.graph, table.rows, rows)
 
 
 def elimination(graph: Graph, names: Mapping[str, str]) -> list[Step]:

@@ -110,6 +110,7 @@ def inspection_page(scene: scenes.Scene, content: Inspection, moved: str = "", t
         names=display_names(scene),
         units=content.units,
         columns={body.name: body.parent for body in mechanism.moving} if mechanism else None,
+        causes=content.causes,
         notices=[*notices, *([cut_short(content)] if content.stopped else [])],
         panels=[
             box(text_or_none(scene, scene.q, scene.qd)),

@@ -86,7 +86,7 @@ def kinetic_only_exact(system: System) -> LagrangeTerms:
     move at qd + qdd dt.
     """
     momentum = cotangents({system.kinetic: ONE}, system.qd)
-    embedding = _Embedding(system)
+    embedding = Embedding(system)
     lagrangian, *embedded = embedding.embed(system.lagrangian, *momentum)
     gradient = cotangents({lagrangian: ONE}, embedding.q)
     rates = [*embedding.embed(*system.q_dot), *system.qdd]
@@ -178,7 +178,7 @@ def _forces(system: System, terms: LagrangeTerms) -> list[Node]:
     return substitute(system.forces, dict(zip([*system.q, *system.qd], [*terms.q, *terms.qd], strict=True)))
 
 
-class _Embedding:
+class Embedding:
     """The Euler relation of Section 2.1 as nodes: the state after a step from variables of the state before it."""
 
     def __init__(self, system: System) -> None:
@@ -221,9 +221,16 @@ def _embedded(system: System, energy: Node, through: Node = ONE) -> LagrangeTerm
 
     through: a factor of all that comes through q: 1 in the formulation, and at 0 the momentum is the right one.
     """
-    embedding = _Embedding(system)
+    embedding = Embedding(system)
     lagrangian, energy = embedding.embed(system.lagrangian, energy)
     factors = dict.fromkeys(embedding.q, through)
     momentum = cotangents({energy: ONE}, embedding.qd, through=factors)  # through q as well: the unwanted coupling
     gradient = cotangents({lagrangian: ONE}, embedding.q)
     return embedding.terms(momentum, gradient)
+
+
+def through_step(system: System, energy: Node, through: Node) -> list[Node]:
+    """The torques without damping and forces of `_embedded`.  through: a variable."""
+    terms = _embedded(system, energy, through)
+    with building(Builder()):
+        return [rate - slope for rate, slope in zip(terms.momentum_rate, terms.gradient, strict=True)]

@@ -46,7 +46,7 @@ def torque_by_link(model: Model) -> TorqueTable:
     system = as_system(model)
     build = Builder()
     rows = [_torque_of(system, partial, build) for partial in folded(system.partial_lagrangians, Builder())]
-    names = _names_of_partials(system)
+    names = names_of_partials(system)
     outside = _damping_and_forces(system, build)
     rows += outside.values()
     outputs = {f"tau{i}_{k}": entry for k, row in enumerate(rows) for i, entry in enumerate(row)}
@@ -117,7 +117,7 @@ def _damping_and_forces(system: System, build: Builder) -> dict[str, list[Node]]
     return {name: row for name, row in rows.items() if any(entry.value != 0.0 for entry in row)}
 
 
-def _names_of_partials(system: System) -> list[str]:
+def names_of_partials(system: System) -> list[str]:
     """Names of the partial Lagrangians: their one tag, as a link's or a body's; else L1, L2, ..."""
     names: Sequence[str] = [_single_tag(partial.tags - _ENERGIES) for partial in system.partial_lagrangians]
     unique = all(names) and len(set(names)) == len(names)

@@ -108,8 +108,15 @@ class TorqueTable:
         Raises
         ------
         ValueError
-            For another shape, a number that is not finite, or an unknown parameter.
+            For another shape, a number that is not finite, an unknown parameter, or a formulation with the Euler
+            relation, whose inputs are the state before the step: such a table has `graph`.
         """
+        own = {*self.system.q, *self.system.qd, *self.system.qdd, *self.system.extra_inputs}
+        if other := [node.name for node in self.graph.inputs if node not in own]:
+            raise ValueError(
+                f"the table's inputs are the state before the step, such as {other[0]}, not q, qd and qdd: evaluate "
+                "its graph"
+            )
         flat = evaluate(self.system, self.graph, {"q": q, "qd": qd, "qdd": qdd}, t, parameters)
         if flat.ndim != 1:
             raise ValueError(f"a table has one state, q, qd and qdd of the shape ({self.system.n},)")

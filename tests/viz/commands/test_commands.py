@@ -133,6 +133,67 @@ def test_why_adds_up_to_the_derivative(said, figures):
     assert "|sum over all 22 path products - derivative by a reverse sweep| = " in text
 
 
+def test_why_a_torque_is_told_by_cause_and_body(said, figures):
+    found = figures("why", "triple_pendulum", "joint 2", "--at", "qd0=2")
+    scene = dyn.scenes.load("triple_pendulum")
+    q, qd, qdd = ([found["at"][f"{kind}{i}"] for i in range(3)] for kind in ("q", "qd", "qdd"))
+    table = dyn.torque_by_cause(scene).at(q, qd, qdd)
+    assert [*found["parts"].values()] == pytest.approx(table.values[:, 1], rel=ROUNDING, abs=ROUNDING)
+    assert found["value"] == pytest.approx(found["sum"], rel=ROUNDING)
+    text = said("why", "triple_pendulum", "tau.joint 2", "--at", "qd0=2")
+    assert "tau.joint 2 = " in text
+    assert " N m, the sum of\n" in text
+    assert re.search(r"  gravity +[-+][.0-9]+  [-+]+\n    of link 3 ", text)
+    assert re.search(r"  sum +[-+][.0-9]+  = tau.joint 2; difference ", text)
+    same = said("why", "triple_pendulum", "tau1", "--at", "qd.joint 1=2", "--formulation", "newton_euler")
+    assert same.partition("; difference")[0] == text.partition("; difference")[0]
+
+
+def test_why_a_cause_is_told_in_every_torque(said, figures):
+    found = figures("why", "triple_pendulum", "gravity")
+    whole = [figures("why", "triple_pendulum", f"tau{i}")["parts"] for i in range(3)]
+    for each in found["causes"]:
+        joint = int(each["what"][-1]) - 1
+        assert each["parts"] == {name: part for name, part in whole[joint].items() if name.startswith("gravity")}
+    heads = {"GRAVITY": "gravity", "coriolis of link 2": "Coriolis of link 2", "centrifugal": "Coriolis"}
+    for asked, head in (heads | {"link 3": "what link 3 does", "damping": "damping"}).items():
+        assert f"\n{head}, in each of\n  tau.joint " in said("why", "triple_pendulum", asked)
+    slopes = figures("why", "triple_pendulum", "gravity", "q.joint 1")["causes"]
+    assert [each["what"] for each in slopes] == [f"d tau.joint {i} / d q.joint 1" for i in (1, 2, 3)]
+    assert "qdd.joint 1, in each of" not in said("why", "triple_pendulum", "inertia of link 1", "qdd0")
+
+
+@pytest.mark.parametrize("formulation", ["chain_rule", "by_definition"])
+def test_why_a_dependence_is_told_by_cause_and_body(figures, said, formulation):
+    found = figures("why", "triple_pendulum", "tau1", "q0", "--formulation", formulation)
+    causes = found["causes"]
+    assert causes["value"] == pytest.approx(found["derivative"], rel=ROUNDING)
+    assert causes["sum"] == pytest.approx(causes["value"], rel=ROUNDING)
+    spurious = [part for name, part in causes["parts"].items() if name.startswith("spurious")]
+    assert any(spurious) == (formulation == "by_definition")
+    text = said("why", "triple_pendulum", "tau1", "q0", "--formulation", formulation)
+    assert ("no physics, but a mistake of the formulation: without it" in text) == any(spurious)
+    assert text.index("N m per rad, the sum of") < text.index(" along ")  # causes lead, paths follow
+
+
+def test_why_on_equations_without_causes_lists_derivatives(figures):
+    found = figures("why", "spring_mass", "qdd0", "--forward")
+    assert found["derivatives"] == {"tau.theta": 1.0, "k": found["derivatives"]["k"], "q.theta": -1.0} | {
+        "I": found["derivatives"]["I"]
+    }
+
+
+def test_why_nan_finds_the_operation_and_its_status_is_a_finding(own, said):
+    assert said("why", "spring_mass", "--nan") == "All values and derivatives are finite here.\n"
+    assert said("why", "triple_pendulum", "tau0", "--k", "2", "q0") == said(
+        "why", "triple_pendulum", "tau0", "q0", "--k", "2"
+    )
+    text = said("why", "spring_mass", "--nan", "qdd0", "--forward", "--at", "I=0,k=3,q0=1,tau0=2", status=1)
+    assert text.startswith("qdd.theta is -inf at q.theta = 1")
+    assert "It begins with %" in text
+    assert "which is -inf, where " in text
+
+
 def test_why_on_forward_dynamics(figures):
     found = figures("why", "chain", "qdd9", "tau0", "--forward", "--k", "1")
     graph = dyn.forward_dynamics(dyn.scenes.load("chain"))

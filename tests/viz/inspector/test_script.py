@@ -152,6 +152,51 @@ def test_values_adjoints_and_paths_of_the_script_are_those_of_the_library(pendul
             )
 
 
+CAUSES = """(record) => {
+  const state = makeState(record);
+  return state.versions.map((version) => {
+    const values = state.evaluate(version), app = { state, version, partials: () => slopesAt(version, values) };
+    const node = new Map([...Object.entries(version.names).map(([node, [name]]) => [name, +node]), ...version.inputs]);
+    return version.outputs.map(([name, , out]) => ["", "q1", "qd0", "qdd2"].map((by) => {
+      const whole = by ? adjoints(version, app.partials(), out)[node.get(by)] : values[out];
+      return { whole, parts: causesOf(app, name, by ? node.get(by) : -1, whole) };
+    }));
+  });
+}"""
+
+
+def test_causes_add_up_and_are_those_of_the_library():
+    scene = dyn.scenes.load("triple_pendulum")
+    content = inspection(scene)
+    rng = np.random.default_rng(2)
+    at = {name: rng.uniform(-1, 1) for name in content.at} | {"dt": 1e-9}
+    graphs, state = [*content.versions.values()], State(at, content.derived)
+    found = dict(
+        zip(content.versions, run_script(CAUSES, record(graphs, None, state=state, causes=content.causes)), strict=True)
+    )
+    table = dyn.torque_by_cause(scene)
+    values = table.at(*[[at[f"{kind}{i}"] for i in range(3)] for kind in ("q", "qd", "qdd")]).values
+    slopes = cg.jacobian(table.graph, ["q1", "qd0", "qdd2"]).evaluate(
+        {name: at[name] for name in table.graph.input_names}
+    )
+    for name, outputs in found.items():
+        excess = content.versions[name].excess
+        assert (excess is None) == (name == "chain_rule")
+        for i, (value, *by) in enumerate(outputs):
+            for k, cause in enumerate(table.rows):
+                assert value["parts"][k] == [cause, pytest.approx(values[k, i], abs=1e-7, rel=1e-9)]
+            for one, each in zip(("q1", "qd0", "qdd2"), by, strict=True):
+                parts = dict(each["parts"])
+                expected = [slopes[f"dtau{i}_{k}/d{one}"] for k in range(len(table.rows))]
+                assert [parts[cause] for cause in table.rows] == pytest.approx(expected, abs=1e-7, rel=1e-9)
+            for each in (value, *by):
+                parts = dict(each["parts"])
+                size = sum(map(abs, parts.values()))
+                assert sum(parts.values()) == pytest.approx(each["whole"], abs=1e-12 * size)
+                if excess:  # at dt = 1e-9 s the step leaves what rounding does to a difference over it
+                    assert abs(parts["step of dt"]) < 1e-6 * size
+
+
 def test_infinities_and_the_negative_zero_reach_the_page():
     x, values = cg.variable("x"), (math.inf, -math.inf, -0.0)
     graph = cg.Graph([x], {str(i): cg.minimum(x, value) for i, value in enumerate(values)})
