@@ -31,9 +31,10 @@ class Version:
     """One of the graphs that the page switches among, and what to see in it.
 
     about: a sentence or two.  marked: nodes in the one color of what is wrong.  steps: to be gone through one by one.
-    rows: {title: nodes} of the rows of the picture from the bottom, alike in all versions; a node that is in none
+    rows: {title: nodes} of the rows of the picture from the bottom; a node that is in none
     stands in the first. Without any, rows are the sweeps.  blamed: edges in that color.  flawed: whether the version is
-    wrong, which it may be with nothing left in it that could be marked.
+    wrong, which it may be with nothing left in it that could be marked.  group: versions of one share a picture, in
+    which what computes the same has the same place; rows are alike in a group.
     """
 
     name: str
@@ -44,6 +45,7 @@ class Version:
     rows: Mapping[str, Collection[Node]] = field(default_factory=dict)
     blamed: Collection[Edge] = frozenset()
     flawed: bool = False
+    group: str = ""
 
     def check(self) -> None:
         """Raises ValueError for a marked node, or one of a step, that is not in the graph."""

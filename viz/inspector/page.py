@@ -18,8 +18,8 @@ from .content import Motion, State, StateTable, Version
 from .record import record
 
 SCRIPTS = (
-    "state.js", "places.js", "arrange.js", "picture.js", "marks.js", "panels.js", "steps.js", "motion.js", "keys.js",
-    "app.js",
+    "state.js", "picture/places.js", "picture/arrange.js", "picture/legible.js", "picture.js", "marks.js", "panels.js", "steps.js", "motion.js",
+    "outline.js", "link.js", "keys.js", "app.js",
 )  # fmt: skip
 
 
@@ -38,6 +38,7 @@ def page(
     columns: Mapping[str, str | None] | None = None,
     notices: Sequence[str] = (),
     panels: Sequence[Panel] = (),
+    view: str = "",
 ) -> Page:
     """The page on which a graph is looked at: it folds by tags, and shows values, paths, sweeps and equations.
 
@@ -72,6 +73,8 @@ def page(
         What stands above everything, such as what a model lacks of its file.
     panels : sequence of Panel
         Parts that other modules add, such as the box of `viz.typed_page`.
+    view : str
+        Name of the version that is shown first; by default the first.
 
     Returns
     -------
@@ -81,7 +84,7 @@ def page(
     Raises
     ------
     ValueError
-        For no version, two of one name, `marked` beside versions, a value for a name that is no input or is derived, a
+        For no version, two of one name, a view that is none, `marked` beside versions, a value for a name that is no input or is derived, a
         number that is not finite, a marked node of another graph, or shapes that do not fit the motion.
 
     Examples
@@ -112,8 +115,10 @@ def page(
         if not isinstance(motion, Motion):
             raise TypeError(f"motion must be a Motion, got {type(motion).__name__}: {motion!r:.60}")
         motion.check()
+    if view and all(version.name != view for version in versions):
+        raise ValueError(f"view must be one of the versions, got {view!r}: {[version.name for version in versions]}")
     introduction = "" if isinstance(graph, Graph) else about
-    data: dict[str, Json] = {"title": title, "introduction": introduction, "notices": list(notices)}
+    data: dict[str, Json] = {"title": title, "introduction": introduction, "notices": list(notices), "view": view}
     live = [table for table in tables if isinstance(table, StateTable)]
     data |= record(versions, motion, *texts, state=State(at or {}, derived), columns=columns, tables=live)
     return compose(title, data, [table for table in tables if isinstance(table, Table)], panels)
@@ -129,10 +134,11 @@ def compose(title: str, data: Mapping[str, Json] | None, tables: Sequence[Table]
         tables="".join([table.html() for table in tables]),
         version=f"cgraph {__version__}",
         panels="".join([panel.body for panel in panels]),
+        end="\n".join([panel.end for panel in panels if panel.end]),
     )
     return html.compose(
         title,
-        "\n".join([body, *[panel.end for panel in panels if panel.end]]),
+        body,
         f"{_colors()}{asset(__package__, 'page.css')}{''.join([panel.style for panel in panels])}",
         f'"use strict";\n{scripts()}\n{added}\nconst inspector = start({first});{begin}',
         {"data": data} | {name: each for panel in panels for name, each in panel.data.items()},

@@ -94,15 +94,15 @@ SCRIPTS = ("machine.js", "run.js", "course.js", "live.js")
 EVALUATION = "'wasm-unsafe-eval'"  # in the policy: WebAssembly may be compiled, text may not
 
 
-def panel(live: Live) -> Panel:
+def panel(live: Live, begin: str = "startLive();") -> Panel:
     """The panel of a live motion, for a page whose style has --text, --back, --soft and --edge.
 
-    The page's scripts need elements.js and address.js.
+    The page's scripts need elements.js and address.js.  begin: JavaScript that begins it, or says when to.
     """
     colors = {"kinetic": theme.BLUE, "potential": theme.ORANGE, "right": theme.GREEN, "wrong": theme.SPURIOUS}
     variables = ":root{" + "".join(f"--live-{name}:{color};" for name, color in colors.items()) + "}\n"
     dark = f"@media (prefers-color-scheme: dark){{:root{{--live-kinetic:{theme.SKY_BLUE};}}}}\n"
-    script = f"{{\n{asset(__package__, *SCRIPTS)}\nstartLive();\n}}"  # in a block it shares no name with a page's
+    script = f"{{\n{asset(__package__, *SCRIPTS)}\n{begin}\n}}"  # in a block it shares no name with a page's
     style = f"{variables}{dark}{asset(__package__, 'live.css')}"
     return Panel(
         asset(__package__, "live.html"), style, run=script, allowed=EVALUATION, data={"live-data": live.to_dict()}

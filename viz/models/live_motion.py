@@ -89,10 +89,10 @@ def live_page(model: Model, path: str | os.PathLike[str] | None = None, *, start
 
 
 def live_panel(scene: Scene, *, momentum: bool = False) -> Panel:
-    """The motion of a scene as a panel at the end of another page, closed at first."""
-    shown = panel(live_of(scene, momentum=momentum))
-    closed = f'<details id="live"><summary>Live: computed as you watch</summary>\n{shown.body}</details>'
-    return shown._replace(body="", end=closed)
+    """The motion of a scene as a view of the inspector, computed from when its tab is first opened."""
+    shown = panel(live_of(scene, momentum=momentum), begin='inspector.onView("live", startLive);')
+    section = f'<section id="live" role="tabpanel" aria-label="live" hidden>\n{shown.body}</section>'
+    return shown._replace(body="", end=section)
 
 
 def live_of(scene: Scene, *, momentum: bool = False) -> Live:
