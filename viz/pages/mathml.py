@@ -31,7 +31,7 @@ def equations(graph: Graph, names: Mapping[str, str], lines: int = 12) -> str:
     missing = few([f"<math>{left}</math>" for left in found.left_out])
     rest = f"<p>{len(found.left_out)} of {total} lines are left out: those of {missing}.</p>" if found.left_out else ""
     table = f'<mtable columnalign="right center left">{rows}</mtable>'
-    return f'<div class="scroll"><math display="block">{table}</math></div>{rest}'
+    return f'<div class="scroll" tabindex="0" role="group"><math display="block">{table}</math></div>{rest}'
 
 
 def few(texts: Sequence[str]) -> str:
