@@ -178,7 +178,10 @@ function listen(app) {
   byId("from").onchange = () => { app.from = byId("from").value; refresh(app); stepTo(app, app.sweep); };
   byId("time").oninput = () => { play(app, false); app.state.show(+byId("time").value); };
   document.addEventListener("keydown", (event) => { if (pressed(app, event)) event.preventDefault(); });
-  addEventListener("beforeprint", () => byId("wide").querySelectorAll("details").forEach((each) => { each.open = true; }));
+  addEventListener("beforeprint", () => {
+    byId("wide").querySelectorAll("details").forEach((each) => { each.open = true; });
+    byId("printed").replaceChildren(tag("b", {}, "Inputs: "), inputsInWords(app));
+  });
   addEventListener("resize", () => {
     if (app.other) return;
     if (!app.view.chosen) app.view = firstView(app); // what a person unfolded stays

@@ -165,6 +165,12 @@ function showInputs(app) {
   byId("reset").hidden = byId("edited").hidden = !app.state.edited;
 }
 
+/** The state as one line. */
+function inputsInWords(app) {
+  const { state } = app, unit = (name) => (app.units.has(name) ? ` ${app.units.get(name)}` : "");
+  return `${state.names.map((name) => `${shownName(app, name)} = ${brief(state.get(name))}${unit(name)}`).join(", ")}.`;
+}
+
 /** How many nodes are there by mistake; where there are none, what else is wrong. */
 function spuriousIn({ marked, blamed, flawed }) {
   const nodes = marked.size ?? marked.length;

@@ -24,7 +24,7 @@ GROUPS = (
     ("p", "momenta"),
     ("tau", "torques"),
 )  # of inputs, by the start of their names
-ENERGIES = 3  # the meters that the strip shows
+ENERGY, ENERGIES = "energy", 3  # the group of the meters that the strip shows, and how many these are
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +34,8 @@ class Live:
     rate: the state equation, whose first inputs are the state, and output k the rate of input k.
     start: a value of every input.  dt: the step at first [s].  methods: those of `dynamics.integrators.TABLEAUS`.
     shown: over the same inputs, an output for each meter, then x and y of each point [m].
-    meters: name, unit and group, the first three kinetic, potential and total energy.
+    meters: name, unit and group, the first three kinetic, potential and total energy, or none of group "energy".
+    notes: {group of meters: a sentence on what they are}.
     parents: of each point the earlier one that it hangs on, or -1.
     scales: {input: how far its slider reaches to both sides of 0}, by default three times the value, or 1.
     names, units: {input: what a person calls it, and its unit}.
@@ -52,6 +53,7 @@ class Live:
     methods: Mapping[str, Any] = field(default_factory=dict)
     names: Mapping[str, str] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
+    notes: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name in self.rate.input_names:
@@ -72,7 +74,8 @@ class Live:
                 {"called": theme.called({"": name})[""], "unit": unit, "group": group}
                 for name, unit, group in self.meters
             ],
-            "energy": ENERGIES - 1,
+            "energy": ENERGIES - 1 if any(group == ENERGY for _, _, group in self.meters) else -1,
+            "notes": dict(self.notes),
             "parents": list(self.parents),
             "methods": list(self.methods),
             "dt": float(self.dt),

@@ -108,7 +108,7 @@ def inspection_page(
     if view == MOMENTUM and all(each.group != view for each in versions):
         as_system(scene.model)  # a system of first order has no momenta at all
         raise ValueError(f"{scene.name}: {content.lacking}")
-    lively = scene.ode is None and scene.system.n <= LIVELY
+    lively = scene.ode is not None or scene.system.n <= LIVELY
     notices = [f"Left out of the model: {'; '.join(scene.left_out)}."] if scene.left_out else []
     notices += [each for each in (tree_alone(scene), content.lacking) if each]
     notices += [f"{moved[0].upper()}{moved[1:]}."] if moved else []

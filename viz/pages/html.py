@@ -50,6 +50,10 @@ summary {{ cursor: pointer; font-weight: 600; }} details caption {{ display: non
 pre {{ background: var(--soft); padding: 0.8rem 1rem; overflow-x: auto; border-radius: 4px; }}
 .point, .warning {{ background: var(--soft); border-left: 5px solid {theme.BLUE}; padding: 0.6rem 1rem; }}
 .warning {{ border-left-color: {theme.SPURIOUS}; }}
+@media print {{ :root {{ color-scheme: light; --text: {theme.TEXT}; --back: #FFFFFF; --soft: #F4F4F2; --line: #D8D8D4; }}
+  body {{ max-width: none; padding: 0; }} nav {{ display: none; }} .scroll, figure {{ overflow: visible; background: none; }}
+  h2, caption, summary {{ break-after: avoid; }} figure, tr, pre, .point, .warning {{ break-inside: avoid; }}
+  p, li {{ orphans: 3; widows: 3; }} thead {{ display: table-header-group; }} figure img.plot {{ min-width: 0; }} }}
 """
 
 

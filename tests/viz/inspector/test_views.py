@@ -87,7 +87,7 @@ def test_a_version_stands_beside_those_that_answer_the_same_question(show):
     page = show()
     for name, columns in (("chain rule", 4), ("forward", 1), ("Hamilton", 2)):
         tab(page, name)
-        assert page.locator("#results thead th").count() == 1 + columns
+        assert page.locator("#results thead th").count() == columns
 
 
 # The address.
@@ -196,9 +196,11 @@ def test_the_outline_has_every_node_of_the_graph_as_text(show):
     page = show("ode")
     page.click("#outline > summary")
     graph = dyn.OdeSystem(lambda y, t: [y[1], -y[0] - 0.2 * y[1]], ["x", "v"])
+    page.wait_for_selector("#outlined details")
     closed = page.locator("#outlined details:not([open]) > summary").locator("visible=true")
     while closed.count():
         closed.first.click()
+        page.wait_for_timeout(20)
     drawn = [node for node in dyn.state_equation(graph).nodes if node.value is None]
     texts = page.locator("#outlined button").all_text_contents()
     assert len(set(texts)) >= len(drawn)
@@ -212,3 +214,14 @@ def test_with_reduced_motion_the_motion_is_shown_in_few_steps(show):
     page.click("#play")
     page.wait_for_timeout(450)
     assert page.evaluate("told") <= 3
+
+
+def test_paper_has_the_inputs_in_a_line_and_the_wide_tables_whole(show):
+    page = show("quadruped", color_scheme="dark", width=1400)
+    page.evaluate("inspector.setState({ qd0: 0.25 }); dispatchEvent(new Event('beforeprint'))")
+    page.emulate_media(media="print")
+    assert "q\u0307.trunk.vx = 0.25 m/s" in page.inner_text("#printed")
+    assert page.locator("#wide table").is_visible()
+    assert page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
+    page.emulate_media(media="screen")
+    assert not page.locator("#printed").is_visible()

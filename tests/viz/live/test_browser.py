@@ -94,9 +94,12 @@ def test_a_system_without_places_shows_its_course_before_anything_runs(show):
     page.get_by_label("q.right", exact=True).fill("2")
     assert lines.nth(0).get_attribute("d") != before[0]  # on the scale of both
     dot = page.locator("#live-picture circle").first
-    assert dot.get_attribute("cx") == "0.00"
+    start = float(dot.get_attribute("cx"))  # on the axis, right of its numbers
     page.click("#live-step")
-    assert float(dot.get_attribute("cx")) > 0.0
+    assert float(dot.get_attribute("cx")) > start
+    numbers = page.locator("#live-picture .live-number").all_text_contents()
+    assert sum(each.endswith(" s") for each in numbers) >= 3
+    assert sum(not each.endswith(" s") for each in numbers) >= 3
     page.select_option("#live-method", "euler")
     page.fill("#live-dt-field", "1e9")
     for _ in range(40):
