@@ -48,9 +48,7 @@ def run(options: argparse.Namespace) -> int:
     content = library.inspection(scene, t_end=options.t_end, say=say)
     count = sum(len(each.graph.nodes) for each in content.versions.values())
     say(f"{scene.name}: writing the page of {extend.counted(count, 'node')}")
-    text = library.inspection_page(
-        scene, content, moved, view=library.first_view(options.forward, options.momentum)
-    )
+    text = library.inspection_page(scene, content, moved, view=library.first_view(options.forward, options.momentum))
     sizes = {
         name: {
             "nodes": len(version.graph.nodes),

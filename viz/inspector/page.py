@@ -18,8 +18,8 @@ from .content import Motion, State, StateTable, Version
 from .record import record
 
 SCRIPTS = (
-    "state.js", "picture/places.js", "picture/arrange.js", "picture/legible.js", "picture.js", "marks.js", "panels.js", "steps.js", "motion.js",
-    "outline.js", "link.js", "keys.js", "app.js",
+    "state.js", "picture/places.js", "picture/arrange.js", "picture/legible.js", "picture.js", "marks.js", "panels.js",
+    "steps.js", "motion.js", "outline.js", "link.js", "keys.js", "app.js",
 )  # fmt: skip
 
 
@@ -84,8 +84,9 @@ def page(
     Raises
     ------
     ValueError
-        For no version, two of one name, a view that is none, `marked` beside versions, a value for a name that is no input or is derived, a
-        number that is not finite, a marked node of another graph, or shapes that do not fit the motion.
+        For no version, two of one name, a view that is none, `marked` beside versions, a value for a name that is no
+        input or is derived, a number that is not finite, a marked node of another graph, or shapes that do not fit
+        the motion.
 
     Examples
     --------

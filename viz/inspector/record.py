@@ -73,9 +73,7 @@ def record(
         "rows": state.rows(inputs, len(motion.t) if motion else 1).tolist(),
         "derived": None if state.derived is None else _graph(state.derived, letters),
         "columns": [[tag, parent] for tag, parent in (columns or {}).items()],
-        "versions": [
-            _version(version, letters) | {"drawing": drawings[version.name]} for version in versions
-        ],
+        "versions": [_version(version, letters) | {"drawing": drawings[version.name]} for version in versions],
         "tables": [_table(table, letters) for table in tables],
         "motion": None if motion is None else _motion(motion, letters),
     }

@@ -58,10 +58,12 @@ DT = 1e-3  # s, the step that the embedded formulations take
 
 @dataclass(frozen=True)
 class Inspection:
-    """versions: {name: the equations}, formulations by their names in `dynamics.FORMULATIONS`.  motion: its instants, and joints where the model has places.
+    """versions: {name: the equations}, formulations by their names in `dynamics.FORMULATIONS`.
+    motion: its instants, and joints where the model has places.
 
     at: {input: (T,) or a number}, the one state of all versions.  derived: what follows from it, the inputs of embedded
-    formulations, q0_old = q0 - dt q_dot0 and qd0_old = qd0 - dt qdd0, and momenta p0 = dL/dqd0; None where nothing does.
+    formulations, q0_old = q0 - dt q_dot0 and qd0_old = qd0 - dt qdd0, and momenta p0 = dL/dqd0; None where nothing
+    does.
     shares: what each partial Lagrangian takes of the torques, None for one part.  carried: see `carried`.
     stopped: why the motion ends before its time, empty where it does not.
     units: {name in the graphs: unit}, where they are known.  lacking: why there are no equations in momenta.
@@ -81,7 +83,7 @@ class Inspection:
 def inspection(
     scene: Scene, *, t_end: float | None = None, say: Callable[[str], None] = lambda line: None
 ) -> Inspection:
-    """All equations of the scene along its free motion: inverse dynamics by the formulations, forward dynamics, momenta.
+    """All equations of a scene along its free motion: inverse dynamics by the formulations, forward dynamics, momenta.
 
     Of an OdeSystem it is the state equation.  say: told of each stage before it begins.
 
@@ -152,7 +154,7 @@ def _along(
 
 
 def _hamilton(scene: Scene) -> list[Version]:
-    """The two forms of the equations at one state, in momenta and in velocities. Raises as `hamilton_equations` does."""
+    """The two forms of the equations, in momenta and in velocities. Raises as `hamilton_equations` does."""
     forms = both_forms(scene)
     hamilton, system, sizes = forms[HAMILTON], scene.system, form_sizes(forms)
     depth = {name: counts.depth for name, counts in sizes.items()}
@@ -223,7 +225,8 @@ def _version(scene: Scene, name: str) -> Version:
         about += " Nothing drives the joints here: these torques are those of the constraints alone."
     else:
         about += " Nothing drives the joints here, so the torques should be 0."
-    return Version(TITLES[name], verdict.graph, about, wrong, blamed=edges, flawed=verdict.differs, group=INVERSE if name in PAPER else name)
+    group = INVERSE if name in PAPER else name
+    return Version(TITLES[name], verdict.graph, about, wrong, blamed=edges, flawed=verdict.differs, group=group)
 
 
 def _named(**tables: Array) -> dict[str, float | Array]:

@@ -245,7 +245,8 @@ def _step(scene: Scene) -> float:
     """A step that is short enough: a share of those that an adaptive method takes at first, rounded."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SimulationWarning)  # the page shows what an equal step does to a stiff system
-        run = simulate(scene, scene.q, None if scene.ode is not None else scene.qd, min(scene.t_end, 1.0), "dopri5", rtol=1e-4, max_steps=MOST_STEPS)
+        qd = None if scene.ode is not None else scene.qd
+        run = simulate(scene, scene.q, qd, min(scene.t_end, 1.0), "dopri5", rtol=1e-4, max_steps=MOST_STEPS)
     steps = np.diff(run.t)
     usual = float(np.median(steps)) if run.stats.steps and steps.size else 1e-2 * scene.t_end
     return float(f"{_round(SHARE * usual) / 2.0:.3g}")
