@@ -28,8 +28,8 @@ def add(parser: Command) -> None:
     takes_a_scene(parser)
     writes_a_page(parser)
     which = parser.add_mutually_exclusive_group()
-    which.add_argument("--forward", action="store_true", help="forward dynamics, in place of the three formulations")
-    which.add_argument("--momentum", action="store_true", help=f"{MOMENTUM_FORM}, in place of them")
+    which.add_argument("--forward", action="store_true", help="show forward dynamics first")
+    which.add_argument("--momentum", action="store_true", help=f"show {MOMENTUM_FORM} first")
     takes_a_start(parser)
     parser.add_argument("--t-end", type=positive, metavar="S", help="how long it moves, in place of the scene's time")
     parser.add_argument("--json", action="store_true", help="print the sizes as JSON")
@@ -45,12 +45,10 @@ def run(options: argparse.Namespace) -> int:
     library.html_target("--out", options.out)
     say(f"reading {options.scene}")
     scene, moved = started(options)
-    content = library.inspection(
-        scene, forward=options.forward, momentum=options.momentum, t_end=options.t_end, say=say
-    )
+    content = library.inspection(scene, t_end=options.t_end, say=say)
     count = sum(len(each.graph.nodes) for each in content.versions.values())
     say(f"{scene.name}: writing the page of {extend.counted(count, 'node')}")
-    text = library.inspection_page(scene, content, moved)
+    text = library.inspection_page(scene, content, moved, view=library.first_view(options.forward, options.momentum))
     sizes = {
         name: {
             "nodes": len(version.graph.nodes),

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from ..models.equations_text import equations_latex, equations_text
     from ..models.film import animate, frames
     from ..models.inspection import FRAMES, inspection
-    from ..models.inspection_page import inspection_page
+    from ..models.inspection_page import first_view, inspection_page
     from ..models.live_motion import live_page
     from ..models.node_classes import form_classes, formulation_classes
     from ..models.remarks import constant_momentum, tree_alone

@@ -12,6 +12,7 @@
 //   results()              {version: {output: number}} at the state
 //   showRecord(record)     show another record, as viz/inspector/record.py describes it; callbacks stay
 //   record()               what is shown
+//   onView(name, callback) a view that is no graph, such as "live": call it when its tab is first opened
 
 const READABLE = 100; // nodes that are drawn one by one at first
 const DRAWABLE = 2500; // more than these are never drawn one by one at once
@@ -20,13 +21,14 @@ const SMALL = 60; // nodes of a graph that shows its values at first
 
 function start(first = JSON.parse(byId("data").textContent)) {
   const callbacks = new Set();
-  const app = { svg: byId("picture"), callbacks, playing: false, noises: new WeakMap() };
+  const app = { svg: byId("picture"), callbacks, first, playing: false, waiting: new Map(), noises: new WeakMap() };
   app.output = () => (app.version.outputs.find(([name]) => name === app.from) ?? app.version.outputs[0])[2];
   app.partials = () => (app.slopes ??= slopesAt(app.version, app.values));
   app.noise = () => (app.bounds ??= boundsIn(app, app.version, app.partials(), app.values));
   app.refresh = () => refresh(app);
   listen(app);
   showRecord(app, first);
+  openLink(app);
   return {
     setState: (values) => { play(app, false); app.state.set(values); },
     state: () => app.state.values(),
@@ -38,31 +40,26 @@ function start(first = JSON.parse(byId("data").textContent)) {
     })),
     showRecord: (record) => showRecord(app, record),
     record: () => app.record,
+    onView: (name, callback) => { if (app.other === name) callback(); else app.waiting.set(name, callback); },
   };
 }
 
 function showRecord(app, record) {
   play(app, false);
   const state = makeState(record, () => stateChanged(app)); // first, so that a bad record leaves the page as it is
-  const plan = makePlan(record, state.versions);
-  Object.assign(app, { record, state, plan, units: new Map(record.units), from: "", seen: null, chosen: false });
-  Object.assign(app, { picked: -1, before: -1, path: null, sweep: -1, lesson: -1, index: 0, version: state.versions[0] });
-  app.largest = Math.max(...state.versions.map((version) => version.ops.length));
+  Object.assign(app, { record, state, groups: new Map(), units: new Map(record.units), from: "", other: "" });
+  Object.assign(app, { picked: -1, before: -1, path: null, sweep: -1, lesson: -1, index: -1, version: null });
   byId("title").textContent = document.title = record.title;
   byId("introduction").textContent = record.introduction;
   byId("introduction").hidden = !record.introduction;
   byId("notices").replaceChildren(...record.notices.map((each) => tag("li", {}, each)));
   byId("notices").hidden = !record.notices.length;
   byId("tables").hidden = !byId("tables").querySelector("table");
-  app.svg.classList.toggle("values", app.largest <= SMALL);
-  byId("values").setAttribute("aria-pressed", app.largest <= SMALL);
-  makeVersions(app);
+  makeTabs(app);
   makeMotion(app);
-  makeResults(app);
   makeInputs(app);
-  app.view = firstView(app);
-  choose(app, 0);
-  if (record.motion) state.show(Math.floor(record.motion.t.length / 4)); // on its way: at rest many products are 0
+  choose(app, firstVersion(app).at);
+  if (record.motion) state.show(firstFrame(record));
   else stateChanged(app);
 }
 
@@ -71,6 +68,7 @@ function stateChanged(app) {
   showTime(app);
   tellLesson(app);
   if (app.playing) { showValues(app); showResults(app); } else refresh(app);
+  keepState(app);
   app.callbacks.forEach((callback) => callback(app.state.values()));
 }
 
@@ -82,7 +80,7 @@ function compute(app) {
 
 function boundsIn(app, graph, slopes, values) {
   const own = ownErrors(graph, values, app.state.errorsOf(graph)), bounds = errorBounds(graph, slopes, own, 0);
-  return app.state.solved ? bounds : sharpened(graph, slopes, values, bounds, own);
+  return app.state.solved(graph) ? bounds : sharpened(graph, slopes, values, bounds, own);
 }
 
 /** Noise of a graph's values: computed only where an output may be noise. */
@@ -95,6 +93,26 @@ function noiseIn(app, graph, values) {
     : new Float64Array(values.length);
   app.noises.set(graph, found);
   return found;
+}
+
+// Versions of a group share places: their plan, what of it is folded and what is seen of it
+
+/** The group of a version, made when it is first shown: { plan, view, seen, largest, versions }. */
+function ownGroup(app, { group }) {
+  if (!app.groups.has(group)) {
+    const versions = app.state.versions.filter((each) => each.group === group);
+    const largest = Math.max(...versions.map((version) => version.ops.length));
+    app.groups.set(group, { versions, largest, plan: makePlan(app.record, versions), view: null, seen: null });
+  }
+  return app.groups.get(group);
+}
+function enterGroup(app, version) {
+  app.own = ownGroup(app, version);
+  Object.assign(app, { plan: app.own.plan, largest: app.own.largest, view: app.own.view, seen: app.own.seen });
+  app.view ??= firstView(app);
+  app.svg.classList.toggle("values", app.largest <= SMALL);
+  byId("values").setAttribute("aria-pressed", app.largest <= SMALL);
+  makeResults(app);
 }
 
 // Detail: nodes, clusters or bodies
@@ -110,9 +128,11 @@ const levels = (app) => ({
 function firstView(app) {
   const size = room(app), aspect = Math.min(2.5, Math.max(0.4, size.width / size.height)), all = levels(app);
   const view = (level) => ({ ...all[level], unbundled: new Set(), aspect });
-  const drawn = app.state.versions.every((version) => version.drawing);
-  if (drawn) return view("nodes");
   const scale = (level) => fitting(size, arrange(app.plan, view(level)));
+  const coarsest = app.plan.columns.length > 1 ? "bodies" : "clusters";
+  const drawings = app.own.versions.map(({ drawing }) => drawing);
+  if (drawings.every(Boolean) && (innerWidth > NARROW || drawings.every((each) => fitting(size, each) >= READ))) return view("nodes");
+  if (innerWidth <= NARROW) return view(app.largest <= SMALL && scale("nodes") >= READ ? "nodes" : coarsest);
   const order = [...(app.largest <= READABLE ? ["nodes"] : []), "clusters", ...(app.plan.columns.length > 1 ? ["bodies"] : [])];
   const boxes = Math.max(...app.plan.place.map((places) => new Set(places.map((place) => app.plan.cluster[place])).size));
   const clear = (level) => scale(level) >= READ && (level !== "clusters" || boxes <= BOXES);
@@ -132,9 +152,9 @@ function detail(app, way) {
     byId("trail").textContent = `More than ${DRAWABLE} nodes: click boxes to unfold them one by one.`;
     return;
   }
-  Object.assign(app.view, all[level]);
-  app.chosen = true;
+  Object.assign(app.view, all[level], { chosen: true });
   redraw(app, true);
+  keepView(app);
 }
 
 const flip = (set, key) => { if (set.has(key)) set.delete(key); else set.add(key); };
@@ -144,10 +164,14 @@ function toggle(app, kind, key) {
   const at = (layout) => ({ folded: layout.boxes?.[key], closed: layout.bodies?.[key] ?? layout.titles?.find((each) => each.column === key) }[kind]);
   const before = at(app.drawn.layout);
   flip(app.view[kind], key);
-  app.chosen = true;
+  app.view.chosen = true;
   redraw(app, false);
   const { k, x, y } = app.seen, after = at(app.drawn.layout);
-  if (before && after) setView(app, { k, x: x + (before.x - after.x) * k, y: y + (before.y - after.y) * k });
+  if (before && after) {
+    setView(app, { k, x: x + (before.x - after.x) * k, y: y + (before.y - after.y) * k });
+    if (kind !== "unbundled" && !app.view[kind].has(key)) approach(app, after); // what was unfolded is to be read
+  }
+  keepView(app);
 }
 
 // Drawing
@@ -169,34 +193,70 @@ function refresh(app) {
   showNode(app, bars);
   showResults(app);
   showInputs(app);
+  showOutline(app);
 }
 
 // Choices
 
-function makeVersions(app) {
-  const { versions } = app.state;
-  byId("versions").replaceChildren(...versions.map((each, i) => {
-    const button = tag("button", { type: "button", role: "radio" }, each.name);
-    if (each.flawed) button.className = "flawed";
-    button.onclick = () => choose(app, i);
-    return button;
-  }));
-  byId("versions").hidden = versions.length < 2;
+/** The version that the record has first, by its name or its place. */
+const firstVersion = ({ state, record }) => state.versions.find(({ name }) => name === record.view) ?? state.versions[0];
+
+const LIVE = "live"; // the view of another script, where the page has its section
+
+/** The versions that have an output of a version, too. */
+function alike(versions, { outputs }) {
+  const own = new Set(outputs.map(([name]) => name));
+  return versions.filter((each) => each.outputs.some(([name]) => own.has(name)));
 }
 
+/** A tab for every version, and for the motion that is computed as it is watched, which is of the page's first record. */
+function makeTabs(app) {
+  const { versions } = app.state, others = app.record === app.first && byId(LIVE) ? [LIVE] : [];
+  const right = alike(versions, versions[0]).filter(({ flawed }) => !flawed);
+  const fewest = Math.min(...right.map(({ ops }) => ops.length));
+  const tabs = versions.map((each, i) => {
+    const button = tag("button", { type: "button", role: "tab", "aria-controls": "view" }, each.name);
+    if (each.flawed) button.className = "flawed";
+    if (right.length > 1 && each === right.find(({ ops }) => ops.length === fewest)) button.append(" ", tag("small", {}, "smallest"));
+    if (i && versions[i - 1].group !== each.group) button.classList.add("apart");
+    return button;
+  });
+  tabs.push(...others.map((name) => tag("button", { type: "button", role: "tab", class: "apart", "aria-controls": name }, name)));
+  tabs.forEach((button, i) => { button.onclick = () => { choose(app, i); keepView(app); }; });
+  byId("versions").replaceChildren(...tabs);
+  byId("versions").hidden = tabs.length < 2;
+}
+
+/** Show the view of a tab: a version, or what another script shows. */
 function choose(app, i) {
-  const { versions } = app.state;
-  if (!versions[i]) return;
-  const places = app.plan.place[app.index];
-  const keep = (node) => (node < 0 ? -1 : app.plan.place[i].indexOf(places[node]));
-  const [picked, before] = [keep(app.picked), keep(app.before)];
-  app.bounds = null;
-  Object.assign(app, { index: i, version: versions[i], picked, before, path: null, sweep: -1, lesson: -1 });
-  [...byId("versions").children].forEach((button, k) => {
-    button.setAttribute("aria-checked", k === i);
+  const { versions } = app.state, tabs = [...byId("versions").children];
+  if (!tabs[i] || (i === app.index && !app.other)) return;
+  tabs.forEach((button, k) => {
+    button.setAttribute("aria-selected", k === i);
     button.tabIndex = k === i ? 0 : -1;
   });
-  const was = room(app).height;
+  app.other = versions[i] ? "" : tabs[i].textContent;
+  byId("view").hidden = Boolean(app.other);
+  byId("wide").hidden = byId("about").hidden = Boolean(app.other);
+  byId(LIVE)?.toggleAttribute("hidden", app.other !== LIVE);
+  document.body.classList.toggle("elsewhere", Boolean(app.other));
+  if (app.other) {
+    play(app, false);
+    app.waiting.get(app.other)?.();
+    app.waiting.delete(app.other);
+    return;
+  }
+  showVersion(app, i);
+}
+
+function showVersion(app, i) {
+  const { versions } = app.state, was = room(app).height, old = app.version, apart = old?.group !== versions[i].group;
+  const keep = (node) => (node < 0 || apart ? -1 : app.plan.place[versions[i].index].indexOf(app.plan.place[old.index][node]));
+  const [picked, before] = [keep(app.picked), keep(app.before)];
+  if (old) Object.assign(app.own, { view: app.view, seen: app.seen });
+  app.bounds = null;
+  Object.assign(app, { index: i, version: versions[i], picked, before, path: null, sweep: -1, lesson: -1 });
+  if (apart) enterGroup(app, app.version);
   showLegend(app);
   byId("about").textContent = app.version.about;
   byId("about").hidden = !app.version.about;
@@ -204,8 +264,9 @@ function choose(app, i) {
   byId("sweep").max = 2 * app.version.ops.length;
   byId("from").replaceChildren(...app.version.outputs.map(([name, letters]) => tag("option", { value: name }, shownName(app, name, letters))));
   if (app.version.outputs.some(([name]) => name === app.from)) byId("from").value = app.from;
+  for (const id of ["statetables", "wide"]) byId(id).hidden = !byId(id).children.length;
   const resized = room(app).height !== was; // by the words above it
-  if (resized && !app.chosen) app.view = firstView(app);
+  if (resized && !app.view.chosen) app.view = firstView(app);
   redraw(app, !app.seen || resized || Boolean(app.version.drawing));
   showCounts(app);
   makeLesson(app);
@@ -214,17 +275,21 @@ function choose(app, i) {
 
 function pick(app, node) {
   if (node === app.picked) return;
+  pickNode(app, node);
+  refresh(app);
+  keepView(app);
+}
+function pickNode(app, node) {
   Object.assign(app, { before: app.picked, picked: node, path: null });
   if (app.before >= 0) {
     const [a, b] = [Math.min(app.before, node), Math.max(app.before, node)];
     app.path = heaviest(app.version, app.partials(), a, b, 1)[0]?.nodes ?? null;
   }
-  refresh(app);
 }
 
 /** Unfold what holds a node, pick it and bring it into view. */
 function goTo(app, node) {
-  const c = app.plan.cluster[app.plan.place[app.index][node]];
+  const c = app.plan.cluster[app.plan.place[app.version.index][node]];
   if (c >= 0) {
     const column = app.plan.columnOf[c];
     if (app.view.closed.has(column)) toggle(app, "closed", column);

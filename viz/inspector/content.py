@@ -31,10 +31,11 @@ class Version:
     """One of the graphs that the page switches among, and what to see in it.
 
     about: a sentence or two.  marked: nodes in the one color of what is wrong.  steps: to be gone through one by one.
-    rows: {title: nodes} of the rows of the picture from the bottom, alike in all versions; a node that is in none
+    rows: {title: nodes} of the rows of the picture from the bottom; a node that is in none
     stands in the first. Without any, rows are the sweeps.  blamed: edges in that color.  flawed: whether the version is
     wrong.  off: the outputs in which it is; without any, all that differ.  excess: what its outputs have too much, by
-    their names, a graph of inputs of the state.
+    their names, a graph of inputs of the state.  group: versions of one share a picture, in which what computes the
+    same has the same place; rows are alike in a group.
     """
 
     name: str
@@ -47,6 +48,7 @@ class Version:
     flawed: bool = False
     off: Collection[str] = ()
     excess: Graph | None = None
+    group: str = ""
 
     def check(self) -> None:
         """Raises ValueError for a marked node, or one of a step, that is not in the graph."""

@@ -6,6 +6,7 @@ const NARROW = 820, TALLEST = 1.3; // pixels; of the window, the picture where t
 function setView(app, view) {
   app.seen = view;
   app.drawn.scene.setAttribute("transform", `translate(${view.x} ${view.y}) scale(${view.k})`);
+  legible(app);
 }
 
 /** The size of the place for the picture, in pixels; in one column it may be higher than the window. */
@@ -24,6 +25,14 @@ function fitView(app) {
   size.height = narrow ? Math.max(240, layout.height * k + 16) : size.height;
   app.svg.style.height = narrow ? `${size.height}px` : "";
   setView(app, { k, x: (size.width - layout.width * k) / 2, y: (size.height - layout.height * k) / 2 });
+}
+
+/** Zoom in on a box until its texts can be read. */
+function approach(app, at) {
+  const { width, height } = app.svg.getBoundingClientRect();
+  if (app.seen.k >= READ) return;
+  const k = READ;
+  setView(app, { k, x: width / 2 - k * (at.x + at.w / 2), y: k * at.h > height ? 12 - k * at.y : height / 2 - k * (at.y + at.h / 2) });
 }
 
 function zoom(app, factor, x, y) {
@@ -108,7 +117,7 @@ function beside(drawn, here, way) {
 /** Unfold or fold what holds the picked node. */
 function foldHere(app) {
   if (app.picked < 0) return;
-  const c = app.plan.cluster[app.plan.place[app.index][app.picked]];
+  const c = app.plan.cluster[app.plan.place[app.version.index][app.picked]];
   if (c < 0) return;
   const column = app.plan.columnOf[c];
   if (app.view.closed.has(column)) toggle(app, "closed", column); else toggle(app, "folded", c);
@@ -148,7 +157,7 @@ function listen(app) {
     },
   });
   const clicks = {
-    fold: () => detail(app, -1), unfold: () => detail(app, 1), fit: () => fitView(app), theme: switchTheme, values: () => switchValues(app),
+    fold: () => detail(app, -1), unfold: () => detail(app, 1), fit: () => fitView(app), theme: switchTheme, copylink: () => copyView(app), values: () => switchValues(app),
     back: () => stepTo(app, app.sweep - 1), on: () => stepTo(app, app.sweep + 1), nosweep: () => stepTo(app, -1),
     play: () => play(app, !app.playing), reset: () => app.state.show(app.state.frame),
   };
@@ -164,12 +173,18 @@ function listen(app) {
   byId("lessonon").onclick = () => teach(app, app.lesson + 1);
   byId("lessonstep").oninput = () => teach(app, +byId("lessonstep").value - 1);
   byId("sweep").oninput = () => stepTo(app, +byId("sweep").value);
+  byId("outline").ontoggle = () => showOutline(app);
+  addEventListener("hashchange", () => openLink(app));
   byId("from").onchange = () => { app.from = byId("from").value; refresh(app); stepTo(app, app.sweep); };
   byId("time").oninput = () => { play(app, false); app.state.show(+byId("time").value); };
   document.addEventListener("keydown", (event) => { if (pressed(app, event)) event.preventDefault(); });
-  addEventListener("beforeprint", () => byId("wide").querySelectorAll("details").forEach((each) => { each.open = true; }));
+  addEventListener("beforeprint", () => {
+    byId("wide").querySelectorAll("details").forEach((each) => { each.open = true; });
+    byId("printed").replaceChildren(tag("b", {}, "Inputs: "), inputsInWords(app));
+  });
   addEventListener("resize", () => {
-    if (!app.chosen) app.view = firstView(app); // what a person unfolded stays
+    if (app.other) return;
+    if (!app.view.chosen) app.view = firstView(app); // what a person unfolded stays
     redraw(app, true);
   });
 }
@@ -186,12 +201,15 @@ function pressed(app, event) {
     "+": () => zoom(app, 1.25, ...middle), "-": () => zoom(app, 0.8, ...middle), Enter: () => foldHere(app),
   };
   const turn = { ArrowLeft: -1, ArrowUp: -1, ArrowRight: 1, ArrowDown: 1 }[key];
-  if (turn && event.target.closest("[role=radiogroup]")) { // as radio buttons do
-    const all = app.state.versions.length;
-    choose(app, (app.index + turn + all) % all);
-    byId("versions").children[app.index].focus();
-  } else if (turn) walk(app, key);
-  else if (key >= "1" && key <= "9") choose(app, +key - 1);
+  const tabs = [...byId("versions").children], tab = tabs.indexOf(event.target);
+  if (turn && tab >= 0) {
+    const next = (tab + turn + tabs.length) % tabs.length;
+    choose(app, next);
+    keepView(app);
+    tabs[next].focus();
+  } else if (app.other && !(key >= "1" && key <= "9")) return false;
+  else if (turn) walk(app, key);
+  else if (key >= "1" && key <= "9") { choose(app, +key - 1); keepView(app); }
   else if (actions[key]) actions[key]();
   else return false;
   return true;

@@ -69,7 +69,7 @@ function lines(cx, cy, half, step) {
   return [...at(cx).map((x) => `M${x} ${-cy - half}V${-cy + half}`), ...at(cy).map((y) => `M${cx - half} ${-y}H${cx + half}`)].join("");
 }
 
-const FPS = 30;
+const FPS = globalThis.matchMedia?.("(prefers-reduced-motion: reduce)").matches ? 2 : 30; // few still pictures for who is disturbed by motion
 const PARTS = 5; // columns of a table whose numbers are painted at the joints
 
 function makeMotion(app) {

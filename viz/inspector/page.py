@@ -18,8 +18,8 @@ from .content import Motion, State, StateTable, Version
 from .record import record
 
 SCRIPTS = (
-    "state.js", "places.js", "arrange.js", "picture.js", "marks.js", "panels.js", "why/causes.js",
-    "why/why.js", "steps.js", "motion.js", "keys.js", "app.js",
+    "state.js", "picture/places.js", "picture/arrange.js", "picture/legible.js", "picture.js", "marks.js", "panels.js",
+    "why/causes.js", "why/why.js", "steps.js", "motion.js", "outline.js", "link.js", "keys.js", "app.js",
 )  # fmt: skip
 
 
@@ -39,6 +39,7 @@ def page(
     notices: Sequence[str] = (),
     panels: Sequence[Panel] = (),
     causes: StateTable | None = None,
+    view: str = "",
 ) -> Page:
     """The page on which a graph is looked at: it folds by tags, and shows values, paths, sweeps and equations.
 
@@ -76,6 +77,8 @@ def page(
     causes : StateTable, optional
         What the outputs of versions are the sums of, a column for each cause, as of `dynamics.torque_by_cause`: what
         the page answers to "why".
+    view : str
+        Name of the version that is shown first; by default the first.
 
     Returns
     -------
@@ -85,8 +88,9 @@ def page(
     Raises
     ------
     ValueError
-        For no version, two of one name, `marked` beside versions, a value for a name that is no input or is derived, a
-        number that is not finite, a marked node of another graph, or shapes that do not fit the motion.
+        For no version, two of one name, a view that is none, `marked` beside versions, a value for a name that is no
+        input or is derived, a number that is not finite, a marked node of another graph, or shapes that do not fit
+        the motion.
 
     Examples
     --------
@@ -118,8 +122,10 @@ def page(
         motion.check()
     if names is None:
         names = {name: text for version in versions for name, text in remarks_of(version.graph).names.items()}
+    if view and all(version.name != view for version in versions):
+        raise ValueError(f"view must be one of the versions, got {view!r}: {[version.name for version in versions]}")
     introduction = "" if isinstance(graph, Graph) else about
-    data: dict[str, Json] = {"title": title, "introduction": introduction, "notices": list(notices)}
+    data: dict[str, Json] = {"title": title, "introduction": introduction, "notices": list(notices), "view": view}
     if not isinstance(causes, StateTable | None):
         raise TypeError(f"causes must be a StateTable, got {type(causes).__name__}: {causes!r:.60}")
     live = [table for table in tables if isinstance(table, StateTable)]
@@ -146,10 +152,11 @@ def compose(title: str, data: Mapping[str, Json] | None, tables: Sequence[Table]
         tables="".join([table.html() for table in tables]),
         version=f"cgraph {__version__}",
         panels="".join([panel.body for panel in panels]),
+        end="\n".join([panel.end for panel in panels if panel.end]),
     )
     return html.compose(
         title,
-        "\n".join([body, *[panel.end for panel in panels if panel.end]]),
+        body,
         f"{_colors()}{asset(__package__, 'page.css')}{''.join([panel.style for panel in panels])}",
         f'"use strict";\n{scripts()}\n{added}\nconst inspector = start({first});{begin}',
         {"data": data} | {name: each for panel in panels for name, each in panel.data.items()},

@@ -141,6 +141,12 @@ function showInputs(app) {
   byId("reset").hidden = byId("edited").hidden = !app.state.edited;
 }
 
+/** The state as one line. */
+function inputsInWords(app) {
+  const { state } = app, unit = (name) => (app.units.has(name) ? ` ${app.units.get(name)}` : "");
+  return `${state.names.map((name) => `${shownName(app, name)} = ${brief(state.get(name))}${unit(name)}`).join(", ")}.`;
+}
+
 function showCounts(app) {
   const { version } = app;
   const rows = app.state.versions.map((each) => tag("tr", {}, rowHead(each.name),
@@ -163,7 +169,7 @@ function showLegend(app) {
 const OFF = 0.01; // relative: what differs by more from the right version is marked
 const FITTING = 3; // columns of numbers for which there is room beside the picture
 
-const namedHead = (words, ...unit) => tag("th", { scope: "row", class: words.length > 16 ? "long" : "" }, words, ...unit);
+const namedHead = (words, ...unit) => tag("th", { scope: "row" }, words, ...unit);
 const largestOf = (values) => values.reduce((most, value) => (Number.isFinite(value) ? Math.max(most, Math.abs(value)) : most), 0);
 
 /** A table with a row for each name and a column for each head: its element, and its cells by row and column. */
@@ -178,9 +184,9 @@ function write(cell, text, kind = "") {
 }
 
 function makeResults(app) {
-  const { versions, tables } = app.state;
+  const { tables } = app.state, versions = app.compared = alike(app.state.versions, app.version);
   app.names = [...new Map(versions.flatMap((each) => each.outputs.map(([name, letters]) => [name, shownName(app, name, letters)])))];
-  app.right = versions.findLastIndex((each) => !each.flawed && versions.some((other) => other.flawed));
+  app.right = versions.findIndex((each) => !each.flawed && versions.some((other) => other.flawed));
   const [shown, cells] = numbers(app, versions.map((each) => each.name), app.names);
   app.cells = cells;
   byId("results").replaceChildren(tag("p", { id: "now" }), shown, ...(app.right < 0 ? []
@@ -210,8 +216,8 @@ function showTable(app, each) {
 
 /** Results of all versions at the one state, and what differs from the version that is right. */
 function showResults(app) {
-  const found = app.state.versions.map((each, i) => {
-    const own = i === app.index ? app.values : app.state.evaluate(each), noise = noiseIn(app, each, own);
+  const found = app.compared.map((each) => {
+    const own = each === app.version ? app.values : app.state.evaluate(each), noise = noiseIn(app, each, own);
     return new Map(each.outputs.map(([name, , node]) => [name, [own[node], noise[node]]]));
   });
   app.names.forEach(([name], row) => found.forEach((each, column) => {
@@ -220,7 +226,7 @@ function showResults(app) {
     const off = wrongIn(each, name) && Math.abs(value - truth) > noise + blur + OFF * Math.max(Math.abs(value), Math.abs(truth));
     write(app.cells[row][column], brief(value, noise), off ? "off" : "");
   }));
-  tellNow(app, app.state.versions, found);
+  tellNow(app, app.compared, found);
   for (const each of app.state.tables) {
     const values = app.state.evaluate(each), noise = noiseIn(app, each, values);
     each.rows.forEach(([, outputs], row) => outputs.forEach((out, column) => {

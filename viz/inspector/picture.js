@@ -22,8 +22,9 @@ function caption(version, node) {
 function draw(svg, record, plan, version, view) {
   svg.replaceChildren();
   const scene = element("g", { id: "scene" }, svg);
-  const frames = element("g", {}, scene), lines = element("g", { class: "lines" }, scene), shapes = element("g", {}, scene);
-  const canvas = { record, plan, version, view, frames, lines, shapes, items: new Map(), shownBy: [], called: new Map(record.called) };
+  const frames = element("g", {}, scene), lines = element("g", { class: "lines" }, scene);
+  const titles = element("g", { class: "titles" }, scene), shapes = element("g", {}, scene); // no line goes through a title
+  const canvas = { record, plan, version, view, frames, lines, titles, shapes, names: [], items: new Map(), shownBy: [], called: new Map(record.called) };
   const own = version.drawing && !view.folded.size && !view.closed.size ? version.drawing : null;
   const layout = own ? asLayout(own, version) : arrange(plan, view, version.index);
   canvas.layout = layout;
@@ -35,7 +36,7 @@ function draw(svg, record, plan, version, view) {
   drawNodes(canvas);
   drawOutputs(canvas);
   const arrows = drawArrows(canvas, own);
-  return { items: canvas.items, shownBy: canvas.shownBy, arrows, layout, scene };
+  return { items: canvas.items, shownBy: canvas.shownBy, names: canvas.names, arrows, layout, scene };
 }
 
 /** A drawing as boxes: of every node that is no constant, and of the outputs. */
@@ -48,7 +49,7 @@ function asLayout(drawing, version) {
   return { nodes, outputs, width: drawing.width, height: drawing.height, bundles: new Map() };
 }
 
-function drawTitles({ plan, layout, frames, version }) {
+function drawTitles({ plan, layout, frames, titles, names, version }) {
   const here = new Set(version.ops.map((_, node) => clusterOf(plan, version, node)).filter((c) => c >= 0));
   const used = new Set([...here].map((c) => plan.clusters[c].column)), rows = new Set([...here].map((c) => `${plan.columnOf[c]} ${plan.clusters[c].stage}`));
   for (const each of layout.titles) {
@@ -57,13 +58,14 @@ function drawTitles({ plan, layout, frames, version }) {
     const group = element("g", { class: "column", "data-column": each.column, tabindex: -1, role: "button" }, frames);
     group.setAttribute("aria-label", `fold ${name || "no tag"} to one box`);
     element("rect", { x: each.x - 6, y: each.y, width: each.w + 12, height: each.h, rx: 8 }, group);
-    const words = element("text", { class: "column-title", x: each.x + each.w / 2, y: each.y + 17 }, group);
+    const words = element("text", { class: "column-title", x: each.x + each.w / 2, y: each.y + 17 }, titles);
     words.textContent = fitted(name || "no tag", each.w / 8);
+    names.push({ text: words, name: name || "no tag", width: each.w, size: 13 });
     element("title", {}, group).textContent = name;
   }
   for (const each of layout.titles) {
     const { stage, x, y } = each; // an empty row is not named
-    if (each.columns?.some((column) => rows.has(`${column} ${stage}`))) element("text", { class: "stage", x, y }, frames).textContent = stage;
+    if (each.columns?.some((column) => rows.has(`${column} ${stage}`))) element("text", { class: "stage", x, y }, titles).textContent = stage;
   }
 }
 
@@ -85,6 +87,7 @@ function drawBodies(canvas) {
     item.group.setAttribute("data-column", column);
     item.group.setAttribute("aria-label", `${name}, ${counted(nodes.length, "node")}${wrong ? `, ${wrong} spurious` : ""}, folded`);
     element("title", {}, item.group).textContent = name;
+    canvas.names.push({ text: item.label, name, width: at.w - 8, size: 13 });
     share(item.group, at, nodes.map((node) => roleOf(version, node)));
     keep(canvas, `b${column}`, item, nodes, second);
   }
@@ -177,6 +180,7 @@ function drawBundles(canvas, side, leaves) {
     const item = shape(shapes, `k${key}`, at, side === "i" ? "box input" : off ? "box output off" : "box output", `▸ ${kind}: ${counted(own.length, side === "i" ? "input" : "output")}`, "");
     item.group.setAttribute("data-bundle", key);
     item.group.setAttribute("aria-label", `${kind}, ${own.length}, folded${off ? ", wrong" : ""}`);
+    canvas.names.push({ text: item.label, name: item.label.textContent, width: at.w - 8, size: 10 });
     const nodes = own.map((name) => node.get(name));
     if (side === "i") keep(canvas, `k${key}`, item, nodes, "");
     else {
@@ -209,7 +213,7 @@ function shape(parent, id, at, kind, words, second, round = false) {
   label.textContent = words;
   const value = element("text", { class: "value", x: at.x + at.w / 2, y: at.y + (tall ? 34 : at.h - 4) }, group);
   value.textContent = second;
-  return { group, value, at };
+  return { group, label, value, at };
 }
 
 function drawArrows({ version, items, shownBy, lines, layout }, drawing) {

@@ -5,16 +5,17 @@
     called, units         [[name in a graph: what a person calls it, or its unit]]
     inputs, rows          names of the state's values, and these at every instant of the motion (one without a motion)
     derived               null, or a graph that computes other inputs of versions from the state
-    stages                titles of the rows of the picture, from the bottom; [] leaves them to the page, by sweep
     columns               [[tag, tag of its parent or null]] in the order of the picture; [] leaves it to the page
-    versions              [{name, about, labels, label, marked, blamed, flawed, off, excess, steps, drawing} and a
+    versions              [{name, group, about, labels, label, stages, marked, blamed, flawed, off, excess, steps,
+                          drawing} and a
                           graph], see below
     tables                [{caption, header, rows: [[name, [numbers of nodes]]]} and a graph]: they follow the state
     causes                null, or such a table: parts of outputs that add up to them, a column for each cause
     motion                null, or {t, points: null or [[[x, y]]], parents, joints, turns, places: null or a graph}
 
 A graph is that of `graph_data`, with outputs [[name, letters, number of a node]], and with names, {number of a node:
-[name, letters]}. labels are the [tags, role, row] that occur, label which of them a node
+[name, letters]}. Versions of one group share a picture. stages are titles of its rows, from the bottom; [] leaves them
+to the page, by sweep. labels are the [tags, role, row] that occur, label which of them a node
 has, marked the nodes in the color of what is wrong, blamed the edges [source, target] in it, flawed whether the version
 is wrong, off the names of the outputs in which it is, excess null or a graph of what its outputs have too much, steps
 [{words, nodes, value, joint}]. Where nodes stand is the page's business, but for a `drawing`.
@@ -61,9 +62,12 @@ def record(
     known = {each.name for graph in graphs for each in (*graph.inputs, *graph.nodes) if each.name}
     known |= {name for graph in graphs for name in graph.outputs} | set(inputs)
     letters = _letters(names or {})
-    drawings = _drawings(graphs, letters)
     for version in versions:
         version.check()
+    drawings = dict[str, dict[str, Json] | None]()
+    for own in _groups(versions):
+        found = _drawings([version.graph for version in own], letters)
+        drawings |= dict(zip([version.name for version in own], found, strict=True))
     for table in (*tables, *([causes] if causes else [])):
         table.check(inputs)
     return {
@@ -72,24 +76,23 @@ def record(
         "inputs": inputs,
         "rows": state.rows(inputs, len(motion.t) if motion else 1).tolist(),
         "derived": None if state.derived is None else _graph(state.derived, letters),
-        "stages": _stages(versions),
         "columns": [[tag, parent] for tag, parent in (columns or {}).items()],
-        "versions": [
-            _version(version, letters) | {"drawing": drawing}
-            for version, drawing in zip(versions, drawings, strict=True)
-        ],
+        "versions": [_version(version, letters) | {"drawing": drawings[version.name]} for version in versions],
         "tables": [_table(table, letters) for table in tables],
         "causes": None if causes is None else _table(causes, letters),
         "motion": None if motion is None else _motion(motion, letters),
     }
 
 
-def _stages(versions: Sequence[Version]) -> list[str]:
-    """Titles of the rows of the versions."""
-    titles = {tuple(version.rows) for version in versions}
-    if len(titles) > 1:
-        raise ValueError(f"all versions need the same rows, got {sorted(map(list, titles))}")
-    return list(*titles)
+def _groups(versions: Sequence[Version]) -> list[list[Version]]:
+    """The versions by group, whose rows have the same titles."""
+    groups: dict[str, list[Version]] = {}
+    for version in versions:
+        groups.setdefault(version.group, []).append(version)
+    for own in groups.values():
+        if len(titles := {tuple(version.rows) for version in own}) > 1:
+            raise ValueError(f"all versions of a group need the same rows, got {sorted(map(list, titles))}")
+    return list(groups.values())
 
 
 def _motion(motion: Motion, letters: Letters) -> dict[str, Json]:
@@ -135,7 +138,9 @@ def _version(version: Version, letters: Letters) -> dict[str, Json]:
     marked, number = set(version.marked), {node: i for i, node in enumerate(version.graph.nodes)}
     return {
         "name": version.name,
+        "group": version.group,
         "about": version.about,
+        "stages": list(version.rows),
         **_graph(version.graph, letters),
         "label": label,
         "labels": [[list(tags), *rest] for tags, *rest in labels],

@@ -43,11 +43,12 @@ const KINDS = /^(qdd|qd|q|tau|lambda|p)\d+(_old|_dot)?$/; // of inputs and outpu
 
 /** The state of a record, and its graphs made ready.  told: called whenever a value has changed. */
 function makeState(record, told = () => {}) {
-  const versions = record.versions.map((each, index) => ({ ...prepare(each), index })), tables = (record.tables ?? []).map(prepare);
+  const groups = record.versions.map(({ group }) => group ?? "");
+  const versions = record.versions.map((each, i) => ({ ...prepare(each), at: i, group: groups[i], index: groups.slice(0, i).filter((own) => own === groups[i]).length })), tables = (record.tables ?? []).map(prepare);
   const causes = record.causes ? prepare(record.causes) : null;
   const derived = record.derived ? prepare(record.derived) : null;
   const called = new Map(record.called), meant = new Map(record.called.map(([name, text]) => [text, name]));
-  const solved = record.inputs.some((name) => KINDS.exec(name)?.[1] === "qdd");
+  const solved = (graph) => graph.inputs.some(([name]) => KINDS.exec(name)?.[1] === "qdd");
   let frame = 0, edited = false, values = null;
 
   /** All values by name, derived ones too. */
@@ -60,7 +61,7 @@ function makeState(record, told = () => {}) {
   /** Errors of a graph's inputs. A state with accelerations was solved for: errors of one kind are those of the largest,
    * times their number, as of a linear system that is solved with rounding. Any other state is as it stands. */
   function errorsOf(graph) {
-    if (!solved) return graph.inputs.map(([name]) => ROUNDING * Math.abs(values.get(name)));
+    if (!solved(graph)) return graph.inputs.map(([name]) => ROUNDING * Math.abs(values.get(name)));
     const grown = edited || !frame ? 1 : GROWN, most = new Map(), kind = (name) => KINDS.exec(name)?.[1] ?? name;
     for (const [name, value] of values) {
       const [largest, many] = most.get(kind(name)) ?? [0, 0];
@@ -98,6 +99,7 @@ function makeState(record, told = () => {}) {
     get frame() { return frame; },
     get edited() { return edited; },
     get: (name) => values.get(name),
+    changed: () => Object.fromEntries(atFrame().flatMap(([name, value]) => (values.get(name) === value ? [] : [[name, values.get(name)]]))),
     values: () => Object.fromEntries(values),
     evaluate: (graph) => graph.run(rowOf(graph)).slice(),
   };

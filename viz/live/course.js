@@ -1,7 +1,14 @@
 // The picture of a system without places: its coordinates over time, from where it was set, and where it is now.
 
 const COURSES = 6; // coordinates in the picture
-const SQUARE = 300, EDGE = 36; // of the picture, and left free for its numbers
+const WIDE = 400, HIGH = 300, EDGE = { left: 58, right: 12, top: 10, bottom: 26 }; // of the picture, and left free for its numbers
+
+/** Round numbers in a range, some four or five of them. */
+function courseTicks(low, high) {
+  const power = 10 ** Math.floor(Math.log10((high - low) / 2)), step = [5, 2, 1].map((each) => each * power).find((each) => (high - low) / each >= 2.9) ?? power;
+  const first = Math.ceil(low / step - 1e-9), many = Math.min(12, Math.floor(high / step + 1e-9) - first + 1);
+  return Array.from({ length: Math.max(0, many) }, (_, k) => (first + k) * step);
+}
 
 /** Draws the coordinates over the time to come, by the steps and thin by much shorter ones. */
 function liveCourse(svg, words, machine, data, state) {
@@ -13,8 +20,10 @@ function liveCourse(svg, words, machine, data, state) {
   const thin = indices.map(() => shape("path", { class: "live-reference live-line" }));
   const thick = indices.map((i) => shape("path", { class: `live-course live-course-${i} live-line` }));
   const dots = indices.map((i) => shape("circle", { class: `live-joint live-course-${i}`, r: 4 }));
-  const texts = ["start", "start", "start", "end"].map((anchor) => shape("text", { class: "live-number", "text-anchor": anchor }));
-  svg.setAttribute("viewBox", `0 0 ${SQUARE} ${SQUARE}`);
+  const axes = shape("g", { class: "live-axes" });
+  svg.prepend(axes);
+  svg.setAttribute("viewBox", `0 0 ${WIDE} ${HIGH}`);
+  svg.classList.add("live-plot");
   svg.setAttribute("aria-label", "coordinates over time, and thin in green the same with much shorter steps");
   words.classList.add("live-legend");
   const rest = positions - indices.length;
@@ -32,26 +41,30 @@ function liveCourse(svg, words, machine, data, state) {
     const values = rows.fine.flatMap((row) => indices.map((i) => row.state[i])).filter(Number.isFinite);
     let low = Math.min(...values), high = Math.max(...values);
     if (!(high > low)) [low, high] = [(low || 0) - 1, (high || 0) + 1];
-    const inner = SQUARE - 2 * EDGE;
-    across = (time) => (SQUARE * time) / end;
-    up = (value) => SQUARE - EDGE - (inner * (value - low)) / (high - low);
+    const right = WIDE - EDGE.right, foot = HIGH - EDGE.bottom;
+    across = (time) => EDGE.left + ((right - EDGE.left) * time) / end;
+    up = (value) => foot - ((foot - EDGE.top) * (value - low)) / (high - low);
     const line = (i, of) => rows[of].map(({ time, state: at }) => [across(time), up(at[i])])
       .filter(([, y]) => Math.abs(y) < 1e4).map(([x, y]) => `${x.toFixed(2)} ${y.toFixed(2)}`);
     const path = (points) => (points.length > 1 ? `M${points.join("L")}` : "");
     indices.forEach((i) => { thick[i].setAttribute("d", path(line(i, "run"))); thin[i].setAttribute("d", path(line(i, "fine"))); });
-    zero.setAttribute("d", low < 0 && high > 0 ? `M0 ${up(0).toFixed(2)}H${SQUARE}` : "");
-    const numbers = [[3, EDGE - 8, high], [3, SQUARE - EDGE + 15, low], [3, SQUARE - 4, from], [SQUARE - 3, SQUARE - 4, from + end]];
-    numbers.forEach(([x, y, value], k) => {
-      texts[k].setAttribute("x", x);
-      texts[k].setAttribute("y", y);
-      texts[k].textContent = k < 2 ? liveNumber(value) : `${liveNumber(value)} s`;
-    });
+    zero.setAttribute("d", low < 0 && high > 0 ? `M${EDGE.left} ${up(0).toFixed(2)}H${right}` : "");
+    axes.replaceChildren(
+      drawn("path", { class: "live-rule", d: `M${EDGE.left} ${EDGE.top}V${foot}H${right}` }),
+      ...courseTicks(low, high).flatMap((value) => mark(value, `M${EDGE.left - 4} ${up(value)}h4`, EDGE.left - 7, up(value) + 4, "end", "")),
+      ...courseTicks(from, from + end).flatMap((time) => mark(time, `M${across(time - from)} ${foot}v4`, across(time - from), HIGH - 7, "middle", " s")),
+    );
+  }
+  /** A tick of an axis and its number. */
+  function mark(value, d, x, y, anchor, unit) {
+    const text = drawn("text", { class: "live-number", "text-anchor": anchor, x, y }, `${liveNumber(value)}${unit}`);
+    return [drawn("path", { class: "live-rule", d }), text];
   }
   /** The picture now; `anew` after something was set. */
   function draw(anew) {
     if (anew || !end || state.time < from || state.time > from + end) look();
     const x = across(state.time - from).toFixed(2);
-    now.setAttribute("d", `M${x} ${EDGE}V${SQUARE - EDGE}`);
+    now.setAttribute("d", `M${x} ${EDGE.top}V${HIGH - EDGE.bottom}`);
     dots.forEach((dot, i) => {
       const y = up(machine.run[i]), seen = Math.abs(y) < 1e4;
       dot.setAttribute("visibility", seen ? "visible" : "hidden");

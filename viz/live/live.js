@@ -14,6 +14,7 @@ async function startLive() {
   const motion = liveRun(machine, data);
   const { state } = motion;
   let playing = false, last = 0;
+  const still = matchMedia("(prefers-reduced-motion: reduce)").matches ? 500 : 0; // ms between pictures, for who is disturbed by motion
   const strip = [];
   const controls = [];
 
@@ -38,7 +39,7 @@ async function startLive() {
     const groups = new Map();
     for (const [group, row] of all) groups.set(group, [...(groups.get(group) ?? []), row]);
     for (const [group, rows] of groups) {
-      $(id).append(tag("details", rows.length <= 8 ? { open: "" } : {}, tag("summary", {}, group), ...inside(rows)));
+      $(id).append(tag("details", rows.length <= 8 ? { open: "" } : {}, tag("summary", {}, group), ...inside(rows, group)));
     }
   }
   grouped("controls", data.inputs.flatMap((input, i) => (i === data.time ? [] : [[input.group, control(i, input)]])));
@@ -58,10 +59,12 @@ async function startLive() {
 
   // The link
 
-  const keep = () => keepPart("live", motion.link());
+  let known; // what the address says of it
+  const keep = () => { known = motion.link(); keepPart("live", known); };
   function read() {
     const part = linkPart("live");
-    if (part === undefined) return;
+    if (part === undefined || part === known) return;
+    known = part;
     $("said").textContent = motion.open(part) ? "" : "The link has no state that could be read.";
     strip.length = 0;
     anew = true;
@@ -132,7 +135,8 @@ async function startLive() {
   const cells = data.meters.map(({ called }) => tag("td", { "data-meter": called }));
   grouped("meters", data.meters.map(({ called, unit, group }, k) => (
     [group, tag("tr", {}, tag("th", { scope: "row" }, called), cells[k], tag("td", {}, unit))]
-  )), (rows) => [tag("table", {}, tag("tbody", {}, ...rows))]);
+  )), (rows, group) => [...(data.notes[group] ? [tag("p", { class: "live-quiet" }, data.notes[group])] : []), tag("table", {}, tag("tbody", {}, ...rows))]);
+  for (const id of ["strip", "energies", "drift-row"]) $(id).toggleAttribute("hidden", data.energy < 0);
   const unitOf = (i) => data.inputs[i].unit;
   function error(id, { index, most, share }) {
     $(`${id}-bar`).value = share > 0 ? Math.min(1, Math.max(0, (Math.log10(share) + 12) / 12)) : share === 0 ? 0 : 1;
@@ -141,7 +145,7 @@ async function startLive() {
   }
   function show() {
     const now = motion.now();
-    cells.forEach((cell, k) => { cell.textContent = liveNumber(now.values[k]); });
+    cells.forEach((cell, k) => { cell.textContent = liveNumber(now.meters[k]); });
     error("ahead", now.ahead);
     error("since", now.since);
     $("horizon").textContent = `${liveNumber(now.ahead.seconds)} s ahead`;
@@ -153,7 +157,7 @@ async function startLive() {
     if (document.activeElement !== $("dt")) $("dt").value = Math.log10(state.dt);
     if (document.activeElement !== $("dt-field")) $("dt-field").value = state.dt;
     draw(now);
-    drawStrip(now.values);
+    if (data.energy >= 0) drawStrip(now.values);
     if (!now.finite && playing) {
       play(false);
       $("said").textContent = `The motion has left the numbers: dt = ${liveNumber(state.dt)} s is too long for it, or a mass is 0. Reset it.`;
@@ -165,8 +169,10 @@ async function startLive() {
 
   function frame(time) {
     if (!playing) return;
-    if (motion.advance(Math.min(0.1, (time - last) / 1000))) show();
-    last = time;
+    if (time - last >= still) {
+      if (motion.advance(Math.min(Math.max(0.1, still / 1000), (time - last) / 1000))) show();
+      last = time;
+    }
     requestAnimationFrame(frame);
   }
   function play(on) {

@@ -24,7 +24,7 @@ GROUPS = (
     ("p", "momenta"),
     ("tau", "torques"),
 )  # of inputs, by the start of their names
-ENERGIES = 3  # the meters that the strip shows
+ENERGY, ENERGIES = "energy", 3  # the group of the meters that the strip shows, and how many these are
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +34,8 @@ class Live:
     rate: the state equation, whose first inputs are the state, and output k the rate of input k.
     start: a value of every input.  dt: the step at first [s].  methods: those of `dynamics.integrators.TABLEAUS`.
     shown: over the same inputs, an output for each meter, then x and y of each point [m].
-    meters: name, unit and group, the first three kinetic, potential and total energy.
+    meters: name, unit and group, the first three kinetic, potential and total energy, or none of group "energy".
+    notes: {group of meters: a sentence on what they are}.
     parents: of each point the earlier one that it hangs on, or -1.
     scales: {input: how far its slider reaches to both sides of 0}, by default three times the value, or 1.
     names, units: {input: what a person calls it, and its unit}.
@@ -52,6 +53,7 @@ class Live:
     methods: Mapping[str, Any] = field(default_factory=dict)
     names: Mapping[str, str] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
+    notes: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         for name in self.rate.input_names:
@@ -68,7 +70,8 @@ class Live:
             "time": self.rate.input_names.index(TIME) if TIME in self.rate.input_names else -1,
             "inputs": [self._input(name, self.names.get(name, name)) for name in self.rate.input_names],
             "meters": [{"called": name, "unit": unit, "group": group} for name, unit, group in self.meters],
-            "energy": ENERGIES - 1,
+            "energy": ENERGIES - 1 if any(group == ENERGY for _, _, group in self.meters) else -1,
+            "notes": dict(self.notes),
             "parents": list(self.parents),
             "methods": list(self.methods),
             "dt": float(self.dt),
@@ -90,15 +93,15 @@ SCRIPTS = ("machine.js", "run.js", "course.js", "live.js")
 EVALUATION = "'wasm-unsafe-eval'"  # in the policy: WebAssembly may be compiled, text may not
 
 
-def panel(live: Live) -> Panel:
+def panel(live: Live, begin: str = "startLive();") -> Panel:
     """The panel of a live motion, for a page whose style has --text, --back, --soft and --edge.
 
-    The page's scripts need elements.js and address.js.
+    The page's scripts need elements.js and address.js.  begin: JavaScript that begins it, or says when to.
     """
     colors = {"kinetic": theme.BLUE, "potential": theme.ORANGE, "right": theme.GREEN, "wrong": theme.SPURIOUS}
     variables = ":root{" + "".join(f"--live-{name}:{color};" for name, color in colors.items()) + "}\n"
     dark = f"@media (prefers-color-scheme: dark){{:root{{--live-kinetic:{theme.SKY_BLUE};}}}}\n"
-    script = f"{{\n{asset(__package__, *SCRIPTS)}\nstartLive();\n}}"  # in a block it shares no name with a page's
+    script = f"{{\n{asset(__package__, *SCRIPTS)}\n{begin}\n}}"  # in a block it shares no name with a page's
     style = f"{variables}{dark}{asset(__package__, 'live.css')}"
     return Panel(
         asset(__package__, "live.html"), style, run=script, allowed=EVALUATION, data={"live-data": live.to_dict()}

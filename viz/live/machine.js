@@ -3,6 +3,7 @@
 const FINER = 4, FINEST = 500; // steps of the reference beside one: a limit, so that any dt is answered within a frame
 const HORIZON = 1500; // steps at most that the error ahead takes
 const COURSE = 300; // first steps that the picture of coordinates over time holds
+const LOOKS = 40; // states at which the size of a group of meters is looked at
 const OTHERS = 1e-6; // of the largest state of its group, below which one counts as no smaller: it may be rounding
 
 const decoded = (base64) => Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
@@ -65,6 +66,21 @@ function liveMachine(data, instances) {
     return { ...apart(ahead, beside), seconds: count * dt };
   }
 
+  /** The largest value of every group of meters on the way from here. */
+  function sizesAhead(method, dt) {
+    const found = new Map(), h = Math.max(dt, data.dt), steps = Math.max(1, Math.round((COURSE * data.dt) / h / LOOKS));
+    ahead.set(run);
+    for (let k = 0; k < LOOKS; k++) {
+      larger(found, look(ahead));
+      step(ahead, method, h, steps);
+    }
+    return found;
+  }
+  /** Have the sizes of groups no smaller than these values. */
+  function larger(found, values) {
+    data.meters.forEach(({ group }, k) => { if (Number.isFinite(values[k])) found.set(group, Math.max(found.get(group) ?? 0, Math.abs(values[k]))); });
+  }
+
   /** Both runs from here on, rows of a time and a state; the steps are no shorter than a picture needs. */
   function course(method, dt) {
     const h = Math.max(dt, data.dt), k = finer(h);
@@ -85,5 +101,5 @@ function liveMachine(data, instances) {
     return rows;
   }
 
-  return { run, fine, step, finer, look, apart, forget, errorAhead, course };
+  return { run, fine, step, finer, look, apart, forget, errorAhead, sizesAhead, larger, course };
 }

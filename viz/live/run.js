@@ -1,11 +1,13 @@
 // A motion that is computed as it is watched: its clock, its step, what is set, and its state as a text for a link.
 
 const MOST_STEPS = 4000; // in a frame, of both runs together: what is left is slower than real time
+const NOTHING = 1e-14; // of the largest meter of its group on the way, below which one is shown as 0
 const AHEAD = 0.25; // s that the error ahead looks at
 
 /** A run of a machine. */
 function liveRun(machine, data) {
   const index = new Map(data.inputs.map(({ name }, i) => [name, i]));
+  let sizes = new Map();
   const state = { dt: data.dt, method: "rk4", time: 0, owed: 0, slow: false };
 
   function reset() {
@@ -17,6 +19,7 @@ function liveRun(machine, data) {
   function together() {
     machine.fine.set(machine.run);
     machine.forget();
+    sizes = machine.sizesAhead(state.method, state.dt);
   }
   /** An input gets a value: of a state the reference starts anew, of a parameter both have it. */
   function set(i, value) {
@@ -45,9 +48,10 @@ function liveRun(machine, data) {
   /** What is shown now, and the errors. */
   function now() {
     const values = machine.look(machine.run), reference = machine.look(machine.fine);
+    machine.larger(sizes, values);
     return {
-      values, reference, since: machine.apart(machine.run, machine.fine),
-      ahead: machine.errorAhead(state.method, state.dt, AHEAD), energyOff: values[data.energy] - reference[data.energy],
+      values, reference, meters: data.meters.map(({ group }, k) => (Math.abs(values[k]) < NOTHING * sizes.get(group) ? 0 : values[k])), since: machine.apart(machine.run, machine.fine),
+      ahead: machine.errorAhead(state.method, state.dt, AHEAD), energyOff: data.energy < 0 ? 0 : values[data.energy] - reference[data.energy],
       finite: machine.run.subarray(0, data.states).every(Number.isFinite),
     };
   }

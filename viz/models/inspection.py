@@ -11,10 +11,9 @@ import numpy as np
 import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import PRIMAL, TANGENT, Array, counted, real_number, topological
-from dynamics.equations.equations_of_motion import forward_dynamics
+from dynamics.equations.equations_of_motion import forward_dynamics, momentum
 from dynamics.equations.formulations.formulations import inverse_dynamics
 from dynamics.equations.formulations.verdict import formulation_verdict
-from dynamics.equations.momentum.hamiltonian import velocities
 from dynamics.equations.momentum.legendre import is_quadratic
 from dynamics.equations.state_equation import state_equation
 from dynamics.equations.torque_parts.torque_decomposition import torque_by_link
@@ -30,6 +29,7 @@ from dynamics.systems.system import System
 from .. import theme
 from ..inspector import Motion, StateTable, Step, Version
 from ..pages.document import Table
+from ..pages.formulation_table import TITLES
 from ..paper.both_forms import HAMILTON, LAGRANGE, VELOCITIES_ALONE, both_forms, form_sizes
 from .node_classes import (
     ACCELERATIONS,
@@ -43,7 +43,10 @@ from .node_classes import (
     formulation_classes,
 )
 
-FORMULATIONS = ("by_definition", "kinetic_only", "chain_rule")  # those of the paper, the flawed ones first
+# Those of the paper, the flawed ones first, in one picture; and equations by velocities, which may be the smallest.
+PAPER = ("by_definition", "kinetic_only", "chain_rule")
+FORMULATIONS = (*PAPER, "newton_euler")
+INVERSE, FORWARD, MOMENTUM = "inverse dynamics", "forward dynamics", "momentum"  # groups of versions
 FRAMES, RATE = 150, 30.0  # most instants shown, and how many a second
 # Rows of the picture by classes of both forms. Of what is solved for, the way back out is a row above the way in.
 INWARD, OUTWARD, TOP = "eliminated", "back out", "rates"
@@ -56,13 +59,16 @@ DT = 1e-3  # s, the step that the embedded formulations take
 
 @dataclass(frozen=True)
 class Inspection:
-    """versions: {name: the equations}.  motion: its instants, and joints where the model has places.
+    """versions: {name: the equations}, formulations by their names in `dynamics.FORMULATIONS`.
+    motion: its instants, and joints where the model has places.
 
-    at: {input: (T,) or a number}, the one state of all versions.  derived: the inputs of embedded formulations from it,
-    q0_old = q0 - dt q_dot0 and qd0_old = qd0 - dt qdd0; None where there are none.
+    at: {input: (T,) or a number}, the one state of all versions.  derived: what follows from it, the inputs of embedded
+    formulations, q0_old = q0 - dt q_dot0 and qd0_old = qd0 - dt qdd0, and momenta p0 = dL/dqd0; None where nothing
+    does.
     shares: what each partial Lagrangian takes of the torques, None for one part.  carried: see `carried`.
     stopped: why the motion ends before its time, empty where it does not.
     units: {name in the graphs: unit}, where they are known.  causes: what adds up to the torques.
+    lacking: why there are no equations in momenta.
     """
 
     versions: Mapping[str, Version]
@@ -74,32 +80,23 @@ class Inspection:
     stopped: str = ""
     units: Mapping[str, str] = field(default_factory=dict)
     causes: StateTable | None = None
+    lacking: str = ""
 
 
 def inspection(
-    scene: Scene,
-    *,
-    forward: bool = False,
-    momentum: bool = False,
-    t_end: float | None = None,
-    say: Callable[[str], None] = lambda line: None,
+    scene: Scene, *, t_end: float | None = None, say: Callable[[str], None] = lambda line: None
 ) -> Inspection:
-    """The scene's inverse dynamics by the three formulations, along its free motion.
+    """All equations of a scene along its free motion: inverse dynamics by the formulations, forward dynamics, momenta.
 
-    forward: its forward dynamics in place of them.  momentum: Hamilton's equations and the state equation.
     Of an OdeSystem it is the state equation.  say: told of each stage before it begins.
 
-    Raises ValueError for t_end out of range or both, and as `simulate` and `hamilton_equations` do.
+    Raises ValueError for t_end out of range, and as `simulate` does.
     """
-    if forward and momentum:
-        raise ValueError("forward and momentum exclude one another: a page shows one of them")
     end = scene.t_end if t_end is None else real_number("t_end", t_end)
     if not 0.0 < end < np.inf:
         raise ValueError(f"t_end must be positive and finite, got {end!r} s")
     frames = int(min(FRAMES, max(2.0, RATE * end))) if np.isfinite(end) else 2
     times = np.linspace(0.0, end, frames) if end > 0.0 else None
-    if momentum:
-        return _hamilton(scene, end, times, say)
     if scene.ode is not None:
         return _first_order(scene, end, times)
     system = scene.system
@@ -108,27 +105,33 @@ def inspection(
     run = simulate(system, scene.q, scene.qd, end, "dopri5", rtol=1e-6, t_eval=times)
     say(f"{scene.name}: deriving forward dynamics")
     rate = forward_dynamics(system)
-    state = _named(q=run.q, qd=run.qd, tau=np.zeros_like(run.qd)) | system.parameters | {"t": run.t}
-    derived = shares = None
-    if forward:
-        about = "Accelerations from torques: solved joint by joint from the tip to the base, then back out to the tip."
-        about += " With them come the forces that hold the constraints." if system.constraints else ""
-        steps = elimination(rate, display_names(scene))
-        versions = {"forward dynamics": Version("forward dynamics", rate, about, steps=steps)}
-    else:
-        found = rate.evaluate({name: state[name] for name in rate.input_names})
-        qdd = np.stack([np.broadcast_to(found[f"qdd{i}"], len(run.t)) for i in range(system.n)], axis=1)
-        if not np.isfinite(qdd).all():
-            raise ValueError(f"{scene.name} has accelerations that are not finite: the motion {run.stats.message}")
-        state |= _named(qdd=qdd)
-        versions = {}
-        for name in FORMULATIONS:
-            say(f"{scene.name}: deriving inverse dynamics, {name.replace('_', ' ')}")
-            versions[name] = _version(scene, name)
-        derived, shares = _derived(system), _shares(scene)
+    state = _named(q=run.q, qd=run.qd, tau=np.zeros_like(run.qd)) | system.parameters | {"t": run.t, "dt": DT}
+    found = rate.evaluate({name: state[name] for name in rate.input_names})
+    qdd = np.stack([np.broadcast_to(found[f"qdd{i}"], len(run.t)) for i in range(system.n)], axis=1)
+    if not np.isfinite(qdd).all():
+        raise ValueError(f"{scene.name} has accelerations that are not finite: the motion {run.stats.message}")
+    state |= _named(qdd=qdd)
+    versions = dict[str, Version]()
+    for name in FORMULATIONS:
+        say(f"{scene.name}: deriving inverse dynamics, {TITLES[name]}")
+        versions[name] = _version(scene, name)
+    versions[FORWARD] = _forward(scene, rate)
+    say(f"{scene.name}: deriving Hamilton's equations, and the state equation beside them")
+    lacking = ""
+    try:
+        versions |= {each.name: each for each in _hamilton(scene)}
+    except ValueError as error:  # a constraint, or a kinetic energy that gives no momenta
+        lacking = f"No equations in momenta: {error}"
+    derived = _derived(system, momenta=not lacking)
     stopped = "" if run.stats.success else run.stats.message
-    shown = _along(scene, run, versions, state | {"dt": DT}, derived, shares, stopped=stopped)
-    return shown if forward else replace(shown, carried=carried(scene), causes=_causes(scene))
+    shown = _along(scene, run, versions, state, derived, _shares(scene), stopped=stopped)
+    return replace(shown, carried=carried(scene), causes=_causes(scene), lacking=lacking)
+
+
+def _forward(scene: Scene, rate: Graph) -> Version:
+    about = "Accelerations from torques: solved joint by joint from the tip to the base, then back out to the tip."
+    about += " With them come the forces that hold the constraints." if scene.system.constraints else ""
+    return Version(FORWARD, rate, about, steps=elimination(rate, display_names(scene)), group=FORWARD)
 
 
 def _along(
@@ -153,15 +156,10 @@ def _along(
     return Inspection(versions, motion, at, derived, shares, stopped=stopped, units=units)
 
 
-def _hamilton(scene: Scene, end: float, times: Array | None, say: Callable[[str], None]) -> Inspection:
-    """The two forms of the equations in the state (q, p), along a motion that is stepped in it; velocities follow."""
-    say(f"{scene.name}: deriving Hamilton's equations, and the state equation beside them")
+def _hamilton(scene: Scene) -> list[Version]:
+    """The two forms of the equations, in momenta and in velocities. Raises as `hamilton_equations` does."""
     forms = both_forms(scene)
     hamilton, system, sizes = forms[HAMILTON], scene.system, form_sizes(forms)
-    say(f"{scene.name}: a motion of {end:g} s, stepped in coordinates and momenta")
-    run = simulate(system, scene.q, scene.qd, end, "dopri5", rtol=1e-6, t_eval=times, form="momentum")
-    assert run.p is not None
-    state = _named(q=run.q, p=run.p, tau=np.zeros_like(run.qd)) | system.parameters | {"t": run.t}
     depth = {name: counts.depth for name, counts in sizes.items()}
     about = (
         "Rates of coordinates and momenta. The velocities are solved from the momenta, "
@@ -173,12 +171,10 @@ def _hamilton(scene: Scene, end: float, times: Array | None, say: Callable[[str]
         f"{counted(depth[LAGRANGE], 'operation')} deep, {len(forms[LAGRANGE].nodes)} nodes."
     )
     steps = elimination(hamilton, display_names(scene)) if is_quadratic(system) else ()
-    versions = {
-        HAMILTON: Version(HAMILTON, hamilton, about, steps=steps, rows=_rows(hamilton)),
-        LAGRANGE: Version(LAGRANGE, forms[LAGRANGE], beside, rows=_rows(forms[LAGRANGE])),
-    }
-    stopped = "" if run.stats.success else run.stats.message
-    return _along(scene, run, versions, state, velocities(system), stopped=stopped)
+    return [
+        Version(HAMILTON, hamilton, about, steps=steps, rows=_rows(hamilton), group=MOMENTUM),
+        Version(LAGRANGE, forms[LAGRANGE], beside, rows=_rows(forms[LAGRANGE]), group=MOMENTUM),
+    ]
 
 
 def _rows(graph: Graph) -> dict[str, list[Node]]:
@@ -205,12 +201,17 @@ def _first_order(scene: Scene, end: float, times: Array | None) -> Inspection:
     return Inspection(versions, Motion(run.t), at, stopped=stopped, units={"t": "s"})
 
 
-def _derived(system: System) -> Graph:
-    """The state that embedded formulations start from: q0_old .., qd0_old .. of q, qd, qdd and dt."""
+def _derived(system: System, *, momenta: bool) -> Graph:
+    """The state that embedded formulations start from, q0_old .., qd0_old .. of q, qd, qdd and dt; and momenta."""
     dt, qdd = cg.variable("dt"), cg.variables([f"qdd{i}" for i in range(system.n)])
     old = {f"q{i}_old": q - dt * rate for i, (q, rate) in enumerate(zip(system.q, system.q_dot, strict=True))}
     old |= {f"qd{i}_old": qd - dt * rate for i, (qd, rate) in enumerate(zip(system.qd, qdd, strict=True))}
-    return Graph([*system.q, *system.qd, *qdd, dt], old)
+    inputs = [*system.q, *system.qd, *qdd, dt]
+    if not momenta:
+        return Graph(inputs, old)
+    graph = momentum(system)
+    own = [node for node in graph.inputs if node not in inputs]
+    return Graph([*inputs, *own], old | graph.outputs)
 
 
 def _version(scene: Scene, name: str) -> Version:
@@ -224,7 +225,7 @@ def _version(scene: Scene, name: str) -> Version:
         )
         about += f" Nothing drives the joints here: {driven}."
     return Version(
-        name.replace("_", " "),
+        TITLES[name],
         verdict.graph,
         about,
         verdict.nodes,
@@ -232,6 +233,7 @@ def _version(scene: Scene, name: str) -> Version:
         flawed=verdict.differs,
         off=tuple(verdict.excess),
         excess=verdict.terms if verdict.differs else None,
+        group=INVERSE if name in PAPER else name,
     )
 
 

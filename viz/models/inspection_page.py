@@ -5,21 +5,20 @@ from __future__ import annotations
 import os
 
 from cgraph.extend import require_flag, write_files
-from dynamics import FORMULATIONS, display_names, scenes
+from dynamics import display_names, scenes
 from dynamics.scenes.start import Start, moving_start, rest_text, with_start
-from dynamics.systems.model import Model
+from dynamics.systems.model import Model, as_system
 
 from ..inspector import page
 from ..pages.html import Page, html_target
-from ..paper.both_forms import HAMILTON
 from ..typed import box
 from .formulas_panel import formulas_panel
-from .inspection import Inspection, inspection
+from .inspection import FORWARD, INVERSE, MOMENTUM, Inspection, inspection
 from .live_motion import live_panel
 from .remarks import tree_alone
 from .typed_text import text_or_none
 
-LIVELY = 10  # velocities: larger models have a page of their motion alone, `live_page`
+LIVELY = 40  # velocities: larger models have a page of their motion alone, `live_page`
 
 
 def inspect(
@@ -47,9 +46,9 @@ def inspect(
     t_end : float, optional
         How long it moves [s]; 3 s of what is no scene.
     forward : bool
-        Forward dynamics, in place of inverse dynamics by the paper's three formulations.
+        Show forward dynamics first, in place of inverse dynamics by definition.
     momentum : bool
-        Hamilton's equations in place of them, and the state equation beside: the state is coordinates and momenta.
+        Show Hamilton's equations first, whose state is coordinates and momenta.
     title : str, optional
         Heading of the page, by default what it shows.
 
@@ -83,26 +82,40 @@ def inspect(
     require_flag("momentum", momentum)
     scene = scenes.of_model(model)
     at = moving_start(scene) if start is None else with_start(scene, start)
-    content = inspection(at, forward=forward, momentum=momentum, t_end=t_end)
+    view = first_view(forward, momentum)
+    content = inspection(at, t_end=t_end)
     moved = rest_text(scene, at) if start is None and at is not scene else ""
-    text = inspection_page(at, content, moved, title)
+    text = inspection_page(at, content, moved, title, view)
     if target is not None:
         write_files({target: text})
     return text
 
 
-def inspection_page(scene: scenes.Scene, content: Inspection, moved: str = "", title: str | None = None) -> Page:
-    """The page of a scene.  moved: why its start was chosen for it, if it was."""
-    mechanism, first = scene.mechanism, next(iter(content.versions))
-    lively = scene.ode is None and scene.system.n <= LIVELY
-    inverse = first in FORMULATIONS
-    what = "inverse dynamics" if inverse else first
+def first_view(forward: bool, momentum: bool) -> str:
+    """The group of versions that is shown first. Raises ValueError for both."""
+    if forward and momentum:
+        raise ValueError("forward and momentum exclude one another: one view is shown first")
+    return FORWARD if forward else MOMENTUM if momentum else INVERSE
+
+
+def inspection_page(
+    scene: scenes.Scene, content: Inspection, moved: str = "", title: str | None = None, view: str = INVERSE
+) -> Page:
+    """The page of a scene.  moved: why its start was chosen for it, if it was.  view: the group that is shown first.
+
+    Raises ValueError for a group that the model has not.
+    """
+    mechanism, versions = scene.mechanism, list(content.versions.values())
+    if view == MOMENTUM and all(each.group != view for each in versions):
+        as_system(scene.model)  # a system of first order has no momenta at all
+        raise ValueError(f"{scene.name}: {content.lacking}")
+    lively = scene.ode is not None or scene.system.n <= LIVELY
     notices = [f"Left out of the model: {'; '.join(scene.left_out)}."] if scene.left_out else []
-    notices += [tree_alone(scene)] if inverse and tree_alone(scene) else []
+    notices += [each for each in (tree_alone(scene), content.lacking) if each]
     notices += [f"{moved[0].upper()}{moved[1:]}."] if moved else []
     return page(
-        list(content.versions.values()),
-        title=f"{scene.name}: {what}" if title is None else title,
+        versions,
+        title=scene.name if title is None else title,
         at=content.at,
         derived=content.derived,
         motion=content.motion,
@@ -114,9 +127,10 @@ def inspection_page(scene: scenes.Scene, content: Inspection, moved: str = "", t
         notices=[*notices, *([cut_short(content)] if content.stopped else [])],
         panels=[
             box(text_or_none(scene, scene.q, scene.qd)),
-            *([live_panel(scene, momentum=first == HAMILTON)] if lively else []),
-            formulas_panel(scene, momenta=first == HAMILTON),
+            *([live_panel(scene, momentum=view == MOMENTUM)] if lively else []),
+            formulas_panel(scene, momenta=view == MOMENTUM),
         ],
+        view=next((each.name for each in versions if each.group == view), ""),
     )
 
 

@@ -36,6 +36,11 @@ from ..pages.html import Page, Panel, html_target
 MOST_BODIES = 4  # of a mechanism whose masses become parameters by themselves
 SAMPLES = 16  # states at which the extent of a mechanism is looked at
 MOST_STEPS = 1000  # of the motion by which dt is chosen
+NOTES = {
+    "torque": "holding: the torque or force that keeps it at rest here against gravity and springs. "
+    "dp/dt: the rate of the momentum p.",
+    "rate": "of the state, as the equations have them",
+}
 USUAL = {"rad": math.pi, "rad/s": 10.0}  # how far sliders reach at least; 1 of all else
 SHARE = 0.25  # of the steps that a method of order 5 chooses
 
@@ -50,7 +55,7 @@ def live_page(model: Model, path: str | os.PathLike[str] | None = None, *, start
     Parameters
     ----------
     model : Model
-        A System, a Mechanism or a Scene.
+        A System, a Mechanism, an OdeSystem or a Scene; of the state of first order it shows the course over time.
     path : str or path, optional
         The file to write the page to, .html.
     start : mapping of str to float, or sequence of float, optional
@@ -65,7 +70,7 @@ def live_page(model: Model, path: str | os.PathLike[str] | None = None, *, start
     Raises
     ------
     TypeError
-        For what is no model, and for a system of first order, which has no Lagrangian.
+        For what is no model.
     ValueError
         For a path that does not end in .html, or a start that does not fit.
     OSError
@@ -89,10 +94,10 @@ def live_page(model: Model, path: str | os.PathLike[str] | None = None, *, start
 
 
 def live_panel(scene: Scene, *, momentum: bool = False) -> Panel:
-    """The motion of a scene as a panel at the end of another page, closed at first."""
-    shown = panel(live_of(scene, momentum=momentum))
-    closed = f'<details id="live"><summary>Live: computed as you watch</summary>\n{shown.body}</details>'
-    return shown._replace(body="", end=closed)
+    """The motion of a scene as a view of the inspector, computed from when its tab is first opened."""
+    shown = panel(live_of(scene, momentum=momentum), begin='inspector.onView("live", startLive);')
+    section = f'<section id="live" role="tabpanel" aria-label="live" hidden>\n{shown.body}</section>'
+    return shown._replace(body="", end=section)
 
 
 def live_of(scene: Scene, *, momentum: bool = False) -> Live:
@@ -104,6 +109,8 @@ def live_of(scene: Scene, *, momentum: bool = False) -> Live:
     """
     model = _adjustable(scene.mechanism) if scene.mechanism is not None else scene.model
     scene = replace(scene, model=model)
+    if scene.ode is not None:
+        return _first_order(scene)
     rate = hamilton_equations(scene.model) if momentum else state_equation(scene.model)
     known = state_inputs(scene.model)
     values = dict(zip(known.states, (*scene.q, *scene.qd), strict=True)) | known.parameters
@@ -121,7 +128,16 @@ def live_of(scene: Scene, *, momentum: bool = False) -> Live:
         usual = {f"qd{i}": USUAL.get(units.get(f"qd{i}", ""), 1.0) for i in range(scene.system.n)}
         reach = {name: abs(p) for name, p in _momenta(scene, values | usual).items()}
         scales |= {name: _round(p) for name, p in reach.items() if 0.0 < p < math.inf}  # of speeds that are none, NaN
-    return Live(rate, start, shown, meters, parents, scales, _step(scene), TABLEAUS, display_names(scene), units)
+    return Live(rate, start, shown, meters, parents, scales, _step(scene), TABLEAUS, display_names(scene), units, NOTES)
+
+
+def _first_order(scene: Scene) -> Live:
+    """The panel's content for a system of first order: its state over time, and its rates."""
+    rate = state_equation(scene)
+    values = dict(zip(scene.coordinates, scene.q, strict=True)) | dict(scene.parameters)
+    start = {name: float(values.get(name, 0.0)) for name in rate.input_names}  # the time is 0
+    meters = [(f"d {name}/dt", "", "rate") for name in scene.coordinates]
+    return Live(rate, start, rate, meters, dt=_step(scene), methods=TABLEAUS, units={"t": "s"})
 
 
 def _adjustable(mechanism: Mechanism) -> Mechanism:
@@ -229,7 +245,8 @@ def _step(scene: Scene) -> float:
     """A step that is short enough: a share of those that an adaptive method takes at first, rounded."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", SimulationWarning)  # the page shows what an equal step does to a stiff system
-        run = simulate(scene, scene.q, scene.qd, min(scene.t_end, 1.0), "dopri5", rtol=1e-4, max_steps=MOST_STEPS)
+        qd = None if scene.ode is not None else scene.qd
+        run = simulate(scene, scene.q, qd, min(scene.t_end, 1.0), "dopri5", rtol=1e-4, max_steps=MOST_STEPS)
     steps = np.diff(run.t)
     usual = float(np.median(steps)) if run.stats.steps and steps.size else 1e-2 * scene.t_end
     return float(f"{_round(SHARE * usual) / 2.0:.3g}")

@@ -46,7 +46,7 @@ class Listing:
 
     def html(self) -> str:
         """The lines as HTML."""
-        return f"<pre>{escape(self.text)}</pre>"
+        return f'<pre tabindex="0">{escape(self.text)}</pre>'
 
     def markdown(self, folder: str) -> list[str]:
         """Lines of Markdown."""
@@ -68,12 +68,13 @@ class Table:
 
     def html(self) -> str:
         """The table as HTML."""
-        head = "".join([f"<th>{escape(name)}</th>" for name in self.header])
+        head = "".join([f'<th scope="col">{escape(name)}</th>' if name else "<td></td>" for name in self.header])
         body = "\n".join(
             ["<tr>" + "".join([f"<td>{escape(cell)}</td>" for cell in row]) + "</tr>" for row in self.rows]
         )
         table = (
-            f'<div class="scroll"><table><caption>{escape(self.caption)}</caption><thead><tr>{head}</tr></thead>'
+            f'<div class="scroll" tabindex="0" role="group"><table><caption>{escape(self.caption)}</caption>'
+            f"<thead><tr>{head}</tr></thead>"
             f"<tbody>\n{body}\n</tbody></table></div>"
         )
         return f"<details><summary>{escape(self.caption)}</summary>\n{table}\n</details>" if self.folded else table
@@ -102,9 +103,9 @@ class Picture:
         """The picture inside the page, with its caption below, which is its alternative text too."""
         data, caption = base64.b64encode(self.svg.encode()).decode(), escape(self.caption)
         style = "" if self.width is None else f' style="width:{self.width};background:none"'
-        kind = ' class="plot"' if self.width == "100%" else ""
+        kind, wide = (' class="plot"', ' class="wide"') if self.width == "100%" else ("", "")
         return (
-            f'<figure><img{kind} src="data:image/svg+xml;base64,{data}" alt="{caption}"{style}>'
+            f'<figure{wide} tabindex="0"><img{kind} src="data:image/svg+xml;base64,{data}" alt="{caption}"{style}>'
             f"<figcaption>{caption}</figcaption></figure>"
         )
 
@@ -159,7 +160,7 @@ def to_html(document: Document) -> str:
             for each in sections
         ]
     )
-    text = f"<h1>{title}</h1>\n{_html(document.introduction)}\n<nav>{links}</nav>\n{body}"
+    text = f"<main>\n<h1>{title}</h1>\n{_html(document.introduction)}\n<nav>{links}</nav>\n{body}\n</main>"
     return compose(document.title, text, STYLE)
 
 

@@ -22,6 +22,12 @@ from .mathml import STYLE as MATHML
 FRAME_HEIGHT = 760  # pixels in a notebook
 _COMMENT = re.compile(r"^ *(?://[^\n]*|/\*\*.*?\*/)\n", re.MULTILINE | re.DOTALL)  # that begins a line
 
+SHADOWS = (  # at the edges beyond which there is more to scroll to
+    "background: linear-gradient(to right, var(--back) 40%, transparent) left / 2.2rem 100% no-repeat local, "
+    "linear-gradient(to left, var(--back) 40%, transparent) right / 2.2rem 100% no-repeat local, "
+    "linear-gradient(to right, rgb(128 128 128 / 0.5), transparent) left / 0.7rem 100% no-repeat scroll, "
+    "linear-gradient(to left, rgb(128 128 128 / 0.5), transparent) right / 0.7rem 100% no-repeat scroll;"
+)
 STYLE = f"""
 :root {{ color-scheme: light dark; --text: {theme.TEXT}; --back: #FFFFFF; --soft: #F4F4F2; --line: #D8D8D4; }}
 @media (prefers-color-scheme: dark) {{ :root {{ --text: #E8E8E4; --back: #17181A; --soft: #232529; --line: #3A3D42; }} }}
@@ -33,17 +39,22 @@ figure {{ margin: 1.2rem 0; }} figcaption {{ font-size: 0.95rem; margin-top: 0.5
 figure {{ overflow-x: auto; }} figcaption {{ position: sticky; left: 0; }}
 figure img {{ display: block; max-width: 100%; height: auto; margin: 0 auto; background: #FFFFFF; border-radius: 4px; }}
 figure img.plot {{ min-width: 40rem; }} /* its letters stay legible: a narrow screen scrolls */
-.scroll {{ overflow-x: auto; }}
+.scroll {{ overflow-x: auto; {SHADOWS} }}
+@media (max-width: 43rem) {{ figure.wide figcaption::before {{ content: "The figure is wider than the page: scroll it sideways. "; opacity: 0.8; }} }}
 table {{ border-collapse: collapse; margin: 1rem 0; font-size: 0.95rem; font-variant-numeric: tabular-nums; }}
 th, td {{ padding: 0.35rem 0.5rem; border-bottom: 1px solid var(--line); text-align: right; }}
 td + td {{ white-space: nowrap; }} td:first-child {{ min-width: 7rem; }}
 th {{ vertical-align: bottom; }}
-th:first-child, td:first-child {{ text-align: left; }} thead th {{ border-bottom: 2px solid var(--text); }}
+th:first-child, td:first-child {{ text-align: left; }} thead :is(th, td) {{ border-bottom: 2px solid var(--text); }}
 caption {{ text-align: left; font-weight: 600; padding-bottom: 0.4rem; }}
 summary {{ cursor: pointer; font-weight: 600; }} details caption {{ display: none; }}
 pre {{ background: var(--soft); padding: 0.8rem 1rem; overflow-x: auto; border-radius: 4px; }}
 .point, .warning {{ background: var(--soft); border-left: 5px solid {theme.BLUE}; padding: 0.6rem 1rem; }}
 .warning {{ border-left-color: {theme.SPURIOUS}; }}
+@media print {{ :root {{ color-scheme: light; --text: {theme.TEXT}; --back: #FFFFFF; --soft: #F4F4F2; --line: #D8D8D4; }}
+  body {{ max-width: none; padding: 0; }} nav {{ display: none; }} .scroll, figure {{ overflow: visible; background: none; }}
+  h2, caption, summary {{ break-after: avoid; }} figure, tr, pre, .point, .warning {{ break-inside: avoid; }}
+  p, li {{ orphans: 3; widows: 3; }} thead {{ display: table-header-group; }} figure img.plot {{ min-width: 0; }} }}
 """
 
 

@@ -41,7 +41,6 @@ function startTyped(inspector, text, shownFirst) {
     showDerived(found);
     keepLink(box.value);
     byId("back-to").hidden = shownFirst;
-    byId("live")?.toggleAttribute("hidden", true); // it moves the page's model, which is not this one
   };
   byId("examples").replaceChildren(tag("option", { value: "" }, "an example"), ...[...TYPED.EXAMPLES.keys()].map((name) => tag("option", { value: name }, name)));
   byId("examples").onchange = () => {
@@ -67,7 +66,6 @@ function startTyped(inspector, text, shownFirst) {
   byId("back-to").onclick = () => {
     inspector.showRecord(before);
     byId("back-to").hidden = true;
-    byId("live")?.toggleAttribute("hidden", false);
     keepLink(null);
   };
   addEventListener("hashchange", () => {
@@ -92,7 +90,7 @@ function openingButton() {
     dispatchEvent(new Event("resize")); // the picture has other room
   };
   button.onclick = () => { open(byId("typed").hidden); if (!byId("typed").hidden) byId("text").focus(); };
-  byId("versions").after(button);
+  byId("title").after(button);
   return open;
 }
 

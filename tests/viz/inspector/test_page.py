@@ -22,6 +22,7 @@ from viz.inspector import Motion, Table, Version
 from viz.inspector.page import SCRIPTS
 from viz.inspector.record import record
 from viz.models.inspection import FORMULATIONS, inspection
+from viz.pages.formulation_table import TITLES
 
 JAVASCRIPT_LIBM = 1e-12  # relative: a browser's sin and exp may differ from the C library's in the last bits
 
@@ -45,8 +46,9 @@ def pendulum(tmp_path_factory) -> str:
 
 def test_it_has_all_formulations_with_their_counts_and_spurious_nodes(pendulum):
     data = data_of(pendulum)
-    assert [each["name"] for each in data["versions"]] == [name.replace("_", " ") for name in FORMULATIONS]
-    for name, each in zip(FORMULATIONS, data["versions"], strict=True):
+    names = [*[TITLES[name] for name in FORMULATIONS], "forward dynamics", "Hamilton's equations", "state equation"]
+    assert [each["name"] for each in data["versions"]] == names
+    for name, each in zip(FORMULATIONS, data["versions"], strict=False):
         graph = dyn.inverse_dynamics(dyn.scenes.load("triple_pendulum"), name)
         arguments = sum(len(node) - 1 for node in each["nodes"] if isinstance(node, list))
         assert (len(each["nodes"]), arguments) == (graph.counts().nodes, graph.counts().edges)
@@ -123,9 +125,11 @@ def test_the_command_tells_sizes(tmp_path, capsys):
     found = json.loads(capsys.readouterr().out)
     counts = dyn.forward_dynamics(dyn.scenes.load("spring_mass")).counts()
     right = {"spurious": 0, "spurious_edges": 0, "differs": False}
-    assert found["versions"] == {"forward dynamics": {"nodes": counts.nodes, "edges": counts.edges} | right}
+    assert found["versions"]["forward dynamics"] == {"nodes": counts.nodes, "edges": counts.edges} | right
     assert found["bytes"] == out.stat().st_size
-    assert data_of(out.read_text(encoding="utf-8"))["motion"]["points"] is None
+    data = data_of(out.read_text(encoding="utf-8"))
+    assert data["motion"]["points"] is None
+    assert data["view"] == "forward dynamics"
 
 
 def test_the_command_refuses_what_is_no_page(tmp_path, capsys):
@@ -154,7 +158,7 @@ def test_what_a_model_leaves_out_stands_above_everything():
     x = cg.variable("x")
     page = viz.page(cg.Graph([x], {"y": cg.sin(x)}), notices=["The model leaves out <friction>."])
     assert data_of(page)["notices"] == ["The model leaves out <friction>."]
-    assert page.index('id="notices"') < page.index('id="introduction"') < page.index("<main>")
+    assert page.index("<main>") < page.index('id="notices"') < page.index('id="introduction"') < page.index('id="view"')
 
 
 def test_a_page_of_loops_shows_where_they_close_and_does_not_promise_torques_of_zero():

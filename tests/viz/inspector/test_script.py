@@ -24,12 +24,14 @@ from viz.models.inspection import Inspection, inspection
 from viz.pages.operations import graph_data, slopes
 
 pytestmark = pytest.mark.usefixtures("without_graphviz")
+PAPER = ("by_definition", "kinetic_only", "chain_rule")
 JAVASCRIPT_LIBM = 1e-12  # relative: a browser's sin and exp may differ from the C library's in the last bits
 
 
 @pytest.fixture(scope="module")
 def pendulum() -> list[Version]:
-    return list(inspection(dyn.scenes.load("triple_pendulum")).versions.values())
+    versions = inspection(dyn.scenes.load("triple_pendulum")).versions
+    return [versions[name] for name in PAPER]
 
 
 # Where nodes are.
@@ -253,12 +255,12 @@ def found_in_spring() -> Inspection:
 
 def spring(at: dict[str, float]) -> tuple[list[Version], State]:
     found = found_in_spring()
-    return list(found.versions.values()), State(dict(found.at) | at, found.derived)
+    return list(found.versions.values()), State(dict(found.at) | at | {"tau0": 0.3}, found.derived)
 
 
 def test_all_versions_are_in_one_state_and_reset_restores_it():
     versions, state = spring({"q0": 0.3, "qd0": 0.2, "qdd0": 0.1, "k": 2.0})
-    found = run_script(SHARED, record(versions, None, state=state), {"q0": 0.7, "dt": 0.25})
+    found = run_script(SHARED, record(versions, None, state=state), {"q0": 0.7, "dt": 0.25, "tau0": 0.2})
     assert found["first"] == found["third"]
     assert found["told"] == [True, False]
     q, qd, qdd, dt = 0.7, 0.2, 0.1, 0.25
@@ -341,7 +343,7 @@ def test_a_velocity_of_a_long_arm_is_no_noise_and_what_cancels_is():
       const values = state.evaluate(version), slopes = slopesAt(version, values);
       const own = ownErrors(version, values, state.errorsOf(version)), bounds = errorBounds(version, slopes, own, 0);
       const sharp = sharpened(version, slopes, values, bounds, own);
-      return [state.solved, ...version.outputs.map(([, , node]) => [values[node], bounds[node], sharp[node]])];
+      return [state.solved(version), ...version.outputs.map(([, , node]) => [values[node], bounds[node], sharp[node]])];
     }"""
     state = State({name: at.get(name, 0.0) for name in graph.input_names})
     data = record([Version("momenta", zero)], None, state=state)

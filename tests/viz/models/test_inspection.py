@@ -32,15 +32,15 @@ def values_of(found: Inspection, graph: Graph) -> dict[str, Any]:
 
 def test_the_free_motion_takes_no_torque_by_the_chain_rule_alone():
     found = ARM()
-    assert tuple(found.versions) == FORMULATIONS
+    assert tuple(found.versions)[:4] == FORMULATIONS
     wrong = []
-    for each in found.versions.values():
+    for each in [found.versions[name] for name in FORMULATIONS]:
         tau = np.stack(list(each.graph.evaluate(values_of(found, each.graph)).values()))
         wrong.append(np.abs(tau).max())
         assert bool(each.marked) == (wrong[-1] > INTEGRATED)
         assert ("Spurious in the graph" in each.about) == bool(each.marked)
     assert wrong[0] > 1.0
-    assert wrong[2] < INTEGRATED
+    assert max(wrong[2:]) < INTEGRATED
 
 
 def test_the_embedded_step_ends_in_the_state_of_the_others():
@@ -69,21 +69,20 @@ def test_shares_of_the_torque_add_up():
 
 
 def test_forward_dynamics_and_a_system_without_places():
-    found = inspection(dyn.scenes.load("spring_mass"), forward=True, t_end=np.pi)
-    (version,) = found.versions.values()
-    assert found.motion.points is found.shares is found.derived is None
-    qdd = version.graph.evaluate(found.at)["qdd0"]
+    found = inspection(dyn.scenes.load("spring_mass"), t_end=np.pi)
+    version = found.versions["forward dynamics"]
+    assert found.motion.points is found.shares is None
+    qdd = version.graph.evaluate(values_of(found, version.graph))["qdd0"]
     assert np.allclose(qdd, -np.cos(found.motion.t), atol=1e-5)  # I = k = 1, let go at 1
 
 
 @each_row("name", ["spring_mass", "triple_pendulum"])
 def test_both_forms_are_in_one_state_of_coordinates_and_momenta(name):
     scene = dyn.scenes.load(name)
-    found = inspection(scene, momentum=True, t_end=0.3)
-    hamilton, lagrange = found.versions.values()
+    found = inspection(scene, t_end=0.3)
+    hamilton, lagrange = [each for each in found.versions.values() if each.group == "momentum"]
     n = scene.system.n
-    assert {f"{kind}{i}" for kind in "qp" for i in range(n)} <= found.at.keys()
-    assert [*found.derived.outputs] == [f"qd{i}" for i in range(n)]
+    assert {f"p{i}" for i in range(n)} <= found.derived.outputs.keys()
     rates, expected = (each.graph.evaluate(values_of(found, each.graph)) for each in (hamilton, lagrange))
     for i in range(n):
         moved = np.gradient(found.at[f"q{i}"], found.motion.t, edge_order=2)
@@ -98,8 +97,6 @@ def test_both_forms_are_in_one_state_of_coordinates_and_momenta(name):
     assert not hamilton.rows["bias"]
     assert not lagrange.rows["rates"]
     assert sorted(step.joint for step in hamilton.steps) == sorted(3 * [*range(n)])
-    with pytest.raises(ValueError, match="exclude one another"):
-        inspection(scene, momentum=True, forward=True)
 
 
 def test_joints_of_a_planar_arm_are_a_link_apart():

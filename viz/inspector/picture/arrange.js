@@ -25,6 +25,7 @@ function makePlan(record, versions) {
     i: new Map(version.inputs.filter(([, node]) => node >= 0).map(([name, node]) => [name, widthOf(version.names[node][1])])),
     o: new Map(version.outputs.map(([name, pretty]) => [name, Math.max(66, widthOf(pretty) + 6)])),
   }));
+  plan.limbs = limbsOf(plan);
   plan.sums = plan.cluster.includes(RESULT_PLACE);
   return plan;
 }
@@ -73,18 +74,41 @@ function arrange(plan, { folded, closed, unbundled, aspect }, index = 0) {
   };
 }
 
-/** All columns as one box each: bodies as their tree, its base at the bottom, or in lines where that is larger; then
- * what is no body. */
+/** Limbs of the tree of bodies, chains from a body to a tip: [[column]] in the order of a walk, of those that a body has
+ * the deepest goes on with it; all in one where nothing branches. */
+function limbsOf({ columns, tree, parents }) {
+  const all = columns.map((_, i) => i).filter((i) => tree[i]), own = columns.map(() => []), height = columns.map(() => 1);
+  const roots = all.filter((i) => !tree[parents[i]] || !own[parents[i]].push(i));
+  for (const i of [...all].reverse()) if (tree[parents[i]]) height[parents[i]] = Math.max(height[parents[i]], height[i] + 1);
+  const limbs = [], starts = roots.reverse();
+  while (starts.length) {
+    const limb = [];
+    for (let i = starts.pop(); i !== undefined;) {
+      limb.push(i);
+      const next = own[i].reduce((best, each) => (best === undefined || height[each] > height[best] ? each : best), undefined);
+      starts.push(...own[i].filter((each) => each !== next).reverse());
+      i = next;
+    }
+    limbs.push(limb);
+  }
+  return limbs;
+}
+
+/** All columns as one box each: limbs as rows or as columns, the base first; one limb as its tree, its base at the
+ * bottom, or in lines where that is larger; then what is no body. */
 function overview(plan, aspect = CELL.aspect) {
   const all = plan.columns.map((_, i) => i), tree = all.filter((i) => plan.tree[i]), rest = all.filter((i) => !plan.tree[i]);
   const local = new Map(tree.map((i, k) => [i, k]));
   const edges = tree.filter((i) => local.has(plan.parents[i])).map((i) => [local.get(plan.parents[i]), local.get(i)]);
   const across = BODY.width + BODY.beside, down = BODY.height + BODY.gap;
-  const deep = layered(tree.map(() => across - LAYERS.gap), edges, down);
-  const spots = [tree.map((_, k) => [deep.x[k] - across / 2, deep.y[k] - down / 2])];
-  for (let per = 1; per <= tree.length; per++) {
-    const lines = Math.ceil(tree.length / per);
-    spots.push(tree.map((_, k) => [(k % per) * across, (lines - 1 - Math.floor(k / per)) * down])); // the base at the bottom left
+  const limbs = plan.limbs, spots = limbs.length > 1 ? inLimbs(plan, limbs, local, across, down) : [];
+  if (!spots.length) {
+    const deep = layered(tree.map(() => across - LAYERS.gap), edges, down);
+    spots.push(tree.map((_, k) => [deep.x[k] - across / 2, deep.y[k] - down / 2]));
+    for (let per = 1; per <= tree.length; per++) {
+      const lines = Math.ceil(tree.length / per);
+      spots.push(tree.map((_, k) => [(k % per) * across, (lines - 1 - Math.floor(k / per)) * down])); // the base at the bottom left
+    }
   }
   const sizeOf = (at) => [Math.max(0, ...at.map(([x]) => x + BODY.width)), Math.max(0, ...at.map(([, y]) => y + down))];
   const found = spots.map((at) => {
@@ -99,6 +123,30 @@ function overview(plan, aspect = CELL.aspect) {
   const bodies = [];
   [...tree, ...rest].forEach((i, k) => { bodies[i] = { column: i, x: at[k][0], y: at[k][1], w: BODY.width, h: BODY.height }; });
   return { boxes: [], bodies, titles: [], width: w, height: h };
+}
+
+/** Places of bodies by limb: a row each, in from where it hangs; or a column each, the base at the bottom. */
+function inLimbs({ parents, tree }, limbs, local, across, down) {
+  const deep = new Map(), rows = [], columns = [];
+  limbs.forEach((limb, row) => limb.forEach((i) => {
+    deep.set(i, tree[parents[i]] ? deep.get(parents[i]) + 1 : 0);
+    rows[local.get(i)] = [deep.get(i) * across, row * down];
+    columns[local.get(i)] = [row * across, -deep.get(i) * down];
+  }));
+  const lowest = Math.min(...columns.map(([, y]) => y));
+  return [rows, columns.map(([x, y]) => [x, y - lowest])];
+}
+
+/** Columns in lines of at most so many, a limb in as few as it can be; what is no body below, beside the base where it has room. */
+function linesOf({ columns, limbs, tree }, most) {
+  const lines = [];
+  for (const limb of limbs) {
+    const last = lines.at(-1), parts = Array.from({ length: Math.ceil(limb.length / most) }, (_, k) => limb.slice(k * most, (k + 1) * most));
+    if (last && parts.length === 1 && last.length + limb.length <= most) last.push(...limb); else lines.push(...parts);
+  }
+  const rest = columns.map((_, i) => i).filter((i) => !tree[i]);
+  if (lines.length === 1 && lines[0].length + rest.length <= most) return [[...lines[0], ...rest]];
+  return [...Array.from({ length: Math.ceil(rest.length / most) }, (_, k) => rest.slice(k * most, (k + 1) * most)), ...lines];
 }
 
 /** Columns side by side, in as few bands as the picture needs; rows by sweep. */
@@ -118,10 +166,9 @@ function columnsIn(plan, folded, closed, aspect) {
   const widths = plan.columns.map((name, i) => (closed.has(i) ? BODY.width
     : Math.max(70, Math.min(160, 8 * name.length), ...plan.stages.map((stage) => cell(i, stage).w))));
   const bands = bandsFor(widths, plan.stages.map((stage) => Math.max(...widths.map((_, i) => cell(i, stage).h))), aspect);
-  const perBand = Math.ceil(plan.columns.length / bands);
   const boxes = [], bodies = [], titles = [];
   const reach = (own) => own.reduce((sum, i) => sum + widths[i] + CELL.beside, -CELL.beside);
-  const lines = Array.from({ length: bands }, (_, band) => plan.columns.map((__, i) => i).slice(band * perBand, (band + 1) * perBand));
+  const lines = linesOf(plan, Math.ceil(plan.columns.length / bands));
   const total = Math.max(...lines.map(reach)) + CELL.beside;
   let y = 0;
   for (const own of [...lines].reverse()) { // the last bodies on top

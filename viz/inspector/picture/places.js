@@ -42,7 +42,7 @@ function placesOf(record, versions) {
       return found.get(key);
     });
   });
-  const stages = record.stages?.length ? record.stages : STAGES;
+  const stages = versions[0].stages?.length ? versions[0].stages : STAGES;
   const columns = columnsOf(bodies, [...keys.values()], versions, groups);
   const order = (a, b) => columns.indexOf(a.column) - columns.indexOf(b.column) || stages.indexOf(a.stage) - stages.indexOf(b.stage)
     || a.marked - b.marked || natural(a.title, b.title);
@@ -50,7 +50,11 @@ function placesOf(record, versions) {
   const parents = new Map(record.columns);
   return {
     clusters, columns, place, first, stages, columnOf: clusters.map(({ column }) => columns.indexOf(column)),
-    parents: columns.map((name) => columns.indexOf(parents.get(name))),
+    parents: columns.map((name) => { // the next further in that is a column
+      let up = parents.get(name);
+      while (up && !columns.includes(up)) up = parents.get(up);
+      return columns.indexOf(up);
+    }),
     tree: columns.map((name) => parents.has(name)),
     cluster: clusterKeys.map((key) => number.get(key) ?? Number(key)),
   };
