@@ -1,4 +1,4 @@
-"""Parts of a torque: what of it moves mass, what goes around the bend, what holds weight and springs."""
+"""Parts of a torque: what of it vanishes with q̈, what with q̇, and what remains at rest."""
 
 from __future__ import annotations
 
@@ -9,10 +9,12 @@ import numpy as np
 from cgraph.extend import Array
 from dynamics import inverse_dynamics
 
-from ..pages.document import Table
-from .subject import SHOWN, Screen, Subject, number
+from ...pages.document import Table
+from ..glossary import term
+from ..screen import Screen
+from ..subject import SHOWN, Subject, number
 
-PARTS = ("inertia: what q̈ takes", "velocity: Coriolis, centrifugal, damping", "position: weight and springs")
+PARTS = ("inertia: what vanishes with q̈", "velocity: what vanishes with q̇", "position: what remains at rest")
 MOVED = 3  # joints with three sliders
 
 
@@ -23,38 +25,38 @@ def torque_parts(subject: Subject) -> Screen:
     joint = int(np.abs(parts).sum(axis=0).argmax())
     sizes = np.abs(parts[:, joint])
     name = escape(subject.joints[joint])
-    state = ", ".join(
-        f"{escape(subject.shown(f'{kind}{i}'))} = {number(subject.values[f'{kind}{i}'])}"
-        for i in range(min(system.n, SHOWN))
-        for kind in (("q", "qd", "qdd") if system.nq == system.n else ("qd", "qdd"))
-    )
     rows = [[joint_name, *[number(value) for value in column], number(column.sum())]
             for joint_name, column in zip(subject.joints[:SHOWN], parts.T, strict=False)]  # fmt: skip
-    table = Table("Parts of the torque", ["joint", "inertia", "velocity", "position", "torque"], rows)
+    table = Table("Parts of τ", [subject.joint, "inertia", "velocity", "position", "τ"], rows)
     play = subject.play(
         "parts",
         {"graph": graph},
         sliders=subject.sliders(("q", "qd", "qdd"), MOVED),
         joints=subject.joints[:SHOWN],
+        joint=subject.joint,
         parts=[part.partition(":")[0] for part in PARTS],
     )
     return Screen(
         "why-this-torque",
-        "Why this torque?",
+        "Why this large?",
         3,
-        f"<p>The system moves: {state}. The torque at a joint, or the force where it slides, has three parts: "
-        "inertia, which vanishes with q̈; centrifugal and Coriolis terms, which vanish with q̇; and weight and springs, "
-        "which remain at rest.</p>",
-        f"Which part is the largest at <b>{name}</b> in this state?",
+        f"<p>In the moment that the lesson began with, the system moves. The {term('generalized force', subject.force)} τ that "
+        f"drives {_each(subject)} has three parts that add up: <b>inertia</b>, which vanishes with q̈; what the <b>velocity</b> does, which vanishes "
+        "with q̇, such as what pulls outwards in a curve; and what the <b>position</b> does, which remains at rest.</p>",
+        f"Which part is the largest at <b>{name}</b> in this moment?",
         PARTS,
         int(sizes.argmax()),
-        "<p>The same graph of the torque, evaluated three times: at rest without acceleration, then with q̈ alone, then with "
-        f"q̇ alone. The three add up to the torque.</p>{table.html()}",
-        "Move the joints. Make the velocity part the largest; then find a position that is held without torque. Bars: inertia "
+        "<p>The same graph of τ, evaluated three times: at rest without acceleration, then with q̈ alone, then with "
+        f"q̇ alone. The three add up to τ.</p>{table.html()}",
+        f"At {name} the parts are {', '.join(number(value) for value in parts[:, joint])}.",
+        "Make the velocity part the largest, if there is one; then find a position that is held without any τ. Bars: inertia "
         "light blue, velocity orange, position green.",
         play,
-        f"At {name} the parts are {', '.join(number(value) for value in parts[:, joint])}.",
     )
+
+
+def _each(subject: Subject) -> str:
+    return "the coordinate" if subject.system.n == 1 else f"each {subject.joint}"
 
 
 def _parts(subject: Subject) -> Array:
