@@ -138,11 +138,12 @@ def two_link() -> Scene:
         with cg.tag("kinetic"):
             kinetic = first**2 + 0.5 * second**2 + first * second * cg.cos(q[1])
         with cg.tag("potential"):
-            potential = -9.81 * (2.0 * cg.cos(q[0]) + cg.cos(q[0] + q[1]))
-        return kinetic - potential
+            depth = 2.0 * cg.cos(q[0]) + cg.cos(q[0] + q[1])
+            below = 9.81 * depth  # minus the potential energy
+        return kinetic + below
 
     about = "a two-link arm in a vertical plane: links of 1 m without mass, 1 kg at the end of each"
-    return Scene("two_link", about, System(lagrangian, ["shoulder", "elbow"]), (0.5, 1.0), (0.0, 0.0), 3.0)
+    return Scene("two_link", about, System(lagrangian, ["shoulder", "elbow"]), (0.5, 1.5), (0.0, 0.0), 3.0)
 
 
 def triple_pendulum(mass_model: str = "rod") -> Scene:

@@ -18,7 +18,7 @@ function read(text) {
 }
 function score() {
   const made = STATE.guesses.filter((guess) => guess !== null).length;
-  return `${STATE.guesses.filter((guess, i) => guess === LESSON.answers[i]).length} of ${made} right`;
+  return made ? `${STATE.guesses.filter((guess, i) => guess === LESSON.answers[i]).length} of ${made} right` : "no guess yet";
 }
 function show() {
   SCREENS.forEach((screen, i) => {
@@ -38,7 +38,7 @@ function show() {
     LINKS[SCREENS.indexOf(screen)].className = guess === null ? "" : guess === answer ? "right" : "wrong";
   });
   SCORE.textContent = score();
-  document.querySelector("#end .score").textContent = `Your score: ${score()}, of ${ASKING.length} questions.`;
+  document.querySelector("#end .score").textContent = `Your score: ${score()}; there ${ASKING.length === 1 ? "is one question" : `are ${ASKING.length} questions`}.`;
   play(ASKING.indexOf(SCREENS[STATE.current]));
   try { history.replaceState(null, "", written()); } catch { /* a frame without an address */ }
 }
@@ -103,6 +103,7 @@ document.addEventListener("keydown", (event) => {
     guess(ASKING.indexOf(SCREENS[STATE.current]), "abcdef".indexOf(event.key.toLowerCase()));
 });
 window.addEventListener("hashchange", () => { read(location.hash); show(); });
+window.addEventListener("beforeprint", () => { document.getElementById("glossary").open = true; });
 read(location.hash);
 STATE.guesses.forEach((guess, i) => { if (guess !== null) ASKING[i].querySelector(".reveal").open = true; });
 show();

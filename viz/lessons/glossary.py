@@ -58,7 +58,7 @@ def glossary(html: str) -> str:
         for name, text in sorted(TERMS.items(), key=lambda row: row[0].lower())
         if _anchor(name) in linked
     ]
-    return f'<section id="glossary" aria-label="Glossary"><h2>Glossary</h2>\n<dl>{"".join(rows)}</dl></section>'
+    return f'<details id="glossary"><summary>Glossary</summary>\n<dl>{"".join(rows)}</dl></details>'
 
 
 def _anchor(name: str) -> str:

@@ -18,6 +18,7 @@ def introduction(subject: Subject) -> str:
     """The first part of a lesson, or of a worksheet, as HTML."""
     name = escape(subject.shown("q0"))
     force = term("torque") if subject.force == "torque" else term("generalized force", subject.force)
+    formula = equations(lagrangian_graph(subject.system), subject.names)
     meant = (
         f"<p>{_sentence(subject.scene.about)}</p>"
         f"<p>Names: <b>{name}</b> is a {term('coordinate')}, <b>{escape(subject.shown('qd0'))}</b> its "
@@ -31,7 +32,8 @@ def introduction(subject: Subject) -> str:
         f"{term('momentum')}.</p>"
         f"<p>∂L/∂q is a {term('partial derivative')}: how fast L changes with q while everything else, q̇ too, is held. "
         f"L is the {term('Lagrangian')}, {term('kinetic energy')} minus {term('potential energy')}. For this system:</p>"
-        + equations(lagrangian_graph(subject.system), subject.names)
+        + formula
+        + ("<p>A v with a number is a part of L that is computed first.</p>" if "<mi>v</mi>" in formula else "")
     )
     return meant + _picture(subject) + _moment(subject) + _parameters(subject) + asked
 
@@ -78,20 +80,18 @@ def _arm(shoulder: float, elbow: float) -> str:
     for angle in (shoulder, shoulder + elbow):
         x, y = places[-1]
         places.append((x + sin(angle), y + cos(angle)))
-    points = [(120.0 + scale * x, _MARGIN + scale * y) for x, y in places]
-    line = " ".join([f"{x:.1f},{y:.1f}" for x, y in points])
-    (x0, y0), (x1, y1), (x2, y2) = points
-    end = x1 + 0.6 * scale * sin(shoulder), y1 + 0.6 * scale * cos(shoulder)
+    (x0, y0), (x1, y1), (x2, y2) = [(40.0 + scale * x, _MARGIN + scale * y) for x, y in places]
+    x, y = x1 + 0.8 * scale * sin(shoulder), y1 + 0.8 * scale * cos(shoulder)
     return (
-        f'<svg class="arm" viewBox="0 0 420 {_HEIGHT:g}" role="img" aria-label="The arm: it hangs from the shoulder, both '
-        'angles are measured from straight on">'
-        f'<line class="dashed" x1="{x0:.1f}" y1="{y0:.1f}" x2="{x0:.1f}" y2="{y0 + 0.8 * scale:.1f}"/>'
-        f'<line class="dashed" x1="{x1:.1f}" y1="{y1:.1f}" x2="{end[0]:.1f}" y2="{end[1]:.1f}"/>'
-        f'<polyline points="{line}"/><circle cx="{x0:.1f}" cy="{y0:.1f}" r="6"/><circle cx="{x1:.1f}" cy="{y1:.1f}" r="6"/>'
-        f'<circle class="mass" cx="{x1:.1f}" cy="{y1:.1f}" r="9"/><circle class="mass" cx="{x2:.1f}" cy="{y2:.1f}" r="9"/>'
-        f'<text x="{x0 - 12:.1f}" y="{y0 - 10:.1f}">shoulder</text>'
-        f'<text x="{x0 + 6:.1f}" y="{y0 + 0.62 * scale:.1f}">q.shoulder</text>'
-        f'<text x="{x1 + 14:.1f}" y="{y1 - 6:.1f}">elbow, 1 kg</text>'
-        f'<text x="{end[0] + 4:.1f}" y="{end[1] + 14:.1f}">q.elbow</text>'
+        f'<svg class="arm" viewBox="0 0 330 {_HEIGHT:g}" role="img" aria-label="The arm hangs from the shoulder; each angle '
+        'is measured from straight on">'
+        f'<line class="dashed" x1="{x0:.1f}" y1="{y0:.1f}" x2="{x0:.1f}" y2="{y0 + scale:.1f}"/>'
+        f'<line class="dashed" x1="{x1:.1f}" y1="{y1:.1f}" x2="{x:.1f}" y2="{y:.1f}"/>'
+        f'<polyline points="{x0:.1f},{y0:.1f} {x1:.1f},{y1:.1f} {x2:.1f},{y2:.1f}"/><circle cx="{x0:.1f}" cy="{y0:.1f}" r="5"/>'
+        f'<circle class="mass" cx="{x1:.1f}" cy="{y1:.1f}" r="8"/><circle class="mass" cx="{x2:.1f}" cy="{y2:.1f}" r="8"/>'
+        f'<text x="{x0 + 12:.1f}" y="{y0 + 4:.1f}">shoulder, fixed</text>'
+        f'<text x="4" y="{y0 + scale + 16:.1f}">q.shoulder</text>'
+        f'<text x="{x1 + 14:.1f}" y="{y1 - 4:.1f}">elbow, 1 kg</text>'
+        f'<text x="{x - 20:.1f}" y="{y + 16:.1f}">q.elbow</text>'
         f'<text x="{x2 + 14:.1f}" y="{y2 + 5:.1f}">1 kg</text></svg>'
     )

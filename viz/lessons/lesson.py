@@ -138,7 +138,8 @@ def page(
         f'<section class="screen" id="start">\n<h2>Before you begin <small>{MINUTES} minutes</small></h2>\n'
         f"<p>About {minutes} minutes, for those who know derivatives. On every screen predict first, then reveal. Keys: A to "
         "F choose, the arrows turn the pages, Tab and Enter do all else. The address keeps the guesses: a bookmark is a "
-        "score. A term with dots below is explained where you press it, and in the glossary at the end.</p>\n"
+        "score. A term with dots below is explained where you press it, and in the glossary at the end. “The paper” is "
+        "T. Kusaka and T. Tanaka, Robotics 2025, 14(9), 115.</p>\n"
         f"{introduction(subject)}\n</section>"
     )
     text = f"{start}\n{body}\n{_end(subject, chosen)}"
@@ -169,7 +170,7 @@ def _end(subject: Subject, chosen: str) -> str:
             if key != chosen
         ]
     )
-    seen = f"<p>In one sentence: {escape(_sentence(subject))}</p>\n" if chosen == "euler" else ""
+    seen = f"<p>In one sentence: {_sentence(subject)}</p>\n" if chosen == "euler" else ""
     return (
         f'<section class="screen" id="end">\n<h2>The end</h2>\n{seen}<p class="score"></p>\n'
         f"<h3>Next lessons</h3>\n<ul>{rows}</ul>\n</section>"
@@ -178,8 +179,8 @@ def _end(subject: Subject, chosen: str) -> str:
 
 def _sentence(subject: Subject) -> str:
     if not subject.verdict.differs:
-        return f"for this system the derivative by definition happens to be right. {subject.verdict.summary}"
+        return f"for this system the derivative by definition happens to be right. {subject.verdict_text}"
     return (
         "a partial derivative holds every other input, but with the Euler relation in the graph q is no input any more: "
-        f"it hangs on q̇, and ∂L/∂q comes into dp/dt at every dt. {subject.verdict.summary}"
+        f"it hangs on q̇, and ∂L/∂q comes into dp/dt at every dt. {subject.verdict_text}"
     )

@@ -17,7 +17,7 @@ TOO_LARGE = "The graphs of this system are too large to be computed many times a
 class Figure:
     """A drawing of a graph to be marked, as SVG.
 
-    task: what to mark, on paper.  answer: the sentence on the marks.
+    task: what to mark, on paper.  answer: the sentence on the marks.  blank: what is marked on paper, if it is another.
     """
 
     plain: str
@@ -25,10 +25,11 @@ class Figure:
     caption: str
     task: str
     answer: str
+    blank: str = ""
 
     def html(self, *, marked: bool = False, paper: bool = False) -> str:
         """The picture with its caption, which follows the reader's colors except on paper."""
-        svg = self.marked if marked else self.plain
+        svg = self.marked if marked else (self.blank if paper else "") or self.plain
         caption = self.answer if marked else self.caption
         return Picture("", svg if paper else to_adaptive(svg), caption, None).html()
 
@@ -62,8 +63,9 @@ class Screen:
             [f'<button type="button" class="choice"><b>{letter}</b> {text}</button>' for letter, text in self._lettered]
         )
         shown, marked = (self.figure.html(), self.figure.html(marked=True)) if self.figure else ("", "")
-        words = self.play_words if self.play or self.picture else TOO_LARGE
-        play = f'<div class="play"><h3>Try it</h3><p>{words}</p>{self.picture}<div class="board"></div></div>\n'
+        words = self.play_words if self.play else TOO_LARGE
+        board = f'<div class="walk">{self.picture}<div class="board"></div></div>' if self.picture else '<div class="board"></div>'
+        play = f'<div class="play"><h3>Try it</h3><p>{words}</p>{board}</div>\n'
         return (
             f'<section class="screen" id="{escape(self.anchor)}">\n{self._heading(number)}\n{self.story}\n{shown}\n'
             f'<div class="predict" role="group" aria-label="Predict"><p><b>Predict.</b> {self.question}</p>'

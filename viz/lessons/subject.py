@@ -53,8 +53,8 @@ class Subject:
 
     @property
     def joints(self) -> list[str]:
-        """Names of the velocities, as a person reads them."""
-        return [theme.pretty(name) for name in self.system.velocities]
+        """Names of the velocities."""
+        return list(self.system.velocities)
 
     @cached_property
     def units(self) -> dict[str, str]:
@@ -88,6 +88,11 @@ class Subject:
     def verdict(self) -> Verdict:
         """The verdict on the formulation by definition."""
         return formulation_verdict(self.scene, "by_definition")
+
+    @property
+    def verdict_text(self) -> str:
+        """The verdict in a sentence, in the letters of the lesson, as HTML."""
+        return in_letters(self.verdict.summary)
 
     @cached_property
     def slopes(self) -> Array:
@@ -167,6 +172,14 @@ def _in_turn(values: Sequence[float], n: int) -> Array:
 def lagrangian_graph(system: System) -> Graph:
     """The Lagrangian, simplified."""
     return cg.simplify(system.graph({"L": system.lagrangian}, system.q, system.qd))
+
+
+def in_letters(text: str) -> str:
+    """A sentence of a verdict in the letters of the lesson, as HTML."""
+    letters = {"tau.": "τ.", "dL/dq": "∂L/∂q", "dK/dq": "∂K/∂q", "qd ": "q̇ ", "qd.": "q̇."}
+    for plain, pretty in letters.items():
+        text = text.replace(plain, pretty)
+    return escape(text)
 
 
 def number(value: float) -> str:

@@ -61,7 +61,7 @@ def closed_loop(subject: Subject) -> Screen:
         f" The force that does this is not known beforehand. So it becomes an unknown, the {term('multiplier')} λ, beside the "
         f"{term('acceleration', 'accelerations')}: M q̈ − Jᵀλ = τ − b and J q̈ = −J̇ q̇, where J holds the slopes of z by q̇. "
         "There are as many equations as unknowns, and one elimination finds them all.</p>",
-        f"The system is at rest where the lesson began, without motors, and is let go. How large is λ of {weight} at that instant?",
+        f"The system is at rest where the lesson began, with τ = 0, and is let go. How large is λ of {weight} at that instant?",
         choices,
         right,
         "<p>λ is what it takes to keep the row at zero. It does no work, because J q̇ = 0 along every "

@@ -6,7 +6,7 @@ from html import escape
 
 import numpy as np
 
-from cgraph.extend import Array
+from cgraph.extend import Array, counted
 from dynamics import forward_dynamics, mass_matrix
 
 from ...pages.document import Table
@@ -60,7 +60,7 @@ def elimination(subject: Subject) -> Screen:
             if n > 1
             else ""
         )
-        + f" cgraph does this on the graph of L itself: the accelerations of this system take {size} nodes.</p>"
+        + f" cgraph does this on the graph of L itself: the accelerations of this system take {counted(size, 'node')}.</p>"
         + Table("Inertia", [one, "all others locked" if n > 1 else "M", "pivot"], rows).html(),
         f"The pivot is {number(free)}."
         + (" A door with a second door hinged to it is easier to push than one with both in line and welded." if n > 1 else ""),

@@ -60,7 +60,8 @@ def energy_and_step(subject: Subject) -> Screen:
         measured.answer,
         f"<p>{measured.words} {_of_euler(subject, measured)}</p>"
         + Table("rk4: largest error of a coordinate", ["dt [s]", "at the end"], rows).html(),
-        "In a damped system energy does fall: the line to compare with is the dashed one.",
+        "The line to compare with is the dashed one"
+        + (": the energy of this system does change." if braked else "; here it stays level."),
         "Move the number of steps. Orange: the energy by Euler’s method over time; blue: by rk4; dashed: by rk4 with very small steps.",
         play,
     )

@@ -51,11 +51,11 @@ def euler_edge(subject: Subject) -> Screen:
         f"held. What does {coordinate} do?",
         (
             "It stays: a velocity and a coordinate are separate inputs",
-            f"It moves by dt times the change, {number(rise)}{unit}",
+            f"It moves by {number(rise)}{unit}",
             f"It moves by {number(by_rate)}{unit}",
         ),
         1 if rise else 0,
-        f"<p>Along the edge from {pushed} through × to {coordinate} the change is multiplied by dt. In the graph of L "
+        f"<p>Along the edge from {pushed} through × to {coordinate} the change is multiplied by dt, so it is small, but it is there. In the graph of L "
         "alone there was no such edge: there q and q̇ were separate inputs, as the partial derivatives ∂L/∂q and ∂L/∂q̇ "
         "want them.</p>",
         "Listen for “but velocity does move position!” True along a motion, and the chain rule uses it; not in ∂L/∂q̇, "

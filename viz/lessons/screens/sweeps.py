@@ -4,19 +4,35 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Names, columns, cotangents
+from cgraph.extend import Names, columns, cotangents, counted
 from dynamics import inverse_dynamics
 
-from ...graph_drawing.dot import plain_drawing
+from ...graph_drawing.dot import to_dot
 from ...graph_drawing.levels import levels_of
 from ...graph_drawing.render import render_svg
 from ..glossary import term
-from ..screen import Screen
+from ..screen import Figure, Screen
 from ..subject import Subject, inline, lagrangian_graph, number
 
+if TYPE_CHECKING:
+    from graphviz import Digraph
+
+# fmt: off   (a table of rules)
+RULES = {
+    "add": "+ passes it to both arguments as it is",
+    "sub": "− passes it to the first argument as it is, to the second with the other sign",
+    "neg": "− passes it on with the other sign",
+    "mul": "× passes to each factor its slope times the other factor",
+    "cos": "cos x passes to x its slope times −sin x",
+    "sin": "sin x passes to x its slope times cos x",
+    "pow": "xʸ passes to x its slope times y xʸ⁻¹, such as 2x for a square",
+}
+# fmt: on
+OTHERS = "any other operation passes on its slope times its own derivative"
 ROWS = 120  # nodes that the page walks through
 DRAWN = 40  # nodes, at most, of a graph that is drawn
 PUSH = 0.1  # by which a coordinate is changed
@@ -46,7 +62,7 @@ def formula_graph(subject: Subject) -> Screen:
         f"a number, or one operation. An {term('edge')}, an arrow, leads from a node to every operation that uses it. "
         f"This graph has {len(graph.nodes)} nodes; inputs are at the bottom, L is at the top.</p>"
         f"<p>To compute L one walks from the bottom to the top, in a {term('forward sweep')}: every node computes its value "
-        "from the values below it.</p>" + _picture(subject, graph, "values"),
+        "from the values below it. v₁, v₂, … are names of values on the way.</p>" + _told_picture(graph),
         f"{shown} is changed by {PUSH:g}{subject.unit(name)}. All other inputs, the velocities too, are held. What does "
         "L do?",
         ("It changes", "It stays as it is", f"It changes only if {subject.told(f'qd{subject.system.n - 1}')} changes, too"),
@@ -56,7 +72,8 @@ def formula_graph(subject: Subject) -> Screen:
         f"L is {number(before)} in this moment.",
         f"Press Next and watch the values go up, as in the picture, from the inputs to L.{_left_out(graph)}",
         {"kind": "sweeps", "rows": _rows(subject, graph, "values"), "slopes": False},
-        _told_picture(graph),
+        _picture(subject, graph, "values"),
+        _figure(subject, graph, values=True),
     )
 
 
@@ -71,10 +88,7 @@ def backward_sweep(subject: Subject) -> Screen:
         "much L changes for each unit of an input.</p><p>They are found by the "
         f"{term('chain rule')}, node by node, in a {term('backward sweep')} from the top to the bottom. L itself has the "
         "slope 1. Then every node passes its slope down to what it is made of:</p>"
-        "<ul><li>+ passes it on as it is, − to its second argument with the other sign,</li>"
-        "<li>× passes to each factor its slope times the other factor,</li>"
-        "<li>cos x passes its slope times −sin x.</li></ul>"
-        "<p>Where two edges leave a node, what comes back by them adds up.</p>",
+        f"<ul>{_rules(graph)}</ul><p>Where several edges leave a node, what comes back by them adds up.</p>",
         f"How many backward sweeps over the graph give all {slopes} slopes?",
         ("1", f"{slopes}, one for each slope", f"{len(graph.nodes)}, one for each node"),
         0,
@@ -85,7 +99,8 @@ def backward_sweep(subject: Subject) -> Screen:
         "Step through both sweeps, values upwards, then slopes downwards, as in the picture. Multiply a few of the slopes "
         f"by hand.{_left_out(graph)}",
         {"kind": "sweeps", "rows": _rows(subject, graph, "slopes"), "slopes": True},
-        _picture(subject, graph, "slopes") + _told_picture(graph),
+        _picture(subject, graph, "slopes"),
+        _figure(subject, graph, values=False),
     )
 
 
@@ -103,14 +118,21 @@ def forward_sweep(subject: Subject) -> Screen:
         f"<p>Written out, these are tables of {subject.system.n} × {subject.system.nq + subject.system.n} slopes times the rates. But a "
         f"{term('forward sweep')} over the graph of p carries with every node the rate of its value: it starts with the "
         "rates q̇ and q̈ at the inputs and ends with dp/dt at the top. No table is ever made.</p>",
-        f"The graph of τ with every slope written out has {written} nodes. The one by a forward sweep has …",
+        f"The graph of τ with every slope written out has {counted(written, 'node')}. The one by a forward sweep has …",
         ("fewer", "as many", "more"),
         0 if swept < written else 1 if swept == written else 2,
-        f"<p>{swept} nodes for {written}."
+        f"<p>{counted(swept, 'node')} for {written}."
         + (" With one coordinate the table has little in it, so there is little to be saved." if subject.system.n == 1 else "")
         + " q and q̇ stay two separate inputs: there is no dt and no earlier state.</p>",
         "Both are right, to the last digits; they differ in size alone.",
     )
+
+
+def _rules(graph: Graph) -> str:
+    """The chain rule at the operations of a graph, as items of a list."""
+    ops = {node.op.name for node in graph.nodes if node.args}
+    rules = [text for name, text in RULES.items() if name in ops]
+    return "".join([f"<li>{text};</li>" for text in rules + [OTHERS] * bool(ops - {*RULES})])
 
 
 def _left_out(graph: Graph) -> str:
@@ -128,33 +150,85 @@ def _used(graph: Graph) -> set[Node]:
 
 
 def _picture(subject: Subject, graph: Graph, name: str) -> str:
-    """The graph of L, where it is small enough."""
+    """The graph of L to light up, where it is small enough."""
     if len(graph.nodes) > DRAWN:
         return ""
-    return inline(render_svg(plain_drawing(graph, subject.names)), name, "The graph of L, inputs at the bottom")
+    return inline(render_svg(_drawing(graph, subject.names, _called(graph))), name, "The graph of L, inputs at the bottom")
+
+
+def _figure(subject: Subject, graph: Graph, *, values: bool) -> Figure | None:
+    """The graph of L to write values at, or slopes where the values are there."""
+    if len(graph.nodes) > DRAWN:
+        return None
+    found, slopes = ({node: number(x) for node, x in each.items()} for each in _numbers(subject, graph))
+    texts = [(_called(graph), ""), (found, " = "), (slopes, ": slope ")]  # at operations, and after the name of an input
+    plain, marked = (
+        render_svg(_drawing(graph, _after(subject, at, sign) if sign else subject.names, at))
+        for at, sign in (texts[:2] if values else texts[1:])
+    )
+    if values:
+        return Figure(
+            plain,
+            marked,
+            "The graph of L. Inputs are at the bottom; the numbers 1 and 2 at edges tell arguments apart; xʸ is a power.",
+            "Write the value of every node beside it, from the bottom to the top, with two digits.",
+            "The values of all nodes.",
+        )
+    return Figure(
+        plain,
+        marked,
+        "The graph of L. Its values were computed on the screen before.",
+        "Write the slope of L by every node beside it, from the top to the bottom. Begin with 1 at the top, and take the "
+        "values from picture 1.",
+        "The slopes of L by all nodes. At the bottom are ∂L/∂q and p = ∂L/∂q̇.",
+        render_svg(_drawing(graph, subject.names, _called(graph))),
+    )
+
+
+def _drawing(graph: Graph, names: Mapping[str, str], at: Mapping[Node, str]) -> Digraph:
+    operations = {node: text for node, text in at.items() if node.args}
+    return to_dot(graph, names=names, formulas=operations, clusters=False, legend=False)
+
+
+def _after(subject: Subject, at: Mapping[Node, str], sign: str) -> dict[str, str]:
+    """Names of the inputs with their numbers."""
+    shown = {str(node.name): f"{subject.shown(str(node.name))}{sign}{text}" for node, text in at.items() if not node.args}
+    return {**subject.names, **shown}
+
+
+def _called(graph: Graph) -> dict[Node, str]:
+    """v7 of every operation: the numbers of the listing, and of the equations on the page."""
+    numbers = Names(graph).number
+    return {node: f"v{numbers[node]}" for node in graph.nodes if node.args}
+
+
+def _numbers(subject: Subject, graph: Graph) -> tuple[dict[Node, float], dict[Node, float]]:
+    """Values, and slopes of L, of all nodes that are no numbers."""
+    (end,) = graph.outputs.values()
+    nodes = [node for node in graph.nodes if node.value is None]
+    bars = cotangents({end: cg.constant(1.0)}, nodes)
+    values = subject.evaluate(Graph(graph.inputs, {str(k): node for k, node in enumerate(nodes)}))
+    slopes = subject.evaluate(Graph(graph.inputs, {str(k): bar for k, bar in enumerate(bars)}))
+    return dict(zip(nodes, values.tolist(), strict=True)), dict(zip(nodes, slopes.tolist(), strict=True))
 
 
 def _rows(subject: Subject, graph: Graph, picture: str) -> list[dict[str, object]]:
     """The nodes from the bottom of the picture up: formula, value, slope of L by the node, and what an input's slope is."""
     (end,) = graph.outputs.values()
     levels, place = levels_of(graph), {node: k for k, node in enumerate(graph.nodes)}
-    nodes = sorted([node for node in graph.nodes if node.value is None], key=lambda node: (levels[node], place[node]))
-    nodes = nodes[-ROWS:]
-    bars = cotangents({end: cg.constant(1.0)}, nodes)
-    values = subject.evaluate(Graph(graph.inputs, {str(k): node for k, node in enumerate(nodes)}))
-    slopes = subject.evaluate(Graph(graph.inputs, {str(k): bar for k, bar in enumerate(bars)}))
-    numbers = Names(graph).number  # those of the listing, and of the equations on the page
-    called = {node: f"v{numbers[node]}" if node.args else subject.shown(str(node.name)) for node in nodes}
+    values, slopes = _numbers(subject, graph)
+    nodes = sorted(values, key=lambda node: (levels[node], place[node]))[-ROWS:]
+    called = {**{node: subject.shown(str(node.name)) for node in nodes if not node.args}, **_called(graph)}
     return [
         {
             "node": "L" if node is end else called[node],
             "box": f"{picture}-n{place[node]}",
             "text": _text(node, called) if node.args else "",
-            "value": value if math.isfinite(value) else None,
-            "slope": slope if math.isfinite(slope) else None,
+            "value": values[node] if math.isfinite(values[node]) else None,
+            "slope": slopes[node] if math.isfinite(slopes[node]) else None,
             "what": _what(node),
         }
-        for node, value, slope in zip(nodes, values.tolist(), slopes.tolist(), strict=True)
+        for node in nodes
     ]
 
 

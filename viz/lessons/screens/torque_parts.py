@@ -42,7 +42,7 @@ def torque_parts(subject: Subject) -> Screen:
         3,
         f"<p>In the moment that the lesson began with, the system moves. The {term('generalized force', subject.force)} τ that "
         f"drives {_each(subject)} has three parts that add up: <b>inertia</b>, which vanishes with q̈; what the <b>velocity</b> does, which vanishes "
-        "with q̇, such as what pulls outwards in a curve; and what the <b>position</b> does, which remains at rest.</p>",
+        "with q̇; and what the <b>position</b> does, which remains at rest.</p>",
         f"Which part is the largest at <b>{name}</b> in this moment?",
         PARTS,
         int(sizes.argmax()),

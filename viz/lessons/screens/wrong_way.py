@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from html import escape
+
 import numpy as np
 
 from cgraph import Graph
@@ -25,8 +27,9 @@ def wrong_way(subject: Subject) -> Screen:
     torque = subject.evaluate(right)
     errors = [(dt, after_a_step(subject, subject.verdict.graph, dt) - torque) for dt in STEPS]
     answer = _answer(subject, errors, torque)
-    k, name = subject.watched, subject.joints[subject.watched]
-    slope = f"∂L/∂q.{name}"
+    k = subject.watched
+    name = escape(subject.joints[k])
+    slope = f"∂L/∂q.{subject.joints[k]}"
     return Screen(
         "wrong-way",
         "The derivative goes the wrong way",
@@ -96,11 +99,11 @@ def _momenta(subject: Subject) -> str:
 
 def _reveal(subject: Subject, answer: int, errors: list[tuple[float, Array]], slope: str, k: int) -> str:
     joints = subject.joints[:SHOWN]
-    rows = [[number(dt), *[number(error) for error in each[: len(joints)]]] for dt, each in errors]
+    rows = [[f"{dt:g}".replace("e-0", "e-"), *[number(error) for error in each[: len(joints)]]] for dt, each in errors]
     unit = subject.unit(f"tau{k}").strip()
     steps = Table(f"Error of dp/dt by definition{unit and f' [{unit}]'}", ["dt [s]", *joints], rows).html()
     if answer == NONE:
-        return f"<p>{subject.verdict.summary}</p>{steps}"
+        return f"<p>{subject.verdict_text}</p>{steps}"
     law = (
         "<p>The derivative of dt · ∂L/∂q with respect to dt is ∂L/∂q + dt · (…), by the product rule. The second part "
         "vanishes with dt. The first does not have dt in it any more: by definition, dp/dt tends to dp/dt + <b>∂L/∂q</b>. "
@@ -112,12 +115,12 @@ def _reveal(subject: Subject, answer: int, errors: list[tuple[float, Array]], sl
     name = f"tau{k}"
     shown = equations(Graph(terms.inputs, {name: terms.outputs[name]}), {**subject.names, name: slope})
     return (
-        f"{law}At {subject.joints[k]} the term that is too much is</p>{shown}<p>which is <b>{number(subject.slopes[k])}"
+        f"{law}At {escape(subject.joints[k])} the term that is too much is</p>{shown}<p>which is <b>{number(subject.slopes[k])}"
         f"{subject.unit(name)}</b> in this moment, the last line of the table.</p>{steps}"
     )
 
 
 def _everywhere(subject: Subject) -> str:
     if not subject.verdict.differs:
-        return subject.verdict.summary
+        return subject.verdict_text
     return "Where it is not zero, the error stays."
