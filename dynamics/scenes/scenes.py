@@ -170,7 +170,9 @@ def chain(n: int = 10) -> Scene:
     return Scene("chain", f"a chain of {n} equal rods, let go at 45 degrees", arm, start, (0.0,) * n, 3.0)
 
 
-_SCENES: dict[str, Callable[..., Scene]] = {each.__name__: each for each in (spring_mass, two_link, triple_pendulum, chain)}
+_SCENES: dict[str, Callable[..., Scene]] = {
+    each.__name__: each for each in (spring_mass, two_link, triple_pendulum, chain)
+}
 _SUFFIXES = (".xml", ".urdf")
 
 

@@ -23,17 +23,23 @@ def add(parser: Command) -> None:
     parser.add_argument("--worksheet", type=Path, metavar="FILE", help="file for a worksheet to be printed: .html")
     parser.add_argument("--key", type=Path, metavar="FILE", help="file for the answers, for the teacher: .html")
     parser.add_argument("--subject", default="euler", metavar="SUBJECT", help="one of {subjects}; default: euler")
-    parser.add_argument("--title", default="", metavar="TEXT", help="what stands at the top, in place of the subject's title")
+    parser.add_argument(
+        "--title", default="", metavar="TEXT", help="what stands at the top, in place of the subject's title"
+    )
     parser.add_argument("--author", default="", metavar="TEXT", help="name below the title")
     may_open(parser)
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=partial(run, parser))
 
 
-def run(options: argparse.Namespace) -> None:
+def run(parser: Command, options: argparse.Namespace) -> None:
     """Write the pages that are asked for."""
-    targets = {form: path for form, path in (("page", options.out), ("worksheet", options.worksheet), ("key", options.key)) if path}
+    targets = {
+        form: path
+        for form, path in (("page", options.out), ("worksheet", options.worksheet), ("key", options.key))
+        if path
+    }
     if not targets:
-        raise ValueError("a lesson needs a file to write: --out, --worksheet or --key")
+        parser.error("one of --out, --worksheet and --key is required")
     for option, path in (("--out", options.out), ("--worksheet", options.worksheet), ("--key", options.key)):
         library.html_target(option, path)
     if len({path.resolve() for path in targets.values()}) < len(targets):
@@ -43,7 +49,9 @@ def run(options: argparse.Namespace) -> None:
     make = partial(library.lesson, scene, subject=options.subject, title=options.title, author=options.author)
     texts = {path: make(form=form) for form, path in targets.items()}
     lesson = library.LESSONS[options.subject]
-    about = f"{len(lesson.screens)} question{'s' * (len(lesson.screens) != 1)} on {scene.name}, {lesson.minutes} minutes"
+    about = (
+        f"{len(lesson.screens)} question{'s' * (len(lesson.screens) != 1)} on {scene.name}, {lesson.minutes} minutes"
+    )
     words = {"page": about, "worksheet": "worksheet, to be printed", "key": "answers to it"}
     lines = [f"{path}: {words[form]}; {len(texts[path].encode()) / 1e3:.0f} kB" for form, path in targets.items()]
     answer("\n".join(lines), texts, show=next(iter(targets.values())) if options.open else None)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from html import escape
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 from cgraph.extend import require_choice, write_files
 from dynamics.scenes.scenes import names
@@ -58,7 +58,7 @@ def lesson(
     path: str | os.PathLike[str] | None = None,
     *,
     subject: str = "euler",
-    form: Literal["page", "worksheet", "key"] = "page",
+    form: str = "page",
     title: str = "",
     author: str = "",
 ) -> Page:

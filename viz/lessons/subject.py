@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from html import escape
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,7 +23,11 @@ from dynamics.systems.model import Model
 from dynamics.systems.system import System
 
 from .. import theme
+from ..graph_drawing.render import render_svg
 from ..pages.operations import graph_data
+
+if TYPE_CHECKING:
+    from graphviz import Digraph
 
 DT = 1e-3  # s, of the embedded formulations
 LARGEST_GRAPH = 4000  # nodes that the page computes many times a second
@@ -33,6 +38,7 @@ _RADIANS = {
     for i in range(2)
     for kind, unit in {"q": "rad", "q_old": "rad", "qd": "rad/s", "qdd": "rad/s²", "tau": "N m", "p": "N m s"}.items()
 }  # of the two-link arm, whose Lagrangian is written out
+_FORCES = {"N m": "torque", "N": "force"}
 _SPEEDS, _ACCELERATIONS, _BENDS = (1.0, -0.8, 0.6), (0.5, 1.0, -0.7), (0.0, -0.8, 0.9)  # in turn, for the joints
 
 
@@ -72,7 +78,7 @@ class Subject:
     def force(self) -> str:
         """What tau is called: a torque, a force, or what stands for both."""
         kinds = {self.units.get(f"tau{i}") for i in range(self.system.n)}
-        return {("N m",): "torque", ("N",): "force"}.get(tuple(map(str, kinds)), "generalized force")
+        return _FORCES.get(next(iter(kinds)) or "", "generalized force") if len(kinds) == 1 else "generalized force"
 
     def unit(self, name: str) -> str:
         """A space and the unit of an input or output; nothing where the model has none."""
@@ -135,6 +141,17 @@ class Subject:
             {"name": name, "shown": self.with_unit(name), "low": -REACH, "high": REACH, "value": self.values[name]}
             for name in names
         ]
+
+    @cached_property
+    def _drawn(self) -> dict[str, str]:
+        return {}
+
+    def svg(self, drawing: Digraph) -> str:
+        """A drawing as SVG, made once where it is used more than once."""
+        source = drawing.source
+        if source not in self._drawn:
+            self._drawn[source] = render_svg(source)
+        return self._drawn[source]
 
     def play(self, kind: str, graphs: Mapping[str, Graph], **other: object) -> dict[str, object] | None:
         """Data by which the page's script draws these graphs at its state; None where they are too large for it."""

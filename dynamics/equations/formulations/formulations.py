@@ -320,9 +320,7 @@ def after_a_step(system: System) -> Graph:
     """
     embedding = _Embedding(system)
     (lagrangian,) = embedding.embed(system.lagrangian)
-    return system.graph(
-        {"L": lagrangian} | {f"q{i}": node for i, node in enumerate(embedding.q)}, embedding.inputs
-    )
+    return system.graph({"L": lagrangian} | {f"q{i}": node for i, node in enumerate(embedding.q)}, embedding.inputs)
 
 
 def _embedded(system: System, energy: Node, through: Node = ONE) -> LagrangeTerms:

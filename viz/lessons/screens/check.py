@@ -13,7 +13,6 @@ from dynamics.equations.formulations.formulation_sizes import INERTIAL_TERM, bla
 from ... import theme
 from ...graph_drawing.dot import plain_drawing
 from ...graph_drawing.legend import kinds_in, legend_svg, to_adaptive
-from ...graph_drawing.render import render_svg
 from ...pages.document import Picture, Table
 from ...pages.formulation_table import TITLES, WHY_FEWER, size_table
 from ..glossary import term
@@ -127,7 +126,10 @@ def _second_try(subject: Subject) -> str:
 def _sizes(subject: Subject) -> str:
     """The sizes of the graphs, for those who ask."""
     sizes = size_table(formulation_sizes(subject.system)).html()
-    why = f"<p>{in_letters(subject.verdict.lacking) or WHY_FEWER.replace('torque', subject.force)}</p>" * subject.verdict.differs
+    why = (
+        f"<p>{in_letters(subject.verdict.lacking) or WHY_FEWER.replace('torque', subject.force)}</p>"
+        * subject.verdict.differs
+    )
     pictures = _pictures(subject)
     return f"<details><summary>How large the graphs are, and how much of them is there by mistake</summary>{sizes}{why}{pictures}</details>"
 
@@ -142,7 +144,7 @@ def _pictures(subject: Subject) -> str:
         if not pictures:
             legend = legend_svg(kinds_in(graph, marked=wrong))
             pictures = Picture("", to_adaptive(legend), "The colors of both pictures.", None).html()
-        svg = render_svg(plain_drawing(graph, subject.names, wrong, edges))
+        svg = subject.svg(plain_drawing(graph, subject.names, wrong, edges))
         caption = (
             f"The inertial term, {TITLES[formulation]}: {len(wrong)} of {len(graph.nodes)} nodes are there by mistake."
         )

@@ -19,7 +19,7 @@ from ..screen import Screen
 from ..subject import Subject, number
 
 FACTORS = (2, 4, 16)  # by which the error of a method of order 1, 2 or 4 shrinks
-STEPS, FINE = (100, 30, 10), 16  # of the coarse motion, and how many of the reference's there are in one
+STEPS, FINE = (300, 100, 30, 10), 16  # of the coarse motion, and how many of the reference's there are in one
 LONGEST_MOTION, HALVINGS = 1.0, 20  # s, of the motion whose order is measured, and how often it is halved
 ROUNDING_ERROR = 1e-12  # of the largest coordinate: an error that says nothing about a method
 SMALL_ERROR = 1e-5  # of the largest coordinate: an error that has not grown beyond its order

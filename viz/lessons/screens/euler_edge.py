@@ -8,7 +8,6 @@ from cgraph import Graph, Node, constant
 from dynamics.equations.formulations.formulations import COUPLING, EULER, after_a_step
 
 from ...graph_drawing.dot import to_dot
-from ...graph_drawing.render import render_svg
 from ..glossary import term
 from ..screen import Figure, Screen
 from ..subject import DT, Subject, number
@@ -82,7 +81,7 @@ def _figure(subject: Subject) -> Figure:
     edges = [edge for edge in graph.edges if COUPLING in edge.target.tags and edge.source.name != "dt"]
     into = [edge for edge in graph.edges if COUPLING in edge.source.tags]
     plain, marked = (
-        render_svg(
+        subject.svg(
             to_dot(graph, names=subject.names, collapse=[INSIDE], clusters=False, legend=False, marked_edges=each)
         )
         for each in ((), [*edges, *into])

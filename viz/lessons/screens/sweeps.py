@@ -13,7 +13,6 @@ from dynamics import inverse_dynamics
 
 from ...graph_drawing.dot import to_dot
 from ...graph_drawing.levels import levels_of
-from ...graph_drawing.render import render_svg
 from ..glossary import term
 from ..screen import Figure, Screen
 from ..subject import Subject, inline, lagrangian_graph, number
@@ -65,7 +64,11 @@ def formula_graph(subject: Subject) -> Screen:
         "from the values below it. v₁, v₂, … are names of values on the way.</p>" + _told_picture(graph),
         f"{shown} is changed by {PUSH:g}{subject.unit(name)}. All other inputs, the velocities too, are held. What does "
         "L do?",
-        ("It changes", "It stays as it is", f"It changes only if {subject.told(f'qd{subject.system.n - 1}')} changes, too"),
+        (
+            "It changes",
+            "It stays as it is",
+            f"It changes only if {subject.told(f'qd{subject.system.n - 1}')} changes, too",
+        ),
         0 if changes else 1,
         why + "<p>In this graph a coordinate q and its velocity q̇ are two inputs of their own: no edge leads from one "
         "to the other. Keep this in mind.</p>",
@@ -122,7 +125,11 @@ def forward_sweep(subject: Subject) -> Screen:
         ("fewer", "as many", "more"),
         0 if swept < written else 1 if swept == written else 2,
         f"<p>{counted(swept, 'node')} for {written}."
-        + (" With one coordinate the table has little in it, so there is little to be saved." if subject.system.n == 1 else "")
+        + (
+            " With one coordinate the table has little in it, so there is little to be saved."
+            if subject.system.n == 1
+            else ""
+        )
         + " q and q̇ stay two separate inputs: there is no dt and no earlier state.</p>",
         "Both are right, to the last digits; they differ in size alone.",
     )
@@ -153,7 +160,9 @@ def _picture(subject: Subject, graph: Graph, name: str) -> str:
     """The graph of L to light up, where it is small enough."""
     if len(graph.nodes) > DRAWN:
         return ""
-    return inline(render_svg(_drawing(graph, subject.names, _called(graph))), name, "The graph of L, inputs at the bottom")
+    return inline(
+        subject.svg(_drawing(graph, subject.names, _called(graph))), name, "The graph of L, inputs at the bottom"
+    )
 
 
 def _figure(subject: Subject, graph: Graph, *, values: bool) -> Figure | None:
@@ -161,9 +170,13 @@ def _figure(subject: Subject, graph: Graph, *, values: bool) -> Figure | None:
     if len(graph.nodes) > DRAWN:
         return None
     found, slopes = ({node: number(x) for node, x in each.items()} for each in _numbers(subject, graph))
-    texts = [(_called(graph), ""), (found, " = "), (slopes, ": slope ")]  # at operations, and after the name of an input
+    texts = [
+        (_called(graph), ""),
+        (found, " = "),
+        (slopes, ": slope "),
+    ]  # at operations, and after the name of an input
     plain, marked = (
-        render_svg(_drawing(graph, _after(subject, at, sign) if sign else subject.names, at))
+        subject.svg(_drawing(graph, _after(subject, at, sign) if sign else subject.names, at))
         for at, sign in (texts[:2] if values else texts[1:])
     )
     if values:
@@ -181,7 +194,7 @@ def _figure(subject: Subject, graph: Graph, *, values: bool) -> Figure | None:
         "Write the slope of L by every node beside it, from the top to the bottom. Begin with 1 at the top, and take the "
         "values from picture 1.",
         "The slopes of L by all nodes. At the bottom are ∂L/∂q and p = ∂L/∂q̇.",
-        render_svg(_drawing(graph, subject.names, _called(graph))),
+        subject.svg(_drawing(graph, subject.names, _called(graph))),
     )
 
 
@@ -192,7 +205,9 @@ def _drawing(graph: Graph, names: Mapping[str, str], at: Mapping[Node, str]) -> 
 
 def _after(subject: Subject, at: Mapping[Node, str], sign: str) -> dict[str, str]:
     """Names of the inputs with their numbers."""
-    shown = {str(node.name): f"{subject.shown(str(node.name))}{sign}{text}" for node, text in at.items() if not node.args}
+    shown = {
+        str(node.name): f"{subject.shown(str(node.name))}{sign}{text}" for node, text in at.items() if not node.args
+    }
     return {**subject.names, **shown}
 
 

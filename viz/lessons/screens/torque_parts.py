@@ -20,7 +20,7 @@ MOVED = 3  # joints with three sliders
 
 def torque_parts(subject: Subject) -> Screen:
     """The screen of a system."""
-    graph, system = inverse_dynamics(subject.system, "chain_rule"), subject.system
+    graph = inverse_dynamics(subject.system, "chain_rule")
     parts = _parts(subject)
     joint = int(np.abs(parts).sum(axis=0).argmax())
     sizes = np.abs(parts[:, joint])

@@ -109,7 +109,9 @@ def _reveal(subject: Subject, answer: int, errors: list[tuple[float, Array]], sl
         "vanishes with dt. The first does not have dt in it any more: by definition, dp/dt tends to dp/dt + <b>∂L/∂q</b>. "
     )
     if answer == VANISHES:
-        return f"{law}Here ∂L/∂q is zero in this moment, and so nothing of it is seen. {_everywhere(subject)}</p>{steps}"
+        return (
+            f"{law}Here ∂L/∂q is zero in this moment, and so nothing of it is seen. {_everywhere(subject)}</p>{steps}"
+        )
     terms = subject.verdict.terms
     assert terms is not None
     name = f"tau{k}"
