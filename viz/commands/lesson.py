@@ -6,6 +6,8 @@ import argparse
 from functools import partial
 from pathlib import Path
 
+from cgraph import extend
+
 from . import library
 from .arguments import answer, may_open, say, scene_of, takes_a_scene
 from .command import Command
@@ -33,14 +35,15 @@ def add(parser: Command) -> None:
 
 def run(parser: Command, options: argparse.Namespace) -> None:
     """Write the pages that are asked for."""
-    targets = {
-        form: path
-        for form, path in (("page", options.out), ("worksheet", options.worksheet), ("key", options.key))
-        if path
+    asked = {
+        "page": ("--out", options.out),
+        "worksheet": ("--worksheet", options.worksheet),
+        "key": ("--key", options.key),
     }
+    targets = {form: path for form, (_, path) in asked.items() if path}
     if not targets:
         parser.error("one of --out, --worksheet and --key is required")
-    for option, path in (("--out", options.out), ("--worksheet", options.worksheet), ("--key", options.key)):
+    for option, path in asked.values():
         library.html_target(option, path)
     if len({path.resolve() for path in targets.values()}) < len(targets):
         raise ValueError("--out, --worksheet and --key need different files")
@@ -49,9 +52,7 @@ def run(parser: Command, options: argparse.Namespace) -> None:
     make = partial(library.lesson, scene, subject=options.subject, title=options.title, author=options.author)
     texts = {path: make(form=form) for form, path in targets.items()}
     lesson = library.LESSONS[options.subject]
-    about = (
-        f"{len(lesson.screens)} question{'s' * (len(lesson.screens) != 1)} on {scene.name}, {lesson.minutes} minutes"
-    )
+    about = f"{extend.counted(len(lesson.screens), 'question')} on {scene.name}, {lesson.minutes} minutes"
     words = {"page": about, "worksheet": "worksheet, to be printed", "key": "answers to it"}
     lines = [f"{path}: {words[form]}; {len(texts[path].encode()) / 1e3:.0f} kB" for form, path in targets.items()]
     answer("\n".join(lines), texts, show=next(iter(targets.values())) if options.open else None)

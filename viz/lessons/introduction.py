@@ -11,6 +11,11 @@ from .glossary import term
 from .subject import SHOWN, Subject, lagrangian_graph, number
 
 MINUTES = 3
+_KNOWN = (
+    "<p><b>A case that you know:</b> a mass m that is lifted, at the height y. Its L is ½ m ẏ² − m g y, its momentum "
+    "p = ∂L/∂ẏ = m ẏ, and ∂L/∂y = −m g. So Lagrange’s equation says τ = m ÿ + m g: the force that accelerates it and "
+    "carries its weight.</p>"
+)
 _HEIGHT, _MARGIN = 200.0, 28.0  # px of the picture
 
 
@@ -22,7 +27,7 @@ def introduction(subject: Subject) -> str:
     meant = (
         f"<p>{_sentence(subject.scene.about)}</p>"
         f"<p>Names: <b>{name}</b> is a {term('coordinate')}, <b>{escape(subject.shown('qd0'))}</b> its "
-        f"{term('velocity')} dq/dt, read “q dot”, and <b>{escape(subject.shown('qdd0'))}</b> its {term('acceleration')}. "
+        f"{term('velocity')} dq/dt, read “q dot”, and <b>{escape(subject.shown('qdd0'))}</b> its {term('acceleration')}, “q two dots”. "
         "Throughout the lesson the system is looked at in one moment, in which it moves:</p>"
     )
     asked = (
@@ -33,6 +38,7 @@ def introduction(subject: Subject) -> str:
         f"<p>∂L/∂q is a {term('partial derivative')}: how fast L changes with q while everything else, q̇ too, is held. "
         f"L is the {term('Lagrangian')}, {term('kinetic energy')} minus {term('potential energy')}. For this system:</p>"
         + formula
+        + _KNOWN
         + ("<p>A v with a number is a part of L that is computed first.</p>" if "<mi>v</mi>" in formula else "")
     )
     return meant + _picture(subject) + _moment(subject) + _parameters(subject) + asked
@@ -58,7 +64,7 @@ def _moment(subject: Subject) -> str:
         table = Table("This moment", ["", ""], rows).html()
     units = "" if subject.units else "<p>The model states no units: any that fit one another, such as those of SI.</p>"
     more = subject.system.n - SHOWN
-    return table + units + (f"<p>The other {more} are in the same way.</p>" if more > 0 else "")
+    return table + units + (f"<p>{more} more {'is' if more == 1 else 'are'} not shown.</p>" if more > 0 else "")
 
 
 def _parameters(subject: Subject) -> str:
@@ -94,4 +100,5 @@ def _arm(shoulder: float, elbow: float) -> str:
         f'<text x="{x1 + 14:.1f}" y="{y1 - 4:.1f}">elbow, 1 kg</text>'
         f'<text x="{x - 20:.1f}" y="{y + 16:.1f}">q.elbow</text>'
         f'<text x="{x2 + 14:.1f}" y="{y2 + 5:.1f}">1 kg</text></svg>'
+        "<p>q.shoulder is measured from straight down, q.elbow from the way in which the upper link points.</p>"
     )

@@ -137,8 +137,8 @@ def page(
     start = (
         f'<section class="screen" id="start">\n<h2>Before you begin <small>{MINUTES} minutes</small></h2>\n'
         f"<p>About {minutes} minutes, for those who know derivatives. On every screen predict first, then reveal. Keys: A to "
-        "F choose, the arrows turn the pages, Tab and Enter do all else. The address keeps the guesses: a bookmark is a "
-        "score. A term with dots below is explained where you press it, and in the glossary at the end. “The paper” is "
+        "F choose, the arrows turn the pages, Tab and Enter do all else. The address of the page holds your guesses: "
+        "bookmark it to keep them. A term with dots below is explained where you press it, and in the glossary at the end. “The paper” is "
         "T. Kusaka and T. Tanaka, Robotics 2025, 14(9), 115.</p>\n"
         f"{introduction(subject)}\n</section>"
     )

@@ -152,12 +152,12 @@ const PLAYS = {
     button(buttons, "All values", () => { step = Math.max(step, count); redraw(); });
     if (play.slopes) button(buttons, "All slopes", () => { step = last; redraw(); });
     button(buttons, "Again", () => { step = 0; redraw(); });
-    const write = grid(board, ["node", "is", "value", ...(play.slopes ? ["slope of L", ""] : [])]);
+    const write = grid(board, ["node", "value", ...(play.slopes ? ["slope of L", ""] : []), "is"]);
     return () => {
       const now = step > count ? 2 * count - step : step - 1; // the row whose value or slope is new
-      const cells = rows.map((row, i) => [row.node, row.text, i < step ? digits(row.value) : "·",
-        ...(play.slopes ? (2 * count - i <= step ? [digits(row.slope), row.what] : ["·", ""]) : [])]);
-      write(cells.reverse(), (i, j) => (count - 1 - i === now && j === (step > count ? 3 : 2) ? "lit" : "")); // as in the picture
+      const cells = rows.map((row, i) => [row.node, i < step ? digits(row.value) : "·",
+        ...(play.slopes ? (2 * count - i <= step ? [digits(row.slope), row.what] : ["·", ""]) : []), row.text]);
+      write(cells.reverse(), (i, j) => (count - 1 - i === now && j === (step > count ? 2 : 1) ? "lit" : "")); // as in the picture
       rows.forEach((row, i) => document.getElementById(row.box)?.classList.toggle("lit", i === now));
     };
   },

@@ -131,6 +131,7 @@ def _sizes(subject: Subject) -> str:
         * subject.verdict.differs
     )
     pictures = _pictures(subject)
+    why = why.replace("spurious", term("spurious"), 1)
     return f"<details><summary>How large the graphs are, and how much of them is there by mistake</summary>{sizes}{why}{pictures}</details>"
 
 

@@ -44,9 +44,9 @@ def euler_edge(subject: Subject) -> Screen:
         "along its rate:</p>"
         '<p class="display">q̇ = q̈ dt + q̇_old &nbsp; and &nbsp; <b>q = q̇ dt + q_old</b></p>'
         f"<p>The second is the {term('Euler relation')}. The inputs are now the {term('state')} before the step, marked "
-        "_old, the accelerations and dt. The picture shows the step, with the graph of L as one box; “×2” at an edge "
-        "stands for two edges.</p>",
-        f"In <em>this</em> graph {pushed} is raised by 1{speed}. dt = {DT:g} s and {subject.told(name + '_old')} are "
+        "_old, the accelerations and dt. The picture shows the step, with the graph of L as one box. The node with "
+        f"{coordinate} in it adds up that coordinate; “×2” at an edge stands for two edges.</p>",
+        f"In <em>this</em> graph {pushed} is raised by 1{speed}, through its input {subject.told(velocity + '_old')}. dt = {DT:g} s and {subject.told(name + '_old')} are "
         f"held. What does {coordinate} do?",
         (
             "It stays: a velocity and a coordinate are separate inputs",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from html import escape
 from typing import TYPE_CHECKING
 
 import cgraph as cg
@@ -32,7 +33,7 @@ RULES = {
 }
 # fmt: on
 OTHERS = "any other operation passes on its slope times its own derivative"
-ROWS = 120  # nodes that the page walks through
+ROWS = 60  # nodes that the page walks through
 DRAWN = 40  # nodes, at most, of a graph that is drawn
 PUSH = 0.1  # by which a coordinate is changed
 
@@ -91,7 +92,7 @@ def backward_sweep(subject: Subject) -> Screen:
         "much L changes for each unit of an input.</p><p>They are found by the "
         f"{term('chain rule')}, node by node, in a {term('backward sweep')} from the top to the bottom. L itself has the "
         "slope 1. Then every node passes its slope down to what it is made of:</p>"
-        f"<ul>{_rules(graph)}</ul><p>Where several edges leave a node, what comes back by them adds up.</p>",
+        f"<ul>{_rules(graph)}</ul>{_example(subject, graph)}<p>Where several edges leave a node, what comes back by them adds up.</p>",
         f"How many backward sweeps over the graph give all {slopes} slopes?",
         ("1", f"{slopes}, one for each slope", f"{len(graph.nodes)}, one for each node"),
         0,
@@ -142,6 +143,26 @@ def _rules(graph: Graph) -> str:
     return "".join([f"<li>{text};</li>" for text in rules + [OTHERS] * bool(ops - {*RULES})])
 
 
+def _example(subject: Subject, graph: Graph) -> str:
+    """The rule of a product at the highest node that is a number times another node."""
+    _, slopes = _numbers(subject, graph)
+    called, levels = _called(graph), levels_of(graph)
+    products = [
+        node for node in called if node.op.name == "mul" and sum([arg.value is not None for arg in node.args]) == 1
+    ]
+    if not products:
+        return ""
+    node = max(products, key=lambda each: (levels[each], slopes[each]))
+    factor, other = sorted(node.args, key=lambda arg: arg.value is None)
+    assert factor.value is not None
+    name = called.get(other) or subject.shown(str(other.name))
+    slope, passed = number(slopes[node]), number(slopes[node] * factor.value)
+    return (
+        f"<p>For example, {called[node]} = {number(factor.value)} × {escape(name)} has the slope {slope}, so it passes "
+        f"{slope} × {number(factor.value)} = {passed} down to {escape(name)}.</p>"
+    )
+
+
 def _left_out(graph: Graph) -> str:
     return f" Of {len(graph.nodes)} nodes the last {ROWS} are shown." if len(graph.nodes) > ROWS else ""
 
@@ -149,7 +170,8 @@ def _left_out(graph: Graph) -> str:
 def _told_picture(graph: Graph) -> str:
     """Words in place of a picture that is not there, for a screen with something to play."""
     many = len(graph.nodes) > DRAWN
-    return f"<p>With {len(graph.nodes)} nodes the graph is too large for a picture here.</p>" if many else ""
+    told = "the same lesson on a two-link arm, <code>cgraph lesson</code>, has one"
+    return f"<p>With {len(graph.nodes)} nodes the graph is too large for a picture here; {told}.</p>" if many else ""
 
 
 def _used(graph: Graph) -> set[Node]:

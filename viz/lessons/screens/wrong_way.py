@@ -41,9 +41,9 @@ def wrong_way(subject: Subject) -> Screen:
         '<p class="display">p by definition = <b>∂L/∂q̇ + dt · ∂L/∂q</b></p>'
         + _momenta(subject)
         + f"<p>The second part is small, since dt is. Then, to get the {term('inertial term')} dp/dt, p is differentiated "
-        "with respect to dt.</p>",
-        f"We shrink dt from one second to a millionth of a second. What does the error of dp/dt by definition do, at "
-        f"<b>{name}</b>?",
+        "with respect to dt, the time that passes in this graph.</p>",
+        f"We shrink dt from one second to a millionth of a second. The error is dp/dt by definition less the right one. "
+        f"What does it do at <b>{name}</b>?",
         (
             "It vanishes with dt",
             "It tends to a number that is not zero",
