@@ -38,8 +38,8 @@ def introduction(subject: Subject) -> str:
         f"<p>∂L/∂q is a {term('partial derivative')}: how fast L changes with q while everything else, q̇ too, is held. "
         f"L is the {term('Lagrangian')}, {term('kinetic energy')} minus {term('potential energy')}. For this system:</p>"
         + formula
-        + _KNOWN
         + ("<p>A v with a number is a part of L that is computed first.</p>" if "<mi>v</mi>" in formula else "")
+        + _KNOWN
     )
     return meant + _picture(subject) + _moment(subject) + _parameters(subject) + asked
 

@@ -146,7 +146,7 @@ def closed_loop(subject: Subject, screen: Screen) -> bool:
     """Pushed by the force that is marked, the free system moves as if it were held."""
     system, n = subject.system, subject.system.n
     assert len(set(screen.choices)) == len(screen.choices) >= 2
-    force = float(screen.choices[screen.answer].replace("−", "-"))
+    force = float(screen.choices[screen.answer].split()[0].replace("−", "-"))
     way = 2.0 * subject.q if len(system.constraints) else np.eye(n)[-1]  # J, of x^2 + y^2 - 1
     push = {f"tau{i}": force * float(way[i]) for i in range(n)}
     free = dyn.forward_dynamics(system.without_constraints)

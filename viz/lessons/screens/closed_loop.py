@@ -34,7 +34,8 @@ def closed_loop(subject: Subject) -> Screen:
     first = multipliers[0]
     weight = f"<b>{escape(shown[0])}</b>"
     static = 0.0 if own or abs(weights[-1]) <= rounding else float(weights[-1])
-    choices, right = _choices(first, static)
+    unit = "" if own else subject.unit(f"tau{subject.system.n - 1}")
+    choices, right = _choices(first, static, unit)
     many = subject.system.n > 1 and not own
     still_held = np.array([answer[f"qdd{i}"] for i in range(subject.system.n)])
     rows = [[joint, *map(number, pair)]
@@ -65,11 +66,12 @@ def closed_loop(subject: Subject) -> Screen:
         choices,
         right,
         "<p>λ is what it takes to keep the row at zero. It does no work, because J q̇ = 0 along every "
-        "motion that is still possible.</p>"
+        "motion that is still possible."
+        + (f" While the rest of the system swings, λ is not the {subject.force} that would hold all of it still." if many else "")
+        + "</p>"
         + Table("Accelerations at rest", [subject.joint, "free", "held"], rows).html()
-        + Table("Multipliers", ["row", "λ"], [[a, number(b)] for a, b in zip(shown, multipliers, strict=True)][:SHOWN]).html(),
-        f"λ = {number(first)}."
-        + (f" While the rest of the system swings, it differs from the {subject.force} that holds the same place still." if many else ""),
+        + Table("Multipliers", ["row", f"λ{unit and f' [{unit.strip()}]'}"], [[a, number(b)] for a, b in zip(shown, multipliers, strict=True)][:SHOWN]).html(),
+        f"λ = {number(first)}{unit}.",
         f"Find a position where λ is zero. Would {last} stay at rest there without the clamp?" if sliders else "",
         play,
     )  # fmt: skip
@@ -102,9 +104,9 @@ def _clamped(system: System) -> System:
     )
 
 
-def _choices(force: float, static: float) -> tuple[tuple[str, ...], int]:
+def _choices(force: float, static: float, unit: str) -> tuple[tuple[str, ...], int]:
     """Three numbers, in order, and the place of the right one; static: what would hold it if nothing else moved."""
     size = max(abs(force), abs(static))
     near = [value for value in (static, -force, 0.0, 2.0 * force, 1.0, -1.0) if abs(value - force) > 0.1 * size]
     values = sorted([force, *list(dict.fromkeys([value + 0.0 for value in near]))[:2]])
-    return tuple([number(value) for value in values]), values.index(force)
+    return tuple([f"{number(value)}{unit}" for value in values]), values.index(force)
