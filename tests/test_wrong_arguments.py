@@ -293,7 +293,7 @@ CALLS = {
     "dyn.scenes.chain": call(dyn.scenes.chain, 2),
     "dyn.scenes.triple_pendulum": call(dyn.scenes.triple_pendulum, "rod"),
     "dyn.cases.load": call(dyn.cases.load, "exponential decay"),
-    "viz.lesson": call(viz.lesson, ARM, None),
+    "viz.lesson": call(viz.lesson, ARM, None, subject="torque", form="page", title="t", author="a"),
     "viz.animate": call(
         viz.animate, ARM, dyn.simulate(ARM, [0.1], [0.0], 0.04), None, kind=None, wanted=lambda t: t[:, np.newaxis],
         marked=(), speed=1.0, dark=False, title=""

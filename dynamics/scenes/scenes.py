@@ -127,6 +127,25 @@ def spring_mass() -> Scene:
     return Scene("spring_mass", about, system, (1.0,), (0.0,), 10.0)
 
 
+def two_link() -> Scene:
+    """A two-link arm of the textbook: links of 1 m without mass, 1 kg at the end of each, in a vertical plane.
+
+    Angles are relative, zero hanging straight down, as of `planar_arm`.
+    """
+
+    def lagrangian(q: Sequence[Node], qd: Sequence[Node], t: Node) -> Node:
+        first, second = qd[0], qd[0] + qd[1]
+        with cg.tag("kinetic"):
+            kinetic = first**2 + 0.5 * second**2 + first * second * cg.cos(q[1])
+        with cg.tag("potential"):
+            depth = 2.0 * cg.cos(q[0]) + cg.cos(q[0] + q[1])
+            below = 9.81 * depth  # minus the potential energy
+        return kinetic + below
+
+    about = "a two-link arm in a vertical plane: links of 1 m without mass, 1 kg at the end of each"
+    return Scene("two_link", about, System(lagrangian, ["shoulder", "elbow"]), (0.5, 1.5), (0.0, 0.0), 3.0)
+
+
 def triple_pendulum(mass_model: str = "rod") -> Scene:
     """The paper's three-link arm: masses 1.0 0.8 0.7 kg, lengths 1.0 0.8 0.7 m, damping 0.1 N m s, in free fall.
 
@@ -151,7 +170,9 @@ def chain(n: int = 10) -> Scene:
     return Scene("chain", f"a chain of {n} equal rods, let go at 45 degrees", arm, start, (0.0,) * n, 3.0)
 
 
-_SCENES: dict[str, Callable[..., Scene]] = {each.__name__: each for each in (spring_mass, triple_pendulum, chain)}
+_SCENES: dict[str, Callable[..., Scene]] = {
+    each.__name__: each for each in (spring_mass, two_link, triple_pendulum, chain)
+}
 _SUFFIXES = (".xml", ".urdf")
 
 

@@ -74,7 +74,7 @@ COMMANDS = {
     "lint": "check that a scene's equations are those of the chain rule; status 1 and the blame if they are not",
     "why": "what makes a torque, by cause and body; why it depends on an input; where a NaN comes from",
     "compare": "compare two formulations of a scene's equations, node by node; status 1 where they differ",
-    "lesson": "a page for a class, on any scene: predict, reveal, play; with answers",
+    "lesson": "a page for a class, on any scene: predict, reveal, try; a worksheet, and the key to it",
     "completion": "a script that lets the Tab key complete commands and options",
 }
 

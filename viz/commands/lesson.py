@@ -1,31 +1,58 @@
-"""`cgraph lesson`: a lesson on a system, six screens to predict, reveal and play with."""
+"""`cgraph lesson`: a lesson on a system, questions to predict and to try, with a worksheet and its key."""
 
 from __future__ import annotations
 
 import argparse
+from functools import partial
+from pathlib import Path
+
+from cgraph import extend
 
 from . import library
-from .arguments import answer_page, say, scene_of, takes_a_scene, writes_a_page
+from .arguments import answer, may_open, say, scene_of, takes_a_scene
 from .command import Command
 
-DEFAULT = "spring_mass"
+DEFAULT = "two_link"
 
 
 def add(parser: Command) -> None:
     """The command's arguments."""
     takes_a_scene(parser, default=DEFAULT)
-    writes_a_page(parser)
-    parser.set_defaults(run=run)
-
-
-def run(options: argparse.Namespace) -> None:
-    """Write the page."""
-    library.html_target("--out", options.out)
-    scene = scene_of(options)
-    say(f"{scene.name}: deriving the equations and answers of {len(library.SCREENS)} screens")
-    text = library.lesson(scene)
-    answer_page(
-        options,
-        f"{options.out}: {len(library.SCREENS)} screens on {scene.name}; {len(text.encode()) / 1e3:.0f} kB",
-        text,
+    parser.names["subjects"] = lambda: [
+        f"{name} ({each.title}, {each.minutes} minutes)" for name, each in library.LESSONS.items()
+    ]
+    parser.add_argument("--out", type=Path, help="file to write the lesson to: .html")
+    parser.add_argument("--worksheet", type=Path, metavar="FILE", help="file for a worksheet to be printed: .html")
+    parser.add_argument("--key", type=Path, metavar="FILE", help="file for the answers, for the teacher: .html")
+    parser.add_argument("--subject", default="euler", metavar="SUBJECT", help="one of {subjects}; default: euler")
+    parser.add_argument(
+        "--title", default="", metavar="TEXT", help="what stands at the top, in place of the subject's title"
     )
+    parser.add_argument("--author", default="", metavar="TEXT", help="name below the title")
+    may_open(parser)
+    parser.set_defaults(run=partial(run, parser))
+
+
+def run(parser: Command, options: argparse.Namespace) -> None:
+    """Write the pages that are asked for."""
+    asked = {
+        "page": ("--out", options.out),
+        "worksheet": ("--worksheet", options.worksheet),
+        "key": ("--key", options.key),
+    }
+    targets = {form: path for form, (_, path) in asked.items() if path}
+    if not targets:
+        parser.error("one of --out, --worksheet and --key is required")
+    for option, path in asked.values():
+        library.html_target(option, path)
+    if len({path.resolve() for path in targets.values()}) < len(targets):
+        raise ValueError("--out, --worksheet and --key need different files")
+    scene = scene_of(options)
+    say(f"{scene.name}: deriving the equations and the answers")
+    make = partial(library.lesson, scene, subject=options.subject, title=options.title, author=options.author)
+    texts = {path: make(form=form) for form, path in targets.items()}
+    lesson = library.LESSONS[options.subject]
+    about = f"{extend.counted(len(lesson.screens), 'question')} on {scene.name}, {lesson.minutes} minutes"
+    words = {"page": about, "worksheet": "worksheet, to be printed", "key": "answers to it"}
+    lines = [f"{path}: {words[form]}; {len(texts[path].encode()) / 1e3:.0f} kB" for form, path in targets.items()]
+    answer("\n".join(lines), texts, show=next(iter(targets.values())) if options.open else None)

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from ..animation.canvas import KINDS, check_can_animate
     from ..graph_drawing.dot import to_dot
     from ..graph_drawing.render import check_can_draw, render_png, render_svg, tags_to_collapse
-    from ..lessons.lesson import SCREENS, lesson
+    from ..lessons.lesson import LESSONS, lesson
     from ..models.causes import CauseTable, Slopes
     from ..models.driven_motion import driven
     from ..models.equations import model_equations

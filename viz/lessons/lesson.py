@@ -1,36 +1,70 @@
-"""The lesson on a system: six screens on one page that loads nothing, with answers for the teacher."""
+"""Lessons on a system: screens of one subject on a page that loads nothing; a worksheet, and its key."""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from html import escape
+from typing import NamedTuple
 
-from cgraph import Graph
-from cgraph.extend import write_files
-from dynamics import inverse_dynamics
+from cgraph.extend import require_choice, write_files
+from dynamics.scenes.scenes import names
 from dynamics.systems.model import Model
 
 from ..graph_drawing.render import check_can_draw
 from ..pages import html
 from ..pages.html import Page, asset, html_target
 from ..pages.operations import values
-from .closed_loop import closed_loop
-from .elimination import elimination
-from .energy_and_step import energy_and_step
-from .euler_edge import euler_edge
-from .subject import Screen, Subject, formula, lagrangian_graph, subject_of
-from .sweeps import sweeps
-from .torque_parts import torque_parts
+from .glossary import glossary
+from .introduction import MINUTES, introduction
+from .screen import Screen
+from .screens.check import check
+from .screens.closed_loop import closed_loop
+from .screens.elimination import elimination
+from .screens.energy_and_step import energy_and_step
+from .screens.euler_edge import euler_edge
+from .screens.sweeps import backward_sweep, formula_graph, forward_sweep
+from .screens.torque_parts import torque_parts
+from .screens.wrong_way import wrong_way
+from .subject import Subject, subject_of
+from .worksheet import worksheet
 
-SCREENS = (euler_edge, sweeps, torque_parts, elimination, closed_loop, energy_and_step)
+
+class Lesson(NamedTuple):
+    """A subject: what it is called, how long it takes a student, and its screens."""
+
+    title: str
+    minutes: int
+    screens: tuple[Callable[[Subject], Screen], ...]
 
 
-def lesson(model: Model, path: str | os.PathLike[str] | None = None) -> Page:
-    """A lesson on a system: six questions to predict, reveal and play with, on one page that loads nothing.
+LESSONS = {
+    "euler": Lesson(
+        "Why a derivative “by definition” is wrong",
+        MINUTES + 25,
+        (formula_graph, backward_sweep, euler_edge, wrong_way, check),
+    ),
+    "sweeps": Lesson("The chain rule in sweeps", MINUTES + 13, (formula_graph, backward_sweep, forward_sweep)),
+    "torque": Lesson("The parts of a torque or force", MINUTES + 3, (torque_parts,)),
+    "elimination": Lesson("Accelerations by elimination", MINUTES + 5, (elimination,)),
+    "loops": Lesson("A constraint and its force", MINUTES + 5, (closed_loop,)),
+    "energy": Lesson("Energy and the size of a step", MINUTES + 5, (energy_and_step,)),
+}
+FORMS = ("page", "worksheet", "key")
 
-    The screens: a time step in the graph, the chain rule by sweeps, the parts of a torque, elimination from tip to
-    base, a loop and its multiplier, energy and step size. All numbers and answers are computed for this system.
+
+def lesson(
+    model: Model,
+    path: str | os.PathLike[str] | None = None,
+    *,
+    subject: str = "euler",
+    form: str = "page",
+    title: str = "",
+    author: str = "",
+) -> Page:
+    """A lesson on a system: questions to predict, reveal and try, on one page that loads nothing.
+
+    Every number is computed for this system in a moment in which it moves, and the right answers are measured on it.
 
     Parameters
     ----------
@@ -38,18 +72,27 @@ def lesson(model: Model, path: str | os.PathLike[str] | None = None) -> Page:
         A System, a Mechanism or a Scene.
     path : str or path, optional
         The file to write the page to, .html.
+    subject : str
+        "euler", why the derivative by definition is wrong, 28 minutes; "sweeps", the chain rule in sweeps; "torque", the
+        parts of a torque; "elimination", accelerations from the last joint to the first; "loops", a constraint and its
+        multiplier; "energy", the error of a step.
+    form : str
+        "page", for the screen; "worksheet", to be printed, with graphs to mark and lines to fill; "key", the answers to
+        both, with the marked graphs, and the equations as LaTeX.
+    title, author : str
+        What stands at the top; without a title that of the subject.
 
     Returns
     -------
     Page
-        The HTML text; a notebook shows it in a frame. Printed, it ends with the answers for the teacher.
+        The HTML text; a notebook shows it in a frame.
 
     Raises
     ------
     TypeError
-        For what is no model, and for a system of first order, which has no Lagrangian.
+        For what is no model, for a system of first order, which has no Lagrangian, and for a title that is no text.
     ValueError
-        For a path that does not end in .html.
+        For an unknown subject or form, and a path that does not end in .html.
     OSError
         For a path that cannot be written.
 
@@ -58,30 +101,51 @@ def lesson(model: Model, path: str | os.PathLike[str] | None = None) -> Page:
     >>> import dynamics as dyn
     >>> import viz
     >>> page = viz.lesson(dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 - 4.5 * q[0] ** 2, ["x"]))
-    >>> page.count('class="screen"')
-    6
+    >>> page.count('class="predict"')
+    5
     """
     target = html_target("the lesson's file", path)
+    chosen = LESSONS[require_choice("subject", subject, LESSONS)]
+    require_choice("form", form, FORMS)
+    for what, given in (("title", title), ("author", author)):
+        if not isinstance(given, str):
+            raise TypeError(f"{what} must be text, got {type(given).__name__}: {given!r:.60}")
     check_can_draw(png=False)
-    subject = subject_of(model)
-    text = page(subject, [screen(subject) for screen in SCREENS])
+    on = subject_of(model)
+    screens = [screen(on) for screen in chosen.screens]
+    heading = title or chosen.title
+    if form == "page":
+        text = page(on, screens, heading, author, chosen.minutes, subject)
+    else:
+        text = worksheet(on, screens, heading, author, key=form == "key")
     if target is not None:
         write_files({target: text})
     return text
 
 
-def page(subject: Subject, screens: Sequence[Screen]) -> Page:
-    """The page of some screens."""
-    title = f"A lesson on {subject.scene.name.replace('_', ' ')}"
+def page(
+    subject: Subject, screens: Sequence[Screen], title: str, author: str = "", minutes: int = 0, chosen: str = "euler"
+) -> Page:
+    """The page of some screens, between the introduction and the end."""
     data = {
         "answers": [screen.answer for screen in screens],
         "plays": [screen.play for screen in screens],
         "values": subject.values,  # of inputs, where a play has no others
     }
     body = "\n".join([screen.to_html(k) for k, screen in enumerate(screens, start=1)])
+    by = f'<p class="by">{escape(author)}</p>' if author else ""
+    start = (
+        f'<section class="screen" id="start">\n<h2>Before you begin <small>{MINUTES} minutes</small></h2>\n'
+        f"<p>About {minutes} minutes, for those who know derivatives. On every screen predict first, then reveal. Keys: A to "
+        "F choose, the arrows turn the pages, Tab and Enter do all else. The address of the page holds your guesses: "
+        "bookmark it to keep them. A term with dots below is explained where you press it, and in the glossary at the end. “The paper” is "
+        "T. Kusaka and T. Tanaka, Robotics 2025, 14(9), 115.</p>\n"
+        f"{introduction(subject)}\n</section>"
+    )
+    text = f"{start}\n{body}\n{_end(subject, chosen)}"
     return html.compose(
         title,
-        f'<h1>{escape(title)}</h1>\n<nav aria-label="Screens"></nav>\n<main>\n{body}\n{_teacher(subject, screens)}\n</main>',
+        f'<h1>{escape(title)}</h1>{by}\n<nav aria-label="Screens"></nav>\n<main>\n{text}\n{glossary(text)}\n</main>',
         asset(__package__, "lesson.css"),
         f'"use strict";\n{scripts()}\n{asset(__package__, "app.js")}',
         {"data": data},
@@ -95,19 +159,28 @@ def scripts() -> str:
     )
 
 
-def _teacher(subject: Subject, screens: Sequence[Screen]) -> str:
-    """The answers, how it runs, and the equations as LaTeX."""
-    answers = "".join([screen.answer_html(k) for k, screen in enumerate(screens, start=1)])
-    minutes = sum(screen.minutes for screen in screens)
-    graphs: dict[str, Graph] = {
-        "The Lagrangian": lagrangian_graph(subject.system),
-        "The torque": inverse_dynamics(subject.system, "chain_rule"),
-    }
-    equations = "".join([f"<p>{name}</p>{formula(graph, subject.scene_names)}" for name, graph in graphs.items()])
+def _end(subject: Subject, chosen: str) -> str:
+    """The last part: what was seen, and the lessons that may follow."""
+    name = subject.scene.name if subject.scene.name in names() else "SCENE"
+    rows = "".join(
+        [
+            f"<li><b>{each.title}</b>, {each.minutes} minutes: <code>cgraph lesson {name} --subject {key} --out "
+            f"{key}.html</code></li>"
+            for key, each in LESSONS.items()
+            if key != chosen
+        ]
+    )
+    seen = f"<p>In one sentence: {_sentence(subject)}</p>\n" if chosen == "euler" else ""
     return (
-        '<details class="teacher"><summary>For the teacher: answers, and equations as LaTeX</summary>\n'
-        f"<ul>{answers}</ul>\n<p>About {minutes} minutes: predict alone, tell a neighbor, reveal, explain in one sentence, "
-        "then play. Letters choose, arrows turn the pages, Tab and Enter do all else. The address keeps the guesses: a "
-        "bookmark is a score. Printed, every screen has a page for the pupils, and this is the last.</p>\n"
-        f"{equations}\n</details>"
+        f'<section class="screen" id="end">\n<h2>The end</h2>\n{seen}<p class="score"></p>\n'
+        f"<h3>Next lessons</h3>\n<ul>{rows}</ul>\n</section>"
+    )
+
+
+def _sentence(subject: Subject) -> str:
+    if not subject.verdict.differs:
+        return f"for this system the derivative by definition happens to be right. {subject.verdict_text}"
+    return (
+        "a partial derivative holds every other input, but with the Euler relation in the graph q is no input any more: "
+        f"it hangs on q̇, and ∂L/∂q comes into dp/dt at every dt. {subject.verdict_text}"
     )

@@ -104,42 +104,60 @@ function startPlay(board, play) {
 }
 
 const PLAYS = {
+  rows(board, play, at, redraw) {
+    const run = named(play.graph);
+    slider(board, "dt [s]", 0, 1, 0.01, 0, (x) => { at.dt = x; redraw(); });
+    at.dt = 0;
+    sliders(board, play, at, redraw);
+    const write = grid(board, play.header);
+    return () => {
+      const found = run(at);
+      write(play.rows.map(([shown, ...names]) => [shown, ...names.map((name) => digits(found[name]))]));
+    };
+  },
   step(board, play, at, redraw) {
-    const right = named(play.right), wrong = named(play.wrong);
+    const right = named(play.right), wrong = named(play.wrong), terms = play.terms && named(play.terms);
     const names = numbered("tau", play.joints.length), old = Object.keys(at).filter((name) => name.endsWith("_old"));
-    const rate = {}; // of what is old, by a second
+    const rate = {}; // of what is old, by a second, where velocities are no rates of coordinates
     for (const name of old) rate[name] = (play.values[name.slice(0, -4)] - play.values[name]) / play.values.dt;
+    if (play.sliders.length)
+      for (const name of old) rate[name] = null; // the rate is a velocity or an acceleration that is at hand
     let still = false;
     slider(board, "dt [s]", -6, 0, 0.1, -3, (x) => { at.dt = 10 ** x; redraw(); }, (x) => digits(10 ** x));
     sliders(board, play, at, redraw);
     const rest = button(board, "Let it rest", () => { still = !still; rest.setAttribute("aria-pressed", still); redraw(); });
-    const write = grid(board, ["joint", "torque", "by definition", "error"]);
-    const svg = board.appendChild(drawn("svg", { role: "img", "aria-label": "Torques, right and by definition" }));
+    rest.setAttribute("aria-pressed", "false");
+    const write = grid(board, [play.joint, "chain rule", "by definition", "difference", "∂L/∂q"]);
+    const svg = board.appendChild(drawn("svg", { role: "img", "aria-label": "By the chain rule and by definition" }));
     return () => {
       const now = { ...at };
       if (still) for (const name in now) if (/^qd+\d+$/.test(name)) now[name] = 0;
-      for (const name of old) now[name] = now[name.slice(0, -4)] - (still ? 0 : rate[name]) * at.dt;
-      const good = right(now), bad = wrong(now);
-      write(names.map((name, i) => [play.joints[i], ...[good[name], bad[name], bad[name] - good[name]].map(digits)]));
+      for (const name of old) {
+        const own = name.slice(0, -4);
+        now[name] = now[own] - (still ? 0 : rate[name] ?? now[own.replace("q", "qd")]) * at.dt;
+      }
+      const good = right(now), bad = wrong(now), much = terms ? terms(now) : {};
+      const size = 1e-9 * Math.max(...names.flatMap((name) => [good[name], bad[name]]).map(Math.abs).filter(Number.isFinite));
+      const shown = (x) => digits(Math.abs(x) <= size ? 0 : x);
+      write(names.map((name, i) =>
+        [play.joints[i], ...[good[name], bad[name], bad[name] - good[name], much[name] ?? 0].map(shown)]));
       bars(svg, Object.fromEntries(names.map((name, i) => [play.joints[i], [good[name], bad[name]]])), play.colors);
     };
   },
   sweeps(board, play, at, redraw) {
-    const rows = play.rows, count = rows.length;
+    const rows = play.rows, count = rows.length, last = play.slopes ? 2 * count : count;
     let step = 0;
     const buttons = board.appendChild(tag("div", { class: "buttons" }));
-    button(buttons, "Next", () => { step = Math.min(step + 1, 2 * count); redraw(); });
+    button(buttons, "Next", () => { step = Math.min(step + 1, last); redraw(); });
     button(buttons, "All values", () => { step = Math.max(step, count); redraw(); });
-    button(buttons, "All slopes", () => { step = 2 * count; redraw(); });
+    if (play.slopes) button(buttons, "All slopes", () => { step = last; redraw(); });
     button(buttons, "Again", () => { step = 0; redraw(); });
-    const write = grid(board, ["node", "is", "value", "slope of L", ""]);
+    const write = grid(board, ["node", "value", ...(play.slopes ? ["slope of L", ""] : []), "is"]);
     return () => {
       const now = step > count ? 2 * count - step : step - 1; // the row whose value or slope is new
-      write(
-        rows.map((row, i) => [row.node, row.text, i < step ? digits(row.value) : "·",
-          2 * count - i <= step ? digits(row.slope) : "·", 2 * count - i <= step ? row.what : ""]),
-        (i, j) => (i === now && j === (step > count ? 3 : 2) ? "lit" : ""),
-      );
+      const cells = rows.map((row, i) => [row.node, i < step ? digits(row.value) : "·",
+        ...(play.slopes ? (2 * count - i <= step ? [digits(row.slope), row.what] : ["·", ""]) : []), row.text]);
+      write(cells.reverse(), (i, j) => (count - 1 - i === now && j === (step > count ? 2 : 1) ? "lit" : "")); // as in the picture
       rows.forEach((row, i) => document.getElementById(row.box)?.classList.toggle("lit", i === now));
     };
   },
@@ -148,8 +166,8 @@ const PLAYS = {
     const names = numbered("tau", play.joints.length);
     const zero = (kind) => Object.fromEntries(Object.keys(at).filter((name) => new RegExp(`^${kind}\\d+$`).test(name)).map((name) => [name, 0]));
     sliders(board, play, at, redraw);
-    const write = grid(board, ["joint", ...play.parts, "torque"]);
-    const svg = board.appendChild(drawn("svg", { role: "img", "aria-label": "Parts of the torques" }));
+    const write = grid(board, [play.joint, ...play.parts, "τ"]);
+    const svg = board.appendChild(drawn("svg", { role: "img", "aria-label": "Parts of τ" }));
     return () => {
       const held = torque({ ...at, ...zero("qd"), ...zero("qdd") });
       const steady = torque({ ...at, ...zero("qdd") }), still = torque({ ...at, ...zero("qd") });
@@ -163,7 +181,7 @@ const PLAYS = {
     let step = 0;
     sliders(board, play, at, () => { step = 0; redraw(); });
     const buttons = board.appendChild(tag("div", { class: "buttons" }));
-    button(buttons, "Take out the next joint", () => { step = Math.min(step + 1, n - 1); redraw(); });
+    button(buttons, "Take out the next", () => { step = Math.min(step + 1, n - 1); redraw(); });
     button(buttons, "Again", () => { step = 0; redraw(); });
     const write = grid(board, ["", ...play.joints]);
     return () => {
@@ -183,7 +201,8 @@ const PLAYS = {
       const rounding = play.rounding * Math.max(0, ...found.map(Math.abs).filter(Number.isFinite));
       const shown = (x) => digits(Math.abs(x) <= rounding ? 0 : x);
       write([...play.joints.map((name, i) => [name, shown(a[`qdd${i}`]), shown(b[`qdd${i}`])]),
-        ...Object.entries(play.multipliers).map(([name, row]) => [`λ, ${row}`, "", digits(b[name])])]);
+        ...Object.entries(play.multipliers).map(([name, row]) =>
+          [`λ, ${row}`, "", digits(Math.abs(b[name]) <= play.rounding * play.force ? 0 : b[name])])]);
     };
   },
   energy(board, play, start, redraw) {
@@ -206,18 +225,25 @@ const PLAYS = {
       const known = exact.filter(Number.isFinite), low = Math.min(...known), high = Math.max(...known);
       const reach = Math.max((high - low) / 2, Math.min(off[0], 2 * Math.max(Math.abs(low), Math.abs(high))), Number.MIN_VALUE);
       const wide = width(svg), middle = (low + high) / 2;
-      const x = (share) => 24 + (wide - 30) * share;
+      const x = (share) => 74 + (wide - 80) * share;
       const y = (e) => 120 - 100 * Math.max(-1.1, Math.min(1.1, (e - middle) / reach));
       const line = (curve, count, look) => drawn("polyline", { fill: "none", "stroke-width": 2, ...look,
         points: curve.flatMap((e, i) => (Number.isFinite(e) ? [`${x(i / count).toFixed(1)},${y(e).toFixed(1)}`] : [])).join(" ") });
       svg.setAttribute("viewBox", `0 0 ${wide} 256`);
       svg.replaceChildren(
-        drawn("text", { x: 0, y: 124 }, "E"), drawn("text", { x: wide - 80, y: 252 }, `t = ${digits(play.t_end)} s`),
+        drawn("line", { x1: x(0), x2: x(0), y1: 10, y2: 230, class: "axis" }),
+        ...[-1, 0, 1].flatMap((share) => [
+          drawn("line", { x1: x(0) - 5, x2: x(0), y1: 120 - 100 * share, y2: 120 - 100 * share, class: "axis" }),
+          drawn("text", { x: x(0) - 8, y: 125 - 100 * share, "text-anchor": "end" }, digits(+(middle + share * reach).toPrecision(3))),
+        ]),
+        drawn("text", { x: 0, y: 14 }, `E${play.unit && ` [${play.unit.trim()}]`}`),
+        drawn("text", { x: x(0), y: 252, "text-anchor": "middle" }, "0"),
+        drawn("text", { x: wide - 6, y: 252, "text-anchor": "end" }, `t = ${digits(play.t_end)} s`),
         ...curves.map((curve, k) => line(curve, steps, { stroke: play.colors[k] })),
         line(exact.filter((_, i) => i % 10 === 0), fine / 10, { class: "axis", "stroke-dasharray": "5 4", "stroke-width": 1 }),
       );
-      words.textContent = `Step ${digits(play.t_end / steps)} s. Largest error of the energy: Euler ${digits(off[0])} J, ` +
-        `rk4 ${digits(off[1])} J.`;
+      words.textContent = `Step ${digits(play.t_end / steps)} s. Largest error of the energy: Euler ${digits(off[0])}${play.unit}, ` +
+        `rk4 ${digits(off[1])}${play.unit}.`;
     };
   },
 };

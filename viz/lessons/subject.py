@@ -1,4 +1,4 @@
-"""Subject of a lesson: a model in a moving state, its names, its graphs for scripts; and screens on it."""
+"""Subject of a lesson: a model in a moving state, its names, units and words, and its graphs for scripts."""
 
 from __future__ import annotations
 
@@ -7,26 +7,38 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from html import escape
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 import cgraph as cg
 from cgraph import Graph
 from cgraph.extend import Array
-from dynamics import display_names
+from dynamics import Verdict, display_names, formulation_verdict
 from dynamics.equations.states.consistent_state import nearest_state
-from dynamics.scenes.scenes import Scene, of_model
+from dynamics.multibody.bodies.joint_coordinates import display_units
+from dynamics.scenes.scenes import Scene, of_model, two_link
 from dynamics.scenes.start import moving_start
 from dynamics.systems.model import Model
 from dynamics.systems.system import System
 
 from .. import theme
+from ..graph_drawing.render import render_svg
 from ..pages.operations import graph_data
+
+if TYPE_CHECKING:
+    from graphviz import Digraph
 
 DT = 1e-3  # s, of the embedded formulations
 LARGEST_GRAPH = 4000  # nodes that the page computes many times a second
 SHOWN = 6  # joints with a slider or a row of their own; of more, the first
 REACH = 3.2  # of a slider to both sides of 0
+_RADIANS = {
+    f"{kind}{i}": unit
+    for i in range(2)
+    for kind, unit in {"q": "rad", "q_old": "rad", "qd": "rad/s", "qdd": "rad/s²", "tau": "N m", "p": "N m s"}.items()
+}  # of the two-link arm, whose Lagrangian is written out
+_FORCES = {"N m": "torque", "N": "force"}
 _SPEEDS, _ACCELERATIONS, _BENDS = (1.0, -0.8, 0.6), (0.5, 1.0, -0.7), (0.0, -0.8, 0.9)  # in turn, for the joints
 
 
@@ -47,8 +59,57 @@ class Subject:
 
     @property
     def joints(self) -> list[str]:
-        """Names of the velocities, as a person reads them."""
-        return [theme.pretty(name) for name in self.system.velocities]
+        """Names of the velocities."""
+        return list(self.system.velocities)
+
+    @cached_property
+    def units(self) -> dict[str, str]:
+        """{name in graphs: unit}, empty where the model does not say."""
+        if self.scene.mechanism is not None:
+            return display_units(self.scene.mechanism.moving)
+        return _RADIANS if self.scene.about == two_link().about else {}
+
+    @property
+    def joint(self) -> str:
+        """What one of the places that move is called."""
+        return "joint" if self.units else "coordinate"
+
+    @property
+    def force(self) -> str:
+        """What tau is called: a torque, a force, or what stands for both."""
+        kinds = {self.units.get(f"tau{i}") for i in range(self.system.n)}
+        return _FORCES.get(next(iter(kinds)) or "", "generalized force") if len(kinds) == 1 else "generalized force"
+
+    def unit(self, name: str) -> str:
+        """A space and the unit of an input or output; nothing where the model has none."""
+        unit = self.units.get(name, "")
+        return f" {unit}" if unit not in ("", "1") else ""
+
+    def with_unit(self, name: str) -> str:
+        """Display name of an input or output, with its unit: q.elbow [rad]."""
+        unit = self.unit(name).strip()
+        return f"{self.shown(name)} [{unit}]" if unit else self.shown(name)
+
+    @cached_property
+    def verdict(self) -> Verdict:
+        """The verdict on the formulation by definition."""
+        return formulation_verdict(self.scene, "by_definition")
+
+    @property
+    def verdict_text(self) -> str:
+        """The verdict in a sentence, in the letters of the lesson, as HTML."""
+        return in_letters(self.verdict.summary)
+
+    @cached_property
+    def slopes(self) -> Array:
+        """dL/dq of every velocity at the state, (n,): what by definition has too much; what is only rounding as 0."""
+        found = self.verdict.excess_at(self.values)
+        return np.array([found.get(f"tau{i}", 0.0) for i in range(self.system.n)])
+
+    @property
+    def watched(self) -> int:
+        """The velocity that questions are about: the first with the largest slope."""
+        return int(np.abs(self.slopes).argmax())
 
     @property
     def scene_names(self) -> dict[str, str]:
@@ -75,11 +136,22 @@ class Subject:
     def sliders(self, kinds: Sequence[str] = ("q",), most: int = SHOWN) -> list[dict[str, object]]:
         """Sliders for the inputs of these kinds of the first joints; none where velocities are no rates of coordinates."""
         free = self.system.kinematics.quasi is None
-        names = [f"{kind}{i}" for i in range(min(self.system.n, most)) for kind in kinds if free]
+        names = [f"{kind}{i}" for kind in kinds for i in range(min(self.system.n, most)) if free]
         return [
-            {"name": name, "shown": self.shown(name), "low": -REACH, "high": REACH, "value": self.values[name]}
+            {"name": name, "shown": self.with_unit(name), "low": -REACH, "high": REACH, "value": self.values[name]}
             for name in names
         ]
+
+    @cached_property
+    def _drawn(self) -> dict[str, str]:
+        return {}
+
+    def svg(self, drawing: Digraph) -> str:
+        """A drawing as SVG, made once where it is used more than once."""
+        source = drawing.source
+        if source not in self._drawn:
+            self._drawn[source] = render_svg(source)
+        return self._drawn[source]
 
     def play(self, kind: str, graphs: Mapping[str, Graph], **other: object) -> dict[str, object] | None:
         """Data by which the page's script draws these graphs at its state; None where they are too large for it."""
@@ -90,6 +162,10 @@ class Subject:
     def shown(self, name: str) -> str:
         """Display name of an input, output or node."""
         return self.names.get(name, theme.pretty(name))
+
+    def told(self, name: str) -> str:
+        """Display name of an input, output or node, as HTML."""
+        return escape(self.shown(name))
 
 
 def subject_of(model: Model) -> Subject:
@@ -103,23 +179,11 @@ def subject_of(model: Model) -> Subject:
         q[q == 0.0] = 0.4
     if len(system.constraints):
         q, qd = nearest_state(scene, q, qd)
-    return Subject(scene, q, qd, qdd, _letters(scene))
+    return Subject(scene, q, qd, qdd, theme.called(display_names(scene)))
 
 
 def _in_turn(values: Sequence[float], n: int) -> Array:
     return np.array([values[i % len(values)] for i in range(n)])
-
-
-def _letters(scene: Scene) -> dict[str, str]:
-    """Names in the paper's letters for one angle, else as everywhere."""
-    if scene.coordinates == ("theta",):
-        return dict(theme.ONE_JOINT)
-    return display_names(scene)
-
-
-def formula(graph: Graph, names: Mapping[str, str], lines: int = 12) -> str:
-    """The LaTeX of a graph, to be copied."""
-    return f"<pre>{escape(graph.latex(names=names, lines=lines))}</pre>"
 
 
 def lagrangian_graph(system: System) -> Graph:
@@ -127,49 +191,12 @@ def lagrangian_graph(system: System) -> Graph:
     return cg.simplify(system.graph({"L": system.lagrangian}, system.q, system.qd))
 
 
-TOO_LARGE = "The graphs of this system are too large to be computed many times a second in a page."
-
-
-@dataclass(frozen=True)
-class Screen:
-    """A story, a question with choices, what is revealed, and something to play with; texts are HTML.
-
-    answer: the number of the right choice.  play: what the page's script draws, {"kind": .., ..}; None where a system is
-    too large for it, which the screen then says.  note: for the teacher, beside the answer.
-    """
-
-    anchor: str
-    title: str
-    minutes: int
-    story: str
-    question: str
-    choices: Sequence[str]
-    answer: int
-    reveal: str
-    play_words: str
-    play: Mapping[str, object] | None
-    note: str
-    picture: str = ""  # what the play is about
-
-    def to_html(self, number: int) -> str:
-        """The screen as a section of the page."""
-        choices = "".join(
-            f'<button type="button" class="choice"><b>{letter}</b> {choice}</button>'
-            for letter, choice in zip("ABCDEF", self.choices, strict=False)
-        )
-        return (
-            f'<section class="screen" id="{escape(self.anchor)}">\n'
-            f"<h2>{number} · {self.title} <small>{self.minutes} minutes</small></h2>\n{self.story}\n"
-            f'<div class="predict" role="group" aria-label="Predict"><p><b>Predict.</b> {self.question}</p>'
-            f'<div class="choices">{choices}</div><p class="verdict" role="status"></p></div>\n'
-            f'<details class="reveal"><summary>Reveal</summary>\n{self.reveal}\n</details>\n'
-            f'<div class="play"><h3>Play</h3><p>{self.play_words if self.play else TOO_LARGE}</p>{self.picture}<div class="board"></div></div>\n</section>'
-        )
-
-    def answer_html(self, number: int) -> str:
-        """A line of the answers for the teacher."""
-        letter = "ABCDEF"[self.answer]
-        return f"<li><b>{number} · {self.title}: {letter}.</b> {self.choices[self.answer]}. {self.note}</li>"
+def in_letters(text: str) -> str:
+    """A sentence of a verdict in the letters of the lesson, as HTML."""
+    letters = {"tau.": "τ.", "dL/dq": "∂L/∂q", "dK/dq": "∂K/∂q", "qd ": "q̇ ", "qd.": "q̇."}
+    for plain, pretty in letters.items():
+        text = text.replace(plain, pretty)
+    return escape(text)
 
 
 def number(value: float) -> str:

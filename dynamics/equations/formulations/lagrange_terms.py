@@ -216,6 +216,16 @@ class Embedding:
         return LagrangeTerms(self.inputs, self.q, self.qd, list(momentum), rate, slopes)
 
 
+def after_a_step(system: System) -> Graph:
+    """L of the state after a step, which the formulation by definition differentiates, and that state's q0...
+
+    Inputs are those of `inverse_dynamics` by it; the nodes of the Euler relation have the tag `EULER`.
+    """
+    embedding = Embedding(system)
+    (lagrangian,) = embedding.embed(system.lagrangian)
+    return system.graph({"L": lagrangian} | {f"q{i}": node for i, node in enumerate(embedding.q)}, embedding.inputs)
+
+
 def _embedded(system: System, energy: Node, through: Node = ONE) -> LagrangeTerms:
     """d/dt of d(energy)/dqd with the Euler relation in the graph, the middle of eq. (3), and dL/dq.
 

@@ -82,7 +82,9 @@ def test_a_chain_has_a_whole_number_of_links(n: Any) -> None:
 
 @each_row("name", ["swing", "", 3, None, ["chain"]])
 def test_what_is_neither_a_name_nor_a_file_is_named_with_the_scenes(name: Any) -> None:
-    message = f"there is no scene {name!r}; the scenes are spring_mass, triple_pendulum, chain, any file that ends"
+    message = (
+        f"there is no scene {name!r}; the scenes are spring_mass, two_link, triple_pendulum, chain, any file that ends"
+    )
     with raises(ValueError, match="^" + re.escape(message)):
         scenes.load(name)
 

@@ -1,9 +1,8 @@
-"""Lessons: one template for any system, answers that the mechanics gives, a page that stands alone and computes."""
+"""Lessons: one template for any system, a page that stands alone and computes, a worksheet and its key."""
 
 from __future__ import annotations
 
 import json
-import math
 import re
 import subprocess
 from pathlib import Path
@@ -16,171 +15,113 @@ import dynamics as dyn
 import viz
 from cgraph.extend import OPS
 from tests.chromium import chromium
+from tests.each_row import each_row
 from tests.tolerances import EQUATIONS
+from tests.viz.lessons.systems import SYSTEMS, block
 from tests.viz.page_elements import Elements
 from viz import cli
 from viz.lessons import lesson as module
-from viz.lessons.energy_and_step import energy_and_step
-from viz.lessons.euler_edge import euler_edge
+from viz.lessons.screens.check import check
+from viz.lessons.screens.closed_loop import closed_loop
+from viz.lessons.screens.elimination import elimination
+from viz.lessons.screens.energy_and_step import energy_and_step
+from viz.lessons.screens.sweeps import backward_sweep
+from viz.lessons.screens.torque_parts import torque_parts
+from viz.lessons.screens.wrong_way import wrong_way
 from viz.lessons.subject import lagrangian_graph, subject_of
-from viz.lessons.torque_parts import torque_parts
 from viz.pages.operations import graph_data
 
 
-def free_block() -> dyn.System:
-    """Nothing depends on where it is."""
-    return dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2, ["x"])
+@pytest.fixture(autouse=True)
+def undrawn(request, monkeypatch):
+    """No pictures, which take most of the time, but where they are asked for."""
+    if "picture" in request.node.name:
+        return
+    monkeypatch.setattr("viz.lessons.subject.render_svg", lambda source: "<svg></svg>")
 
 
-def bead() -> dyn.scenes.Scene:
-    """A bead on a rod that turns about a point, by a constraint, pushed as time goes on."""
-
-    def energy(q, qd, t, p):
-        return 0.5 * p["m"] * (qd[0] ** 2 + qd[1] ** 2) - 9.81 * p["m"] * q[1]
-
-    system = dyn.System(
-        energy,
-        "x y",
-        {"m": 2.0},
-        forces=lambda q, qd, t: [cg.sin(t), 0.0],
-        damping=0.1,
-        constraints=lambda q, t: {"rod": q[0] ** 2 + q[1] ** 2 - 1.0},
-    )
-    return dyn.scenes.Scene("bead", "", system, (0.6, 0.8), (0.0, 0.0), 1.0)
+def made(name: str, form: str = "page", **options: str) -> str:
+    model = SYSTEMS[name]() if name in SYSTEMS else dyn.scenes.load(name)
+    return viz.lesson(model, form=form, **options)
 
 
-def ball() -> dyn.Mechanism:
-    joint = dyn.Joint("ball", name="<b>top</b>")
-    return dyn.Mechanism([dyn.Body("top", joint, mass=1.0, center=(0.1, 0.0, -0.5), inertia=(0.1, 0.1, 0.02))])
-
-
-MODELS = {
-    "wheel": lambda: dyn.scenes.load("spring_mass"),
-    "arm": lambda: dyn.scenes.load("triple_pendulum"),
-    "block": free_block,
-    "bead": bead,
-    "ball": ball,
-}
-
-
-@pytest.fixture(scope="module", params=[name for name in MODELS if name != "arm"])
-def subject(request):
-    return subject_of(MODELS[request.param]())
-
-
-@pytest.fixture(scope="module")
-def screens(subject):
-    """The screens of that system, {anchor: screen}; of the wheel alone with pictures, which take most of the time."""
-    with pytest.MonkeyPatch.context() as patched:
-        if subject.system.n > 1 or not subject.system.parameters:
-            patched.setattr("viz.lessons.euler_edge.DRAWN", 0)
-            patched.setattr("viz.lessons.sweeps.DRAWN", 0)
-        return {screen.anchor: screen for screen in [make(subject) for make in module.SCREENS]}
-
-
-@pytest.fixture(scope="module")
-def text(subject, screens) -> str:
-    """The page of that system."""
-    return module.page(subject, list(screens.values()))
-
-
-def test_every_lesson_has_the_same_form_and_stands_alone(text):
+@each_row(("form", "name"), [("page", "two_link"), ("worksheet", "hoop"), ("key", "ball")])
+def test_every_lesson_has_the_same_form_and_stands_alone(form, name):
+    text = made(name, form, title="<i>Mine</i>", author="A & B")
     found = Elements(text)
     ids = [attributes["id"] for _, attributes in found.elements if "id" in attributes]
     assert (found.open, sorted(set(ids))) == ([], sorted(ids))
-    assert text.count('<section class="screen"') == text.count("<summary>Reveal</summary>") == len(module.SCREENS)
+    assert "&lt;i&gt;Mine&lt;/i&gt;" in text
+    assert "A &amp; B" in text
     assert "<b>top</b>" not in text
     assert "@media print" in text
+    links = {
+        str(attributes["href"])[1:] for kind, attributes in found.elements if kind == "a" and "class" in attributes
+    }
+    assert form == "key" or (links and links <= {*ids})  # every term is in the glossary
+    if form == "page":
+        assert text.count('class="predict"') == text.count("<summary>Reveal</summary>") == 5
+        assert [text.count(f"--subject {subject} ") for subject in module.LESSONS] == [0, 1, 1, 1, 1, 1]
 
 
-def test_the_teacher_s_answers_are_those_of_the_page(text):
+def test_a_worksheet_asks_and_its_key_answers():
+    sheet, key = made("hoop", "worksheet"), made("hoop", "key")
+    for text in (sheet, key):
+        assert text.count('<ul class="choices">') == 5
+    assert sheet.count('class="because"') == 5
+    assert re.findall(r"<span>(\w+)</span>", sheet)[:3] == ["Name", "Class", "Date"]
+    assert sheet.count("<b>Mark.</b>") == 3  # values, slopes, and the edges of the step
+    assert 'class="answer"' not in sheet
+    assert key.count('class="answer"') == 5
+    assert "\\begin{aligned}" in key
+
+
+def test_the_pictures_of_a_key_have_the_marks():
+    sheet, key = made("two_link", "worksheet"), made("two_link", "key")
+    pictures = [re.findall(r"data:image/svg\+xml;base64,([^\"]*)", text) for text in (sheet, key)]
+    assert [each == other for each, other in zip(*pictures, strict=True)] == [False] * 3
+
+
+def test_the_guesses_are_scored_by_the_marked_answers():
+    text = made("block")
     data = json.loads(re.findall(r'<script id="data" type="application/json">(.*?)</script>', text, re.DOTALL)[0])
-    listed = re.findall(r"<li><b>\d · [^:]*: ([A-F])\.</b>", text)
+    listed = re.findall(r'<p class="answer"><b>([A-F])\.</b>', text)
     assert ["ABCDEF".index(letter) for letter in listed] == data["answers"]
 
 
-def test_the_error_by_definition_tends_to_the_slope_of_the_lagrangian(subject, screens):
-    """Whether it vanishes is what L says, by differences of L of its own."""
-    system = subject.system
-    energy = system.graph({"L": system.lagrangian}, system.q, system.qd)
-    if system.kinematics.quasi is not None:
-        return  # slopes along a quaternion are no differences of L
-    at = [subject.evaluate(energy, **{f"q{i}": subject.q[i] + h})[0] for i in range(system.n) for h in (1e-5, -1e-5)]
-    slope = np.abs(np.subtract(at[::2], at[1::2])).max() / 2e-5
-    screen = screens["euler-edge"]
-    assert screen.answer == int(slope > 1e-6)
-    if slope > 1e-6:
-        (last,) = re.findall(r"largest error is ([−\d.e]+)\.", screen.note)
-        assert float(last.replace("−", "-")) == pytest.approx(slope, rel=1e-3)
-
-
-def test_slopes_of_the_sweeps_are_momenta_under_the_numbers_of_the_listing(subject, screens):
-    rows = screens["sweeps"].play["rows"]
+@each_row("name", ["two_link", "ball", "hoop"])
+def test_slopes_of_the_sweeps_are_momenta_under_the_numbers_of_the_listing(name):
+    subject = subject_of(SYSTEMS[name]() if name in SYSTEMS else dyn.scenes.load(name))
+    rows = backward_sweep(subject).play["rows"]
     momenta = subject.evaluate(dyn.momentum(subject.system))
     slopes = {row["node"]: row["slope"] for row in rows if row["what"].startswith("p")}
     assert all(slopes[subject.shown(f"qd{i}")] == pytest.approx(p, rel=1e-9, abs=1e-12) for i, p in enumerate(momenta)
                if subject.shown(f"qd{i}") in slopes)  # fmt: skip
     assert slopes
+    assert rows[-1]["node"] == "L"
     listing = lagrangian_graph(subject.system).listing()
-    operations = [row for row in rows if row["node"][0] == "v" and row["text"]]
-    for row in operations[-3:]:
+    for row in [row for row in rows if row["node"][0] == "v" and row["text"]][-3:]:
         (line,) = re.findall(rf"^%{row['node'][1:]} = .*$", listing, re.MULTILINE)
         (op,) = re.findall(r"= (\w+)", line)
-        assert OPS[op].symbol in row["text"] or op in row["text"]
+        assert OPS[op].symbol in row["text"] or op in row["text"] or (op == "pow" and "power" in row["text"])
 
 
-def test_parts_of_a_torque_add_up(subject, screens):
-    screen = screens["why-this-torque"]
+def test_parts_of_a_torque_add_up():
+    subject = subject_of(SYSTEMS["cart_pole"]())
     numbers = [
         [float(cell.replace("−", "-")) for cell in re.findall(r"<td>([−\d.e]+)</td>", row)]
-        for row in re.findall(r"<tr><td>.*?</tr>", screen.reveal)
+        for row in re.findall(r"<tr><td>.*?</tr>", torque_parts(subject).reveal)
     ]
     torque = subject.evaluate(dyn.inverse_dynamics(subject.system, "chain_rule"))
     assert np.allclose([row[-1] for row in numbers], torque, rtol=1e-3, atol=1e-12)
     assert np.allclose([sum(row[:3]) for row in numbers], torque, rtol=2e-3, atol=2e-3 * np.abs(torque).max())
 
 
-def test_a_pivot_is_the_inertia_with_all_others_free(subject, screens):
-    """By the inverse of M: the first joint's acceleration for a unit torque at it."""
-    n = subject.system.n
-    matrix = subject.evaluate(dyn.mass_matrix(subject.system)).reshape(n, n)
-    screen = screens["elimination"]
-    free = 1.0 / np.linalg.inv(matrix)[0, 0]
-    (told,) = re.findall(r"The pivot is ([\d.e]+)\.", screen.note)
-    assert float(told) == pytest.approx(free, rel=1e-3)
-    assert screen.answer == int(free < matrix[0, 0] * (1.0 - 1e-9))
-
-
-def test_a_multiplier_holds_its_row(subject, screens):
-    """Pushed by the force that the page tells, the free system moves as if it were held."""
-    screen = screens["closed-loop"]
-    assert len(set(screen.choices)) == len(screen.choices) >= 2
-    if len(subject.system.constraints):
-        return
-    assert screen.reveal.count("<td>0</td>") >= 1  # of the held joint, without rounding
-    n = subject.system.n
-    still = {f"qd{i}": 0.0 for i in range(n)}
-    force = float(screen.choices[screen.answer].replace("−", "-"))
-    forward = dyn.forward_dynamics(subject.system)
-    held = subject.evaluate(forward, **still, **{f"tau{n - 1}": force})
-    free = subject.evaluate(forward, **still)
-    assert abs(held[-1]) <= 1e-3 * max(1.0, abs(free[-1]))
-
-
-def test_the_answer_on_half_the_step_is_the_factor_that_was_measured(subject, screens):
-    """Of a motion for which rk4 is exact there is none, and then none of the factors is right."""
-    screen = screens["energy-and-step"]
-    factors = [float(text) for text in re.findall(r"a factor of ([\d.]+)\.", screen.reveal)]
-    if factors:
-        assert abs(math.log2(factors[0] / float(screen.choices[screen.answer]))) < 0.5
-    else:
-        assert screen.choices[screen.answer] == "none of these"
-        assert "rounding" in screen.reveal
-
-
 def test_a_chain_that_whips_is_watched_for_a_shorter_time():
     """Ten rods are off after a second: the order is measured where it shows, and no warning is left."""
-    (factor,) = re.findall(r"a factor of ([\d.]+)\.", energy_and_step(subject_of(dyn.scenes.load("chain", n=6))).reveal)
+    (factor,) = re.findall(
+        r"a factor of ([\d.]+)\. The", energy_and_step(subject_of(dyn.scenes.load("chain", n=6))).reveal
+    )
     assert 12.0 < float(factor) < 24.0
 
 
@@ -192,14 +133,19 @@ def v8():
     return engine
 
 
-def test_the_page_computes_what_the_graphs_do(subject, screens, v8):
+@each_row("name", ["two_link", "ball", "bead"])
+def test_the_page_computes_what_the_graphs_do(name, v8):
     """To the last bits: only functions of the C library may differ in them."""
-    plays = [screens[name].play for name in ("euler-edge", "why-this-torque", "elimination", "closed-loop")]
-    graphs = [play[name] for play in plays for name in ("right", "wrong", "graph", "free", "held") if name in play]
-    assert len(graphs) == 6
+    subject = subject_of(SYSTEMS[name]() if name in SYSTEMS else dyn.scenes.load(name))
+    plays = [screen(subject).play for screen in (check, torque_parts, elimination, closed_loop)]
+    graphs = [
+        play[name] for play in plays for name in ("right", "wrong", "terms", "graph", "free", "held") if name in play
+    ]
+    assert len(graphs) == 7
     direct = [
         dyn.inverse_dynamics(subject.system, "chain_rule"),
         dyn.inverse_dynamics(subject.system, "by_definition"),
+        subject.verdict.terms,
         dyn.inverse_dynamics(subject.system, "chain_rule"),
         dyn.mass_matrix(subject.system),
     ]
@@ -211,7 +157,7 @@ def test_the_page_computes_what_the_graphs_do(subject, screens, v8):
 
 
 def test_the_page_s_pivots_and_steps_are_the_library_s(v8):
-    arm = MODELS["arm"]()
+    arm = dyn.scenes.load("triple_pendulum")
     matrix = subject_of(arm).evaluate(dyn.mass_matrix(arm)).reshape(3, 3)
     stages = json.loads(v8.eval(f"JSON.stringify(stages({matrix.tolist()}))"))
     pivots = [stages[2 - i][i][i] for i in range(3)]
@@ -227,23 +173,51 @@ def test_the_page_s_pivots_and_steps_are_the_library_s(v8):
     assert np.allclose(json.loads(rows)[-1], [*run.q[-1], *run.qd[-1]], rtol=1e-11, atol=1e-11)
 
 
-def test_a_line_makes_the_page(tmp_path, capsys, monkeypatch):
-    monkeypatch.setattr("viz.lessons.euler_edge.DRAWN", 0)  # pictures take most of the time
-    target = tmp_path / "lesson.html"
-    page = viz.lesson(free_block(), target)
-    assert target.read_text(encoding="utf-8") == page
-    assert cli.main(["lesson", "--out", str(target)]) == 0
-    assert "6 screens on spring_mass" in capsys.readouterr().out
-    assert "A lesson on spring mass" in target.read_text(encoding="utf-8")
+def test_a_line_makes_the_pages(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    page = viz.lesson(block(), "lesson.html")
+    assert Path("lesson.html").read_text(encoding="utf-8") == page
+    line = [
+        "lesson",
+        "--out",
+        "a.html",
+        "--worksheet",
+        "b.html",
+        "--key",
+        "c.html",
+        "--subject",
+        "loops",
+        "--author",
+        "Me",
+    ]
+    assert cli.main(line) == 0
+    assert re.findall(r"^(.*?): (1 question|work|ans)", capsys.readouterr().out, re.MULTILINE) == [
+        ("a.html", "1 question"), ("b.html", "work"), ("c.html", "ans"),
+    ]  # fmt: skip
+    assert all(
+        [
+            "A constraint and its force" in Path(name).read_text(encoding="utf-8")
+            for name in ("a.html", "b.html", "c.html")
+        ]
+    )
+    for wrong, message in (
+        (["lesson", "--key", "a.txt"], "--key must end"),
+        (["lesson", "--out", "a.html", "--key", "a.html"], "different files"),
+        (["lesson", "--out", "a.html", "--subject", "euclid"], "subject must be"),
+    ):  # fmt: skip
+        assert cli.main(wrong) == cli.ERROR
+        assert message in capsys.readouterr().err
     with pytest.raises(ValueError, match=r"must end in \.html"):
-        viz.lesson(free_block(), tmp_path / "lesson.txt")
+        viz.lesson(block(), tmp_path / "lesson.txt")
     with pytest.raises(TypeError, match="first-order"):
         viz.lesson(dyn.OdeSystem(lambda x, t: [-x[0]], ["x"]))
+    with pytest.raises(TypeError, match="author must be text"):
+        viz.lesson(block(), author=7)
 
 
 def test_a_system_too_large_for_the_page_is_said_to_be(monkeypatch):
     monkeypatch.setattr("viz.lessons.subject.LARGEST_GRAPH", 5)
-    assert "too large to be computed" in torque_parts(subject_of(MODELS["wheel"]())).to_html(3)
+    assert "too large to be computed" in torque_parts(subject_of(dyn.scenes.load("spring_mass"))).to_html(3)
 
 
 def test_the_address_holds_the_score(tmp_path):
@@ -251,16 +225,16 @@ def test_the_address_holds_the_score(tmp_path):
     if (program := chromium()) is None:
         pytest.skip("no Chromium here")
     page: Path = tmp_path / "lesson.html"
-    viz.lesson(free_block(), page)
+    viz.lesson(block(), page)
     run = subprocess.run(
         [program, "--headless", "--no-sandbox", "--disable-gpu", f"--user-data-dir={tmp_path}", "--v=0",
-         "--enable-logging=stderr", "--virtual-time-budget=2000", "--dump-dom", f"{page.as_uri()}#4;01-9"],
+         "--enable-logging=stderr", "--virtual-time-budget=2000", "--dump-dom", f"{page.as_uri()}#4;11-9"],
         capture_output=True, encoding="utf-8", timeout=60, check=False,
     )  # fmt: skip
     assert "CONSOLE" not in run.stderr
     dom = run.stdout
-    assert "1 of 2 right" in dom  # A is right on the first, wrong on the second; 9 is no choice
-    assert re.findall(r'<section class="screen current" id="([\w-]+)"', dom) == ["elimination"]
+    assert "1 of 2 right" in dom  # B is right on the first, wrong on the second; 9 is no choice
+    assert re.findall(r'<section class="screen current" id="([\w-]+)"', dom) == ["wrong-way"]
     assert dom.count('<details class="reveal" open="">') == 2
     assert re.search(r'<a href="#1"[^>]*class="right"', dom)
     assert re.search(r'<a href="#2"[^>]*class="wrong"', dom)
@@ -276,16 +250,18 @@ def test_what_is_said_of_a_cart_does_not_hang_on_the_order_of_its_coordinates(or
         return kinetic + 3.924 * cg.cos(angle)
 
     names = [("cart", "pendulum")[k] for k in order]
-    screen = euler_edge(subject_of(dyn.System(energies, names, damping=[0.4 * (k == 0) for k in order])))
-    assert screen.answer == 1
-    assert "K contains positions" in screen.reveal
-    assert (
-        "its energy does change" in energy_and_step(subject_of(dyn.System(energies, names, damping=[0.4, 0.0]))).story
-    )
+    subject = subject_of(dyn.System(energies, names, damping=[0.4 * (k == 0) for k in order]))
+    screen = wrong_way(subject)
+    assert screen.choices[screen.answer] == "It tends to a number that is not zero"
+    assert "<b>pendulum</b>" in screen.question
+    assert "K depends on positions" in check(subject).reveal
+    assert "its energy does change" in energy_and_step(subject).story
 
 
-def test_of_what_does_not_depend_on_its_place_the_first_answer_is_right_and_told_so() -> None:
-    screen = euler_edge(subject_of(free_block()))
-    assert screen.answer == 0
-    assert "K does not depend on position" in screen.reveal
-    assert "A is right of this system: ∂L/∂q is zero at every state." in screen.note
+def test_of_what_does_not_depend_on_its_place_it_is_said_that_there_is_no_error() -> None:
+    subject = subject_of(block())
+    screen = wrong_way(subject)
+    assert screen.choices[screen.answer] == "There is no error, at any dt"
+    assert "∂L/∂q is 0, so nothing comes through" in screen.reveal
+    assert "∂K/∂q is 0" in check(subject).reveal
+    assert "happens to be right" in made("block")

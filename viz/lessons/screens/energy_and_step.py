@@ -11,13 +11,15 @@ import numpy as np
 from cgraph.extend import Array
 from dynamics import SimulationWarning, energy, simulate, state_equation
 
-from .. import theme
-from ..pages.document import Table
-from ..pages.operations import graph_data
-from .subject import Screen, Subject, number
+from ... import theme
+from ...pages.document import Table
+from ...pages.operations import graph_data
+from ..glossary import term
+from ..screen import Screen
+from ..subject import Subject, number
 
 FACTORS = (2, 4, 16)  # by which the error of a method of order 1, 2 or 4 shrinks
-STEPS, FINE = (100, 30, 10), 16  # of the coarse motion, and how many of the reference's there are in one
+STEPS, FINE = (300, 100, 30, 10), 16  # of the coarse motion, and how many of the reference's there are in one
 LONGEST_MOTION, HALVINGS = 1.0, 20  # s, of the motion whose order is measured, and how often it is halved
 ROUNDING_ERROR = 1e-12  # of the largest coordinate: an error that says nothing about a method
 SMALL_ERROR = 1e-5  # of the largest coordinate: an error that has not grown beyond its order
@@ -43,24 +45,39 @@ def energy_and_step(subject: Subject) -> Screen:
         t_end=min(subject.scene.t_end, 3.0),
         fine=2000 if len(rate.nodes) < 1000 else 500,
         colors=[theme.ORANGE, theme.BLUE],
+        unit=" J" if subject.units else "",
     )
     return Screen(
         "energy-and-step",
         "Energy and the step",
-        4,
-        "<p>Now the system moves on its own, step by step. Euler's method follows the slope at the start of a step; the "
-        "classical Runge-Kutta method, rk4, takes a weighted mean of four. Without damping and drive energy is conserved, so its "
+        5,
+        f"<p>Now the system moves on its own, step by step. {term('Euler’s method')} follows the rate at the start of a step; the "
+        f"classical Runge-Kutta method, {term('rk4')}, takes a weighted mean of four. Without damping and drive energy is conserved, so its "
         f"change is an error that can be seen.{_BRAKED if braked else ''}</p>",
         f"rk4 takes {steps} steps to t = {number(t_end)} s. We halve the step. The error of the positions "
         "then becomes smaller by a factor of about …",
-        (*map(str, FACTORS), "none of these"),
+        (*map(str, FACTORS), "none of these factors"),
         measured.answer,
-        f"<p>{measured.words} Euler's error is only halved.</p>"
+        f"<p>{measured.words} {_of_euler(subject, measured)}</p>"
         + Table("rk4: largest error of a coordinate", ["dt [s]", "at the end"], rows).html(),
-        "Move the number of steps. Orange: Euler's energy over time; blue: that of rk4; dashed: that of rk4 with very small steps.",
+        "The line to compare with is the dashed one"
+        + (": the energy of this system does change." if braked else "; here it stays level."),
+        "Move the number of steps. Orange: the energy by Euler’s method over time; blue: by rk4; dashed: by rk4 with very small steps.",
         play,
-        "In a damped system energy does fall: the line to compare with is the dashed one.",
     )
+
+
+def _of_euler(subject: Subject, measured: Measured) -> str:
+    """Sentence on the errors of Euler's method with the same steps."""
+    t_end, steps = measured.t_end, measured.steps
+    exact = _end(subject, t_end, FINE * steps)
+    ends = [_end(subject, t_end, factor * steps, "euler") for factor in (1, 2)]
+    if exact is None or any([end is None for end in ends]):
+        return ""
+    coarse, finer = (float(np.abs(end - exact).max()) for end in ends if end is not None)
+    if finer <= measured.rounding:
+        return "Euler’s method is exact here, too."
+    return f"The error of Euler’s method becomes smaller by a factor of {number(coarse / finer)} alone."
 
 
 class Measured(NamedTuple):
@@ -104,9 +121,7 @@ def _measured(subject: Subject) -> Measured:
     t_end, last = min(subject.scene.t_end, LONGEST_MOTION), None
     for _ in range(HALVINGS):
         for steps in STEPS:
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", SimulationWarning)  # that the error is large is what is looked for
-                exact, coarse, finer = (_end(subject, t_end, factor * steps) for factor in (FINE, 1, 2))
+            exact, coarse, finer = (_end(subject, t_end, factor * steps) for factor in (FINE, 1, 2))
             if exact is None or coarse is None or finer is None:
                 continue
             size = max(float(np.abs(exact).max()), float(np.abs(subject.q).max()))
@@ -121,8 +136,10 @@ def _measured(subject: Subject) -> Measured:
     raise RuntimeError(f"{subject.scene.name} moves too fast for a lesson: rk4 misses it within {2.0 * t_end:g} s")
 
 
-def _end(subject: Subject, t_end: float, steps: int) -> Array | None:
-    """The coordinates at the end of a motion by rk4; None of one that is not whole."""
-    run = simulate(subject.system, subject.q, subject.qd, t_end, "rk4", dt=t_end / steps)
+def _end(subject: Subject, t_end: float, steps: int, method: str = "rk4") -> Array | None:
+    """The coordinates at the end of a motion; None of one that is not whole."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", SimulationWarning)  # that an error is large is what is looked for
+        run = simulate(subject.system, subject.q, subject.qd, t_end, method, dt=t_end / steps)
     end: Array = run.q[-1]
     return end if run.stats.success else None

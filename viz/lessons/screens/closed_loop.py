@@ -10,8 +10,10 @@ from cgraph import Node
 from cgraph.extend import Array
 from dynamics import System, forward_dynamics, gravity_force
 
-from ..pages.document import Table
-from .subject import SHOWN, Screen, Subject, number
+from ...pages.document import Table
+from ..glossary import term
+from ..screen import Screen
+from ..subject import SHOWN, Subject, number
 
 ROUNDING = 1e-12  # of the largest weight, or acceleration: what is rounding
 
@@ -32,7 +34,8 @@ def closed_loop(subject: Subject) -> Screen:
     first = multipliers[0]
     weight = f"<b>{escape(shown[0])}</b>"
     static = 0.0 if own or abs(weights[-1]) <= rounding else float(weights[-1])
-    choices, right = _choices(first, static)
+    unit = "" if own else subject.unit(f"tau{subject.system.n - 1}")
+    choices, right = _choices(first, static, unit)
     many = subject.system.n > 1 and not own
     still_held = np.array([answer[f"qdd{i}"] for i in range(subject.system.n)])
     rows = [[joint, *map(number, pair)]
@@ -46,27 +49,31 @@ def closed_loop(subject: Subject) -> Screen:
         joints=subject.joints[:SHOWN],
         multipliers=dict(zip(names, shown, strict=True)),
         rounding=ROUNDING,
+        force=float(np.abs(weights).max(initial=0.0)),
     )
+    last = escape(subject.joints[-1])
     return Screen(
         "closed-loop",
-        "A loop closes",
-        3,
-        ("<p>This system has constraints: rows z(q, q̇) that stay zero." if own else
-         f"<p>We clamp <b>{escape(subject.joints[-1])}</b>: a row z = q̇ that stays zero, the simplest of all loops.") +
-        " The force that does this is not known beforehand. So it becomes an unknown, the <b>multiplier</b> λ, beside the "
-        "accelerations: M q̈ − Jᵀλ = τ − b and J q̈ = −J̇ q̇. As many equations as unknowns, one elimination.</p>",
-        f"The system is at rest, without motors, and is let go. How large is the force λ of {weight} at that instant?",
+        "A loop closes" if own else f"{last} is clamped",
+        5,
+        (f"<p>This system has a {term('constraint')}: " + ("rows" if len(names) > 1 else "a row") + " z(q, q̇) that "
+         + ("stay" if len(names) > 1 else "stays") + " zero." if own else
+         f"<p>We clamp <b>{last}</b>. This is the simplest {term('constraint')}, a row z = q̇ that stays zero.") +
+        f" The force that does this is not known beforehand. So it becomes an unknown, the {term('multiplier')} λ, beside the "
+        f"{term('acceleration', 'accelerations')}: M q̈ − Jᵀλ = τ − b and J q̈ = −J̇ q̇, where J holds the slopes of z by q̇. "
+        "There are as many equations as unknowns, and one elimination finds them all.</p>",
+        f"The system is at rest where the lesson began, with τ = 0, and is let go. How large is λ of {weight} at that instant?",
         choices,
         right,
-        f"<p>λ = {number(first)}: what it takes to keep the row at zero. It does no work, because J q̇ = 0 along every "
-        "motion that is still possible.</p>"
-        + Table("Accelerations at rest", ["joint", "free", "held"], rows).html()
-        + Table("Multipliers", ["row", "λ"], [[a, number(b)] for a, b in zip(shown, multipliers, strict=True)][:SHOWN]).html(),
-        "Find a position where the clamp carries no load. Would the system stay at rest there without it?"
-        if sliders else "Accelerations without and with the rows, at rest.",
+        "<p>λ is what it takes to keep the row at zero. It does no work, because J q̇ = 0 along every "
+        "motion that is still possible."
+        + (f" While the rest of the system swings, λ is not the {subject.force} that would hold all of it still." if many else "")
+        + "</p>"
+        + Table("Accelerations at rest", [subject.joint, "free", "held"], rows).html()
+        + Table("Multipliers", ["row", f"λ{unit and f' [{unit.strip()}]'}"], [[a, number(b)] for a, b in zip(shown, multipliers, strict=True)][:SHOWN]).html(),
+        f"λ = {number(first)}{unit}.",
+        f"Find a position where λ is zero. Would {last} stay at rest there without the clamp?" if sliders else "",
         play,
-        f"λ = {number(first)}."
-        + (" While the other joints swing, it differs from the torque that holds the same place still." if many else ""),
     )  # fmt: skip
 
 
@@ -97,9 +104,9 @@ def _clamped(system: System) -> System:
     )
 
 
-def _choices(force: float, static: float) -> tuple[tuple[str, ...], int]:
+def _choices(force: float, static: float, unit: str) -> tuple[tuple[str, ...], int]:
     """Three numbers, in order, and the place of the right one; static: what would hold it if nothing else moved."""
     size = max(abs(force), abs(static))
     near = [value for value in (static, -force, 0.0, 2.0 * force, 1.0, -1.0) if abs(value - force) > 0.1 * size]
     values = sorted([force, *list(dict.fromkeys([value + 0.0 for value in near]))[:2]])
-    return tuple([number(value) for value in values]), values.index(force)
+    return tuple([f"{number(value)}{unit}" for value in values]), values.index(force)

@@ -1,0 +1,287 @@
+"""Sweeps: a formula as a graph, its values from the inputs up, its slopes from the output down, and rates once more up."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from html import escape
+from typing import TYPE_CHECKING
+
+import cgraph as cg
+from cgraph import Graph, Node
+from cgraph.extend import Names, columns, cotangents, counted
+from dynamics import inverse_dynamics
+
+from ...graph_drawing.dot import to_dot
+from ...graph_drawing.levels import levels_of
+from ..glossary import term
+from ..screen import Figure, Screen
+from ..subject import Subject, inline, lagrangian_graph, number
+
+if TYPE_CHECKING:
+    from graphviz import Digraph
+
+# fmt: off   (a table of rules)
+RULES = {
+    "add": "+ passes it to both arguments as it is",
+    "sub": "− passes it to the first argument as it is, to the second with the other sign",
+    "neg": "− passes it on with the other sign",
+    "mul": "× passes to each factor its slope times the other factor",
+    "cos": "cos x passes to x its slope times −sin x",
+    "sin": "sin x passes to x its slope times cos x",
+    "pow": "xʸ passes to x its slope times y xʸ⁻¹, such as 2x for a square",
+}
+# fmt: on
+OTHERS = "any other operation passes on its slope times its own derivative"
+ROWS = 60  # nodes that the page walks through
+DRAWN = 40  # nodes, at most, of a graph that is drawn
+PUSH = 0.1  # by which a coordinate is changed
+
+
+def formula_graph(subject: Subject) -> Screen:
+    """The screen on what a computational graph is."""
+    graph, name = lagrangian_graph(subject.system), f"q{subject.system.nq - 1}"
+    (before,), (after,) = subject.evaluate(graph), subject.evaluate(graph, **{name: subject.values[name] + PUSH})
+    (other,) = subject.evaluate(graph, **{name: subject.values[name] - PUSH})
+    size = max(abs(float(each)) for each in (before, after, other))
+    changes = max(abs(after - before), abs(other - before)) > 1e-12 * size
+    reached = name in {node.name for node in graph.nodes if not node.args and node in _used(graph)}
+    shown = f"<b>{subject.told(name)}</b>"
+    why = (
+        f"<p>Edges lead from {shown} up to L, so its value takes part. L goes from {number(before)} to {number(after)}.</p>"
+        if changes
+        else f"<p>Edges lead from {shown} up to L, but what comes by them cancels: L stays {number(before)}.</p>"
+        if reached
+        else f"<p>No edge leads from {shown} up to L: the formula of L does not contain it. L stays {number(before)}.</p>"
+    )
+    return Screen(
+        "formula-graph",
+        "A formula as a graph",
+        4,
+        f"<p>A computer keeps the formula of L as a {term('computational graph')}. A {term('node')} is an {term('input')}, "
+        f"a number, or one operation. An {term('edge')}, an arrow, leads from a node to every operation that uses it. "
+        f"This graph has {len(graph.nodes)} nodes; inputs are at the bottom, L is at the top.</p>"
+        f"<p>To compute L one walks from the bottom to the top, in a {term('forward sweep')}: every node computes its value "
+        "from the values below it. v₁, v₂, … are names of values on the way.</p>" + _told_picture(graph),
+        f"{shown} is changed by {PUSH:g}{subject.unit(name)}. All other inputs, the velocities too, are held. What does "
+        "L do?",
+        (
+            "It changes",
+            "It stays as it is",
+            f"It changes only if {subject.told(f'qd{subject.system.n - 1}')} changes, too",
+        ),
+        0 if changes else 1,
+        why + "<p>In this graph a coordinate q and its velocity q̇ are two inputs of their own: no edge leads from one "
+        "to the other. Keep this in mind.</p>",
+        f"L is {number(before)} in this moment.",
+        f"Press Next and watch the values go up, as in the picture, from the inputs to L.{_left_out(graph)}",
+        {"kind": "sweeps", "rows": _rows(subject, graph, "values"), "slopes": False},
+        _picture(subject, graph, "values"),
+        _figure(subject, graph, values=True),
+    )
+
+
+def backward_sweep(subject: Subject) -> Screen:
+    """The screen on slopes."""
+    graph, slopes = lagrangian_graph(subject.system), subject.system.n + subject.system.nq
+    return Screen(
+        "sweeps",
+        "Backward: all slopes in one sweep",
+        5,
+        f"<p>Lagrange’s equation asks for ∂L/∂q and for p = ∂L/∂q̇, here {slopes} {term('slope', 'slopes')} of L: by how "
+        "much L changes for each unit of an input.</p><p>They are found by the "
+        f"{term('chain rule')}, node by node, in a {term('backward sweep')} from the top to the bottom. L itself has the "
+        "slope 1. Then every node passes its slope down to what it is made of:</p>"
+        f"<ul>{_rules(graph)}</ul>{_example(subject, graph)}<p>Where several edges leave a node, what comes back by them adds up.</p>",
+        f"How many backward sweeps over the graph give all {slopes} slopes?",
+        ("1", f"{slopes}, one for each slope", f"{len(graph.nodes)}, one for each node"),
+        0,
+        "<p>One sweep, because it passes every node and arrives at every input. From the bottom to the top, on the other "
+        "hand, one would need a sweep for each input.</p>",
+        "Forward, a sweep gives the slopes of all nodes by one input; backward, those of one output by all inputs, and L "
+        "is one number.",
+        "Step through both sweeps, values upwards, then slopes downwards, as in the picture. Multiply a few of the slopes "
+        f"by hand.{_left_out(graph)}",
+        {"kind": "sweeps", "rows": _rows(subject, graph, "slopes"), "slopes": True},
+        _picture(subject, graph, "slopes"),
+        _figure(subject, graph, values=False),
+    )
+
+
+def forward_sweep(subject: Subject) -> Screen:
+    """The screen on the rate of the momentum."""
+    counts = {name: len(inverse_dynamics(subject.system, name).nodes) for name in ("chain_rule", "chain_rule_literal")}
+    swept, written = counts.values()
+    return Screen(
+        "forward-sweep",
+        "Forward: a rate in one sweep",
+        4,
+        f"<p>The {term('momentum')} p depends on q and q̇, which change at the rates q̇ and q̈. By the "
+        f"{term('chain rule')}</p>"
+        '<p class="display">dp/dt = (∂p/∂q) q̇ + (∂p/∂q̇) q̈.</p>'
+        f"<p>Written out, these are tables of {subject.system.n} × {subject.system.nq + subject.system.n} slopes times the rates. But a "
+        f"{term('forward sweep')} over the graph of p carries with every node the rate of its value: it starts with the "
+        "rates q̇ and q̈ at the inputs and ends with dp/dt at the top. No table is ever made.</p>",
+        f"The graph of τ with every slope written out has {counted(written, 'node')}. The one by a forward sweep has …",
+        ("fewer", "as many", "more"),
+        0 if swept < written else 1 if swept == written else 2,
+        f"<p>{counted(swept, 'node')} for {written}."
+        + (
+            " With one coordinate the table has little in it, so there is little to be saved."
+            if subject.system.n == 1
+            else ""
+        )
+        + " q and q̇ stay two separate inputs: there is no dt and no earlier state.</p>",
+        "Both are right, to the last digits; they differ in size alone.",
+    )
+
+
+def _rules(graph: Graph) -> str:
+    """The chain rule at the operations of a graph, as items of a list."""
+    ops = {node.op.name for node in graph.nodes if node.args}
+    rules = [text for name, text in RULES.items() if name in ops]
+    return "".join([f"<li>{text};</li>" for text in rules + [OTHERS] * bool(ops - {*RULES})])
+
+
+def _example(subject: Subject, graph: Graph) -> str:
+    """The rule of a product at the highest node that is a number times another node."""
+    _, slopes = _numbers(subject, graph)
+    called, levels = _called(graph), levels_of(graph)
+    products = [
+        node for node in called if node.op.name == "mul" and sum([arg.value is not None for arg in node.args]) == 1
+    ]
+    if not products:
+        return ""
+    node = max(products, key=lambda each: (levels[each], slopes[each]))
+    factor, other = sorted(node.args, key=lambda arg: arg.value is None)
+    assert factor.value is not None
+    name = called.get(other) or subject.shown(str(other.name))
+    slope, passed = number(slopes[node]), number(slopes[node] * factor.value)
+    return (
+        f"<p>For example, {called[node]} = {number(factor.value)} × {escape(name)} has the slope {slope}, so it passes "
+        f"{slope} × {number(factor.value)} = {passed} down to {escape(name)}.</p>"
+    )
+
+
+def _left_out(graph: Graph) -> str:
+    return f" Of {len(graph.nodes)} nodes the last {ROWS} are shown." if len(graph.nodes) > ROWS else ""
+
+
+def _told_picture(graph: Graph) -> str:
+    """Words in place of a picture that is not there, for a screen with something to play."""
+    many = len(graph.nodes) > DRAWN
+    told = "the same lesson on a two-link arm, <code>cgraph lesson</code>, has one"
+    return f"<p>With {len(graph.nodes)} nodes the graph is too large for a picture here; {told}.</p>" if many else ""
+
+
+def _used(graph: Graph) -> set[Node]:
+    return {edge.source for edge in graph.edges} | set(graph.outputs.values())
+
+
+def _picture(subject: Subject, graph: Graph, name: str) -> str:
+    """The graph of L to light up, where it is small enough."""
+    if len(graph.nodes) > DRAWN:
+        return ""
+    return inline(
+        subject.svg(_drawing(graph, subject.names, _called(graph))), name, "The graph of L, inputs at the bottom"
+    )
+
+
+def _figure(subject: Subject, graph: Graph, *, values: bool) -> Figure | None:
+    """The graph of L to write values at, or slopes where the values are there."""
+    if len(graph.nodes) > DRAWN:
+        return None
+    found, slopes = ({node: number(x) for node, x in each.items()} for each in _numbers(subject, graph))
+    texts = [
+        (_called(graph), ""),
+        (found, " = "),
+        (slopes, ": slope "),
+    ]  # at operations, and after the name of an input
+    plain, marked = (
+        subject.svg(_drawing(graph, _after(subject, at, sign) if sign else subject.names, at))
+        for at, sign in (texts[:2] if values else texts[1:])
+    )
+    if values:
+        return Figure(
+            plain,
+            marked,
+            "The graph of L. Inputs are at the bottom; the numbers 1 and 2 at edges tell arguments apart; xʸ is a power.",
+            "Write the value of every node beside it, from the bottom to the top, with two digits.",
+            "The values of all nodes.",
+        )
+    return Figure(
+        plain,
+        marked,
+        "The graph of L. Its values were computed on the screen before.",
+        "Write the slope of L by every node beside it, from the top to the bottom. Begin with 1 at the top, and take the "
+        "values from picture 1.",
+        "The slopes of L by all nodes. At the bottom are ∂L/∂q and p = ∂L/∂q̇.",
+        subject.svg(_drawing(graph, subject.names, _called(graph))),
+    )
+
+
+def _drawing(graph: Graph, names: Mapping[str, str], at: Mapping[Node, str]) -> Digraph:
+    operations = {node: text for node, text in at.items() if node.args}
+    return to_dot(graph, names=names, formulas=operations, clusters=False, legend=False)
+
+
+def _after(subject: Subject, at: Mapping[Node, str], sign: str) -> dict[str, str]:
+    """Names of the inputs with their numbers."""
+    shown = {
+        str(node.name): f"{subject.shown(str(node.name))}{sign}{text}" for node, text in at.items() if not node.args
+    }
+    return {**subject.names, **shown}
+
+
+def _called(graph: Graph) -> dict[Node, str]:
+    """v7 of every operation: the numbers of the listing, and of the equations on the page."""
+    numbers = Names(graph).number
+    return {node: f"v{numbers[node]}" for node in graph.nodes if node.args}
+
+
+def _numbers(subject: Subject, graph: Graph) -> tuple[dict[Node, float], dict[Node, float]]:
+    """Values, and slopes of L, of all nodes that are no numbers."""
+    (end,) = graph.outputs.values()
+    nodes = [node for node in graph.nodes if node.value is None]
+    bars = cotangents({end: cg.constant(1.0)}, nodes)
+    values = subject.evaluate(Graph(graph.inputs, {str(k): node for k, node in enumerate(nodes)}))
+    slopes = subject.evaluate(Graph(graph.inputs, {str(k): bar for k, bar in enumerate(bars)}))
+    return dict(zip(nodes, values.tolist(), strict=True)), dict(zip(nodes, slopes.tolist(), strict=True))
+
+
+def _rows(subject: Subject, graph: Graph, picture: str) -> list[dict[str, object]]:
+    """The nodes from the bottom of the picture up: formula, value, slope of L by the node, and what an input's slope is."""
+    (end,) = graph.outputs.values()
+    levels, place = levels_of(graph), {node: k for k, node in enumerate(graph.nodes)}
+    values, slopes = _numbers(subject, graph)
+    nodes = sorted(values, key=lambda node: (levels[node], place[node]))[-ROWS:]
+    called = {**{node: subject.shown(str(node.name)) for node in nodes if not node.args}, **_called(graph)}
+    return [
+        {
+            "node": "L" if node is end else called[node],
+            "box": f"{picture}-n{place[node]}",
+            "text": _text(node, called) if node.args else "",
+            "value": values[node] if math.isfinite(values[node]) else None,
+            "slope": slopes[node] if math.isfinite(slopes[node]) else None,
+            "what": _what(node),
+        }
+        for node in nodes
+    ]
+
+
+def _text(node: Node, called: Mapping[Node, str]) -> str:
+    """The operation on its arguments, these by name or number."""
+    parts = [number(arg.value) if arg.value is not None else called.get(arg, "…") for arg in node.args]
+    if node.op.name == "pow":
+        return " to the power ".join(parts)
+    if columns(node.op).infix:
+        return f" {columns(node.op).symbol} ".join(parts)
+    return f"{columns(node.op).symbol}{parts[0]}" if columns(node.op).signs else f"{node.op.name}({', '.join(parts)})"
+
+
+def _what(node: Node) -> str:
+    """Meaning of the slope at an input."""
+    name = node.name or ""
+    if node.args or not name[-1:].isdigit():
+        return ""
+    return "p = ∂L/∂q̇" if name.startswith("qd") else "∂L/∂q" if name.startswith("q") else ""
