@@ -50,14 +50,13 @@ def figure7(larger: Mapping[str, str] = LARGER) -> Part:
     legend = legend_svg(theme.in_words(kinds, theme.MOTION_WORDS), 1)
     orders = {f"{form}, {method}": graph for method in METHODS for form, graph in _chain(LINKS, method).items()}
     silhouettes = silhouettes_svg([LevelPanel(title, graph) for title, graph in orders.items()])
-    header = ("", *[f"{size}, {form}" for size in SIZES for form in ("Lagrange", "Hamilton")])
     blocks: list[Block] = [
         Paragraph(_answer(sizes[ARM]), point=True),
         drawn("fig7a", spring, _caption("7a", SPRING, sizes[SPRING]), "auto", _seen(SPRING, sizes[SPRING])),
         Picture("", to_adaptive(legend), "The colors of Figure 7.", "auto"),
         drawn("fig7b", arm, _caption("7b", ARM, sizes[ARM]), "100%", _seen(ARM, sizes[ARM])),
         Paragraph(_cause(sizes[ARM])),
-        Table("Sizes of both forms", header, _rows(sizes), file="fig7"),
+        Table("Sizes of both forms", ("", *SIZES), _rows(sizes), file="fig7"),
         Paragraph(_remedy(orders)),
         drawn("fig7c", silhouettes, _silhouettes_caption(LINKS), "100%", _silhouettes_seen(orders)),
     ]
@@ -72,8 +71,10 @@ def _size(counts: Counts) -> dict[str, int]:
 
 def _rows(sizes: Mapping[str, Mapping[str, Counts]]) -> list[tuple[str, ...]]:
     return [
-        (name, *[str(getattr(forms[form], size)) for size in SIZES for form in (LAGRANGE, HAMILTON)])
+        (f"{name}, {TITLES[form].partition(':')[0]}", *[str(getattr(counts, size)) for size in SIZES])
         for name, forms in sizes.items()
+        for form, counts in forms.items()
+        if form in TITLES
     ]
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 from cgraph import Graph
-from cgraph.extend import Polynomial, expand, format_polynomial
+from cgraph.extend import Json, Polynomial, expand, format_polynomial
 from dynamics import formulation_sizes, formulation_verdict, inverse_dynamics, momentum_rate, scenes
 from dynamics.equations.formulations.formulation_sizes import (
     INERTIAL_TERM,
@@ -173,7 +173,7 @@ NOTES = (
     (theme.SPURIOUS, 2.5, "", "an edge that is there by mistake"),
     (theme.LINE, 1.2, "1 2", "first and second argument, 1 − 2"),
 )
-STEPS = tuple(10.0 ** (-k / 2) for k in range(13))  # s, 1 to 1e-6
+STEPS = (1.0, *[float(f"{digit}e-{k}") for k in range(1, 7) for digit in (3, 1)])  # s, 1 to 1e-6
 
 
 def moving_figure() -> tuple[Stage, str]:
@@ -229,6 +229,6 @@ def figures_1_to_3() -> Part:
         Paragraph(WHY_FEWER.replace("∂L/∂q", "∂L/∂θ")),
     ]
     counted = {f"{term}, {formulation}": size._asdict() for (term, formulation), size in sizes.items()}
-    return Part(
-        "figures", "Figures 1 to 3: the inertial term, three times", blocks, {**figures, "sizes": counted}, files
-    )
+    heading = "Figures 1 to 3: the inertial term, three times"
+    moves: dict[str, Json] = {"stage": moving.data()}
+    return Part("figures", heading, blocks, {**figures, "sizes": counted}, files, moves)

@@ -13,15 +13,16 @@ from typing import NamedTuple
 from cgraph.extend import Json
 
 from ..graph_drawing.render import check_can_draw
+from ..pages import html
 from ..pages.document import Document, Markup, Section, check_folder, to_html
+from ..pages.html import asset
 from ..plots import plot
 from .by_depth import figure7
 from .embedding import embedding
 from .free_fall import figures4_and_5
-from .one_joint import equations, figures_1_to_3, moving_figure
+from .one_joint import equations, figures_1_to_3
 from .part import Part
 from .scaling import scaling_of_counts
-from .stage import script, style
 from .timing import figure6
 from .typeset import typeset
 
@@ -102,5 +103,6 @@ def page_of(parts: Sequence[Part], links: Mapping[str, str]) -> str:
     )
     sections = [Section(part.name, part.heading, part.blocks) for part in parts]
     document = Document("The chain rule keeps θ and ω apart", [Markup(text, "")], sections)
-    moving, _ = moving_figure()
-    return to_html(document, style(), script(), {"stage": moving.data()})
+    script = f'"use strict";\n{asset(html.__package__, "elements.js")}{asset(__package__, "stage.js", "fall.js")}'
+    data = {name: each for part in parts for name, each in part.moves.items()}
+    return to_html(document, asset(__package__, "article.css"), script, data)

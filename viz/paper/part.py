@@ -24,7 +24,8 @@ SCALE = 160 / 96  # of a plot as PNG: 160 pixels an inch
 class Part(NamedTuple):
     """One part of the paper: its section of the page, and what no block stands for.
 
-    data: {name in figures.json: figures as plain data}.  other: {name: content} of further files.
+    data: {name in figures.json: figures as plain data}.  other: {name: content} of further files.  moves: {id of an
+    element: what the page's script reads there}, for figures that move.
     """
 
     name: str
@@ -32,6 +33,7 @@ class Part(NamedTuple):
     blocks: Sequence[Block]
     data: Mapping[str, Json]
     other: Mapping[str, str | bytes] = MappingProxyType({})
+    moves: Mapping[str, Json] = MappingProxyType({})
 
     def files(self) -> dict[str, str | bytes]:
         """{name: content} of the pictures and tables that have a file, and of the others."""

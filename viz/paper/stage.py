@@ -11,7 +11,6 @@ from cgraph.extend import Json
 
 from .. import theme
 from ..pages.document import Picture
-from ..pages.html import asset
 from .fixed_layout import OUTPUT, View, spoken, stage_svg, written
 
 FIRST_STEP = 2  # of `steps`, what the slider shows first
@@ -58,13 +57,14 @@ class Stage:
         values = [every.evaluate(_known(view, state)) for state in self.states]
         nodes: dict[str, Json] = {}
         for place, shape in view.shapes.items():
-            mistake = " · there by mistake" if shape.paint == theme.MARKED else ""
-            what = "output" if shape.kind == OUTPUT else shape.paint.words if not mistake else shape.kind
+            roles = " and ".join(sorted(shape.node.roles - {"input"}))
+            told = shape.kind if shape.kind == OUTPUT or not roles else f"{shape.kind}: {roles}"
+            what = f"{told} · there by mistake" if shape.paint == theme.MARKED else told
             formula = written(view.graph, shape.node, self.letters)
             name = shape.texts[0].replace(" old", "_old")
             short = name if name == formula or not shape.named else f"{name} = {formula}"
             text = short if shape.named else formula
-            nodes[place] = [f"{text}", f"{what}{mistake}", [_number(float(each[place])) for each in values]]
+            nodes[place] = [text, what, [_number(float(each[place])) for each in values]]
         return nodes
 
     def _compared(self) -> list[Json]:
@@ -89,7 +89,7 @@ def _known(view: View, state: Mapping[str, float]) -> dict[str, float]:
 
 
 def _number(value: float) -> str:
-    return f"{value:.4g}".replace("-", "−")
+    return f"{value:.4g}".replace("e-0", "e-").replace("-", "−")
 
 
 def stage_html(stage: Stage, told: str, legend: Picture) -> str:
@@ -110,7 +110,7 @@ def stage_html(stage: Stage, told: str, legend: Picture) -> str:
     return (
         f'<figure class="stage"><fieldset><legend>Formulation</legend>{buttons}</fieldset>'
         f'<div id="graph" role="group" aria-roledescription="graph">{stage_svg(views, first)}</div><div class="beside">'
-        '<p id="told" role="status">Point at a node, or tap it, or walk through the graph with the arrow keys.</p>'
+        '<p id="told">Point at a node, or tap it, or walk through the graph with the arrow keys.</p>'
         f'<p class="step"><label for="dt">Step dt</label><input id="dt" type="range" min="0" max="{len(stage.steps) - 1}" '
         f'value="{FIRST_STEP}" step="1" aria-describedby="at"><output for="dt"></output></p>'
         f'<table id="compared"><thead><tr><th></th><th>{escape(stage.called)}</th><th>of it too much</th></tr></thead>'
@@ -118,13 +118,3 @@ def stage_html(stage: Stage, told: str, legend: Picture) -> str:
         f'<figcaption id="caption">{escape(stage.captions[first])}</figcaption>'
         '<details><summary>This graph as text</summary><p id="words"></p></details></figure>'
     )
-
-
-def style() -> str:
-    """The style of the figure."""
-    return asset(__package__, "article.css")
-
-
-def script() -> str:
-    """The script of the figure; it reads its data from the element `stage`."""
-    return f'"use strict";\n{asset("viz.pages", "elements.js")}{asset(__package__, "article.js")}'

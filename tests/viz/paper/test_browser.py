@@ -7,15 +7,16 @@ import itertools
 import pytest
 
 from tests.each_row import each_row
+from viz.paper.free_fall import figures4_and_5
 from viz.paper.one_joint import equations, figures_1_to_3
 from viz.paper.paper import page_of
 
 
 @pytest.fixture(scope="module")
 def article(tmp_path_factory):
-    """The page, of Equation (3) and of Figures 1 to 3 alone."""
+    """The page, of Equation (3) and of Figures 1 to 5 alone."""
     path = tmp_path_factory.mktemp("article") / "index.html"
-    path.write_text(page_of([equations(), figures_1_to_3()], {}))
+    path.write_text(page_of([equations(), figures_1_to_3(), figures4_and_5()], {}))
     return path
 
 
@@ -46,7 +47,24 @@ def test_a_smaller_step_leaves_the_error(visit, article):
     assert page.inner_text("#told").startswith("α dt = 4")
     page.keyboard.press("End")
     assert page.evaluate(cells) == ["−1.5", "0", "0"]
-    assert page.inner_text("#told").startswith("α dt = 4e−06")
+    assert page.inner_text("#told").startswith("α dt = 4e−6")
+
+
+def test_the_fall_begins_by_its_button_and_stops(visit, article):
+    page = visit(article, "", 390, 900, reduced_motion="reduce")
+    assert page.evaluate("byId('time').value") == "0"  # nothing moves by itself
+    page.click("text=Let it fall")
+    for _ in range(50):
+        page.wait_for_timeout(100)
+        if page.evaluate("byId('time').valueAsNumber"):
+            break
+    page.click("text=Stop")
+    stopped = page.evaluate("byId('time').value")
+    assert page.locator("#arm line").count() == 3
+    page.focus("#time")
+    page.keyboard.press("End")
+    assert page.inner_text("#time + output") == "3.00 s"
+    assert 0 < int(stopped) < 150
 
 
 @each_row(("width", "scheme"), itertools.product((390, 1400), ("light", "dark")))

@@ -20,6 +20,7 @@ from viz import theme
 from viz.graph_drawing.render import RenderError
 from viz.paper import paper as module
 from viz.paper.embedding import EmbeddingError, _panels
+from viz.paper.free_fall import torque_at_rest
 from viz.paper.one_joint import STATE, WORDS, caption, moving_figure, view
 from viz.paper.scaling import SCALED, NodeScaling, edge_law
 from viz.paper.timing import timing
@@ -154,6 +155,22 @@ def test_the_figures_show_the_letters_of_the_papers_captions(paper):
 def test_the_falls_agree_with_mujoco(paper):
     _, data, _ = paper
     assert data["fall"]["largest_difference"] < SOLVED  # rad in 3 s: rounding, grown by the motion
+
+
+def test_the_moving_fall_is_the_paper_s_and_by_definition_the_arm_weighs_nothing(paper):
+    folder, _, _ = paper
+    text = (folder / "index.html").read_text()
+    (motion,) = re.findall(r'<script id="motion" type="application/json">(.*?)</script>', text)
+    moved = json.loads(motion)
+    assert moved["dt"] == pytest.approx(0.02)
+    assert len(moved["ours"]) == len(moved["theirs"]) == 151
+    assert np.allclose(moved["ours"], moved["theirs"], rtol=0.0, atol=1e-4)  # of pictures: rounded to 0.1 mm
+    assert moved["ours"][0] == pytest.approx([0.0, 0.0, 1.0, 0.0, 1.8, 0.0, 2.5, 0.0], abs=1e-9)
+    scene = dyn.scenes.load("triple_pendulum")
+    weight = 9.81 * (1.0 * 0.5 + 0.8 * 1.4 + 0.7 * 2.15)  # straight out, uniform rods
+    assert torque_at_rest(scene, "chain_rule") == pytest.approx(weight)
+    assert torque_at_rest(scene, "by_definition") == 0.0
+    assert "the torque that holds it is 0 N m in place of 30.7 N m" in text
 
 
 def test_the_law_has_slope_one(paper):

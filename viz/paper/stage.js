@@ -1,4 +1,4 @@
-// The figure that moves: which graph is shown, at which step, and what is told of the node that is pointed at.
+// Figures 1 to 3: which graph is shown, at which step, and what is told of the node that is pointed at.
 
 const stage = JSON.parse(byId("stage").textContent);
 const boxes = [...document.querySelectorAll(".stage .box")];
