@@ -28,7 +28,7 @@ def run(options: argparse.Namespace) -> None:
     beside = {
         "typed.html": (
             "Type a Lagrangian, at first that of Figures 1 to 3",
-            lambda: library.typed_page(library.typed_text(spring)),
+            lambda: library.typed_page(library.typed_text(spring, spring.q)),
         ),
         "live.html": ("The three-link arm of Figures 4 and 5, live", lambda: library.live_page(arm)),
     }

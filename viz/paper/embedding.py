@@ -103,7 +103,7 @@ def embedding(links: Sequence[int] = LINKS) -> Part:
         plotted("law", labeled(_panels(laws), shared=False, room=0.5), caption, seen),
         Table("The error and its limit as dt tends to 0", header, rows, file="law"),
         Paragraph(
-            "Kinetic only is exact for one joint, where K does not depend on θ, and wrong for a real arm under this plain "
+            "Kinetic only is exact for one joint, where K does not depend on θ, and wrong for an arm of several links under this plain "
             "embedding. It is exact again if the momentum is taken before the relation is embedded. The paper calls its "
             "kinetic-only method accurate on three links (Table 1). Its program is not public: it may have done either."
         ),

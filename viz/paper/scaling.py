@@ -137,8 +137,8 @@ def _answer(laws: Mapping[str, Sequence[int]]) -> str:
     linear = [TITLES[name] for name, law in laws.items() if len(law) == 2]
     quadratic = [TITLES[name] for name, law in laws.items() if len(law) == 3]
     return (
-        f"Edges grow linearly by these formulations, each further link adding the same number: {_listed(linear)}. They grow quadratically "
-        f"where the gradient of every momentum is taken: {_listed(quadratic)}. So the embedding is not what makes a graph grow quadratically."
+        f"Each further link adds the same number of edges, so growth is linear: {_listed(linear)}. It adds ever more where the gradient "
+        f"of every momentum is taken, so growth is quadratic: {_listed(quadratic)}. The embedding is not what makes a graph grow quadratically."
     )
 
 

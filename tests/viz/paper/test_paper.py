@@ -261,7 +261,7 @@ def test_linear_is_said_of_what_another_link_adds_the_same_to(paper):
         law = edge_law(NodeScaling(name, tuple(edges), (), tuple(edges.values()), ()))
         assert (len(slopes) == 1) == (len(law) == 2) == (name != "chain_rule_literal")
         assert all(sum(c * n**k for k, c in enumerate(law)) == size for n, size in edges.items())
-    assert "the same number: by definition, kinetic only and chain rule." in text
+    assert "growth is linear: by definition, kinetic only and chain rule." in text
     assert edge_law(NodeScaling("bent", (3, 4, 5, 6), (), (1, 2, 4, 8), ())) == ()
     assert edge_law(NodeScaling("short", (3, 4), (), (1, 2), ())) == ()
 
