@@ -54,6 +54,11 @@ def test_every_figure_is_there_as_svg_and_png(paper):
     assert not [path for path in folder.iterdir() if path.name.startswith(".")]  # nothing half written
 
 
+def test_the_parts_of_the_data_are_those_that_the_docs_list(paper):
+    _, data, _ = paper
+    assert f"{list(data)}\n" in (Path(__file__).parents[3] / "docs" / "pictures.md").read_text(encoding="utf-8")
+
+
 def test_there_is_a_progress_line_for_each_part(paper):
     _, _, lines = paper
     assert [line[:5] for line in lines if line.endswith("...")] == [f"[{k}/8]" for k in range(1, 9)]
