@@ -47,6 +47,7 @@ def figure7(larger: Mapping[str, str] = LARGER) -> Part:
         [LevelPanel(TITLES[name], graph, marks.get(name, {})) for name, graph in shown[ARM].items()], SMALL_SCALE
     )
     kinds = kinds_in(*shown[SPRING].values(), *shown[ARM].values())
+    kinds.remove(theme.OUTPUT)  # a ring around a node here, as the captions say
     legend = legend_svg(theme.in_words(kinds, theme.MOTION_WORDS), 1)
     orders = {f"{form}, {method}": graph for method in METHODS for form, graph in _chain(LINKS, method).items()}
     silhouettes = silhouettes_svg([LevelPanel(title, graph) for title, graph in orders.items()])

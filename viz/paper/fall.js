@@ -26,9 +26,9 @@ function runFall({ dt, ours, theirs }) {
     time.setAttribute("aria-valuetext", time.nextElementSibling.textContent);
   }
 
-  function stop() {
+  function stop(next) {
     began = null;
-    button.textContent = "Let it fall";
+    button.textContent = next;
   }
 
   function step(now) {
@@ -36,22 +36,22 @@ function runFall({ dt, ours, theirs }) {
     const k = Math.floor((now - began) / (1000 * dt));
     time.value = k;
     show();
-    if (k >= ours.length - 1) stop();
+    if (k >= ours.length - 1) stop("Let it fall");
     else requestAnimationFrame(step);
   }
 
   button.addEventListener("click", () => {
     if (began !== null) {
-      stop();
+      stop("Go on");
       return;
     }
-    const from = time.valueAsNumber < ours.length - 1 ? time.valueAsNumber : 0;
+    const from = button.textContent === "Go on" ? time.valueAsNumber : 0;
     began = performance.now() - 1000 * dt * from;
     button.textContent = "Stop";
     requestAnimationFrame(step);
   });
   time.addEventListener("input", () => {
-    stop();
+    stop(time.valueAsNumber < ours.length - 1 ? "Go on" : "Let it fall");
     show();
   });
   show();

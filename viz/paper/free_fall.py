@@ -116,7 +116,7 @@ def _moving(scene: Scene, run: Trajectory, ours: Array, theirs: Array | None) ->
         f'<figure class="moving"><svg viewBox="{" ".join([f"{each:.0f}" for each in box])}" role="img" '
         f'aria-label="The falling arm at the time of the slider"><path id="trail"/>{still}<g id="arm"></g><g id="dots"></g></svg>'
         '<p class="step"><button id="run" type="button">Let it fall</button><label for="time">t</label>'
-        f'<input id="time" type="range" min="0" max="{last}" value="0" step="1"><output for="time"></output></p>'
+        f'<input id="time" type="range" min="0" max="{last}" value="{last * 2 // 5}" step="1"><output for="time"></output></p>'
         f"<figcaption>{caption}</figcaption></figure>"
     )
     dt = float(run.t[FRAME] - run.t[0])
