@@ -58,7 +58,7 @@ class Command(argparse.ArgumentParser):
 
 # What each does, in the order of the help. To add a command, write its file and name it here.
 COMMANDS = {
-    "paper": "the paper's six figures and its table, measured, in one folder",
+    "paper": "the paper's six figures and its table, measured, and three of our own, in one folder",
     "bench": "our speed beside what is installed: CasADi, Pinocchio, MuJoCo, heyoka, JAX, SymPy, PyTorch",
     "report": "error beside run time of every integrator, ours and others', as pages",
     "scenes": "the scenes, with the size of their graphs",

@@ -6,6 +6,8 @@ import argparse
 import json
 from pathlib import Path
 
+import dynamics as dyn
+
 from . import library
 from .arguments import answer, may_open, say
 from .command import Command
@@ -22,7 +24,15 @@ def add(parser: Command) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Write the folder."""
-    files, data = library.paper(options.out, say, quick=options.quick)
+    spring, arm = (dyn.scenes.load(name) for name in ("spring_mass", "triple_pendulum"))
+    beside = {
+        "typed.html": (
+            "Type a Lagrangian, at first that of Figures 1 to 3",
+            lambda: library.typed_page(library.typed_text(spring, spring.q)),
+        ),
+        "live.html": ("The three-link arm of Figures 4 and 5, live", lambda: library.live_page(arm)),
+    }
+    files, data = library.paper(options.out, say, quick=options.quick, beside=beside)
     page = options.out / "index.html"
     said = json.dumps(data, indent=1) if options.json else f"All of it on one page: {page}"
     answer(said, files, folder=options.out, show=page if options.open else None)

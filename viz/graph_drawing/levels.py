@@ -12,6 +12,7 @@ from cgraph.extend import columns, counted
 
 from .. import theme
 
+RING = 5.0  # pixels by which the ring of an output is wider than its node
 SWEEPS = 8  # over all rows, to bring nodes near their neighbors
 HEAD, FOOT, SIDE, FONT = 46.0, 12.0, 40.0, 13  # pixels above and below the rows and between panels, and of letters
 Place = tuple[float, float]
@@ -153,16 +154,23 @@ def _nodes(graph: Graph, at: Mapping[Node, Place], scale: Scale) -> list[str]:
     parts = []
     for node, (x, y) in at.items():
         paint, w, h = theme.ROLES[theme.role_of(node)], scale.width, scale.height
-        ring = 2.5 if node in outputs else 1.2
-        parts.append(
-            f'<rect x="{x - w / 2:.1f}" y="{y - h / 2:.1f}" width="{w:.1f}" height="{h:.1f}" '
-            f'rx="{h / 2 if node.args else 2:.1f}" fill="{paint.fill}" '
-            f'stroke="{theme.LINE.lower() if node in outputs else paint.line}" stroke-width="{ring}"/>'
-        )
+        if node in outputs:  # a ring around it, which leaves its color to be seen
+            ring = f'fill="none" stroke="{theme.LINE.lower()}"'
+            parts.append(f'<rect class="ring" {_around(x, y, w + RING, h + RING, node)} {ring}/>')
+        look = f'fill="{paint.fill}" stroke="{paint.line}" stroke-width="1.2"'
+        parts.append(f"<rect {_around(x, y, w, h, node)} {look}/>")
         if scale.names:
             parts.append(f'<g class="node">{label(x, y + 4, _shown(node, scale), "middle")}</g>')
             parts += [label(x, y - h / 2 - 6, " = ".join(outputs[node]), "middle")] if node in outputs else []
     return parts
+
+
+def _around(x: float, y: float, width: float, height: float, node: Node) -> str:
+    """Place and corners of a node's shape: round where it is computed."""
+    corner = height / 2 if node.args else 2.0
+    return (
+        f'x="{x - width / 2:.1f}" y="{y - height / 2:.1f}" width="{width:.1f}" height="{height:.1f}" rx="{corner:.1f}"'
+    )
 
 
 def _shown(node: Node, scale: Scale) -> str:

@@ -179,7 +179,7 @@ def subject_of(model: Model) -> Subject:
         q[q == 0.0] = 0.4
     if len(system.constraints):
         q, qd = nearest_state(scene, q, qd)
-    return Subject(scene, q, qd, qdd, theme.called(display_names(scene)))
+    return Subject(scene, q, qd, qdd, display_names(scene))
 
 
 def _in_turn(values: Sequence[float], n: int) -> Array:

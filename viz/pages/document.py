@@ -39,6 +39,22 @@ class Paragraph:
 
 
 @dataclass(frozen=True)
+class Markup:
+    """HTML as it is, such as words with formulas or what moves.  words: what stands for it in Markdown."""
+
+    markup: str
+    words: str
+
+    def html(self) -> str:
+        """The HTML."""
+        return self.markup
+
+    def markdown(self, folder: str) -> list[str]:
+        """Lines of Markdown."""
+        return [self.words, ""]
+
+
+@dataclass(frozen=True)
 class Listing:
     """Text in lines as they are."""
 
@@ -89,8 +105,9 @@ class Table:
 class Picture:
     """SVG whose ink takes the page's colors, see `plot.to_adaptive_svg`.
 
-    name: of its file, without suffix; empty for none.  width: in the page; None leaves it to the page's style.
-    png: the scale of a PNG beside the SVG, as of `render_png`; 0 for none.
+    name: of its file, without suffix; empty for none.  width: in the page, "100%" or "auto"; None leaves it to the
+    page's style.  png: the scale of a PNG beside the SVG, as of `render_png`; 0 for none.  alt: what is seen, for who
+    does not see it; the caption where there is none.
     """
 
     name: str
@@ -98,14 +115,15 @@ class Picture:
     caption: str
     width: str | None = "100%"
     png: float = 0.0
+    alt: str = ""
 
     def html(self) -> str:
-        """The picture inside the page, with its caption below, which is its alternative text too."""
+        """The picture inside the page, with its caption below."""
         data, caption = base64.b64encode(self.svg.encode()).decode(), escape(self.caption)
-        style = "" if self.width is None else f' style="width:{self.width};background:none"'
-        kind, wide = (' class="plot"', ' class="wide"') if self.width == "100%" else ("", "")
+        kind = "" if self.width is None else ' class="plot"' if self.width == "100%" else ' class="drawing"'
+        wide = ' class="wide"' if self.width == "100%" else ""
         return (
-            f'<figure{wide} tabindex="0"><img{kind} src="data:image/svg+xml;base64,{data}" alt="{caption}"{style}>'
+            f'<figure{wide} tabindex="0"><img{kind} src="data:image/svg+xml;base64,{data}" alt="{escape(self.alt) or caption}">'
             f"<figcaption>{caption}</figcaption></figure>"
         )
 
@@ -119,7 +137,7 @@ def _row(cells: Sequence[str]) -> str:
     return "| " + " | ".join([cell.replace("|", "\\|") for cell in cells]) + " |"
 
 
-Block = Paragraph | Listing | Table | Picture
+Block = Paragraph | Markup | Listing | Table | Picture
 
 
 @dataclass(frozen=True)
@@ -150,8 +168,11 @@ def left_out(what: Sequence[str]) -> list[Block]:
     return [Paragraph(f"Left out of the model: {'; '.join(what)}.", warning=True)] if what else []
 
 
-def to_html(document: Document) -> str:
-    """The document as a page that needs no other file, with a line of links to its sections."""
+def to_html(document: Document, style: str = "", script: str = "", data: Mapping[str, object] | None = None) -> str:
+    """The document as a page that needs no other file, with a line of links to its sections.
+
+    style, script, data: of blocks that move, as `compose` takes them.
+    """
     title, sections = escape(document.title), document.sections
     links = " ".join([f'<a href="#{escape(each.anchor)}">{escape(each.heading)}</a>' for each in sections])
     body = "\n".join(
@@ -161,7 +182,7 @@ def to_html(document: Document) -> str:
         ]
     )
     text = f"<main>\n<h1>{title}</h1>\n{_html(document.introduction)}\n<nav>{links}</nav>\n{body}\n</main>"
-    return compose(document.title, text, STYLE)
+    return compose(document.title, text, STYLE + style, script, data)
 
 
 def _html(blocks: Sequence[Block]) -> str:

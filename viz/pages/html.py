@@ -38,7 +38,8 @@ nav a {{ margin-right: 1rem; display: inline-block; }} a {{ color: inherit; }}
 figure {{ margin: 1.2rem 0; }} figcaption {{ font-size: 0.95rem; margin-top: 0.5rem; }}
 figure {{ overflow-x: auto; }} figcaption {{ position: sticky; left: 0; }}
 figure img {{ display: block; max-width: 100%; height: auto; margin: 0 auto; background: #FFFFFF; border-radius: 4px; }}
-figure img.plot {{ min-width: 40rem; }} /* its letters stay legible: a narrow screen scrolls */
+figure img.drawing, figure img.plot {{ background: none; }}
+figure img.plot {{ width: 100%; min-width: 40rem; }} /* its letters stay legible: a narrow screen scrolls */
 .scroll {{ overflow-x: auto; {SHADOWS} }}
 @media (max-width: 43rem) {{ figure.wide figcaption::before {{ content: "The figure is wider than the page: scroll it sideways. "; opacity: 0.8; }} }}
 table {{ border-collapse: collapse; margin: 1rem 0; font-size: 0.95rem; font-variant-numeric: tabular-nums; }}

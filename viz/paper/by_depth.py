@@ -15,7 +15,7 @@ from ..pages.document import Block, Paragraph, Picture, Table
 from .both_forms import HAMILTON, LAGRANGE, VELOCITIES_ALONE, both_forms, form_sizes
 from .part import Part, drawn
 
-TITLES = {LAGRANGE: "Lagrange: accelerations of (q, q̇)", HAMILTON: "Hamilton: rates of (q, p)"}
+TITLES = {LAGRANGE: "Lagrange: accelerations of (θ, ω)", HAMILTON: "Hamilton: rates of (θ, p)"}
 SPRING, ARM = "a rotor on a spring", "the three-link arm"
 LARGER = {"a planar chain of 20": "planar 20", "an arm of 7 in space": "arm 7", "a tree of 15": "tree 15"}
 LARGE_SCALE = Scale(
@@ -42,28 +42,28 @@ def figure7(larger: Mapping[str, str] = LARGER) -> Part:
     sizes |= {name: form_sizes(both_forms(SCENES[model]())) for name, model in larger.items()}
     spring = levels_svg([LevelPanel(TITLES[name], graph) for name, graph in shown[SPRING].items()], LARGE_SCALE)
     level = sizes[ARM][VELOCITIES_ALONE].depth
-    marks: dict[str, Mapping[str, int]] = {HAMILTON: {"q̇ is solved": level}}
+    marks: dict[str, Mapping[str, int]] = {HAMILTON: {"ω is solved": level}}
     arm = levels_svg(
         [LevelPanel(TITLES[name], graph, marks.get(name, {})) for name, graph in shown[ARM].items()], SMALL_SCALE
     )
     kinds = kinds_in(*shown[SPRING].values(), *shown[ARM].values())
-    legend = legend_svg(theme.in_words(kinds, theme.MOTION_WORDS))
+    kinds.remove(theme.OUTPUT)  # a ring around a node here, as the captions say
+    legend = legend_svg(theme.in_words(kinds, theme.MOTION_WORDS), 1)
     orders = {f"{form}, {method}": graph for method in METHODS for form, graph in _chain(LINKS, method).items()}
     silhouettes = silhouettes_svg([LevelPanel(title, graph) for title, graph in orders.items()])
-    header = ("", *[f"{size}, {form}" for size in SIZES for form in ("Lagrange", "Hamilton")])
     blocks: list[Block] = [
         Paragraph(_answer(sizes[ARM]), point=True),
-        drawn("fig7a", spring, _caption("7a", SPRING, sizes[SPRING]), "auto"),
+        drawn("fig7a", spring, _caption("7a", SPRING, sizes[SPRING]), "auto", _seen(SPRING, sizes[SPRING])),
         Picture("", to_adaptive(legend), "The colors of Figure 7.", "auto"),
-        drawn("fig7b", arm, _caption("7b", ARM, sizes[ARM])),
+        drawn("fig7b", arm, _caption("7b", ARM, sizes[ARM]), "100%", _seen(ARM, sizes[ARM])),
         Paragraph(_cause(sizes[ARM])),
-        Table("Sizes of both forms", header, _rows(sizes), file="fig7"),
+        Table("Sizes of both forms", ("", *SIZES), _rows(sizes), file="fig7"),
         Paragraph(_remedy(orders)),
-        drawn("fig7c", silhouettes, _silhouettes_caption(LINKS)),
+        drawn("fig7c", silhouettes, _silhouettes_caption(LINKS), "100%", _silhouettes_seen(orders)),
     ]
     data = {name: {form: _size(counts) for form, counts in each.items()} for name, each in sizes.items()}
     data[f"a planar chain of {LINKS}"] = {title: _size(graph.counts()) for title, graph in orders.items()}
-    return Part("forms", "Figure 7: both forms by depth", blocks, data)
+    return Part("forms", "Figure 7: both forms by depth", blocks, {"forms": data})
 
 
 def _size(counts: Counts) -> dict[str, int]:
@@ -72,18 +72,34 @@ def _size(counts: Counts) -> dict[str, int]:
 
 def _rows(sizes: Mapping[str, Mapping[str, Counts]]) -> list[tuple[str, ...]]:
     return [
-        (name, *[str(getattr(forms[form], size)) for size in SIZES for form in (LAGRANGE, HAMILTON)])
+        (f"{name}, {TITLES[form].partition(':')[0]}", *[str(getattr(counts, size)) for size in SIZES])
         for name, forms in sizes.items()
+        for form, counts in forms.items()
+        if form in TITLES
     ]
 
 
 def _caption(number: str, what: str, forms: Mapping[str, Counts]) -> str:
     lagrange, hamilton = forms[LAGRANGE], forms[HAMILTON]
-    thick = "One of the longest paths is thick; outputs have a thick outline, and lines from constants are left out."
+    thick = "One of the longest paths is thick; a ring is around an output, and lines from constants are left out."
     return (
-        f"Figure {number}. Both forms of {what}, a row for each operation on the longest path to a node, the same rows for "
+        f"Figure {number}. Not in the paper: both forms of {what}, a row for each operation on the longest path to a node, the same rows for "
         f"both: {lagrange.depth} operations deep by accelerations, {hamilton.depth} by momenta. {thick}"
     )
+
+
+def _seen(what: str, forms: Mapping[str, Counts]) -> str:
+    each = [
+        f"{TITLES[form]} {c.nodes} nodes and {c.edges} edges, {c.depth} deep and {c.width} wide"
+        for form, c in forms.items()
+        if form in TITLES
+    ]
+    return f"Two graphs of {what} side by side, inputs at the bottom: {'; '.join(each)}."
+
+
+def _silhouettes_seen(orders: Mapping[str, Graph]) -> str:
+    each = [f"{title} {len(graph.nodes)} nodes, {graph.counts().depth} deep" for title, graph in orders.items()]
+    return f"Four towers over one scale of depth: {'; '.join(each)}."
 
 
 def _answer(forms: Mapping[str, Counts]) -> str:
@@ -100,7 +116,7 @@ def _answer(forms: Mapping[str, Counts]) -> str:
 def _cause(forms: Mapping[str, Counts]) -> str:
     level = forms[VELOCITIES_ALONE].depth
     return (
-        "The cause can be seen. ∂L/∂q is taken at q̇, so q̇ has to be solved from p first, by the elimination that "
+        "The cause can be seen. ∂L/∂θ is taken at ω, so ω has to be solved from p first, by the elimination that "
         f"otherwise gives the accelerations, {level} operations deep; the momenta of the links then go from the tip to the "
         f"base once more, {forms[HAMILTON].depth - level} further. For accelerations the bias is computed in parallel with the factors of "
         "the elimination, not after them. First or second order makes no difference: both are deep because links "
@@ -130,7 +146,7 @@ def _remedy(orders: Mapping[str, Graph]) -> str:
 
 def _silhouettes_caption(links: int) -> str:
     return (
-        f"Figure 7c. A planar chain of {links} links in both forms and both orders of elimination. A row for each "
+        f"Figure 7c. Not in the paper: a planar chain of {links} links in both forms and both orders of elimination. A row for each "
         "operation on the longest path to a node, as wide as there are nodes on it: areas are numbers of nodes, in the "
         "colors of Figure 7. Towers that are high and narrow leave a machine little to do at the same time."
     )

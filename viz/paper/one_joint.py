@@ -2,22 +2,32 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 from cgraph import Graph
-from cgraph.extend import Polynomial, expand, format_polynomial
-from dynamics import formulation_sizes, inverse_dynamics, momentum_rate, scenes
-from dynamics.equations.formulations.formulation_sizes import INERTIAL_TERM, blamed, formulation_size
+from cgraph.extend import Json, Polynomial, expand, format_polynomial
+from dynamics import formulation_sizes, formulation_verdict, inverse_dynamics, momentum_rate, scenes
+from dynamics.equations.formulations.formulation_sizes import (
+    INERTIAL_TERM,
+    PAPER as FORMULATIONS,
+    blamed,
+)
 
 from .. import theme
 from ..graph_drawing.dot import plain_drawing
 from ..graph_drawing.legend import kinds_in, legend_svg, to_adaptive
 from ..graph_drawing.render import render_svg
-from ..pages.document import Block, Listing, Paragraph, Picture
+from ..pages.document import Block, Markup, Paragraph, Picture
 from ..pages.formulation_table import TITLES, WHY_FEWER, size_table
+from .fixed_layout import View, spoken, subscripts, view_of
 from .part import Part, drawn
+from .stage import Stage, stage_html
+from .typeset import row, terms, typeset
 
-EQUATION = "Lagrange's equation, τ = dp/dt − ∂L/∂θ"
+SCENE = "spring_mass"
+LETTERS = {**theme.ONE_JOINT, "q0_old": "θ_old", "qd0_old": "ω_old"}  # in a line of text
 
 
 # The paper's right-hand side, I qdd - k (qdd dt^2 + 2 qd dt + q_old), as coefficients.
@@ -42,105 +52,183 @@ class Equation:
 
 def equation3(formulation: str) -> Equation:
     """The terms of the graph of that formulation; qd0 stands for the embedded velocity qdd0 dt + qd0_old."""
-    return Equation(formulation, _terms(momentum_rate(scenes.load("spring_mass"), formulation)))
+    return Equation(formulation, _terms(momentum_rate(scenes.load(SCENE), formulation)))
 
 
-def torque_terms(formulation: str) -> Polynomial:
-    """The terms of the whole torque, d/dt dL/dqd - dL/dq, of that formulation."""
-    return _terms(inverse_dynamics(scenes.load("spring_mass"), formulation))
+def torque_terms(formulation: str, whole: Sequence[str] = ("qd0",)) -> Polynomial:
+    """The terms of the whole torque, d/dt dL/dqd - dL/dq, of that formulation.
+
+    whole: embedded ones that stand for themselves, q0 for qd0 dt + q0_old.
+    """
+    return _terms(inverse_dynamics(scenes.load(SCENE), formulation), whole)
 
 
-def _terms(graph: Graph) -> Polynomial:
-    velocity = {node: "qd0" for node in graph.nodes if node.args and node.name == "qd0"}
-    return expand(graph.only_output(), velocity)
+def _terms(graph: Graph, whole: Sequence[str] = ("qd0",)) -> Polynomial:
+    return expand(
+        graph.only_output(), {node: str(node.name) for node in graph.nodes if node.args and node.name in whole}
+    )
 
 
 def equations() -> Part:
     """Equation (3), read off the graphs term by term."""
-    forms = [equation3(name) for name in ("by_definition", "kinetic_only", "chain_rule")]
+    forms = [equation3(name) for name in FORMULATIONS]
     same = forms[0].terms == PAPER
     lines = [f"{'paper, Eq. (3)':16} d/dt dL/dqd = {format_polynomial(PAPER)}"]
     lines += [f"{TITLES[form.formulation]:16} d/dt dL/dqd = {form}" for form in forms]
     lines.append(f"By definition, the graph has the paper's terms, all of them and no other: {'yes' if same else 'NO'}")
-    torques = {name: format_polynomial(torque_terms(name)) for name in ("by_definition", "kinetic_only", "chain_rule")}
+    torques = {name: format_polynomial(torque_terms(name)) for name in FORMULATIONS}
+    sums = {name: torque_terms(name, ("q0", "qd0")) for name in FORMULATIONS}
     lines += ["", "The torque is what Lagrange's equation asks for, tau = d/dt dL/dqd - dL/dq:"]
     lines += [f"{TITLES[name]:16} tau = {torque}" for name, torque in torques.items()]
-    text = "\n".join(lines) + "\n"
-    blocks: list[Block] = [
-        Paragraph(
-            "One rotor on a spring: L = I qd²/2 − k q²/2. The inertial term of Lagrange's equation should be I qdd and "
-            "nothing else. These lines are not typed in: each graph is expanded into its terms. qd0 is the velocity, "
-            "q0_old the position one step of length dt earlier."
-        ),
-        Listing(text),
-        Paragraph(
-            "All terms with k are wrong. They come from embedding q = qd dt + q_old in the graph: differentiating by the "
-            "velocity then also differentiates the spring's energy. In the whole torque the first of them, −k q_old, cancels "
-            "the correct +k q of −∂L/∂q: as dt tends to 0 the spring is gone. In the same way an arm by definition "
-            "weighs nothing.",
-            point=True,
-        ),
+    lines += [
+        "",
+        "q0 is the paper's theta, qd0 its omega, qdd0 its alpha, q0_old the angle one step of length dt earlier.",
     ]
+    blocks = [Markup(_equations_html(forms, sums, same), "\n".join(lines))]
     data = {"equal_to_paper": same} | {form.formulation: str(form) for form in forms} | {"torques": torques}
-    return Part("equations", "Equation (3) from the graph", blocks, data, {"equations.txt": text})
+    files = {"equations.txt": "\n".join(lines) + "\n"}
+    return Part("equations", "Equation (3), read off the graphs", blocks, {"equations": data}, files)
 
 
-FIGURES = {  # name: heading, formulation, caption
+RATE = row("d/dt ∂L/∂ω")
+PAPERS_LINE = (  # Eq. (3) as it is printed, its last line
+    f'<math display="block"><mrow>{RATE}{row("= I α −")}<munder><mrow class="wrong">'
+    f"{row('k ( α dt^2 + 2 ω dt + θ_old )')}</mrow><mtext>unnecessary terms</mtext></munder></mrow></math>"
+)
+
+
+def _equations_html(forms: list[Equation], torques: Mapping[str, Polynomial], same: bool) -> str:
+    """The section's words and its table, with formulas."""
+    right, torque = forms[-1].terms, torques[FORMULATIONS[-1]]
+    rows = [("the paper, Eq. (3), multiplied out", terms(PAPER, right), "")]
+    rows += [
+        (f"{TITLES[form.formulation]}, our graph", terms(form.terms, right), terms(torques[form.formulation], torque))
+        for form in forms
+    ]
+    body = "".join([f"<tr><td>{title}</td><td>{left}</td><td>{total}</td></tr>" for title, left, total in rows])
+    rate = f"<math>{RATE}</math>"
+    verdict = "the paper's terms, all of them and no other" if same else "NOT the paper's terms"
+    return (
+        f"<p>A rotor on a spring, Section 2.1 of the paper: {typeset('L = ½ I ω^2 − ½ k θ^2')}, with the angle "
+        f"{typeset('θ')}, its rate {typeset('ω')} and the acceleration {typeset('α')}. The inertial term of Lagrange's equation, "
+        f"{rate}, is {typeset('I α')} and nothing else. With {typeset('θ = ω dt + θ_old')} embedded in the graph "
+        f"the paper finds instead, in its Eq. (3),</p>{PAPERS_LINE}"
+        "<p>The lines below are not typed in: each graph is expanded into its terms. "
+        f"By definition, our graph has {verdict}.</p>"
+        '<div class="scroll" tabindex="0" role="region" aria-label="Equation (3)"><table class="formulas">'
+        f"<caption>Terms of the graphs; wrong ones are underlined. In the torque {typeset('θ')} stands for {typeset('ω dt + θ_old')}.</caption>"
+        f"<thead><tr><th></th><th>inertial term {rate}</th>"
+        f"<th>whole torque {typeset('τ = d/dt ∂L/∂ω − ∂L/∂θ')}</th></tr></thead><tbody>{body}</tbody></table></div>"
+        '<p class="point">Differentiating by the velocity also differentiates the spring\'s energy, since '
+        f"{typeset('θ')} is computed from {typeset('ω')}. In the whole torque {typeset('− k θ_old')} cancels the correct "
+        f"{typeset('k θ')} of {typeset('− ∂L/∂θ')}: as {typeset('dt')} tends to 0 the spring is gone. In the same way an arm "
+        "by definition weighs nothing.</p>"
+    )
+
+
+WORDS = {  # file: formulation, what the figure shows, and what is to see in it
     "fig1": (
-        "Figure 1: by definition",
         "by_definition",
+        "By definition, with θ = ω dt + θ_old embedded (Section 2.1).",
         (
-            "Figure 1. By definition, with the Euler relation embedded. {spurious_nodes} of {nodes} nodes and {spurious_edges} "
-            "of {edges} edges (in vermillion) are there by mistake: the spring's energy is attached to the momentum through "
-            "θ = ω dt + θ old."
+            "There by mistake: {wrong_operations} operations and {wrong_edges} edges, in vermillion, by which the spring's energy "
+            "enters the momentum. Inputs {alone} serve these alone, and are no mistake themselves."
         ),
     ),
     "fig2": (
-        "Figure 2: kinetic only",
         "kinetic_only",
-        (
-            "Figure 2. Kinetic energy in place of L in the velocity derivative. The spring is gone from the inertial term, "
-            "which is right here; the Euler relation ω = α dt + ω old is still in the graph. Colors as above."
-        ),
+        "The kinetic energy K in place of L in the derivative by the velocity (Section 2.1).",
+        "Nothing is there by mistake: no spring in the inertial term, which is right for one joint; ω = α dt + ω_old is still embedded.",
     ),
     "fig3": (
-        "Figure 3: chain rule",
         "chain_rule",
-        (
-            "Figure 3. The chain rule, dp/dt = ∇p · (ω, α), from the full Lagrangian. No dt, no earlier state, and nothing "
-            "of the spring: ω and θ stay independent. Colors as above."
-        ),
+        "The chain rule, dp/dt = ∇p · (ω, α), from the whole L (Section 2.2).",
+        "Nothing is there by mistake: no dt, no earlier state and no spring; ω is an input of its own, independent of θ.",
     ),
 }
 
 
-def figure(name: str) -> Part:
-    """One of Figures 1 to 3, the inertial term of the rotor on a spring with its momentum, its counts in the caption.
-
-    The legend of all stands above the first.
-    """
-    heading, formulation, words = FIGURES[name]
-    graph, wrong = blamed(scenes.load("spring_mass"), INERTIAL_TERM, formulation)
-    size = formulation_size(graph, wrong)
-    caption = f"{words.format(**size._asdict())} {size.nodes} nodes, {size.edges} edges."
-    drawing = plain_drawing(graph, theme.ONE_JOINT, wrong.nodes, wrong.edges)
-    blocks = [drawn(name, render_svg(drawing), caption, "auto")]
-    if name == "fig1":
-        legend = to_adaptive(legend_svg(kinds_in(graph, marked=wrong.nodes)))
-        blocks.insert(0, Picture("legend", legend, "The colors of Figures 1 to 3.", "auto"))
-    return Part(name, heading, blocks, size._asdict(), {f"{name}.dot": str(drawing.source)})
+@cache
+def view(formulation: str) -> View:
+    """The inertial term of the rotor on a spring, with its momentum, as it is drawn."""
+    graph, wrong = blamed(scenes.load(SCENE), INERTIAL_TERM, formulation)
+    return view_of(graph, theme.ONE_JOINT, wrong.nodes, wrong.edges)
 
 
-def sizes() -> Part:
-    """The sizes of these graphs, and of those of the whole torque."""
-    counted = formulation_sizes(scenes.load("spring_mass"))
-    blocks: list[Block] = [
-        Paragraph(
-            f"Figures 1 to 3 draw the inertial term dp/dt of {EQUATION}, beside the momentum p = ∂L/∂ω. What the commands "
-            "“cgraph lint” and “cgraph inspect” look at is the whole torque τ. Both are counted by one function."
-        ),
-        replace(size_table(counted), file="sizes"),
-        Paragraph(WHY_FEWER),
+def caption(name: str) -> str:
+    """The caption of one of Figures 1 to 3, with the numbers of what is drawn."""
+    formulation, what, seen = WORDS[name]
+    drawing = view(formulation).drawn()
+    alone = " and ".join([text.replace(" ", "_") for text in view(formulation).inputs_of_mistakes()])
+    return (
+        f"Figure {name[3:]}. {what} Drawn are {drawing.nodes} nodes, {drawing.inputs} inputs and {drawing.operations} "
+        f"operations, and {drawing.edges} edges; the {drawing.outputs} outputs in double frames are no nodes, and the "
+        f"{drawing.output_arrows} arrows to them no edges. {seen.format(**drawing._asdict(), alone=alone)}"
+    )
+
+
+STATE = {"q0": 0.5, "qd0": 1.0, "qdd0": 4.0, "I": 2.0, "k": 3.0}  # rad, rad/s, rad/s^2, kg m^2, N m/rad
+NOTES = (
+    (theme.LINE, 1.2, "", "an edge: a value goes into an operation"),
+    (theme.SPURIOUS, 2.5, "", "an edge that is there by mistake"),
+    (theme.LINE, 1.2, "1 2", "first and second argument, 1 − 2"),
+)
+STEPS = (1.0, *[float(f"{digit}e-{k}") for k in range(1, 7) for digit in (3, 1)])  # s, 1 to 1e-6
+
+
+def moving_figure() -> tuple[Stage, str]:
+    """The three formulations on one layout, with the values of their nodes at each step, and where these are taken."""
+    views = {name: view(formulation) for name, (formulation, _, _) in WORDS.items()}
+    states = [
+        STATE | {"dt": dt, "q0_old": STATE["q0"] - STATE["qd0"] * dt, "qd0_old": STATE["qd0"] - STATE["qdd0"] * dt}
+        for dt in STEPS
     ]
-    data = {f"{term}, {formulation}": size._asdict() for (term, formulation), size in counted.items()}
-    return Part("sizes", "Sizes of the graphs", blocks, data)
+    excess = formulation_verdict(scenes.load(SCENE), "by_definition").excess_at(STATE)["tau0"]
+    told = (
+        f"At θ = {STATE['q0']:g} rad, ω = {STATE['qd0']:g} rad/s and α = {STATE['qdd0']:g} rad/s², with I = {STATE['I']:g} kg m² and "
+        f"k = {STATE['k']:g} N m/rad; θ_old and ω_old are what they were one step dt before. What is faint belongs to other figures."
+    )
+    titles = {name: f"Figure {name[3:]}: {TITLES[formulation]}" for name, (formulation, _, _) in WORDS.items()}
+    captions = {name: caption(name) for name in WORDS}
+    seen = Stage(views, titles, captions, LETTERS, STEPS, states, "p0_dot", "dp/dt [N\u00a0m]")
+    limit = f"By definition {excess:+.3g} N m of it, −k θ, stay however small dt is.".replace("-", "−")
+    return seen, f"{told} {limit}"
+
+
+def legend() -> str:
+    """What shapes, colors and arrows of Figures 1 to 3 mean, as SVG."""
+    graphs = [view(formulation).graph for formulation, _, _ in WORDS.values()]
+    wrong = view("by_definition").wrong
+    return to_adaptive(legend_svg(kinds_in(*graphs, marked=wrong), 1, notes=NOTES))
+
+
+def figures_1_to_3() -> Part:
+    """Figures 1 to 3: the three formulations on one layout, and the sizes of these graphs and of the whole torque."""
+    sizes = formulation_sizes(scenes.load(SCENE))
+    figures = {name: sizes[INERTIAL_TERM, formulation]._asdict() for name, (formulation, _, _) in WORDS.items()}
+    moving, told = moving_figure()
+    explained = Picture("legend", legend(), "Shapes, colors and arrows of Figures 1 to 3.", "auto")
+    blocks: list[Block] = [
+        Markup(stage_html(moving, told, explained), "Figures 1 to 3 on one layout are on the page alone."),
+        explained,
+    ]
+    files: dict[str, str | bytes] = {}
+    for name, (formulation, _, _) in WORDS.items():
+        seen = view(formulation)
+        drawing = plain_drawing(seen.graph, theme.ONE_JOINT, seen.wrong, seen.wrong_edges)
+        alt = f"Graph. {spoken(seen.graph, LETTERS)}"
+        blocks.append(drawn(name, subscripts(render_svg(drawing)), caption(name), "auto", alt))
+        files[f"{name}.dot"] = str(drawing.source)
+    blocks += [
+        Paragraph(
+            "Figures 1 to 3 draw the inertial term dp/dt of Lagrange's equation, τ = dp/dt − ∂L/∂θ, beside the momentum p = ∂L/∂ω. "
+            "What the commands “cgraph lint” and “cgraph inspect” look at is the whole torque τ. One function counts both; "
+            "there by mistake it counts inputs, too, that serve nothing else."
+        ),
+        replace(size_table(sizes), caption="Nodes and edges of Figures 1 to 3 and of the whole torque", file="sizes"),
+        Paragraph(WHY_FEWER.replace("∂L/∂q", "∂L/∂θ")),
+    ]
+    counted = {f"{term}, {formulation}": size._asdict() for (term, formulation), size in sizes.items()}
+    heading = "Figures 1 to 3: the inertial term, three times"
+    moves: dict[str, Json] = {"stage": moving.data()}
+    return Part("figures", heading, blocks, {**figures, "sizes": counted}, files, moves)

@@ -22,13 +22,18 @@ SCALE = 160 / 96  # of a plot as PNG: 160 pixels an inch
 
 
 class Part(NamedTuple):
-    """One part of the paper: its section of the page, its figures as plain data, and files that no block stands for."""
+    """One part of the paper: its section of the page, and what no block stands for.
+
+    data: {name in figures.json: figures as plain data}.  other: {name: content} of further files.  moves: {id of an
+    element: what the page's script reads there}, for figures that move.
+    """
 
     name: str
     heading: str
     blocks: Sequence[Block]
     data: Mapping[str, Json]
     other: Mapping[str, str | bytes] = MappingProxyType({})
+    moves: Mapping[str, Json] = MappingProxyType({})
 
     def files(self) -> dict[str, str | bytes]:
         """{name: content} of the pictures and tables that have a file, and of the others."""
@@ -43,11 +48,11 @@ class Part(NamedTuple):
         return files | dict(self.other)
 
 
-def plotted(name: str, figure: Figure, caption: str) -> Picture:
-    """A plot with its files."""
-    return Picture(name, plot.to_adaptive_svg(figure, background=True), caption, png=SCALE)
+def plotted(name: str, figure: Figure, caption: str, alt: str) -> Picture:
+    """A plot with its files.  alt: what is seen in it."""
+    return Picture(name, plot.to_adaptive_svg(figure, background=True), caption, png=SCALE, alt=alt)
 
 
-def drawn(name: str, svg: str, caption: str, width: str = "100%") -> Picture:
-    """A drawing with its files."""
-    return Picture(name, to_adaptive(svg), caption, width, png=2.0)
+def drawn(name: str, svg: str, caption: str, width: str, alt: str) -> Picture:
+    """A drawing with its files.  width: as of a `Picture`.  alt: what is seen in it."""
+    return Picture(name, to_adaptive(svg), caption, width, png=2.0, alt=alt)

@@ -113,16 +113,34 @@ def snapshots(times: Array, positions: Array, instants: Sequence[float], dots: A
     return figure
 
 
-def bars(groups: Mapping[str, Mapping[str, tuple[float, float, float]]], colors: Mapping[str, str]) -> Figure:
-    """Bars with a range, {panel: {bar: (height, low, high)}}, a panel with its own scale for each group.
+def over_time(times: Array, values: Array, y: str, colors: Sequence[str]) -> Figure:
+    """Curves over time on a logarithmic scale, named "joint 1" and on; what is NaN is left out.
 
-    colors: {bar: color}.
+    times: (T,) [s].  values: (T, n), positive.  y: the axis's name.
+    """
+    with style():
+        figure = empty_figure(9.0, 2.8)
+        axis = figure.subplots()
+        for joint, (column, color) in enumerate(zip(values.T, colors, strict=False), start=1):
+            axis.plot(times, column, ".", color=color, markersize=2.0, label=f"joint {joint}")
+        axis.set_yscale("log")
+        axis.set_xlabel("t [s]")
+        axis.set_ylabel(y)
+        axis.grid(**GRID)
+        axis.legend(frameon=False, markerscale=5.0, loc="lower right", ncols=values.shape[1])
+    return figure
+
+
+def bars(groups: Mapping[str, Mapping[str, tuple[float, float, float]]], colors: Mapping[str, str], y: str) -> Figure:
+    """Bars with a range, {panel: {bar: (height, low, high)}}, a panel for each group, all on one scale.
+
+    colors: {bar: color}.  y: the scale's name.
     """
     with style():
         figure = empty_figure(9.0, 3.6)
-        for axis, (title, values) in zip(
-            np.atleast_1d(figure.subplots(1, len(groups))).flat, groups.items(), strict=True
-        ):
+        axes = np.atleast_1d(figure.subplots(1, len(groups), sharey=True))
+        axes[0].set_ylabel(y)
+        for axis, (title, values) in zip(axes, groups.items(), strict=True):
             heights, low, high = (np.array(each) for each in zip(*values.values(), strict=True))
             places = np.arange(len(values))
             axis.bar(places, heights, color=[colors[name] for name in values], width=0.62)
@@ -133,5 +151,5 @@ def bars(groups: Mapping[str, Mapping[str, tuple[float, float, float]]], colors:
                 )
             axis.set_xticks(places, [name.replace(" ", "\n", 1) for name in values])
             axis.set_title(title, fontsize=10, loc="left")
-            axis.set_ylim(0.0, 1.12 * high.max())
+        axes[0].set_ylim(0.0, 1.12 * max([high for group in groups.values() for _, _, high in group.values()]))
     return figure

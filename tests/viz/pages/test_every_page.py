@@ -14,6 +14,8 @@ import viz
 from tests.viz.page_elements import Elements
 from viz.inspector import Table
 from viz.pages.document import Document, Picture, Section, to_html
+from viz.paper.one_joint import equations, figures_1_to_3
+from viz.paper.paper import page_of
 
 SVG, MATHML = "http://www.w3.org/2000/svg", "http://www.w3.org/1998/Math/MathML"  # names, not addresses
 ARM = dyn.planar_arm([1.0, 0.8], [1.0, 0.8])
@@ -24,6 +26,7 @@ PAGES = {  # kind: its page, bytes at most, and the one thing that its policy al
     "live": (lambda: viz.live_page(ARM), 60_000, "'wasm-unsafe-eval'"),
     "typed": (viz.typed_page, 500_000, ""),
     "lesson": (lambda: viz.lesson(ARM), 200_000, ""),
+    "paper": (lambda: page_of([equations(), figures_1_to_3()], {}), 200_000, ""),
     "document": (
         lambda: to_html(Document("d", [], [Section("s", "S", [Picture("p", "<svg/>", "c"), Table("t", ["a"], [])])])),
         20_000,

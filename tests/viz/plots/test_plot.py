@@ -27,7 +27,9 @@ def test_the_ink_of_a_picture_follows_the_page() -> None:
 
 
 def test_a_bar_has_its_range() -> None:
-    axis = plot.bars({"times": {"a": (2.0, 1.0, 5.0), "b": (3.0, 2.5, 3.5)}}, {"a": "red", "b": "blue"}).axes[0]
+    groups = {"ours": {"a": (2.0, 1.0, 5.0), "b": (3.0, 2.5, 3.5)}, "others'": {"a": (20.0, 20.0, 20.0)}}
+    axis, other = plot.bars(groups, {"a": "red", "b": "blue"}, "ratio").axes
+    assert axis.get_ylim() == other.get_ylim() == (0.0, 1.12 * 20.0)  # one scale, so that heights can be compared
     assert [bar.get_height() for bar in axis.patches] == [2.0, 3.0]
     (ranges,) = [container for container in axis.containers if hasattr(container, "has_yerr")]
     assert [segment[:, 1].tolist() for segment in ranges[2][0].get_segments()] == [[1.0, 5.0], [2.5, 3.5]]

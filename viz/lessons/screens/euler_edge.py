@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from cgraph import Graph, Node, constant
-from dynamics.equations.formulations.formulations import COUPLING, EULER, after_a_step
+from dynamics.equations.formulations.lagrange_terms import COUPLING, EULER, after_a_step
 
 from ...graph_drawing.dot import to_dot
 from ..glossary import term

@@ -1,0 +1,255 @@
+"""Several graphs of the same quantities on one layout: what they share stays where it is, and each shows its own part."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from html import escape
+from typing import NamedTuple
+
+from cgraph import Edge, Graph, Node
+from cgraph.extend import Names, columns
+
+from .. import theme
+from ..graph_drawing.dot import short_formulas
+from ..graph_drawing.render import Positions, positions
+from ..theme import Paint
+
+LETTER, LEAF, OPERATION, MARGIN = (
+    8.6,
+    30.0,
+    46.0,
+    18.0,
+)  # pixels: a letter's width, heights of shapes, room at the sides
+FONT, SMALL = 15, 13  # pixels
+_NUMBERED = re.compile(r"%[0-9]+")  # a node without a name in a formula
+OUTPUT, INPUT, NODE = "output", "input", "operation"
+
+
+class Shape(NamedTuple):
+    """One box or ellipse.  texts: its lines.  node: what it stands for; of an output, the node that computes it.
+
+    named: whether the first text is a name.
+    """
+
+    kind: str
+    paint: Paint
+    texts: tuple[str, ...]
+    node: Node
+    named: bool = True
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Width and height in pixels."""
+        room = LETTER * max(map(len, self.texts))
+        return (max(44.0, room + 26.0), OPERATION) if self.kind == NODE else (max(34.0, room + 18.0), LEAF)
+
+
+class Arrow(NamedTuple):
+    """One arrow.  slot: the argument's number, where the order matters, else empty."""
+
+    slot: str
+    wrong: bool
+    to_output: bool
+
+
+class Drawn(NamedTuple):
+    """How many shapes and arrows of each kind a drawing has; `wrong` ones are among the others."""
+
+    inputs: int
+    operations: int
+    outputs: int
+    edges: int
+    output_arrows: int
+    wrong_operations: int
+    wrong_edges: int
+
+    @property
+    def nodes(self) -> int:
+        """Inputs and operations: outputs are no nodes."""
+        return self.inputs + self.operations
+
+
+@dataclass(frozen=True)
+class View:
+    """One graph as it is drawn: {place: shape} and {(place, place): arrow}, by places that all views share.
+
+    wrong, wrong_edges: the operations and edges that are painted so.
+    """
+
+    graph: Graph
+    shapes: Mapping[str, Shape]
+    arrows: Mapping[tuple[str, str], Arrow]
+    wrong: frozenset[Node]
+    wrong_edges: frozenset[Edge]
+
+    def drawn(self) -> Drawn:
+        """What the drawing has, counted shape by shape and arrow by arrow."""
+        kinds = [shape.kind for shape in self.shapes.values()]
+        arrows = list(self.arrows.values())
+        return Drawn(
+            inputs=kinds.count(INPUT),
+            operations=kinds.count(NODE),
+            outputs=kinds.count(OUTPUT),
+            edges=sum([not arrow.to_output for arrow in arrows]),
+            output_arrows=sum([arrow.to_output for arrow in arrows]),
+            wrong_operations=sum([shape.paint == theme.MARKED for shape in self.shapes.values()]),
+            wrong_edges=sum([arrow.wrong and not arrow.to_output for arrow in arrows]),
+        )
+
+    def inputs_of_mistakes(self) -> list[str]:
+        """The texts of inputs all of whose arrows are wrong."""
+        sound = {source for (source, _), arrow in self.arrows.items() if not arrow.wrong}
+        return [shape.texts[0] for place, shape in self.shapes.items() if shape.kind == INPUT and place not in sound]
+
+
+def view_of(
+    graph: Graph, names: Mapping[str, str], wrong: Collection[Node] = (), wrong_edges: Collection[Edge] = ()
+) -> View:
+    """A graph as it is drawn, without constants.  names: {name in the graph: text shown}.
+
+    A wrong operation is painted so, with the arrows out of it; an input that serves nothing else is no mistake itself.
+    """
+    if strange := [node for node in graph.nodes if node.value is not None]:
+        raise ValueError(f"a fixed layout has no constants, got {len(strange)}, such as {strange[0]!r}")
+    places, formulas = _places(graph), short_formulas(graph, names)
+    wrong_edges = frozenset([edge for edge in graph.edges if edge.source in wrong or edge in wrong_edges])
+    wrong = frozenset([node for node in wrong if node.args])
+    shapes = {places[node]: _shape(node, names, formulas, node in wrong) for node in graph.nodes}
+    arrows = {}
+    for edge in graph.edges:
+        op = edge.target.op
+        slot = str(edge.slot + 1) if op.arity > 1 and not op.commutative else ""
+        arrows[places[edge.source], places[edge.target]] = Arrow(slot, edge in wrong_edges, False)
+    for name, node in graph.outputs.items():
+        place = f"output {name}"
+        shapes[place] = Shape(OUTPUT, theme.OUTPUT, (names.get(name, theme.pretty(name)),), node)
+        arrows[places[node], place] = Arrow("", node in wrong, True)
+    return View(graph, shapes, arrows, wrong, wrong_edges)
+
+
+def _places(graph: Graph) -> dict[Node, str]:
+    """{node: its place}: its name, whether it is an input or computed, else its operation on the places of its arguments."""
+    places: dict[Node, str] = {}
+    for node in graph.nodes:
+        arguments = [places[each] for each in node.args]
+        listed = ", ".join(sorted(arguments) if node.op.commutative else arguments)
+        places[node] = node.name or f"{node.op.name}({listed})"
+    return places
+
+
+def _shape(node: Node, names: Mapping[str, str], formulas: Mapping[Node, str], wrong: bool) -> Shape:
+    text = names.get(node.name, theme.pretty(node.name)) if node.name else formulas.get(node, "")
+    if not node.args:
+        return Shape(INPUT, theme.ROLES["input"], (text,), node)
+    paint = theme.MARKED if wrong else theme.ROLES[theme.role_of(node)]
+    return Shape(NODE, paint, tuple(filter(None, (text, columns(node.op).symbol))), node, bool(node.name))
+
+
+def stage_svg(views: Mapping[str, View], shown: str) -> str:
+    """All views on one layout, as SVG for a page; elements of other views than the one shown have the class `off`.
+
+    An element that looks the same in several views is one, with their names in `data-views`.
+    """
+    at = _layout(list(views.values()))
+    lines: dict[str, list[str]] = {}
+    boxes: dict[str, list[str]] = {}
+    for name, view in views.items():
+        for (source, target), arrow in view.arrows.items():
+            middle = at.centers[target], view.shapes[target].size
+            lines.setdefault(_arrow(at.lines[source, target], arrow, middle), []).append(name)
+        for place, shape in view.shapes.items():
+            boxes.setdefault(_box(place, shape, at.centers[place]), []).append(name)
+    parts = [_in_views(inside, names, shown) for group in (lines, boxes) for inside, names in group.items()]
+    width, height = at.size[0] + 2 * MARGIN, at.size[1]
+    return (
+        f'<svg viewBox="{-MARGIN:.0f} 0 {width:.0f} {height:.0f}" width="{width:.0f}" height="{height:.0f}" '
+        f'font-family="{theme.FONT_FAMILIES}" font-size="{FONT}" text-anchor="middle">{"".join(parts)}</svg>'
+    )
+
+
+class _Layout(NamedTuple):
+    centers: Mapping[str, tuple[float, float]]
+    lines: Mapping[tuple[str, str], str]
+    size: tuple[float, float]
+
+
+def _layout(views: Sequence[View]) -> _Layout:
+    """Where the places of all views are, as wide and high as the largest shape at each."""
+    sizes: dict[str, tuple[float, float]] = {}
+    for view in views:
+        for place, shape in view.shapes.items():
+            wide, high = sizes.get(place, (0.0, 0.0))
+            sizes[place] = max(wide, shape.size[0]), max(high, shape.size[1])
+    number = {place: i for i, place in enumerate(sizes)}
+    pairs = list(dict.fromkeys([pair for view in views for pair in view.arrows]))
+    found: Positions = positions([(list(sizes.values()), [(number[a], number[b]) for a, b in pairs])])[0]
+    centers = {place: found.centers[i] for place, i in number.items()}
+    return _Layout(centers, {(a, b): found.lines[number[a], number[b]] for a, b in pairs}, found.size)
+
+
+def _in_views(inside: str, names: Sequence[str], shown: str) -> str:
+    kind, rest = inside.split("|", 1)
+    off = "" if shown in names else " off"
+    return f'<g class="{kind}{off}" data-views="{" ".join(names)}"{rest}</g>'
+
+
+def _arrow(path: str, arrow: Arrow, target: tuple[tuple[float, float], tuple[float, float]]) -> str:
+    (x, y), (_, height) = target
+    kind = " ".join(["arrow", *["wrong"] * arrow.wrong, *["to-output"] * arrow.to_output])
+    start = float(path[1:].split(maxsplit=1)[0])
+    side = -1.0 if start < x else 1.0  # below the shape, on the side that the argument comes from
+    slot = f'<text x="{x + side * 26:.1f}" y="{y + height / 2 + 12:.1f}" font-size="{SMALL}">{arrow.slot}</text>'
+    return f'{kind}|><path d="{path}"/>{slot * bool(arrow.slot)}'
+
+
+def _box(place: str, shape: Shape, center: tuple[float, float]) -> str:
+    (x, y), (w, h) = center, shape.size
+    paint, box = shape.paint, f'x="{x - w / 2:.1f}" y="{y - h / 2:.1f}" width="{w:.1f}" height="{h:.1f}"'
+    look = f'fill="{paint.fill}" stroke="{paint.line}"'
+    if shape.kind == NODE:
+        outline = f'<ellipse cx="{x:.1f}" cy="{y:.1f}" rx="{w / 2:.1f}" ry="{h / 2:.1f}" {look}/>'
+    elif shape.kind == INPUT:
+        outline = f'<rect {box} rx="7" {look}/>'
+    else:
+        inner = f'x="{x - w / 2 + 3:.1f}" y="{y - h / 2 + 3:.1f}" width="{w - 6:.1f}" height="{h - 6:.1f}"'
+        outline = f"<rect {box} {look}/><rect {inner} {look}/>"
+    top = y + 5 - 9 * (len(shape.texts) - 1)
+    texts = "".join(
+        [
+            f'<text x="{x:.1f}" y="{top + 18 * i:.1f}">{subscripts(escape(each))}</text>'
+            for i, each in enumerate(shape.texts)
+        ]
+    )
+    kind = f"box {shape.kind}{' wrong' * (paint == theme.MARKED)}"
+    return f'{kind}|data-place="{escape(place)}">{outline}{texts}'.replace("|", "| ", 1)
+
+
+def subscripts(text: str) -> str:
+    """A text of SVG with "old" of an earlier state as a subscript."""
+    return text.replace(" old", f'<tspan dy="4" font-size="{SMALL - 1}">old</tspan>')
+
+
+def spoken(graph: Graph, names: Mapping[str, str]) -> str:
+    """A graph in words: what goes in, and what each named node and each output is computed from."""
+    called = Names(graph, names)
+    inputs = ", ".join([called.shown(str(node.name)) for node in graph.nodes if not node.args])
+    named = [node for node in graph.nodes if node.args and node.name]
+    formulas = [f"{called.shown(str(node.name))} = {written(graph, node, names)}" for node in named]
+    formulas += [
+        f"{names.get(name, theme.pretty(name))} = {written(graph, node, names)}" for name, node in graph.outputs.items()
+    ]
+    return f"Inputs {inputs}. {'; '.join(formulas)}."
+
+
+def written(graph: Graph, node: Node, names: Mapping[str, str]) -> str:
+    """The formula of a node, down to what has a name, in the letters of a drawing; of an input its name."""
+    called = Names(graph, names)
+    numbered = {f"%{number}": each for each, number in called.number.items()}
+    text = called.formula(node) if node.args else called.short(node)
+    while found := _NUMBERED.search(text):
+        part = called.formula(numbered[found[0]])
+        inside = f"({part})" if " + " in part or " - " in part else part
+        text = text[: found.start()] + inside + text[found.end() :]
+    return text.replace(" * ", " ").replace("-", "−")
