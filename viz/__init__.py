@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from .models.driven_motion import driven as driven
     from .models.film import animate as animate
     from .models.inspection_page import inspect as inspect
-    from .models.live_motion import live_page as live_page
+    from .models.live_motion import live as live
     from .models.typed_text import typed_text as typed_text
     from .typed.text_page import typed_page as typed_page
 

@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from ..models.film import animate, frames
     from ..models.inspection import FRAMES, inspection
     from ..models.inspection_page import inspection_page
-    from ..models.live_motion import live_page
+    from ..models.live_motion import live
     from ..models.node_classes import form_classes, formulation_classes
     from ..models.remarks import constant_momentum, tree_alone
     from ..pages import pruning_page, stability_page, work_precision_page
