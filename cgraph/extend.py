@@ -125,7 +125,7 @@ if TYPE_CHECKING:  # shared by the three packages alone: no promise is made for 
         require_whole as require_whole,
     )
     from .util.threads import share as share, thread_count as thread_count
-    from .util.words import counted as counted, or_nearest as or_nearest
+    from .util.words import counted as counted, nearest as nearest, or_nearest as or_nearest
 
 
 if not TYPE_CHECKING:  # a checker shall see a misspelt name

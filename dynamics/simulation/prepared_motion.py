@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import Array, floats, require_choice, require_flag, require_sequence
+from cgraph.extend import Array, floats, or_nearest, require_choice, require_flag, require_sequence, scipy_module
 
 from ..equations.state_equation import FORMS
 from ..equations.states.initial_value import other_inputs
@@ -349,7 +349,7 @@ def prepare(
     varied : str or iterable of str
         Parameters of the model or of a controller whose values stay open, so that those of a call cost nothing. Values
         of others are built into the machine code, as `simulate` does, and other ones compile anew. Not with a
-        SampledController, nor SciPy's solvers.
+        SampledController, nor SciPy's solvers. With a controller that is a function the first call checks the names.
 
     Returns
     -------
@@ -380,6 +380,11 @@ def prepare(
     names = require_sequence("varied", [varied] if isinstance(varied, str) else varied, "names of parameters", str)
     if names and (isinstance(tau, SampledController) or options.scipy_solver is not None):
         raise ValueError(f"varied = {names} needs one of dyn.METHODS, and no SampledController, which holds its forces")
+    if unknown := [name for name in names if name not in equations.parameters and not callable(tau)]:
+        known = or_nearest(unknown[0], list(equations.parameters))
+        raise ValueError(f"varied: the system has no parameter {unknown[0]!r:.80}; {known}")
+    if options.scipy_solver is not None:
+        scipy_module("integrate", f"method {method!r}")
     dense_output = require_flag("dense_output", dense_output)
     return PreparedMotion(model, options, tau, as_events(events), form, dense_output, names)
 

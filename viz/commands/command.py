@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import difflib
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from importlib import import_module
 from typing import Any
 
 from cgraph import __version__
+from cgraph.extend import nearest
 
 
 class Command(argparse.ArgumentParser):
@@ -72,6 +72,8 @@ COMMANDS = {
     "completion": "a script that lets the Tab key complete commands and options",
 }
 
+OPTIONS = ("-h", "--help", "--version")  # of the command line itself
+
 
 def parsers() -> tuple[argparse.ArgumentParser, dict[str, Command]]:
     """The parser of the command line, and those of its commands; what it parses has `run`, the command's function."""
@@ -98,18 +100,20 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
 
     argparse takes the words of a list from one place; of those that an option parts (`a --quick b`) the rest follow.
     """
-    whole, _ = parsers()
+    whole, commands = parsers()
     words = sys.argv[1:] if arguments is None else list(arguments)
     if not words:
         words = ["--help"]
-    elif not words[0].startswith("-") and words[0] not in COMMANDS:
-        near = difflib.get_close_matches(words[0].casefold(), COMMANDS, 1)
-        hint = f"did you mean {near[0]!r}?" if near else "`cgraph` alone lists them"
-        whole.error(f"there is no command {words[0]!r}: {hint}")
+    elif words[0] not in COMMANDS and not any([option.startswith(words[0]) for option in OPTIONS]):
+        near = nearest(words[0], [*COMMANDS, *OPTIONS], 1)
+        hint = f"did you mean {near[0]!r}?" if near else "`cgraph` alone lists the commands"
+        whole.error(f"there is no {'option' if words[0].startswith('-') else 'command'} {words[0]!r}: {hint}")
     options, rest = whole.parse_known_args(words)
     if rest:
         several = getattr(options, getattr(options, "words", ""), None)
         if several is None or any([each.startswith("-") for each in rest]):
-            whole.error(f"unrecognized arguments: {' '.join(rest)}")
+            command = commands[words[0]]
+            near = nearest(rest[0].partition("=")[0], command._option_string_actions, 1)
+            command.error(f"unrecognized arguments: {' '.join(rest)}{f'; did you mean {near[0]!r}?' if near else ''}")
         several.extend(rest)
     return options

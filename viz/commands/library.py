@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from dynamics.io.load import compiled
     from dynamics.multibody.changes.pruning import PruneResult
     from dynamics.scenes.start import Start, moving_start, rest_text, with_start
+    from dynamics.simulation.run_options import RunOptions
     from dynamics.verification.certificate import certify
 
     from .. import theme

@@ -207,7 +207,7 @@ def tables(rows: Sequence[Row], where: str = "") -> str:
         "Medians of alternating turns on one core. In brackets: times ours, above 1 where ours is faster.",
         f"* the fastest of its row.  ! it differs from ours by more than {AGREES:g}.  - a: not measured, see below.",
         "",
-        *[f"{peer:<11} {PEERS[peer].about}" for peer in shown],
+        *[f"{peer:<11} {PEERS[peer].told}" for peer in shown],
         *(textwrap.wrap(f"not installed: {', '.join(missing)} ({HOW})", WIDTH) if missing else []),
     ]
     for task, about in TASKS.items():
