@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import Array, floats, or_nearest, require_choice, require_flag, require_sequence, scipy_module
+from cgraph.extend import Array, floats, require_choice, require_flag, require_sequence
 
 from ..equations.state_equation import FORMS
 from ..equations.states.initial_value import other_inputs
 from ..systems.model import Model, as_equations
 from .events.event import Event, as_events
-from .moving import Moving, Tau
+from .moving import Moving, Tau, check_varied
 from .outcome import INTERRUPTED, REACHED, MotionError, outcome
 from .progress_bar import Progress
 from .row_values import converted, unreached_momenta
@@ -378,13 +378,7 @@ def prepare(
     if not (callable(tau) or isinstance(tau, float | SampledController)):
         other_inputs(equations, tau)
     names = require_sequence("varied", [varied] if isinstance(varied, str) else varied, "names of parameters", str)
-    if names and (isinstance(tau, SampledController) or options.scipy_solver is not None):
-        raise ValueError(f"varied = {names} needs one of dyn.METHODS, and no SampledController, which holds its forces")
-    if unknown := [name for name in names if name not in equations.parameters and not callable(tau)]:
-        known = or_nearest(unknown[0], list(equations.parameters))
-        raise ValueError(f"varied: the system has no parameter {unknown[0]!r:.80}; {known}")
-    if options.scipy_solver is not None:
-        scipy_module("integrate", f"method {method!r}")
+    check_varied(equations, tau, options, names)
     dense_output = require_flag("dense_output", dense_output)
     return PreparedMotion(model, options, tau, as_events(events), form, dense_output, names)
 

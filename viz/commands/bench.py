@@ -27,8 +27,8 @@ def add(parser: Command) -> None:
         "modes": lambda: library.speed.MODES,
         "peers": lambda: library.speed.PEERS,
         "quick_scenes": lambda: library.speed.QUICK["scenes"],
-        "motions": lambda: library.motions.MOTIONS,
-        "motion_peers": lambda: library.motions.PEERS,
+        "motions": lambda: library.MOTIONS,
+        "motion_peers": lambda: library.PEERS,
     }
     parser.add_argument(
         "what",

@@ -8,8 +8,7 @@ from collections.abc import Callable, Iterable, Sequence
 from importlib import import_module
 from typing import Any
 
-from cgraph import __version__
-from cgraph.extend import nearest
+from cgraph import __version__, extend
 
 
 class Command(argparse.ArgumentParser):
@@ -105,7 +104,7 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     if not words:
         words = ["--help"]
     elif words[0] not in COMMANDS and not any([option.startswith(words[0]) for option in OPTIONS]):
-        near = nearest(words[0], [*COMMANDS, *OPTIONS], 1)
+        near = extend.nearest(words[0], [*COMMANDS, *OPTIONS], 1)
         hint = f"did you mean {near[0]!r}?" if near else "`cgraph` alone lists the commands"
         whole.error(f"there is no {'option' if words[0].startswith('-') else 'command'} {words[0]!r}: {hint}")
     options, rest = whole.parse_known_args(words)
@@ -113,7 +112,7 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
         several = getattr(options, getattr(options, "words", ""), None)
         if several is None or any([each.startswith("-") for each in rest]):
             command = commands[words[0]]
-            near = nearest(rest[0].partition("=")[0], command._option_string_actions, 1)
+            near = extend.nearest(rest[0].partition("=")[0], command._option_string_actions, 1)
             command.error(f"unrecognized arguments: {' '.join(rest)}{f'; did you mean {near[0]!r}?' if near else ''}")
         several.extend(rest)
     return options

@@ -13,10 +13,10 @@ if TYPE_CHECKING:
     from dynamics.experiments.stability import stability
     from dynamics.experiments.text_table import table
     from dynamics.experiments.timing import machine
-    from dynamics.experiments.work_precision import motions, named_tasks, work_precision
+    from dynamics.experiments.work_precision import comparisons, named_tasks, work_precision
     from dynamics.experiments.work_precision.cold_start import STARTS
-    from dynamics.experiments.work_precision.comparisons import COMPARISONS
-    from dynamics.experiments.work_precision.measurement import PEERS
+    from dynamics.experiments.work_precision.groups import COMPARISONS, PEERS
+    from dynamics.experiments.work_precision.motion_scenes import MOTIONS
     from dynamics.experiments.work_precision.work_precision import to_csv
     from dynamics.integrators import TABLEAUS
     from dynamics.io.load import compiled

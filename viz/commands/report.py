@@ -151,7 +151,7 @@ def _comparisons(options: argparse.Namespace) -> None:
     print(library.machine())
     with _exact_motions(options.out) as (folder, new):
         for name in options.compare or library.COMPARISONS:
-            for text in library.COMPARISONS[name](str(folder)):
+            for text in getattr(library.comparisons, name)(str(folder)):
                 print(f"\n{text}", flush=True)
         answer("", new(), folder=options.out)
 
