@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from .graph_drawing.render import render_png as render_png, render_svg as render_svg
     from .inspector.page import page as page
     from .lessons.lesson import lesson as lesson
+    from .models.drawing import draw as draw
     from .models.driven_motion import driven as driven
     from .models.film import animate as animate
     from .models.inspection_page import inspect as inspect

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import difflib
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from importlib import import_module
 from typing import Any
 
-from cgraph import __version__, extend
+from cgraph import __version__
 
 
 class Command(argparse.ArgumentParser):
@@ -71,6 +72,7 @@ COMMANDS = {
     "completion": "a script that lets the Tab key complete commands and options",
 }
 
+ALIKE = 0.7  # share of the letters that two words have in common
 OPTIONS = ("-h", "--help", "--version")  # of the command line itself
 
 
@@ -104,15 +106,20 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     if not words:
         words = ["--help"]
     elif words[0] not in COMMANDS and not any([option.startswith(words[0]) for option in OPTIONS]):
-        near = extend.nearest(words[0], [*COMMANDS, *OPTIONS], 1)
-        hint = f"did you mean {near[0]!r}?" if near else "`cgraph` alone lists the commands"
+        hint = _nearest(words[0], [*COMMANDS, *OPTIONS]) or "`cgraph` alone lists the commands"
         whole.error(f"there is no {'option' if words[0].startswith('-') else 'command'} {words[0]!r}: {hint}")
     options, rest = whole.parse_known_args(words)
     if rest:
         several = getattr(options, getattr(options, "words", ""), None)
         if several is None or any([each.startswith("-") for each in rest]):
             command = commands[words[0]]
-            near = extend.nearest(rest[0].partition("=")[0], command._option_string_actions, 1)
-            command.error(f"unrecognized arguments: {' '.join(rest)}{f'; did you mean {near[0]!r}?' if near else ''}")
+            hint = _nearest(rest[0].partition("=")[0], command._option_string_actions)
+            command.error(f"unrecognized arguments: {' '.join(rest)}{hint and f'; {hint}'}")
         several.extend(rest)
     return options
+
+
+def _nearest(word: str, known: Iterable[str]) -> str:
+    """A question for the known word that is spelled most like a word; "" where none is like it."""
+    near = difflib.get_close_matches(word.casefold(), known, 1, ALIKE)
+    return f"did you mean {near[0]!r}?" if near else ""
