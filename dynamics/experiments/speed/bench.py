@@ -125,7 +125,7 @@ def _row(case: PeerModel, task: str, mode: str, pool: WorkerPool, repeats: int) 
     ready = pool.prepared(task, mode, row.skipped)
     samples: dict[str, list[float]] = {peer: [] for peer in ready}
     used = dict.fromkeys(ready, 0.0)
-    for turn in range(repeats):  # in turns, so that all share the machine's moods
+    for turn in range(repeats):  # in turns, so that a busy machine slows all alike
         for peer in [each for each in ready if turn < FEWEST_TURNS or used[each] < LONG_TURNS]:
             begin = time.perf_counter()
             try:
