@@ -48,7 +48,7 @@ coverage: $(INSTALLED)test  ## the lines that no test runs: the total, and the W
 docs: $(INSTALLED)docs,viz,mujoco  ## the documentation, into docs/_build/html
 	$(BIN)/sphinx-build --fail-on-warning --keep-going -q docs docs/_build/html
 
-pictures: $(INSTALLED)test  ## the pictures that the pages' examples and the gallery's commands make; ARGS=docs/gallery.md for one page
+pictures: $(INSTALLED)test  ## all pictures of the pages, from their examples and commands; ARGS=docs/gallery.md for one page
 	$(BIN)/python -m tests.page_pictures $(ARGS)
 
 bench: $(INSTALLED)bench  ## the comparisons with other software

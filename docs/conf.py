@@ -22,6 +22,7 @@ extensions = [
     "sphinx.ext.napoleon",
     "sphinx_extensions.mathml",
     "sphinx_extensions.names",
+    "sphinx_extensions.live_page",
     "sphinx_extensions.architecture",
     "sphinx_extensions.command_reference",
 ]

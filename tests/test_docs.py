@@ -70,8 +70,9 @@ def commands(page: str) -> list[str]:
 
 
 def texts(svg: Path) -> list[str]:
-    """The texts of a drawing."""
-    return sorted(re.findall(r"<text[^>]*>([^<]*)", svg.read_text(encoding="utf-8")))
+    """The texts of a drawing; of a plot, whose letters are outlines, the comments that spell them."""
+    shown = svg.read_text(encoding="utf-8")
+    return sorted(re.findall(r"<text[^>]*>([^<]*)", shown) or re.findall(r"<!-- (.*?) -->", shown))
 
 
 def run_examples(name: str, folder: Path) -> subprocess.CompletedProcess[str]:

@@ -127,3 +127,29 @@ def test_the_command_reference_is_built(site: Path) -> None:
     page = (site / "command-reference.html").read_text(encoding="utf-8")
     assert page.count("<h2>cgraph ") > 10
     assert '<span class="pre">--start</span>' in page
+
+
+def test_the_reference_has_no_docstrings_of_python_s_own(pages: list[Path]) -> None:
+    kinds = (dict, tuple, str, Exception, object.__init__, tuple.index)
+    own = [line for kind in kinds for line in str(kind.__doc__).split("\n")]
+    lines = {" ".join(line.split()) for line in own if len(line) > 12}
+    for path in pages:
+        if path.parent.name == "reference":
+            text = re.sub(r"<[^>]*>", "", path.read_text(encoding="utf-8")).replace("&gt;", ">").replace("’", "'")
+            assert [line for line in lines if line in " ".join(text.split())] == [], path.name
+
+
+def test_a_page_is_at_work_on_the_front_page_and_its_picture_stands_there_without_a_script(
+    new_page: Any, site: Path
+) -> None:
+    page = new_page(viewport={"width": 1400, "height": 900})
+    page.goto((site / "index.html").as_uri())
+    picture = page.locator(".live-picture img")
+    page.locator(".live-frame").scroll_into_view_if_needed()
+    live = page.frame_locator(".live-frame")
+    live.locator("#live-step").click()
+    assert live.locator("#live-clock").text_content().strip().endswith("s")
+    assert not picture.is_visible()
+    page.emulate_media(media="print")
+    assert picture.is_visible()
+    assert not page.locator(".live-frame").is_visible()

@@ -300,7 +300,8 @@ CALLS = {
     ),
     "viz.driven": call(viz.driven, ARM, "chain_rule", 0.1),
     "viz.inspect": call(viz.inspect, ARM, None, start=[0.1, 0.0], t_end=0.1, forward=False, title=None, momentum=False),
-    "viz.live_page": call(viz.live_page, ARM, None, start=[0.1, 0.0]),
+    "viz.draw": call(viz.draw, ARM, None, formulation="chain_rule"),
+    "viz.live": call(viz.live, ARM, None, start=[0.1, 0.0]),
     "viz.page": call(
         viz.page, GRAPH, title="t", about="", at=None, marked=(), motion=None, tables=(), names=None, units=None,
         derived=None, columns={"link 1": "base"}, notices=["n"], panels=(), causes=None

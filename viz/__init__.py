@@ -11,10 +11,11 @@ if TYPE_CHECKING:
     from .graph_drawing.render import render_png as render_png, render_svg as render_svg
     from .inspector.page import page as page
     from .lessons.lesson import lesson as lesson
+    from .models.drawing import draw as draw
     from .models.driven_motion import driven as driven
     from .models.film import animate as animate
     from .models.inspection_page import inspect as inspect
-    from .models.live_motion import live_page as live_page
+    from .models.live_motion import live as live
     from .models.typed_text import typed_text as typed_text
     from .typed.text_page import typed_page as typed_page
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import select
 import signal
@@ -15,8 +16,13 @@ ERRORS = (ValueError, TypeError, OSError, ImportError, RuntimeError, MemoryError
 
 
 def start() -> int:
-    """The process's command: `main` with the signals of the first second, and warnings in a line."""
+    """The process's command: `main` with the signals of the first second, and warnings in a line.
+
+    A letter that standard output cannot encode is written as its number, as Python does on standard error.
+    """
     watch_loading()
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")
     try:
         return main()
     except Exception:  # noqa: BLE001 (a mistake of ours must not look like a finding, which status 1 is)

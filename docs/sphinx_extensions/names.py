@@ -29,8 +29,11 @@ def _directive(package, name):
     if inspect.isclass(value):
         inherited = ["   :inherited-members:"] if name in ("Compiled", "Mechanism") else []  # bases without a page
         return [f".. autoclass:: {package}.{name}", "   :members:", *inherited, ""]
-    kind = "autofunction" if callable(value) else "autodata"
-    return [f".. {kind}:: {package}.{name}", ""]
+    if callable(value):
+        return [f".. autofunction:: {package}.{name}", ""]
+    own = "" if type(value).__module__ == "builtins" else inspect.getdoc(type(value))  # not Python's of a tuple
+    listed = ", ".join([f"``{each}``" for each in value])
+    return [f".. py:data:: {package}.{name}", "", *([f"   {own}", ""] if own else []), f"   {listed}.", ""]
 
 
 def setup(app):

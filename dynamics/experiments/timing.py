@@ -59,7 +59,7 @@ class Timed:
 
 
 def in_turns(runs: Sequence[Timed], turns: int, chunk: float = 0.0, enough: float = math.inf) -> None:
-    """Time all runs in turns, so that they share the machine's moods, without garbage collection.
+    """Time all runs in turns, so that a busy machine slows all alike, without garbage collection.
 
     chunk: seconds of a turn, which short runs fill by several.  enough: seconds of a run, after which three are enough.
     """

@@ -27,6 +27,8 @@ def path_of(source: object) -> Path:
     """The path of a file that is there. Raises MechanismError."""
     if not isinstance(source, str | os.PathLike):
         raise MechanismError(f"a model is a path or XML text, and of MJCF an MjModel, too, got {type(source).__name__}")
+    if not os.fspath(source):
+        raise MechanismError("a model is a path or XML text, got an empty text")
     path = Path(source)
     try:
         is_folder, is_file = path.is_dir(), path.is_file()

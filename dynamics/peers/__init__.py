@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from importlib import import_module
 from importlib.util import find_spec
 
+from cgraph.extend import install
+
 from .peer import DERIVATIVES, MODES, MOTIONS, TASKS, Peer, PeerModel, TimedTask, UnavailableError
 
 CALLS = {(task, mode) for task in ("inverse", "forward") for mode in ("call", "batch")}
@@ -22,6 +24,7 @@ class Kind:
 
     about: what it is, in one line.  package: what has to be installed, by the name it is imported by.
     offers: the (task, mode) that it has a function for.  home: its class, as module.name.  options: of the class.
+    without: a package that it does without, and what it is then.
     """
 
     about: str
@@ -29,6 +32,12 @@ class Kind:
     offers: Set[tuple[str, str]]
     home: str
     options: Mapping[str, bool] = field(default_factory=dict)
+    without: tuple[str, str] | None = None
+
+    @property
+    def told(self) -> str:
+        """What it is with the packages that are installed, in one line."""
+        return self.without[1] if self.without and find_spec(self.without[0]) is None else self.about
 
     @property
     def installed(self) -> bool:
@@ -49,7 +58,11 @@ class Kind:
 # In the order of the tables' columns; modules and packages are imported when a peer is made.
 PEERS = {
     "ours": Kind(
-        "our graph as machine code through LLVM", "cgraph", ALL | {("inertial-gradient", "call")}, "ours.Ours"
+        "our graph as machine code through LLVM",
+        "cgraph",
+        ALL | {("inertial-gradient", "call")},
+        "ours.Ours",
+        without=("llvmlite", f"our graph as generated Python; machine code needs llvmlite: {install('native')}"),
     ),
     "ours-numpy": Kind(
         "our graph as generated NumPy, for where there is no llvmlite",

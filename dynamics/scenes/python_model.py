@@ -58,6 +58,10 @@ def python_model(name: str) -> Model:
             if Path(source).is_dir()
             else f"there is no file {source!r:.200}"
         )
+    if not of_file and Path(source).is_dir() and not Path(source, "__init__.py").is_file():
+        raise ValueError(
+            f"{source!r:.200} is a folder, and a model is in a file, as in {source + '/model.py:system'!r:.200}"
+        )
     folder = Path(source).resolve().parent if of_file else Path.cwd()
     with _first_on_path(folder), redirect_stdout(sys.stderr):
         module = _told(source, lambda: _executed(Path(source)) if of_file else importlib.import_module(source))

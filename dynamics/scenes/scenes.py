@@ -15,7 +15,7 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import real_array, real_number
+from cgraph.extend import nearest, or_nearest, real_array, real_number
 
 from ..io.load import load_at_start
 from ..multibody.builders.planar_arm import planar_arm
@@ -298,6 +298,8 @@ def load(name: str | os.PathLike[str], /, **options: Any) -> Scene:
     elif isinstance(name, str | os.PathLike) and is_python(text := os.fspath(name)):
         make = partial(_of_python, text)
     else:
+        if isinstance(name, str) and nearest(name, _SCENES):
+            raise ValueError(f"there is no scene {name!r:.200}; {or_nearest(name, [*_SCENES])}")
         raise ValueError(
             f"there is no scene {name!r:.200}; the scenes are {', '.join(_SCENES)}, "
             f"any file that ends in {' or '.join(_SUFFIXES)}, and a model in Python as file.py:name"

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Array, kept_by_first
+from cgraph.extend import Array, kept_by_first, or_nearest, scipy_module
 
 from ..equations.state_equation import state_inputs
 from ..equations.states.initial_value import other_inputs, start_state
@@ -85,6 +85,22 @@ def with_applied(model: Model, tau: Any, parameters: Mapping[str, Any] | None) -
         return moving, Applied(moving, 0.0, moving.system.tau, tau)
     moving, constant, forces = with_closed_form(moving, tau, parameters)
     return moving, Applied(moving, constant, forces)
+
+
+def check_varied(model: Equations, tau: Tau, options: RunOptions, varied: Sequence[str]) -> None:
+    """Raise for parameters that cannot be varied, and ImportError for a solver of SciPy, where there is no SciPy.
+
+    The parameters of a controller that is a function are those that a run gives it.
+    """
+    if varied and (isinstance(tau, SampledController) or options.scipy_solver is not None):
+        raise ValueError(
+            f"varied = {varied} needs one of dyn.METHODS, and no SampledController, which holds its forces"
+        )
+    if unknown := [name for name in varied if name not in model.parameters and not callable(tau)]:
+        known = or_nearest(unknown[0], list(model.parameters))
+        raise ValueError(f"varied: the system has no parameter {unknown[0]!r:.80}; {known}")
+    if options.scipy_solver is not None:
+        scipy_module("integrate", f"method {options.method!r}")
 
 
 class Moving:

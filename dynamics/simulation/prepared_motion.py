@@ -19,7 +19,7 @@ from ..equations.state_equation import FORMS
 from ..equations.states.initial_value import other_inputs
 from ..systems.model import Model, as_equations
 from .events.event import Event, as_events
-from .moving import Moving, Tau
+from .moving import Moving, Tau, check_varied
 from .outcome import INTERRUPTED, REACHED, MotionError, outcome
 from .progress_bar import Progress
 from .row_values import converted, unreached_momenta
@@ -349,7 +349,7 @@ def prepare(
     varied : str or iterable of str
         Parameters of the model or of a controller whose values stay open, so that those of a call cost nothing. Values
         of others are built into the machine code, as `simulate` does, and other ones compile anew. Not with a
-        SampledController, nor SciPy's solvers.
+        SampledController, nor SciPy's solvers. With a controller that is a function the first call checks the names.
 
     Returns
     -------
@@ -378,8 +378,7 @@ def prepare(
     if not (callable(tau) or isinstance(tau, float | SampledController)):
         other_inputs(equations, tau)
     names = require_sequence("varied", [varied] if isinstance(varied, str) else varied, "names of parameters", str)
-    if names and (isinstance(tau, SampledController) or options.scipy_solver is not None):
-        raise ValueError(f"varied = {names} needs one of dyn.METHODS, and no SampledController, which holds its forces")
+    check_varied(equations, tau, options, names)
     dense_output = require_flag("dense_output", dense_output)
     return PreparedMotion(model, options, tau, as_events(events), form, dense_output, names)
 

@@ -13,10 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import Array, real_array, real_number
+from cgraph.extend import Array, nearest, real_array, real_number
 
 from ..equations.states.initial_value import times_to_record
-from ..integrators import METHODS, Method
+from ..integrators import METHODS, MOST_STAGES, Method
 from ..integrators.step_control import RESOLUTION
 from .steps.equal_steps import step_count
 
@@ -243,7 +243,11 @@ def check_method(method: str) -> None:
         if method.removeprefix(SCIPY) not in SCIPY_SOLVERS:
             raise ValueError(f"SciPy's methods are {', '.join(SCIPY + name for name in SCIPY_SOLVERS)}, got {method!r}")
     elif method not in METHODS:
-        raise ValueError(f"method must be one of {', '.join(METHODS)} or scipy:..., got {method!r}")
+        if method.startswith("gauss"):
+            raise ValueError(f"Gauss methods are gauss2, gauss4, .. up to gauss{2 * MOST_STAGES}, got {method!r:.60}")
+        near = " or ".join(map(repr, nearest(method, METHODS)))
+        hint = f"did you mean {near}?" if near else f"there are {', '.join(METHODS)} and scipy:..."
+        raise ValueError(f"there is no method {method!r:.60}; {hint}")
 
 
 def time_span(t_end: float | None, t0: float, t_span: ArrayLike | None) -> tuple[float, float]:

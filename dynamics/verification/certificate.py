@@ -102,7 +102,7 @@ def certify(
         try:
             residuals.append(agreement.residual(name, peer(), model, at))
         except agreement.NotComparableError as error:
-            left_out.append(f"{name}: {error}")
+            left_out.append(str(error) if str(error).startswith(name) else f"{name}: {error}")
     if len(system.constraints):
         held, said = agreement.with_loops(model, at)
         residuals, left_out = [*residuals, *held], [*left_out, *said]

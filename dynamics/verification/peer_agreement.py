@@ -240,8 +240,8 @@ def with_loops(model: Model, at: Mapping[str, Array]) -> tuple[list[Residual], l
         theirs = constrained_accelerations(bodies, at["q"], at["qd"], at["tau"])
     except NotComparableError as error:
         return [], [f"MuJoCo and Pinocchio with constraints: {error}"]
-    except ImportError:
-        return [], [*said, "Pinocchio's constraintDynamics: is not installed"]
+    except ImportError as error:
+        return [], [*said, f"Pinocchio's constraintDynamics: {error}"]
     except UnavailableError as error:
         return [], [*said, f"Pinocchio's constraintDynamics: {error}"]
     ours = evaluate(bodies, forward_dynamics(bodies), at)[:, : theirs.shape[1]]
@@ -271,9 +271,7 @@ def _without_forces(model: Model) -> Mechanism:
 def _translated(make: Callable[[PeerModel], Peer], model: Model) -> Translation:
     try:
         return Translation(make, bare(model))
-    except ImportError:
-        raise NotComparableError("is not installed") from None
-    except (UnavailableError, MechanismError) as error:
+    except (ImportError, UnavailableError, MechanismError) as error:
         raise NotComparableError(str(error)) from None
 
 

@@ -81,7 +81,7 @@ def test_the_core_loads_nothing_else_of_ours(tmp_path: Path) -> None:
 
 
 def test_drawing_knows_nothing_of_mechanics(tmp_path: Path) -> None:
-    drawing = sorted({*viz.__all__} - {"animate", "driven", "inspect", "lesson", "live_page", "typed_text"})
+    drawing = sorted({*viz.__all__} - {"animate", "draw", "driven", "inspect", "lesson", "live", "typed_text"})
     assert "dynamics" not in loaded(f"from viz import {', '.join(drawing)}; step('viz')", tmp_path)["viz"]
 
 

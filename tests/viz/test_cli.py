@@ -110,9 +110,18 @@ def test_a_model_file_stands_where_a_scene_s_name_does(tmp_path, capsys):
         ("compare nowhere", "there is no scene 'nowhere'"),
         ("lint nowhere.py:system", "there is no file 'nowhere.py'"),
         (["simulate", "chain", "--start", "joint 11=1"], "there is no joint 11; did you mean"),
-        ("simulate chain --every 1e-300", "--every 1e-300 makes "),
+        ("simulate chain --every 1e-300 --csv a.csv", "--every 1e-300 makes "),
+        ("simulate chain --every 0.1", "--every goes with --csv"),
+        ("simulate chain --dt 0.1", "--dt goes with methods of equal steps, such as --method rk4; dop853 chooses"),
         ("simulate chain --csv nowhere/a.csv", "cannot write"),
-        ("simulate chain --method rk5", "method must be one of "),
+        ("simulate chain --method rk5", "there is no method 'rk5'; there are euler, rk4, "),
+        ("simulate chain --method gauss26", "Gauss methods are gauss2, gauss4, .. up to gauss24, got 'gauss26'"),
+        ("simulate chain --method yoshida", "there is no method 'yoshida'; did you mean 'yoshida"),
+        ("lint triple_pendulm", "there is no scene 'triple_pendulm'; did you mean 'triple_pendulum'?"),
+        ("draw spring_mass --collapse nolink --out x.txt", "--collapse goes with .svg, .png, .dot"),
+        ("bench counts --links 1", "the smallest model that is counted has 3 links, got links = 1"),
+        ("bench operations --links 1", "the smallest model that is counted has 3 links, got links = 1"),
+        ("report", "a report of run times needs a scene, as in: cgraph report spring_mass"),
         ("lesson --out lesson.txt", "--out must end in .html"),
         ("report nothing", "there is no scene 'nothing'"),
         ("report spring_mass spring_mass", "each scene needs a name of its own"),
@@ -125,10 +134,10 @@ def test_a_model_file_stands_where_a_scene_s_name_does(tmp_path, capsys):
         ("report --stability --budget 3", "--budget goes with a report of run times"),
         ("report --stability --ignore", "--ignore goes with a report of run times or --pruning"),
         ("report --stability --pruning", "one at a time"),
-        ("report --pruning", "a report needs a scene"),
+        ("report --pruning", "--pruning needs a scene"),
         ("report --compare speed", "comparisons are orders, taylor, stiff, loops, energy, got 'speed'"),
         ("report --compare orders --json", "--json goes with a report of run times"),
-        ("report chain --compare orders", "a report needs a scene, or --stability or --compare and none"),
+        ("report chain --compare orders", "--compare takes no scene, got 'chain'"),
         ("report chain --pruning --lock a=1 --lock a=2", "--lock takes each body once"),
     ],
 )
@@ -141,6 +150,14 @@ def test_a_mistake_gets_one_line_and_exit_status_2(here, capsys, arguments, said
     assert "Errno" not in error
     assert said in error
     assert sorted(path.name for path in here.iterdir()) == ["a_file"]
+
+
+def test_an_answer_that_the_terminal_cannot_spell_is_written_and_its_files_too(here, monkeypatch):
+    (here / "m\u00fchle.py").write_text("import dynamics as dyn\nm\u00fchle = dyn.planar_arm([1.0], [1.0])\n", "utf-8")
+    monkeypatch.setenv("PYTHONIOENCODING", "ascii")
+    done = run("simulate", "m\u00fchle.py:m\u00fchle", "--csv", "a.csv", cwd=here)
+    assert (done.returncode, done.stdout[:10]) == (0, r"m\xfchle.m"), done.stderr
+    assert (here / "a.csv").is_file()
 
 
 def test_the_exit_status_of_a_process_is_the_command_s():
@@ -166,6 +183,15 @@ draw chain --out a.dot --forward --formulation kinetic_only"""
         *[(line, "") for line in re.split(r"[|\n]", USAGE)],
         ("draw chain chain --out a.dot", "unrecognized arguments: "),
         ("bench --quickly", "unrecognized arguments: "),
+        ("--foo", "there is no option '--foo': `cgraph` alone lists the commands"),
+        ("version", "there is no command 'version': did you mean '--version'?"),
+        (
+            "simulate chain --tend 2",
+            "simulate: error: unrecognized arguments: --tend 2; did you mean '--t-end'?",
+        ),
+        ("draw chain --out=", "argument --out: expected the name of a file or folder, got ''"),
+        ("simulate chain --csv=", "argument --csv: expected the name of a file or folder, got ''"),
+        ("simulate chain --start q0", "got 'q0'; a start is such as q0=0.5,qd0=1, or all numbers of q and qd"),
         ("report spring_mass --start a,b", "argument --start: expected a finite number, got 'a'"),
         ("report spring_mass --start 1,nan", "argument --start: expected a finite number, got 'nan'"),
         ("report spring_mass --pruning --lock tip=x", "argument --lock: expected a finite number, got 'x'"),
@@ -374,6 +400,12 @@ def test_peers_that_a_figure_does_without_are_named_with_their_extra(without, ca
     printed = capsys.readouterr().out
     assert "MuJoCo is not installed: in a checkout of cgraph, pip install -e '.[mujoco]'" in printed
     assert "Pinocchio is not installed: in a checkout of cgraph, pip install -e '.[bench]'" in printed
+    assert cli.main(["certify", "spring_mass", "--states", "1"]) == 0
+    arm = dyn.certify(dyn.planar_arm([1.0], [1.0]), states=1)
+    assert [line.partition(": in a checkout")[0] for line in arm.left_out] == [
+        "MuJoCo is not installed",
+        "Pinocchio is not installed",
+    ]
 
 
 LATE = """import dynamics as dyn
@@ -424,7 +456,9 @@ def test_without_arguments_the_commands_are_listed(capsys):
     assert [name for name in COMMANDS if f"\n    {name}" not in shown] == []
 
 
-@each_row("typed, meant", [("simulat", "'simulate'"), ("Draw", "'draw'"), ("xyzzy", "`cgraph` alone lists them")])
+@each_row(
+    "typed, meant", [("simulat", "'simulate'"), ("Draw", "'draw'"), ("xyzzy", "`cgraph` alone lists the commands")]
+)
 def test_a_command_that_there_is_not_is_told_with_the_nearest(capsys, typed, meant):
     with pytest.raises(SystemExit) as ended:
         cli.main([typed])

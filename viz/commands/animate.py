@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
-from pathlib import Path
 
 import dynamics as dyn
 from cgraph import extend
 
 from . import library
-from .arguments import FORMULATIONS, answer, formulation, positive, say, started, takes_a_scene, takes_a_start
+from .arguments import FORMULATIONS, answer, formulation, place, positive, say, started, takes_a_scene, takes_a_start
 from .command import Command
 
 DRIVEN = ("by_definition", "chain_rule")
@@ -22,7 +21,7 @@ def add(parser: Command) -> None:
     takes_a_scene(parser)
     takes_a_start(parser)
     parser.names["kinds"] = lambda: library.KINDS
-    parser.add_argument("--out", type=Path, required=True, help="file to write: {kinds}, MP4 by ffmpeg")
+    parser.add_argument("--out", type=place, required=True, help="file to write: {kinds}, MP4 by ffmpeg")
     parser.add_argument(
         "--driven", action="store_true", help="two side by side: the same motion is wanted, driven by two torques"
     )

@@ -81,7 +81,7 @@ def unless_json(options: argparse.Namespace, data: object, text: object) -> str:
 
 def writes_a_page(command: argparse.ArgumentParser) -> None:
     """The arguments `--out` and `--open`; `answer_page` writes and opens."""
-    command.add_argument("--out", type=Path, required=True, help="file to write: .html")
+    command.add_argument("--out", type=place, required=True, help="file to write: .html")
     may_open(command)
 
 
@@ -171,6 +171,13 @@ def equations_of(
         return dyn.forward_dynamics(scene), "forward dynamics"
     graph = verdict.graph if verdict else dyn.inverse_dynamics(scene, options.formulation)
     return graph, f"inverse dynamics, {options.formulation.replace('_', ' ')}"
+
+
+def place(text: str) -> Path:
+    """The path of a file or folder, for argparse."""
+    if not text:
+        raise argparse.ArgumentTypeError("expected the name of a file or folder, got ''")
+    return Path(text)
 
 
 def listed(text: str) -> tuple[str, ...]:
@@ -322,7 +329,13 @@ def takes_a_start(command: argparse.ArgumentParser) -> None:
 
 def start(text: str) -> library.Start:
     """`q0=0.3,qd.knee=1` as numbers by name, or `0.3,0,0,1` as all of them, for argparse."""
-    return point(text) if "=" in text else [number(each) for each in text.split(",")]
+    if "=" in text:
+        return point(text)
+    try:
+        return [number(each) for each in text.split(",")]
+    except argparse.ArgumentTypeError as error:
+        said = f"{error}; a start is such as q0=0.5,qd0=1, or all numbers of q and qd"
+        raise argparse.ArgumentTypeError(said) from None
 
 
 def started(options: argparse.Namespace, *, free: bool = True) -> tuple[dyn.scenes.Scene, str]:

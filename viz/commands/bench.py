@@ -27,8 +27,8 @@ def add(parser: Command) -> None:
         "modes": lambda: library.speed.MODES,
         "peers": lambda: library.speed.PEERS,
         "quick_scenes": lambda: library.speed.QUICK["scenes"],
-        "motions": lambda: library.motions.MOTIONS,
-        "motion_peers": lambda: library.motions.PEERS,
+        "motions": lambda: library.MOTIONS,
+        "motion_peers": lambda: library.PEERS,
     }
     parser.add_argument(
         "what",
@@ -96,10 +96,10 @@ def run(options: argparse.Namespace) -> None:
 def _print(options: argparse.Namespace, bench: library.Bench, chosen: dict[str, Any]) -> None:
     found: list[Any] = []
     at_once, complete = not (options.json or bench.rows), False
-    if at_once:
-        print(library.machine())
     try:
         for part in bench.run(options.quick, **chosen):
+            if at_once and not found:
+                print(library.machine())
             found.append(part)
             if at_once:
                 print(part, flush=True)

@@ -13,7 +13,7 @@ import dynamics as dyn
 from cgraph import extend
 
 from . import library
-from .arguments import answer, scene_of, takes_a_scene
+from .arguments import answer, place, scene_of, takes_a_scene
 from .command import Command
 
 EQUATIONS: dict[str, Callable[[dyn.scenes.Scene], cg.Graph]] = {
@@ -48,7 +48,7 @@ def add(parser: Command) -> None:
         help="default: forward_dynamics; of a first-order system state_equation",
     )
     parser.add_argument(
-        "--out", type=Path, help="file to write, in place of standard output: .c (and .h), .wasm or .py"
+        "--out", type=place, help="file to write, in place of standard output: .c (and .h), .wasm or .py"
     )
     parser.set_defaults(run=run)
 

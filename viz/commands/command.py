@@ -78,6 +78,9 @@ COMMANDS = {
     "completion": "a script that lets the Tab key complete commands and options",
 }
 
+ALIKE = 0.7  # share of the letters that two words have in common
+OPTIONS = ("-h", "--help", "--version")  # of the command line itself
+
 
 def parsers() -> tuple[argparse.ArgumentParser, dict[str, Command]]:
     """The parser of the command line, and those of its commands; what it parses has `run`, the command's function."""
@@ -104,18 +107,25 @@ def parse(arguments: Sequence[str] | None = None) -> argparse.Namespace:
 
     argparse takes the words of a list from one place; of those that an option parts (`a --quick b`) the rest follow.
     """
-    whole, _ = parsers()
+    whole, commands = parsers()
     words = sys.argv[1:] if arguments is None else list(arguments)
     if not words:
         words = ["--help"]
-    elif not words[0].startswith("-") and words[0] not in COMMANDS:
-        near = difflib.get_close_matches(words[0].casefold(), COMMANDS, 1)
-        hint = f"did you mean {near[0]!r}?" if near else "`cgraph` alone lists them"
-        whole.error(f"there is no command {words[0]!r}: {hint}")
+    elif words[0] not in COMMANDS and not any([option.startswith(words[0]) for option in OPTIONS]):
+        hint = _nearest(words[0], [*COMMANDS, *OPTIONS]) or "`cgraph` alone lists the commands"
+        whole.error(f"there is no {'option' if words[0].startswith('-') else 'command'} {words[0]!r}: {hint}")
     options, rest = whole.parse_known_args(words)
     if rest:
         several = getattr(options, getattr(options, "words", ""), None)
         if several is None or any([each.startswith("-") for each in rest]):
-            whole.error(f"unrecognized arguments: {' '.join(rest)}")
+            command = commands[words[0]]
+            hint = _nearest(rest[0].partition("=")[0], command._option_string_actions)
+            command.error(f"unrecognized arguments: {' '.join(rest)}{hint and f'; {hint}'}")
         several.extend(rest)
     return options
+
+
+def _nearest(word: str, known: Iterable[str]) -> str:
+    """A question for the known word that is spelled most like a word; "" where none is like it."""
+    near = difflib.get_close_matches(word.casefold(), known, 1, ALIKE)
+    return f"did you mean {near[0]!r}?" if near else ""

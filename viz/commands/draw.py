@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 
 import cgraph as cg
 import dynamics as dyn
 from cgraph import extend
 
 from . import library
-from .arguments import answer, collapsed, equations_of, scene_of, takes_a_scene, takes_equations, verdict_of
+from .arguments import answer, collapsed, equations_of, place, scene_of, takes_a_scene, takes_equations, verdict_of
 from .command import Command
 
 PICTURES = (".svg", ".png")
@@ -22,7 +21,7 @@ def add(parser: Command) -> None:
     """The command's arguments."""
     takes_a_scene(parser)
     takes_equations(parser)
-    parser.add_argument("--out", type=Path, required=True, help="file to write: .svg, .png, .dot or .txt")
+    parser.add_argument("--out", type=place, required=True, help="file to write: .svg, .png, .dot or .txt")
     parser.add_argument(
         "--collapse",
         action="append",
@@ -37,6 +36,8 @@ def run(options: argparse.Namespace) -> None:
     kind = options.out.suffix
     if kind not in KINDS:
         raise ValueError(f"--out must end in {', '.join(KINDS[:-1])} or {KINDS[-1]}, got {options.out}")
+    if kind == ".txt" and options.collapse is not None:
+        raise ValueError(f"--collapse goes with {', '.join(KINDS[:-1])}: a list has every node, got {options.out}")
     extend.check_writable(options.out)
     if kind in PICTURES:
         library.check_can_draw(png=kind == ".png")

@@ -13,15 +13,16 @@ if TYPE_CHECKING:
     from dynamics.experiments.stability import stability
     from dynamics.experiments.text_table import table
     from dynamics.experiments.timing import machine
-    from dynamics.experiments.work_precision import motions, named_tasks, work_precision
+    from dynamics.experiments.work_precision import comparisons, named_tasks, work_precision
     from dynamics.experiments.work_precision.cold_start import STARTS
-    from dynamics.experiments.work_precision.comparisons import COMPARISONS
-    from dynamics.experiments.work_precision.measurement import PEERS
+    from dynamics.experiments.work_precision.groups import COMPARISONS, PEERS
+    from dynamics.experiments.work_precision.motion_scenes import MOTIONS
     from dynamics.experiments.work_precision.work_precision import to_csv
     from dynamics.integrators import TABLEAUS
     from dynamics.io.load import compiled
     from dynamics.multibody.changes.pruning import PruneResult
     from dynamics.scenes.start import Start, moving_start, rest_text, with_start
+    from dynamics.simulation.run_options import RunOptions
     from dynamics.verification.certificate import certify
 
     from .. import theme
@@ -36,7 +37,7 @@ if TYPE_CHECKING:
     from ..models.film import animate, frames
     from ..models.inspection import FRAMES, inspection
     from ..models.inspection_page import first_view, inspection_page
-    from ..models.live_motion import live_page
+    from ..models.live_motion import live
     from ..models.node_classes import form_classes, formulation_classes
     from ..models.remarks import constant_momentum, tree_alone
     from ..models.typed_text import typed_text

@@ -22,5 +22,5 @@ def run(options: argparse.Namespace) -> None:
     library.html_target("--out", options.out)
     scene, _ = started(options)
     say(f"{scene.name}: deriving what moves and what is shown")
-    text = library.live_page(scene)
+    text = library.live(scene)
     answer_page(options, f"{options.out}: {len(text.encode()) / 1e3:.0f} kB", text)

@@ -9,13 +9,13 @@ from pathlib import Path
 import dynamics as dyn
 
 from . import library
-from .arguments import answer, may_open, say
+from .arguments import answer, may_open, place, say
 from .command import Command
 
 
 def add(parser: Command) -> None:
     """The command's arguments."""
-    parser.add_argument("--out", type=Path, default=Path("paper"), help="folder to fill (default: paper)")
+    parser.add_argument("--out", type=place, default=Path("paper"), help="folder to fill (default: paper)")
     parser.add_argument("--quick", action="store_true", help="times of fewer evaluations, and shorter chains")
     may_open(parser)
     parser.add_argument("--json", action="store_true", help="print the figures as JSON on standard output")

@@ -21,6 +21,7 @@ from .arguments import (
     answer,
     listed,
     number,
+    place,
     positive,
     reading,
     reads_files,
@@ -67,7 +68,7 @@ def add(parser: Command) -> None:
         "--stability", action="store_true", help="the table of stiff and extreme cases; status 1 for an unexplained row"
     )
     reads_files(parser)
-    parser.add_argument("--out", type=Path, help=f"folder to fill (default: {FOLDER}; with --json, none)")
+    parser.add_argument("--out", type=place, help=f"folder to fill (default: {FOLDER}; with --json, none)")
     parser.add_argument("--t-end", type=positive, metavar="S", help="how long, instead of the scene's own time")
     parser.add_argument(
         "--start", type=start, metavar="A=1,B=2", help="instead of the scene's own: by names, or all numbers"
@@ -102,8 +103,10 @@ def run(options: argparse.Namespace) -> int | None:
     if len(kinds) > 1:
         raise ValueError(f"{' and '.join(kinds)} are {len(kinds)} reports: one at a time")
     kind = kinds[0]
-    if bool(options.scenes) == (kind in (STABILITY, COMPARE)):
-        raise ValueError("a report needs a scene, or --stability or --compare and none")
+    if not options.scenes and kind in (CURVES, PRUNING):
+        raise ValueError(f"{kind} needs a scene, as in: cgraph report spring_mass; --stability and --compare need none")
+    if options.scenes and kind in (STABILITY, COMPARE):
+        raise ValueError(f"{kind} takes no scene, got {options.scenes[0]!r:.80}")
     for name, with_these in GO_WITH.items():
         if kind not in with_these and getattr(options, name) not in (None, False):
             raise ValueError(f"--{name.replace('_', '-')} goes with {' or '.join(with_these)}, not with {kind}")
@@ -148,7 +151,7 @@ def _comparisons(options: argparse.Namespace) -> None:
     print(library.machine())
     with _exact_motions(options.out) as (folder, new):
         for name in options.compare or library.COMPARISONS:
-            for text in library.COMPARISONS[name](str(folder)):
+            for text in getattr(library.comparisons, name)(str(folder)):
                 print(f"\n{text}", flush=True)
         answer("", new(), folder=options.out)
 

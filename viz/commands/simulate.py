@@ -9,7 +9,8 @@ from typing import Any
 import dynamics as dyn
 from cgraph import extend
 
-from .arguments import MOMENTUM_FORM, answer, positive, started, takes_a_scene, takes_a_start, unless_json
+from . import library
+from .arguments import MOMENTUM_FORM, answer, place, positive, started, takes_a_scene, takes_a_start, unless_json
 from .command import Command
 
 METHOD = "dop853"
@@ -33,7 +34,7 @@ def add(parser: Command) -> None:
     parser.add_argument("--dt", type=positive, metavar="S", help="the largest of equal steps (default: 0.001)")
     parser.add_argument("--rtol", type=positive, metavar="R", help="relative error of a chosen step (default: 1e-9)")
     parser.add_argument("--every", type=positive, metavar="S", help="a row so often (default: every step is one)")
-    parser.add_argument("--csv", type=Path, metavar="FILE", help="write t, q, qd and energy, a line for each row")
+    parser.add_argument("--csv", type=place, metavar="FILE", help="write t, q, qd and energy, a line for each row")
     parser.add_argument("--json", action="store_true", help="print as JSON")
     parser.set_defaults(run=run)
 
@@ -42,6 +43,11 @@ def run(options: argparse.Namespace) -> int:
     """Print how the run went; 1 where it ends before its time."""
     if options.csv is not None:
         extend.check_writable(options.csv)
+    elif options.every is not None:
+        raise ValueError("--every goes with --csv: it says how often the table has a row")
+    if options.dt is not None and library.RunOptions(1.0, options.method).adaptive:
+        said = f"{options.method} chooses its steps, to the error --rtol"
+        raise ValueError(f"--dt goes with methods of equal steps, such as --method rk4; {said}")
     scene, _ = started(options)
     end = scene.t_end if options.t_end is None else options.t_end
     form = "momentum" if options.momentum else "velocity"

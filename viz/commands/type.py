@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 from . import library
-from .arguments import answer_page, writes_a_page
+from .arguments import answer_page, place, writes_a_page
 from .command import Command
 
 
 def add(parser: Command) -> None:
     """The command's arguments."""
     writes_a_page(parser)
-    parser.add_argument("--text", type=Path, metavar="FILE", help="what the box holds at first, by default an example")
+    parser.add_argument("--text", type=place, metavar="FILE", help="what the box holds at first, by default an example")
     parser.set_defaults(run=run)
 
 

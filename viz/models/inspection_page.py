@@ -18,7 +18,7 @@ from .live_motion import live_panel
 from .remarks import tree_alone
 from .typed_text import text_or_none
 
-LIVELY = 40  # velocities: larger models have a page of their motion alone, `live_page`
+LIVELY = 40  # velocities: larger models have a page of their motion alone, `live`
 
 
 def inspect(

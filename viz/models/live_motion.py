@@ -30,7 +30,7 @@ from dynamics.simulation.trajectory import SimulationWarning
 from dynamics.systems.display_names import display_names
 from dynamics.systems.model import Model
 
-from ..live import Live, page_text, panel
+from ..live_page import Live, page_text, panel
 from ..pages.html import Page, Panel, html_target
 
 MOST_BODIES = 4  # of a mechanism whose masses become parameters by themselves
@@ -45,7 +45,7 @@ USUAL = {"rad": math.pi, "rad/s": 10.0}  # how far sliders reach at least; 1 of 
 SHARE = 0.25  # of the steps that a method of order 5 chooses
 
 
-def live_page(model: Model, path: str | os.PathLike[str] | None = None, *, start: Start | None = None) -> Page:
+def live(model: Model, path: str | os.PathLike[str] | None = None, *, start: Start | None = None) -> Page:
     """The page on which a model moves as it is watched, computed there: one HTML file that loads nothing.
 
     Sliders and fields set the state, the torques, the parameters and dt; of a small mechanism without parameters,
@@ -80,7 +80,7 @@ def live_page(model: Model, path: str | os.PathLike[str] | None = None, *, start
     --------
     >>> import dynamics as dyn
     >>> import viz
-    >>> page = viz.live_page(dyn.planar_arm([1.0], [1.0]), start={"joint 1": 1.0})
+    >>> page = viz.live(dyn.planar_arm([1.0], [1.0]), start={"joint 1": 1.0})
     >>> "wasm-unsafe-eval" in page, len(page.encode()) < 50_000
     (True, True)
     """

@@ -122,8 +122,9 @@ class Picture:
         data, caption = base64.b64encode(self.svg.encode()).decode(), escape(self.caption)
         kind = "" if self.width is None else ' class="plot"' if self.width == "100%" else ' class="drawing"'
         wide = ' class="wide"' if self.width == "100%" else ""
+        alt = escape(self.alt) or caption
         return (
-            f'<figure{wide} tabindex="0"><img{kind} src="data:image/svg+xml;base64,{data}" alt="{escape(self.alt) or caption}">'
+            f'<figure{wide} tabindex="0"><img{kind} src="data:image/svg+xml;base64,{data}" alt="{alt}">'
             f"<figcaption>{caption}</figcaption></figure>"
         )
 

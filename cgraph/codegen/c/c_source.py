@@ -9,11 +9,12 @@ from typing import NamedTuple
 from ...core.graph import Graph
 from ...util.atomic_write import atomic_write
 from ...util.require import require_flag, require_graph, require_path, require_texts
+from ...util.words import counted
 from .c_identifiers import check_function_name, distinct
 from .c_statements import comment, functions
 
 _HEADER = """\
-/* {name}: {n_out} outputs of {n_in} inputs, written by cgraph. Units are those of the equations behind it. */
+/* {name}: {counts}, written by cgraph. Units are those of the equations behind it. */
 #ifndef {NAME}_H
 #define {NAME}_H
 
@@ -146,8 +147,7 @@ def to_c(graph: Graph, name: str = "function", *, fma: bool = False, names: Mapp
     header = _HEADER.format(
         name=name,
         NAME=name.upper(),
-        n_in=len(inputs),
-        n_out=len(outputs),
+        counts=f"{counted(len(outputs), 'output')} of {counted(len(inputs), 'input')}",
         inputs=_enumerators(places, input_names, called, f"{name.upper()}_N_IN"),
         outputs=_enumerators(results, list(outputs), called, f"{name.upper()}_N_OUT"),
     )

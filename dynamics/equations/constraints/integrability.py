@@ -22,7 +22,7 @@ import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import Array, Builder, building, cotangents, tangents, topological
 
-from ...systems.constraints import Constraints
+from ...systems.constraints import ConstraintError, Constraints
 from ...systems.kinematics import ONE, ZERO
 from ...systems.model import Model, as_system
 from ...systems.system import System
@@ -56,7 +56,7 @@ def integrable_rows(model: Model) -> dict[str, bool]:
     Raises
     ------
     ConstraintError
-        Where no state is seen that meets the constraints.
+        Where no state is seen that meets the constraints, or at which their rows and slopes are finite numbers.
     ValueError
         For a constraint that depends on time, whose drift the brackets do not see.
 
@@ -86,9 +86,12 @@ def integrable_rows(model: Model) -> dict[str, bool]:
     numbers, curvature = RowNumbers(system.constraints), _Curvature(system)
     kept = list(range(len(system.constraints)))
     rng = np.random.default_rng(1)
-    states = list(islice(numbers.states(), STATES))
+    found = ((point, numbers.finite_matrix(point)) for point in numbers.states())
+    states = list(islice(((point, matrix) for point, matrix in found if matrix is not None), STATES))
+    if not states:
+        raise ConstraintError("no state was seen at which the rows of the constraints are finite numbers")
     while True:
-        bent = {k for point in states for k in curvature.bent(point, numbers.matrix(point), kept, rng)}
+        bent = {k for point, matrix in states for k in curvature.bent(point, matrix, kept, rng)}
         if not bent:
             break
         kept = [k for k in kept if k not in bent]
@@ -127,12 +130,17 @@ class _Curvature:
         if free.shape[1] < 2:
             return set()
         result: set[int] = set()
+        judged = False
         for _ in range(STATES):
             v, w = (free @ rng.normal(size=free.shape[1]) for _ in range(2))
             at = point | {f"v{i}": float(x) for i, x in enumerate(v)} | {f"w{i}": float(x) for i, x in enumerate(w)}
             values = np.array(list(self.graph.evaluate(at).values()), dtype=np.float64).reshape(-1, 4)
-            size = np.abs(values[:, 1:]).max(axis=1)
+            if not np.isfinite(values).all():
+                continue
+            judged, size = True, np.abs(values[:, 1:]).max(axis=1)
             result |= {k for k in rows if abs(values[k, 0]) > ROW_ROUNDING * size[k]}
+        if not judged:
+            raise ConstraintError("the slopes of the constraints are no finite numbers where they were looked at")
         return result
 
 

@@ -96,10 +96,10 @@ class RowNumbers:
             rows, columns = self.scales(point)
             for _ in range(ITERATIONS):
                 phi, matrix = self.gaps(point), self.matrix(point)
-                if not (np.isfinite(phi).all() and np.isfinite(matrix).all()):
+                left, scaled = rows[: len(phi)] * phi, (rows[:, None] * matrix * columns)[: len(phi)]
+                if not (np.isfinite(left).all() and np.isfinite(scaled).all()):
                     break
-                left = rows[: len(phi)] * phi
-                step = -np.linalg.lstsq((rows[:, None] * matrix * columns)[: len(phi)], left, rcond=TRUNCATED)[0]
+                step = -np.linalg.lstsq(scaled, left, rcond=TRUNCATED)[0]
                 size = float(np.linalg.norm(step))
                 shorter = min(1.0, LONGEST_STEP / size) if size else 1.0
                 point = self.point(self.moved_by(point, shorter * columns * step), point)
@@ -147,6 +147,12 @@ class RowNumbers:
         weights = dict(zip([f"lambda{k}" for k in range(m)], np.eye(m), strict=True))
         columns = self.columns.evaluate({**point, **weights})
         return np.stack([np.broadcast_to(column, m) for column in columns.values()], axis=1)
+
+    def finite_matrix(self, point: Mapping[str, float]) -> Array | None:
+        """J; None where it has an entry that is no finite number."""
+        with np.errstate(all="ignore"):
+            matrix = self.matrix(point)
+        return matrix if np.isfinite(matrix).all() else None
 
     def certain_matrix(self, point: Mapping[str, float]) -> Array:
         """J with 0 for entries that are rounding alone."""

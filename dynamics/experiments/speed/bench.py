@@ -125,7 +125,7 @@ def _row(case: PeerModel, task: str, mode: str, pool: WorkerPool, repeats: int) 
     ready = pool.prepared(task, mode, row.skipped)
     samples: dict[str, list[float]] = {peer: [] for peer in ready}
     used = dict.fromkeys(ready, 0.0)
-    for turn in range(repeats):  # in turns, so that all share the machine's moods
+    for turn in range(repeats):  # in turns, so that a busy machine slows all alike
         for peer in [each for each in ready if turn < FEWEST_TURNS or used[each] < LONG_TURNS]:
             begin = time.perf_counter()
             try:
@@ -207,7 +207,7 @@ def tables(rows: Sequence[Row], where: str = "") -> str:
         "Medians of alternating turns on one core. In brackets: times ours, above 1 where ours is faster.",
         f"* the fastest of its row.  ! it differs from ours by more than {AGREES:g}.  - a: not measured, see below.",
         "",
-        *[f"{peer:<11} {PEERS[peer].about}" for peer in shown],
+        *[f"{peer:<11} {PEERS[peer].told}" for peer in shown],
         *(textwrap.wrap(f"not installed: {', '.join(missing)} ({HOW})", WIDTH) if missing else []),
     ]
     for task, about in TASKS.items():

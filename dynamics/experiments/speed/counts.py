@@ -76,8 +76,14 @@ VARIANTS = {
 
 
 def node_counts(links: int = LARGEST_COUNTED) -> Iterator[Table]:
-    """The table of counts: of every idea in nodes, of the others relative to it. links: of the largest model."""
-    sizes = {name: int(name.split()[1]) for name in COUNTED if int(name.split()[1]) <= links}
+    """The table of counts: of every idea in nodes, of the others relative to it. links: of the largest model.
+
+    Raises ValueError for fewer links than the smallest model has.
+    """
+    all_sizes = {name: int(name.split()[1]) for name in COUNTED}
+    sizes = {name: size for name, size in all_sizes.items() if size <= links}
+    if not sizes:
+        raise ValueError(f"the smallest model that is counted has {min(all_sizes.values())} links, got links = {links}")
     rows = []
     base: dict[str, int] = {}
     for name, variant in VARIANTS.items():
@@ -207,7 +213,12 @@ def published(what: str, name: str, n: int) -> str:
 
 
 def operation_counts(links: int = LARGEST) -> Iterator[Table | str]:
-    """A table for each quantity. links: of the largest model."""
+    """A table for each quantity. links: of the largest model.
+
+    Raises ValueError for fewer links than the smallest model has.
+    """
+    if not models(links):
+        raise ValueError(f"the smallest model that is counted has {min(PLANAR)} links, got links = {links}")
     for what, (equations, _) in QUANTITIES.items():
         rows = []
         for name, model in models(links).items():

@@ -247,6 +247,3 @@ def energy(folder: str, steps: int = STEPS, starts: int = STARTS) -> Iterator[st
             *table(header, rows, left=(0, 6)),
         ]
     )
-
-
-COMPARISONS = {"orders": orders, "taylor": taylor, "stiff": stiff, "loops": loops, "energy": energy}

@@ -15,22 +15,13 @@ from cgraph.extend import Array
 
 from ...equations.energies import energy
 from ...multiprecision import Reference
-from ...simulation.run_options import SCIPY
 from ...systems.model import as_system
 from ..accuracy_task import INTERVALS, AccuracyTask
 from ..timing import Spent, in_turns, spent
 from .trajectory_runs import CHOSEN, EndSolver, Outcome, Run
 
-OURS = "ours"
-# How the names of peers' solvers begin.
-PEERS = {"MuJoCo": "MuJoCo", "SciPy": SCIPY, "heyoka": "heyoka", "CasADi": "CVODES", "diffrax": "diffrax"}
 PATIENCE = 3.0  # times as long for the others, most of which need more time for the same error
 AnySolver = TypeVar("AnySolver", bound=EndSolver)
-
-
-def group(name: str) -> str:
-    """The peer that a solver of this name belongs to; ours for none."""
-    return next((peer for peer, begin in PEERS.items() if name.startswith(begin)), OURS)
 
 
 CHUNK = 5e-3  # s, of runs that are timed in one turn

@@ -23,7 +23,8 @@ from ...multiprecision import Reference
 from ...peers.peer import made
 from ..accuracy_task import AccuracyTask
 from ..text_table import WIDTH, Footnotes, check_names, digits, table
-from .measurement import OURS, PATIENCE, PEERS, EndMetrics, Entry, ErrorMetrics, Tried, group, sweep, time_in_turns
+from .groups import OURS, PEERS, group
+from .measurement import PATIENCE, EndMetrics, Entry, ErrorMetrics, Tried, sweep, time_in_turns
 from .motion_runs import HeyokaBatch, Many, ManyEnds, Motion
 from .motion_scenes import MOTIONS, TIMES, exact_end, sizes
 from .trajectory_peers import Heyoka, offers

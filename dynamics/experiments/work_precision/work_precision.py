@@ -20,7 +20,8 @@ from ..accuracy_task import AccuracyTask
 from ..text_table import check_names, csv_text
 from ..timing import exponent, load as load_of_machine, machine, spent
 from .cold_start import STARTS, ColdStart, cold_starts
-from .measurement import FLOOR_ERROR, OURS, PATIENCE, PEERS, Entry, ErrorMetrics, Tried, group, sweep, time_in_turns
+from .groups import OURS, PEERS, group
+from .measurement import FLOOR_ERROR, PATIENCE, Entry, ErrorMetrics, Tried, sweep, time_in_turns
 from .named_tasks import load
 from .trajectory_peers import offers
 from .trajectory_runs import EQUAL, Ours, Solver, problem_of

@@ -16,7 +16,7 @@ from cgraph import Node
 from cgraph.extend import Array, require_whole
 
 from ...equations.states.initial_value import InitialValues, initial_values
-from ...integrators import METHODS, Problem, derive, in_form
+from ...integrators import Problem, derive, in_form
 from ...systems.model import Model
 from ..events.event import Event, EventProgram, as_events, event_program
 from ..events.event_log import split_crossings
@@ -24,7 +24,7 @@ from ..moving import with_applied
 from ..outcome import INTERRUPTED
 from ..progress_bar import Progress
 from ..row_values import converted, unreached_momenta
-from ..run_options import METHOD, RunOptions, require_room, time_span
+from ..run_options import METHOD, SCIPY, RunOptions, require_room, time_span
 from ..sampled_controller import SampledController
 from ..steps.equal_steps import EqualSteps, even_steps, step_count
 from ..steps.step_program import StepProgram, step_program
@@ -228,8 +228,8 @@ def _warnings(stats: EnsembleStats) -> list[str]:
 
 
 def _check(method: str, chunk: int | None, tau: object) -> None:
-    if isinstance(method, str) and method not in METHODS:
-        raise ValueError(f"method must be one of {', '.join(METHODS)}, got {method!r}")
+    if isinstance(method, str) and method.startswith(SCIPY):
+        raise ValueError(f"simulate_many takes methods of dyn.METHODS, and none of SciPy, got {method!r:.60}")
     if chunk is not None:
         require_whole("chunk", chunk, 1)
     if isinstance(tau, SampledController):

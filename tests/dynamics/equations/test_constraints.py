@@ -109,6 +109,24 @@ def test_integrable_rows_are_told_from_others_in_any_units(scale: float) -> None
     assert dyn.integrable_rows(dyn.System(plane, "x y a")) == {}
 
 
+@each_row("rate", [1e-6, 1.0, 1e6])
+def test_rows_that_overflow_are_judged_where_they_are_numbers(rate: float) -> None:
+    def rows(q: Any, qd: Any, t: Any) -> Any:
+        return {"growing": cg.exp(rate * q[0]) * qd[1] - qd[2]}
+
+    for held in ({}, {"constraints": lambda q, t: {"bent": rate * (q[0] - q[1] ** 2)}}):
+        system = dyn.System(plane, "x y a", velocity_constraints=rows, **held)
+        assert dyn.integrable_rows(system) == {**dict.fromkeys(system.constraints.names, True), "growing": bool(held)}
+
+    nowhere = dyn.System(
+        plane,
+        "x y a",
+        velocity_constraints=lambda q, qd, t: {"none": cg.exp(1e9 * q[0]) * cg.exp(-1e9 * q[0]) * qd[0] - qd[1]},
+    )
+    with pytest.raises(dyn.ConstraintError, match="no state was seen at which the rows of the constraints are finite"):
+        dyn.integrable_rows(nowhere)
+
+
 def test_brackets_of_quasi_velocities_count() -> None:
     """Of a rotor, w_z = 0 alone is not integrable: turns about x and y together turn about z."""
     ball = dyn.Body("ball", dyn.Joint("ball"), inertia=(1.0, 2.0, 2.5))

@@ -459,3 +459,12 @@ def test_the_bench_sets_ours_beside_its_peers(capsys):
         assert one["difference"] <= module.AGREES
     nodes = len(dyn.forward_dynamics(SCENES["planar 3"]()).nodes)
     assert call["cells"]["ours"]["size"] == nodes
+
+
+def test_without_llvmlite_our_graph_is_called_python_and_the_extra_is_named(without) -> None:
+    row = Row("planar 3", "forward", "call", 3, {"ours": Cell(1.0, 1.0, 1.0, 0.1, 0.0, 90)})
+    assert "our graph as machine code" in tables([row])
+    without("llvmlite")
+    text = " ".join(tables([row]).split())
+    assert "our graph as generated Python; machine code needs llvmlite: in a checkout of cgraph, pip" in text
+    assert "as machine code" not in text

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from pytest import approx, raises
 
-from dynamics.experiments.work_precision.measurement import OURS, Entry, Tried
+from dynamics.experiments.work_precision.groups import OURS
+from dynamics.experiments.work_precision.measurement import Entry, Tried
 from dynamics.experiments.work_precision.motion_runs import HeyokaBatch, Many, Motion
 from dynamics.experiments.work_precision.motion_scenes import MOTIONS, TIMES, exact_end, sizes
 from dynamics.experiments.work_precision.motions import ERRORS, Cell, Missed, Row, cost, motions, tables

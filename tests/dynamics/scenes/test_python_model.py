@@ -58,6 +58,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "bytes.py").write_bytes(b"\xff\xfe")
     (tmp_path / "empty.py").write_text("")
     (tmp_path / "folder.py").mkdir()
+    (tmp_path / "bare").mkdir()
     monkeypatch.chdir(tmp_path)
     before = set(sys.modules)
     yield tmp_path
@@ -95,6 +96,7 @@ def test_any_model_in_python_is_a_scene(name, called, coordinates, folder, capsy
     [
         ("nowhere.py:system", "there is no file 'nowhere.py'"),
         ("folder.py:system", "'folder.py' is a folder, and a model is in a file"),
+        ("bare:system", "'bare' is a folder, and a model is in a file, as in 'bare/model.py:system'"),
         ("models.py", "'models.py' is a Python file: name the model in it, as in 'models.py:system'"),
         ("models.py:", "'models.py' is a Python file: name the model in it"),
         ("models.py:sistem", "'models.py' has no 'sistem'; did you mean 'system'?"),

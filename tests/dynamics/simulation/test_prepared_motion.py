@@ -311,6 +311,7 @@ OWN: list[tuple[dict[str, Any], str]] = [
     ({"varied": 3}, "varied must be a sequence of names"),
     ({"varied": ["k"], "method": "scipy:BDF", "dt": None}, "needs one of dyn.METHODS"),
     ({"form": "speed"}, "form"),
+    ({"varied": ["unknown"]}, "varied: the system has no parameter 'unknown'; it has "),
 ]
 
 
@@ -320,3 +321,9 @@ OWN: list[tuple[dict[str, Any], str]] = [
 def test_what_is_fixed_is_checked_at_once(given: dict[str, Any], message: str) -> None:
     with pytest.raises((TypeError, ValueError), match=message):
         dyn.prepare(oscillator(), **{"method": "rk4", "dt": 0.1} | given)
+
+
+def test_a_solver_of_scipy_that_is_not_installed_is_said_at_once(without: Any) -> None:
+    without("scipy.integrate")
+    with pytest.raises(ImportError, match=r"method 'scipy:Radau' needs SciPy: .*'\.\[scipy\]'"):
+        dyn.prepare(oscillator(), "scipy:Radau")

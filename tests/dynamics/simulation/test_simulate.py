@@ -227,7 +227,7 @@ ARGUMENTS: list[tuple[dict[str, Any], str]] = [
     ({"dt": 1e-17}, "dt = 1e-17 s is below the resolution of the time at t_end = 1 s"),
     ({"t0": -1e15, "dt": 0.1}, r"dt = 0.1 s is below the resolution .* at t0 = -1e\+15 s"),
     ({"dt": 1e-13}, r"9999999999990 steps of 2 numbers take .* GiB are free: record fewer times"),
-    ({"method": "rk5"}, "method must be one of euler, rk4, .*, got 'rk5'"),
+    ({"method": "rk5"}, "there is no method 'rk5'; there are euler, rk4, "),
     ({"method": None}, "method must be one of euler, .* got None"),
     (
         {"method": "dopri5"},

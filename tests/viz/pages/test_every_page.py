@@ -23,7 +23,7 @@ X = cg.variable("x")
 PAGES = {  # kind: its page, bytes at most, and the one thing that its policy allows besides
     "inspect": (lambda: viz.inspect(ARM, t_end=0.2), 400_000, "'wasm-unsafe-eval'"),
     "page": (lambda: viz.page(cg.Graph([X], {"y": cg.sin(X)}), tables=[Table("t", ["a"], [["b"]])]), 200_000, ""),
-    "live": (lambda: viz.live_page(ARM), 60_000, "'wasm-unsafe-eval'"),
+    "live": (lambda: viz.live(ARM), 60_000, "'wasm-unsafe-eval'"),
     "typed": (viz.typed_page, 500_000, ""),
     "lesson": (lambda: viz.lesson(ARM), 200_000, ""),
     "paper": (lambda: page_of([equations(), figures_1_to_3()], {}), 200_000, ""),

@@ -16,8 +16,8 @@ import dynamics as dyn
 import viz
 from dynamics.integrators import TABLEAUS
 from tests.each_row import each_row
-from viz.live import Live, page_text
-from viz.live.live_panel import SCRIPTS
+from viz.live_page import Live, page_text
+from viz.live_page.live_panel import SCRIPTS
 from viz.models.live_motion import live_of
 from viz.pages.html import asset
 
@@ -35,7 +35,9 @@ class Script:
 
     def __init__(self, data: dict) -> None:
         self.engine = MiniRacer()
-        self.engine.eval(f'"use strict";\n{asset("viz.live", *SCRIPTS)}\nvar data = {json.dumps(data)}, machine, run;')
+        self.engine.eval(
+            f'"use strict";\n{asset("viz.live_page", *SCRIPTS)}\nvar data = {json.dumps(data)}, machine, run;'
+        )
         codes = [list(base64.b64decode(data[name])) for name in ("rate", "shown")]  # V8 alone has no atob
         modules = [f"new WebAssembly.Module(Uint8Array.of({str(code)[1:-1]}))" for code in codes]
         instances = ", ".join([f"new WebAssembly.Instance({module}, LIVE_IMPORTS)" for module in modules])
@@ -318,5 +320,5 @@ def test_a_start_that_is_no_number_is_told():
 def test_a_center_that_attracts_has_a_page():
     """Its state at 0 has no rates, and no weight that sliders could be as long as."""
     planet = dyn.System(lambda q, qd, t: qd[0] ** 2 + qd[1] ** 2 + 1.0 / cg.hypot(q[0], q[1]), "x y")
-    assert "wasm-unsafe-eval" in viz.live_page(planet)
-    assert "wasm-unsafe-eval" in viz.live_page(planet, start=[0.0, 0.0, 0.0, 0.0])
+    assert "wasm-unsafe-eval" in viz.live(planet)
+    assert "wasm-unsafe-eval" in viz.live(planet, start=[0.0, 0.0, 0.0, 0.0])
