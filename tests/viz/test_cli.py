@@ -98,7 +98,10 @@ def test_a_model_file_stands_where_a_scene_s_name_does(tmp_path, capsys):
         ("paper --out a_file", "cannot write into the folder a_file: a_file is a file"),
         ("certify nowhere.xml", "there is no file 'nowhere.xml'"),
         ("why triple_pendulum tau0 q9", "nothing in the graph is called 'q9'"),
-        ("why triple_pendulum tau9 q0", "there is no torque and no cause 'tau9'; it has gravity, Coriolis, inertia, damping, tau.joint 1"),
+        (
+            "why triple_pendulum tau9 q0",
+            "there is no torque and no cause 'tau9'; it has gravity, Coriolis, inertia, damping, tau.joint 1",
+        ),
         ("why triple_pendulum", "why needs to know WHAT: a torque, such as tau0, or a cause, such as gravity"),
         ("why triple_pendulum weigth", "there is no torque and no cause 'weigth'"),
         ("why spring_mass tau0 q0 --at zz=1", "the graph has no input zz"),

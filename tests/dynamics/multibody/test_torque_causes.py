@@ -155,6 +155,11 @@ def test_terms_of_a_potential_energy_are_told_by_their_formulas():
     assert table.values[:, 1] == pytest.approx([0.0, 0.0, 0.0, 0.0, 3.0], abs=LONG_SUM)
 
 
+def test_what_nothing_moves_has_no_torque():
+    still = torque_by_cause(dyn.System(lambda q, qd, t: 0.0 * qd[0], "x")).at([1.0], [1.0], [1.0])
+    assert (still.rows, still.total.tolist()) == (("inertia",), [0.0])
+
+
 def test_base_parameters_change_no_cause():
     arm = random_tree(4, 4, ["revolute"], "revolute")
     q, qd, qdd, _ = random_state(arm, 0)
