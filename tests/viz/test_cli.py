@@ -103,6 +103,7 @@ def test_a_model_file_stands_where_a_scene_s_name_does(tmp_path, capsys):
             "there is no torque and no cause 'tau9'; it has gravity, Coriolis, inertia, damping, tau.joint 1",
         ),
         ("why triple_pendulum", "why needs to know WHAT: a torque, such as tau0, or a cause, such as gravity"),
+        ("why triple_pendulum gravity --svg a.svg", "--svg draws the paths from INPUT: name one"),
         ("why triple_pendulum weigth", "there is no torque and no cause 'weigth'"),
         ("why spring_mass tau0 q0 --at zz=1", "the graph has no input zz"),
         ("lint spring_mass --box zz=0:1", "the graph has no input zz"),

@@ -12,6 +12,7 @@ from cgraph import extend
 from . import library
 from .arguments import (
     REST,
+    answer,
     answer_and_draw,
     check_picture,
     counting,
@@ -61,6 +62,8 @@ def run(options: argparse.Namespace) -> int | None:
     """Print causes, then paths and what they add up to; of two that are not connected, where the chain stops."""
     if not options.output and not options.nan:
         raise ValueError("why needs to know WHAT: a torque, such as tau0, or a cause, such as gravity")
+    if options.svg and not (options.input or options.nan):
+        raise ValueError("--svg draws the paths from INPUT: name one, as in `why SCENE tau0 q1`")
     check_picture(options)
     scene = scene_of(options)
     verdict = verdict_of(options, scene)
@@ -79,8 +82,9 @@ def run(options: argparse.Namespace) -> int | None:
             _dependence(options, scene, names, verdict, table, output, at, state)
         return None
     causes = table.in_all(options.output, options.input or "")
-    data = {"at": at} | causes.to_dict()
-    answer_and_draw(options, unless_json(options, data, f"{state}\n{causes}"), graph, scene)
+    if options.svg:
+        raise ValueError(f"--svg draws paths between two nodes, and {causes.name!r} is a cause")
+    answer(unless_json(options, {"at": at} | causes.to_dict(), f"{state}\n{causes}"))
     return None
 
 
@@ -101,7 +105,7 @@ def _value(
     else:
         slopes = library.Slopes(names, output, at)
         text, data = str(slopes), slopes.to_dict()
-    answer_and_draw(options, unless_json(options, {"at": at} | data, f"{state}\n{text}"), graph, scene)
+    answer(unless_json(options, {"at": at} | data, f"{state}\n{text}"))
 
 
 def _dependence(
@@ -151,7 +155,8 @@ def _nan(options: argparse.Namespace, scene: dyn.scenes.Scene, names: extend.Nam
     """Print where a number that is not finite comes from; status 1 where there is one."""
     output = options.output and names.meant(options.output)
     found = cg.why_nan(names.graph, at, output or None, options.input, names=dyn.display_names(scene))
-    answer_and_draw(options, unless_json(options, found.to_dict(), found), names.graph, scene)
+    marked = {found.node} & set(names.graph.nodes)
+    answer_and_draw(options, unless_json(options, found.to_dict(), found), names.graph, scene, marked=marked)
     return 1 if found.what else 0
 
 

@@ -94,7 +94,8 @@ def torque_by_cause(model: Model, formulation: str = "chain_rule") -> TorqueTabl
         inputs = embedding.inputs
         rows, outside = ({name: embedding.embed(*row) for name, row in each.items()} for each in (rows, outside))
     rows |= (_of_step(system, formulation, list(rows.values()), build) if of_step else {}) | outside
-    rows = {name: row for name, row in rows.items() if any(entry.value != 0.0 for entry in row)}
+    kept = {name: row for name, row in rows.items() if any(entry.value != 0.0 for entry in row)}
+    rows = kept or {"inertia": [ZERO] * system.n}
     outputs = {f"tau{i}_{k}": entry for k, row in enumerate(rows.values()) for i, entry in enumerate(row)}
     graph = cg.simplify(system.graph(outputs, inputs))
     return TorqueTable("torque by cause", tuple(rows), system.velocities, system, graph, sum_axis=0)

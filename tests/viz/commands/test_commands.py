@@ -375,6 +375,7 @@ def test_a_motion_cut_short_is_a_finding(own, figures, capsys):
         (["lint", "spring_mass", "--formulation", "by_definition"], 1, theme.MARKS[:1]),
         (["why", "spring_mass", "tau0", "q0"], 0, theme.MARKS[:1]),
         (["why", "spring_mass", "tau0", "qd0"], 0, theme.MARKS[1:]),
+        (["why", "spring_mass", "--nan", "--forward", "--at", "I=0"], 1, theme.MARKS[:1]),
         (["compare", "spring_mass"], 1, theme.MARKS),
     ],
 )

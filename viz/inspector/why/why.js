@@ -71,6 +71,12 @@ function askWhy(app) {
   byId("why").replaceChildren(tag("div", { class: "row" }, "why", what, by), app.asking.answer);
 }
 
+/** The bodies, or other tags, that a path passes, in order; neighbors of the same are one. */
+function bodiesOn(version, nodes) {
+  const tags = nodes.slice(1).map((node) => version.labels[version.label[node]][0].filter((each) => !ENERGIES.includes(each)).join(", "));
+  return tags.filter((each, i) => each && each !== tags[i - 1]);
+}
+
 function showWhy(app) {
   if (app.asking?.version !== app.version) { askWhy(app); app.cause = ""; }
   const { version } = app, { what, by, answer } = app.asking;
@@ -106,8 +112,10 @@ function showWhy(app) {
   found.forEach(({ nodes, slots, product }) => {
     const words = nodes.map((node, i) => (i && alike(nodes) ? `argument ${slots[i - 1] + 1} of ` : "") + told(app, node));
     const crossed = nodes.filter((node) => version.marked.has(node)).length, on = app.path?.join() === nodes.join();
+    const bodies = bodiesOn(version, nodes), ends = [nameOf(app, nodes[0]), ...bodies, nameOf(app, nodes.at(-1))];
     const button = tag("button", { type: "button", class: `path${on ? " on" : ""}` },
-      `${brief(product)}: ${words.join(" → ")}${crossed ? `  (${crossed} spurious)` : ""}`);
+      `${brief(product)}: ${bodies.length ? ends.join(" → ") : words.join(" → ")}${crossed ? `  (${crossed} spurious)` : ""}`,
+      ...(bodies.length ? [tag("br"), tag("span", { class: "unit" }, words.join(" → "))] : []));
     button.onclick = () => { app.path = on ? null : nodes; paintPath(app); showWhy(app); };
     answer.append(button);
   });
