@@ -133,14 +133,14 @@ def two_link() -> Scene:
     Angles are relative, zero hanging straight down, as of `planar_arm`.
     """
 
-    def lagrangian(q: Sequence[Node], qd: Sequence[Node], t: Node) -> Node:
-        first, second = qd[0], qd[0] + qd[1]
+    def lagrangian(q: Sequence[Node], qd: Sequence[Node], t: Node) -> list[Node]:
         with cg.tag("kinetic"):
+            first, second = qd[0], qd[0] + qd[1]
             kinetic = first**2 + 0.5 * second**2 + first * second * cg.cos(q[1])
         with cg.tag("potential"):
             depth = 2.0 * cg.cos(q[0]) + cg.cos(q[0] + q[1])
             below = 9.81 * depth  # minus the potential energy
-        return kinetic + below
+        return [kinetic, below]
 
     about = "a two-link arm in a vertical plane: links of 1 m without mass, 1 kg at the end of each"
     return Scene("two_link", about, System(lagrangian, ["shoulder", "elbow"]), (0.5, 1.5), (0.0, 0.0), 3.0)

@@ -30,7 +30,7 @@ def run(options: argparse.Namespace) -> None:
             "Type a Lagrangian, at first that of Figures 1 to 3",
             lambda: library.typed_page(library.typed_text(spring, spring.q)),
         ),
-        "live.html": ("The three-link arm of Figures 4 and 5, live", lambda: library.live_page(arm)),
+        "live.html": ("The three-link arm of Figures 4 and 5, live", lambda: library.live(arm)),
     }
     files, data = library.paper(options.out, say, quick=options.quick, beside=beside)
     page = options.out / "index.html"

@@ -40,6 +40,8 @@ function show() {
   SCORE.textContent = score();
   document.querySelector("#end .score").textContent = `Your score: ${score()}; there ${ASKING.length === 1 ? "is one question" : `are ${ASKING.length} questions`}.`;
   play(ASKING.indexOf(SCREENS[STATE.current]));
+  for (const each of SCREENS[STATE.current].querySelectorAll(".scroll, figure, .graph-picture"))
+    if (each.scrollWidth > each.clientWidth) each.tabIndex = 0; // what scrolls is reached by keys
   try { history.replaceState(null, "", written()); } catch { /* a frame without an address */ }
 }
 function go(to) {
@@ -71,7 +73,7 @@ function explain(link) {
 const NAV = document.querySelector("nav");
 const LINKS = SCREENS.map((screen, i) => {
   const text = i === 0 ? "Start" : i === SCREENS.length - 1 ? "End" : String(i);
-  const link = tag("a", { href: `#${i}`, "aria-label": screen.querySelector("h2").textContent }, text);
+  const link = tag("a", { href: `#${i}`, "aria-label": `${text}: ${screen.querySelector("h2").textContent}` }, text);
   link.addEventListener("click", (event) => { event.preventDefault(); go(i); });
   const turn = tag("div", { class: "turn" });
   if (i) button(turn, "← Back", () => go(i - 1)); else turn.append(tag("span"));

@@ -58,10 +58,10 @@ def _moment(subject: Subject) -> str:
     if subject.system.nq == subject.system.n:
         shown = min(subject.system.n, SHOWN)
         lines = [[row for each in range(3) for row in rows[each * shown + i]] for i in range(shown)]
-        header = ["coordinate", "", "velocity", "", "acceleration", ""]
+        header = ["coordinate", "value", "velocity", "value", "acceleration", "value"]
         table = Table("This moment", header, lines).html()
     else:
-        table = Table("This moment", ["", ""], rows).html()
+        table = Table("This moment", ["quantity", "value"], rows).html()
     units = "" if subject.units else "<p>The model states no units: any that fit one another, such as those of SI.</p>"
     more = subject.system.n - SHOWN
     return table + units + (f"<p>{more} more {'is' if more == 1 else 'are'} not shown.</p>" if more > 0 else "")

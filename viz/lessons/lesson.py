@@ -145,7 +145,7 @@ def page(
     text = f"{start}\n{body}\n{_end(subject, chosen)}"
     return html.compose(
         title,
-        f'<h1>{escape(title)}</h1>{by}\n<nav aria-label="Screens"></nav>\n<main>\n{text}\n{glossary(text)}\n</main>',
+        f'<header><h1>{escape(title)}</h1>{by}</header>\n<nav aria-label="Screens"></nav>\n<main>\n{text}\n{glossary(text)}\n</main>',
         asset(__package__, "lesson.css"),
         f'"use strict";\n{scripts()}\n{asset(__package__, "app.js")}',
         {"data": data},
@@ -170,7 +170,7 @@ def _end(subject: Subject, chosen: str) -> str:
             if key != chosen
         ]
     )
-    seen = f"<p>In one sentence: {_sentence(subject)}</p>\n" if chosen == "euler" else ""
+    seen = f"<p>In short: {_sentence(subject)}</p>\n" if chosen == "euler" else ""
     return (
         f'<section class="screen" id="end">\n<h2>The end</h2>\n{seen}<p class="score"></p>\n'
         f"<h3>Next lessons</h3>\n<ul>{rows}</ul>\n</section>"

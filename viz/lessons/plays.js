@@ -152,7 +152,7 @@ const PLAYS = {
     button(buttons, "All values", () => { step = Math.max(step, count); redraw(); });
     if (play.slopes) button(buttons, "All slopes", () => { step = last; redraw(); });
     button(buttons, "Again", () => { step = 0; redraw(); });
-    const write = grid(board, ["node", "value", ...(play.slopes ? ["slope of L", ""] : []), "is"]);
+    const write = grid(board, ["node", "value", ...(play.slopes ? ["slope of L", "it is"] : []), "is"]);
     return () => {
       const now = step > count ? 2 * count - step : step - 1; // the row whose value or slope is new
       const cells = rows.map((row, i) => [row.node, i < step ? digits(row.value) : "·",
@@ -183,7 +183,7 @@ const PLAYS = {
     const buttons = board.appendChild(tag("div", { class: "buttons" }));
     button(buttons, "Take out the next", () => { step = Math.min(step + 1, n - 1); redraw(); });
     button(buttons, "Again", () => { step = 0; redraw(); });
-    const write = grid(board, ["", ...play.joints]);
+    const write = grid(board, ["row", ...play.joints]);
     return () => {
       const found = mass(at), name = (i, j) => found[`M_${i}_${j}`];
       const matrix = play.joints.map((_, i) => play.joints.map((_, j) => name(i, j)));
@@ -195,7 +195,7 @@ const PLAYS = {
   loop(board, play, at, redraw) {
     const free = named(play.free), held = named(play.held);
     sliders(board, play, at, redraw);
-    const write = grid(board, ["", "free", "held"]);
+    const write = grid(board, ["at rest", "free", "held"]);
     return () => {
       const a = free(at), b = held(at), found = play.joints.flatMap((_, i) => [a[`qdd${i}`], b[`qdd${i}`]]);
       const rounding = play.rounding * Math.max(0, ...found.map(Math.abs).filter(Number.isFinite));

@@ -28,7 +28,7 @@ def worksheet(subject: Subject, screens: Sequence[Screen], title: str, author: s
     heading = f"Key: {title}" if key else title
     return html.compose(
         heading,
-        f"<h1>{escape(heading)}</h1>{by}\n<main>\n{text}\n{'' if key else glossary(text).replace('<details', '<details open', 1)}\n</main>",
+        f"<header><h1>{escape(heading)}</h1>{by}</header>\n<main>\n{text}\n{'' if key else glossary(text).replace('<details', '<details open', 1)}\n</main>",
         asset(__package__, "worksheet.css"),
     )
 

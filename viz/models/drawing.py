@@ -11,7 +11,6 @@ from dynamics.equations.formulations.verdict import formulation_verdict
 from dynamics.equations.state_equation import state_equation
 from dynamics.systems.model import Model
 
-from .. import theme
 from ..graph_drawing.dot import to_dot
 from ..graph_drawing.render import check_can_draw, render_png, render_svg, tags_to_collapse
 
@@ -84,7 +83,7 @@ def draw(
             graph,
             marked=() if verdict is None else verdict.nodes,
             marked_edges=() if verdict is None else verdict.edges,
-            names=theme.called(display_names(scene)),
+            names=display_names(scene),
             collapse=tags_to_collapse(graph),
             caption=f"{scene.name}: {what}",
         )

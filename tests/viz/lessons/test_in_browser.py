@@ -74,6 +74,8 @@ def test_every_screen_fits_and_can_be_read(show, width, scheme):
         page.evaluate(f"go({k}); guess(ASKING.indexOf(SCREENS[{k}]), 0)")
         assert page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth") == 0
         assert page.evaluate("[...document.querySelectorAll('.screen')].filter((s) => s.offsetHeight).length") == 1
+        scrolling = "[...document.querySelectorAll('.current .scroll')].filter((s) => s.scrollWidth > s.clientWidth)"
+        assert page.evaluate(f"{scrolling}.filter((s) => s.tabIndex < 0).length") == 0
     assert page.evaluate("document.getAnimations().length") == 0
     light = page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
     assert light == (scheme == "light")

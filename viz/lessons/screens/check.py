@@ -49,8 +49,8 @@ def check(subject: Subject) -> Screen:
         f"coordinates of this moment. {_at_rest(subject, held, still)} the {subject.force} that holds the system where it "
         f"is. At <b>{name}</b> it is {number(needed)}{unit}{', for nothing pulls there' if not needed else ''}.</p>"
         "<p>The right way to dp/dt needs no step: p depends on q and q̇, which change at the rates q̇ and q̈. So, by the "
-        f"{term('chain rule')},</p><p class=\"display\">dp/dt = (∂p/∂q) q̇ + (∂p/∂q̇) q̈,</p><p>with q and q̇ as "
-        "separate inputs throughout.</p>",
+        f"{term('chain rule')},</p><p class=\"display\">dp/dt = (∂p/∂q) q̇ + (∂p/∂q̇) q̈,</p><p>"
+        "summed over all coordinates, with q and q̇ as separate inputs throughout.</p>",
         f"The graph by definition computes τ at <b>{name}</b>, at rest, with dt = 1e-6 s. It gives …",
         choices,
         answer,

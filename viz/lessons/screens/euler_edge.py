@@ -31,7 +31,7 @@ def euler_edge(subject: Subject) -> Screen:
              "value": subject.values[f"{velocity}_old"]},
         ],
         dt=True,
-        header=["", "value"],
+        header=["quantity", "value"],
         rows=[[f"{subject.told(name)} after the step", name]],
     )  # fmt: skip
     return Screen(
@@ -93,7 +93,7 @@ def _figure(subject: Subject) -> Figure:
         f"A step of length dt, and L of the state after it. Inputs are at the bottom, L is at the top.{one}",
         "Draw over the edges by which a velocity q̇ reaches a coordinate q. Then draw, in another color, the way of "
         "the slope from L back to q̇ through q.",
-        f"In vermillion the Euler relation: from q̇ through × to q.{one}",
+        f"In vermillion, an orange red, the Euler relation: from q̇ through × to q.{one}",
     )
 
 

@@ -205,7 +205,7 @@ def _figure(subject: Subject, graph: Graph, *, values: bool) -> Figure | None:
         return Figure(
             plain,
             marked,
-            "The graph of L. Inputs are at the bottom; the numbers 1 and 2 at edges tell arguments apart; xʸ is a power.",
+            f"The graph of L. Inputs are at the bottom.{_signs(graph)}",
             "Write the value of every node beside it, from the bottom to the top, with two digits.",
             "The values of all nodes.",
         )
@@ -218,6 +218,14 @@ def _figure(subject: Subject, graph: Graph, *, values: bool) -> Figure | None:
         "The slopes of L by all nodes. At the bottom are ∂L/∂q and p = ∂L/∂q̇.",
         subject.svg(_drawing(graph, subject.names, _called(graph))),
     )
+
+
+def _signs(graph: Graph) -> str:
+    """What signs in the picture mean, of those that are in it."""
+    ops = {node.op for node in graph.nodes if node.args}
+    ordered = any([op.arity > 1 and not op.commutative for op in ops])
+    power = any([op.name == "pow" for op in ops])
+    return " The numbers 1 and 2 at edges tell arguments apart." * ordered + " xʸ is a power." * power
 
 
 def _drawing(graph: Graph, names: Mapping[str, str], at: Mapping[Node, str]) -> Digraph:
