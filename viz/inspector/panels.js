@@ -241,7 +241,7 @@ function showResults(app) {
   app.names.forEach(([name], row) => found.forEach((each, column) => {
     if (!each.has(name)) return;
     const [value, noise] = each.get(name), [truth, blur] = found[app.right]?.get(name) ?? [value, 0];
-    const off = wrongIn(each, name) && Math.abs(value - truth) > noise + blur + OFF * Math.max(Math.abs(value), Math.abs(truth));
+    const off = wrongIn(app.state.versions[column], name) && Math.abs(value - truth) > noise + blur + OFF * Math.max(Math.abs(value), Math.abs(truth));
     write(app.cells[row][column], brief(value, noise), off ? "off" : "");
   }));
   tellNow(app, app.state.versions, found);

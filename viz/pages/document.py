@@ -73,8 +73,8 @@ class Table:
             ["<tr>" + "".join([f"<td>{escape(cell)}</td>" for cell in row]) + "</tr>" for row in self.rows]
         )
         table = (
-            f'<div class="scroll"><table><caption>{escape(self.caption)}</caption><thead><tr>{head}</tr></thead>'
-            f"<tbody>\n{body}\n</tbody></table></div>"
+            f'<div class="scroll"><table><caption><span>{escape(self.caption)}</span></caption>'
+            f"<thead><tr>{head}</tr></thead><tbody>\n{body}\n</tbody></table></div>"
         )
         return f"<details><summary>{escape(self.caption)}</summary>\n{table}\n</details>" if self.folded else table
 
