@@ -168,11 +168,11 @@ function showInputs(app) {
 function showCounts(app) {
   const { version } = app;
   const rows = app.state.versions.map((each) => tag("tr", {}, rowHead(each.name),
-    ...[each.ops.length, each.edges.length, spuriousIn(each)].map((count) => tag("td", {}, String(count)))));
+    ...[each.ops.length, each.edges.length, ...spuriousIn(each)].map((count) => tag("td", {}, String(count)))));
   const ops = new Map();
   version.ops.forEach((op) => { ops.set(op, (ops.get(op) ?? 0) + 1); });
   const kinds = [...ops].sort((a, b) => b[1] - a[1]).map(([op, many]) => `${op} ${many}`);
-  byId("counts").replaceChildren(table(["", "nodes", "edges", "spurious"], rows),
+  byId("counts").replaceChildren(table(["", "nodes", "edges", ...SPURIOUS], rows),
     quiet(`Constants (${version.constants.size}) are written where they are used. ${kinds.join(", ")}.`));
 }
 
@@ -180,14 +180,14 @@ function showLegend(app) {
   const kinds = [["input", "input"], ["primal", "as written"], ["adjoint", "adjoint: reverse"], ["tangent", "tangent: forward"], ["several", "several roles"], ["wrong", "spurious"], ["off", "wrong result"]];
   const present = new Set(app.version.labels.map(([, role]) => role));
   if (app.version.marked.size || app.version.blamed.length) present.add("wrong");
-  if (app.version.off.size) present.add("off");
+  else if (app.version.off.size) present.add("off");
   byId("legend").replaceChildren(...kinds.filter(([kind]) => present.has(kind)).map(([kind, words]) => tag("span", { class: kind }, words)));
 }
 
 const OFF = 0.01; // relative: what differs by more from the right version is marked
 const FITTING = 3; // columns of numbers for which there is room beside the picture
 
-const namedHead = (words, ...unit) => tag("th", { scope: "row", class: words.length > 16 ? "long" : "" }, words, ...unit);
+const namedHead = (words, ...unit) => tag("th", { scope: "row", class: words.length > 11 ? "long" : "" }, words, ...unit);
 const largestOf = (values) => values.reduce((most, value) => (Number.isFinite(value) ? Math.max(most, Math.abs(value)) : most), 0);
 
 /** A table with a row for each name and a column for each head: its element, and its cells by row and column. */
