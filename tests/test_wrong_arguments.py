@@ -312,7 +312,7 @@ CALLS = {
     "viz.render_png": call(viz.render_png, "<svg xmlns='http://www.w3.org/2000/svg' width='1' height='1'/>", scale=2.0),
     "viz.to_dot": call(
         viz.to_dot, GRAPH, names=None, formulas=None, marked=frozenset(), marked_label="", marked_edges=frozenset(),
-        clusters=True, collapse=(), only=None, caption=None, legend=True, rankdir="BT"
+        wrong_outputs=(), clusters=True, collapse=(), only=None, caption=None, legend=True, rankdir="BT"
     ),
 }  # fmt: skip
 

@@ -69,7 +69,7 @@ def run(options: argparse.Namespace) -> int:
     ]
     data = {"scene": scene.name} | named | sizes | comparison.to_dict()
     data |= {"verdicts": {name: each.to_dict() for name, each in verdicts.items()}} if verdicts else {}
-    told = [f"{name}: {each}" for name, each in verdicts.items()]
+    told = [str(each) for each in verdicts.values()]
     if options.momentum:
         agreement, text = _forms(scene, graphs)
         data, lines = data | agreement, [text, *lines]

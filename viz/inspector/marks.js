@@ -58,10 +58,12 @@ function digits(count) {
   return text.length <= 15 ? text : `${text[0]}.${text.slice(1, 3)}e+${text.length - 1}`;
 }
 
-/** How many nodes and edges of a version are spurious, in words; where neither is left, that a term is gone. */
+const SPURIOUS = ["spurious nodes", "spurious edges"]; // heads of the columns of `spuriousIn`
+
+/** How many nodes and edges of a version are spurious; where none is left and it is flawed, that a term is gone. */
 function spuriousIn({ marked, blamed, flawed }) {
-  const kinds = [[marked.size ?? marked.length, "node"], [blamed.length, "edge"]].filter(([many]) => many);
-  return kinds.map(([many, kind]) => counted(many, kind)).join(", ") || (flawed ? "a term is gone" : "none");
+  const counts = [marked.size ?? marked.length, blamed.length];
+  return flawed && !counts[0] && !counts[1] ? [0, "0, a term is gone"] : counts;
 }
 
 /** Whether an output of a version can be wrong: one of those that it names, or any of a flawed one that names none. */

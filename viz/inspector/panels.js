@@ -150,11 +150,11 @@ function inputsInWords(app) {
 function showCounts(app) {
   const { version } = app;
   const rows = app.state.versions.map((each) => tag("tr", {}, rowHead(each.name),
-    ...[each.ops.length, each.edges.length, spuriousIn(each)].map((count) => tag("td", {}, String(count)))));
+    ...[each.ops.length, each.edges.length, ...spuriousIn(each)].map((count) => tag("td", {}, String(count)))));
   const ops = new Map();
   version.ops.forEach((op) => { ops.set(op, (ops.get(op) ?? 0) + 1); });
   const kinds = [...ops].sort((a, b) => b[1] - a[1]).map(([op, many]) => `${op} ${many}`);
-  byId("counts").replaceChildren(table(["", "nodes", "edges", "spurious"], rows),
+  byId("counts").replaceChildren(table(["", "nodes", "edges", ...SPURIOUS], rows),
     quiet(`Constants (${version.constants.size}) are written where they are used. ${kinds.join(", ")}.`));
 }
 
@@ -162,7 +162,7 @@ function showLegend(app) {
   const kinds = [["input", "input"], ["primal", "as written"], ["adjoint", "adjoint: reverse"], ["tangent", "tangent: forward"], ["several", "several roles"], ["wrong", "spurious"], ["off", "wrong result"]];
   const present = new Set(app.version.labels.map(([, role]) => role));
   if (app.version.marked.size || app.version.blamed.length) present.add("wrong");
-  if (app.version.off.size) present.add("off");
+  else if (app.version.off.size) present.add("off");
   byId("legend").replaceChildren(...kinds.filter(([kind]) => present.has(kind)).map(([kind, words]) => tag("span", { class: kind }, words)));
 }
 
@@ -223,7 +223,7 @@ function showResults(app) {
   app.names.forEach(([name], row) => found.forEach((each, column) => {
     if (!each.has(name)) return;
     const [value, noise] = each.get(name), [truth, blur] = found[app.right]?.get(name) ?? [value, 0];
-    const off = wrongIn(each, name) && Math.abs(value - truth) > noise + blur + OFF * Math.max(Math.abs(value), Math.abs(truth));
+    const off = wrongIn(app.compared[column], name) && Math.abs(value - truth) > noise + blur + OFF * Math.max(Math.abs(value), Math.abs(truth));
     write(app.cells[row][column], brief(value, noise), off ? "off" : "");
   }));
   tellNow(app, app.compared, found);

@@ -351,7 +351,7 @@ def carried(scene: Scene) -> Table | None:
         rows.append([part or "no part", *cells, str(of_part[part])])
     rows.append(["all", *[str(of_kind[kind]) for kind in kinds], f"{of_part.total()}"])
     caption = (
-        f"What AD of the energy carries: of {len(left.nodes)} nodes by the chain rule these {of_part.total()} are not "
-        f"among the {len(right.nodes)} of equations by velocities, which never build what cancels"
+        f"Nodes that only the chain rule has: {of_part.total()} of its {len(left.nodes)}. Newton and Euler's equations "
+        f"have {len(right.nodes)} nodes in all, and give the same torques"
     )
     return Table(caption, ["nodes of", *map(theme.pretty, kinds), "all"], rows)

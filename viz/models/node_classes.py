@@ -25,9 +25,9 @@ VELOCITIES, RATES = "velocities of the momenta", "rates of the momenta"
 def formulation_classes(verdicts: Iterable[Verdict]) -> Callable[[Graph], Callable[[Node], str]]:
     """The class of each node of the verdicts' graphs, as `cg.compare` asks for it.
 
-    "spurious adjoint": it serves only derivatives through q = qd dt + q_old.
-    "takes in what is spurious": a sum that has a part of it.  "Euler edge": the embedded relations q = qd dt + q_old
-    and qd = qdd dt + qd_old, and their rates.  "needed": all else.
+    "spurious": it serves only derivatives through q = qd dt + q_old.
+    "takes in a spurious term": a sum that has a part of it, or what is made of it.
+    "Euler relation": q = qd dt + q_old and qd = qdd dt + qd_old, and their rates.  "needed": all else.
     Where one of them is by velocities and all are right, what derivatives the other carries, see `derivative_class`.
     """
     known = {each.graph: each for each in verdicts}
@@ -43,10 +43,10 @@ def formulation_classes(verdicts: Iterable[Verdict]) -> Callable[[Graph], Callab
 
         def name(node: Node) -> str:
             if node in wrong.nodes:
-                return "spurious adjoint"
+                return "spurious"
             if node in spoilt:
-                return "takes in what is spurious"
-            return "Euler edge" if EULER in node.tags and node not in adjoint else "needed"
+                return "takes in a spurious term"
+            return "Euler relation" if EULER in node.tags and node not in adjoint else "needed"
 
         return name
 

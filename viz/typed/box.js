@@ -105,13 +105,13 @@ function showWrong(wrong) {
 function showDerived({ system, motion, record }) {
   const rows = record.versions.map((version) => {
     const { name, nodes, flawed } = version, edges = argsOf(version).flat().length;
-    return tag("tr", {}, rowHead(name), ...[nodes.length, edges, spuriousIn(version)].map((count, k) => tag("td", { class: k === 2 && flawed ? "off" : "" }, String(count))));
+    return tag("tr", {}, rowHead(name), ...[nodes.length, edges, ...spuriousIn(version)].map((count, k) => tag("td", { class: k > 1 && flawed ? "off" : "" }, String(count))));
   });
   const lint = TYPED.FORMULATIONS.map((name) => {
     const found = TYPED.verdict(system, name), words = found.differs ? "wrong" : "right";
     return tag("details", {}, tag("summary", {}, `${name.replace("_", " ")}: ${words}`), tag("pre", {}, TYPED.lint(system, found).join("\n")));
   });
-  byId("derived").replaceChildren(...typedFormulas(system), table(["", "nodes", "edges", "spurious"], rows), ...lint, ...(motion.error ? [] : motionWords(system, motion)));
+  byId("derived").replaceChildren(...typedFormulas(system), scrolled(table(["", "nodes", "edges", ...SPURIOUS], rows)), ...lint, ...(motion.error ? [] : motionWords(system, motion)));
 }
 const LONGEST_FORMULA = 120; // symbols of a formula that is shown
 

@@ -2,7 +2,7 @@
 
 // A label is a number: its low bits are roles, the others tags, by their place in `tagNames`.
 const INPUT = 1, PRIMAL = 2, ADJOINT = 4, TANGENT = 8, ROLES = 15;
-const tagNames = ["euler", "q of qd", "damping", "force", "kinetic", "potential", "definition", "lagrangian"];
+const tagNames = ["Euler relation", "qd dt", "damping", "force", "kinetic", "potential", "definition", "lagrangian"];
 const [EULER, COUPLING, DAMPING, FORCE, KINETIC, POTENTIAL, DEFINITION, LAGRANGIAN] = tagNames.map((_, i) => 16 << i);
 const derived = (label, role) => (label & ~(INPUT | PRIMAL)) | role;
 const withTagsOf = (label, other) => label | (other & ~ROLES);

@@ -34,7 +34,7 @@ function verdict(system, formulation) {
   const missing = excess.filter(([i]) => cancelled.has(`tau${i}`)), gone = missing.map(([i, value]) => term(i, value, -1));
   const lacking = missing.length ? `In ${shortList(missing.map(([i]) => names.get(`tau${i}`)))} nothing spurious is left to be marked: a right term is gone with it. `
     + `${shortList(gone)} ${gone.length > 1 ? "are" : "is"} missing.` : "";
-  const why = `Why: the derivative by qd went through ${STEP} as well. It adds dt ${slope} to the momentum and so, at every dt, ${slope} to its rate, `
+  const why = `Why: the derivative by qd went through ${STEP}. That adds dt ${slope} to the momentum and ${slope} to its rate, `
     + `which cancels the -${slope} of Lagrange's equation.`;
   const terms = off.length > 1 ? `${shortList(called)} are off, each by its ${slope}` : `${called[0]} is off by ${slope}.${system.coordinates[excess[0][0]]}`;
   const lines = [`${begin} wrong at every dt, however small. At ${where}:`, ...values, why,
@@ -50,7 +50,7 @@ const sixDigits = (value) => String(+value.toPrecision(6));
 /** Words on how many edges and nodes of a graph of so many nodes are spurious. */
 function spuriousText(nodes, spurious, edges) {
   const serve = `${spurious} of ${nodes} node${nodes === 1 ? "" : "s"} that serve${spurious === 1 ? "s" : ""} nothing else`;
-  return `Spurious in the graph: ${edges} edge${edges === 1 ? "" : "s"}, and ${spurious ? serve : "no node"}`;
+  return `Spurious: ${edges} edge${edges === 1 ? "" : "s"}, and ${spurious ? serve : "no node"}`;
 }
 
 /** A function from values of inputs to the values of nodes, and bounds of their rounding. */

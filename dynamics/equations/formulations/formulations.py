@@ -5,17 +5,17 @@ Equations and figures named here are those of T. Kusaka and T. Tanaka, Robotics 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import remarked, require_flag
+from cgraph.extend import Remarks, remarked, require_flag
 
 from ...systems.model import Model, as_system
 from ...systems.system import System
 from ..equation import LARGEST_REWRITTEN, Equation, Output
 from .lagrange_terms import INERTIAL, chain_rule, finished, formulation_name, momenta, newton_euler, torques
-from .verdict import remarks
 
 
 @Equation("q qd qdd", Output("tau{}", ("n",), "N m or N")).describes
@@ -61,7 +61,7 @@ def inverse_dynamics(model: Model, formulation: str | None = None, *, simplify: 
         graph = finished(system, formulation)
     if not simplify:
         graph = torques(system, formulation)
-    return remarked(graph, partial(remarks, model, formulation, torques))
+    return remarked(graph, partial(_remarks, model, formulation, torques))
 
 
 @Equation("q qd qdd", Output("p{}_dot", ("n",), "N m or N")).describes
@@ -99,7 +99,13 @@ def momentum_rate(
     derive = partial(momenta, keep_momentum=require_flag("keep_momentum", keep_momentum))
     graph = derive(as_system(model), formulation)
     graph = cg.simplify(graph) if require_flag("simplify", simplify) else graph
-    return remarked(graph, partial(remarks, model, formulation, derive))
+    return remarked(graph, partial(_remarks, model, formulation, derive))
+
+
+def _remarks(model: Model, formulation: str, derive: Callable[..., Graph], graph: Graph) -> Remarks:
+    from .verdict import remarks  # loaded when a notebook asks
+
+    return remarks(model, formulation, derive, graph)
 
 
 def _smaller(system: System) -> tuple[str, Graph]:

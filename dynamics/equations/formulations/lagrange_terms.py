@@ -19,8 +19,8 @@ from ..bias_terms import along_motion, bias_terms, state_rate
 from ..equation import shortened
 from ..substitute import substitute
 
-EULER = "euler"  # tag of the embedded relations q = qd dt + q_old and qd = qdd dt + qd_old
-COUPLING = "q of qd"  # tag of the product qd dt in the first of them, through which dL/dqd reaches dL/dq
+EULER = "Euler relation"  # tag of the embedded relations q = qd dt + q_old and qd = qdd dt + qd_old
+COUPLING = "qd dt"  # tag of the product qd dt in the first of them, through which dL/dqd reaches dL/dq
 LAGRANGIAN = "lagrangian"  # tag of what the author left untagged: derivatives of it would take a relation's tag instead
 
 

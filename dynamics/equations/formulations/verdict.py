@@ -110,8 +110,8 @@ class Verdict:
     >>> print(dyn.formulation_verdict(ball, "by_definition"))
     By definition, the torque is wrong at every dt, however small. At qdd.y=0.0236:
       tau.y is 0.0236, by the chain rule 9.8336: off by dL/dq.y = -9.81
-    Why: the derivative by qd went through q = qd dt + q_old as well. It adds dt dL/dq to the momentum and so, at \
-every dt, dL/dq to its rate, which cancels the -dL/dq of Lagrange's equation.
+    Why: the derivative by qd went through q = qd dt + q_old. That adds dt dL/dq to the momentum and dL/dq to its \
+rate, which cancels the -dL/dq of Lagrange's equation.
     In tau.y nothing spurious is left to be marked: a right term is gone with it. -dL/dq.y = 9.81 is missing.
     """
 
@@ -200,8 +200,8 @@ every dt, dL/dq to its rate, which cancels the -dL/dq of Lagrange's equation.
             return ""
         slope = next(iter(self.excess.values())).symbol.partition(".")[0].strip("()")
         return (
-            f"Why: the derivative by qd went through {_step(slope)} as well. It adds dt {slope} to the momentum and "
-            f"so, at every dt, {slope} to its rate, which cancels the -{slope} of Lagrange's equation."
+            f"Why: the derivative by qd went through {_step(slope)}. That adds dt {slope} to the momentum and {slope} "
+            f"to its rate, which cancels the -{slope} of Lagrange's equation."
         )
 
     @property
@@ -341,7 +341,7 @@ def remarks(model: Model, formulation: str, derive: Derive, graph: Graph) -> Rem
 def spurious_text(nodes: int, spurious: int, edges: int) -> str:
     """Words on how many edges and nodes of a graph of so many nodes are spurious."""
     serve = f"{spurious} of {counted(nodes, 'node')} that serve{'s' * (spurious == 1)} nothing else"
-    return f"Spurious in the graph: {counted(edges, 'edge')}, and {serve if spurious else 'no node'}"
+    return f"Spurious: {counted(edges, 'edge')}, and {serve if spurious else 'no node'}"
 
 
 def _step(slope: str) -> str:

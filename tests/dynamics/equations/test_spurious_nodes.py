@@ -105,5 +105,5 @@ def test_only_the_relations_are_euler_edges() -> None:
     pendulum = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 + 9.81 * cg.cos(q[0]), ["x"])
     verdict = dyn.formulation_verdict(pendulum, "by_definition")
     graph, name = verdict.graph, formulation_classes([verdict])(verdict.graph)
-    edges = [node for node in graph.nodes if name(node) == "Euler edge"]
+    edges = [node for node in graph.nodes if name(node) == "Euler relation"]
     assert [node.name or node.op.name for node in edges] == ["mul", "qd0", "mul", "q0"]

@@ -5,7 +5,7 @@ from mpmath import mp, mpf
 from pytest import approx, mark
 
 import dynamics as dyn
-from dynamics.equations.formulations.lagrange_terms import INERTIAL
+from dynamics.equations.formulations.lagrange_terms import EULER, INERTIAL
 
 STATES = 200
 ROUNDING = 1e-13  # a dozen operations, relative to the largest term that is summed
@@ -117,4 +117,4 @@ def test_spurious_is_seen_before_simplification_too() -> None:
 def test_the_chain_rule_has_no_trace_of_the_euler_relation() -> None:
     graph = dyn.inverse_dynamics(SPRING_MASS, "chain_rule")
     assert not {"dt", "q0_old", "qd0_old"} & set(graph.input_names)
-    assert "euler" not in graph.counts().by_tag
+    assert EULER not in graph.counts().by_tag

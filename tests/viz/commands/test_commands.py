@@ -67,7 +67,7 @@ def test_a_file_with_a_coordinate_that_nothing_uses_and_with_forces_and_torques(
     found = figures("compare", str(model), status=1)
     for side in ("left", "right"):
         assert found["in_both"] + len(found[f"only_{side}"]) == found[f"{side}_nodes"]
-    assert found["left_classes"]["spurious adjoint"] > 0
+    assert found["left_classes"]["spurious"] > 0
     said("inspect", str(model), "--t-end", "0.1", "--out", str(page))
     text = page.read_text(encoding="utf-8")
     for name, called, unit in (("tau0", "tau.slide", "N"), ("tau1", "tau.hinge", "N m")):
@@ -215,7 +215,7 @@ def test_compare_has_totals_that_add_up_and_a_class_for_every_node(said, figures
         only = found[f"only_{side}"]
         assert found["in_both"] + len(only) == found[f"{side}_nodes"]
         assert sum(found[f"{side}_classes"].values()) == len(only)
-    assert set(found["left_classes"]) == {"needed", "spurious adjoint", "takes in what is spurious", "Euler edge"}
+    assert set(found["left_classes"]) == {"needed", "spurious", "takes in a spurious term", "Euler relation"}
     assert {name: each["differs"] for name, each in found["verdicts"].items()} == {
         "by_definition": True,
         "chain_rule": False,
@@ -223,7 +223,7 @@ def test_compare_has_totals_that_add_up_and_a_class_for_every_node(said, figures
     assert set(found["right_classes"]) == {"needed"}
     arm = dyn.scenes.load("triple_pendulum")
     assert found["left_nodes"] == len(dyn.inverse_dynamics(arm, "by_definition").nodes)
-    assert found["left_classes"]["spurious adjoint"] == len(dyn.formulation_verdict(arm, "by_definition").nodes)
+    assert found["left_classes"]["spurious"] == len(dyn.formulation_verdict(arm, "by_definition").nodes)
     text = said("compare", "triple_pendulum", "--formulations", "chain_rule", "chain_rule_literal", status=1)
     assert text.startswith("left: chain_rule, 171 nodes = ")
     assert "spurious" not in text
@@ -251,7 +251,7 @@ def test_an_edge_that_is_wrong_by_itself_is_seen_by_every_command(tmp_path, said
     (tmp_path / "own.py").write_text(ATWOOD)
     model, page = f"{tmp_path / 'own.py'}:atwood", str(tmp_path / "page.html")
     found = figures("compare", model, status=1)
-    assert found["left_classes"] == {"takes in what is spurious": 2}
+    assert found["left_classes"] == {"takes in a spurious term": 2}
     assert [found["verdicts"][name]["differs"] for name in ("by_definition", "chain_rule")] == [True, False]
     assert "By definition, the torque is wrong" in said("compare", model, status=1)
     versions = figures("inspect", model, "--t-end", "0.1", "--out", page)["versions"]

@@ -69,7 +69,7 @@ def test_without_tags_nodes_stand_with_the_step_or_with_the_lagrangian_in_all_ve
     system = dyn.System(lagrangian, ["x", "y"])
     graphs = [dyn.inverse_dynamics(system, name) for name in ("by_definition", "chain_rule")]
     plan = run_script(PLACES, record([Version(f"{i}", graph) for i, graph in enumerate(graphs)], None))
-    assert sorted(plan["columns"]) == ["euler", "lagrangian"]
+    assert sorted(plan["columns"]) == ["Euler relation", "lagrangian"]
     euler, chain = map(set, plan["place"])
     assert euler & {place for place in chain if plan["cluster"][place] >= 0}  # dL/dq
 

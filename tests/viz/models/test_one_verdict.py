@@ -54,7 +54,7 @@ def test_every_page_and_table_has_the_same_verdict(name: str) -> None:
         assert (row.spurious_nodes, row.missing_terms) == (len(verdict.nodes), len(verdict.missing))
         assert any(row[3:]) == verdict.differs
         class_of = formulation_classes([verdict])(verdict.graph)
-        assert sum([class_of(node) == "spurious adjoint" for node in verdict.graph.nodes]) == len(verdict.nodes)
+        assert sum([class_of(node) == "spurious" for node in verdict.graph.nodes]) == len(verdict.nodes)
         shown = remarks_of(dyn.inverse_dynamics(scene, formulation))
         assert (len(shown.nodes), len(shown.edges)) == (len(verdict.nodes), len(verdict.edges))
         if text:
