@@ -216,7 +216,7 @@ def _by_matrices(system: System) -> Block:
         held = [(variable(f"M_{i}_{j}"), matrix[i][j]) for i in range(n) for j in range(i + 1)]
     held += [(letters[name], [[entry] for entry in column]) for name, column in kept.items()]
     about = _about(system, list(kept), ", symmetric" * wide)
-    return Block("The same by matrices", [_in_general(system, list(kept)), *held], about)
+    return Block("Torque by matrices", [_in_general(system, list(kept)), *held], about)
 
 
 def _spurious(scene: Scene, formulation: str) -> list[Block]:

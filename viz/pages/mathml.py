@@ -16,11 +16,14 @@ from .. import theme
 SUM, PRODUCT, FUNCTION, LEAF = 1, 2, 3, 4  # how strongly a text binds, as in the rows of operations
 FEW = 8  # names that a sentence lists
 DIGITS = 4  # of numbers
-# Of every page with equations; some browsers align the columns of a table by it, others by the attribute.
+# Of every page with equations. Some browsers align the columns of a table by it, others by the attribute; the brackets
+# of a matrix are lines, since parentheses grow only in a font that is made for mathematics.
 STYLE = """
 div.scroll:has(> math) { overflow-x: auto; } div.scroll > math { width: max-content; margin: 2px 0 2px 1em; }
 mtable.aligned > mtr > mtd { text-align: left; padding: 3px 2px; }
 mtable.aligned > mtr > mtd:first-child { text-align: right; }
+mtable.matrix { border: solid; border-width: 0 1.5px; border-radius: 9px; padding: 0 4px; margin: 3px 0; }
+mtable.matrix mtd { padding: 2px 6px; }
 """
 _ACCENTS = {"dot": "\u02d9", "ddot": "\u00a8", "bar": "\u00af"}
 _DRAWN = {"q\u0308": "qdd", "q\u0307": "qd", "τ": "tau"}  # letters of names that are drawn, see `theme.called`
@@ -150,4 +153,4 @@ def _fenced(text: str) -> str:
 
 def _matrix(rows: Sequence[Sequence[str]]) -> str:
     inside = "".join(f"<mtr>{''.join(f'<mtd>{entry}</mtd>' for entry in row)}</mtr>" for row in rows)
-    return f"<mrow><mo>(</mo><mtable>{inside}</mtable><mo>)</mo></mrow>"
+    return f'<mtable class="matrix">{inside}</mtable>'
