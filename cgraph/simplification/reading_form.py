@@ -18,8 +18,10 @@ from ..writing.naming import with_name
 from .canonical import COEFFICIENT_ROUNDING, Canonical, Powers, Sum
 from .identities import shortest
 
-LARGEST, MOST = 120, 700  # nodes that are written out, of one and of all
+TERMS, LONGEST = 48, 200.0  # terms and symbols of what is written out, at most
+LARGEST = 120  # nodes of one that is written out
 WORTH = 1.6  # so much longer may be what is written out
+ENOUGH = 2  # nodes that stay as they are, after which no larger one is written out
 PLAINER = 1.2  # and so much longer that in which every product of sums is written out, beside where sums are kept
 SHORT = 8  # symbols of what is written again where it is needed again
 FUNCTION, RATE = 2, 3  # ranks of factors: a function stands behind coordinates, before their rates
@@ -30,7 +32,7 @@ Signed = tuple[bool, Node]  # whether it is subtracted, and what
 
 
 @explain_failure
-def reading_form(nodes: Sequence[Node], ranks: Mapping[str, int] | None = None) -> list[Node]:
+def reading_form(nodes: Sequence[Node], ranks: Mapping[str, int] | None = None, largest: int = LARGEST) -> list[Node]:
     r"""Nodes of the same values, as a person writes them.
 
     The nodes are not folded, and have the names that they had: `x**2` is a power, and a sum is a chain of + and - that
@@ -39,39 +41,47 @@ def reading_form(nodes: Sequence[Node], ranks: Mapping[str, int] | None = None) 
 
     ranks: {name of a variable: its rank}, 0 of what is not named. In a product numbers stand first, then parameters
     (0), coordinates (1), functions (2), and rates (3 and more), by which terms are collected; of one rank in the order
-    of `ranks`.
+    of `ranks`.  largest: nodes of one that is written out, and of all four times as many.
 
     >>> import cgraph as cg
     >>> from cgraph.extend import reading_form
     >>> m, l, w = cg.variables("m l w")
-    >>> (y,) = reading_form([w * (l * (w * m)) * l + (-2.0) * m], {"w": 3})
+    >>> (y,) = reading_form([w * (l * (w * m)) * l + (-2.0) * m], {"m": 0, "l": 0, "w": 3})
     >>> print(cg.latex(y))
     m \, {l}^{2} \, {w}^{2} - 2 \, m
     """
-    reader = _Reader(ranks or {})
+    reader = _Reader(ranks or {}, largest)
     plain = reader.tidied(nodes)
-    return [reader.shorter(node, tidy) for node, tidy in zip(nodes, plain, strict=True)]
+    orders = [topological([node]) for node in nodes]
+    written: dict[int, Node] = {}
+    missed = 0
+    for i in sorted(range(len(nodes)), key=lambda i: len(orders[i])):  # where two stay as they are, so will larger ones
+        written[i] = plain[i] if missed == ENOUGH else reader.shorter(orders[i], plain[i])
+        missed += written[i] is plain[i] and len(orders[i]) > SHORT
+    return [written[i] for i in range(len(nodes))]
 
 
 class _Reader:
     """The maker of such nodes, each of them once."""
 
-    def __init__(self, ranks: Mapping[str, int]) -> None:
+    def __init__(self, ranks: Mapping[str, int], largest: int = LARGEST) -> None:
+        self.largest = largest
         self.ranks = {name: (rank, place) for place, (name, rank) in enumerate(ranks.items())}
         self._made: dict[tuple[object, ...], Node] = {}
-        self.left = MOST  # nodes that may still be written out
+        self.left = 4 * largest  # nodes that may still be written out
         self._numbers: dict[Node, tuple[float, Node]] = {}  # products with a number before them
         self._rank: dict[Node, Rank] = {}
 
-    def shorter(self, node: Node, tidy: Node) -> Node:
-        """The node written out where that is short, else as it stands."""
-        order = topological([node])
-        if len(order) > LARGEST or any(each.name and each.args for each in order[:-1]) or self.left < len(order):
+    def shorter(self, order: Sequence[Node], tidy: Node) -> Node:
+        """The last node of an order written out where that is short, else as it stands."""
+        node = order[-1]
+        if len(order) > self.largest or any(each.name and each.args for each in order[:-1]) or self.left < len(order):
             return tidy
         self.left -= len(order)
-        expanded, kept = (_Writer(self, canonical([node])).node(node) for canonical in (_Expanded, Canonical))
-        out = expanded if ink(expanded) <= PLAINER * ink(kept) else kept
-        return out if ink(out) <= WORTH * ink(tidy) else tidy
+        sums = [canonical for canonical in (_Expanded([node]), Canonical([node])) if len(canonical[node]) <= TERMS]
+        forms = [_Writer(self, canonical, node).node for canonical in sums]
+        out = min(forms, key=lambda form: ink(form) / (PLAINER if form is forms[0] else 1.0), default=tidy)
+        return out if ink(out) <= min(WORTH * ink(tidy), LONGEST) else tidy
 
     def make(self, name: str, *args: Node) -> Node:
         """The one node of an operation."""
@@ -260,17 +270,28 @@ class _Expanded(Canonical):
 
 
 class _Writer:
-    """Nodes written out as sums of products."""
+    """A node written out as a sum of products, `node`."""
 
-    def __init__(self, reader: _Reader, canonical: Canonical) -> None:
+    def __init__(self, reader: _Reader, canonical: Canonical, node: Node) -> None:
         self.reader, self.canonical = reader, canonical
         self._atoms: dict[int, Node] = {}
-        for atom in list(canonical.made):  # in the order in which they are made, arguments first
+        for atom in sorted(
+            self._needed(canonical[node])
+        ):  # as they are made, arguments first: deep graphs recur nowhere
             self._atom(atom)
+        self.node = self._sum(canonical[node])
 
-    def node(self, node: Node) -> Node:
-        """The node, written out."""
-        return self._sum(self.canonical[node])
+    def _needed(self, a: Sum) -> set[int]:
+        """The atoms that a sum is made of, and those within them."""
+        found: set[int] = set()
+        rest = [a]
+        while rest:
+            new = {atom for powers in rest.pop() for atom, _ in powers} - found
+            found |= new
+            for atom in new:
+                args = self.canonical.made[atom][1]
+                rest += [args] if isinstance(args, dict) else [self.canonical[arg] for arg in args if arg.args]
+        return found
 
     def _atom(self, atom: int) -> Node:
         if atom not in self._atoms:

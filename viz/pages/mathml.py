@@ -9,7 +9,7 @@ from functools import partial
 from html import escape
 
 from cgraph import Graph, variable
-from cgraph.extend import GREEK, Notation, Op, Side, fraction, reading_form, statements, symbol
+from cgraph.extend import GREEK, Notation, Op, Side, fraction, is_letter, reading_form, statements, symbol
 
 from .. import theme
 
@@ -115,7 +115,7 @@ def _name(name: str) -> str:
 
 
 def _letter(index: str) -> str:
-    word = index.rstrip("0123456789")
+    word = index.rstrip("0123456789") if is_letter(index.rstrip("0123456789")) else ""
     return GREEK.get(word, word) + theme.pretty(f"x{index[len(word) :]}")[1:] if word else index
 
 
