@@ -9,7 +9,7 @@ from typing import NamedTuple
 from ..core.node import Node
 from ..core.traversal import topological
 from ..operations.operation import LEAF, Op, columns
-from ..util.require import require_mapping, require_sequence, require_texts, require_whole
+from ..util.require import require_flag, require_mapping, require_sequence, require_texts, require_whole
 
 Text = tuple[str, int]  # a formula, and how strongly it binds, as in the table of operations
 Side = Node | Sequence[Sequence[Node]]  # of a statement: a node, or a matrix by rows
@@ -105,7 +105,7 @@ class Formulas:
         texts = notation.names(shown.values())
         self.names = {name: texts[text] for name, text in shown.items()}
         operations = [node for node in nodes if node.args]
-        self.reading = reading
+        self.reading = require_flag("reading", reading)
         self.size: dict[Node, int] = {}  # operations in a node's line
         self.lined = self._lined(operations)
         numbered = [node for node in operations if node in self.lined] if reading else operations
