@@ -95,12 +95,13 @@ if TYPE_CHECKING:  # shared by the three packages alone: no promise is made for 
     from .program.derivatives.tape import Tape as Tape, run_passes as run_passes
     from .program.runners.batch_code import LaneCode as LaneCode
     from .simplification.identities import shortened as shortened
+    from .simplification.ordered_terms import ink as ink
     from .simplification.polynomial import (
         Polynomial as Polynomial,
         expand as expand,
         format_polynomial as format_polynomial,
     )
-    from .simplification.reading_form import ink as ink, reading_form as reading_form
+    from .simplification.reading_form import reading_form as reading_form
     from .simplification.rounding_growth import rounding_spread as rounding_spread
     from .util.atomic_write import (
         atomic_write as atomic_write,

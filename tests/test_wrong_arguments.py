@@ -362,7 +362,7 @@ CALLS |= {
     "extend.Factor": call(a_program_of(extend.Factor), "x", "y"),
     "extend.added": call(a_program_of(extend.added), "x", "y", "z"),
     "extend.copied": call(a_program_of(extend.copied), "x", "y"),
-    "extend.Formulas": call(extend.Formulas, GRAPH.nodes, GRAPH.outputs, PLAIN, called=None),
+    "extend.Formulas": call(extend.Formulas, GRAPH.nodes, GRAPH.outputs, PLAIN, called=None, reading=False),
     "extend.If": call(a_program_of(extend.If), "x", (HALF,), (HALF,)),
     "extend.Map": call(a_program_of(extend.Map), GRAPH, ("x",), ("y",), ("z",)),
     "extend.Names": call(extend.Names, GRAPH, None),

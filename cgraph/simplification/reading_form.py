@@ -10,27 +10,25 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 
-from ..core.node import CONSTANT, Node, constant
+from ..core.node import CONSTANT, Node
 from ..core.traversal import topological
-from ..operations.operation import OPS
 from ..util.explain_failure import explain_failure
 from ..writing.naming import with_name
 from .canonical import COEFFICIENT_ROUNDING, Canonical, Powers, Sum
 from .identities import shortest
+from .ordered_terms import ARITHMETIC, FUNCTION, RATE, OrderedTerms, Signed, ink, inks
 
-LARGEST, MOST = 120, 700  # nodes that are written out, of one and of all
+TERMS, LONGEST = 48, 200.0  # terms and symbols of what is written out, at most
+LARGEST = 120  # nodes of one that is written out
 WORTH = 1.6  # so much longer may be what is written out
+ENOUGH = 2  # nodes that stay as they are, after which no larger one is written out
 PLAINER = 1.2  # and so much longer that in which every product of sums is written out, beside where sums are kept
 SHORT = 8  # symbols of what is written again where it is needed again
-FUNCTION, RATE = 2, 3  # ranks of factors: a function stands behind coordinates, before their rates
 RATIOS = (1.0, 2.0, 0.5)  # of two sums of which one is written, with the rates of both
-ARITHMETIC = ("add", "sub", "neg", "mul", "div", "pow")
-Rank = tuple[int, int]  # of a factor, and its place among those of that rank
-Signed = tuple[bool, Node]  # whether it is subtracted, and what
 
 
 @explain_failure
-def reading_form(nodes: Sequence[Node], ranks: Mapping[str, int] | None = None) -> list[Node]:
+def reading_form(nodes: Sequence[Node], ranks: Mapping[str, int] | None = None, largest: int = LARGEST) -> list[Node]:
     r"""Nodes of the same values, as a person writes them.
 
     The nodes are not folded, and have the names that they had: `x**2` is a power, and a sum is a chain of + and - that
@@ -39,51 +37,44 @@ def reading_form(nodes: Sequence[Node], ranks: Mapping[str, int] | None = None) 
 
     ranks: {name of a variable: its rank}, 0 of what is not named. In a product numbers stand first, then parameters
     (0), coordinates (1), functions (2), and rates (3 and more), by which terms are collected; of one rank in the order
-    of `ranks`.
+    of `ranks`.  largest: nodes of one that is written out, and of all four times as many.
 
     >>> import cgraph as cg
     >>> from cgraph.extend import reading_form
     >>> m, l, w = cg.variables("m l w")
-    >>> (y,) = reading_form([w * (l * (w * m)) * l + (-2.0) * m], {"w": 3})
+    >>> (y,) = reading_form([w * (l * (w * m)) * l + (-2.0) * m], {"m": 0, "l": 0, "w": 3})
     >>> print(cg.latex(y))
     m \, {l}^{2} \, {w}^{2} - 2 \, m
     """
-    reader = _Reader(ranks or {})
+    reader = _Reader(ranks or {}, largest)
     plain = reader.tidied(nodes)
-    return [reader.shorter(node, tidy) for node, tidy in zip(nodes, plain, strict=True)]
+    orders = [topological([node]) for node in nodes]
+    written: dict[int, Node] = {}
+    missed = 0
+    for i in sorted(range(len(nodes)), key=lambda i: len(orders[i])):  # where two stay as they are, so will larger ones
+        written[i] = plain[i] if missed == ENOUGH else reader.shorter(orders[i], plain[i])
+        missed += written[i] is plain[i] and len(orders[i]) > SHORT
+    return [written[i] for i in range(len(nodes))]
 
 
-class _Reader:
-    """The maker of such nodes, each of them once."""
+class _Reader(OrderedTerms):
+    """The maker of the nodes of a reading form."""
 
-    def __init__(self, ranks: Mapping[str, int]) -> None:
-        self.ranks = {name: (rank, place) for place, (name, rank) in enumerate(ranks.items())}
-        self._made: dict[tuple[object, ...], Node] = {}
-        self.left = MOST  # nodes that may still be written out
-        self._numbers: dict[Node, tuple[float, Node]] = {}  # products with a number before them
-        self._rank: dict[Node, Rank] = {}
+    def __init__(self, ranks: Mapping[str, int], largest: int = LARGEST) -> None:
+        super().__init__(ranks)
+        self.largest = largest
+        self.left = 4 * largest  # nodes that may still be written out
 
-    def shorter(self, node: Node, tidy: Node) -> Node:
-        """The node written out where that is short, else as it stands."""
-        order = topological([node])
-        if len(order) > LARGEST or any(each.name and each.args for each in order[:-1]) or self.left < len(order):
+    def shorter(self, order: Sequence[Node], tidy: Node) -> Node:
+        """The last node of an order written out where that is short, else as it stands."""
+        node = order[-1]
+        if len(order) > self.largest or any(each.name and each.args for each in order[:-1]) or self.left < len(order):
             return tidy
         self.left -= len(order)
-        expanded, kept = (_Writer(self, canonical([node])).node(node) for canonical in (_Expanded, Canonical))
-        out = expanded if ink(expanded) <= PLAINER * ink(kept) else kept
-        return out if ink(out) <= WORTH * ink(tidy) else tidy
-
-    def make(self, name: str, *args: Node) -> Node:
-        """The one node of an operation."""
-        if (known := self._made.get((name, *args))) is None:
-            known = self._made[name, *args] = Node(OPS[name], args)
-        return known
-
-    def number(self, value: float) -> Node:
-        """The one node of a number."""
-        if (known := self._made.get((value,))) is None:
-            known = self._made[value,] = constant(value)
-        return known
+        sums = [canonical for canonical in (_Expanded([node]), Canonical([node])) if len(canonical[node]) <= TERMS]
+        forms = [_Writer(self, canonical, node).node for canonical in sums]
+        out = min(forms, key=lambda form: ink(form) / (PLAINER if form is forms[0] else 1.0), default=tidy)
+        return out if ink(out) <= min(WORTH * ink(tidy), LONGEST) else tidy
 
     # As it stands.
 
@@ -95,7 +86,7 @@ class _Reader:
         for node in order:
             for arg in node.args:
                 uses[arg] = uses.get(arg, 0) + 1
-        size = _inks(order)
+        size = inks(order)
         alone = {node for node in order if (uses[node] == 1 or size[node] <= SHORT) and not node.name}
         sums: dict[Node, list[Signed]] = {}  # the terms of each node
         products: dict[Node, tuple[float, dict[Node, int]]] = {}  # the factors of each node
@@ -155,101 +146,11 @@ class _Reader:
         if not node.args:
             return node
         if len(terms) > 1:
-            return self.sum([self._signed(minus, done.get(term, term)) for minus, term in terms])
+            return self.sum([self.signed(minus, done.get(term, term)) for minus, term in terms])
         if node.op.name in ("mul", "div", "neg", "pow") and (product[1] or product[0] != 1.0):
             minus, made = self.product(*product)
             return self.make("neg", made) if minus else made
         return self.make(node.op.name, *[done[arg] for arg in node.args])
-
-    def _signed(self, minus: bool, node: Node) -> Signed:
-        if node.op.name == "neg":
-            return not minus, node.args[0]
-        if node.value is not None and node.value < 0.0:
-            return not minus, self.number(-node.value)
-        return minus, node
-
-    # Sums and products of what is made.
-
-    def operation(self, name: str, args: Sequence[Node]) -> Node:
-        """An operation on nodes that are made, a sum or a product in order."""
-        if name in ("add", "sub"):
-            return self.sum([self._signed(False, args[0]), self._signed(name == "sub", args[1])])
-        if name in ("mul", "div", "neg") and all(arg.value is None for arg in args):
-            powers = dict.fromkeys(args[:1], 1)
-            for arg in args[1:]:
-                powers[arg] = powers.get(arg, 0) + (1 if name == "mul" else -1)
-            minus, made = self.product(-1.0 if name == "neg" else 1.0, powers)
-            return self.make("neg", made) if minus else made
-        return self.make(name, *args)
-
-    def sum(self, terms: Sequence[Signed]) -> Node:
-        """Terms added up, a positive one first."""
-        if not terms:
-            return self.number(0.0)
-        ranks = {node: self.rank(node) for _, node in terms}
-        order = sorted(terms, key=lambda term: (-ranks[term[1]][0], ranks[term[1]][1]))
-        first = next((i for i, (minus, _) in enumerate(order) if not minus), 0)
-        order = [order[first], *order[:first], *order[first + 1 :]]
-        minus, total = order[0]
-        total = self.make("neg", total) if minus else total
-        for minus, node in order[1:]:
-            total = self.make("sub" if minus else "add", total, node)
-        return total
-
-    def product(self, coefficient: float, powers: Mapping[Node, int]) -> Signed:
-        """A product, its sign apart: a number, factors by rank, over those of negative powers."""
-        held: dict[Node, int] = {}
-        for node, power in powers.items():
-            number, rest = self._apart(node)
-            coefficient *= number**power
-            held[rest] = held.get(rest, 0) + power
-        powers = held
-        factors = sorted(
-            [(node, power) for node, power in powers.items() if power], key=lambda each: self.rank(each[0])
-        )
-        top = [self._power(node, power) for node, power in factors if power > 0]
-        below = [self._power(node, -power) for node, power in factors if power < 0]
-        size, minus = abs(coefficient), math.copysign(1.0, coefficient) < 0.0
-        node = self._times(top) if top else self.number(size)
-        if top and size != 1.0:
-            self._numbers[whole := self.make("mul", self.number(size), node)] = size, node
-            node = whole
-        return minus, self.make("div", node, self._times(below)) if below else node
-
-    def _apart(self, node: Node) -> tuple[float, Node]:
-        """The number before a product, and the rest."""
-        sign = 1.0
-        if node.op.name == "neg":
-            sign, node = -1.0, node.args[0]
-        if node in self._numbers:
-            number, node = self._numbers[node]
-            return sign * number, node
-        return sign, node
-
-    def _times(self, factors: Sequence[Node]) -> Node:
-        node = factors[0]
-        for factor in factors[1:]:
-            node = self.make("mul", node, factor)
-        return node
-
-    def _power(self, node: Node, power: int) -> Node:
-        return node if power == 1 else self.make("pow", node, self.number(float(power)))
-
-    def rank(self, node: Node) -> Rank:
-        """The place of a factor in a product: the rank of a name, of a rate in it, else that of a function."""
-        if node not in self._rank:
-            for each in topological([node]):
-                if each not in self._rank:
-                    self._rank[each] = self._ranked(each)
-        return self._rank[node]
-
-    def _ranked(self, node: Node) -> Rank:
-        if not node.args:
-            return (-1, 0) if node.value is not None else self.ranks.get(str(node.name), (0, len(self.ranks)))
-        inner = [self._rank[arg] for arg in node.args]
-        rank = max([each for each, _ in inner])
-        place = min([place for each, place in inner if each == rank])
-        return (rank, place) if rank >= RATE or node.op.name in ARITHMETIC else (FUNCTION, place)
 
 
 class _Expanded(Canonical):
@@ -260,17 +161,28 @@ class _Expanded(Canonical):
 
 
 class _Writer:
-    """Nodes written out as sums of products."""
+    """A node written out as a sum of products, `node`."""
 
-    def __init__(self, reader: _Reader, canonical: Canonical) -> None:
+    def __init__(self, reader: _Reader, canonical: Canonical, node: Node) -> None:
         self.reader, self.canonical = reader, canonical
         self._atoms: dict[int, Node] = {}
-        for atom in list(canonical.made):  # in the order in which they are made, arguments first
+        for atom in sorted(
+            self._needed(canonical[node])
+        ):  # as they are made, arguments first: deep graphs recur nowhere
             self._atom(atom)
+        self.node = self._sum(canonical[node])
 
-    def node(self, node: Node) -> Node:
-        """The node, written out."""
-        return self._sum(self.canonical[node])
+    def _needed(self, a: Sum) -> set[int]:
+        """The atoms that a sum is made of, and those within them."""
+        found: set[int] = set()
+        rest = [a]
+        while rest:
+            new = {atom for powers in rest.pop() for atom, _ in powers} - found
+            found |= new
+            for atom in new:
+                args = self.canonical.made[atom][1]
+                rest += [args] if isinstance(args, dict) else [self.canonical[arg] for arg in args if arg.args]
+        return found
 
     def _atom(self, atom: int) -> Node:
         if atom not in self._atoms:
@@ -374,17 +286,3 @@ def _ratio(a: Mapping[Powers, float], b: Mapping[Powers, float]) -> float:
     ratios = RATIOS if b.keys() != {()} else RATIOS[:1] * (abs(b[()]) != 1.0)
     near = next((each for each in ratios if abs(abs(first) - each) <= COEFFICIENT_ROUNDING * each), 0.0)
     return math.copysign(near, first) if same else 0.0
-
-
-def ink(node: Node) -> float:
-    """Symbols of a node that is written without lines of its own."""
-    return _inks(topological([node]))[node]
-
-
-def _inks(order: Sequence[Node]) -> dict[Node, float]:
-    size: dict[Node, float] = {}
-    for each in order:
-        size[each] = (
-            1.0 + sum([size[arg] for arg in each.args]) - (each.op.name in ("mul", "pow")) if each.args else 1.0
-        )
-    return size

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from ..core.node import Node
 from ..core.traversal import topological
 from ..operations.operation import LEAF, Op, columns
-from ..util.require import require_mapping, require_sequence, require_texts, require_whole
+from ..util.require import require_flag, require_mapping, require_sequence, require_texts, require_whole
 
 Text = tuple[str, int]  # a formula, and how strongly it binds, as in the table of operations
 Side = Node | Sequence[Sequence[Node]]  # of a statement: a node, or a matrix by rows
@@ -105,7 +105,7 @@ class Formulas:
         texts = notation.names(shown.values())
         self.names = {name: texts[text] for name, text in shown.items()}
         operations = [node for node in nodes if node.args]
-        self.reading = reading
+        self.reading = require_flag("reading", reading)
         self.size: dict[Node, int] = {}  # operations in a node's line
         self.lined = self._lined(operations)
         numbered = [node for node in operations if node in self.lined] if reading else operations
@@ -131,12 +131,12 @@ class Formulas:
         for node in kept:
             lefts = ([self.symbol[node]] if node in self.lined else []) + named.get(node, [])
             first, *same = dict.fromkeys(lefts or [""])
-            equations += self.rows(first, node)
+            equations += self._rows(first, node)
             equations += [(left, first) for left in same]
         left_out = sorted(queue[most:], key=self.places.__getitem__)
         return Lines(equations, [(*named.get(node, ()), self.symbol.get(node, ""))[0] for node in left_out])
 
-    def needed(self, ends: Sequence[Node]) -> list[Node]:
+    def _needed(self, ends: Sequence[Node]) -> list[Node]:
         """The nodes with lines that the formulas of some nodes are or refer to, those nearest to them first."""
         queue = list(dict.fromkeys(ends))
         found: dict[Node, None] = dict.fromkeys([node for node in queue if node in self.lined])
@@ -146,7 +146,7 @@ class Formulas:
             queue += new
         return list(found)
 
-    def rows(self, left: str, node: Node) -> list[tuple[str, str]]:
+    def _rows(self, left: str, node: Node) -> list[tuple[str, str]]:
         """The line of a node; a long sum of reading form goes on in further rows."""
         texts = self._texts(node)
         spine, parts = node, list[tuple[Node, Node]]()  # the sums from the outermost inwards, and what each adds
@@ -167,7 +167,7 @@ class Formulas:
                 rows[-1] += text
         return [(left if i == 0 else "", row) for i, row in enumerate(rows)]
 
-    def formula(self, node: Node) -> str:
+    def _formula(self, node: Node) -> str:
         """The formula of a node, which refers to those with lines."""
         return self._texts(node)[node][0]
 
@@ -238,19 +238,19 @@ def statements(
     ends = [entry for sides in given for entry in _entries(sides)]
     found = Formulas(topological(ends), {}, notation, called, reading=True)
     kept, needed, all_needed = _fitting(given, found, require_whole("lines", lines, 1), whole)
-    equations = [row for node in needed for row in found.rows(found.symbol[node], node)]
+    equations = [row for node in needed for row in found._rows(found.symbol[node], node)]
     for *lefts, right in kept:
-        left = notation.equals.join([found.formula(each) for each in lefts if isinstance(each, Node)])
+        left = notation.equals.join([found._formula(each) for each in lefts if isinstance(each, Node)])
         if isinstance(right, Node):
-            equations += [(left, found.symbol[right])] if right in found.lined else found.rows(left, right)
+            equations += [(left, found.symbol[right])] if right in found.lined else found._rows(left, right)
         else:
             entries = [
-                [found.symbol.get(each, "") if each in found.lined else found.formula(each) for each in row]
+                [found.symbol.get(each, "") if each in found.lined else found._formula(each) for each in row]
                 for row in right
             ]
             equations.append((left, notation.matrix(entries)))
     told = set(needed)
-    left_out = [found.formula(sides[0]) for sides in given if sides not in kept and isinstance(sides[0], Node)]
+    left_out = [found._formula(sides[0]) for sides in given if sides not in kept and isinstance(sides[0], Node)]
     left_out += [found.symbol[node] for node in all_needed if node not in told]
     return Lines(equations, left_out)
 
@@ -264,14 +264,14 @@ def _fitting(
     shown: set[Node] = set()
     everything: set[Node] = set()
     for sides in given:
-        needed = set(found.needed(_entries(sides)))
+        needed = set(found._needed(_entries(sides)))
         everything |= needed
         if len(shown | needed) + len(kept) < most:
             kept.append(sides)
             shown |= needed
     if not kept and given and not whole:
         kept = [given[0]]
-        shown = set(found.needed(_entries(given[0]))[: most - 1])
+        shown = set(found._needed(_entries(given[0]))[: most - 1])
     return kept, sorted(shown, key=place), sorted(everything, key=place)
 
 

@@ -11,7 +11,7 @@ from ..core.traversal import topological
 from ..operations.operation import FUNCTION, LEAF, PRODUCT, SUM, Op
 from ..util.caches import OPERATIONS, memo
 from .formulas import LINES, Formulas, Lines, Notation, Text, fraction
-from .symbols import GREEK, symbol
+from .symbols import GREEK, is_letter, symbol
 
 _ACCENTS = {"dot": r"\dot{{{}}}", "ddot": r"\ddot{{{}}}", "bar": r"\bar{{{}}}"}
 _SIGNS = {"·": r"\cdot", "−": "-", "≤": r"\leq", "≠": r"\neq", "⌊": r"\lfloor", "⌋": r"\rfloor",
@@ -101,8 +101,14 @@ def _name(name: str) -> str:
     text = word if len(word) == 1 else f"\\{word}" if word in GREEK else literal(word)
     text = _ACCENTS[found.accent].format(text) if found.accent else text
     text = rf"\partial {text}" if found.before else text
-    below = [each if len(each) == 1 or each.isdigit() else literal(each) for each in found.below]
+    below = [_index(each) for each in found.below]
     return f"{text}_{{{','.join(below)}}}" if below else text
+
+
+def _index(name: str) -> str:
+    """An index: a number or a letter, which may have a number in turn; else a word."""
+    found = symbol(name)
+    return _name(name) if found and is_letter(found.word) else name if name.isdigit() else literal(name)
 
 
 def number_text(value: float, digits: int = 17) -> Text:

@@ -21,6 +21,7 @@ from dynamics.systems.system import System
 from ..pages.mathml import ranks
 
 EXPLICIT, BRIEF = 130.0, 45.0  # symbols of an equation that is written out, of up to two and of more velocities
+LARGEST, FEW_INPUTS = 120, 16  # nodes of a graph that is written out, of so few inputs; of more inputs a third
 MATRICES = 4  # velocities up to which M is shown as a matrix
 MOST_PARTS = 8  # partial Lagrangians whose sum is shown
 LETTERS = {
@@ -116,7 +117,8 @@ def _short_names(scene: Scene) -> tuple[dict[str, str], dict[str, str]]:
 
 def _statements(graph: Graph, order: Mapping[str, int] | None = None) -> list[tuple[Side, ...]]:
     """Each output of a graph and what it is.  order: ranks of the inputs, see `reading_form`."""
-    rights = reading_form(list(graph.outputs.values()), order or ranks(graph.input_names))
+    largest = LARGEST if len(graph.input_names) <= FEW_INPUTS else LARGEST // 3
+    rights = reading_form(list(graph.outputs.values()), order or ranks(graph.input_names), largest)
     return [(variable(name), right) for name, right in zip(graph.outputs, rights, strict=True)]
 
 
@@ -216,7 +218,7 @@ def _by_matrices(system: System) -> Block:
         held = [(variable(f"M_{i}_{j}"), matrix[i][j]) for i in range(n) for j in range(i + 1)]
     held += [(letters[name], [[entry] for entry in column]) for name, column in kept.items()]
     about = _about(system, list(kept), ", symmetric" * wide)
-    return Block("The same by matrices", [_in_general(system, list(kept)), *held], about)
+    return Block("Torque by matrices", [_in_general(system, list(kept)), *held], about)
 
 
 def _spurious(scene: Scene, formulation: str) -> list[Block]:
@@ -225,7 +227,8 @@ def _spurious(scene: Scene, formulation: str) -> list[Block]:
     if not verdict.differs or verdict.terms is None or not verdict.excess:
         return []
     names = [name for name, node in verdict.terms.outputs.items() if node.value != 0.0]
-    rights = reading_form([verdict.terms.outputs[name] for name in names], ranks(verdict.terms.input_names))
+    terms = Graph(verdict.terms.inputs, {name: verdict.terms.outputs[name] for name in names})
+    rights = [_right(each) for each in _statements(terms)]
     held: list[tuple[Side, ...]] = []
     energy, had = EMBEDDED[formulation]
     for name, right in zip(names, rights, strict=True):

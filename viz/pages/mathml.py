@@ -9,18 +9,21 @@ from functools import partial
 from html import escape
 
 from cgraph import Graph, variable
-from cgraph.extend import GREEK, Notation, Op, Side, fraction, reading_form, statements, symbol
+from cgraph.extend import GREEK, Notation, Op, Side, fraction, is_letter, reading_form, statements, symbol
 
 from .. import theme
 
 SUM, PRODUCT, FUNCTION, LEAF = 1, 2, 3, 4  # how strongly a text binds, as in the rows of operations
 FEW = 8  # names that a sentence lists
 DIGITS = 4  # of numbers
-# Of every page with equations; some browsers align the columns of a table by it, others by the attribute.
+# Of every page with equations. Some browsers align the columns of a table by it, others by the attribute; the brackets
+# of a matrix are lines, since parentheses grow only in a font that is made for mathematics.
 STYLE = """
 div.scroll:has(> math) { overflow-x: auto; } div.scroll > math { width: max-content; margin: 2px 0 2px 1em; }
 mtable.aligned > mtr > mtd { text-align: left; padding: 3px 2px; }
 mtable.aligned > mtr > mtd:first-child { text-align: right; }
+mtable.matrix { border: solid; border-width: 0 1.5px; border-radius: 9px; padding: 0 4px; margin: 3px 0; }
+mtable.matrix mtd { padding: 2px 6px; }
 """
 _ACCENTS = {"dot": "\u02d9", "ddot": "\u00a8", "bar": "\u00af"}
 _DRAWN = {"q\u0308": "qdd", "q\u0307": "qd", "τ": "tau"}  # letters of names that are drawn, see `theme.called`
@@ -76,7 +79,7 @@ def few(texts: Sequence[str]) -> str:
 def ranks(names: Iterable[str]) -> dict[str, int]:
     """Ranks of the inputs of graphs of mechanics, see `reading_form`: parameters, coordinates, rates, forces."""
     found = {}
-    for name in names:
+    for name in sorted(names, key="t".__eq__):  # of parameters time is the last
         kind = symbol(name) if re.fullmatch(r"(q|qd|qdd|p|tau)\d+(_\w+)?", name) else None
         place = {"": 1, "dot": 3, "ddot": 4}[kind.accent] if kind else 0
         found[name] = {"p": 3, "tau": 5}.get(kind.word, place) if kind else 0
@@ -112,7 +115,7 @@ def _name(name: str) -> str:
 
 
 def _letter(index: str) -> str:
-    word = index.rstrip("0123456789")
+    word = index.rstrip("0123456789") if is_letter(index.rstrip("0123456789")) else ""
     return GREEK.get(word, word) + theme.pretty(f"x{index[len(word) :]}")[1:] if word else index
 
 
@@ -150,4 +153,4 @@ def _fenced(text: str) -> str:
 
 def _matrix(rows: Sequence[Sequence[str]]) -> str:
     inside = "".join(f"<mtr>{''.join(f'<mtd>{entry}</mtd>' for entry in row)}</mtr>" for row in rows)
-    return f"<mrow><mo>(</mo><mtable>{inside}</mtable><mo>)</mo></mrow>"
+    return f'<mtable class="matrix">{inside}</mtable>'

@@ -21,7 +21,7 @@ def test_the_surplus_is_seen_of_a_wrong_version_alone_and_of_its_model(visit, tm
     assert not surplus.is_visible()
     assert not short.is_visible()
     titles = page.locator("#formulas h3:visible").all_inner_texts()
-    assert titles == ["Lagrangian", "Momenta, p = ∂L/∂q̇", "The same by matrices", "Spurious term, kinetic only"]
+    assert titles == ["Lagrangian", "Momenta, p = ∂L/∂q̇", "Torque by matrices", "Spurious term, kinetic only"]
     assert wrong != page.evaluate(
         "getComputedStyle(document.querySelector('#formulas .equations:not(.spurious) math')).color"
     )

@@ -137,7 +137,7 @@ def python_of(element: ElementTree.Element) -> str:
     if element.tag in ("mi", "mn"):
         return element.text
     if element.tag == "mtable":
-        return ", ".join(inside)
+        return f"[{', '.join(inside)}]"
     if element.tag == "mtr":
         return f"[{', '.join(inside)}]"
     if inside and inside[0] == inside[-1] == "|":
@@ -146,8 +146,7 @@ def python_of(element: ElementTree.Element) -> str:
     if element.tag in forms:
         return forms[element.tag].format(*(inside if element.tag != "msqrt" else ["".join(inside)]))
     assert element.tag in ("mrow", "mtd"), element.tag
-    text = "".join(inside)
-    return f"[{text[1:-1]}]" if element.tag == "mrow" and len(element) == 3 and element[1].tag == "mtable" else text
+    return "".join(inside)
 
 
 def lines_of_mathml(block):
@@ -209,7 +208,7 @@ def test_the_lines_compute_what_the_graphs_do(model):
         torque = inverse_dynamics(scene, "chain_rule")
         if (title := "Torque, τ = dp/dt − ∂L/∂q") in blocks:
             agrees(blocks[title], torque, point)
-        if (title := "The same by matrices") in blocks:
+        if (title := "Torque by matrices") in blocks:
             by_matrices(blocks[title], scene, torque, point)
 
 

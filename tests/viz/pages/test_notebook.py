@@ -141,7 +141,7 @@ def test_a_model_is_shown_by_its_lagrangian_and_torque():
     for model, titles in (
         (pendulum, ["Lagrangian", "Torque, τ = dp/dt − ∂L/∂q"]),
         (decay, ["State equation"]),
-        (dyn.planar_arm([1.0] * 3, [1.0] * 3), ["Lagrangian", "The same by matrices"]),
+        (dyn.planar_arm([1.0] * 3, [1.0] * 3), ["Lagrangian", "Torque by matrices"]),
     ):
         shown = model_html(model)
         assert re.findall("<h4>(.*?)</h4>", shown) == titles
