@@ -58,7 +58,7 @@ function digits(count) {
   return text.length <= 15 ? text : `${text[0]}.${text.slice(1, 3)}e+${text.length - 1}`;
 }
 
-const SPURIOUS = ["spurious nodes", "spurious edges"]; // heads of the columns of `spuriousIn`
+const SPURIOUS_HEADS = ["spurious nodes", "spurious edges"]; // heads of the columns of `spuriousIn`
 
 /** How many nodes and edges of a version are spurious; where none is left and it is flawed, that a term is gone. */
 function spuriousIn({ marked, blamed, flawed }) {

@@ -89,7 +89,8 @@ class Table:
             ["<tr>" + "".join([f"<td>{escape(cell)}</td>" for cell in row]) + "</tr>" for row in self.rows]
         )
         table = (
-            f'<div class="scroll" tabindex="0" role="group"><table><caption><span>{escape(self.caption)}</span></caption>'
+            f'<div class="scroll" tabindex="0" role="group"><table>'
+            f"<caption><span>{escape(self.caption)}</span></caption>"
             f"<thead><tr>{head}</tr></thead>"
             f"<tbody>\n{body}\n</tbody></table></div>"
         )

@@ -111,7 +111,7 @@ function showDerived({ system, motion, record }) {
     const found = TYPED.verdict(system, name), words = found.differs ? "wrong" : "right";
     return tag("details", {}, tag("summary", {}, `${name.replace("_", " ")}: ${words}`), tag("pre", {}, TYPED.lint(system, found).join("\n")));
   });
-  byId("derived").replaceChildren(...typedFormulas(system), scrolled(table(["", "nodes", "edges", ...SPURIOUS], rows)), ...lint, ...(motion.error ? [] : motionWords(system, motion)));
+  byId("derived").replaceChildren(...typedFormulas(system), scrolled(table(["", "nodes", "edges", ...SPURIOUS_HEADS], rows)), ...lint, ...(motion.error ? [] : motionWords(system, motion)));
 }
 const LONGEST_FORMULA = 120; // symbols of a formula that is shown
 
