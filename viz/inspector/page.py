@@ -96,7 +96,7 @@ def page(
     >>> "<title>A sine</title>" in text
     True
     """
-    for what, text in (("title", title), ("about", about)):
+    for what, text in (("title", title), ("about", about), ("view", view)):
         if not isinstance(text, str):
             raise TypeError(f"{what} of a page must be text, got {type(text).__name__}: {text!r:.60}")
     if at is not None:
