@@ -18,8 +18,8 @@ from .content import Motion, State, StateTable, Version
 from .record import record
 
 SCRIPTS = (
-    "state.js", "picture/places.js", "picture/arrange.js", "picture/legible.js", "picture.js", "marks.js", "panels.js",
-    "steps.js", "motion.js", "outline.js", "link.js", "keys.js", "app.js",
+    "state.js", "picture/places.js", "picture/arrange.js", "picture/legible.js", "picture/course.js", "picture.js",
+    "marks.js", "panels.js", "steps.js", "motion.js", "outline.js", "link.js", "keys.js", "app.js",
 )  # fmt: skip
 
 
