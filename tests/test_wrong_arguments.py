@@ -304,7 +304,7 @@ CALLS = {
     "viz.live": call(viz.live, ARM, None, start=[0.1, 0.0]),
     "viz.page": call(
         viz.page, GRAPH, title="t", about="", at=None, marked=(), motion=None, tables=(), names=None, units=None,
-        derived=None, columns={"link 1": "base"}, notices=["n"], panels=(), causes=None
+        derived=None, columns={"link 1": "base"}, notices=["n"], panels=(), causes=None, view=""
     ),
     "viz.typed_page": call(viz.typed_page, "L = x'^2"),
     "viz.typed_text": call(viz.typed_text, ARM, [0.1], [0.0]),

@@ -217,7 +217,7 @@ function makeTabs(app) {
   const tabs = versions.map((each, i) => {
     const button = tag("button", { type: "button", role: "tab", "aria-controls": "view" }, each.name);
     if (each.flawed) button.className = "flawed";
-    if (right.length > 1 && each === right.find(({ ops }) => ops.length === fewest)) button.append(" ", tag("small", {}, "smallest"));
+    if (right.length > 1 && right.includes(each) && each.ops.length === fewest) button.append(" ", tag("small", {}, "smallest"));
     if (i && versions[i - 1].group !== each.group) button.classList.add("apart");
     return button;
   });

@@ -17,6 +17,7 @@ function armView(svg, motion) {
   const follows = way > FOLLOW * 2 * reach;
   const half = follows ? Math.max(1.5 * reach, size / 100) : 0.58 * size;
   svg.replaceChildren();
+  svg.setAttribute("aria-label", "the mechanism in motion");
   const r = half / 26, step = nice(0.8 * half);
   const grid = element("path", { class: "grid", "stroke-width": r / 4 }, svg);
   element("path", { class: "ground", d: `M${-4 * r} 0H${4 * r}`, "stroke-width": r / 2 }, svg);
@@ -77,14 +78,12 @@ function makeMotion(app) {
   byId("moving").hidden = !motion;
   app.arm = null;
   if (!motion) return;
-  byId("arm").toggleAttribute("hidden", !motion.points);
-  byId("frame").hidden = !motion.points;
-  if (motion.points) {
-    app.arm = armView(byId("arm"), motion);
-    app.places = motion.places && prepare(motion.places);
-    app.largestTorque = 0;
-    byId("frame").textContent = app.arm.words;
-  }
+  app.arm = motion.points ? armView(byId("arm"), motion) : courseView(byId("arm"), app);
+  app.places = motion.places && prepare(motion.places);
+  app.largestTorque = 0;
+  byId("arm").toggleAttribute("hidden", !app.arm);
+  byId("frame").textContent = app.arm?.words ?? "";
+  byId("frame").hidden = !app.arm?.words;
   byId("time").max = motion.t.length - 1;
 }
 

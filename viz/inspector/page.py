@@ -18,8 +18,9 @@ from .content import Motion, State, StateTable, Version
 from .record import record
 
 SCRIPTS = (
-    "state.js", "picture/places.js", "picture/arrange.js", "picture/legible.js", "picture.js", "marks.js", "panels.js",
-    "why/causes.js", "why/why.js", "steps.js", "motion.js", "outline.js", "link.js", "keys.js", "app.js",
+    "state.js", "picture/places.js", "picture/arrange.js", "picture/legible.js", "picture/course.js", "picture.js",
+    "marks.js", "panels.js", "why/causes.js", "why/why.js", "steps.js", "motion.js", "outline.js", "link.js", "keys.js",
+    "app.js",
 )  # fmt: skip
 
 
@@ -100,7 +101,7 @@ def page(
     >>> "<title>A sine</title>" in text
     True
     """
-    for what, text in (("title", title), ("about", about)):
+    for what, text in (("title", title), ("about", about), ("view", view)):
         if not isinstance(text, str):
             raise TypeError(f"{what} of a page must be text, got {type(text).__name__}: {text!r:.60}")
     if at is not None:

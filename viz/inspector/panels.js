@@ -141,10 +141,13 @@ function showInputs(app) {
   byId("reset").hidden = byId("edited").hidden = !app.state.edited;
 }
 
-/** The state as one line. */
+/** The state as one line: what is not 0, to rounding. */
 function inputsInWords(app) {
-  const { state } = app, unit = (name) => (app.units.has(name) ? ` ${app.units.get(name)}` : "");
-  return `${state.names.map((name) => `${shownName(app, name)} = ${brief(state.get(name))}${unit(name)}`).join(", ")}.`;
+  const { state, units } = app, noise = state.errorsOf({ inputs: state.names.map((name) => [name]) });
+  const unit = (name) => (["1", undefined].includes(units.get(name)) ? "" : ` ${units.get(name)}`);
+  const told = state.names.map((name, i) => [name, brief(state.get(name), noise[i])]).filter(([, text]) => text !== "0");
+  const rest = told.length < state.names.length ? [told.length ? "all others 0" : "all 0"] : [];
+  return `${[...told.map(([name, text]) => `${shownName(app, name)} = ${text}${unit(name)}`), ...rest].join(", ")}.`;
 }
 
 function showCounts(app) {
