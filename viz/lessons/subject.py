@@ -98,7 +98,7 @@ class Subject:
     @property
     def verdict_text(self) -> str:
         """The verdict in a sentence, in the letters of the lesson, as HTML."""
-        return in_letters(self.verdict.summary)
+        return in_letters(self.verdict.summary).replace("the torque is", f"the {self.force} is", 1)
 
     @cached_property
     def slopes(self) -> Array:

@@ -83,6 +83,7 @@ def draw(
             graph,
             marked=() if verdict is None else verdict.nodes,
             marked_edges=() if verdict is None else verdict.edges,
+            wrong_outputs=() if verdict is None else tuple(verdict.excess),
             names=display_names(scene),
             collapse=tags_to_collapse(graph),
             caption=f"{scene.name}: {what}",

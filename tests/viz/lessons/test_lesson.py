@@ -262,6 +262,6 @@ def test_of_what_does_not_depend_on_its_place_it_is_said_that_there_is_no_error(
     subject = subject_of(block())
     screen = wrong_way(subject)
     assert screen.choices[screen.answer] == "There is no error, at any dt"
-    assert "∂L/∂q is 0, so nothing comes through" in screen.reveal
+    assert "∂L/∂q is 0, and the derivative through" in screen.reveal
     assert "∂K/∂q is 0" in check(subject).reveal
     assert "happens to be right" in made("block")

@@ -15,7 +15,7 @@ from tests.dynamics.textbook import TEXTBOOK
 from tests.slow import slow
 from tests.viz.typed.typed_script import run_typed
 from viz import typed_text
-from viz.models.inspection import FORMULATIONS, inspection
+from viz.models.inspection import PAPER, inspection
 from viz.models.node_classes import formulation_classes
 
 ROUNDING = 1e-9  # of numbers of size 1 to 100
@@ -40,7 +40,7 @@ def test_every_page_and_table_has_the_same_verdict(name: str) -> None:
     versions = inspection(scene, t_end=1e-3).versions
     sizes, right = dyn.formulation_sizes(scene), dyn.inverse_dynamics(scene, "chain_rule")
     text = typed_text(scene, q=list(scene.q)) if scene.system.n <= 3 and not scene.mechanism else ""
-    for formulation in FORMULATIONS:
+    for formulation in PAPER:
         verdict, version = dyn.formulation_verdict(scene, formulation), versions[formulation]
         painted = [bool(version.marked), bool(version.blamed), bool(version.off)]
         assert (version.flawed, any(painted)) == (verdict.differs, verdict.differs)
