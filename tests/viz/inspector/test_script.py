@@ -24,7 +24,6 @@ from viz.models.inspection import PAPER, Inspection, inspection
 from viz.pages.operations import graph_data, slopes
 
 pytestmark = pytest.mark.usefixtures("without_graphviz")
-PAPER = ("by_definition", "kinetic_only", "chain_rule")
 JAVASCRIPT_LIBM = 1e-12  # relative: a browser's sin and exp may differ from the C library's in the last bits
 
 
