@@ -87,6 +87,7 @@ if TYPE_CHECKING:  # shared by the three packages alone: no promise is made for 
     from .core.checks import check_name as check_name
     from .core.evaluation import Array as Array
     from .core.label import UNLABELLED as UNLABELLED
+    from .core.scope import without_collection as without_collection
     from .explain.lint.lint import Lint as Lint
     from .explain.remarks import Remarks as Remarks, remarked as remarked, remarks_of as remarks_of
     from .explain.why_nan import WhyNan as WhyNan
@@ -102,7 +103,7 @@ if TYPE_CHECKING:  # shared by the three packages alone: no promise is made for 
         format_polynomial as format_polynomial,
     )
     from .simplification.reading_form import reading_form as reading_form
-    from .simplification.rounding_growth import rounding_spread as rounding_spread
+    from .simplification.rounding_growth import error_bounds as error_bounds, rounding_spread as rounding_spread
     from .util.atomic_write import (
         atomic_write as atomic_write,
         check_writable as check_writable,

@@ -17,8 +17,9 @@ if TYPE_CHECKING:
     from .disk_cache import Cache
 
 LEVEL = 2  # of the code generator's optimization; the text has no redundancy for passes over it to find
-# Nodes; beyond, level 0: a quarter of the time to compile, code that takes a third longer, or a tenth where it waits
-# for memory.
+SHORT = 2000  # nodes; beyond, level 1 but in vectors: three quarters of the time to compile, code as fast within 2 %.
+# Nodes; beyond, level 0: a quarter of the time to compile, code that takes twice as long, or a tenth longer where it
+# waits for memory.
 QUICK = 60_000
 _lock = threading.Lock()  # llvmlite compiles in one context
 
@@ -65,13 +66,20 @@ class Host:
         self._identity = "\n".join((*llvm, self._target.triple, self._name, self._features))
 
     def compile(
-        self, text: str, functions: Iterable[str], nodes: int, cache: Cache | None = None, *, looped: bool = False
+        self,
+        text: str,
+        functions: Iterable[str],
+        nodes: int,
+        cache: Cache | None = None,
+        *,
+        lanes: int = 1,
+        looped: bool = False,
     ) -> Code:
         """Machine code, made or found in the cache, of a module's text that calls these functions of the C library.
 
-        nodes: of its graphs.  looped: whether they are loops over vectors that wait for memory.
+        nodes: of its graphs.  lanes: of its numbers.  looped: whether they are loops over vectors that wait for memory.
         """
-        level = LEVEL if nodes <= (QUICK // 3 if looped else QUICK) else 0
+        level = 0 if nodes > (QUICK // 3 if looped else QUICK) else 1 if nodes > SHORT and lanes == 1 else LEVEL
         with _lock:
             self._find(functions)
             if cache is None:

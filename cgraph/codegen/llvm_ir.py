@@ -11,7 +11,7 @@ from ..operations.operation import OPS, columns
 from ..operations.texts import LLVM_ONE_OR_ZERO, LLVM_WHERE
 from .arithmetic import REGISTERS, Arithmetic, bits, words_of
 from .function_writer import FunctionWriter
-from .parts import Parts
+from .parts import STEPS, Parts
 from .schedule import Joined, Merged, Scheduled, joined_calls, products_of, schedule
 from .vector_math import POLYNOMIAL, helpers
 from .vector_sums import Sums, Vectors, vector_sums
@@ -189,10 +189,12 @@ def instructions(
         places = outputs.get(step, []) if isinstance(step, Node) else []
         kept = vectors.store(step, r) if isinstance(step, Node) else []
         written[-1] += [*lines, *more, *kept, *parts.write(step, r), *store(places, r)]
-    for node, places in outputs.items():
-        if not node.args:
-            r, lines = leaf(node, f"%leaf{places[0]}")
-            written[-1] += [*lines, *store(places, r)]
+    leaves = [(node, row) for node, places in outputs.items() if not node.args for row in places]
+    for number, (node, row) in enumerate(leaves):
+        if number % STEPS == STEPS // 2:  # the first of them go to the part that is there
+            written.append([])
+        r, lines = leaf(node, f"%leaf{row}")
+        written[-1] += [*lines, *store([row], r)]
     written[-1] += _last_stores(ends, parts, store)
     return Code(written, constants.start(), parts.places, constants.definitions())
 

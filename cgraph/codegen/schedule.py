@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 from ..core.graph import Graph
 from ..core.node import Node
+from ..core.traversal import as_made
 from ..operations.operation import columns
 from .vector_math import POLYNOMIAL
 from .vector_sums import Sums
@@ -41,32 +42,28 @@ Scheduled = Node | Joined | Sums
 def schedule(graph: Graph, merged: Merged) -> dict[Scheduled, tuple[Scheduled, ...]]:
     """Every operation once and what it reads, arguments first, and before the results of a joined call the call.
 
-    Calls of library functions come as early as they can, since a call empties the registers and at first there is
-    little in them. Else the order is depth first from the outputs, and of a node's arguments the one with the longest
-    way from the inputs comes first: what is computed first must be kept while the other is. (The argument that needs
-    the most registers, as in Sethi and Ullman 1970, is the better one in trees; where nodes are shared it has values
-    read from memory a tenth more often, in a 7-joint arm's forward dynamics two fifths.)
+    The order is that in which the nodes were made: a derivation goes from body to body, and what it makes for one is
+    used by the next. Calls of library functions come as early as they can, since a call empties the registers and at
+    first there is little in them.
     """
-    depth = _depth(graph)
+    reads: dict[Scheduled, tuple[Scheduled, ...]] = {}
+    stack: list[Scheduled] = list(graph.outputs.values())
+    while stack:
+        step = stack.pop()
+        if step not in reads and not _leaf(step):
+            reads[step] = needed(step, merged)
+            stack += reads[step]
     early = [merged.calls.get(node, node) for node in graph.nodes if node.args and columns(node.op).calls_library]
+    made = as_made([step for step in reads if isinstance(step, Node)])
     order: dict[Scheduled, tuple[Scheduled, ...]] = {}
-    waiting: dict[Scheduled, tuple[Scheduled, ...]] = {}
-    results = [node for node in graph.outputs.values() if node.args]
-    stack: list[Scheduled] = [*reversed(results), *reversed(early)]
+    stack = [*reversed(made), *reversed(early)]
     while stack:
         step = stack[-1]
-        if step in order:
-            stack.pop()
+        missing = [each for each in reads[step] if each not in order and not _leaf(each)]
+        if missing and step not in order:
+            stack += reversed(missing)
             continue
-        if step in waiting:  # all that it reads is there
-            stack.pop()
-            order[step] = waiting.pop(step)
-            continue
-        reads = waiting[step] = needed(step, merged)
-        missing = [each for each in reversed(reads) if each not in order and not _leaf(each)]
-        if len(missing) > 1:
-            missing.sort(key=depth.__getitem__)
-        stack += missing
+        order.setdefault(stack.pop(), reads[step])
     return order
 
 
@@ -103,14 +100,6 @@ def products_of(graph: Graph) -> dict[Node, Node]:
         for product in [next((arg for arg in node.args if arg.op.name == "mul" and users[arg] == 1), None)]
         if product is not None
     }
-
-
-def _depth(graph: Graph) -> dict[Scheduled, int]:
-    """Operations on the longest way from an input or a constant to a node."""
-    depth: dict[Scheduled, int] = {}
-    for node in graph.nodes:
-        depth[node] = 1 + max([depth[arg] for arg in node.args], default=-1)
-    return depth
 
 
 def joined_calls(graph: Graph, together: int) -> dict[Node, Joined]:

@@ -42,12 +42,10 @@ class Builder:
         # a * b and b * a are one node, with a constant first, else in the order of the one that was made first.
         if op.commutative and args[1].op is CONSTANT and args[0].op is not CONSTANT:
             args = args[::-1]
-        key: tuple[str | int, ...]  # ids: the garbage collector would follow nodes; the node made keeps args alive
-        if len(args) == 2:
-            first, second = id(args[0]), id(args[1])
-            key = (op.name, second, first) if op.commutative and first > second else (op.name, first, second)
-        else:
-            key = (op.name, *map(id, args))
+        # By ids: the garbage collector would follow nodes. The node made keeps its arguments alive.
+        key: tuple[str | int, ...] = (op.name, *map(id, args))
+        if op.commutative and id(args[0]) > id(args[1]):
+            key = (op.name, key[2], key[1])
         node = self._made.get(key)
         if node is None:
             if not label.has_tags:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import numbers
 from collections.abc import Callable
+from itertools import count
 from typing import Any, NoReturn, SupportsFloat
 
 import numpy as np
@@ -51,12 +52,13 @@ class Node:
     (<node mul>, (<node 2.0>, <node sin>))
     """
 
-    __slots__ = ("__weakref__", "args", "label", "name", "op", "value")
+    __slots__ = ("__weakref__", "args", "label", "name", "op", "serial", "value")
     op: Row
     args: tuple[Node, ...]
     value: float | None
     name: str | None
     label: Label
+    serial: int  # larger than those of all nodes made before, of the arguments too
 
     def __init__(
         self,
@@ -72,6 +74,7 @@ class Node:
         _set_label(self, label)
         _set_value(self, value)
         _set_name(self, name)
+        _set_serial(self, next(_serials))
 
     def __setattr__(self, key: str, value: object) -> NoReturn:
         raise AttributeError(f"a Node is immutable: cannot set {key!r}")
@@ -198,7 +201,8 @@ class Node:
 
 
 # The setters of the fields, which Node.__setattr__ does not stop; in half the time of object.__setattr__.
-_set_args, _set_label, _set_name, _set_op, _set_value = [vars(Node)[field].__set__ for field in Node.__slots__[1:]]
+_set_args, _set_label, _set_name, _set_op, _set_serial, _set_value = [vars(Node)[f].__set__ for f in Node.__slots__[1:]]
+_serials = count()
 Scalar = Node | float
 _constants: Interned[tuple[float, float], Node] = Interned()
 _variables: Interned[str, Node] = Interned()
@@ -298,9 +302,7 @@ def apply(op: Row, *args: Scalar) -> Node:
 
 def _built(op: Row, args: tuple[Node, ...]) -> Node:
     scope = current.get()
-    if scope.build is None:
-        return Node(op, args, scope.label)
-    node: Node = scope.build(op, args, scope.label)
+    node: Node = (scope.build or Node)(op, args, scope.label)
     return node
 
 

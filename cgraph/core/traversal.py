@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from operator import attrgetter
 
 from .checks import GraphError
 from .node import Node
@@ -21,7 +22,6 @@ def topological(outputs: Iterable[Node]) -> list[Node]:
     """
     order: list[Node] = []
     closed: set[Node] = set()  # what is in `order`
-    waiting: set[Node] = set()  # on the stack, for an argument that is not closed yet
     for output in outputs:
         if output in closed:
             continue
@@ -33,8 +33,7 @@ def topological(outputs: Iterable[Node]) -> list[Node]:
                     continue
                 if arg.args:
                     stack.append((node, rest))
-                    waiting.add(node)
-                    if arg in waiting:
+                    if arg.serial >= node.serial:
                         raise GraphError(f"the graph has a cycle through {arg!r}")
                     node, rest = arg, iter(arg.args)
                     break
@@ -49,12 +48,17 @@ def topological(outputs: Iterable[Node]) -> list[Node]:
     return order
 
 
+def as_made(nodes: Iterable[Node]) -> list[Node]:
+    """Nodes in the order in which they were made, so arguments first: what was derived together stays together."""
+    return sorted(nodes, key=attrgetter("serial"))
+
+
 def rebuild(
     outputs: Iterable[Node], replace: dict[Node, Node], make: Callable[[Node, tuple[Node, ...]], Node]
 ) -> dict[Node, Node]:
     """{node: copy} of all that `outputs` reach: `replace[node]` if there is one, else `make(node, new_arguments)`."""
     new = dict(replace)
-    for node in topological(outputs):
+    for node in as_made(topological(outputs)):
         if node not in new:
             new[node] = make(node, tuple([new[arg] for arg in node.args])) if node.args else node
     return new

@@ -76,11 +76,12 @@ class Names:
     def inputs_of(self, what: str, values: Mapping[str, Value]) -> dict[str, Value]:
         """Values by the graph's names of inputs. Raises GraphError, naming `what`, for what is no input, or twice."""
         result: dict[str, Value] = {}
+        inputs = dict.fromkeys(self.graph.input_names)
         for name, value in values.items():
             meant = self.meant(name) if isinstance(name, str) else name
-            if meant not in self.graph.input_names:
-                has = listed([self.shown(each) for each in self.graph.input_names]) or "none"
-                near = self._near(name, self.graph.input_names)
+            if meant not in inputs:
+                has = listed([self.shown(each) for each in inputs]) or "none"
+                near = self._near(name, inputs)
                 raise GraphError(f"{what}: the graph has no input {name!s:.80}{near} (it has {has})")
             if meant in result:
                 raise GraphError(f"{what} gives the input {self.shown(meant)} twice, once as {meant}")

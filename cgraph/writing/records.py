@@ -9,6 +9,7 @@ from ..core.checks import GraphError
 from ..core.graph import Graph
 from ..core.label import label
 from ..core.node import CONSTANT, VARIABLE, Node, as_node, variable
+from ..core.traversal import as_made
 from ..operations.table import OPS
 
 Record = tuple[str, tuple[int, ...], Any, Any, tuple[Any, ...]]  # operation, arguments, value, name, label
@@ -16,9 +17,10 @@ Record = tuple[str, tuple[int, ...], Any, Any, tuple[Any, ...]]  # operation, ar
 
 def reduced(graph: Graph) -> tuple[Callable[..., Graph], tuple[object, ...]]:
     """Result of `Graph.__reduce__`: the function that makes the graph again, and its arguments."""
-    number = {node: i for i, node in enumerate(graph.nodes)}
+    nodes = as_made(graph.nodes)  # made again in this order
+    number = {node: i for i, node in enumerate(nodes)}
     outputs = {name: number[node] for name, node in graph.outputs.items()}
-    return restored, (graph.input_names, tuple(records(graph.nodes)), outputs)
+    return restored, (graph.input_names, tuple(records(nodes)), outputs)
 
 
 def records(nodes: Sequence[Node]) -> Iterator[Record]:

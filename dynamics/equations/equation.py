@@ -158,6 +158,7 @@ def documented(
     return function
 
 
+@extend.without_collection()
 def shortened(system: System, derive: Callable[[System], Graph], *, mirrored: bool = False) -> Graph:
     """derive(system), or of the system's energies written anew by identities, or its outputs so, if that is smaller.
 

@@ -46,8 +46,8 @@ def compile(
         "llvm": machine code (extra `native`). "python": generated Python over floats. "numpy": generated NumPy over
         arrays. "auto": machine code where llvmlite is installed, the C library has all functions of the graph and that
         has at most 1 000 000 nodes, else generated Python for `fn(x)` and generated NumPy for `fn.batch(X)`; a
-        RuntimeWarning says so if it is the size. Beyond 60 000 nodes machine code is made in a quarter of the time for
-        a node, and takes a third longer to run.
+        RuntimeWarning says so if it is the size. Beyond 60 000 nodes machine code is made in two thirds of the time
+        for a node, and takes twice as long to run.
     fast : bool
         May also re-associate sums and products, multiply by reciprocals and mistake the sign of a zero; NaN and
         infinities keep their meaning.

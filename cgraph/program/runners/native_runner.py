@@ -78,8 +78,8 @@ class NativeRunner(Runner):
         assert self._entry is not None
         return self
 
-    def _compiled(self, text: str, *, looped: bool = False) -> llvm.Code:
-        return self._host.compile(text, self._functions, self._nodes, self._cache, looped=looped)
+    def _compiled(self, text: str, lanes: int = 1, *, looped: bool = False) -> llvm.Code:
+        return self._host.compile(text, self._functions, self._nodes, self._cache, lanes=lanes, looped=looped)
 
     @property
     def _entry(self) -> Any:
@@ -99,7 +99,7 @@ class NativeRunner(Runner):
                 vectors = Arithmetic(self._flags, lanes, registers)
                 one = point_arithmetic(self._flags, registers)
                 text = program_ir(program, vectors if lanes > 1 else one, self.width)
-                self._codes[lanes] = self._compiled(text).function("run", _RUN)
+                self._codes[lanes] = self._compiled(text, lanes).function("run", _RUN)
         return self._codes[lanes]
 
     def _run(self, memory: Array, passes: int, every: int, feed: Array) -> Record:
@@ -162,7 +162,7 @@ class NativeRunner(Runner):
         from .batch_code import BatchCode
 
         lanes, text, alone = self._host.lanes, self._batch_module(name), whole_graph(self._fused, name) is not None
-        code = self._compiled(text.source, looped=not alone)
+        code = self._compiled(text.source, lanes, looped=not alone)
         width = max(WORK // max(1, self._nodes) // lanes, 1) * lanes
         places = offsets(self._fused_many.registers, 1) if start else {}
         begin = {places[other]: numbers for other, numbers in start.items()}
@@ -183,7 +183,7 @@ class NativeRunner(Runner):
         masked, size = fused(many_keeping(beside, kept), alike=alike), sum([lengths[name] for name in kept])
         with without_collection():
             text = lane_ir(masked, size, clock, arithmetic)
-        return LaneCode(self._compiled(text.source), masked, kept, lanes, text.size)
+        return LaneCode(self._compiled(text.source, lanes), masked, kept, lanes, text.size)
 
     def _point_text(self, x: str, y: str) -> str:
         """The text in LLVM's language."""

@@ -24,6 +24,7 @@ LAST_STEP, LONGEST_STEP = 1e-9, 0.5  # steps there, of displacements
 SMALL_GAP = 1e-6  # of the first gap: what Newton's method closes to rounding in a step or two
 OPEN = 0.5  # certain digits of a row that is not 0
 FOLLOWS = 4.0  # more digits of one that follows from others: the rounding of axes and lengths that it has in common
+UNCERTAIN = 0.1  # of an entry: no digit of it is certain where its rounding is larger
 ROUNDS = 4  # of scaling
 NEAR_STATES = 3  # states about another one, at which rows are as large as they usually are
 SIZES = 10.0 ** np.arange(-10.0, 11.0)  # of displacements
@@ -156,12 +157,16 @@ class RowNumbers:
 
     def certain_matrix(self, point: Mapping[str, float]) -> Array:
         """J with 0 for entries that are rounding alone."""
-        m = len(self.constraints)
-        matrix = self.matrix(point)
-        for k in range(m):
-            digits = extend.certain_digits(self.columns, {**point, **{f"lambda{j}": float(j == k) for j in range(m)}})
-            matrix[k] = np.where(np.array(list(digits.values())) >= 1.0, matrix[k], 0.0)
-        return matrix
+        m, roundoff = len(self.constraints), np.finfo(float).eps / 2.0
+        weights = dict(zip([f"lambda{k}" for k in range(m)], np.eye(m), strict=True))
+        nodes = self.columns.nodes
+        values, errors = extend.error_bounds(nodes, {**point, **weights}, roundoff, of_inputs=roundoff)
+        columns = self.columns.outputs.values()
+        matrix, rounding = (
+            np.stack([np.broadcast_to(each[column], m) for column in columns], axis=1) for each in (values, errors)
+        )
+        with np.errstate(invalid="ignore"):
+            return np.where(rounding <= UNCERTAIN * np.abs(matrix), matrix, 0.0)
 
     @cached_property
     def reach(self) -> Array:

@@ -48,13 +48,14 @@ def accelerations(system: System, method: str = "auto", check: bool = False) -> 
     constrained = bool(len(system.constraints))
     short = system.n <= DENSE_UP_TO and not (constrained and check)
     methods = [method] if method != "auto" else ["recursive", "dense"] if short else ["recursive"]
-    ways = [(system, each) for each in methods]
+    terms = bias_terms(system)
+    ways = [(system, terms, each) for each in methods]
     if (whole := system.whole) is not None:
-        ways.insert(0, (whole, methods[0]))
+        ways.insert(0, (whole, bias_terms(whole), methods[0]))
     graphs: list[Graph] = []  # the safest first
-    for form, each in ways:  # the dense matrix may lose in its entries what elimination keeps
+    for form, given, each in ways:  # the dense matrix may lose in its entries what elimination keeps
         try:
-            graphs.append(_solved(form, bias_terms(form), each, check))
+            graphs.append(_solved(form, given, each, check))
         except SingularError as error:
             failure = error
     if not graphs and failure.index >= system.n:

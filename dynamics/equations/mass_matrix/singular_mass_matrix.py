@@ -188,7 +188,7 @@ def _moved_by_rounding(graph: Graph, constants: Mapping[str, float], point: Mapp
 
 def _inverse(accelerations: Graph, point: dict[str, float], n: int) -> Array:
     """M^-1 (n, n), from the accelerations at large torques on one coordinate at a time."""
-    torques = {f"tau{i}": TORQUE * np.eye(n)[i] for i in range(n)}
+    torques = {f"tau{i}": torque for i, torque in enumerate(TORQUE * np.eye(n))}
     with np.errstate(all="ignore"):
         values = accelerations.evaluate(point | torques)
         return np.array([np.broadcast_to(values[f"qdd{i}"], n) for i in range(n)]) / TORQUE

@@ -131,7 +131,8 @@ def kinematic_chains(
     index = {body.name: i for i, body in enumerate(moving)}
     paths = [_path(carrier.name, moving, index) for carrier in carriers]
     common = next(name for name in paths[0] if all([name in path for path in paths]))
-    axes = {name: axes_of(moving[i]) for name, i in index.items()} | {WORLD: np.eye(3)}
+    needed = {common, *[carrier.name for carrier in carriers]}
+    axes = {name: np.eye(3) if name == WORLD else axes_of(moving[index[name]]) for name in needed}
     result = []
     for carrier, path in zip(carriers, paths, strict=True):
         steps = tuple([states[index[name]] for name in path[: path.index(common)]])

@@ -110,7 +110,12 @@ def test_the_bits_do_not_depend_on_how_code_is_divided_and_optimized(monkeypatch
     whole, function = results()
     assert "@part1" not in function.batch_source()
     assert "@point.part1" not in function.source
-    settings = {"steps": (parts, "STEPS", 7), "level": (llvm_engine, "QUICK", 3), "tiles": (batch_ir, "FEW_PLACES", -1)}
+    settings = {
+        "steps": (parts, "STEPS", 7),
+        "level 0": (llvm_engine, "QUICK", 3),
+        "level 1": (llvm_engine, "SHORT", 3),
+    }
+    settings["tiles"] = batch_ir, "FEW_PLACES", -1
     settings["tiles of two"] = batch_ir, "VECTORS", 2
     for name, (module, setting, value) in settings.items():
         with monkeypatch.context() as patch:
@@ -123,6 +128,15 @@ def test_the_bits_do_not_depend_on_how_code_is_divided_and_optimized(monkeypatch
     monkeypatch.setattr(llvm_engine.host(), "registers", 3)
     assert all(map(same, results()[0], whole))
     assert fma or same(whole[0], evaluated(graph, points.T[:1])[0])
+
+
+def test_outputs_that_are_constants_are_divided_among_functions():
+    """LLVM takes a time that grows with the square of the stores in one of them."""
+    x = cg.variable("x")
+    outputs = {f"{k}": cg.constant(float(k % 7)) for k in range(5 * parts.STEPS)} | {"y": x * x}
+    function = cg.compile(cg.Graph([x], outputs), "llvm")
+    assert max(part.count("store double") for part in function.source.split("define internal")) <= parts.STEPS + 1
+    assert function([3.0]).tolist() == [float(k % 7) for k in range(5 * parts.STEPS)] + [9.0]
 
 
 def test_constants_stand_in_a_table_and_divisors_in_instructions():

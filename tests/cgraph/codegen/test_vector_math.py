@@ -3,6 +3,7 @@
 import ctypes
 import itertools
 import math
+import pickle
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from cgraph.codegen.batch_ir import batch_ir
 from cgraph.codegen.llvm_ir import TOGETHER, libm_functions
 from cgraph.codegen.schedule import Joined, Merged, joined_calls, products_of, schedule
 from cgraph.core.node import apply
+from cgraph.core.traversal import topological
 from cgraph.operations.operation import OPS
 from tests.cgraph.engines import SPECIAL, evaluated, graph_of
 from tests.each_row import each_row
@@ -268,12 +270,21 @@ def test_a_call_waits_for_the_calls_that_its_arguments_need():
     assert cg.compile(graph, "llvm")([0.3, 1.2, 0.7]) == pytest.approx(list(expected.values()), rel=SHORT_SUM)
 
 
-def test_the_deeper_argument_is_computed_first():
-    a, b, c, d, e = cg.variables("a b c d e")
-    wide, narrow = (a * b) / (c * d), -e
-    for y in (narrow + wide, wide + narrow):
-        order = schedule(cg.Graph([a, b, c, d, e], {"y": y}), Merged({}, {}))
-        assert list(order).index(wide) < list(order).index(narrow)
+def two_chains(steps=40):
+    """Two long products made side by side, in a graph that names one after the other, with a sum of 0 to fold."""
+    a, b = nodes = cg.variables("a b")
+    for _ in range(steps):
+        nodes = [cg.sqrt(node * (node + 0.0) + 1.0) for node in nodes]
+    return cg.Graph([a, b], dict(zip("ab", nodes, strict=True)))
+
+
+@each_row("graph", [two_chains(), cg.simplify(two_chains()), pickle.loads(pickle.dumps(two_chains()))])
+def test_operations_are_computed_in_the_order_in_which_they_were_made(graph):
+    order = list(schedule(graph, Merged({}, {})))
+    assert order == sorted(order, key=lambda node: node.serial)
+    roots = [node for node in order if node.op.name == "sqrt"]
+    below = [set(topological([node])) for node in graph.outputs.values()]
+    assert [root in below[k % 2] for k, root in enumerate(roots)] == [True] * 80
 
 
 def test_a_schedule_of_a_deep_graph_needs_no_recursion_and_no_square_of_its_size():
