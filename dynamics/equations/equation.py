@@ -15,7 +15,6 @@ from typing import Protocol, TypeVar
 import cgraph as cg
 from cgraph import Graph, Node, extend
 
-from ..systems.display_names import display_names
 from ..systems.model import Model, as_system
 from ..systems.system import System
 
@@ -126,7 +125,13 @@ class Equation:
 
 def called(graph: Graph, model: Model) -> Graph:
     """The graph, which a notebook draws with the names that a person calls its inputs and outputs by."""
-    return extend.remarked(graph, lambda _: extend.Remarks(display_names(model)))
+
+    def remarks(_: Graph) -> extend.Remarks:
+        from ..systems.display_names import display_names  # loaded when a notebook asks
+
+        return extend.Remarks(display_names(model))
+
+    return extend.remarked(graph, remarks)
 
 
 def documented(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 
 from cgraph import Graph
 from cgraph.extend import Json, Polynomial, expand, format_polynomial
@@ -148,7 +147,6 @@ WORDS = {  # file: formulation, what the figure shows, and what is to see in it
 }
 
 
-@cache
 def view(formulation: str) -> View:
     """The inertial term of the rotor on a spring, with its momentum, as it is drawn."""
     graph, wrong = blamed(scenes.load(SCENE), INERTIAL_TERM, formulation)
@@ -158,8 +156,9 @@ def view(formulation: str) -> View:
 def caption(name: str) -> str:
     """The caption of one of Figures 1 to 3, with the numbers of what is drawn."""
     formulation, what, seen = WORDS[name]
-    drawing = view(formulation).drawn()
-    alone = " and ".join([text.replace(" ", "_") for text in view(formulation).inputs_of_mistakes()])
+    shown = view(formulation)
+    drawing = shown.drawn()
+    alone = " and ".join([text.replace(" ", "_") for text in shown.inputs_of_mistakes()])
     return (
         f"Figure {name[3:]}. {what} Drawn are {drawing.nodes} nodes, {drawing.inputs} inputs and {drawing.operations} "
         f"operations, and {drawing.edges} edges; the {drawing.outputs} outputs in double frames are no nodes, and the "

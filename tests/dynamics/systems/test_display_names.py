@@ -113,7 +113,7 @@ def test_the_command_line_takes_and_shows_them(tmp_path, capsys):
     assert "tau.hip depends on q.trunk.qy along" in out
     assert "q.hip=0.5" in out
     assert cli.main(["why", *scene, "tau.hipp", "q.hip"]) == 2
-    assert "did you mean tau.hip" in capsys.readouterr().err
+    assert "did you mean 'tau.hip'" in capsys.readouterr().err
     assert cli.main(["lint", *scene, "--json"]) == 0
     proof = json.loads(capsys.readouterr().out)["proofs"][0]
     assert "q.hip" in proof  # the last of the coordinates, which are more than the velocities
