@@ -24,7 +24,10 @@ def start() -> int:
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")
     try:
-        return main()
+        status = main()
+        if stopped() and status == 128 + stopped():  # all is cleaned up, but threads may still be in machine code,
+            os._exit(status)  # which the end of Python does not wait for, and may not survive
+        return status
     except Exception:  # noqa: BLE001 (a mistake of ours must not look like a finding, which status 1 is)
         sys.excepthook(*sys.exc_info())
         return ERROR
