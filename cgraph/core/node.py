@@ -107,11 +107,17 @@ class Node:
         return render_html("node", self)
 
     def __bool__(self) -> NoReturn:
-        raise TypeError("a Node has no truth value before it is evaluated; choose between nodes with cg.where")
+        raise TypeError(
+            "a Node has no truth value before it is evaluated: in place of `if`, `and` or `max`, choose between nodes "
+            "with cg.where, cg.minimum or cg.maximum, and between pieces of a table with cg.interp"
+        )
 
     def __float__(self) -> float:
         if self.value is None:
-            raise TypeError(f"{self!r} has no value before it is evaluated; for math.cos and the like there is cg.cos")
+            raise TypeError(
+                f"{self!r} has no value before it is evaluated: in place of math.cos and the like take cg.cos, in place "
+                f"of np.interp cg.interp, in place of `if` cg.where; values come from cg.Graph(inputs, outputs).evaluate"
+            )
         return self.value
 
     def __copy__(self) -> Node:
