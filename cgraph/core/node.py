@@ -107,17 +107,11 @@ class Node:
         return render_html("node", self)
 
     def __bool__(self) -> NoReturn:
-        raise TypeError(
-            "a Node has no truth value before it is evaluated: in place of `if`, `and` or `max`, choose between nodes "
-            "with cg.where, cg.minimum or cg.maximum, and between pieces of a table with cg.interp"
-        )
+        raise TypeError("a Node has no truth value before it is evaluated; choose by cg.where, or in data by cg.interp")
 
     def __float__(self) -> float:
         if self.value is None:
-            raise TypeError(
-                f"{self!r} has no value before it is evaluated: in place of math.cos and the like take cg.cos, in place "
-                f"of np.interp cg.interp, in place of `if` cg.where; values come from cg.Graph(inputs, outputs).evaluate"
-            )
+            raise TypeError(f"{self!r} has no value before it is evaluated; cg.cos, cg.where, cg.interp, .. take nodes")
         return self.value
 
     def __copy__(self) -> Node:

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any
-
-import numpy as np
+from itertools import pairwise
 
 from ..core.builder import Builder
 from ..core.node import Node, Scalar, as_node
@@ -18,7 +16,9 @@ from .table import abs_, less, not_equal, sign, where
 Piece = list[Node]  # a_0, a_1, .. of the polynomial a_0 + a_1 t + a_2 t**2 + .., t = x - start
 
 
-def interp(x: Scalar, xs: Sequence[float], ys: Sequence[Scalar], kind: str = "linear", outside: str = "constant") -> Any:
+def interp(
+    x: Scalar, xs: Sequence[float], ys: Sequence[Scalar], kind: str = "linear", outside: str = "constant"
+) -> Node:
     """The value at x of a function that is known at the points of a table: measured torques, losses, a cam.
 
     Between knots i and i + 1 it is a polynomial of t = x - xs[i], which comparisons choose. At a knot the derivative is
@@ -27,7 +27,7 @@ def interp(x: Scalar, xs: Sequence[float], ys: Sequence[Scalar], kind: str = "li
     Parameters
     ----------
     x : Node or float
-        Where, finite; or an array of them.
+        Where, finite.
     xs : sequence of n >= 2 floats
         Knots, finite and increasing strictly, in the unit of x.
     ys : sequence of n nodes or floats
@@ -42,8 +42,8 @@ def interp(x: Scalar, xs: Sequence[float], ys: Sequence[Scalar], kind: str = "li
     Returns
     -------
     Node
-        The value; an array of nodes for an array. Of n knots it takes about n comparisons, and with them n selections
-        for each of 3 numbers of a "linear" table, 5 of another one; a derivative adds a few operations to these.
+        The value. Of n knots it takes n comparisons, and n selections with them for each of 3 numbers of a "linear"
+        table, 5 of another one; a derivative adds a few operations to these.
 
     Raises
     ------
@@ -66,11 +66,9 @@ def interp(x: Scalar, xs: Sequence[float], ys: Sequence[Scalar], kind: str = "li
     >>> round(cg.gradient(motor).evaluate({"w": 100.0})["dtorque/dw"], 6)
     -0.0016
     """
-    if isinstance(x, np.ndarray) and x.ndim:
-        return np.frompyfunc(lambda each: interp(each, xs, ys, kind, outside), 1, 1)(x.astype(object))
     require_choice("kind of interp", kind, tuple(_SLOPES))
     require_choice("outside of interp", outside, ("constant", "linear"))
-    at, knots = as_node(x.item() if isinstance(x, np.ndarray) else x), _knots(xs)
+    at, knots = as_node(x), _knots(xs)
     with building(Builder()):  # which computes what is constant
         pieces = _pieces(knots, _values(ys, len(knots)), _SLOPES[kind], straight=outside == "linear")
     if any([each.value is not None and not math.isfinite(each.value) for piece in pieces for each in piece]):
@@ -122,7 +120,7 @@ def _pieces(
 
     slopes_of: of steps and slopes between the knots, the slopes at the knots; None for straight lines.
     """
-    h = [after - before for before, after in zip(x, x[1:], strict=False)]
+    h = [after - before for before, after in pairwise(x)]
     rise = [(after - before) / step for before, after, step in zip(y, y[1:], h, strict=False)]
     zero = as_node(0.0)
     if slopes_of is None:
@@ -132,7 +130,12 @@ def _pieces(
         d = slopes_of(h, rise)
         first, last = d[0], d[-1]
         inside = [  # Hermite's cubic of values and slopes at both ends
-            [y[i], d[i], (3.0 * rise[i] - 2.0 * d[i] - d[i + 1]) / h[i], (d[i] + d[i + 1] - 2.0 * rise[i]) / h[i] / h[i]]
+            [
+                y[i],
+                d[i],
+                (3.0 * rise[i] - 2.0 * d[i] - d[i + 1]) / h[i],
+                (d[i] + d[i + 1] - 2.0 * rise[i]) / h[i] / h[i],
+            ]
             for i in range(len(h))
         ]
     more = [zero] * (len(inside[0]) - 2)
@@ -162,9 +165,9 @@ def _end(h0: float, h1: float, a: Node, b: Node) -> Node:
 def _natural(h: list[float], rise: list[Node]) -> list[Node]:
     """Slopes at the knots at which second derivatives are continuous, and 0 at the ends: Thomas's elimination."""
     n = len(h)
-    diagonal = [2.0 / h[0], *[2.0 / a + 2.0 / b for a, b in zip(h, h[1:], strict=False)], 2.0 / h[-1]]
+    diagonal = [2.0 / h[0], *[2.0 / a + 2.0 / b for a, b in pairwise(h)], 2.0 / h[-1]]
     weighted = [3.0 * each / step for each, step in zip(rise, h, strict=True)]
-    right = [weighted[0], *[a + b for a, b in zip(weighted, weighted[1:], strict=False)], weighted[-1]]
+    right = [weighted[0], *[a + b for a, b in pairwise(weighted)], weighted[-1]]
     for i in range(n):
         factor = 1.0 / h[i] / diagonal[i]
         diagonal[i + 1] -= factor / h[i]

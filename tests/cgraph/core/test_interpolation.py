@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import pickle
+import re
 from fractions import Fraction
 
 import numpy as np
@@ -36,8 +37,8 @@ def with_slopes(node):
     """The value, and its first and second derivative."""
     graph = cg.Graph([X], {"y": node})
     slope = cg.gradient(graph)
-    outputs = dict(zip("ydc", [*graph.outputs.values(), *slope.outputs.values(), *cg.gradient(slope).outputs.values()]))
-    return cg.Graph([X], outputs)
+    (y,), (d,), (c,) = [each.outputs.values() for each in (graph, slope, cg.gradient(slope))]
+    return cg.Graph([X], {"y": y, "d": d, "c": c})
 
 
 def reference(xs, ys, kind):
@@ -169,11 +170,6 @@ def test_values_may_be_nodes_whose_derivatives_are_those_of_differences(kind):
     assert graph.evaluate(at)["y"] == pytest.approx(numbers.evaluate({"x": 1.7})["y"], rel=ROUNDING)
 
 
-def test_arrays_of_nodes_go_element_by_element():
-    x = np.array(cg.variables("x0 x1"))
-    assert cg.interp(x, [0, 1], [2, 3]).shape == (2,)
-
-
 @each_row(
     "arguments, said",
     [
@@ -189,12 +185,13 @@ def test_arrays_of_nodes_go_element_by_element():
     ],
 )
 def test_what_is_no_table_is_told(arguments, said):
-    with pytest.raises(ValueError) as told:
+    with pytest.raises(ValueError, match=re.escape(said)):
         cg.interp(X, *arguments)
-    assert said in str(told.value)
 
 
-@each_row("wrong, says", [(float, "cg.interp"), (bool, "cg.where"), (lambda x: np.interp(x, [0, 1], [0, 1]), "cg.interp")])
+@each_row(
+    "wrong, says", [(float, "cg.interp"), (bool, "cg.where"), (lambda x: np.interp(x, [0, 1], [0, 1]), "cg.interp")]
+)
 def test_a_node_where_a_number_is_needed_says_what_to_take(wrong, says):
     with pytest.raises(TypeError, match=says):
         wrong(X)
