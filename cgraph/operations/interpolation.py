@@ -10,7 +10,7 @@ from ..core.builder import Builder
 from ..core.node import Node, Scalar, as_node
 from ..core.scope import building
 from ..util.real_arrays import real_array
-from ..util.require import require_choice
+from ..util.require import require_choice, require_sequence
 from .table import abs_, less, not_equal, sign, where
 
 Piece = list[Node]  # a_0, a_1, .. of the polynomial a_0 + a_1 t + a_2 t**2 + .., t = x - start
@@ -68,7 +68,7 @@ def interp(
     """
     require_choice("kind of interp", kind, tuple(_SLOPES))
     require_choice("outside of interp", outside, ("constant", "linear"))
-    at, knots = as_node(x), _knots(xs)
+    at, knots = _named("x of interp", x), _knots(xs)
     with building(Builder()):  # which computes what is constant
         pieces = _pieces(knots, _values(ys, len(knots)), _SLOPES[kind], straight=outside == "linear")
     if any([each.value is not None and not math.isfinite(each.value) for piece in pieces for each in piece]):
@@ -81,6 +81,14 @@ def interp(
     for each in (*coefficients[1:], y):  # Horner's scheme
         value = value * t + each
     return value
+
+
+def _named(what: str, value: Scalar) -> Node:
+    """The node of a value; an error says whose it is."""
+    try:
+        return as_node(value)
+    except (TypeError, ValueError) as error:
+        raise type(error)(f"{what}: {error}") from None
 
 
 def _knots(xs: Sequence[float]) -> list[float]:
@@ -99,18 +107,13 @@ def _knots(xs: Sequence[float]) -> list[float]:
 
 
 def _values(ys: Sequence[Scalar], n: int) -> list[Node]:
-    values = list(ys)
-    if len(values) != n:
-        raise ValueError(f"ys of interp must have a value for each of the {n} knots, got {len(values)}")
-    numbers = real_array("ys of interp", [0.0 if isinstance(each, Node) else each for each in values])
-    if numbers.ndim != 1:
-        raise ValueError(f"ys of interp must be a sequence of {n} values, got shape {numbers.shape}")
-    if bad := [k for k, number in enumerate(numbers.tolist()) if not math.isfinite(number)]:
-        raise ValueError(f"ys of interp must be finite, got ys[{bad[0]}] = {numbers[bad[0]].item()!r}")
-    return [
-        each if isinstance(each, Node) else as_node(number)
-        for each, number in zip(values, numbers.tolist(), strict=True)
-    ]
+    values = require_sequence("ys of interp", ys, "numbers or nodes")
+    nodes = [_named(f"ys[{k}] of interp", each) for k, each in enumerate(values)]
+    if len(nodes) != n:
+        raise ValueError(f"ys of interp must have a value for each of the {n} knots, got {len(nodes)}")
+    if bad := [k for k, node in enumerate(nodes) if node.value is not None and not math.isfinite(node.value)]:
+        raise ValueError(f"ys of interp must be finite, got ys[{bad[0]}] = {nodes[bad[0]].value!r}")
+    return nodes
 
 
 def _pieces(
