@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from .explain.why_nan import why_nan as why_nan
     from .explain.why_not import why_not as why_not
     from .operations import abs as abs, round as round
+    from .operations.interpolation import interp as interp
     from .operations.table import (
         acos as acos,
         asin as asin,

@@ -133,6 +133,7 @@ CALLS = {
     "cg.double_double": call(cg.double_double, GRAPH, low=False),
     "cg.hessian_solve": call(cg.hessian_solve, SQUARES, ["x", "y"], [1.0, 2.0], check=False, order="recursive"),
     "cg.Graph.latex": call(GRAPH.latex, names=None, lines=5),
+    "cg.interp": call(cg.interp, X, [0.0, 1.0], [2.0, 3.0], kind="linear", outside="constant"),
     "cg.latex": call(cg.latex, X * Y, names=None, lines=5),
     "cg.lint": call(
         cg.lint, GRAPH, independent=(), depends=None, box=None, at=None, digits=4.0, function="f", names=None
@@ -248,8 +249,10 @@ CALLS = {
     "dyn.release": call(dyn.release, TWO, [0.0, 0.0], [0.0, 0.0], TWO.bodies[-1].name),
     "dyn.Joint": call(
         with_joint, "revolute", axis=(0.0, 0.0, 1.0), position=(0.0, 0.0, 0.0), orientation=np.eye(3).tolist(),
-        damping=0.0, stiffness=0.0, spring_reference=0.0, armature=0.0, pitch=0.0, second_axis=None, name="q"
+        damping=0.0, stiffness=0.0, spring_reference=0.0, armature=0.0, pitch=0.0, second_axis=None, name="q",
+        limits=None
     ),
+    "dyn.Limits": call(dyn.Limits, (-1.0, 1.0), velocity=(-1.0, 1.0), effort=(-1.0, 1.0)),
     "dyn.Body": call(with_body, "b", dyn.Joint("revolute"), "world", 1.0, (0.0, 0.0, 0.0), (0.1, 0.1, 0.1)),
     "dyn.JointLimit": call(on_joint(dyn.JointLimit), "b", -1.0, 1.0, 1e3, 0.1),
     "dyn.JointFriction": call(on_joint(dyn.JointFriction), "b", 1.0, 0.1),

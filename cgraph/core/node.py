@@ -110,11 +110,11 @@ class Node:
         return render_html("node", self)
 
     def __bool__(self) -> NoReturn:
-        raise TypeError("a Node has no truth value before it is evaluated; choose between nodes with cg.where")
+        raise TypeError("a Node has no truth value before it is evaluated; choose by cg.where, or in data by cg.interp")
 
     def __float__(self) -> float:
         if self.value is None:
-            raise TypeError(f"{self!r} has no value before it is evaluated; for math.cos and the like there is cg.cos")
+            raise TypeError(f"{self!r} has no value before it is evaluated; cg.cos, cg.where, cg.interp, .. take nodes")
         return self.value
 
     def __copy__(self) -> Node:

@@ -21,7 +21,18 @@ from ..multibody.trees.mechanism import WORLD, Body, Joint, Mechanism, Mechanism
 from .left_out import listed, present, refused_or_left_out
 from .mujoco_twin import mujoco
 from .read_equality import left_of_equalities, other_equalities, read_loops
-from .smooth_forces import NONE, Smooth, actuators, disabled, first_output, inputs, mjcf_forces, modelled, single
+from .smooth_forces import (
+    NONE,
+    Smooth,
+    actuators,
+    disabled,
+    first_output,
+    inputs,
+    joint_limits,
+    mjcf_forces,
+    modelled,
+    single,
+)
 from .source import is_text, path_of, root_of, text_of
 from .stand_ins import zeros_again
 
@@ -150,6 +161,7 @@ def _joint(mj: MjModel, j: int, position: Array, orientation: Array) -> Joint:
         stiffness=float(mj.jnt_stiffness[j]) * (not _elsewhere(mj, j)) * (not disabled(mj, "SPRING")),
         spring_reference=float(mj.qpos_spring[mj.jnt_qposadr[j]]) if single else 0.0,
         armature=float(mj.dof_armature[dof]),
+        limits=joint_limits(mj, j) if single else None,
     )
 
 

@@ -14,6 +14,7 @@ from cgraph.extend import Array, require_flag
 
 from ..multibody.algebra import spatial
 from ..multibody.bodies.body import moment_rounding
+from ..multibody.bodies.limits import ANYTHING, NO_LIMITS, Limits
 from ..multibody.forces.joint_force import JointForce, JointFriction
 from ..multibody.joints import COMPOSITIONS, TYPES
 from ..multibody.loops import Loop
@@ -22,7 +23,7 @@ from .left_out import follows_itself, listed, present, refused_or_left_out
 from .smooth_forces import NONE, Smooth
 
 GRAVITY = (0.0, 0.0, -9.81)  # m/s^2, where the file says nothing
-FAR_LIMIT = 1e9  # m: a limit of a slide that `to_urdf` writes because URDF asks for one; it stands for none
+FAR_LIMIT = 1e9  # in any unit: a limit that `to_urdf` writes because URDF asks for one; it stands for none
 _OTHERS = {"revolute": "revolute", "planar": "planar"}  # beside the words of joint types: a hinge with limits, three
 _ENTRIES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _KNOWN = {
@@ -155,6 +156,7 @@ def _joint(joint: Element, name: str, child: str) -> Joint:
         if kinds[word] in COMPOSITIONS or TYPES[kinds[word]].has_axis:
             fields["axis"] = (1.0, 0.0, 0.0) if axis is None else _numbers(axis, where, "xyz", 3)
         fields["damping"] = 0.0 if dynamics is None else _numbers(dynamics, where, "damping", 1, "0")[0]
+        fields["limits"] = _possible_limits(joint, name)
     return Joint(kinds[word], name="" if name == child else name, **fields)
 
 
@@ -247,11 +249,13 @@ def _couplings(joints: Mapping[str, Element], leaders: Mapping[str, str]) -> lis
 def _outside(robot: Element, joints: Mapping[str, Element], smooth: Smooth) -> list[str]:
     """Sentences on forces and inputs on a mechanism that are not taken."""
     limited = [name for name, joint in joints.items() if _limits(joint, name)]
+    wrong = [name for name, joint in joints.items() if _possible_limits(joint, name) is None]
     rubbing = [f"{name}: {force:g}" for name, joint in joints.items() if (force := _friction(joint, name))]
     return present(
         {
             "contacts": robot.findall("link/collision"),
             f"joint limits ({listed(limited)})": limited and smooth.limits is None,
+            f"limits that cannot be ({listed(wrong)})": wrong,
             f"friction loss ({listed(rubbing)})": rubbing and smooth.friction is None,
             f"extensions of URDF ({listed(list(dict.fromkeys(_extensions(robot))))})": [*_extensions(robot)],
         }
@@ -277,6 +281,30 @@ def _limits(joint: Element, name: str) -> tuple[float, float] | None:
         return None
     lower, upper = (_numbers(limit, where, side, 1, "0")[0] for side in ("lower", "upper"))
     return None if (lower, upper) == (-FAR_LIMIT, FAR_LIMIT) else (lower, upper)
+
+
+def _numbers_of_limits(joint: Element, name: str) -> Limits:
+    """Limits of position, velocity and effort. Raises ValueError for such that cannot be."""
+    limit = _one(joint, f"joint {name!r}", "limit")
+    if limit is None or joint.get("type") not in _SINGLE:
+        return NO_LIMITS
+    ends = _limits(joint, name) or (-math.inf, math.inf)
+    lower, upper = (end if abs(end) < FAR_LIMIT else math.copysign(math.inf, end) for end in ends)
+    velocity, effort = (float(limit.get(what, "inf")) for what in ("velocity", "effort"))
+    return Limits((lower, upper), _both_ways(velocity), _both_ways(effort))
+
+
+def _both_ways(size: float) -> tuple[float, float]:
+    return ANYTHING if size >= FAR_LIMIT else (-size, size)
+
+
+def _possible_limits(joint: Element, name: str) -> Limits | None:
+    try:
+        return _numbers_of_limits(joint, name)
+    except MechanismError:
+        raise
+    except ValueError:
+        return None
 
 
 def _friction(joint: Element, name: str) -> float:

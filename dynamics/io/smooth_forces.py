@@ -1,4 +1,4 @@
-"""Smooth forces of a robot file, taken on request: limits as springs, friction loss without its jump, actuators."""
+"""Smooth forces of a robot file, taken on request: limits as springs, friction loss, actuators; and limits of MJCF."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import numpy as np
 from cgraph.extend import Array, real_array, real_number, require_flag
 
 from ..multibody.bodies.body import Body, MechanismError
+from ..multibody.bodies.limits import ANYTHING, Limits
 from ..multibody.forces.joint_force import Actuator, JointForce, JointFriction, JointLimit, Range
 from .mujoco_twin import mujoco
 
@@ -173,3 +174,35 @@ def _actuator(mj: MjModel, i: int, name: str, moving: Sequence[Body]) -> Actuato
 
 def _range(limited: int, ends: Array) -> Range | None:
     return (float(ends[0]), float(ends[1])) if limited else None
+
+
+def joint_limits(mj: MjModel, j: int) -> Limits:
+    """Limits of a hinge or slide of MuJoCo's model as numbers: its range, and what its actuators can do together."""
+    driving = [i for i in range(actuators(mj)) if _on_joint(mj, i) and mj.actuator_trnid[i, 0] == j]
+    efforts = [_effort(mj, i) for i in driving]
+    total = (sum([low for low, _ in efforts]), sum([high for _, high in efforts])) if efforts else ANYTHING
+    effort = _clipped(total, _range(mj.jnt_actfrclimited[j], mj.jnt_actfrcrange[j]))
+    return Limits(_range(mj.jnt_limited[j], mj.jnt_range[j]) or ANYTHING, effort=effort)
+
+
+def _effort(mj: MjModel, i: int) -> Range:
+    """What an actuator can do along its joint: gear times its force, which its input gives where it is a motor."""
+    kinds = [_called(kind, getattr(mj, f"actuator_{kind.lower()}type")[i]) for kind in ("Dyn", "Gain", "Bias")]
+    ctrl, force = inputs(mj, i), ANYTHING
+    if kinds == ["none", "fixed", "none"] and len(ctrl) == 1 and not disabled(mj, "CLAMPCTRL"):
+        force = _scaled(
+            mj.actuator_gainprm[i, 0], _range(mj.actuator_ctrllimited[ctrl[0]], mj.actuator_ctrlrange[ctrl[0]])
+        )
+    force = _clipped(force, _range(mj.actuator_forcelimited[i], mj.actuator_forcerange[i]))
+    return _scaled(mj.actuator_gear[first_output(mj, i), 0], force)
+
+
+def _scaled(factor: float, pair: Range | None) -> Range:
+    """The pair times a number, in order; an infinite one times 0 is 0."""
+    low, high = sorted([float(factor) * end if factor else 0.0 for end in pair or ANYTHING])
+    return low, high
+
+
+def _clipped(pair: Range, to: Range | None) -> Range:
+    low, high = np.clip(pair, *(to or ANYTHING))
+    return float(low), float(high)

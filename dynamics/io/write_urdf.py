@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -10,9 +11,10 @@ from numpy.typing import ArrayLike
 
 from cgraph.extend import Array
 
+from ..multibody.bodies.limits import NO_LIMITS
 from ..multibody.parameters import vanishes
 from ..multibody.quantities.body_quantity import of_bodies
-from ..multibody.trees.mechanism import WORLD, Body, MechanismError, require_mechanism
+from ..multibody.trees.mechanism import WORLD, Body, MechanismError, MechanismWarning, require_mechanism
 from ..systems.model import Model
 from .read_urdf import FAR_LIMIT, GRAVITY
 from .write_loops import mimic_lines, numbers
@@ -30,7 +32,8 @@ def to_urdf(model: Model) -> str:
     Returns
     -------
     str
-        The text. Joints have the names of the coordinates; a slide has limits of 1e9 m, as URDF asks for some.
+        The text. Joints have the names of the coordinates, and their limits; where there are none and URDF asks for
+        some, they are 1e9. A limit of effort or velocity that is not the same both ways is left out, with a warning.
 
     Raises
     ------
@@ -88,7 +91,10 @@ def _joint_lines(body: Body, name: str, mimic: str) -> list[str]:
         raise MechanismError(f"URDF has no joint of the kind {joint.kind!r}, as is the joint of body {body.name!r}")
     place = f'    <origin xyz="{numbers(joint.position)}" rpy="{numbers(_rpy(joint.orientation))}"/>'
     ends = f"    <parent link={quoteattr(body.parent)}/><child link={quoteattr(body.name)}/>"
-    opened = f'  <joint name={quoteattr(name)} type="{joint.type.urdf}">'
+    limits = joint.limits or NO_LIMITS
+    ended = joint.type.limited or limits.position != NO_LIMITS.position
+    kind = "revolute" if ended and not joint.type.limited else joint.type.urdf  # "continuous" has no ends
+    opened = f'  <joint name={quoteattr(name)} type="{kind}">'
     if not joint.type.moves:
         return [opened, ends, place, "  </joint>"]
     for what in ("stiffness", "armature"):
@@ -97,15 +103,26 @@ def _joint_lines(body: Body, name: str, mimic: str) -> list[str]:
     dynamics = f'<dynamics damping="{joint.damping!r}"/>'
     if not joint.type.has_axis:
         return [opened, ends, place, f"    {dynamics}", "  </joint>"]
-    limits = f'lower="{-FAR_LIMIT!r}" upper="{FAR_LIMIT!r}" ' if joint.type.limited else ""
+    lower, upper = (min(max(end, -FAR_LIMIT), FAR_LIMIT) for end in limits.position)
+    ends_of = f'lower="{lower!r}" upper="{upper!r}" ' if ended else ""
+    effort, velocity = (_size(name, what, getattr(limits, what)) for what in ("effort", "velocity"))
     return [
         opened,
         ends,
         place,
         f'    <axis xyz="{numbers(joint.axis)}"/>{dynamics}{mimic}',
-        f'    <limit {limits}effort="{FAR_LIMIT!r}" velocity="{FAR_LIMIT!r}"/>',
+        f'    <limit {ends_of}effort="{effort!r}" velocity="{velocity!r}"/>',
         "  </joint>",
     ]
+
+
+def _size(name: str, what: str, pair: tuple[float, float]) -> float:
+    """A limit that is the same both ways, as URDF has them; a warning for another, which is left out."""
+    if pair[0] != -pair[1]:
+        text = f"URDF has one {what} limit for both ways: that of {name!r}, {pair[0]:g} to {pair[1]:g}, is left out"
+        warnings.warn(text, MechanismWarning, stacklevel=5)
+        return FAR_LIMIT
+    return min(pair[1], FAR_LIMIT)
 
 
 def _rpy(orientation: ArrayLike) -> Array:

@@ -18,6 +18,7 @@ from cgraph import Node
 from cgraph.extend import nearest, or_nearest, real_array, real_number
 
 from ..io.load import load_at_start
+from ..multibody.bodies.limits import NO_LIMITS, Limits
 from ..multibody.builders.planar_arm import planar_arm
 from ..multibody.trees.mechanism import Mechanism, as_mechanism
 from ..systems.model import Model, as_ode, as_system
@@ -100,6 +101,11 @@ class Scene:
     def mechanism(self) -> Mechanism | None:
         """The bodies of the model, if it has any."""
         return as_mechanism(self.model)
+
+    @property
+    def limits(self) -> dict[str, Limits]:
+        """{coordinate: its limits} of the bodies, see `Limits`; of a model without bodies there are none."""
+        return self.mechanism.limits if self.mechanism else dict.fromkeys(self.coordinates, NO_LIMITS)
 
     @property
     def left_out(self) -> tuple[str, ...]:

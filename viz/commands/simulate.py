@@ -63,7 +63,7 @@ def run(options: argparse.Namespace) -> int:
         t_eval=at,
         form=form,
     )
-    data = {"scene": scene.name, "rows": len(run.t), "form": form} | _summary(run)
+    data = {"scene": scene.name, "rows": len(run.t), "form": form} | _summary(run) | _beyond(scene, run)
     files: dict[Path, str | bytes] = {} if options.csv is None else {options.csv: run.to_csv()}
     answer(unless_json(options, data, f"{scene.name}: {_text(run, data)}"), files)
     return 0 if run.stats.success else 1
@@ -98,6 +98,23 @@ def _summary(run: dyn.Trajectory) -> dict[str, Any]:
     }
 
 
+def _beyond(scene: dyn.Scene, run: dyn.Trajectory) -> dict[str, Any]:
+    """Sentences on the limits of joints that rows of the run lie beyond; nothing of a model that has no limits."""
+    from dynamics.multibody.bodies.joint_coordinates import display_units
+    from dynamics.multibody.bodies.limits import NO_LIMITS, beyond_limits
+
+    limits = {name: each for name, each in scene.limits.items() if each != NO_LIMITS}
+    if not limits or scene.mechanism is None:
+        return {}
+    units = display_units(scene.mechanism.moving)
+    columns = {
+        "position": {name: run.q[:, run.coordinates.index(name)] for name in limits},
+        "velocity": {name: run.qd[:, run.velocities.index(name)] for name in limits},
+    }
+    unit_of = {name: units[f"q{run.coordinates.index(name)}"] for name in limits}
+    return {"beyond_limits": beyond_limits(limits, run.t, columns, unit_of)}
+
+
 def _text(run: dyn.Trajectory, data: dict[str, Any]) -> str:
     """The summary in words."""
     at_end = ", ".join([f"{name} = {value:.6g}" for name, value in [*data["end"].items()][:SHOWN]])
@@ -115,6 +132,8 @@ def _text(run: dyn.Trajectory, data: dict[str, Any]) -> str:
             f"  energy  {data['energy']:.6g} J at the start, {data['energy_at_end']:.6g} J at the end, "
             f"changed by {data['energy_drift']:.2g} J at most"
         )
+    if "beyond_limits" in data:
+        lines += [f"  limits  {each}" for each in data["beyond_limits"] or ["kept in every row"]]
     return "\n".join(lines)
 
 

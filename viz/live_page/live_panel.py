@@ -38,6 +38,7 @@ class Live:
     notes: {group of meters: a sentence on what they are}.
     parents: of each point the earlier one that it hangs on, or -1.
     scales: {input: how far its slider reaches to both sides of 0}, by default three times the value, or 1.
+    limits: {input: (lower, upper)}, where its slider ends, at an infinite one as it does without.
     names, units: {input: what a person calls it, and its unit}.
 
     Raises ValueError for an input without a finite value.
@@ -53,7 +54,11 @@ class Live:
     methods: Mapping[str, Any] = field(default_factory=dict)
     names: Mapping[str, str] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
+<<<<<<< HEAD:viz/live_page/live_panel.py
     notes: Mapping[str, str] = field(default_factory=dict)
+=======
+    limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+>>>>>>> ba03949544638fe71f2ea982d3f78a1542c3cb70:viz/live/live_panel.py
 
     def __post_init__(self) -> None:
         for name in self.rate.input_names:
@@ -85,8 +90,13 @@ class Live:
             kinds[0] if kinds else "state" if name in self.rate.input_names[: len(self.rate.outputs)] else "parameters"
         )
         low = 0.0 if group == "parameters" and value > 0.0 else -scale  # a mass, a length, gravity
+        lower, upper = self.limits.get(name, (-math.inf, math.inf))
+        low = min(lower, value) if math.isfinite(lower) else min(low, upper - scale)
+        high = max(upper, value) if math.isfinite(upper) else max(scale, low + scale)
+        if not low < high:
+            low, high = value - scale, value + scale
         unit = self.units.get(name, "")
-        return {"name": name, "called": called, "unit": unit, "value": value, "low": low, "high": scale, "group": group}
+        return {"name": name, "called": called, "unit": unit, "value": value, "low": low, "high": high, "group": group}
 
 
 SCRIPTS = ("machine.js", "run.js", "course.js", "live.js")

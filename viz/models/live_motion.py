@@ -128,7 +128,18 @@ def live_of(scene: Scene, *, momentum: bool = False) -> Live:
         usual = {f"qd{i}": USUAL.get(units.get(f"qd{i}", ""), 1.0) for i in range(scene.system.n)}
         reach = {name: abs(p) for name, p in _momenta(scene, values | usual).items()}
         scales |= {name: _round(p) for name, p in reach.items() if 0.0 < p < math.inf}  # of speeds that are none, NaN
-    return Live(rate, start, shown, meters, parents, scales, _step(scene), TABLEAUS, display_names(scene), units, NOTES)
+    names, limits = display_names(scene), _limits(scene)
+    return Live(rate, start, shown, meters, parents, scales, _step(scene), TABLEAUS, names, units, NOTES, limits)
+
+
+def _limits(scene: Scene) -> dict[str, tuple[float, float]]:
+    """{input: where its slider ends}: the joints' limits of position, velocity and effort."""
+    places = {name: k for k, name in enumerate(scene.velocities)}
+    found = {f"q{k}": each.position for k, each in enumerate(scene.limits.values())}
+    for name, each in scene.limits.items():
+        if name in places:
+            found |= {f"qd{places[name]}": each.velocity, f"tau{places[name]}": each.effort}
+    return found
 
 
 def _first_order(scene: Scene) -> Live:

@@ -19,7 +19,6 @@ MOST_COORDINATES = 4  # coordinates that the page takes
 _NAME = re.compile(r"[^\W\d_][A-Za-z0-9_]*")
 _RESERVED = re.compile(r"(q|qd|qdd|tau|lambda)\d+(_old)?|t|dt|pi|π|.+dot\d*|time|damping|tau|force|coordinates?|[qLTV]")
 _ALIASES = ("ln", "arcsin", "arccos", "arctan", "arctan2", "min", "max")  # functions of the page beside the operations
-_NO_FUNCTION = ("where", "less", "less_equal", "equal", "not_equal", "zero_safe_mul")
 _DOTS = "\N{COMBINING DOT ABOVE}\N{COMBINING DIAERESIS}"
 _SUM, _POWER, _WHOLE = 1, 8, 9  # how strongly a sign binds, a power, and a name or a function
 
@@ -47,7 +46,7 @@ def typed_text(model: Model, q: Sequence[float] | None = None, qd: Sequence[floa
         For what is no model, or has no Lagrangian, and a start that is not of numbers.
     ValueError
         For a start of another length, more coordinates, constraints, quasi-velocities, or an operation that has no
-        text, such as `where`.
+        text.
 
     Examples
     --------
@@ -149,12 +148,12 @@ class _Writer:
             return _number(node.value), _WHOLE if math.copysign(1.0, node.value) > 0.0 else _SUM
         if not node.args:
             return self.known[str(node.name)], _WHOLE
-        if node.op.name in _NO_FUNCTION:
+        if node.op.name == "zero_safe_mul":
             raise ValueError(f"the Lagrangian has the operation {node.op.name!r}, which cannot be typed")
         parts = [self.written[arg] for arg in node.args]
         if node.op.name == "pow":
             return "^".join([self._part(part, _WHOLE) for part in parts]), _POWER
-        if (infix := columns(node.op).infix) is not None:
+        if (infix := columns(node.op).infix) is not None and infix[1]:  # relations are functions
             symbol, strength = infix
             return f"{self._part(parts[0], strength)} {symbol} {self._part(parts[1], strength + 1)}", strength
         if columns(node.op).signs == (-1,):

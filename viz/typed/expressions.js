@@ -68,7 +68,7 @@ function notUnderstood(text, at) {
 
 const MOST_NESTED = 100;
 const ALIASES = { ln: "log", arcsin: "asin", arccos: "acos", arctan: "atan", arctan2: "atan2", min: "minimum", max: "maximum" };
-const HIDDEN = ["add", "sub", "mul", "div", "neg", "zero_safe_mul", "where", "less", "less_equal", "equal", "not_equal"];
+const HIDDEN = ["add", "sub", "mul", "div", "neg", "zero_safe_mul"];
 const isFunction = (name) => Object.hasOwn(ALIASES, name) || (Object.hasOwn(ROWS, name) && !HIDDEN.includes(name));
 const functionNames = () => [...Object.keys(ROWS).filter(isFunction), ...Object.keys(ALIASES)];
 

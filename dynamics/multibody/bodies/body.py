@@ -18,6 +18,7 @@ from ..algebra import spatial
 from ..joints import COMPOSITIONS, TYPES, JointType
 from ..joints.consistency import contradiction
 from ..parameters import Quantities, Quantity, entries, evaluated, names_in, symbol, vanishes
+from .limits import NO_LIMITS, Limits
 
 WORLD = "world"
 TEXT_ROUNDING = 1e-9  # of the largest entry: what is left of an inertia or a rotation that came through text
@@ -80,6 +81,9 @@ class Joint:
     name : str
         What the coordinate is called; by default as the body. Of several coordinates it goes before what they are,
         as in "base.x".
+    limits : Limits, optional
+        Of position, velocity and effort, as numbers: nothing holds the joint to them. Of a joint that is several, one
+        for all its coordinates, or a sequence of one for each. Ball and free joints have none.
 
     Raises
     ------
@@ -105,12 +109,13 @@ class Joint:
     pitch: float = 0.0
     second_axis: ArrayLike | None = None
     name: str = ""
+    limits: Any = None  # Limits, or of a composed joint one for each coordinate
 
     def __post_init__(self) -> None:
         kinds = [*TYPES, *COMPOSITIONS]
         if not isinstance(self.kind, str) or self.kind not in kinds:
             raise MechanismError(f"a joint must be one of {', '.join(kinds)}, got {self.kind!r:.60}")
-        for name in ("damping", "stiffness", "spring_reference", "armature"):
+        for name in ("damping", "stiffness", "spring_reference", "armature", "limits"):
             value = getattr(self, name)
             if isinstance(value, Sequence | np.ndarray) and not isinstance(value, str):
                 object.__setattr__(self, name, tuple(value))
@@ -292,7 +297,17 @@ def _checked_joint(where: str, joint: Joint) -> Joint:
         raise MechanismError(f"{no} spring, got stiffness {joint.stiffness!r}")
     if not (joint.type.geared or vanishes(given["armature"])):
         raise MechanismError(f"{no} armature, got {joint.armature!r}")
-    return Joint(joint.kind, axis=axis, orientation=orientation, pitch=pitch, name=joint.name, **given)
+    limits = check_limits(f"{where}: limits", joint.limits)
+    if limits not in (None, NO_LIMITS) and len(joint.type.coordinates) != 1:
+        raise MechanismError(f"{no} limits, got {limits!r:.80}")
+    return Joint(joint.kind, axis=axis, orientation=orientation, pitch=pitch, name=joint.name, limits=limits, **given)
+
+
+def check_limits(what: str, limits: object) -> Limits | None:
+    """The limits of one coordinate. Raises MechanismError for what are none."""
+    if limits is None or isinstance(limits, Limits):
+        return limits
+    raise MechanismError(f"{what} must be of the type Limits, got {type(limits).__name__}: {limits!r:.60}")
 
 
 def _pitch(where: str, joint: Joint) -> float:

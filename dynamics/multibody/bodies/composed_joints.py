@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
@@ -22,6 +22,7 @@ from .body import (
     Body,
     Joint,
     MechanismError,
+    check_limits,
     checked_name,
     checked_rotation,
     quantities,
@@ -29,7 +30,8 @@ from .body import (
     vector,
 )
 
-_NUMBERS = ("damping", "stiffness", "spring_reference", "armature")
+_NUMBERS = {name: JOINT_QUANTITIES[name] for name in ("damping", "stiffness", "spring_reference", "armature")}
+_PER_PART: dict[str, Callable[[str, object], Any]] = {**_NUMBERS, "limits": check_limits}
 
 
 def parts_of(body: Body) -> list[Body]:
@@ -39,7 +41,7 @@ def parts_of(body: Body) -> list[Body]:
     where, joint, chain = f"body {body.name!r}", body.joint, COMPOSITIONS[body.joint.kind]
     _check_placement(where, joint)
     axes = _axes(where, joint)
-    numbers = {name: _per_part(where, body, name) for name in _NUMBERS}
+    numbers = {name: _per_part(where, body, name) for name in _PER_PART}
     placed: dict[str, Any] = {"position": joint.position, "orientation": joint.orientation}
     bodies: list[Body] = []
     for i, part in enumerate(chain):
@@ -135,5 +137,5 @@ def _per_part(where: str, body: Body, quantity: str) -> Sequence[Any]:
     if len(value) != len(names):
         raise MechanismError(f"{what} must be one number, or {len(names)} for {', '.join(names)}, got {value!r:.80}")
     for name, number in zip(names, value, strict=True):
-        JOINT_QUANTITIES[quantity](f"{what} of the coordinate {f'{body.coordinate}.{name}'!r}", number)
+        _PER_PART[quantity](f"{what} of the coordinate {f'{body.coordinate}.{name}'!r}", number)
     return value

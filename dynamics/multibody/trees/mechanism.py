@@ -29,6 +29,7 @@ from ..bodies.joint_coordinates import (
     quasi_velocities,
     velocity_names,
 )
+from ..bodies.limits import NO_LIMITS, Limits
 from ..forces.external_force import Force, generalized_forces
 from ..forces.joint_force import JointForce, add_joint_forces, check_any_force
 from ..loops import Loop, check_loops, of_loops, position_rows, velocity_rows
@@ -176,6 +177,12 @@ class Mechanism(Structure):
     def velocities(self) -> tuple[str, ...]:
         """Names of the velocities, which are those of the coordinates but for ball and free joints."""
         return velocity_names(self.moving)
+
+    @property
+    def limits(self) -> dict[str, Limits]:
+        """{coordinate: its limits}, of position, velocity and effort; infinite where there are none, see `Limits`."""
+        kinds = [(body.joint.limits or NO_LIMITS, len(body.joint.type.coordinates)) for body in self.moving]
+        return dict(zip(self.coordinates, [each for each, count in kinds for _ in range(count)], strict=True))
 
     @property
     def mechanism(self) -> Mechanism:

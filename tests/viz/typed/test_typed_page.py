@@ -11,6 +11,7 @@ import pytest
 import cgraph as cg
 import dynamics as dyn
 import viz
+from cgraph.operations.table import zero_safe_mul
 from tests.each_row import each_row
 from tests.viz.typed.typed_script import run_typed
 from viz import cli
@@ -23,8 +24,14 @@ def coupled(q, qd, t, p):
 
 
 OWN = dyn.System(coupled, "theta_1 time", {"class": 0.3}, lambda q, qd, t: [cg.cos(t), 0.0], damping=[0.1, 0.0])
+CAM = dyn.System(  # kept below by a measured potential, and pushed by a force that falls with speed
+    lambda q, qd, t: 0.5 * qd[0] ** 2 - cg.interp(q[0], [-1.0, 0.0, 0.4, 1.5], [2.0, 0.0, 0.1, 3.0], "monotone"),
+    "x",
+    forces=lambda q, qd, t: [cg.interp(qd[0], [0.0, 1.0, 2.0], [1.0, 0.8, 0.0])],
+)
 SYSTEMS = {
     "own": OWN,
+    "table": CAM,
     "spring_mass": dyn.scenes.load("spring_mass"),
     "triple_pendulum": dyn.scenes.load("triple_pendulum"),
     "chain of 4": dyn.scenes.load("chain", n=4),
@@ -77,9 +84,9 @@ def test_names_that_mean_something_in_a_text_are_renamed():
         (3, TypeError, "expected a System, a mechanism or a scene, got int: 3"),
         (dyn.scenes.load("chain", n=5), ValueError, "the page takes up to 4 coordinates"),
         (
-            dyn.System(lambda q, qd, t: cg.where(q[0] < 0.0, 1.0, 2.0) * qd[0] ** 2, "x"),
+            dyn.System(lambda q, qd, t: zero_safe_mul(q[0], qd[0]) * qd[0], "x"),
             ValueError,
-            "the operation 'less', which cannot be typed",
+            "the operation 'zero_safe_mul', which cannot be typed",
         ),
     ],
 )

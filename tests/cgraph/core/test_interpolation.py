@@ -1,0 +1,209 @@
+"""`interp`: tables as functions, beside NumPy's and SciPy's, and alike on every back end."""
+
+from __future__ import annotations
+
+import math
+import pickle
+import re
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+import cgraph as cg
+import dynamics as dyn
+from cgraph.explain.lint.singular import intervals
+from tests.cgraph.codegen.test_c import agrees, needs_cc
+from tests.cgraph.engines import ENGINES, evaluated
+from tests.each_row import each_row
+from tests.slow import slow
+from tests.ulps import same
+
+KINDS = ("linear", "monotone", "natural")
+OUTSIDE = ("constant", "linear")
+ROUNDING = 1e-12  # of the largest value, over the smallest step for each derivative: a few dozen terms in another order
+X = cg.variable("x")
+
+
+def table(seed, *, least=2):
+    """Knots and values: rough, in steps with flat stretches, or smooth; of any size."""
+    draw = np.random.default_rng(seed)
+    n = int(draw.integers(least, 25))
+    xs = np.cumsum(draw.uniform(0.05, 1.0, n)) * 10.0 ** draw.uniform(-3, 3) - draw.uniform(-1, 1)
+    ys = [draw.normal(size=n), np.cumsum(np.round(draw.uniform(0, 1.5, n))), np.sin(np.arange(n))][seed % 3]
+    return xs, ys * 10.0 ** draw.uniform(-5, 5)
+
+
+def with_slopes(node):
+    """The value, and its first and second derivative."""
+    graph = cg.Graph([X], {"y": node})
+    slope = cg.gradient(graph)
+    (y,), (d,), (c,) = [each.outputs.values() for each in (graph, slope, cg.gradient(slope))]
+    return cg.Graph([X], {"y": y, "d": d, "c": c})
+
+
+def reference(xs, ys, kind):
+    """SciPy's functions: value, first and second derivative."""
+    scipy = pytest.importorskip("scipy.interpolate")
+    if kind == "linear" or len(xs) == 2:
+        exact = scipy.PPoly(np.array([np.diff(ys) / np.diff(xs), ys[:-1]]), xs)
+    else:
+        exact = scipy.PchipInterpolator(xs, ys) if kind == "monotone" else scipy.CubicSpline(xs, ys, bc_type="natural")
+    return [exact, exact.derivative(), exact.derivative(2)]
+
+
+@pytest.mark.parametrize("seeds", [range(6), *slow(range(6, 300))])
+def test_values_and_slopes_are_those_of_scipy(seeds):
+    for seed in seeds:
+        xs, ys = table(seed)
+        points = np.concatenate([np.random.default_rng(seed).uniform(xs[0], xs[-1], 100), xs[:-1]])
+        for kind in KINDS:
+            found = cg.compile(with_slopes(cg.interp(X, xs, ys, kind)), "numpy").batch([points])
+            for order, (row, exact) in enumerate(zip(found, reference(xs, ys, kind), strict=True)):
+                error = np.abs(row - exact(points)).max()
+                assert error <= ROUNDING * np.abs(ys).max() / np.diff(xs).min() ** order, (seed, kind, order)
+
+
+def test_a_linear_table_is_that_of_numpy_outside_too():
+    xs, ys = table(1)
+    points = np.linspace(xs[0] - 1.0, xs[-1] + 1.0, 501)
+    found = cg.compile(cg.Graph([X], {"y": cg.interp(X, xs, ys)}), "numpy").batch([points])[0]
+    assert np.abs(found - np.interp(points, xs, ys)).max() <= ROUNDING * np.abs(ys).max()
+
+
+@each_row("kind, outside", [(kind, outside) for kind in KINDS for outside in OUTSIDE])
+def test_outside_it_goes_on_as_it_is_told(kind, outside):
+    xs, ys = [0.0, 1.0, 3.0], [1.0, 2.0, 7.0]
+    graph = with_slopes(cg.interp(X, xs, ys, kind, outside))
+    ends = {x: graph.evaluate({"x": x}) for x in (-2.0, 0.0, math.nextafter(3.0, 0.0), 3.0, 5.0)}
+    if outside == "constant":
+        assert ends[-2.0] == {"y": 1.0, "d": 0.0, "c": 0.0}
+        assert ends[5.0] == {"y": 7.0, "d": 0.0, "c": 0.0}
+    else:
+        assert ends[-2.0]["y"] == pytest.approx(1.0 - 2.0 * ends[0.0]["d"])
+        assert ends[5.0]["y"] == pytest.approx(7.0 + 2.0 * ends[math.nextafter(3.0, 0.0)]["d"])
+        assert ends[5.0]["c"] == ends[-2.0]["c"] == 0.0
+    assert math.isnan(graph.evaluate({"x": math.nan})["y"])
+    assert [graph.evaluate({"x": x})["y"] for x in xs] == ys
+
+
+@each_row("seed", range(8))
+def test_a_monotone_table_never_leaves_the_values_beside(seed):
+    xs, ys = table(seed)
+    points = np.sort(np.random.default_rng(seed).uniform(xs[0], xs[-1], 300))
+    found = cg.compile(cg.Graph([X], {"y": cg.interp(X, xs, ys, "monotone")}), "numpy").batch([points])[0]
+    place = np.searchsorted(xs, points, side="right") - 1
+    slack = ROUNDING * np.abs(ys).max()
+    assert (found >= np.minimum(ys[place], ys[place + 1]) - slack).all()
+    assert (found <= np.maximum(ys[place], ys[place + 1]) + slack).all()
+
+
+def all_kinds(seed=0, **more):
+    """One graph of a table in every kind, with its derivatives."""
+    xs, ys = table(seed, least=4)
+    outputs = {}
+    for kind in KINDS:
+        made = with_slopes(cg.interp(X, xs, ys, kind, **more))
+        outputs |= {f"{name} {kind}": node for name, node in made.outputs.items()}
+    ends = (xs[0] - 1.0, xs[-1] + 1.0)
+    return cg.Graph([X], outputs), np.concatenate([np.random.default_rng(seed).uniform(*ends, 60), xs])[:, None]
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_every_engine_has_the_bits_of_evaluation(engine):
+    graph, points = all_kinds(outside="linear")
+    function = cg.compile(graph, engine, **({"fma": False} if engine == "llvm" else {}))
+    assert same(function.batch(points.T).T, evaluated(graph, points))
+    assert same(np.array([function(point) for point in points]), evaluated(graph, points))
+
+
+@needs_cc
+def test_c_has_the_bits_of_evaluation(tmp_path):
+    graph, points = all_kinds()
+    agrees(tmp_path, {"table": graph}, {"table": points})
+
+
+def test_webassembly_has_the_bits_of_evaluation():
+    graph, points = all_kinds()
+    module = pytest.importorskip("tests.wasm").instance(graph)
+    assert same(np.array([module(*point) for point in points]), evaluated(graph, points))
+
+
+def test_double_double_has_the_digits_of_fractions():
+    xs, ys, x = [0.0, 1.0, 3.0], [0.1, 0.7, -0.4], 1.3
+    graph = cg.double_double(cg.Graph([X], {"y": cg.interp(X, xs, ys)}), low=True)
+    exact = Fraction(ys[1]) + Fraction((ys[2] - ys[1]) / 2.0) * (Fraction(x) - 1)  # of a slope that is in float64
+    found = sum([Fraction(value) for value in graph.evaluate({"x": x}).values()])
+    assert abs(found - exact) <= Fraction(1, 2**100)
+
+
+def test_bounds_hold():
+    graph, points = all_kinds()
+    low, high = float(points.min()), float(points.max())
+    bounds = intervals(graph, {"x": (low, high)})
+    rows = evaluated(graph, points)
+    for node, column in zip(graph.outputs.values(), rows.T, strict=True):
+        assert bounds[node][0] <= column.min()
+        assert column.max() <= bounds[node][1]
+
+
+def test_a_reference_solution_has_its_digits_through_a_knot():
+    """x_dot = 1 + x up to x = 1, then 2 x."""
+    pytest.importorskip("flint")
+    table = dyn.OdeSystem(lambda x, t: [cg.interp(x[0], [0.0, 1.0, 2.0], [1.0, 2.0, 4.0], outside="linear")], ["x"])
+    found = dyn.reference(table, [0.25], None, [1.0], digits=20).decimal[0][0]
+    assert float(found) == pytest.approx(math.exp(2.0) / 1.6**2, rel=1e-15)
+    run = dyn.simulate(table, [0.25], None, 1.0, rtol=1e-10)
+    assert run.q[-1, 0] == pytest.approx(float(found), rel=1e-8)
+    with pytest.raises(ValueError, match="method 'taylor' needs equations that are smooth"):
+        dyn.simulate(table, [0.25], None, 1.0, "taylor")
+
+
+def test_the_data_are_part_of_the_hash_and_of_a_pickle():
+    xs, ys = table(2)
+    graphs = [cg.Graph([X], {"y": cg.interp(X, xs, [*ys[:-1], last], "natural")}) for last in (ys[-1], ys[-1] * 2.0)]
+    assert cg.structure_hash(graphs[0]) != cg.structure_hash(graphs[1])
+    again = pickle.loads(pickle.dumps(graphs[0]))
+    assert cg.structure_hash(again) == cg.structure_hash(graphs[0])
+    assert cg.simplify(graphs[0]).evaluate({"x": xs[0]}) == pytest.approx(graphs[0].evaluate({"x": xs[0]}))
+
+
+@each_row("kind", KINDS)
+def test_values_may_be_nodes_whose_derivatives_are_those_of_differences(kind):
+    xs, names = [0.0, 1.0, 2.5, 4.0], ["a", "b", "c", "d"]
+    ys = cg.variables(names)
+    graph = cg.Graph([X, *ys], {"y": cg.interp(X, xs, ys, kind, "linear")})
+    at = dict(zip(["x", *names], [1.7, 0.3, 0.5, 1.9, 2.0], strict=True))
+    slopes = cg.gradient(graph).evaluate(at)
+    for name in at:
+        ends = [graph.evaluate({**at, name: at[name] + step})["y"] for step in (-1e-5, 1e-5)]
+        assert slopes[f"dy/d{name}"] == pytest.approx((ends[1] - ends[0]) / 2e-5, rel=1e-7)
+    numbers = cg.Graph([X], {"y": cg.interp(X, xs, [at[name] for name in names], kind, "linear")})
+    assert graph.evaluate(at)["y"] == pytest.approx(numbers.evaluate({"x": 1.7})["y"], rel=ROUNDING)
+
+
+@each_row(
+    "arguments, said",
+    [
+        (([0.0, 1.0, 1.0], [0.0] * 3), "xs of interp must increase strictly, got xs[1] = 1.0 and xs[2] = 1.0"),
+        (([0.0, -1.0], [0.0] * 2), "xs of interp must increase strictly, got xs[0] = 0.0 and xs[1] = -1.0"),
+        (([0.0, math.nan], [0.0] * 2), "xs of interp must be finite, got xs[1] = nan"),
+        (([0.0, 1.0], [0.0, math.inf]), "ys of interp must be finite, got ys[1] = inf"),
+        (([0.0, 1.0], [0.0] * 3), "ys of interp must have a value for each of the 2 knots, got 3"),
+        (([0.0], [0.0]), "xs of interp must be a sequence of two knots or more, got shape (1,)"),
+        (([0.0, 5e-324], [0.0, 1.0]), "interp: a slope of the table is too large for float64"),
+        (([0.0, 1.0], [0.0, 1.0], "cubic"), "kind of interp must be"),
+        (([0.0, 1.0], [0.0, 1.0], "linear", "nan"), "outside of interp must be"),
+    ],
+)
+def test_what_is_no_table_is_told(arguments, said):
+    with pytest.raises(ValueError, match=re.escape(said)):
+        cg.interp(X, *arguments)
+
+
+@each_row(
+    "wrong, says", [(float, "cg.interp"), (bool, "cg.where"), (lambda x: np.interp(x, [0, 1], [0, 1]), "cg.interp")]
+)
+def test_a_node_where_a_number_is_needed_says_what_to_take(wrong, says):
+    with pytest.raises(TypeError, match=says):
+        wrong(X)

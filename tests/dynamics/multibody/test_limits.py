@@ -1,0 +1,157 @@
+"""Limits of joints as numbers: from files, to files, and where they are shown; beside MuJoCo's and Pinocchio's."""
+
+from __future__ import annotations
+
+import json
+import math
+import pickle
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+
+import cgraph as cg
+import dynamics as dyn
+from tests.each_row import each_row
+from viz import cli
+from viz.models.live_motion import live_of
+
+LEFT_OUT = pytest.mark.filterwarnings("ignore:.*left out:dynamics.MechanismWarning")
+HALF = dyn.Limits((-0.5, 0.5))
+INERTIAL = '<inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>'
+
+
+def urdf(*joints: tuple[str, str, str]) -> str:
+    """A chain of joints, (name, type, attributes of its limit), about and along y."""
+    links = "".join([f'<link name="{name}">{INERTIAL}</link>' for name, *_ in joints])
+    text = f'<link name="base"/>{links}'
+    for (parent, *_), (name, kind, limit) in zip([("base", "", ""), *joints], joints, strict=False):
+        ends = f'<parent link="{parent}"/><child link="{name}"/><axis xyz="0 1 0"/>'
+        text += f'<joint name="j_{name}" type="{kind}">{ends}{f"<limit {limit}/>" if limit else ""}</joint>'
+    return f'<robot name="r">{text}</robot>'
+
+
+ROBOT = urdf(
+    ("hinge", "revolute", 'lower="-1" upper="2" effort="30" velocity="3.5"'),
+    ("wheel", "continuous", 'effort="5" velocity="7"'),
+    ("slide", "prismatic", 'lower="0" upper="0.2" effort="50" velocity="0.5"'),
+)
+MODEL = """<mujoco><compiler angle="degree" autolimits="true"/><worldbody>
+  <body name="a"><joint name="s" axis="0 1 0" range="-90 45" actuatorfrcrange="-8 9"/><geom size=".1"/>
+    <body name="b" pos="0 0 -.5"><joint name="e" axis="0 1 0"/><joint name="p" type="slide" range="0 .3"/>
+      <geom size=".1"/>
+      <body name="c"><joint name="r" type="ball" range="0 30"/><geom size=".1"/></body></body></body></worldbody>
+  <actuator><motor joint="s" gear="-3" ctrlrange="-1 4"/><motor joint="s" ctrlrange="-2 2"/>
+    <motor joint="e" gear="2" forcerange="-1 5"/><position joint="p" kp="30" ctrlrange="-1 1" forcerange="-20 20"/>
+  </actuator></mujoco>"""
+
+
+@LEFT_OUT
+def test_those_of_urdf_come_back_from_text() -> None:
+    arm = dyn.load_urdf(ROBOT)
+    assert arm.limits == {
+        "j_hinge": dyn.Limits((-1.0, 2.0), (-3.5, 3.5), (-30.0, 30.0)),
+        "j_wheel": dyn.Limits(velocity=(-7.0, 7.0), effort=(-5.0, 5.0)),
+        "j_slide": dyn.Limits((0.0, 0.2), (-0.5, 0.5), (-50.0, 50.0)),
+    }
+    assert dyn.load_urdf(dyn.to_urdf(arm)).limits == arm.limits
+    assert pickle.loads(pickle.dumps(arm)).limits == arm.limits
+    assert list(arm.lock("wheel").limits) == ["j_hinge", "j_slide"]
+
+
+@LEFT_OUT
+def test_those_of_urdf_are_pinocchios() -> None:
+    pin, arm = pytest.importorskip("pinocchio"), dyn.load_urdf(ROBOT)
+    model: Any = pin.buildModelFromXML(ROBOT)
+    for name, each in arm.limits.items():
+        joint = model.joints[model.getJointId(name)]
+        assert (model.velocityLimit[joint.idx_v], model.effortLimit[joint.idx_v]) == (each.velocity[1], each.effort[1])
+        if joint.nq == 1:
+            assert (model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q]) == each.position
+
+
+@LEFT_OUT
+def test_those_of_mjcf_are_mujocos() -> None:
+    mujoco = pytest.importorskip("mujoco")
+    arm, model = dyn.load_mjcf(MODEL), mujoco.MjModel.from_xml_string(MODEL)
+    for j in range(3):
+        expected = tuple(model.jnt_range[j]) if model.jnt_limited[j] else (-math.inf, math.inf)
+        assert arm.limits[model.joint(j).name].position == expected
+    efforts = {name: each.effort for name, each in arm.limits.items()}
+    assert efforts["s"] == (-8.0, 5.0)  # -12 to 3 by a gear of -3, and 2 to both sides, within -8 to 9
+    assert (efforts["e"], efforts["p"]) == ((-2.0, 10.0), (-20.0, 20.0))
+    assert {arm.limits[name] for name in arm.coordinates[3:]} == {dyn.Limits()}  # a ball has none
+    data = mujoco.MjData(model)
+    low, high = [], []
+    for ctrl in np.random.default_rng(0).uniform(-50.0, 50.0, (200, model.nu)):
+        data.ctrl[:] = ctrl
+        mujoco.mj_forward(model, data)
+        low.append(data.qfrc_actuator[:2].copy())
+        high.append(data.qfrc_actuator[:2].copy())
+    assert np.min(low, axis=0) == pytest.approx([-8.0, -2.0])
+    assert np.max(high, axis=0) == pytest.approx([5.0, 10.0])
+
+
+@LEFT_OUT
+def test_the_equations_are_those_without() -> None:
+    free = re.sub("<limit[^>]*>", "", ROBOT)
+    graphs = [dyn.forward_dynamics(dyn.load_urdf(text)) for text in (ROBOT, free)]
+    assert cg.structure_hash(graphs[0]) == cg.structure_hash(graphs[1])
+
+
+def test_a_joint_of_several_coordinates_has_one_for_each() -> None:
+    each = (HALF, None)
+    body = dyn.Body("b", dyn.Joint("universal", limits=each), mass=1.0, inertia=(1.0, 1.0, 1.0))
+    assert [*dyn.Mechanism([body]).limits.values()] == [HALF, dyn.Limits()]
+    with pytest.raises(dyn.MechanismError, match=r"limits must be one number, or 2 for angle1, angle2"):
+        dyn.Mechanism([dyn.Body("b", dyn.Joint("universal", limits=[None] * 3), mass=1.0)])
+
+
+@each_row(
+    "made, said",
+    [
+        (lambda: dyn.Limits((1.0, -1.0)), "limits: position must be (lower, upper), got (1.0, -1.0)"),
+        (lambda: dyn.Limits(velocity=(0.0, math.nan)), "limits: velocity must be (lower, upper), got (0.0, nan)"),
+        (lambda: dyn.Limits(effort=1.0), "limits: effort must be (lower, upper), got 1.0"),
+        (
+            lambda: dyn.Mechanism([dyn.Body("b", dyn.Joint("ball", limits=HALF), mass=1.0)]),
+            "body 'b': a joint of the kind 'ball' has no limits",
+        ),
+        (
+            lambda: dyn.Mechanism([dyn.Body("b", dyn.Joint("revolute", limits=(0.0, 1.0)), mass=1.0)]),
+            "body 'b': limits must be of the type Limits, got tuple: (0.0, 1.0)",
+        ),
+    ],
+)
+def test_what_are_no_limits_is_told(made: Any, said: str) -> None:
+    with pytest.raises(ValueError, match=re.escape(said)):
+        made()
+
+
+def test_what_cannot_be_in_a_file_is_said() -> None:
+    text = urdf(("a", "revolute", 'lower="1" upper="-1"'), ("b", "continuous", 'effort="-3"'))
+    with pytest.warns(dyn.MechanismWarning, match=r"limits that cannot be \(j_a, j_b\)"):
+        arm = dyn.load_urdf(text)
+    assert {*arm.limits.values()} == {dyn.Limits()}
+    one_way = dyn.Joint("revolute", limits=dyn.Limits(effort=(0.0, 5.0)))
+    with pytest.warns(dyn.MechanismWarning, match="one effort limit for both ways: that of 'b', 0 to 5, is left out"):
+        assert 'effort="1000000000.0"' in dyn.to_urdf(dyn.Mechanism([dyn.Body("b", one_way, inertia=(1.0, 1.0, 1.0))]))
+
+
+@LEFT_OUT
+def test_a_run_says_which_it_left_and_sliders_end_there(tmp_path: Any, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "arm.urdf").write_text(ROBOT, encoding="utf-8")
+    start = "--start=qd.j_hinge=4,qd.j_slide=-0.1"
+    cli.main(["simulate", str(tmp_path / "arm.urdf"), start, "--t-end=0.4", "--every=0.1", "--json"])
+    said = json.loads(capsys.readouterr().out)["beyond_limits"]
+    assert [each.partition(" at ")[0] for each in said] == [
+        "position of j_slide leaves 0 to 0.2 m",
+        "velocity of j_hinge leaves -3.5 to 3.5 rad/s",
+    ]
+    data: Any = live_of(dyn.scenes.of_file(tmp_path / "arm.urdf")).to_dict()
+    ends = {each["name"]: (each["low"], each["high"]) for each in data["inputs"]}
+    assert ends["q0"] == (-1.0, 2.0)
+    assert ends["q2"] == (0.0, 0.2)
+    assert (ends["qd1"], ends["tau1"]) == ((-7.0, 7.0), (-5.0, 5.0))
+    assert ends["q1"] == (-math.pi, math.pi)
