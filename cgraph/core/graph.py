@@ -95,8 +95,7 @@ class Graph:
         self.outputs = _checked_outputs(outputs)
         self.nodes = tuple(topological(self.outputs.values()))
         known = set(self.inputs)
-        free = [node.name for node in self.nodes if node.op is VARIABLE and node not in known]
-        if free:
+        if free := [node.name for node in self.nodes if node.op is VARIABLE and node not in known]:
             listed = ", ".join(repr(name) for name in sorted(map(str, free)))
             names = ", ".join(self.input_names) or "none"
             raise GraphError(f"the outputs need {listed}, not among the inputs ({names})")
@@ -136,8 +135,7 @@ class Graph:
             if node in replace:
                 raise TypeError(f"input {name!r} is given twice")
             replace[node] = as_node(value)
-        missing = [str(node.name) for node in self.inputs if node not in replace]
-        if missing:
+        if missing := [str(node.name) for node in self.inputs if node not in replace]:
             raise TypeError(f"no value for input {', '.join(missing)}")
         new = rebuild(self.outputs.values(), replace, lambda n, args: Node(n.op, args, n.label, name=n.name))
         return {name: new[node] for name, node in self.outputs.items()}
@@ -196,20 +194,24 @@ class Graph:
         check(self)
 
     def to_networkx(self) -> networkx.MultiDiGraph:
-        """A networkx.MultiDiGraph from arguments to uses.
+        """A networkx.MultiDiGraph from arguments to uses, nodes numbered as in `nodes`, unused inputs behind.
 
-        Nodes are numbered as in `nodes` (unused inputs follow), with op, name, value, tags, roles and outputs (names)
-        as attributes; the key of an edge is the argument's slot.
+        They have op; name, value, input (a place) if any; as JSON tags, roles, lines, outputs; edges a slot.
         """
         from ..writing.networkx_queries import to_networkx
 
         return to_networkx(self.nodes, self.inputs, self.outputs)
 
+    @staticmethod
+    def from_networkx(network: networkx.DiGraph) -> Graph:
+        """The graph of what `to_networkx` gave, also through a file. Raises GraphError where something is missing."""
+        from ..writing.networkx_queries import from_networkx
+
+        return from_networkx(network)
+
     def __repr__(self) -> str:
-        return (
-            f"<Graph ({_short(self.input_names)}) -> ({_short(tuple(self.outputs))}): "
-            f"{len(self.nodes)} nodes, {sum(len(node.args) for node in self.nodes)} edges>"
-        )
+        ends, edges = map(_short, (self.input_names, tuple(self.outputs))), sum(len(node.args) for node in self.nodes)
+        return f"<Graph ({') -> ('.join(ends)}): {len(self.nodes)} nodes, {edges} edges>"
 
     def _repr_html_(self) -> str | None:
         """The drawing that a notebook shows, when a drawing package is installed (extra `viz`)."""

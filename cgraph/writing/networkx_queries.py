@@ -1,39 +1,111 @@
-"""Graph queries by networkx: the one place that knows it."""
+"""A graph as one of networkx and back, and queries by it: the one place that knows it."""
 
 from __future__ import annotations
 
+import json
 from collections import Counter
-from collections.abc import Collection, Mapping, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Collection, Mapping, Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any
 
-from ..core.graph import Edge
-from ..core.node import Node
+from ..core.checks import GraphError, check_name
+from ..core.graph import Edge, Graph
+from ..core.label import SourceLine
+from ..core.node import CONSTANT, VARIABLE, Node
+from ..operations.table import OPS
+from .records import Record, restored
 
 if TYPE_CHECKING:
     import networkx
 
+LABELS = ("tags", "roles", "lines")
+
 
 def to_networkx(nodes: Sequence[Node], inputs: Sequence[Node], outputs: Mapping[str, Node]) -> networkx.MultiDiGraph:
-    """A MultiDiGraph from arguments to uses, of nodes in topological order and the inputs that nothing uses."""
+    """A MultiDiGraph from arguments to uses, of nodes in topological order and the inputs that nothing uses.
+
+    Attributes are texts and numbers, as GraphML and GEXF have them; lists and mappings are JSON.
+    """
     import networkx
 
     result = networkx.MultiDiGraph()
     number: dict[Node, int] = {}
+    places = {node: place for place, node in enumerate(inputs)}
+    named: dict[Node, dict[str, int]] = {}
+    for place, (name, node) in enumerate(outputs.items()):
+        named.setdefault(node, {})[name] = place
     for node in dict.fromkeys((*nodes, *inputs)):
         number[node] = len(number)
+        there = {"name": node.name, "value": node.value, "input": places.get(node)}
         result.add_node(
             number[node],
             op=node.op.name,
-            name=node.name,
-            value=node.value,
-            tags=sorted(node.tags),
-            roles=sorted(node.roles),
-            outputs=[name for name, output in outputs.items() if output is node],
+            **{name: value for name, value in there.items() if value is not None},
+            **{name: _text(sorted(getattr(node, name))) for name in LABELS},
+            outputs=_text(named.get(node, {})),
         )
     for node in nodes:
         for slot, arg in enumerate(node.args):
-            result.add_edge(number[arg], number[node], key=slot)
+            result.add_edge(number[arg], number[node], key=slot, slot=slot)
     return result
+
+
+def from_networkx(network: networkx.DiGraph) -> Graph:
+    """The graph of which `to_networkx` gave this, or a file of it. Raises GraphError where something is missing."""
+    import networkx
+
+    if not isinstance(network, networkx.DiGraph):
+        raise TypeError(f"from_networkx takes a networkx.DiGraph, got {type(network).__name__}: {network!r:.60}")
+    try:
+        order = list(networkx.topological_sort(network))
+    except networkx.NetworkXUnfeasible:
+        raise GraphError("from_networkx: the arguments of a node lead back to it") from None
+    number = {key: k for k, key in enumerate(order)}
+    kept: list[Record] = []
+    inputs: dict[int, str] = {}
+    outputs: dict[int, tuple[str, int]] = {}
+    for key in order:
+        read = partial(_read, key, network.nodes[key])
+        op, name = read("op", str), read("name", _name, None)
+        if op not in (CONSTANT.name, VARIABLE.name, *OPS):
+            raise GraphError(f"operation {op!r} of node {key!r} is not in the table: register its row first")
+        value = read("value", float) if op == CONSTANT.name else None
+        if op == VARIABLE.name:
+            inputs[read("input", int)] = read("name", _name)
+        slots = {_read(key, data, "slot", int): number[source] for source, _, data in network.in_edges(key, data=True)}
+        arity = OPS[op].arity if op in OPS else 0
+        if sorted(slots) != list(range(arity)) or network.in_degree(key) != arity:
+            raise GraphError(f"node {key!r}, {op}, takes {arity} arguments in slots from 0, got {sorted(slots)}")
+        labels = tuple([tuple([_member(each) for each in read(label, json.loads, ())]) for label in LABELS])
+        kept.append((op, tuple([slots[slot] for slot in range(arity)]), value, name, labels))
+        outputs |= {place: (output, number[key]) for output, place in read("outputs", json.loads, {}).items()}
+    given = tuple([inputs[place] for place in sorted(inputs)])
+    return restored(given, tuple(kept), dict([outputs[place] for place in sorted(outputs)]))
+
+
+def _read(key: object, data: Mapping[str, Any], name: str, kind: Callable[[Any], Any], default: object = ...) -> Any:
+    """An attribute of a node or of an edge to it."""
+    if name not in data:
+        if default is ...:
+            raise GraphError(f"node {key!r} has no attribute {name!r}, which to_networkx gives it or its edges")
+        return default
+    try:
+        return kind(data[name])
+    except (TypeError, ValueError) as error:
+        raise GraphError(f"attribute {name!r} of node {key!r}, {data[name]!r:.60}, cannot be read: {error}") from None
+
+
+def _name(name: str) -> str:
+    return check_name("a node", name)
+
+
+def _member(member: object) -> object:
+    """A tag, a role or a source line as JSON has it."""
+    return SourceLine(*member) if isinstance(member, list) else member
+
+
+def _text(value: object) -> str:
+    return json.dumps(value, ensure_ascii=False)
 
 
 def minimum_cut(edges: Sequence[Edge], sources: Collection[Node], sinks: Collection[Node]) -> list[Edge]:
