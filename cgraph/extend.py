@@ -126,6 +126,7 @@ if TYPE_CHECKING:  # shared by the three packages alone: no promise is made for 
     )
     from .util.threads import share as share, thread_count as thread_count
     from .util.words import counted as counted, or_nearest as or_nearest
+    from .writing.holds_nodes import HoldsNodes as HoldsNodes
 
 
 if not TYPE_CHECKING:  # a checker shall see a misspelt name
