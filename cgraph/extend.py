@@ -132,6 +132,7 @@ if TYPE_CHECKING:  # shared by the three packages alone: no promise is made for 
     from .util.threads import share as share, thread_count as thread_count
     from .util.words import counted as counted, nearest as nearest, or_nearest as or_nearest
     from .writing.formulas import Side as Side, fraction as fraction, statements as statements
+    from .writing.holds_nodes import HoldsNodes as HoldsNodes
     from .writing.latex import LATEX as LATEX, latex_block as latex_block, number_text as number_text
     from .writing.symbols import GREEK as GREEK, is_letter as is_letter, symbol as symbol
 

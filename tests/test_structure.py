@@ -33,6 +33,8 @@ OPTIONAL = {
     "heyoka": "heyoka",
     "jax": "jax",
     "sympy": "sympy",
+    "pandas": "pandas",
+    "xarray": "xarray",
     "torch": None,  # measured when it is there, never asked for
 }
 

@@ -240,7 +240,7 @@ CALLS = {
     "dyn.simulate_many": call(
         dyn.simulate_many, ARM, [[0.1]], [[0.0]], 0.02, "rk4", t0=0.0, t_span=None, t_eval=None, tau=0.0,
         parameters=None, workers=1, chunk=None, max_step=None, rtol=None, atol=None, events=(), first_step=None,
-        form="velocity", **RUNS
+        form="velocity", store=None, **RUNS
     ),
     "dyn.attach_with_impact": call(
         dyn.attach_with_impact, ARM, [0.0], [0.0], body(parent=ARM.bodies[0].name), None, velocity=(0, 0, 0),

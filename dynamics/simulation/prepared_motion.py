@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import Array, floats, require_choice, require_flag, require_sequence
+from cgraph.extend import Array, HoldsNodes, floats, require_choice, require_flag, require_sequence
 
 from ..equations.state_equation import FORMS
 from ..equations.states.initial_value import other_inputs
@@ -60,7 +60,7 @@ class MotionEnd(NamedTuple):
     qd: Array
 
 
-class PreparedMotion:
+class PreparedMotion(HoldsNodes):
     """Motions of one model by one method, all but start, end and parameter values fixed; made by `prepare`.
 
     A call gives the Trajectory that `simulate` gives, to the bit. Any number of threads may call a motion at once: the

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import cgraph as cg
 from cgraph import Graph, Node, extend
-from cgraph.extend import topological
+from cgraph.extend import HoldsNodes, topological
 
 from .arguments import (
     TIME,
@@ -23,7 +23,7 @@ from .arguments import (
 RESERVED = (TIME, "dt")
 
 
-class OdeSystem:
+class OdeSystem(HoldsNodes):
     """A system of first-order differential equations, xdot = rate(x, t).
 
     Parameters

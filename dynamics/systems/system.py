@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph, Node, extend
-from cgraph.extend import Builder, building, require_sequence, topological
+from cgraph.extend import Builder, HoldsNodes, building, require_sequence, topological
 
 from .arguments import (
     TIME,
@@ -32,7 +32,7 @@ from .kinematics import Kinematics
 from .quasi_velocities import QuasiVelocities
 
 
-class System:
+class System(HoldsNodes):
     """A mechanical system with Lagrangian L(q, qd, t) = K - P.
 
     The equation of motion is  d/dt dL/dqd - dL/dq = tau + forces - damping * qd.
@@ -246,8 +246,6 @@ class System:
     def changed(self, **given: object) -> System:
         """A copy with these attributes in place of its own; what follows from attributes is derived anew."""
         other = copy(self)
-        for name in [name for name in vars(self) if isinstance(getattr(System, name, None), cached_property)]:
-            del vars(other)[name]
         vars(other).update(given)
         return other
 

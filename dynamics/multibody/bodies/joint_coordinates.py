@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import partial
 from typing import NamedTuple, TypeVar
 
 import numpy as np
@@ -116,17 +117,22 @@ def quasi_velocities(bodies: Sequence[Body]) -> QuasiVelocities | None:
     types = [body.joint.type for body in bodies]
     if all([_are_rates(kind) for kind in {*types}]):
         return None
-
-    def rate(q: Sequence[Node], u: Sequence[Node]) -> list[Node]:
-        joints = zip(types, parts(bodies, q, u), strict=True)
-        return [node for kind, (x, v) in joints for node in kind.rate(x, v)]
-
-    def structure(u: Sequence[Node], p: Sequence[Node]) -> list[Node]:
-        joints = zip(types, places(bodies), strict=True)
-        return [node for kind, place in joints for node in kind.structure(u[place.u], p[place.u])]
-
-    def normalized(q: Sequence[Node]) -> list[Node]:
-        return [node for kind, place in zip(types, places(bodies), strict=True) for node in kind.normalized(q[place.q])]
-
     groups = [place.q.start + group for kind, place in zip(types, places(bodies), strict=True) for group in kind.groups]
+    rate, structure, normalized = (partial(each, bodies) for each in (_rate, _structure, _normalized))
     return QuasiVelocities(velocity_names(bodies), rate, structure, neutral(bodies), normalized, groups)
+
+
+def _rate(bodies: Sequence[Body], q: Sequence[Node], u: Sequence[Node]) -> list[Node]:
+    return [
+        node for body, (x, v) in zip(bodies, parts(bodies, q, u), strict=True) for node in body.joint.type.rate(x, v)
+    ]
+
+
+def _structure(bodies: Sequence[Body], u: Sequence[Node], p: Sequence[Node]) -> list[Node]:
+    joints = [(body.joint.type, place.u) for body, place in zip(bodies, places(bodies), strict=True)]
+    return [node for kind, at in joints for node in kind.structure(u[at], p[at])]
+
+
+def _normalized(bodies: Sequence[Body], q: Sequence[Node]) -> list[Node]:
+    joints = [(body.joint.type, place.q) for body, place in zip(bodies, places(bodies), strict=True)]
+    return [node for kind, at in joints for node in kind.normalized(q[at])]

@@ -6,7 +6,7 @@ Modified copies have joints locked and freed, and subtrees taken off and hung on
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Any, NamedTuple, Self, TypeVar
 from weakref import WeakKeyDictionary
@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import kept_by_first
+from cgraph.extend import HoldsNodes, kept_by_first
 
 from ..algebra import spatial
 from ..bodies.body import BODY_QUANTITIES, JOINT_QUANTITIES, WORLD, Body, MechanismError, checked, quantities
@@ -126,7 +126,7 @@ class Subtree:
 
 
 @dataclass(frozen=True, eq=False)
-class Structure:
+class Structure(HoldsNodes):
     """The fields of a `Mechanism`, see there, and copies with joints locked or freed, or with other subtrees."""
 
     bodies: Sequence[Body]
@@ -138,10 +138,6 @@ class Structure:
     left_out: tuple[str, ...] = ()
     loops: Sequence[Loop] = ()
     shared: SharedParts = field(default_factory=SharedParts, repr=False, kw_only=True)
-
-    def __getstate__(self) -> dict[str, object]:
-        """The fields alone: what was derived from them is derived again where it is needed."""
-        return {each.name: getattr(self, each.name) for each in fields(self)}
 
     @property
     def parameter_values(self) -> dict[str, float]:

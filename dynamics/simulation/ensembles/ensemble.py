@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,6 +12,10 @@ from cgraph.extend import Array
 
 from ..outcome import INTERRUPTED, REACHED
 from ..trajectory import Crossings, Stats
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
 
 Counts = np.ndarray[Any, np.dtype[np.int64]]
 
@@ -142,6 +146,12 @@ class Ensemble:
         {name of an event: (Crossings, ..)}, N of them, one for each trajectory.
     p : ndarray, optional
         Momenta dL/dqd, (N, T, n), of runs with `form="momentum"`.
+    q_start, qd_start : ndarray
+        The states that the trajectories began with, (N, nq) and (N, n), as they were normalized.
+    parameters : mapping
+        {name: (N,)} of what else differed between them: parameters, and tau0, tau1, .. of an applied force (N, n).
+    coordinates, velocities : tuple of str
+        Names of the columns of q and of those of qd.
 
     Examples
     --------
@@ -157,6 +167,11 @@ class Ensemble:
     stats: EnsembleStats
     events: Mapping[str, tuple[Crossings, ...]] = field(default_factory=dict)
     p: Array | None = None
+    q_start: Array = field(default_factory=lambda: np.empty((0, 0)))
+    qd_start: Array = field(default_factory=lambda: np.empty((0, 0)))
+    parameters: Mapping[str, Array] = field(default_factory=dict)
+    coordinates: tuple[str, ...] = ()
+    velocities: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         many, rows, n = self.q.shape
@@ -164,3 +179,59 @@ class Ensemble:
         span = f", t = {self.t[0]:g} .. {self.t[-1]:g} s" if rows else ""
         whole = int(np.count_nonzero(self.stats.success))
         return f"<Ensemble of {many}, {what}: {rows} rows{span}; {self.stats.method}, {whole} reached t_end>"
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """A row for each trajectory and time (extra `tables`).
+
+        Its index is (trajectory, t); its columns are coordinates "q.<name>" and velocities "qd.<name>", momenta
+        "p.<name>", then parameters, then `success` and `message`. Starts, events and other statistics are not in it. A
+        file is pandas' own, as in `.to_parquet("fall.parquet")`.
+
+        Returns
+        -------
+        pandas.DataFrame
+            N times T rows, in memory.
+
+        Raises
+        ------
+        ImportError
+            Where pandas is not installed.
+
+        Examples
+        --------
+        >>> import dynamics as dyn
+        >>> spring = dyn.System(lambda q, qd, t, p: 0.5 * qd[0] ** 2 - 0.5 * p["k"] * q[0] ** 2, "x", {"k": 1.0})
+        >>> sweep = dyn.simulate_many(spring, [1.0], [0.0], 1.0, parameters={"k": [1.0, 4.0]}, t_eval=[0.0, 1.0])
+        >>> table = sweep.to_pandas()
+        >>> table["q.x"].loc[1, 1.0].round(3), table["k"].loc[1, 1.0]
+        (np.float64(-0.416), np.float64(4.0))
+        """
+        from .tables import to_pandas
+
+        return to_pandas(self)
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Arrays with names (extra `tables`): all but `events`, whose number differs from trajectory to trajectory.
+
+        Its dimensions are trajectory, t, coordinate and velocity; parameters are coordinates of a trajectory, and each
+        of the statistics is a variable of it. Memory maps of a store stay what they are.
+
+        Returns
+        -------
+        xarray.Dataset
+
+        Raises
+        ------
+        ImportError
+            Where xarray is not installed.
+
+        Examples
+        --------
+        >>> import dynamics as dyn
+        >>> fan = dyn.simulate_many(dyn.planar_arm([1.0], [1.0]), [[0.1], [0.2]], [0.0], 1.0, t_eval=[0.0, 1.0])
+        >>> fan.to_xarray().q.sel(coordinate="joint 1", t=1.0).values.round(4)
+        array([-0.077, -0.155])
+        """
+        from .tables import to_xarray
+
+        return to_xarray(self)

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
+import os
 import time
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Node
-from cgraph.extend import Array, require_whole
+from cgraph.extend import Array, require_path, require_whole
 
 from ...equations.states.initial_value import InitialValues, initial_values
 from ...integrators import Problem, derive, in_form
@@ -31,8 +33,9 @@ from ..steps.step_program import StepProgram, step_program
 from ..trajectory import SimulationWarning
 from .ensemble import Ensemble, EnsembleStats
 from .lanes import fits_lanes, iterates
+from .store import Store, sweep_of
 from .task import Chunk, Part, Task, not_begun
-from .workers import Map, Workers, checked, finished
+from .workers import Team, Workers, checked, finished
 
 VECTOR = 8  # lanes, or a multiple of them, of every processor: a chunk of trajectories side by side is whole vectors
 LARGEST_CHUNK = 256  # trajectories in a chunk, unless asked for
@@ -68,6 +71,7 @@ def simulate_many(
     backend: str = "auto",
     progress: bool | None = None,
     form: str = "velocity",
+    store: str | os.PathLike[str] | None = None,
 ) -> Ensemble:
     """The motions of a system from N starts at t0 to t_end, by one program that is compiled once.
 
@@ -98,24 +102,34 @@ def simulate_many(
     parameters : mapping, optional
         {name: value} in place of the model's own, and of those of a controller, a number for all or one for each
         trajectory, (N,).
-    workers : int, callable or None
-        How many threads share the work, None for one on each core; or any map, `workers(function, iterable)`, such as
-        that of a pool of processes. The numbers are the same to the last bit.
+    workers : int, Executor, callable or None
+        How many threads share the work, None for one on each core; or an executor of `concurrent.futures`, such as
+        Dask's `client.get_executor()`; or any map, `workers(function, iterable)`. The numbers are the same to the last
+        bit.
     chunk : int, optional
         Trajectories that a worker takes at a time; by default some chunks for each, of at most 256. Side by side it is
         rounded up to whole vectors, multiples of 8.
+    store : path, optional
+        A folder, empty or not there, in which chunks are kept as they end. The same call again takes up where the first
+        was ended, by whatever, with the chunks as they were cut then, and at last reads all from the folder. Ctrl-C is
+        then a KeyboardInterrupt.
 
     Returns
     -------
     Ensemble
-        t (T,), q (N, T, nq), qd (N, T, n), and `stats` with an entry for each trajectory.
+        t (T,), q (N, T, nq), qd (N, T, n), and `stats` with an entry for each trajectory. With a store q and qd are
+        memory maps of its file: what is read of them is loaded, and they cannot be written. With `form="momentum"` qd
+        are computed, and in memory.
 
     Raises
     ------
     TypeError, ValueError
-        For arguments of another type, shape or range, each by name, and for `workers` that give no results.
+        For arguments of another type, shape or range, each by name, for `workers` that give no results, and for a
+        `store` that keeps another sweep, by what differs: model, starts, parameters, options, versions.
     MemoryError
         For a result that would not fit.
+    OSError
+        For a `store` that cannot be written, or has no room.
     RuntimeError
         Where a process of `workers` is ended from outside.
     SingularMassMatrixError
@@ -129,7 +143,7 @@ def simulate_many(
     [-0.077, -0.155, -0.2348]
     """
     # Check
-    _check(method, chunk, tau)
+    folder = _check(method, chunk, tau, store)
     t0, t_end = time_span(t_end, t0, t_span)
     arguments = (dt, max_step, rtol, atol, t_eval, first_step, max_steps, backend, progress)
     options = RunOptions(t_end, method, *arguments, t0, estimate_error)
@@ -137,7 +151,7 @@ def simulate_many(
     model, applied = with_applied(model, tau, parameters)
     start = initial_values(model, q, qd, applied.constant, parameters, t0)
     options.check(start.states)
-    count = _row_count(options, *start.x.shape)
+    count = _row_count(options, *start.x.shape, stored=store is not None)
 
     # Derive the equations as graphs, and write the steps of the method over them
     begin = time.perf_counter()
@@ -150,14 +164,14 @@ def simulate_many(
     sent = replace(options, t_eval=options.row_times) if watched else options
     task = Task(program, sent, count, tuple(grids), watch if watched else None, lanes)
     x, p = _stepped(problem, start, t0)
-    chunks = _chunks(x, p, chunk, team, count * program.steps.width if lanes else 0, grids)
+    width = _width(len(x), chunk, team, count * program.steps.width if lanes else 0, grids)
 
     # Integrate, by whoever takes the chunks and compiles the steps
-    whole = not_begun(0, np.empty((len(x), count, problem.size)), events=bool(watched))
-    _run(task, chunks, team, whole)
+    kept = None if folder is None else Store(folder, sweep_of(problem, task, x, p), width, (len(x), count, x.shape[1]))
+    whole = _run(task, x, p, width, team, kept)
 
     # Put the result together
-    result = _ensemble(problem, watch, options, whole, (start.x, x, p), time.perf_counter() - begin)
+    result = _ensemble(problem, watch, options, whole, (start, x, p), time.perf_counter() - begin)
     for text in _warnings(result.stats):
         warnings.warn(text, SimulationWarning, stacklevel=2)
     return result
@@ -169,8 +183,8 @@ def _stepped(problem: Problem, start: InitialValues, t0: float) -> tuple[Array, 
     return converted(problem.momentum, t0, start.x, p), p
 
 
-def _row_count(options: RunOptions, many: int, m: int) -> int:
-    """Rows of a trajectory, T, of so many of m numbers.
+def _row_count(options: RunOptions, many: int, m: int, *, stored: bool) -> int:
+    """Rows of a trajectory, T, of so many of m numbers.  stored: in a file, not in memory.
 
     Raises ValueError where trajectories would not have the same, MemoryError where all would not fit.
     """
@@ -182,7 +196,8 @@ def _row_count(options: RunOptions, many: int, m: int) -> int:
     times, length = options.times, options.t_end - options.t0
     count = step_count(length, options.step) + 1 if times is None else len(times)
     what = f"{many} trajectories of {count} rows of {m} numbers"
-    require_room(8 * many * count * m, what, "record fewer times (t_eval) or simulate fewer at once")
+    if not stored:
+        require_room(8 * many * count * m, what, "record fewer times (t_eval), simulate fewer at once or name a store")
     return count
 
 
@@ -191,20 +206,32 @@ def _ensemble(
     watch: EventProgram,
     options: RunOptions,
     whole: Part,
-    starts: tuple[Array, Array, Array],
+    starts: tuple[InitialValues, Array, Array],
     seconds: float,
 ) -> Ensemble:
-    """Ensemble of all that has come.  starts: q and qd, their states (N, m), and the parameters of the problem."""
-    times, rows, nq, p = options.row_times, whole.rows, problem.nq, starts[2]
+    """Ensemble of all that has come.  starts: as given, their states (N, m), and the parameters of the problem."""
+    times, rows, nq, (start, x, p) = options.row_times, whole.rows, problem.nq, starts
     logs = [split_crossings(watch, log, nq, p[k]) for k, log in enumerate(whole.happened)]
     crossings = {event.name: tuple([named[event.name] for named in logs]) for event in watch.events}
     missed: dict[int, list[str]] = {}
-    for k, (q, x, numbers) in enumerate(zip(*starts, strict=True)) if problem.missing is not None else ():
-        missed[k] = unreached_momenta(problem, times, rows[k], numbers, start=(options.t0, q, x))
+    for k in range(len(x)) if problem.missing is not None else ():
+        missed[k] = unreached_momenta(problem, times, rows[k], p[k], start=(options.t0, start.x[k], x[k]))
     stats = whole.runs.stats(options.method, seconds, missed)
     states = converted(problem.velocities, times, rows, p[:, None])
     momenta = rows[:, :, nq:] if problem.momenta else None
-    return Ensemble(times, states[:, :, :nq], states[:, :, nq:], stats, crossings, momenta)
+    return Ensemble(
+        times,
+        rows[:, :, :nq],
+        states[:, :, nq:],
+        stats,
+        crossings,
+        momenta,
+        start.x[:, :nq],
+        start.x[:, nq:],
+        start.varied,
+        problem.model.coordinates,
+        problem.model.velocities,
+    )
 
 
 def _warnings(stats: EnsembleStats) -> list[str]:
@@ -227,7 +254,8 @@ def _warnings(stats: EnsembleStats) -> list[str]:
     return said
 
 
-def _check(method: str, chunk: int | None, tau: object) -> None:
+def _check(method: str, chunk: int | None, tau: object, store: str | os.PathLike[str] | None) -> Path | None:
+    """The folder of a store. Raises for what is wrong with these arguments alone."""
     if isinstance(method, str) and method.startswith(SCIPY):
         raise ValueError(f"simulate_many takes methods of dyn.METHODS, and none of SciPy, got {method!r:.60}")
     if chunk is not None:
@@ -237,6 +265,7 @@ def _check(method: str, chunk: int | None, tau: object) -> None:
             "a SampledController may remember what it has seen, and so controls one run: call simulate for each start, "
             "or write the controller in closed form"
         )
+    return None if store is None else require_path("store", store)
 
 
 def _side_by_side(program: StepProgram, options: RunOptions, count: int) -> tuple[list[EqualSteps], bool]:
@@ -255,10 +284,8 @@ def _grids(program: StepProgram, options: RunOptions, count: int) -> list[EqualS
     return grids if sum(grid.steps for grid in grids) <= options.max_steps else []
 
 
-def _chunks(
-    x: Array, p: Array, chunk: int | None, workers: int | Map, rows: int, grids: Sequence[EqualSteps]
-) -> list[Chunk]:
-    """The starts in chunks.
+def _width(count: int, chunk: int | None, workers: Team, rows: int, grids: Sequence[EqualSteps]) -> int:
+    """Trajectories in a chunk, of so many.
 
     rows: numbers in the rows of steps that a trajectory keeps in its lane, 0 where it is in none.
     grids: of trajectories side by side, whose chunks are of whole vectors, so that each has the same neighbors in any.
@@ -267,27 +294,40 @@ def _chunks(
     if rows and chunk is not None:
         chunk = min(chunk, largest)
     if chunk is None:
-        short = rows and grids and len(x) * grids[0].steps <= SHORT
+        short = rows and grids and count * grids[0].steps <= SHORT
         shares = 1 if short else SHARES
-        chunk = min(largest, math.ceil(len(x) / (shares * (UNKNOWN if callable(workers) else workers))))
-    width = math.ceil(chunk / VECTOR) * VECTOR if grids else int(chunk)
-    return [Chunk(k, x[k : k + width], p[k : k + width]) for k in range(0, len(x), width)]
+        chunk = min(largest, math.ceil(count / (shares * (workers if isinstance(workers, int) else UNKNOWN))))
+    return math.ceil(chunk / VECTOR) * VECTOR if grids else int(chunk)
 
 
-def _run(task: Task, chunks: Sequence[Chunk], workers: int | Map, whole: Part) -> None:
+def _run(task: Task, x: Array, p: Array, width: int, workers: Team, store: Store | None) -> Part:
     """Run the chunks, by whoever shares them, until all parts have come, or Ctrl-C; rows that have not are NaN.
 
+    Those that a store has are taken from there, and others are kept there as they end.
     Raises ValueError unless all parts come.
     """
+    rows = np.empty((len(x), task.count, x.shape[1])) if store is None else store.rows
+    whole, width = not_begun(0, rows, events=task.events is not None), width if store is None else store.width
+    chunks = [Chunk(k, x[k : k + width], p[k : k + width]) for k in range(0, len(x), width)]
     arrived = np.zeros(len(whole.rows), dtype=bool)
+
+    def put(part: Part) -> None:
+        whole.put(part)
+        arrived[part.first : part.first + len(part.rows)] = True
+
+    for chunk in chunks if store is not None else ():
+        if store is not None and (part := store.part(chunk)) is not None:
+            put(part)
+    left = [chunk for chunk in chunks if not arrived[chunk.first]]
     try:
         with (
             Progress("simulate", len(arrived), task.options.progress) as report,
-            closing(finished(task, chunks, workers, whole.rows)) as parts,
+            closing(finished(task, left, workers, whole.rows)) as parts,
         ):
             for part in parts:
-                whole.put(part)
-                arrived[part.first : part.first + len(part.rows)] = True
+                put(part)
+                if store is not None and not part.runs.interrupted:
+                    store.keep(part)
                 report(int(arrived.sum()))
         if not arrived.all():
             raise ValueError(
@@ -295,4 +335,7 @@ def _run(task: Task, chunks: Sequence[Chunk], workers: int | Map, whole: Part) -
                 f"{len(arrived)} trajectories came back {arrived.sum()}"
             )
     except KeyboardInterrupt:
+        if store is not None:
+            raise
         whole.rows[~arrived] = math.nan
+    return whole if store is None else replace(whole, rows=store.read_only())

@@ -1,11 +1,11 @@
-"""Workers: what shares chunks out, among threads of this process or by any map."""
+"""Workers: what shares chunks out, among threads of this process, by an executor or by any map."""
 
 from __future__ import annotations
 
 import multiprocessing
 import threading
 from collections.abc import Callable, Generator, Iterable, Sequence
-from concurrent.futures import BrokenExecutor, Future, ThreadPoolExecutor
+from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor, as_completed
 from contextlib import closing, suppress
 from multiprocessing.pool import Pool
 from multiprocessing.process import BaseProcess
@@ -18,36 +18,37 @@ from cgraph.extend import Array, thread_count
 from .task import Chunk, Part, Task
 
 Map = Callable[[Callable[[Chunk], Part], Sequence[Chunk]], Iterable[Part]]
-Workers = int | Map | None
+Team = int | Map | Executor  # number of threads, or who does the work
+Workers = Team | None
 LOOK = 0.1  # s: not every system interrupts a wait without an end for Ctrl-C
 MOST_THREADS = 2**31  # threads
 
 
-def checked(workers: Workers) -> int | Map:
-    """The number of threads, or the map. Raises ValueError for what is neither."""
-    if callable(workers):
+def checked(workers: Workers) -> Team:
+    """The number of threads, the executor or the map. Raises ValueError for what is none of these."""
+    if isinstance(workers, Executor) or callable(workers):
         return workers
     if workers is None:
         return thread_count(None)
     if isinstance(workers, bool) or not isinstance(workers, (int, np.integer)) or not 1 <= workers <= MOST_THREADS:
         raise ValueError(
-            "workers must be a whole number from 1, None for one on each core, or a function like map, got "
+            "workers must be a whole number from 1, None for one on each core, an executor or a function like map, got "
             f"{workers!r:.40}"
         )
     return thread_count(workers)
 
 
-def finished(task: Task, chunks: Sequence[Chunk], workers: int | Map, table: Array) -> Generator[Part, None, None]:
+def finished(task: Task, chunks: Sequence[Chunk], workers: Team, table: Array) -> Generator[Part, None, None]:
     """The parts as they come, in any order; closing it, or an exception, ends the threads.
 
     table: (N, T, m), in which this process makes the rows. Those of a map's parts lie elsewhere.
 
     Raises TypeError for a map that gives something else than results, RuntimeError for a process that was ended.
     """
-    if callable(workers):
+    if not isinstance(workers, int):
         done = 0
         try:
-            for part in _by_map(task, chunks, workers):
+            for part in _elsewhere(task, chunks, workers):
                 yield part
                 done += 1
         except BrokenExecutor:
@@ -55,7 +56,7 @@ def finished(task: Task, chunks: Sequence[Chunk], workers: int | Map, table: Arr
                 "a process of workers was ended from outside, as where memory runs out, when "
                 f"{done} of {len(chunks)} chunks were here"
             ) from None
-    elif workers == 1 or len(chunks) == 1:
+    elif workers == 1 or len(chunks) <= 1:
         for chunk in chunks:
             part = task.run(chunk, _rows(table, chunk), lambda: False)
             yield part
@@ -66,9 +67,17 @@ def finished(task: Task, chunks: Sequence[Chunk], workers: int | Map, table: Arr
             yield from parts
 
 
-def _by_map(task: Task, chunks: Sequence[Chunk], workers: Map) -> Generator[Part, None, None]:
-    pool = getattr(workers, "__self__", None)
-    parts = _by_pool(pool, task, chunks) if isinstance(pool, Pool) else workers(task, chunks)
+def _elsewhere(task: Task, chunks: Sequence[Chunk], workers: Map | Executor) -> Generator[Part, None, None]:
+    """The parts that others make, looked at: from an executor or a pool, or from their maps, as they end."""
+    pool = workers if isinstance(workers, Executor) else getattr(workers, "__self__", None)
+    parts: object
+    if isinstance(pool, Executor):
+        parts = _by_executor(pool, task, chunks)
+    elif isinstance(pool, Pool):
+        parts = _by_pool(pool, task, chunks)
+    else:
+        assert not isinstance(workers, Executor)
+        parts = workers(task, chunks)
     if not isinstance(parts, Iterable):
         raise TypeError(f"workers must give the results of the function, as map does, got {parts!r:.60}")
     for part in parts:
@@ -77,6 +86,19 @@ def _by_map(task: Task, chunks: Sequence[Chunk], workers: Map) -> Generator[Part
                 f"workers must give the results of the function, as map does, got {type(part).__name__}: {part!r:.60}"
             )
         yield part
+
+
+def _by_executor(pool: Executor, task: Task, chunks: Sequence[Chunk]) -> Generator[Part, None, None]:
+    """The parts as they end, none of which is kept: an executor's own map waits for the first, and holds the others."""
+    waiting = {pool.submit(task, chunk) for chunk in chunks}
+    try:
+        for future in as_completed(waiting):
+            waiting.discard(future)
+            yield future.result()
+            del future
+    finally:
+        for each in waiting:
+            each.cancel()
 
 
 def _by_pool(pool: Pool, task: Task, chunks: Sequence[Chunk]) -> Generator[Part, None, None]:

@@ -166,7 +166,12 @@ Q = np.zeros((4, 2))
         (Q, Q, {"max_steps": 0}, "max_steps must be a whole number, at least 1, or infinite, got 0"),
         (Q, Q, {"t_eval": [0.5, 0.2]}, "t_eval must be increasing times"),
         (Q, Q, {"chunk": 0}, "chunk must be a whole number from 1, got 0"),
-        (Q, Q, {"workers": 0}, "workers must be a whole number from 1, None for one on each core, or a function"),
+        (
+            Q,
+            Q,
+            {"workers": 0},
+            "workers must be a whole number from 1, None for one on each core, an executor or a function",
+        ),
         (Q, Q, {"workers": lambda f, each: []}, "a result for each item, as map does: of 4 trajectories came back 0"),
     ],
 )

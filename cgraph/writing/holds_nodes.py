@@ -1,0 +1,106 @@
+"""HoldsNodes: what pickles with the nodes that it holds, which are parts of one graph on their way."""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Callable
+from copy import deepcopy
+from functools import cached_property
+from io import BytesIO
+from typing import Any, Self, TypeVar
+
+from ..core.graph import Graph
+from ..core.node import VARIABLE, Node
+from ..core.traversal import topological
+
+Held = TypeVar("Held")
+
+
+class HoldsNodes:
+    """An object whose attributes hold nodes, however deep: it pickles with them, and nodes that it shares stay shared.
+
+    What was derived and can be again, cached properties and results that `kept_by_first` keeps, stays where it is.
+
+    Raises
+    ------
+    pickle.PicklingError
+        When it is pickled, for a function that another process cannot find: a lambda, or one inside another.
+
+    Examples
+    --------
+    >>> import pickle
+    >>> import cgraph as cg
+    >>> from cgraph.extend import HoldsNodes
+    >>> class Spring(HoldsNodes):
+    ...     def __init__(self, force):
+    ...         self.force = force
+    >>> state = Spring(3.0 * cg.variable("x")).__reduce__()
+    >>> state[1][2]
+    <Graph (x) -> (0): 3 nodes, 2 edges>
+    """
+
+    def __getstate__(self) -> dict[str, Any]:
+        kind = type(self)
+        derived = [name for name in vars(self) if isinstance(getattr(kind, name, None), cached_property)]
+        return {name: value for name, value in vars(self).items() if name not in (*derived, "_results")}
+
+    def __reduce__(self) -> tuple[Callable[..., object], tuple[object, ...]]:
+        written = BytesIO()
+        pickler = _Pickler(written)
+        try:
+            pickler.dump(self.__getstate__())
+        except (pickle.PicklingError, AttributeError, TypeError) as error:
+            if _TOLD in str(error):  # of what it holds
+                raise
+            raise pickle.PicklingError(
+                f"a {type(self).__name__}{_TOLD}: {error}; give it functions that are written in a module by def, "
+                "which another process finds, in place of a lambda or one inside another"
+            ) from None
+        return _restored, (type(self), written.getvalue(), pickler.graph())
+
+    def __copy__(self) -> Self:
+        return _of(type(self), self.__getstate__())
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> Self:
+        return _of(type(self), deepcopy(self.__getstate__(), memo))
+
+
+_TOLD = " does not pickle"
+
+
+class _Pickler(pickle.Pickler):
+    """Writes the number of a node in its place."""
+
+    def __init__(self, file: BytesIO) -> None:
+        super().__init__(file)
+        self.numbers: dict[Node, int] = {}
+
+    def persistent_id(self, given: object) -> int | None:
+        return self.numbers.setdefault(given, len(self.numbers)) if isinstance(given, Node) else None
+
+    def graph(self) -> Graph | None:
+        """The nodes that it has met, as outputs that their numbers name."""
+        variables = [node for node in topological(list(self.numbers)) if node.op is VARIABLE]
+        return Graph(variables, {f"{k}": node for node, k in self.numbers.items()}) if self.numbers else None
+
+
+class _Unpickler(pickle.Unpickler):
+    """Reads the nodes of a graph where there are numbers."""
+
+    def __init__(self, file: BytesIO, graph: Graph | None) -> None:
+        super().__init__(file)
+        self._nodes = {} if graph is None else graph.outputs
+
+    def persistent_load(self, number: int) -> Node:
+        return self._nodes[f"{number}"]
+
+
+def _restored(kind: type[Held], written: bytes, graph: Graph | None) -> Held:
+    """The object in another process."""
+    return _of(kind, _Unpickler(BytesIO(written), graph).load())
+
+
+def _of(kind: type[Held], state: dict[str, Any]) -> Held:
+    result = object.__new__(kind)
+    vars(result).update(state)
+    return result

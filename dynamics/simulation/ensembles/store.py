@@ -1,0 +1,176 @@
+"""Store: a folder that keeps a sweep of trajectories while it runs, from which it goes on where it was ended."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import platform
+import shutil
+from collections.abc import Iterable
+from hashlib import blake2b
+from importlib.metadata import PackageNotFoundError, version
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+from zipfile import BadZipFile
+
+import numpy as np
+
+import cgraph as cg
+from cgraph.extend import Array, Json, atomic_write
+
+from ...integrators import Problem
+from .ensemble import RunTable
+from .task import Chunk, Part, Task
+
+SWEEP, ROWS = "sweep.json", "rows.npy"
+FORMAT = 1
+
+
+class Store:
+    """The folder of a sweep.
+
+    sweep.json: what the sweep is, see `sweep_of`, and how many trajectories are in a chunk.  rows.npy: the states
+    (N, T, m) of all, in place.  chunk-000000000.npz, ..: how the trajectories from that number on went, a file each,
+    which is there once their rows are.
+
+    width: trajectories in a chunk, as the sweep began.  rows: the table, written through to the file.
+    """
+
+    def __init__(self, folder: Path, sweep: dict[str, Json], width: int, shape: tuple[int, ...]) -> None:
+        """Open the folder, or begin it. Raises ValueError where it keeps something else, OSError where it cannot be."""
+        self._folder = folder
+        folder.mkdir(parents=True, exist_ok=True)
+        if (folder / SWEEP).exists():
+            known = self._read()
+            _require_same(folder, known, sweep)
+            width = int(known["chunk"])
+        elif any(folder.iterdir()):
+            raise ValueError(
+                f"store {str(folder)!r} is a folder with other files and without a sweep: name an empty one"
+            )
+        else:
+            atomic_write(folder / SWEEP, json.dumps({**sweep, "chunk": width}, indent=1))
+        self.width = width
+        if not (folder / ROWS).exists():
+            self._make_rows(shape)
+        self.rows: Array = np.load(folder / ROWS, mmap_mode="r+")
+        if self.rows.shape != shape:
+            raise ValueError(f"store {str(folder)!r} is damaged: its {ROWS} has shape {self.rows.shape}, not {shape}")
+
+    def part(self, chunk: Chunk) -> Part | None:
+        """The results of a chunk, if they are there."""
+        count = len(chunk.x)
+        runs = RunTable(count)
+        try:
+            with np.load(self._file(chunk.first), allow_pickle=False) as kept:
+                for name, column in runs.columns.items():
+                    column[:] = kept[name]
+                texts = json.loads(kept["texts"].tobytes())
+        except (OSError, ValueError, KeyError, EOFError, BadZipFile):  # not there, or damaged: the chunk is run again
+            return None
+        runs.messages, runs.warnings = texts["messages"], [tuple(each) for each in texts["warnings"]]
+        happened = [[(number, t, np.array(x)) for number, t, x in log] for log in texts["happened"]]
+        return Part(chunk.first, self.rows[chunk.first : chunk.first + count], runs, happened)
+
+    def keep(self, part: Part) -> None:
+        """Write how the trajectories of a part went; their rows are in the table."""
+        self.rows.flush()  # type: ignore[attr-defined]  # of a memmap
+        happened = [[(number, t, x.tolist()) for number, t, x in log] for log in part.happened]
+        texts = {"messages": part.runs.messages, "warnings": part.runs.warnings, "happened": happened}
+        written = BytesIO()
+        np.savez(written, texts=np.frombuffer(json.dumps(texts).encode(), np.uint8), **part.runs.columns)
+        atomic_write(self._file(part.first), written.getvalue())
+
+    def read_only(self) -> Array:
+        """The table, of which rows are read when they are asked for, and none can be written."""
+        table: Array = np.load(self._folder / ROWS, mmap_mode="r")
+        return table
+
+    def _file(self, first: int) -> Path:
+        return self._folder / f"chunk-{first:09d}.npz"
+
+    def _read(self) -> dict[str, Any]:
+        try:
+            known = json.loads((self._folder / SWEEP).read_text(encoding="utf-8"))
+        except ValueError:
+            known = None
+        if not isinstance(known, dict) or not isinstance(known.get("chunk"), int):
+            raise ValueError(f"store {str(self._folder)!r} is damaged: its {SWEEP} is not one that was written here")
+        return known
+
+    def _make_rows(self, shape: tuple[int, ...]) -> None:
+        if any(self._folder.glob("chunk-*.npz")):
+            raise ValueError(f"store {str(self._folder)!r} is damaged: it has results of chunks, and no {ROWS}")
+        size, free = 8 * int(np.prod(shape)), shutil.disk_usage(self._folder).free
+        if size > free:  # a write through a memory map would end the process
+            raise OSError(
+                f"store {str(self._folder)!r} needs {size / 2**30:.3g} GiB for {shape[0]} trajectories of {shape[1]} "
+                f"rows of {shape[2]} numbers, and {free / 2**30:.3g} GiB are free: record fewer times (t_eval)"
+            )
+        made = self._folder / f".{ROWS}.{os.getpid()}.tmp"
+        np.lib.format.open_memmap(made, "w+", np.float64, shape=shape)
+        if hasattr(os, "posix_fallocate"):  # now, as nobody else may then take the room
+            with made.open("r+b") as file:
+                os.posix_fallocate(file.fileno(), 0, made.stat().st_size)
+        made.replace(self._folder / ROWS)
+
+
+def sweep_of(problem: Problem, task: Task, x: Array, p: Array) -> dict[str, Json]:
+    """What makes a sweep the sweep that it is: equations, starts, parameters, options, and by which versions.
+
+    x, p: states (N, m) and parameters (N, ..) that the steps start from.
+    """
+    program, options, watched = task.program, task.options, task.events.events if task.events else ()
+    model = [problem.rate, problem.velocities, program.normalization]
+    events = [graph for event in watched for graph in (event.values, event.reset)]
+    given = {
+        "format": FORMAT,
+        "cgraph": cg.__version__,
+        "llvmlite": _version("llvmlite"),
+        "machine": platform.machine(),
+        **{name: getattr(options, name) for name in ("method", "backend", "estimate_error")},
+        **{name: _number(getattr(options, name)) for name in ("t0", "t_end", "dt", "max_step", "first_step")},
+        "max_steps": _number(options.max_steps),
+        "rtol": options.relative,
+        "atol": np.asarray(options.absolute, dtype=np.float64).tolist(),
+        "times": _digest([options.row_times.tobytes()]),
+        "states": program.components,
+        "varied": problem.parameters,
+        "events": [f"{event.name} {event.direction} {event.terminal}" for event in watched],
+        "model": _digest([cg.structure_hash(graph).encode() for graph in [*model, *events] if graph is not None]),
+        "steps": _digest([cg.structure_hash(graph).encode() for graph in program.steps.graphs()]),
+        "trajectories": len(x),
+        "starts": _digest([x.tobytes()]),
+        "parameters": _digest([p.tobytes()]),
+    }
+    sweep: dict[str, Json] = json.loads(json.dumps(given))
+    return sweep
+
+
+def _require_same(folder: Path, known: dict[str, Any], sweep: dict[str, Json]) -> None:
+    for name, value in sweep.items():
+        if known.get(name) != value:
+            raise ValueError(
+                f"store {str(folder)!r} keeps another sweep: there {name} is {known.get(name)!r:.60}, "
+                f"here {value!r:.60}"
+            )
+
+
+def _number(value: float | None) -> float | None:
+    return None if value is None or value == math.inf else float(value)
+
+
+def _digest(parts: Iterable[bytes]) -> str:
+    digest = blake2b(digest_size=16)
+    for part in parts:
+        digest.update(part)
+    return digest.hexdigest()
+
+
+def _version(package: str) -> str:
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return ""
