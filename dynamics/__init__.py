@@ -90,6 +90,7 @@ if TYPE_CHECKING:
     )
     from .multibody.trees.mechanism import (
         Body as Body,
+        Contact as Contact,
         Force as Force,
         Joint as Joint,
         Loop as Loop,

@@ -86,6 +86,14 @@ def closed(body_name, to, at, to_at, axis, length, coefficients, name, tolerance
     return dyn.Mechanism([body(), body("c", "b")], loops=[coupling])
 
 
+def touching(body_name, to, at, to_at, normal, radius, to_radius, stiffness, dissipation, friction, velocity):
+    """A mechanism with contacts of both kinds."""
+    material = {"stiffness": stiffness, "dissipation": dissipation, "friction": friction, "velocity": velocity}
+    plane = dyn.Contact(body_name, to, at=at, to_at=to_at, normal=normal, radius=radius, **material)
+    sphere = dyn.Contact(body_name, to, at=at, to_at=to_at, radius=radius, to_radius=to_radius, **material)
+    return dyn.Mechanism([body(), body("c", "b")], forces=[plane, sphere])
+
+
 def lagrangian(q, qd, t):
     return 0.5 * qd[0] ** 2
 
@@ -200,10 +208,12 @@ CALLS = {
     "dyn.certify": call(dyn.certify, SYSTEM, 1, 0, speed=1.0, twin=None),
     "dyn.to_mjcf": call(dyn.to_mjcf, ARM, 0.001),
     "dyn.load_mjcf": call(
-        dyn.load_mjcf, dyn.to_mjcf(ARM), ignore=True, limits=(1e3, 0.1), friction=0.1, actuators=True
+        dyn.load_mjcf, dyn.to_mjcf(ARM), ignore=True, limits=(1e3, 0.1), friction=0.1, actuators=True,
+        contacts="compliant"
     ),
     "dyn.load_urdf": call(
-        dyn.load_urdf, dyn.to_urdf(ARM), ignore=True, limits=(1e3, 0.1), friction=0.1, floating=False
+        dyn.load_urdf, dyn.to_urdf(ARM), ignore=True, limits=(1e3, 0.1), friction=0.1, floating=False,
+        contacts="compliant"
     ),
     "dyn.planar_arm": call(dyn.planar_arm, [1.0], [1.0], 0.0, "rod", 9.81, parameters=None),
     "dyn.serial_arm": call(dyn.serial_arm, [LINK], (0.0, 0.0, -9.81), parameters=None),
@@ -259,6 +269,9 @@ CALLS = {
     "dyn.Actuator": call(
         on_joint(dyn.Actuator), "b", "u", 1.0, (1.0, 0.0, 0.0), (0.0, 0.0, 0.0), (-1.0, 1.0), (-1.0, 1.0), (-1.0, 1.0)
     ),
+    "dyn.Contact": call(
+        touching, "b", "c", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 1.0), 0.1, 0.2, 1e3, 0.1, 0.5, 0.1
+    ),
     "dyn.SampledController": call(dyn.SampledController, lambda q, qd, t: q, 0.1),
     "dyn.HeldForces.at": call(HeldForces(np.zeros(1), np.zeros((1, 1))).at, [0.1]),
     "dyn.with_controller": call(dyn.with_controller, ARM, lambda q, qd, t, p: [p["k"]], {"k": 1.0}),
@@ -281,6 +294,7 @@ CALLS = {
     "dyn.Mechanism.lock": call(TWO.lock, FIRST, 0.0),
     "dyn.Mechanism.unlock": call(TWO.lock(FIRST).unlock, FIRST),
     "dyn.Mechanism.map_state_from": call(ARM.map_state_from, ARM, [0.0], [0.0]),
+    "dyn.Mechanism.contact": call(ARM.contact, dyn.Contact(FIRST, stiffness=1.0)),
     "dyn.Mechanism.motion": call(ARM.motion, FIRST, (0.0, 0.0, 0.0)),
     "dyn.Mechanism.position": call(ARM.position, FIRST, (0.0, 0.0, 0.0)),
     "dyn.Mechanism.subtree": call(TWO.subtree, LAST),

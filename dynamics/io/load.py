@@ -33,6 +33,7 @@ def load_mjcf(
     limits: Sequence[float] | None = None,
     friction: float | None = None,
     actuators: bool = False,
+    contacts: str | None = None,
 ) -> Mechanism:
     """The mechanism of a MuJoCo model: its trees of joints and welds, springs, damping and armature, and its loops.
 
@@ -49,7 +50,6 @@ def load_mjcf(
         Leave out what a mechanism cannot have: springs of free joints, tendons, fluid, ...
         Contacts, joint limits, friction loss and actuators, which act on a mechanism and do not belong to it, are
         left out unless asked for; of an actuator that acts with no input, such as a servo, the force is said.
-        Contact always is.
     limits : pair of floats, optional
         (stiffness, damping) of springs that stand for the limits of hinges and slides, see `JointLimit`.
     friction : float, optional
@@ -57,6 +57,12 @@ def load_mjcf(
     actuators : bool
         Take motors, position and velocity servos and the like on hinges and slides, see `Actuator`. Their inputs are
         parameters, "ctrl_" and the actuator's name (or number), 0 where nothing else is said.
+    contacts : "compliant", optional
+        Take spheres, and the ends of capsules, on planes, where MuJoCo lets them collide, as compliant contacts, see
+        `Contact`. The file's softness is not taken, its sliding friction is. With the weight W of all that moves, g of
+        gravity, the radius r and a sink s = 0.01 r, the stiffness is W / s^(3/2), so that a sphere that carries it all
+        sinks by s; dissipation is 1 / sqrt(g s), which damps that motion with a ratio of 0.4; the velocity of friction
+        is 0.1 sqrt(g s). Other shapes and pairs are left out. Other numbers go in by `dataclasses.replace`.
 
     Returns
     -------
@@ -81,7 +87,7 @@ def load_mjcf(
     """
     given, name = isinstance(source, mujoco().MjModel), called(source)
     mj = source if given else compiled_mjcf(source, name)
-    return warned(read_mjcf(mj, ignore, smooth(limits, friction, actuators)), "the model" if given else name)
+    return warned(read_mjcf(mj, ignore, smooth(limits, friction, actuators, contacts)), "the model" if given else name)
 
 
 def load_urdf(
@@ -91,13 +97,14 @@ def load_urdf(
     floating: bool = False,
     limits: Sequence[float] | None = None,
     friction: float | None = None,
+    contacts: str | None = None,
 ) -> Mechanism:
     """The mechanism of a URDF file, with the numbers of the file; its root link stands still, or floats.
 
     Every link is a body of its name, those without mass and those on fixed joints too, so that `position("tool0")` is
     where that frame is. Coordinates have the names of the joints, in the order of the file, those that carry
-    others first. A joint that mimics another is coupled to it by a loop, see `Loop`. Shapes are not read, so their
-    meshes need not be there. A link whose moments no rigid body can have is taken as it is, with a warning; of negative
+    others first. A joint that mimics another is coupled to it by a loop, see `Loop`. Meshes are not read, and
+    need not be there. A link whose moments no rigid body can have is taken as it is, with a warning; of negative
     moments 0 is taken, without `ignore` only of those that rounding to the digits of the file can make of 0.
 
     Parameters
@@ -115,6 +122,10 @@ def load_urdf(
         (stiffness, damping) of springs that stand for the limits of hinges and slides, see `JointLimit`.
     friction : float, optional
         A velocity [rad/s or m/s]; friction loss then acts as loss tanh(qd / friction), see `JointFriction`.
+    contacts : "compliant", optional
+        Take collision shapes that are spheres, and the ends of capsules, as compliant contacts with the ground, the
+        plane through the world's origin across gravity, with the numbers of `load_mjcf` and a friction of 1. Other
+        shapes, and contacts of links with one another, are left out.
 
     Returns
     -------
@@ -134,7 +145,7 @@ def load_urdf(
     >>> dyn.load_urdf(dyn.to_urdf(dyn.Mechanism([rotor]))).coordinates
     ('rotor',)
     """
-    taken = smooth(limits, friction, False)
+    taken = smooth(limits, friction, False, contacts)
     return warned(read_urdf(urdf_root(source), called(source), ignore, floating, taken), called(source))
 
 

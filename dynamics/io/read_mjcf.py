@@ -18,7 +18,9 @@ from cgraph.extend import Array
 from ..multibody.algebra import spatial
 from ..multibody.joints import TYPES
 from ..multibody.trees.mechanism import WORLD, Body, Joint, Mechanism, MechanismError, MechanismWarning
+from .contacts import with_contacts
 from .left_out import listed, present, refused_or_left_out
+from .mjcf_contacts import mjcf_balls
 from .mujoco_twin import mujoco
 from .read_equality import left_of_equalities, other_equalities, read_loops
 from .smooth_forces import (
@@ -67,7 +69,8 @@ def read_mjcf(mj: MjModel, ignore: bool, smooth: Smooth = NONE) -> Mechanism:
     gravity = mj.opt.gravity * (not disabled(mj, "GRAVITY"))
     moving = [body for body in bodies if body.joint.type.moves]
     forces, loops = mjcf_forces(mj, moving, smooth), read_loops(mj, moving, ends)
-    return Mechanism(bodies, gravity, forces, left_out=left_out, loops=loops)
+    mechanism = Mechanism(bodies, gravity, forces, left_out=left_out, loops=loops)
+    return with_contacts(mechanism, *mjcf_balls(mj, ends)) if smooth.contacts else mechanism
 
 
 def compiled_mjcf(source: object, called: str) -> MjModel:
@@ -205,7 +208,7 @@ def _acting_from_outside(mj: MjModel, smooth: Smooth) -> list[str]:
     servos = [f"{mj.actuator(i).name or f'number {i}'}: {force}" for i, force in acting.items() if force]
     others = present(
         {
-            "contacts": touching and not disabled(mj, "CONSTRAINT", "CONTACT"),
+            "contacts": touching and not (smooth.contacts or disabled(mj, "CONSTRAINT", "CONTACT")),
             f"joint limits ({listed(_joint_names(mj, limits))})": limits and limited,
             "tendon limits": _any(mj, "tendon_limited") and limited,
             f"friction loss ({listed(losses)})": losses and rubbing and smooth.friction is None,

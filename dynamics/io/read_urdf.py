@@ -19,6 +19,7 @@ from ..multibody.forces.joint_force import JointForce, JointFriction
 from ..multibody.joints import COMPOSITIONS, TYPES
 from ..multibody.loops import Loop
 from ..multibody.trees.mechanism import WORLD, Body, Joint, Mechanism, MechanismError
+from .contacts import Ball, capsule_ends, with_contacts
 from .left_out import follows_itself, listed, present, refused_or_left_out
 from .smooth_forces import NONE, Smooth
 
@@ -61,13 +62,14 @@ def read_urdf(robot: Element, called: str, ignore: bool, floating: bool = False,
                 bodies.append(Body(child, _joint(element, name, child), parent, **inertials[child].fields))
         outside = [*_outside(robot, joints, smooth), *mimics.of_no_effect, *_negative(inertials, by_digits=True)]
         left_out = refused_or_left_out([*mimics.refused, *_negative(inertials, by_digits=False)], outside, ignore)
-        return Mechanism(
+        mechanism = Mechanism(
             bodies,
             _gravity(robot),
             _forces(joints, smooth),
             left_out=left_out,
             loops=_couplings(joints, mimics.leaders),
         )
+        return with_contacts(mechanism, *_balls(links)) if smooth.contacts else mechanism
     except MechanismError as error:
         raise MechanismError(f"URDF, {called}: {error}") from None
 
@@ -253,7 +255,7 @@ def _outside(robot: Element, joints: Mapping[str, Element], smooth: Smooth) -> l
     rubbing = [f"{name}: {force:g}" for name, joint in joints.items() if (force := _friction(joint, name))]
     return present(
         {
-            "contacts": robot.findall("link/collision"),
+            "contacts": robot.findall("link/collision") and not smooth.contacts,
             f"joint limits ({listed(limited)})": limited and smooth.limits is None,
             f"limits that cannot be ({listed(wrong)})": wrong,
             f"friction loss ({listed(rubbing)})": rubbing and smooth.friction is None,
@@ -272,6 +274,34 @@ def _forces(joints: Mapping[str, Element], smooth: Smooth) -> list[JointForce]:
         if smooth.friction is not None and (loss := _friction(joint, name)):
             forces.append(JointFriction(body, loss, smooth.friction))
     return forces
+
+
+def _balls(links: Mapping[str, Element]) -> tuple[list[Ball], list[str]]:
+    """Spheres and ends of capsules of the links, and sentences on contacts other than theirs with the ground."""
+    balls: list[Ball] = []
+    others: list[str] = []
+    touching: dict[str, None] = {}
+    for name, link in links.items():
+        for collision in link.findall("collision") if name != WORLD else ():
+            touching[name] = None
+            where = f"the collision of link {name!r}"
+            geometry = _one(collision, where, "geometry")
+            shape = next(iter(geometry), None) if geometry is not None else None
+            if shape is None or shape.tag not in ("sphere", "capsule"):
+                others.append(f"{name}: {'no shape' if shape is None else shape.tag}")
+                continue
+            center, turn = origin_of(collision, where)
+            half = 0.5 * _numbers(shape, where, "length", 1)[0] if shape.tag == "capsule" else 0.0
+            radius = _numbers(shape, where, "radius", 1)[0]
+            if not (radius > 0.0 and half >= 0.0):
+                raise MechanismError(f"{where}: radius must be positive, and length not negative")
+            centers = capsule_ends(center, turn[:, 2], half) if half else [center]
+            balls += [Ball(name, at, radius) for at in centers]
+    sentences = {
+        f"contacts of shapes other than spheres and capsules ({listed(others)})": others,
+        "contacts of links with one another": len(touching) > 1,
+    }
+    return balls, present(sentences)
 
 
 def _limits(joint: Element, name: str) -> tuple[float, float] | None:

@@ -14,6 +14,7 @@ from cgraph.extend import Array, real_array, real_number, require_flag
 from ..multibody.bodies.body import Body, MechanismError
 from ..multibody.bodies.limits import ANYTHING, Limits
 from ..multibody.forces.joint_force import Actuator, JointForce, JointFriction, JointLimit, Range
+from .contacts import asked
 from .mujoco_twin import mujoco
 
 if TYPE_CHECKING:
@@ -25,12 +26,14 @@ class Smooth:
     """Choice of the forces of a file that are taken.
 
     limits: stiffness and damping of springs in place of joint limits, see `JointLimit`; None leaves limits out.
-    friction: the velocity of `JointFriction`; None leaves friction loss out.  actuators: whether they are taken.
+    friction: the velocity of `JointFriction`; None leaves friction loss out.
+    actuators, contacts: whether they are taken.
     """
 
     limits: tuple[float, float] | None = None
     friction: float | None = None
     actuators: bool = False
+    contacts: bool = False
 
     def limit(self, body: str, lower: float, upper: float) -> JointLimit:
         """The limit of a joint."""
@@ -41,8 +44,8 @@ class Smooth:
 NONE = Smooth()
 
 
-def smooth(limits: Sequence[float] | None, friction: float | None, actuators: bool) -> Smooth:
-    """Choice of forces, checked. Raises MechanismError and TypeError."""
+def smooth(limits: Sequence[float] | None, friction: float | None, actuators: bool, contacts: str | None) -> Smooth:
+    """Choice of forces, checked. Raises MechanismError, TypeError and ValueError."""
     springs = None
     if limits is not None:
         pair = real_array("limits", limits)
@@ -51,7 +54,7 @@ def smooth(limits: Sequence[float] | None, friction: float | None, actuators: bo
         springs = (float(pair[0]), float(pair[1]))
     if friction is not None and not 0.0 < real_number("friction", friction) < math.inf:
         raise MechanismError(f"friction must be a velocity > 0, at which most of it acts, got {friction!r}")
-    return Smooth(springs, friction, require_flag("actuators", actuators))
+    return Smooth(springs, friction, require_flag("actuators", actuators), asked(contacts))
 
 
 def disabled(mj: MjModel, *what: str) -> bool:

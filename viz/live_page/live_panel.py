@@ -54,11 +54,8 @@ class Live:
     methods: Mapping[str, Any] = field(default_factory=dict)
     names: Mapping[str, str] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
-<<<<<<< HEAD:viz/live_page/live_panel.py
     notes: Mapping[str, str] = field(default_factory=dict)
-=======
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
->>>>>>> ba03949544638fe71f2ea982d3f78a1542c3cb70:viz/live/live_panel.py
 
     def __post_init__(self) -> None:
         for name in self.rate.input_names:

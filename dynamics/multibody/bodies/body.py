@@ -221,11 +221,11 @@ def quantities(what: str, value: object, shape: tuple[int, ...] = (3,)) -> Array
     if np.shape(np.asarray(value, dtype=object)) != shape:
         raise MechanismError(f"{what} must be {shape} finite numbers, got {value!r:.80}")
     array = np.empty(len(known), dtype=object)
-    array[:] = [_number(what, each, minimum=-math.inf) for each in known]
+    array[:] = [quantity(what, each, minimum=-math.inf) for each in known]
     return array.reshape(shape) if names_in(known) else array.astype(np.float64).reshape(shape)
 
 
-def _number(what: str, value: Any, unit: str = "", minimum: float = 0.0) -> float | Node:
+def quantity(what: str, value: Any, unit: str = "", minimum: float = 0.0) -> float | Node:
     """The number, or the node of a parameter."""
     if isinstance(value, Node) and not names_in([value]):
         value = evaluated(value, {}).item()
@@ -244,11 +244,11 @@ def _check_names(what: str, value: str | Node) -> None:
 
 
 def _mass(what: str, value: object) -> float | Node:
-    return _number(what, value, " kg")
+    return quantity(what, value, " kg")
 
 
 def _any_number(what: str, value: object) -> float | Node:
-    return _number(what, value, minimum=-math.inf)
+    return quantity(what, value, minimum=-math.inf)
 
 
 def checked(body: Body) -> Body:
@@ -367,8 +367,8 @@ BODY_QUANTITIES: dict[str, Callable[[str, object], Any]] = {
 }
 JOINT_QUANTITIES: dict[str, Callable[[str, object], Any]] = {
     "position": quantities,
-    "damping": _number,
-    "stiffness": _number,
+    "damping": quantity,
+    "stiffness": quantity,
     "spring_reference": _any_number,
-    "armature": _number,
+    "armature": quantity,
 }

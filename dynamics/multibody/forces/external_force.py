@@ -1,4 +1,4 @@
-"""Forces and torques on bodies, and the generalized forces that they are."""
+"""Forces and torques on bodies, from outside."""
 
 from __future__ import annotations
 
@@ -13,10 +13,9 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import Builder, building, cotangents, topological
+from cgraph.extend import topological
 
-from ...systems.kinematics import gathered
-from ..algebra.spatial import ZERO, Triple
+from ..algebra.spatial import Triple
 from ..bodies.body import MechanismError, vector
 from ..sweeps.kinematic_chain import KinematicChain
 
@@ -90,26 +89,13 @@ def check_force(force: Force, bodies: Container[str]) -> None:
                 )
 
 
-def generalized_forces(
-    forces: Sequence[tuple[Force, KinematicChain]], qd: Sequence[Node], parameters: Mapping[str, Node]
-) -> list[Node]:
-    """Q = J^T f + J_w^T torque of all forces together, one node for each of qd.
-
-    Virtual power is f . v + torque . w, v and w linear in qd, so one reverse sweep from v and w, seeded with the force
-    and the torque, gives its slope along qd. What the force itself depends on is not differentiated.
-    """
-    build = Builder()
-    total = [ZERO] * len(qd)
-    for force, chain in forces:
-        with building(build), cg.tag(force.body, FORCE):
-            value, torque = (_nodes(each, parameters) for each in (force.value, force.torque))
-            if force.frame == "body":
-                value, torque = chain.direction(value), chain.direction(torque)
-            motion = chain.motion(force.at)
-            seeds = gathered(zip((*motion.velocity, *motion.omega), (*value, *torque), strict=True))
-            shares = cotangents(seeds, qd, build)
-            total = [sum_ + share for sum_, share in zip(total, shares, strict=True)]
-    return total
+def powers(force: Force, chain: KinematicChain, parameters: Mapping[str, Node]) -> list[tuple[Node, Node]]:
+    """Components of v and w of the body, and those of force and torque on them: virtual power is f . v + torque . w."""
+    value, torque = (_nodes(each, parameters) for each in (force.value, force.torque))
+    if force.frame == "body":
+        value, torque = chain.direction(value), chain.direction(torque)
+    motion = chain.motion(force.at)
+    return list(zip((*motion.velocity, *motion.omega), (*value, *torque), strict=True))
 
 
 def _nodes(components: Sequence[Component], parameters: Mapping[str, Node]) -> Triple:

@@ -16,6 +16,7 @@ from cgraph.extend import Builder, building, check_name, real_array, real_number
 from ..bodies.body import Body, MechanismError
 from ..bodies.joint_coordinates import places
 from ..joints import COMPOSITIONS
+from .contact import Contact, check_contact
 from .external_force import FORCE, Force, check_force
 
 Range = tuple[float, float]
@@ -246,10 +247,15 @@ def _within(node: Node, limits: Range | None) -> Node:
     return node if limits is None else cg.minimum(cg.maximum(node, float(limits[0])), float(limits[1]))
 
 
-def check_any_force(force: Force | JointForce, carried: Container[str], bodies: Sequence[Body]) -> None:
+AnyForce = Force | JointForce | Contact
+
+
+def check_any_force(force: AnyForce, carried: Container[str], bodies: Sequence[Body]) -> None:
     """Raises MechanismError for a force that bodies, or the joint of one, cannot have.  carried: names of bodies."""
     if isinstance(force, JointForce):
         _check_joint_force(force, bodies)
+    elif isinstance(force, Contact):
+        check_contact(force, carried)
     else:
         check_force(force, carried)
 

@@ -30,7 +30,9 @@ from ..bodies.joint_coordinates import (
     velocity_names,
 )
 from ..bodies.limits import NO_LIMITS, Limits
-from ..forces.external_force import Force, generalized_forces
+from ..forces.contact import Contact, check_contact, touch
+from ..forces.external_force import Force
+from ..forces.generalized_forces import generalized_forces
 from ..forces.joint_force import JointForce, add_joint_forces, check_any_force
 from ..loops import Loop, check_loops, of_loops, position_rows, velocity_rows
 from ..parameters import Quantity, bound, entries, names_in, symbol
@@ -44,6 +46,7 @@ from .tree_equations import TreeEquations
 __all__ = [
     "WORLD",
     "Body",
+    "Contact",
     "Force",
     "Joint",
     "Loop",
@@ -67,13 +70,13 @@ class Mechanism(Structure):
         In any order.
     gravity : array_like, (3,)
         In the world's axes [m/s^2]. In place of a number may stand a parameter, as in a `Body`.
-    forces : sequence of Force and JointForce
-        On bodies from outside, beside the joint forces tau; they enter the equations as J^T f. And along joints:
-        `JointLimit`, `JointFriction`, `Actuator`.
+    forces : sequence of Force, JointForce and Contact
+        On bodies from outside, beside the joint forces tau; they enter the equations as J^T f. Along joints:
+        `JointLimit`, `JointFriction`, `Actuator`. And where bodies touch: `Contact`.
     parameters : mapping
         {name: value} of the parameters that bodies, joints, gravity and forces have. They are inputs of the graphs, and
-        `simulate` binds them. Each needs a value with which the mechanism can be; only one that forces alone name is 0
-        without.
+        `simulate` binds them. Each needs a value with which the mechanism can be; only one that a `Force` or
+        `Actuator` alone names is 0 without.
     locked : mapping
         {body: coordinate [rad or m]} of joints that stand still: their bodies are welded on, see `lock`.
     base_parameters : bool
@@ -109,7 +112,7 @@ class Mechanism(Structure):
     def __post_init__(self) -> None:
         quantities("gravity", self.gravity)
         require_flag("base_parameters", self.base_parameters)
-        kinds = {"bodies": (Body,), "forces": (Force, JointForce), "loops": (Loop,), "left_out": (str,)}
+        kinds = {"bodies": (Body,), "forces": (Force, JointForce, Contact), "loops": (Loop,), "left_out": (str,)}
         for what, allowed in kinds.items():  # kept, so that an iterator is read once
             object.__setattr__(self, what, listed(what, allowed, getattr(self, what)))
         self._check_parameters([part for body in self.bodies for part in self.shared.parts(body)])
@@ -235,11 +238,10 @@ class Mechanism(Structure):
 
     def _require_values(self, values: Mapping[str, ArrayLike], bodies: Sequence[Body] | None = None) -> None:
         with outer_names(self.bodies):
-            require_values(self.parts if bodies is None else bodies, self.gravity, values)
+            require_values(self.parts if bodies is None else bodies, self.gravity, self.forces, values)
 
     def _generalized_forces(self, q: list[Node], qd: list[Node], t: Node, p: dict[str, Node]) -> list[Node]:
-        on_bodies = [force for force in self.forces if isinstance(force, Force)]
-        total = generalized_forces([(force, self._chain(force.body, q, qd)) for force in on_bodies], qd, p)
+        total = generalized_forces(self.forces, lambda body: self._chain(body, q, qd), qd, p)
         return add_joint_forces(total, self.forces, self.moving, (q, qd), p)
 
     def _chain(self, body: str, q: Sequence[Node], qd: Sequence[Node]) -> KinematicChain:
@@ -276,6 +278,22 @@ class Mechanism(Structure):
         chain, point = self.chain(body), _point(body, at)
         with building(Builder()), cg.tag(body):
             return chain.graph(point, self.system.q, [*self.system.qd, *self._lengths])
+
+    def contact(self, contact: Contact) -> Graph:
+        """A contact in a state: inputs q0.., qd0.., parameters; outputs in the world's axes.
+
+        depth [m], negative where the bodies are apart; normal [N], N of `Contact`; x, y, z [m], the point where the
+        force acts; vx, vy, vz [m/s], the velocity of the body there against the other; fx, fy, fz [N], the force on the
+        body, friction and all; energy [J], stored.
+        contact: one of the `forces`, or another. Raises MechanismError for one that bodies cannot have.
+        """
+        if not isinstance(contact, Contact):
+            raise MechanismError(f"a contact is a Contact, got {type(contact).__name__}: {contact!r:.60}")
+        check_contact(contact, self.carriers)
+        with building(Builder()), cg.tag(contact.body):
+            outputs = touch(contact, self.chain(contact.body), self.chain(contact.to)).outputs()
+        names = dict.fromkeys([*names_in(self._lengths), *sorted(contact.names)])
+        return cg.simplify(Graph([*self.system.q, *self.system.qd, *cg.variables(list(names))], outputs))
 
     @property
     def _lengths(self) -> list[Node]:

@@ -21,8 +21,8 @@ from cgraph.extend import HoldsNodes, kept_by_first
 from ..algebra import spatial
 from ..bodies.body import BODY_QUANTITIES, JOINT_QUANTITIES, WORLD, Body, MechanismError, checked, quantities
 from ..bodies.composed_joints import parts_of
-from ..forces.external_force import Force
-from ..forces.joint_force import JointForce
+from ..forces.contact import CONTACT_QUANTITIES, Contact
+from ..forces.joint_force import AnyForce, JointForce
 from ..loops import Loop
 from ..parameters import Quantities, bound, entries, evaluated, names_in
 from ..sweeps.links import Link, LinkState, axes_of, link
@@ -92,8 +92,8 @@ class Subtree:
         What the first hung on.
     places : tuple of int
         Where the bodies stood among the mechanism's, which orders coordinates.
-    forces : tuple of Force and JointForce
-        On these bodies and their joints.
+    forces : tuple of Force, JointForce and Contact
+        On these bodies and their joints, and between these bodies and others, which `attach` needs to be there.
     parameters : mapping
         The values that the bodies, their joints and the forces use.
     locked : mapping
@@ -112,7 +112,7 @@ class Subtree:
     bodies: tuple[Body, ...]
     parent: str = WORLD
     places: tuple[int, ...] = ()
-    forces: tuple[Force | JointForce, ...] = ()
+    forces: tuple[AnyForce, ...] = ()
     parameters: Mapping[str, float] = field(default_factory=dict)
     locked: Mapping[str, float | ArrayLike] = field(default_factory=dict)
     loops: tuple[Loop, ...] = ()
@@ -131,7 +131,7 @@ class Structure(HoldsNodes):
 
     bodies: Sequence[Body]
     gravity: Quantities = (0.0, 0.0, -9.81)
-    forces: Sequence[Force | JointForce] = ()
+    forces: Sequence[AnyForce] = ()
     parameters: Mapping[str, float] = field(default_factory=dict)
     locked: Mapping[str, float | ArrayLike] = field(default_factory=dict)
     base_parameters: bool = False
@@ -170,7 +170,7 @@ class Structure(HoldsNodes):
         names = descendants(self.bodies, body)
         bodies = {each.name: (place, each) for place, each in enumerate(self.bodies) if each.name in names}
         order = [body, *(name for name in bodies if name != body)]
-        forces = tuple([force for force in self.forces if force.body in names])
+        forces = tuple([force for force in self.forces if not names.isdisjoint(_held(force))])
         taken = tuple([bodies[name][1] for name in order])
         used = used_names(taken, (), forces)
         return Subtree(
@@ -192,7 +192,7 @@ class Structure(HoldsNodes):
         return changed(
             self,
             bodies=tuple([each for each in self.bodies if each.name not in names]),
-            forces=tuple([force for force in self.forces if force.body not in names]),
+            forces=tuple([force for force in self.forces if names.isdisjoint(_held(force))]),
             locked={name: at for name, at in self.locked.items() if name not in names},
             loops=tuple([loop for loop in self.loops if names.isdisjoint((loop.body, loop.to))]),
         )
@@ -261,6 +261,11 @@ def inserted(bodies: tuple[Body, ...], new: tuple[Body, ...], places: tuple[int,
     return result
 
 
+def _held(force: AnyForce) -> set[str]:
+    """Names of the bodies that a force is on."""
+    return {force.body, force.to} if isinstance(force, Contact) else {force.body}
+
+
 def _check_body(body: object) -> None:
     if not isinstance(body, str):
         raise MechanismError(f"a body is named by a string, got {type(body).__name__}: {body!r:.60}")
@@ -281,7 +286,8 @@ def changed(
 
 def listed(what: str, kinds: tuple[type, ...], given: object) -> tuple[Any, ...]:
     """The entries of a field. Raises MechanismError for what is no sequence, and for entries of another type."""
-    names = " or ".join([kind.__name__ for kind in kinds])
+    *others, last = [kind.__name__ for kind in kinds]
+    names = f"{', '.join(others)} or {last}" if others else last
     if isinstance(given, str) or not isinstance(given, Iterable):
         raise MechanismError(f"{what} must be a sequence of {names}, got {type(given).__name__}: {given!r:.60}")
     values = tuple(given)
@@ -300,9 +306,12 @@ class Use(NamedTuple):
     check: Callable[[str, object], object]
 
 
-def uses(bodies: Sequence[Body], gravity: Quantities) -> Iterator[Use]:
-    """The quantities of bodies, their joints and gravity in which there are parameters."""
+def uses(bodies: Sequence[Body], gravity: Quantities, forces: Iterable[AnyForce]) -> Iterator[Use]:
+    """The quantities of bodies, their joints, gravity and contacts in which there are parameters."""
     yield from _of_parameters([("gravity", gravity, quantities)])
+    for force in [each for each in forces if isinstance(each, Contact)]:
+        rows = CONTACT_QUANTITIES.items()
+        yield from _of_parameters([(f"{force.label}: {name}", getattr(force, name), check) for name, check in rows])
     for body in bodies:
         yield from _uses_of(body)
 
@@ -324,18 +333,20 @@ def _of_parameters(rows: Iterable[tuple[str, object, Callable[[str, object], obj
             yield Use(what, value, names, check)
 
 
-def used_names(bodies: Sequence[Body], gravity: Quantities, forces: Iterable[Force | JointForce]) -> dict[str, None]:
+def used_names(bodies: Sequence[Body], gravity: Quantities, forces: Sequence[AnyForce]) -> dict[str, None]:
     """The names that occur in forces, and then those in bodies and gravity."""
     result = dict.fromkeys([name for force in forces for name in force.names])
-    return result | {name: None for use in uses(bodies, gravity) for name in use.names}
+    return result | {name: None for use in uses(bodies, gravity, forces) for name in use.names}
 
 
-def require_values(bodies: Sequence[Body], gravity: Quantities, values: Mapping[str, ArrayLike]) -> None:
+def require_values(
+    bodies: Sequence[Body], gravity: Quantities, forces: Sequence[AnyForce], values: Mapping[str, ArrayLike]
+) -> None:
     """Raises MechanismError for a parameter without value, and for a value, or one of N, that makes no body or joint.
 
-    A parameter of a force is 0 by default; a mass or length that is would be another mechanism.
+    A parameter of a `Force` is 0 by default; a mass or stiffness that is would be another mechanism.
     """
-    for use in uses(bodies, gravity):
+    for use in uses(bodies, gravity, forces):
         if missing := [name for name in use.names if name not in values]:
             raise MechanismError(f"{use.what} has the parameter {missing[0]!r}, which needs a value in `parameters`")
         at = {name: np.asarray(values[name], dtype=np.float64) for name in use.names}
@@ -359,9 +370,11 @@ def bound_body(body: Body, values: Mapping[str, float]) -> Body:
     return replace(body, joint=replace(body.joint, **joint), **own)
 
 
-def bound_force(force: Force | JointForce, values: Mapping[str, float]) -> Force | JointForce:
+def bound_force(force: AnyForce, values: Mapping[str, float]) -> AnyForce:
     """The force likewise; one along a joint keeps its input, which then has that value."""
     if isinstance(force, JointForce) or not force.names & values.keys():
         return force
+    if isinstance(force, Contact):
+        return replace(force, **{name: bound(getattr(force, name), values) for name in CONTACT_QUANTITIES})
     value, torque = ([bound(each, values) for each in three] for three in (force.value, force.torque))
     return replace(force, value=value, torque=torque)

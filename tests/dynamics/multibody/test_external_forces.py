@@ -207,8 +207,8 @@ BAD: dict[str, tuple[Any, str]] = {
     "unknown body": ([Force("hand", (1, 0, 0))], "there is a force on the unknown body 'hand'"),
     "the world": ([Force("world", (1, 0, 0))], "there is a force on the unknown body 'world'"),
     "no name": ([Force(3, (1, 0, 0))], "there is a force on the unknown body 3"),
-    "no force": ([(1, 0, 0)], "forces must be of the type Force or JointForce, got tuple: (1, 0, 0)"),
-    "one force": (Force("rotor"), "forces must be a sequence of Force or JointForce, got Force: "),
+    "no force": ([(1, 0, 0)], "forces must be of the type Force, JointForce or Contact, got tuple: (1, 0, 0)"),
+    "one force": (Force("rotor"), "forces must be a sequence of Force, JointForce or Contact, got Force: "),
     "frame": (
         [Force("rotor", (1, 0, 0), frame="local")],
         "the force on body 'rotor': frame must be one of world, body, got 'local'",

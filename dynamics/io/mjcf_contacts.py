@@ -1,0 +1,87 @@
+"""Contacts of MuJoCo's model: which of its geoms meet, and the spheres among them that are on planes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cgraph.extend import Array
+
+from ..multibody.algebra import spatial
+from .contacts import Ball, capsule_ends
+from .left_out import listed, present
+from .mujoco_twin import mujoco
+from .smooth_forces import disabled
+
+if TYPE_CHECKING:
+    from mujoco import MjModel
+
+SLIDING = 3  # dimensions of a contact with friction that slides and does no more
+
+
+def mjcf_balls(mj: MjModel, ends: Sequence[tuple[str, Array]]) -> tuple[list[Ball], list[str]]:
+    """Spheres and ends of capsules on planes, and sentences on contacts that are not such.
+
+    ends: of each of MuJoCo's bodies, the name of ours, and the origin of its frame in that one's.
+    """
+    if disabled(mj, "CONSTRAINT", "CONTACT"):
+        return [], []
+    types = mujoco().mjtGeom
+    plane, sphere, capsule = (int(getattr(types, f"mjGEOM_{name}")) for name in ("PLANE", "SPHERE", "CAPSULE"))
+    data = mujoco().MjData(mj)
+    mujoco().mj_kinematics(mj, data)  # planes stand still
+    balls: list[Ball] = []
+    others: list[str] = []
+    rolling = False
+    for (first, second), (friction, dimensions) in _meetings(mj).items():
+        ground, geom = sorted((first, second), key=lambda g: int(mj.geom_type[g]) != plane)
+        kind = int(mj.geom_type[geom])
+        if int(mj.geom_type[ground]) != plane or kind not in (sphere, capsule):
+            others.append(f"{_called(mj, first)} and {_called(mj, second)}")
+            continue
+        rolling |= dimensions > SLIDING
+        body, origin = ends[int(mj.geom_bodyid[geom])]
+        center, radius = origin + mj.geom_pos[geom], float(mj.geom_size[geom, 0])
+        axis = spatial.from_quaternion(mj.geom_quat[geom])[:, 2]
+        centers = capsule_ends(center, axis, float(mj.geom_size[geom, 1])) if kind == capsule else [center]
+        normal = spatial.snapped(data.geom_xmat[ground].reshape(3, 3)[:, 2])
+        for at in centers:
+            rubbing = friction if dimensions >= SLIDING else 0.0
+            balls.append(Ball(body, spatial.cleaned(at), radius, rubbing, data.geom_xpos[ground].copy(), normal))
+    sentences = {
+        f"contacts other than of spheres and capsules with planes ({listed(others)})": others,
+        "torsional and rolling friction of contacts": rolling,
+    }
+    return balls, present(sentences)
+
+
+def _meetings(mj: MjModel) -> dict[tuple[int, int], tuple[float, int]]:
+    """Pairs of geoms that MuJoCo lets collide, with their friction and the dimensions of the contact."""
+    kind, affinity, weld = mj.geom_contype, mj.geom_conaffinity, mj.body_weldid[mj.geom_bodyid]
+    meet = ((kind[:, None] & affinity) | (kind & affinity[:, None])) != 0
+    meet &= weld[:, None] != weld
+    if not disabled(mj, "FILTERPARENT"):
+        above = mj.body_weldid[mj.body_parentid[weld]]
+        meet &= ~((above[:, None] == weld) & (weld != 0)) & ~((above == weld[:, None]) & (weld[:, None] != 0))
+    body = mj.geom_bodyid.astype(np.int64)
+    lower, upper = np.minimum(body[:, None], body), np.maximum(body[:, None], body)
+    meet &= ~np.isin((lower << 16) + upper, mj.exclude_signature)
+    found = {(int(a), int(b)): _mixed(mj, int(a), int(b)) for a, b in np.argwhere(np.triu(meet, 1))}
+    for k in range(mj.npair):
+        a, b = sorted((int(mj.pair_geom1[k]), int(mj.pair_geom2[k])))
+        found[a, b] = float(mj.pair_friction[k, 0]), int(mj.pair_dim[k])
+    return found
+
+
+def _mixed(mj: MjModel, a: int, b: int) -> tuple[float, int]:
+    """Friction and dimensions of two geoms: those of the one of higher priority, else the larger."""
+    first, second = int(mj.geom_priority[a]), int(mj.geom_priority[b])
+    chosen = [a, b] if first == second else [a if first > second else b]
+    return max([float(mj.geom_friction[g, 0]) for g in chosen]), max([int(mj.geom_condim[g]) for g in chosen])
+
+
+def _called(mj: MjModel, geom: int) -> str:
+    name: str = mj.geom(geom).name
+    return name or f"a geom of body {mj.body(int(mj.geom_bodyid[geom])).name!r}"

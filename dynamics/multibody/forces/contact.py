@@ -1,0 +1,195 @@
+"""Contact as a force: a point or sphere of a body on a plane or a sphere of another, compliant and with friction."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Container
+from dataclasses import KW_ONLY, dataclass
+from typing import Any, NamedTuple
+
+from numpy.typing import ArrayLike
+
+import cgraph as cg
+from cgraph import Node
+from cgraph.extend import as_node, is_finite
+
+from ..algebra import spatial
+from ..algebra.spatial import Triple, cross, dot, plus, scaled
+from ..bodies.body import WORLD, MechanismError, quantity, unit_axis, vector
+from ..parameters import Quantity, names_in, symbol, vanishes
+from ..sweeps.kinematic_chain import KinematicChain
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """Compliant contact of a point or sphere of a body with a plane, or with a sphere, of another or the world.
+
+    With the depth x, how far the surfaces would go through each other, and the velocity v of the body against the
+    other where they touch, v_n along the normal n and v_t across it, the force on the body is N n - F:
+
+        N = stiffness x^(3/2) max(0, 1 + dissipation dx/dt) for x > 0, else 0
+        F = friction N v_t / sqrt(v_t^2 + velocity^2)
+
+    N is Hertz's law with the damping of Hunt and Crossley (J. Applied Mechanics 1975). It never pulls, and N and its
+    slope are continuous at the touch. F is smooth dry friction. It is less than `friction` N, and it creeps where
+    true friction sticks: under a load of s friction N, s < 1, with s / sqrt(1 - s^2) of `velocity`.
+
+    Parameters
+    ----------
+    body, to : str
+        Names of the bodies; `to` may be "world", and the other force of the pair, -N n + F, acts on it.
+    at : array_like, (3,)
+        The point of the body, or the center of its sphere, in its frame [m].
+    to_at : array_like, (3,)
+        A point of the plane, or the center of the sphere, in the frame of `to` [m].
+    normal : array_like, (3,)
+        Of the plane, out of the ground, in the axes of `to`; need not have length 1. Two spheres do not use it.
+    radius : float
+        Of the sphere of the body [m]; 0 is a point.
+    to_radius : float, optional
+        Of the sphere of `to` [m]. None, the default, is a plane.
+    stiffness : float or parameter
+        At least 0 [N/m^(3/2)]. A weight W sinks by (W / stiffness)^(2/3). Of two elastic spheres it is
+        4/3 E sqrt(R), with 1/R = 1/radius + 1/to_radius and 1/E = (1 - nu^2)/E_1 + (1 - nu_2^2)/E_2.
+    dissipation : float or parameter
+        d, at least 0 [s/m]. A body that arrives with the speed v leaves with e v, where
+        d v (1 + e) = log((1 + d v) / (1 - d e v)); for small d v that is e = 1 - 2/3 d v.
+    friction : float or parameter
+        Coefficient of friction, at least 0.
+    velocity : float or parameter
+        The speed [m/s] at which 0.71 of the friction acts. It must be positive where there is friction.
+
+    Notes
+    -----
+    In place of a number of the last four may stand a parameter, as in a `Body`; it needs a value in `parameters`. The
+    force acts at the point of the body, or of the line between the centers, that divides it as the radii; on a plane
+    that is the lowest point of the sphere. It is one of the `forces` of a mechanism, no potential: `energy` is without
+    what the contact stores, which `Mechanism.contact` tells. There is no rigid contact, no friction that sticks, and no
+    rolling or torsional friction; a body is touched where it has a `Contact` and nowhere else.
+
+    Examples
+    --------
+    A ball of 2 kg rests where its weight is stiffness x^(3/2).
+
+    >>> import dynamics as dyn
+    >>> ball = dyn.Body("ball", dyn.Joint("prismatic", (0.0, 0.0, 1.0)), mass=2.0)
+    >>> ground = dyn.Contact("ball", radius=0.1, stiffness=1e5)
+    >>> resting = dyn.Mechanism([ball], (0.0, 0.0, -10.0), forces=[ground])
+    >>> depth = (2.0 * 10.0 / 1e5) ** (2 / 3)
+    >>> abs(dyn.forward_dynamics(resting).evaluate({"q0": 0.1 - depth, "qd0": 0.0, "tau0": 0.0})["qdd0"]) < 1e-9
+    True
+    """
+
+    body: str
+    to: str = WORLD
+    _: KW_ONLY
+    at: ArrayLike = (0.0, 0.0, 0.0)
+    to_at: ArrayLike = (0.0, 0.0, 0.0)
+    normal: ArrayLike = (0.0, 0.0, 1.0)
+    radius: float = 0.0
+    to_radius: float | None = None
+    stiffness: Quantity
+    dissipation: Quantity = 0.0
+    friction: Quantity = 0.0
+    velocity: Quantity = 0.0
+
+    @property
+    def components(self) -> tuple[str, ...]:
+        """Names of parameters that are 0 without a value: none."""
+        return ()
+
+    @property
+    def names(self) -> set[str]:
+        """Set of the names of its parameters."""
+        return set(names_in([getattr(self, name) for name in CONTACT_QUANTITIES]))
+
+    @property
+    def label(self) -> str:
+        """What errors call it."""
+        return f"contact of body {self.body!r} with {self.to!r}"
+
+
+def _positive(what: str, value: object) -> float | Node:
+    number = quantity(what, value)
+    if not isinstance(number, Node) and number == 0.0:
+        raise MechanismError(f"{what} must be positive where there is friction, got {value!r}")
+    return number
+
+
+CONTACT_QUANTITIES: dict[str, Callable[[str, object], Any]] = {
+    "stiffness": quantity,
+    "dissipation": quantity,
+    "friction": quantity,
+    "velocity": _positive,
+}
+
+
+def check_contact(contact: Contact, bodies: Container[str]) -> None:
+    """Raises MechanismError for a contact on a body that is not among `bodies`, and for numbers out of range."""
+    for name in (contact.body, contact.to):
+        if not isinstance(name, str) or (name not in bodies and (name != WORLD or name is contact.body)):
+            raise MechanismError(f"there is a contact on the unknown body {name!r:.80}")
+    where = contact.label
+    if contact.body == contact.to:
+        raise MechanismError(f"{where}: a contact needs two bodies")
+    vector(f"{where}: at", contact.at)
+    vector(f"{where}: to_at", contact.to_at)
+    if contact.to_radius is None:
+        unit_axis(f"{where}: normal", contact.normal)
+    radii = {"radius": contact.radius, "to_radius": contact.to_radius}
+    for what, value in radii.items():
+        if value is not None and not (is_finite(value) and value >= 0.0):
+            raise MechanismError(f"{where}: {what} must be finite and at least 0, got {value!r:.60} m")
+    if contact.radius == contact.to_radius == 0.0:
+        raise MechanismError(f"{where}: two points do not touch, one of radius and to_radius must be positive")
+    for name, check in CONTACT_QUANTITIES.items():
+        if name != "velocity" or not vanishes(contact.friction):
+            check(f"{where}: {name}", getattr(contact, name))
+
+
+class Touch(NamedTuple):
+    """A contact in a state, in the world's axes."""
+
+    depth: Node  # [m], negative where the bodies are apart
+    point: Triple  # where the force acts [m]
+    velocity: Triple  # of the body there against the other, linear in qd [m/s]
+    normal: Node  # N [N]
+    force: Triple  # on the body, friction and all [N]
+    energy: Node  # stored, 2/5 stiffness x^(5/2) [J]
+
+    def outputs(self) -> dict[str, Node]:
+        """The outputs of `Mechanism.contact`."""
+        triples = {"": self.point, "v": self.velocity, "f": self.force}
+        named = {f"{prefix}{axis}": each[i] for prefix, each in triples.items() for i, axis in enumerate("xyz")}
+        return {"depth": self.depth, "normal": self.normal, **named, "energy": self.energy}
+
+
+def touch(contact: Contact, body: KinematicChain, to: KinematicChain) -> Touch:
+    """The contact of bodies that are so placed and move so.  body, to: the joints between each and the world."""
+    ours, theirs = body.motion(contact.at), to.motion(contact.to_at)
+    gap = plus(ours.position, scaled(-1.0, theirs.position))
+    if contact.to_radius is None:
+        along = to.direction(spatial.constant(unit_axis("normal", contact.normal)))
+        depth = contact.radius - dot(along, gap)
+        arm = scaled(-float(contact.radius), along)
+    else:
+        distance = cg.sqrt(dot(gap, gap))
+        along = scaled(1.0 / distance, gap)
+        depth = (contact.radius + contact.to_radius) - distance
+        arm = scaled(-contact.radius / (contact.radius + contact.to_radius), gap)
+    velocity = plus(ours.velocity, cross(ours.omega, arm))
+    there = plus(theirs.velocity, cross(theirs.omega, plus(gap, arm)))
+    velocity = plus(velocity, scaled(-1.0, there))
+    rate = dot(along, velocity)  # -dx/dt
+    stiffness, dissipation, friction, slow = (as_node(symbol(getattr(contact, name))) for name in CONTACT_QUANTITIES)
+    touching = cg.less(0.0, depth)
+    inside = cg.where(touching, depth, 1.0)  # apart, the slope of the root of 0 would be infinite
+    pressed = cg.where(touching, stiffness * inside * cg.sqrt(inside), 0.0)
+    energy = 0.4 * pressed * inside
+    if not vanishes(contact.dissipation):
+        pressed = pressed * cg.maximum(1.0 - dissipation * rate, 0.0)
+    force = scaled(pressed, along)
+    if not vanishes(contact.friction):
+        slip = plus(velocity, scaled(-rate, along))
+        share = friction * pressed / cg.sqrt(dot(slip, slip) + slow * slow)
+        force = plus(force, scaled(-share, slip))
+    return Touch(depth, plus(ours.position, arm), velocity, pressed, force, energy)

@@ -1,0 +1,150 @@
+"""Contacts of robot files: which shapes meet, where, of what material; and what is left out."""
+
+import warnings
+from typing import Any
+
+import numpy as np
+import pytest
+from pytest import approx, raises
+
+import dynamics as dyn
+from dynamics.io.mjcf_contacts import _meetings
+from tests.tolerances import EQUATIONS
+
+# All geoms overlap, so that MuJoCo has a contact for every pair that may meet.
+CROWD = """<mujoco><option>{flags}</option><default><geom size="1"/></default><worldbody>
+<geom name="floor" type="plane" size="1 1 1" friction="0.3"/><geom name="post" type="sphere"/>
+<body name="a" pos="0.1 0 0"><freejoint/><geom name="a1" type="sphere" friction="0.7"/>
+<geom name="a2" type="capsule" size="1 1" pos="0 .1 0" contype="2" conaffinity="4"/>
+<body name="b" pos="0 0.2 0"><joint axis="0 0 1"/><geom name="b1" type="sphere" condim="1" friction="0.9"/>
+<geom name="b2" type="box" size="1 1 1" contype="4" conaffinity="2"/>
+<body name="c" pos="0 0.1 0.1"><geom name="c1" type="sphere" priority="1" friction="0.1"/>
+<body name="d" pos="0 0.1 0"><joint axis="1 0 0"/><geom name="d1" type="sphere" contype="0"/></body></body>
+</body></body>
+<body name="e" pos="0 0 0.3"><freejoint/><geom name="e1" type="sphere" condim="4"/></body></worldbody>
+<contact><exclude body1="a" body2="e"/>
+<pair geom1="b1" geom2="floor" friction="0.25 0.25 0.1 0.1 0.1" condim="3"/></contact>
+</mujoco>"""
+
+LEG = """<robot name="leg"><link name="base"/><link name="leg"><inertial><mass value="2"/><origin xyz="0 0 -0.2"/>
+<inertia ixx=".1" iyy=".1" izz=".1" ixy="0" ixz="0" iyz="0"/></inertial>
+<collision><origin xyz="0 0 -0.2" rpy="0 1.5707963267948966 0"/>
+<geometry><capsule radius="0.02" length="0.3"/></geometry></collision>
+<collision><origin xyz="0 0 -0.4"/><geometry>{shape}</geometry></collision></link>
+<joint name="slide" type="prismatic"><parent link="base"/><child link="leg"/><axis xyz="0 0 1"/>
+<limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
+
+
+def silently(read: Any, *args: Any, **options: Any) -> dyn.Mechanism:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", dyn.MechanismWarning)
+        return read(*args, **options)
+
+
+@pytest.mark.parametrize("flags", ["", '<flag filterparent="disable"/>'])
+def test_the_pairs_and_their_friction_are_those_of_mujoco(flags: str) -> None:
+    mujoco = pytest.importorskip("mujoco")
+    mj = mujoco.MjModel.from_xml_string(CROWD.format(flags=flags))
+    data = mujoco.MjData(mj)
+    mujoco.mj_forward(mj, data)
+    theirs = {}
+    for contact in data.contact[: data.ncon]:
+        pair = tuple(sorted((int(contact.geom1), int(contact.geom2))))
+        theirs[pair] = (approx(float(contact.friction[0])), int(contact.dim))
+    assert _meetings(mj) == theirs
+    assert len(theirs) > 8
+
+
+def test_spheres_and_ends_of_capsules_are_where_mujoco_has_them() -> None:
+    """On a tilted plane, of bodies that turn about points other than their origins."""
+    mujoco = pytest.importorskip("mujoco")
+    text = """<mujoco><worldbody><geom type="plane" size="1 1 1" pos="0 0 -0.5" euler="20 30 0" friction="0.6"/>
+    <body pos="0.1 0 0.2" euler="10 20 30"><joint type="hinge" pos="0.1 0.2 0.3" axis="0 1 1"/>
+    <joint name="second" type="hinge" pos="-0.1 0.1 0" axis="1 0 0" ref="20"/>
+    <geom name="ball" type="sphere" size="0.05" pos="0.1 -0.2 0.3"/>
+    <geom name="rod" type="capsule" size="0.03 0.2" pos="-0.1 0.2 0" euler="40 50 60" contype="0"/></body>
+    </worldbody></mujoco>"""
+    model = dyn.load_mjcf(text, contacts="compliant")
+    assert model.left_out == ()
+    mj = mujoco.MjModel.from_xml_string(text)
+    data = mujoco.MjData(mj)
+    data.qpos[:] = [0.7, -0.4]
+    mujoco.mj_forward(mj, data)
+    rod, ball = mj.geom("rod").id, mj.geom("ball").id
+    half = 0.2 * data.geom_xmat[rod].reshape(3, 3)[:, 2]
+    expected = [data.geom_xpos[ball], data.geom_xpos[rod] - half, data.geom_xpos[rod] + half]
+    contacts = [each for each in model.forces if isinstance(each, dyn.Contact)]
+    for contact, center in zip(contacts, expected, strict=True):
+        place = model.position(contact.body, contact.at).evaluate({"q0": 0.7, "q1": -0.4})
+        assert list(place.values()) == approx(center.tolist(), abs=EQUATIONS)
+        depth = dyn.arrays_at(model, model.contact(contact), q=data.qpos, qd=[0.0, 0.0])["depth"]
+        normal = data.geom_xmat[0].reshape(3, 3)[:, 2]
+        assert float(depth) == approx(contact.radius - normal @ (center - data.geom_xpos[0]), abs=EQUATIONS)
+        assert contact.friction == 1.0  # the larger: that of the ball, by default
+
+
+def test_a_sphere_that_carries_all_sinks_by_a_hundredth_of_its_radius() -> None:
+    """In any units, and however strong gravity is."""
+    pytest.importorskip("mujoco")
+    for radius, mass, gravity in ((0.1, 2.0, 9.81), (1e-3, 1e-4, 1.6)):
+        text = f"""<mujoco><option gravity="0 0 {-gravity}"/><worldbody><geom type="plane" size="1 1 1"/>
+        <body><joint type="slide" axis="0 0 1"/><geom type="sphere" size="{radius}" mass="{mass}"/></body></worldbody>
+        </mujoco>"""
+        model = dyn.load_mjcf(text, contacts="compliant")
+        rest = {"q0": 0.99 * radius, "qd0": 0.0, "tau0": 0.0}
+        assert dyn.forward_dynamics(model).evaluate(rest)["qdd0"] == approx(0.0, abs=EQUATIONS * gravity)
+        A, _ = dyn.linearize(model, [0.99 * radius], [0.0])
+        poles = np.linalg.eigvals(A)
+        assert (-poles.real / np.abs(poles)).tolist() == approx([0.5 * 1.5**-0.5] * 2, rel=1e-6)  # damped as said
+
+
+def test_what_is_no_sphere_on_a_plane_is_left_out_and_said() -> None:
+    mujoco = pytest.importorskip("mujoco")
+    mj = mujoco.MjModel.from_xml_string(CROWD.format(flags=""))
+    with pytest.warns(dyn.MechanismWarning, match="left out contacts other than of spheres and capsules with planes"):
+        model = dyn.load_mjcf(mj, contacts="compliant")
+    friction = {each.body: each.friction for each in model.forces if isinstance(each, dyn.Contact)}
+    assert friction == {"a": 0.7, "b": 0.25, "c": 0.1, "d": 1.0, "e": 1.0}
+    assert [text.split(" (")[0] for text in model.left_out] == [
+        "contacts other than of spheres and capsules with planes",
+        "torsional and rolling friction of contacts",
+    ]
+    assert silently(dyn.load_mjcf, mj).left_out == ("contacts",)
+    off = mujoco.MjModel.from_xml_string(CROWD.format(flags='<flag contact="disable"/>'))
+    assert not silently(dyn.load_mjcf, off, contacts="compliant").forces
+
+
+def test_spheres_and_capsules_of_a_urdf_stand_on_the_ground() -> None:
+    text = LEG.format(shape='<sphere radius="0.05"/>')
+    with pytest.warns(dyn.MechanismWarning, match=r"left out joint limits \(slide\)$"):
+        model = dyn.load_urdf(text, contacts="compliant")
+    contacts = [each for each in model.forces if isinstance(each, dyn.Contact)]
+    assert np.array([each.at for each in contacts]).tolist() == [
+        approx([-0.15, 0.0, -0.2]),
+        approx([0.15, 0.0, -0.2]),
+        approx([0.0, 0.0, -0.4]),
+    ]
+    assert [each.radius for each in contacts] == [0.02, 0.02, 0.05]
+    run = dyn.simulate(model, [0.6], [0.0], 2.0)
+    assert run.q[-1, 0] == approx(0.4 + 0.99 * 0.05, rel=1e-6)
+    boxed = silently(dyn.load_urdf, LEG.format(shape='<box size="1 1 1"/>'), contacts="compliant")
+    assert boxed.left_out == ("joint limits (slide)", "contacts of shapes other than spheres and capsules (leg: box)")
+    assert silently(dyn.load_urdf, text).left_out == ("contacts", "joint limits (slide)")
+
+
+def test_where_nothing_touches_or_weighs_it_is_said() -> None:
+    rotor = dyn.Mechanism([dyn.Body("rotor", dyn.Joint("revolute"), mass=1.0, inertia=(0.1, 0.1, 0.1))])
+    text = "contacts, as no sphere or capsule of a body that moves is on a plane"
+    with pytest.warns(dyn.MechanismWarning, match=text):
+        assert dyn.load_urdf(dyn.to_urdf(rotor), contacts="compliant").left_out == (text,)
+    light = LEG.format(shape='<sphere radius="0.05"/>').replace(
+        "</robot>", '<mujoco><option gravity="0 0 0"/></mujoco></robot>'
+    )
+    with raises(
+        dyn.MechanismError, match="stiffness of contacts follows from the weight of the model, and it has none"
+    ):
+        dyn.load_urdf(light, contacts="compliant")
+    with raises(ValueError, match="contacts must be"):
+        dyn.load_urdf(dyn.to_urdf(rotor), contacts="rigid")
+    with raises(dyn.MechanismError, match="collision of link 'leg': radius must be positive"):
+        dyn.load_urdf(LEG.format(shape='<sphere radius="-1"/>'), contacts="compliant")

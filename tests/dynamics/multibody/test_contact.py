@@ -1,0 +1,341 @@
+"""Contacts: their laws, beside closed forms; action and reaction; units; smoothness; and what cannot be one."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from pytest import approx, mark, raises
+
+import cgraph as cg
+import dynamics as dyn
+from dynamics.multibody.parameters import vanishes
+from tests.dynamics.mechanisms import random_rotation, random_state, random_tree
+from tests.each_row import each_row
+from tests.tolerances import EQUATIONS, SHORT_SUM, SOLVED
+
+STEPS = 1e-7  # of motions at rtol 1e-10 through touches, where only N and its slope are continuous
+DIFFERENCES = 1e-5  # of slopes of such motions, whose chosen steps count as constants
+MATERIAL: dict[str, Any] = {"stiffness": 1e5, "dissipation": 0.3, "friction": 0.4, "velocity": 0.01}
+RADIUS, MASS, GRAVITY = 0.1, 2.0, 9.81
+
+
+def ball(name: str = "ball", **others: Any) -> dyn.Body:
+    """A ball of even density, free."""
+    moment = 0.4 * MASS * RADIUS**2
+    return dyn.Body(name, dyn.Joint("free"), mass=MASS, inertia=(moment, moment, moment), **others)
+
+
+def on_ground(**material: Any) -> dyn.Mechanism:
+    return dyn.Mechanism([ball()], forces=[dyn.Contact("ball", radius=RADIUS, **(MATERIAL | material))])
+
+
+def falling(**contact: Any) -> dyn.Mechanism:
+    """A mass on a vertical slide, without gravity, on the ground."""
+    slide = dyn.Body("mass", dyn.Joint("prismatic", (0.0, 0.0, 1.0)), mass=MASS)
+    return dyn.Mechanism([slide], (0.0, 0.0, 0.0), [dyn.Contact("mass", **contact)])
+
+
+def trees() -> list[dyn.Mechanism]:
+    """Random trees whose bodies touch, pairwise and on the ground, by both kinds of contact."""
+    found = []
+    for seed in range(4):
+        rng, tree = np.random.default_rng(seed), random_tree(seed, 4)
+        contacts = [
+            dyn.Contact(
+                *pair,
+                at=rng.normal(size=3),
+                to_at=rng.normal(size=3),
+                normal=rng.normal(size=3),
+                radius=float(rng.uniform(0.5, 5.0)),
+                to_radius=to_radius,
+                **MATERIAL,
+            )
+            for pair in (("b3", "world"), ("b1", "b3"), ("b2", "b0"))
+            for to_radius in (None, 3.0)
+        ]
+        found.append(replace(tree, forces=contacts))
+    return found
+
+
+def evaluated(mechanism: dyn.Mechanism, contact: dyn.Contact, q: Any, qd: Any) -> dict[str, Any]:
+    return dyn.arrays_at(mechanism, mechanism.contact(contact), q=q, qd=qd)
+
+
+# --- closed forms
+
+
+@each_row("d, unit", [(d, unit) for d in (0.1, 1.0, 5.0) for unit in (1.0, 1e-9)])
+def test_a_body_is_thrown_back_as_hunt_and_crossley_say(d: float, unit: float) -> None:
+    """d v (1 + e) = log((1 + d v) / (1 - d e v)), in meters and nanometers."""
+    model = falling(stiffness=1e5 / math.sqrt(unit), dissipation=d / unit)
+    run = dyn.simulate(model, [0.001 * unit], [-unit], 1.0, rtol=1e-10, atol=1e-13 * unit)
+    e = run.qd[-1, 0] / unit
+    assert 0.0 < e < 1.0
+    assert d * (1.0 + e) == approx(math.log((1.0 + d) / (1.0 - d * e)), rel=STEPS)
+
+
+def test_without_dissipation_nothing_is_lost_and_what_is_stored_is_the_work_of_the_force() -> None:
+    model = falling(stiffness=1e5)
+    run = dyn.simulate(model, [0.01], [-1.0], 0.1, rtol=1e-10, atol=1e-13)
+    stored = evaluated(model, model.forces[0], run.q, run.qd)["energy"]
+    assert stored.max() > 0.9 * run.energy[0]
+    assert run.energy + stored == approx(run.energy[0], rel=STEPS)
+
+
+def test_a_ball_that_slips_rolls_at_five_sevenths_of_its_speed() -> None:
+    """It slips for 2 v / (7 friction g), and, but for the creep, not after."""
+    mu, slow, speed = 0.2, 1e-4, 1.0
+    model = on_ground(friction=mu, velocity=slow)
+    height = RADIUS - (MASS * GRAVITY / MATERIAL["stiffness"]) ** (2.0 / 3.0)
+    slipping = 2.0 * speed / (7.0 * mu * GRAVITY)
+    times = [0.5 * slipping, 0.9 * slipping, 2.0 * slipping]
+    start = [0.0, 0.0, height, 1.0, 0.0, 0.0, 0.0], [speed, 0.0, 0.0, 0.0, 0.0, 0.0]
+    run = dyn.simulate(model, *start, times[-1], "rodas", t_eval=times)
+    sliding = run.qd[:, 0] - RADIUS * run.qd[:, 4]
+    for k, t in enumerate(times[:2]):
+        assert run.qd[k, 0] == approx(speed - mu * GRAVITY * t, abs=slow)
+        assert sliding[k] == approx(speed - 3.5 * mu * GRAVITY * t, abs=slow)
+    assert run.qd[-1, 0] == approx(5.0 / 7.0 * speed, rel=1e-6)
+    assert abs(sliding[-1]) < slow
+
+
+def test_on_a_slope_a_block_creeps_as_stated() -> None:
+    """Under a load of s friction N with s / sqrt(1 - s^2) of the velocity."""
+    s, mu, slow = 0.8, 0.5, 1e-3
+    slope = math.atan(s * mu)
+    pull = (GRAVITY * math.sin(slope), 0.0, -GRAVITY * math.cos(slope))
+    slide = dyn.Body("rail", dyn.Joint("prismatic", (0.0, 0.0, 1.0)))
+    block = dyn.Body("block", dyn.Joint("prismatic", (1.0, 0.0, 0.0)), "rail", mass=MASS)
+    ground = dyn.Contact("block", **(MATERIAL | {"friction": mu, "velocity": slow}))
+    sink = (MASS * GRAVITY * math.cos(slope) / MATERIAL["stiffness"]) ** (2.0 / 3.0)
+    run = dyn.simulate(dyn.Mechanism([slide, block], pull, [ground]), [-sink, 0.0], [0.0, 0.0], 1.0, "rodas")
+    assert run.qd[-1] == approx([0.0, slow * s / math.sqrt(1.0 - s * s)], abs=1e-6 * slow)
+
+
+# --- laws
+
+
+def test_the_force_never_pulls_and_friction_stays_below_its_bound() -> None:
+    touched = 0
+    for tree in trees():
+        for seed, contact in enumerate(tree.forces):
+            assert isinstance(contact, dyn.Contact)
+            q, qd, *_ = random_state(tree, seed)
+            found = {name: float(value) for name, value in evaluated(tree, contact, q, 5.0 * qd).items()}
+            normal, force = found["normal"], np.array([found[f"f{axis}"] for axis in "xyz"])
+            assert normal >= 0.0
+            assert normal == 0.0 or found["depth"] > 0.0
+            across = math.sqrt(max(force @ force - normal**2, 0.0))
+            assert across <= MATERIAL["friction"] * normal * (1.0 + SHORT_SUM) + SOLVED * normal
+            touched += normal > 0.0
+    assert touched >= 8
+
+
+def test_generalized_forces_have_the_power_of_the_contacts() -> None:
+    """Q . qd is the sum of f . v."""
+    for tree in trees():
+        q, qd, _, tau = random_state(tree, 5)
+        free = replace(tree, forces=())
+        state = {"q": q, "qd": qd, "tau": tau}
+        rates = [dyn.arrays_at(each, dyn.forward_dynamics(each), **state)["qdd"] for each in (tree, free)]
+        mass = dyn.arrays_at(tree, dyn.mass_matrix(tree), q=q)["M"]
+        power = float(qd @ mass @ (rates[0] - rates[1]))
+        parts = []
+        for contact in tree.forces:
+            assert isinstance(contact, dyn.Contact)
+            found = evaluated(tree, contact, q, qd)
+            parts.append(sum([float(found[f"f{axis}"]) * float(found[f"v{axis}"]) for axis in "xyz"]))
+        assert power == approx(sum(parts), rel=SOLVED, abs=SOLVED * max(map(abs, parts)))
+
+
+def test_action_is_reaction() -> None:
+    """Bodies on nothing that hit one another, eccentric, with friction: momentum and angular momentum stay."""
+    rng = np.random.default_rng(3)
+    first, second = ball("first"), ball("second")
+    for to_radius in (0.07, None):
+        offset = rng.normal(size=(2, 3)) * 0.02
+        contact = dyn.Contact(
+            "first", "second", at=offset[0], to_at=offset[1], normal=(0.2, 0.1, 1.0), radius=RADIUS,
+            to_radius=to_radius, **MATERIAL,
+        )  # fmt: skip
+        model = dyn.Mechanism([first, second], (0.0, 0.0, 0.0), [contact])
+        q = [0.0, 0.0, 0.25, 1.0, 0.0, 0.0, 0.0, 0.01, 0.02, 0.0, 1.0, 0.0, 0.0, 0.0]
+        run = dyn.simulate(model, q, [0.3, 0.0, -2.0, 1.0, 2.0, 3.0, *[0.0] * 6], 0.2, rtol=1e-10, atol=1e-12)
+        momenta = dyn.arrays_at(model, dyn.spatial_momentum(model), q=run.q, qd=run.qd)["h"]
+        assert evaluated(model, contact, run.q, run.qd)["normal"].max() > 10.0
+        assert np.abs(momenta - momenta[0]).max() < SOLVED * np.abs(momenta).max()
+        assert (run.energy[-1]) < 0.99 * run.energy[0]
+
+
+def test_in_a_turned_frame_a_contact_is_the_same() -> None:
+    """A plane given in the world, and in the axes of a body welded to it."""
+    rng = np.random.default_rng(1)
+    turn, place, normal, point = random_rotation(rng), rng.normal(size=3), rng.normal(size=3), rng.normal(size=3)
+    table = dyn.Body("table", dyn.Joint("fixed", position=place, orientation=turn))
+    given = {"at": rng.normal(size=3), "radius": 20.0, **MATERIAL}
+    in_world = dyn.Contact("ball", to_at=point, normal=normal, **given)
+    on_table = dyn.Contact("ball", "table", to_at=turn.T @ (point - place), normal=3.0 * turn.T @ normal, **given)
+    models = [dyn.Mechanism([ball(), table], forces=[each]) for each in (in_world, on_table)]
+    q, qd, _, tau = random_state(models[0], 2)
+    first, second = (dyn.arrays_at(each, dyn.forward_dynamics(each), q=q, qd=qd, tau=tau)["qdd"] for each in models)
+    assert np.abs(first).max() > 1e3
+    assert np.abs(first - second).max() < EQUATIONS * np.abs(first).max()
+
+
+@each_row("mass, length, time", [(2.0**7, 2.0**-10, 2.0**5), (2.0**-9, 2.0**6, 2.0**-4)])
+def test_in_other_units_a_contact_is_the_same(mass: float, length: float, time: float) -> None:
+    """Of mass, length and time, the stiffness in N/m^(3/2)."""
+    moment = 0.4 * MASS * RADIUS**2 * mass * length**2
+    body = dyn.Body("ball", dyn.Joint("free"), mass=mass * MASS, inertia=(moment, moment, moment))
+    other = dyn.Contact(
+        "ball",
+        radius=length * RADIUS,
+        stiffness=MATERIAL["stiffness"] * mass * length / time**2 / length**1.5,
+        dissipation=MATERIAL["dissipation"] * time / length,
+        friction=MATERIAL["friction"],
+        velocity=MATERIAL["velocity"] * length / time,
+    )
+    q, qd = [0.0, 0.0, 0.09, 1.0, 0.0, 0.0, 0.0], [1.0, 0.5, -0.4, 1.0, 2.0, 3.0]
+    ours, theirs = on_ground(), dyn.Mechanism([body], (0.0, 0.0, -GRAVITY * length / time**2), [other])
+    turned = [1.0 / time] * 3
+    first = dyn.arrays_at(ours, dyn.forward_dynamics(ours), q=q, qd=qd)["qdd"]
+    state = {
+        "q": [length * x for x in q[:3]] + q[3:],
+        "qd": [*[length / time * v for v in qd[:3]], *[v / time for v in qd[3:]]],
+    }
+    second = dyn.arrays_at(theirs, dyn.forward_dynamics(theirs), **state)["qdd"]
+    scales = np.array([length / time**2] * 3 + [each / time for each in turned])
+    assert (second / scales).tolist() == approx(first.tolist(), rel=SHORT_SUM)
+
+
+# --- derivatives
+
+
+def test_slopes_are_there_at_the_touch_and_apart() -> None:
+    """First and second, forward and reverse: 0 apart and at the touch, and never NaN."""
+    model = on_ground()
+    forward = dyn.forward_dynamics(model)
+    slopes = cg.jacobian(forward, ["q2", "qd0", "qd2"])
+    second = cg.jacobian(slopes, ["q2", "qd2"])
+    for height in (2.0 * RADIUS, RADIUS):
+        state = dict.fromkeys(forward.input_names, 0.0) | {"q2": height, "q3": 1.0, "qd0": 1.0, "qd2": -1.0}
+        assert set(slopes.evaluate(state).values()) == {0.0}
+        assert set(second.evaluate(state).values()) == {0.0}
+
+
+def test_a_gradient_through_a_landing_is_that_of_differences() -> None:
+    """Of where a spinning ball is after its first bounce, by the start and by the material."""
+    contact = dyn.Contact("ball", radius=RADIUS, stiffness="k", dissipation="d", friction="mu", velocity="slow")
+    values = {"k": 1e5, "d": 0.3, "mu": 0.4, "slow": 0.01}
+    model = dyn.Mechanism([ball()], forces=[contact], parameters=values)
+    q, qd, exact = [0.0, 0.0, 0.15, 1.0, 0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0, 0.0, 0.0], {"rtol": 1e-11, "atol": 1e-14}
+
+    def end(q: Any, qd: Any, values: dict[str, float]) -> float:
+        run = dyn.simulate(model, q, qd, 0.15, parameters=values, **exact)
+        return float(run.q[-1, 0] + run.q[-1, 2] + 0.1 * run.qd[-1, 4])
+
+    found = dyn.gradient(
+        model, lambda q, qd, t: q[0] + q[2] + 0.1 * qd[4], q, qd, 0.15, wrt=["q", "qd", *values], **exact
+    )
+    assert found.value == approx(end(q, qd, values), rel=STEPS)
+    for name, value in values.items():
+        h = 1e-4 * value
+        low, high = (end(q, qd, values | {name: value + sign * h}) for sign in (-1.0, 1.0))
+        assert float(found.gradients[name]) * value == approx((high - low) / 2e-4, abs=DIFFERENCES)
+    low, high = (end([0.0, 0.0, 0.15 + sign * 1e-5, 1.0, 0.0, 0.0, 0.0], qd, values) for sign in (-1.0, 1.0))
+    assert found.gradients["q"][2] == approx((high - low) / 2e-5, abs=DIFFERENCES)
+
+
+# --- as part of a mechanism
+
+
+def test_calls_batches_and_plain_python_agree() -> None:
+    for tree in trees()[:2]:
+        forward = dyn.forward_dynamics(tree)
+        states = [random_state(tree, seed) for seed in range(5)]
+        rows = np.array([np.concatenate([q, qd, tau]) for q, qd, _, tau in states])
+        native, plain = (cg.compile(forward, backend=backend) for backend in ("auto", "python"))
+        found = native.batch(rows.T).T
+        assert np.array([native(row) for row in rows]).tolist() == found.tolist()
+        for row, values in zip(rows, found, strict=True):
+            assert np.abs(plain(row) - values).max() < EQUATIONS * np.abs(values).max()
+
+
+def test_parameters_of_a_contact_are_inputs_and_are_bound() -> None:
+    named = {"stiffness": "k", "dissipation": "d", "friction": "mu", "velocity": "slow"}
+    values = {name: MATERIAL[what] for what, name in named.items()}
+    opened = dyn.Mechanism([ball()], forces=[dyn.Contact("ball", radius=RADIUS, **named)], parameters=values)
+    state = {f"q{i}": x for i, x in enumerate([0.0, 0.0, 0.09, 1.0, 0.0, 0.0, 0.0])}
+    state |= {f"{kind}{i}": 0.3 for kind in ("qd", "tau") for i in range(6)}
+    results = [
+        dyn.forward_dynamics(each).evaluate(state | dict(each.parameters))
+        for each in (opened, opened.bind(), on_ground())
+    ]
+    assert results[0] == approx(results[1], rel=SHORT_SUM)
+    assert results[1] == results[2]
+    assert opened.bind().forces[0].stiffness == 1e5
+    softer = opened.bind({"k": 1.0})
+    assert set(softer.parameters) == {"d", "mu", "slow"}
+    assert vanishes(replace(softer.forces[0], friction=0.0).friction)
+
+
+def test_a_contact_goes_with_the_bodies_that_it_is_between() -> None:
+    arm = dyn.planar_arm([1.0, 0.5], [1.0, 0.8])
+    inner = dyn.Contact("link 1", radius=0.1, stiffness="k")
+    between = dyn.Contact("link 2", "link 1", radius=0.1, to_radius=0.2, stiffness=1e3)
+    model = dyn.Mechanism(arm.bodies, arm.gravity, [inner, between], {"k": 1e4})
+    for body in ("link 2", "link 1"):
+        taken = model.subtree(body)
+        assert between in taken.forces
+        assert between not in model.detach(body).forces
+        assert set(model.detach(body).attach(taken).forces) == {inner, between}
+    assert dict(model.detach("link 1").parameters) == {}
+    assert model.lock("link 2", 0.3).forces == (inner, between)
+
+
+BAD: dict[str, tuple[dict[str, Any], str]] = {
+    "nobody": ({"body": "nobody"}, "there is a contact on the unknown body 'nobody'"),
+    "no other": ({"to": "nobody"}, "there is a contact on the unknown body 'nobody'"),
+    "the world": ({"body": "world", "to": "ball"}, "there is a contact on the unknown body 'world'"),
+    "itself": ({"to": "ball"}, "contact of body 'ball' with 'ball': a contact needs two bodies"),
+    "points": ({"radius": 0.0, "to_radius": 0.0}, "contact of body 'ball' with 'world': two points do not touch"),
+    "a radius": (
+        {"radius": -1.0},
+        "contact of body 'ball' with 'world': radius must be finite and at least 0, got -1.0 m",
+    ),
+    "no normal": ({"normal": (0, 0, 0)}, "contact of body 'ball' with 'world': normal must not be zero"),
+    "soft": (
+        {"stiffness": -1.0},
+        "contact of body 'ball' with 'world': stiffness must be finite and at least 0, got -1.0",
+    ),
+    "sticky": ({"friction": math.nan}, "contact of body 'ball' with 'world': friction must be finite and at least 0"),
+    "a jump": (
+        {"friction": 0.5},
+        "contact of body 'ball' with 'world': velocity must be positive where there is friction",
+    ),
+    "no value": (
+        {"stiffness": "k"},
+        "contact of body 'ball' with 'world': stiffness has the parameter 'k', which needs",
+    ),
+}
+
+
+@mark.parametrize("case", BAD)
+def test_a_contact_that_cannot_be_is_refused(case: str) -> None:
+    given, message = BAD[case]
+    contact = dyn.Contact(**({"body": "ball", "radius": RADIUS, "stiffness": 1e5} | given))
+    with raises(dyn.MechanismError, match="^" + re.escape(message)):
+        dyn.Mechanism([ball()], forces=[contact])
+
+
+def test_a_value_that_makes_no_contact_is_refused() -> None:
+    contact = dyn.Contact("ball", radius=RADIUS, stiffness=1e5, friction=0.5, velocity="slow")
+    model = dyn.Mechanism([ball()], forces=[contact], parameters={"slow": 0.01})
+    with raises(dyn.MechanismError, match=r"velocity must be positive .* where slow = 0\.0"):
+        model.bind({"slow": 0.0})
+    with raises(dyn.MechanismError, match="a contact is a Contact, got str"):
+        model.contact("ball")  # type: ignore[arg-type]
