@@ -89,7 +89,6 @@ if TYPE_CHECKING:  # shared by the three packages alone: no promise is made for 
     from .core.label import UNLABELLED as UNLABELLED
     from .core.scope import without_collection as without_collection
     from .explain.lint.lint import Lint as Lint
-    from .explain.remarks import Remarks as Remarks, remarked as remarked, remarks_of as remarks_of
     from .explain.why_nan import WhyNan as WhyNan
     from .operations.operation import columns as columns
     from .program.derivatives.linearization import Linearization as Linearization, Linearized as Linearized
@@ -134,6 +133,7 @@ if TYPE_CHECKING:  # shared by the three packages alone: no promise is made for 
     from .writing.formulas import Side as Side, fraction as fraction, statements as statements
     from .writing.holds_nodes import HoldsNodes as HoldsNodes
     from .writing.latex import LATEX as LATEX, latex_block as latex_block, number_text as number_text
+    from .writing.naming import Remarks as Remarks, remarked as remarked, remarks_of as remarks_of
     from .writing.symbols import GREEK as GREEK, is_letter as is_letter, symbol as symbol
 
 

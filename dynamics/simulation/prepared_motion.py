@@ -25,8 +25,7 @@ from .progress_bar import Progress
 from .row_values import converted, unreached_momenta
 from .run_options import METHOD, RunOptions
 from .sampled_controller import SampledController
-from .solution import Solution
-from .steps.dense_output import StepBlock
+from .steps.dense_output import Solution, StepBlock
 from .steps.integration import integration_of
 from .steps.stepping import NativeIntegration
 from .trajectory import SimulationWarning, Trajectory

@@ -17,7 +17,7 @@ from cgraph.extend import Array, counted, or_nearest
 
 from .row_values import row_values
 from .sampled_controller import HeldForces
-from .solution import Solution
+from .steps.dense_output import Solution
 
 if TYPE_CHECKING:
     from cgraph.extend import WhyNan

@@ -31,7 +31,9 @@ from ...systems.kinematics import ONE, ZERO
 from ...systems.model import Model, as_system
 from ...systems.system import System
 from ..changes.switched_effects import without_effect
-from ..forces.external_force import Force, generalized_forces
+from ..forces.contact import Contact
+from ..forces.external_force import Force
+from ..forces.generalized_forces import generalized_forces
 from ..forces.joint_force import JointForce, add_joint_forces
 from ..trees.mechanism import Mechanism, as_mechanism
 
@@ -184,22 +186,24 @@ def _of_forces(system: System, mechanism: Mechanism | None, build: Builder) -> I
     if mechanism is None:
         forces = {"applied forces": system.forces}
     else:
-        together: dict[str, list[Force | JointForce]] = {}
+        together: dict[str, list[Force | JointForce | Contact]] = {}
         for force in mechanism.forces:
             kind = type(force).__name__.removeprefix("Joint").lower()
-            together.setdefault(f"{kind} {'on' if isinstance(force, Force) else 'of'} {force.body}", []).append(force)
+            together.setdefault(f"{kind} {'of' if isinstance(force, JointForce) else 'on'} {force.body}", []).append(
+                force
+            )
         forces = {name: tuple(_along_velocities(mechanism, each)) for name, each in together.items()}
     for name, given in forces.items():
         with building(build):
             yield name, [-each for each in folded(given, build)]
 
 
-def _along_velocities(mechanism: Mechanism, forces: Sequence[Force | JointForce]) -> list[Node]:
+def _along_velocities(mechanism: Mechanism, forces: Sequence[Force | JointForce | Contact]) -> list[Node]:
     """Some forces of a mechanism as generalized ones."""
     given = {name: cg.variable(name) for name in mechanism.parameter_values}
     q, qd = mechanism.system.q, mechanism.system.qd
-    on_bodies = [(force, mechanism.chain(force.body)) for force in forces if isinstance(force, Force)]
-    return add_joint_forces(generalized_forces(on_bodies, qd, given), forces, mechanism.moving, (q, qd), given)
+    along = generalized_forces(forces, mechanism.chain, qd, given)
+    return add_joint_forces(along, forces, mechanism.moving, (q, qd), given)
 
 
 def _of_step(
