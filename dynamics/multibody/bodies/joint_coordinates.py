@@ -17,6 +17,7 @@ from ...systems.quasi_velocities import QuasiVelocities
 from ..joints import JointType
 from ..parameters import Quantities
 from .body import WORLD, Body
+from .limits import NO_LIMITS, Limits
 
 Value = TypeVar("Value")
 _FORCES = {"rad/s": "N m", "m/s": "N"}
@@ -55,6 +56,12 @@ def coordinate_names(bodies: Sequence[Body]) -> tuple[str, ...]:
 def velocity_names(bodies: Sequence[Body]) -> tuple[str, ...]:
     """Names of all velocities: the joint's, with a word for the velocity where it has several."""
     return tuple([_called(body, name) for body in bodies for name in body.joint.type.velocities])
+
+
+def joint_limits(bodies: Sequence[Body]) -> dict[str, Limits]:
+    """{coordinate: its limits}, those of its joint."""
+    limits = [body.joint.limits or NO_LIMITS for body in bodies for _ in body.joint.type.coordinates]
+    return dict(zip(coordinate_names(bodies), limits, strict=True))
 
 
 def _called(body: Body, name: str) -> str:

@@ -49,7 +49,7 @@ class Contact:
         Of the sphere of `to` [m]. None, the default, is a plane.
     stiffness : float or parameter
         At least 0 [N/m^(3/2)]. A weight W sinks by (W / stiffness)^(2/3). Of two elastic spheres it is
-        4/3 E sqrt(R), with 1/R = 1/radius + 1/to_radius and 1/E = (1 - nu^2)/E_1 + (1 - nu_2^2)/E_2.
+        4/3 E sqrt(R), with 1/R = 1/radius + 1/to_radius and 1/E = (1 - nu_1^2)/E_1 + (1 - nu_2^2)/E_2.
     dissipation : float or parameter
         d, at least 0 [s/m]. A body that arrives with the speed v leaves with e v, where
         d v (1 + e) = log((1 + d v) / (1 - d e v)); for small d v that is e = 1 - 2/3 d v.
@@ -60,11 +60,15 @@ class Contact:
 
     Notes
     -----
-    In place of a number of the last four may stand a parameter, as in a `Body`; it needs a value in `parameters`. The
-    force acts at the point of the body, or of the line between the centers, that divides it as the radii; on a plane
-    that is the lowest point of the sphere. It is one of the `forces` of a mechanism, no potential: `energy` is without
-    what the contact stores, which `Mechanism.contact` tells. There is no rigid contact, no friction that sticks, and no
-    rolling or torsional friction; a body is touched where it has a `Contact` and nowhere else.
+    The last four numbers may be parameters, as those of a `Body`; each needs a value in `parameters`.
+
+    The force acts at the point of the body, or at that of the line between the centers that divides it as the radii;
+    on a plane it is the lowest point of the sphere. Where the centers of two spheres coincide there is no normal, and
+    the force is NaN. The force is one of the `forces` of a mechanism and no potential: `energy` is without what the
+    contact stores, which `Mechanism.contact` tells.
+
+    There is no rigid contact, no friction that sticks, and no rolling or torsional friction. Bodies touch where they
+    have a `Contact` and nowhere else.
 
     Examples
     --------

@@ -1,23 +1,26 @@
-"""Joint forces: what acts along the freedoms of one joint, limits as springs, dry friction, and actuators."""
+"""Joint forces: limits as springs, dry friction, actuators; and all forces along the velocities of a mechanism."""
 
 from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import Builder, building, check_name, real_array, real_number
+from cgraph.extend import Builder, building, check_name, cotangents, real_array, real_number
 
+from ...systems.kinematics import gathered
+from ..algebra.spatial import ZERO
 from ..bodies.body import Body, MechanismError
 from ..bodies.joint_coordinates import places
 from ..joints import COMPOSITIONS
-from .contact import Contact, check_contact
-from .external_force import FORCE, Force, check_force
+from ..sweeps.kinematic_chain import KinematicChain
+from .contact import Contact, check_contact, touch
+from .external_force import FORCE, Force, check_force, powers
 
 Range = tuple[float, float]
 
@@ -273,20 +276,41 @@ def _check_joint_force(force: JointForce, bodies: Sequence[Body]) -> None:
     force.check(body)
 
 
-def add_joint_forces(
-    total: Sequence[Node],
+def generalized_forces(
     forces: Sequence[object],
+    chain: Callable[[str], KinematicChain],
     moving: Sequence[Body],
     state: tuple[Sequence[Node], Sequence[Node]],
     parameters: Mapping[str, Node],
 ) -> list[Node]:
-    """A force for each velocity, with those of joints added.  moving: bodies.  state: q and qd."""
-    result, (q, qd) = list(total), state
+    """Q = J^T f + J_w^T torque of all forces on bodies together, and those of joints: one node for each velocity.
+
+    Virtual power is a sum of forces times velocities, linear in qd, so one reverse sweep from the velocities, seeded
+    with the forces, gives its slope along qd. What a force itself depends on is not differentiated.
+    chain: the joints between a body and the world.  moving: bodies.  state: q and qd.
+    """
+    build, (q, qd) = Builder(), state
+    total: list[Node] = [ZERO] * len(qd)
+    for force in forces:
+        if isinstance(force, Force | Contact):
+            with building(build), cg.tag(force.body, FORCE):
+                shares = cotangents(gathered(_powers(force, chain, parameters)), qd, build)
+                total = [sum_ + share for sum_, share in zip(total, shares, strict=True)]
     where = {body.name: place for body, place in zip(moving, places(moving), strict=True)}
     for force in [each for each in forces if isinstance(each, JointForce)]:
         if (place := where.get(force.body)) is not None:
             with building(Builder()), cg.tag(force.body, FORCE):
                 along = force.along(q[place.q], qd[place.u], parameters)
                 for k, node in zip(range(place.u.start, place.u.stop), along, strict=True):
-                    result[k] = result[k] + node
-    return result
+                    total[k] = total[k] + node
+    return total
+
+
+def _powers(
+    force: Force | Contact, chain: Callable[[str], KinematicChain], parameters: Mapping[str, Node]
+) -> list[tuple[Node, Node]]:
+    """Velocities, and the forces on them."""
+    if isinstance(force, Force):
+        return powers(force, chain(force.body), parameters)
+    state = touch(force, chain(force.body), chain(force.to))
+    return list(zip(state.velocity, state.force, strict=True))

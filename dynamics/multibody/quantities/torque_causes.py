@@ -33,8 +33,7 @@ from ...systems.system import System
 from ..changes.switched_effects import without_effect
 from ..forces.contact import Contact
 from ..forces.external_force import Force
-from ..forces.generalized_forces import generalized_forces
-from ..forces.joint_force import JointForce, add_joint_forces
+from ..forces.joint_force import JointForce, generalized_forces
 from ..trees.mechanism import Mechanism, as_mechanism
 
 SPURIOUS = "spurious"  # what a derivative through q = qd dt + q_old adds
@@ -202,8 +201,7 @@ def _along_velocities(mechanism: Mechanism, forces: Sequence[Force | JointForce 
     """Some forces of a mechanism as generalized ones."""
     given = {name: cg.variable(name) for name in mechanism.parameter_values}
     q, qd = mechanism.system.q, mechanism.system.qd
-    along = generalized_forces(forces, mechanism.chain, qd, given)
-    return add_joint_forces(along, forces, mechanism.moving, (q, qd), given)
+    return generalized_forces(forces, mechanism.chain, mechanism.moving, (q, qd), given)
 
 
 def _of_step(

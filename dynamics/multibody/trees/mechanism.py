@@ -22,6 +22,7 @@ from ..bodies.body import WORLD, Body, Joint, MechanismError, MechanismWarning, 
 from ..bodies.composed_joints import locked_parts, outer_names, require_parents
 from ..bodies.joint_coordinates import (
     coordinate_names,
+    joint_limits,
     lengths,
     neutral,
     per_velocity,
@@ -29,11 +30,10 @@ from ..bodies.joint_coordinates import (
     quasi_velocities,
     velocity_names,
 )
-from ..bodies.limits import NO_LIMITS, Limits
+from ..bodies.limits import Limits
 from ..forces.contact import Contact, check_contact, touch
 from ..forces.external_force import Force
-from ..forces.generalized_forces import generalized_forces
-from ..forces.joint_force import JointForce, add_joint_forces, check_any_force
+from ..forces.joint_force import JointForce, check_any_force, generalized_forces
 from ..loops import Loop, check_loops, of_loops, position_rows, velocity_rows
 from ..parameters import Quantity, bound, entries, names_in, symbol
 from ..sweeps.kinematic_chain import KinematicChain, kinematic_chains
@@ -184,8 +184,7 @@ class Mechanism(Structure):
     @property
     def limits(self) -> dict[str, Limits]:
         """{coordinate: its limits}, of position, velocity and effort; infinite where there are none, see `Limits`."""
-        kinds = [(body.joint.limits or NO_LIMITS, len(body.joint.type.coordinates)) for body in self.moving]
-        return dict(zip(self.coordinates, [each for each, count in kinds for _ in range(count)], strict=True))
+        return joint_limits(self.moving)
 
     @property
     def mechanism(self) -> Mechanism:
@@ -241,8 +240,7 @@ class Mechanism(Structure):
             require_values(self.parts if bodies is None else bodies, self.gravity, self.forces, values)
 
     def _generalized_forces(self, q: list[Node], qd: list[Node], t: Node, p: dict[str, Node]) -> list[Node]:
-        total = generalized_forces(self.forces, lambda body: self._chain(body, q, qd), qd, p)
-        return add_joint_forces(total, self.forces, self.moving, (q, qd), p)
+        return generalized_forces(self.forces, lambda body: self._chain(body, q, qd), self.moving, (q, qd), p)
 
     def _chain(self, body: str, q: Sequence[Node], qd: Sequence[Node]) -> KinematicChain:
         ends = [self.carriers[name] for name in (body, WORLD)]

@@ -135,6 +135,21 @@ def test_the_force_never_pulls_and_friction_stays_below_its_bound() -> None:
     assert touched >= 8
 
 
+def test_the_force_acts_where_the_surfaces_touch() -> None:
+    """Of spheres of any radii, each way around, and of a sphere on a plane."""
+    direction = np.array([2.0, -1.0, 2.0]) / 3.0
+    place, still = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0], [0.0] * 12
+    model = dyn.Mechanism([ball("first"), ball("second")])
+    q = [*place, *(0.4 * direction), 1.0, 0.0, 0.0, 0.0]
+    rows = [("first", "second", 0.1, 0.3), ("second", "first", 0.3, 0.1), ("first", "second", 0.1, None)]
+    for body, to, radius, to_radius in rows:
+        to_at = (0.0, 0.0, 0.0) if to_radius else -0.3 * direction
+        contact = dyn.Contact(body, to, to_at=to_at, normal=-direction, radius=radius, to_radius=to_radius, **MATERIAL)
+        found = evaluated(model, contact, q, still)
+        assert [float(found[axis]) for axis in "xyz"] == approx((0.1 * direction).tolist(), rel=SHORT_SUM)
+        assert abs(found["depth"]) < SHORT_SUM
+
+
 def test_generalized_forces_have_the_power_of_the_contacts() -> None:
     """Q . qd is the sum of f . v."""
     for tree in trees():
