@@ -142,19 +142,7 @@ class Mechanism(Structure):
         return extend.render_html("model", self)
 
     def __repr__(self) -> str:
-        counted = (
-            f"{len(self.bodies)} bodies, {len(self.coordinates)} coordinate(s) {_first(self.coordinates)}".rstrip()
-        )
-        named = {
-            "locked": list(self.locked),
-            "forces on": [force.body for force in self.forces],
-            "loops": [loop.label for loop in self.loops],
-        }
-        parts = [counted + (", ..." if len(self.coordinates) > SHOWN else "")]
-        parts += [f"{what} {_first(names)}" for what, names in named.items() if names]
-        parts += [f"parameters {', '.join(self.parameter_values)}"] if self.parameter_values else []
-        parts += [f"gravity {', '.join([_shown(each) for each in entries(self.gravity)])}"]
-        return f"<Mechanism of {'; '.join(parts)}>"
+        return f"<Mechanism of {'; '.join(_summary(self))}>"
 
     @cached_property
     def parts(self) -> tuple[Body, ...]:
@@ -366,6 +354,21 @@ def require_mechanism(model: Model, what: str) -> Mechanism:
     if mechanism is None:
         raise MechanismError(f"{what} takes rigid bodies, a Mechanism or a scene of one, got {model!r:.80}")
     return mechanism
+
+
+def _summary(mechanism: Mechanism) -> list[str]:
+    """What a mechanism has: bodies, coordinates, what acts on them, parameters and gravity."""
+    some = _first(mechanism.coordinates)
+    counted = f"{len(mechanism.bodies)} bodies, {len(mechanism.coordinates)} coordinate(s) {some}".rstrip()
+    named = {
+        "locked": list(mechanism.locked),
+        "forces on": [force.body for force in mechanism.forces],
+        "loops": [loop.label for loop in mechanism.loops],
+    }
+    parts = [counted + (", ..." if len(mechanism.coordinates) > SHOWN else "")]
+    parts += [f"{what} {_first(names)}" for what, names in named.items() if names]
+    parts += [f"parameters {', '.join(mechanism.parameter_values)}"] if mechanism.parameter_values else []
+    return [*parts, f"gravity {', '.join([_shown(each) for each in entries(mechanism.gravity)])}"]
 
 
 def _first(names: Sequence[str]) -> str:

@@ -143,7 +143,7 @@ def test_what_cannot_be_in_a_file_is_said() -> None:
 def test_a_run_says_which_it_left_and_sliders_end_there(tmp_path: Any, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "arm.urdf").write_text(ROBOT, encoding="utf-8")
     start = "--start=qd.j_hinge=4,qd.j_slide=-0.1"
-    cli.main(["simulate", str(tmp_path / "arm.urdf"), start, "--t-end=0.4", "--every=0.1", "--json"])
+    cli.main(["simulate", str(tmp_path / "arm.urdf"), start, "--t-end=0.4", "--json"])
     said = json.loads(capsys.readouterr().out)["beyond_limits"]
     assert [each.partition(" at ")[0] for each in said] == [
         "position of j_slide leaves 0 to 0.2 m",
