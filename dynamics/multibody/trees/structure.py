@@ -21,6 +21,7 @@ from cgraph.extend import HoldsNodes, kept_by_first
 from ..algebra import spatial
 from ..bodies.body import BODY_QUANTITIES, JOINT_QUANTITIES, WORLD, Body, MechanismError, checked, quantities
 from ..bodies.composed_joints import parts_of
+from ..bodies.many_values import unsure
 from ..forces.external_force import Force
 from ..forces.joint_force import JointForce
 from ..loops import Loop
@@ -341,7 +342,8 @@ def require_values(bodies: Sequence[Body], gravity: Quantities, values: Mapping[
         at = {name: np.asarray(values[name], dtype=np.float64) for name in use.names}
         rows = evaluated(use.value, at)
         varied = any([each.ndim for each in at.values()])
-        for k, row in enumerate(rows if varied else [rows]):
+        for k in unsure(use.check, rows) if varied else [0]:
+            row = rows[k] if varied else rows
             try:
                 use.check(use.what, row.item() if row.ndim == 0 else row)
             except MechanismError as error:
