@@ -351,8 +351,13 @@ def require_values(
             raise MechanismError(f"{use.what} has the parameter {missing[0]!r}, which needs a value in `parameters`")
         at = {name: np.asarray(values[name], dtype=np.float64) for name in use.names}
         rows = evaluated(use.value, at)
-        varied = any([each.ndim for each in at.values()])
-        for k, row in enumerate(rows if varied else [rows]):
+        varied, looked_at = any([each.ndim for each in at.values()]), [0]
+        if varied:
+            from ..bodies.many_values import unsure  # which one set of values does not need
+
+            looked_at = unsure(use.check, rows)
+        for k in looked_at:
+            row = rows[k] if varied else rows
             try:
                 use.check(use.what, row.item() if row.ndim == 0 else row)
             except MechanismError as error:

@@ -23,7 +23,7 @@ from ..events.event_log import Happening, WatchedIntegration
 from ..outcome import INTERRUPTED, outcome
 from ..run_options import RunOptions
 from ..steps.equal_steps import EqualSteps, equal_steps
-from ..steps.integration import integration
+from ..steps.integration import AdaptiveIntegration, integration
 from ..steps.step_program import StepProgram, compile_steps
 from ..steps.stepping import (
     BLOCK_TIME,
@@ -36,6 +36,7 @@ from ..steps.stepping import (
 )
 from .ensemble import RunTable
 from .lanes import ChosenInLanes, EqualInLanes, InLanes, iterates, lanes_of
+from .unseen_run import run_unseen
 
 WORK = 2**21  # nodes computed in a block: half a millisecond for each vector
 NUMBERS = 2**22  # in the rows of a block
@@ -347,6 +348,7 @@ class Task:
         with _lock:
             compiled = compile_steps(self.program, self.options.backend)
         run: Integration | None = None
+        ends = self.options.row_times[-1] == self.options.t_end
         whole, end, count = True, time.perf_counter() + seconds, 0
         for k in which:
             if whole and time.perf_counter() >= end:
@@ -355,17 +357,20 @@ class Task:
             if not whole:
                 part.rows[k] = np.nan
                 continue
-            x, p = chunk.x[k], chunk.p[k].tolist()
+            x, native = chunk.x[k], NativeRun(compiled, self.options, chunk.p[k].tolist(), stopped)
             if isinstance(run, NativeIntegration):
-                run.set_parameters(p)
+                run.set_parameters(native.parameters)
             else:
-                run = integration(NativeRun(compiled, self.options, p, stopped), events=self.events)
-            stats, recorder = outcome(run, x, self.options)
-            part.runs.set(k, stats)
-            if isinstance(run, WatchedIntegration):
-                part.happened[k] = run.log.happened
-            states = recorder.table()[1]
-            part.rows[k, : len(states)], part.rows[k, len(states) :] = states, np.nan
+                run = integration(native, events=self.events)
+            by_end = run if ends and isinstance(run, AdaptiveIntegration) else None
+            if by_end is None or not run_unseen(by_end, x, part.runs, k, part.rows[k]):
+                run = run if by_end is None else integration(native)  # whose first blocks are short: it says when
+                stats, recorder = outcome(run, x, self.options)
+                part.runs.set(k, stats)
+                if isinstance(run, WatchedIntegration):
+                    part.happened[k] = run.log.happened
+                states = recorder.table()[1]
+                part.rows[k, : len(states)], part.rows[k, len(states) :] = states, np.nan
             whole = not part.runs.messages[k].startswith(INTERRUPTED)
         return count
 

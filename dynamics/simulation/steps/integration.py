@@ -97,6 +97,30 @@ class AdaptiveIntegration(NativeIntegration):
             self.flat = FlatPosition(self.program)
             self.flat.begin(t0, self.x, self.parameters)
 
+    def unseen(self, x: Array) -> bool:
+        """Take all steps from x (m,), none of them looked at; whether that could be, and nothing speaks against them.
+
+        State and counts are then those of `blocks`, to the bit; else the run is to be made again.
+        """
+        if self._recorded or self.options.max_steps < math.inf:
+            return False
+        self.begin(x, self.options.t0, self.options.t_end)
+        self.to_end()
+        return not self.status and self._number("at_limit") < HELD
+
+    @property
+    def counts(self) -> dict[str, float]:
+        """Numbers of `Stats` of an unseen run."""
+        rejected, longest = self._number("rejected"), self._number("longest_made")
+        steps = self._number("trials") - rejected if longest else 0.0
+        evaluations = self._number("evaluations")
+        return {
+            "steps": steps,
+            "rejected": rejected,
+            "nfev": evaluations,
+            "dt": min(longest, self.options.longest_step),
+        }
+
     def until(self, t: float) -> None:
         """Steps to t, the last of which ends there."""
         self._towards(t)
