@@ -11,6 +11,10 @@ if TYPE_CHECKING:
     from .autodiff.jacobian import hessian as hessian, jacobian as jacobian
     from .autodiff.products import gradient as gradient, jvp as jvp, vjp as vjp
     from .autodiff.sparsity import sparsity as sparsity
+    from .bridges.casadi import to_casadi as to_casadi
+    from .bridges.jax import as_jax as as_jax, to_jax as to_jax
+    from .bridges.scipy import to_scipy as to_scipy
+    from .bridges.torch import to_torch as to_torch
     from .codegen.c.c_source import to_c as to_c
     from .codegen.disk_cache import clear_cache as clear_cache
     from .codegen.wasm.to_wasm import to_wasm as to_wasm

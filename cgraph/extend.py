@@ -84,6 +84,7 @@ if TYPE_CHECKING:  # shared by the three packages alone: no promise is made for 
     from .autodiff.hessian_solve import Order as Order, solve_tangents as solve_tangents
     from .autodiff.jets import Jets as Jets, convolution as convolution
     from .autodiff.ldl_solve import ldl_elimination as ldl_elimination, ldl_solve as ldl_solve
+    from .bridges.translation import Operations as Operations, operations as operations, translated as translated
     from .core.checks import check_name as check_name
     from .core.evaluation import Array as Array
     from .core.label import UNLABELLED as UNLABELLED
@@ -109,7 +110,7 @@ if TYPE_CHECKING:  # shared by the three packages alone: no promise is made for 
         write_files as write_files,
     )
     from .util.caches import kept_by_first as kept_by_first, memo as memo
-    from .util.extras import install as install, scipy_module as scipy_module
+    from .util.extras import install as install, required as required, scipy_module as scipy_module
     from .util.html_text import html_lines as html_lines, html_table as html_table, render_html as render_html
     from .util.json_type import Json as Json
     from .util.real_arrays import (

@@ -34,8 +34,10 @@ RESULTS = "docs/reference/results.md"
 RUN = [name for name, page in PAGES.items() if "```python\n" in page]
 FENCE = re.compile(r"^```(\w*)[^\n]*\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 MARK = "-- end of example --"
+NEEDED = {"docs/bridges.md": ("casadi", "jax", "torch")}  # {page: packages without which it is not run}
 SECONDS = 120  # for one page; each takes a few
-APART = ("docs/extending.md", "docs/ensembles.md")  # in processes of their own: rows are added, workers are started
+# In processes of their own: JAX is set to float64, rows are added, workers are started.
+APART = ("docs/bridges.md", "docs/extending.md", "docs/ensembles.md")
 
 
 def examples(page: str) -> list[tuple[int, str, str]]:
@@ -102,6 +104,8 @@ LONG = "docs/derivatives.md"  # its figures take most of the time
 @pytest.mark.parametrize("name", [*[name for name in RUN if name != LONG], *slow(LONG)])
 def test_examples_print_what_is_shown(name: str, tmp_path: Path) -> None:
     """From top to bottom, in one namespace, in an empty folder, and write the pictures that the page shows."""
+    for package in NEEDED.get(name, ()):
+        pytest.importorskip(package)
     if name in APART:
         run = run_examples(name, tmp_path)
         assert run.returncode == 0, run.stderr

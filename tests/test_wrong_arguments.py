@@ -150,6 +150,7 @@ CALLS = {
     "cg.specialize": call(cg.specialize, GRAPH, {"x": 1.0}, outputs=None),
     "cg.tag": call(tagged, "a"),
     "cg.to_c": call(cg.to_c, GRAPH, "f", fma=False, names=None),
+    "cg.to_scipy": call(cg.to_scipy, cg.compile(cg.Graph([X], {"r": X * X}))),
     "cg.to_wasm": call(cg.to_wasm, GRAPH, None, time="t", host=()),
     "cg.variable": call(cg.variable, "x"),
     "cg.variables": call(cg.variables, "x y"),
@@ -460,8 +461,10 @@ RECORDS = """
     extend.Notation extend.Op
 """
 # Nothing to give; types; decorators; what a mechanism calls; what empties the user's caches; the fast way into compiled
-# code, which looks at nothing, and into the names of nodes.
-LEFT_OUT = """cg.recording_lines cg.clear_cache cg.clear_caches cg.Compiled.bind cg.Compiled.values cg.Graph.check
+# code, which looks at nothing, and into the names of nodes; what needs a package that need not be there, see
+# `tests/cgraph/bridges`.
+LEFT_OUT = """cg.as_jax cg.to_casadi cg.to_jax cg.to_torch cg.recording_lines cg.clear_cache cg.clear_caches
+    cg.Compiled.bind cg.Compiled.values cg.Graph.check
     cg.Graph.counts cg.Graph.listing cg.Graph.only_output cg.Graph.to_networkx dyn.System.braking dyn.System.changed
     dyn.System.mass_matrix dyn.System.require_known dyn.System.require_values dyn.JointForce.along
     dyn.JointForce.check dyn.JointLimit.along dyn.JointLimit.check dyn.JointFriction.along dyn.JointFriction.check
@@ -602,6 +605,8 @@ GRAPH_FIRST = [
     (cg.specialize, ({},)),
     (cg.structure_hash, ()),
     (cg.to_c, ()),
+    (cg.to_casadi, ()),
+    (cg.to_jax, ()),
     (cg.to_wasm, ()),
     (cg.vjp, ()),
     (cg.why, ("y", "x")),

@@ -19,7 +19,12 @@ def install(extra: str) -> str:
 def scipy_module(name: str, what: str) -> ModuleType:
     """SciPy's module `integrate` or `sparse`. Raises ImportError, that `what` needs it, where there is none."""
     require_choice("name", name, ("integrate", "sparse"))
+    return required(f"scipy.{name}", f"{what} needs SciPy", "scipy")
+
+
+def required(module: str, needs: str, extra: str) -> ModuleType:
+    """A package's module. Raises ImportError, that something needs it and the extra has it, where there is none."""
     try:
-        return import_module(f"scipy.{name}")
-    except ImportError:
-        raise ImportError(f"{what} needs SciPy: {install('scipy')}") from None
+        return import_module(module)
+    except ImportError as error:
+        raise ImportError(f"{needs}: {install(extra)}") from error

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from cgraph import Graph, GraphError, to_casadi
 from cgraph.extend import Array, kept_by_first
 
 from .peer import (
@@ -28,7 +29,7 @@ from .peer import (
     rk4_step,
 )
 from .task_graphs import rate_graph, task_graph
-from .translate import lagrangian, quasi_velocities, translated
+from .translate import lagrangian, quasi_velocities
 
 if TYPE_CHECKING:
     from casadi import Function
@@ -95,15 +96,10 @@ class CasadiPeer(Peer):
 
     def _ours(self, task: str) -> Function:
         """Our graph of the task, node for node."""
-        ca = self.casadi
         if task == "rk4":
             return self._step(self.function("rate"))
         graph = rate_graph(self.case) if task == "rate" else task_graph(self.case, task)
-        x = ca.SX.sym("x", len(graph.inputs))
-        values = translated(graph.nodes, dict(zip(graph.inputs, ca.vertsplit(x), strict=True)), ca, NAMES, ca.SX)
-        return ca.Function(
-            task.replace("-", "_"), [x], [ca.vertcat(*[values[node] for node in graph.outputs.values()])]
-        )
+        return our_function(graph, task.replace("-", "_"))
 
     def _step(self, rate: Function) -> Function:
         """One RK4 step that calls the rate of the state four times."""
@@ -175,6 +171,14 @@ class CasadiPeer(Peer):
             if done.returncode:
                 raise UnavailableError(f"the C compiler failed: {done.stderr.strip()[-200:]}")
             return self.casadi.external(function.name(), str(library))
+
+
+def our_function(graph: Graph, name: str) -> Function:
+    """Our graph, node for node. Raises UnavailableError for an operation that CasADi does not have."""
+    try:
+        return to_casadi(graph, name)
+    except GraphError as error:
+        raise UnavailableError(str(error)) from None
 
 
 def casadi() -> ModuleType:

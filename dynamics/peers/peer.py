@@ -6,7 +6,6 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from importlib import import_module
 from types import ModuleType
 from typing import Any, TypeVar
 
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Array, install, topological
+from cgraph.extend import Array, required as extra_module, topological
 
 from ..equations.state_equation import normalization
 from ..integrators.tableau import RK4
@@ -137,10 +136,7 @@ class UnavailableError(Exception):
 
 def required(module: str, name: str) -> ModuleType:
     """The module of a package. Raises ImportError naming the extra when it is not installed."""
-    try:
-        return import_module(module)
-    except ImportError as error:
-        raise ImportError(f"{name} is not installed: {install('bench')}") from error
+    return extra_module(module, f"{name} is not installed", "bench")
 
 
 def made(

@@ -12,7 +12,7 @@ from cgraph import Node
 from cgraph.extend import topological
 
 from ..systems.system import System
-from .peer import Peer, PeerModel, TimedTask, UnavailableError
+from .peer import Peer, PeerModel, TimedTask, UnavailableError, required
 from .translate import require_rates
 
 if TYPE_CHECKING:
@@ -38,7 +38,7 @@ class TorchPeer(Peer):
 def eager_evaluations(system: System, formulations: Iterable[str]) -> dict[str, Callable[[np.ndarray], list[Tensor]]]:
     """{formulation: function of its inputs} by torch.autograd on the same Lagrangian; empty without torch."""
     try:
-        import torch
+        torch = required("torch", "PyTorch")
     except ImportError:
         return {}
     ways = {"by_definition": _embedded(torch, system, system.lagrangian), "chain_rule": _chain_rule(torch, system)}

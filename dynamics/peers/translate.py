@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import Builder, columns, topological
+from cgraph.extend import Builder, Op, topological, translated as expressions
 
 from .peer import PeerModel, UnavailableError
 
@@ -27,20 +27,14 @@ def translated(
     functions: the module that has sin, cos, ..., by the names of our operations or those in `names`.
     number: makes a constant.  Raises UnavailableError for an operation that the module does not have.
     """
-    result = dict(env)
-    for node in order:
-        if node in result:
-            continue
-        if node.value is not None:
-            result[node] = number(node.value)
-            continue
-        name = node.op.name
-        function: Any = columns(node.op).operator
-        function = function or getattr(functions, (names or {}).get(name, name), None)
-        if function is None:
-            raise UnavailableError(f"has no operation {name!r}")
-        result[node] = function(*[result[arg] for arg in node.args])
-    return result
+
+    def function_of(op: Op) -> Callable[..., Any]:
+        found = op.operator or getattr(functions, (names or {}).get(op.name, op.name), None)
+        if found is None:
+            raise UnavailableError(f"has no operation {op.name!r}")
+        return found
+
+    return expressions(order, env, function_of, number)
 
 
 def lagrangian(

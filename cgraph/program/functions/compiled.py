@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import ctypes
 from collections.abc import Callable
+from functools import cached_property
 from typing import TypedDict
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ...codegen.bound_call import bound
+from ...codegen.c_entry import CEntry, c_entry
 from ...core.checks import GraphError
 from ...core.evaluation import Array
 from ...core.graph import Graph
@@ -17,6 +20,7 @@ from ...util.memory import lies_in_rows, require_memory, require_out, require_ta
 from ...util.real_arrays import real_array
 from ...util.threads import thread_count, write_batch
 from ..program import Program
+from ..runners.native_runner import NativeRunner
 from ..statements.call import Call
 from .bound_function import BoundFunction
 from .differentiable import Differentiable, Ready
@@ -102,6 +106,35 @@ class Compiled(BoundFunction, Differentiable):
         require_memory("y", y, (self.n_out,))
         require_target("y", y, "x", x)
         return bound(self._bound(x, y))
+
+    @property
+    def address(self) -> int:
+        """Address of the machine code as a function of C, `void (const double *x, double *y)`, for cffi, Numba, ctypes.
+
+        x has the n_in inputs, y the n_out outputs, and they do not overlap; any number of threads may call it. It is
+        there as long as this compiled graph is: keep `fn` alive while the address is used.
+        Raises RuntimeError for generated Python, which has none.
+
+        >>> import ctypes
+        >>> x = cg.variable("x")
+        >>> fn = cg.compile(cg.Graph([x], {"y": x + 1.0}))
+        >>> numbers = ctypes.POINTER(ctypes.c_double)
+        >>> y = ctypes.c_double()
+        >>> ctypes.CFUNCTYPE(None, numbers, numbers)(fn.address)(ctypes.c_double(2.0), y)
+        >>> y.value
+        3.0
+        """
+        return ctypes.cast(self._c_entry.function, ctypes.c_void_p).value or 0
+
+    @cached_property
+    def _c_entry(self) -> CEntry:
+        """The machine code as functions of C; made at the first use."""
+        if not isinstance(self._runner, NativeRunner):
+            raise RuntimeError(
+                f"an address needs machine code, and this is generated Python, backend {self.backend!r}: "
+                "cg.compile(graph, 'llvm') says what is missing"
+            )
+        return c_entry(self._runner.point("x", "y").entry, self.n_in, self.n_out)
 
     def batch_source(self) -> str:
         """The text of the function for batches: NumPy or LLVM."""

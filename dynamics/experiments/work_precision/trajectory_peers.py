@@ -15,7 +15,7 @@ from cgraph.extend import Array
 from ...integrators import Problem
 from ...io.mujoco_twin import rollout
 from ...peers import PeerModel, UnavailableError
-from ...peers.casadi import NAMES as CASADI_NAMES, casadi
+from ...peers.casadi import casadi, our_function
 from ...peers.heyoka import expressions, heyoka
 from ...peers.jax import NAMES as JAX_NAMES, double_precision
 from ...peers.mujoco import MujocoPeer
@@ -286,10 +286,8 @@ def heyoka_derivatives(hy: ModuleType, task: AccuracyTask) -> list[tuple[express
 
 def casadi_equations(ca: ModuleType, problem: Problem) -> dict[str, SX]:
     """Our rate as CasADi's x, t and ode. Raises UnavailableError for an operation it has not."""
-    graph, x, t = problem.rate, ca.SX.sym("x", problem.size), ca.SX.sym("t")
-    env = dict(zip(graph.inputs, [*ca.vertsplit(x), t], strict=True))
-    values = translated(graph.nodes, env, ca, CASADI_NAMES, ca.SX)
-    return {"x": x, "t": t, "ode": ca.vertcat(*[values[rate] for rate in graph.outputs.values()])}
+    x, t = ca.SX.sym("x", problem.size), ca.SX.sym("t")
+    return {"x": x, "t": t, "ode": our_function(problem.rate, "rate")(ca.vertcat(x, t))}
 
 
 def offers(task: AccuracyTask, smallest: float, problem: Problem, backend: str) -> dict[str, Callable[[], Solver]]:

@@ -1,0 +1,121 @@
+"""`to_torch`: a compiled graph called from within PyTorch."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property, partial
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..autodiff.products import jvp, vjp
+from ..core.checks import GraphError
+from ..program.functions.compiled import Compiled
+from ..util.extras import required
+from .derived import derived, require_compiled, values_at
+
+if TYPE_CHECKING:
+    from torch import Tensor
+
+
+def to_torch(fn: Compiled) -> Callable[[Tensor], Tensor]:
+    """The compiled graph as a function within PyTorch, which calls its machine code.
+
+    `autograd` and `torch.func` differentiate it, in reverse and forward, to any order: the derivatives are the graphs
+    of `cg.vjp` and `cg.jvp`, compiled in the same way when they are first asked for. `torch.func.vmap` and further axes
+    in front call it for all points at once.
+
+    Parameters
+    ----------
+    fn : Compiled
+        Of `cg.compile`.
+
+    Returns
+    -------
+    callable
+        (n_in,) -> (n_out,), and (..., n_in) -> (..., n_out), in float64, on the CPU.
+
+    Raises
+    ------
+    TypeError
+        For what is no compiled graph; by the function, for what is no tensor of float64 on the CPU.
+    GraphError
+        By the function, for x of another shape.
+    ImportError
+        Without PyTorch (extra `torch`).
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> x, y = cg.variables("x y")
+    >>> area = cg.to_torch(cg.compile(cg.Graph([x, y], {"area": x * y})))
+    >>> import torch
+    >>> point = torch.tensor([2.0, 3.0], dtype=torch.float64, requires_grad=True)
+    >>> area(point).backward()
+    >>> point.grad.tolist()
+    [3.0, 2.0]
+    """
+    require_compiled("to_torch", fn)
+    torch = required("torch", "to_torch needs PyTorch", "torch")
+    return partial(_checked, torch, _call(torch).apply, _WithDerivatives(fn))
+
+
+def _checked(torch: ModuleType, call: Callable[..., Tensor], of: _WithDerivatives, x: Tensor) -> Tensor:
+    if not isinstance(x, torch.Tensor):
+        raise TypeError(f"x must be a tensor, got {type(x).__name__}: {x!r:.60}")
+    if x.dtype != torch.float64 or x.device.type != "cpu":
+        raise TypeError(f"to_torch calls machine code for float64 on the CPU, got {x.dtype} on {x.device}")
+    if not x.shape or x.shape[-1] != of.fn.n_in:
+        raise GraphError(f"x must have shape (..., {of.fn.n_in}), one value for each input, got {tuple(x.shape)}")
+    return call(of, x)
+
+
+class _WithDerivatives:
+    """A compiled graph and its derivatives, made at the first use."""
+
+    def __init__(self, fn: Compiled) -> None:
+        self.fn = fn
+
+    @cached_property
+    def pulled(self) -> _WithDerivatives:
+        """(x, y_bar) -> x_bar."""
+        return _WithDerivatives(derived(self.fn, vjp))
+
+    @cached_property
+    def pushed(self) -> _WithDerivatives:
+        """(x, x_dot) -> y_dot."""
+        return _WithDerivatives(derived(self.fn, jvp))
+
+
+def _call(torch: ModuleType) -> Any:
+    """The autograd.Function of a compiled graph with derivatives and a point, (..., n_in)."""
+
+    class Call(torch.autograd.Function):  # type: ignore[name-defined, misc]
+        @staticmethod
+        def forward(of: _WithDerivatives, x: Tensor) -> Tensor:
+            values: Tensor = torch.from_numpy(np.ascontiguousarray(values_at(of.fn, x.detach().numpy())))
+            return values
+
+        @staticmethod
+        def setup_context(ctx: Any, inputs: tuple[_WithDerivatives, Tensor], output: Tensor) -> None:
+            ctx.of, x = inputs
+            ctx.save_for_backward(x)
+            ctx.save_for_forward(x)
+
+        @staticmethod
+        def backward(ctx: Any, y_bar: Tensor) -> tuple[None, Tensor]:
+            (x,) = ctx.saved_tensors
+            return None, Call.apply(ctx.of.pulled, torch.cat([x, y_bar], -1))
+
+        @staticmethod
+        def jvp(ctx: Any, of: None, x_dot: Tensor) -> Tensor:
+            (x,) = ctx.saved_tensors
+            y_dot: Tensor = Call.apply(ctx.of.pushed, torch.cat([x, x_dot], -1))
+            return y_dot
+
+        @staticmethod
+        def vmap(info: Any, in_dims: tuple[None, int], of: _WithDerivatives, x: Tensor) -> tuple[Tensor, int]:
+            return Call.apply(of, x.movedim(in_dims[1], 0)), 0
+
+    return Call
