@@ -140,7 +140,7 @@ CALLS = {
     "cg.loop": call(cg.loop, HALVE, {"x": "next"}, "python", fast=False, fma=True),
     "cg.specialize": call(cg.specialize, GRAPH, {"x": 1.0}, outputs=None),
     "cg.tag": call(tagged, "a"),
-    "cg.to_c": call(cg.to_c, GRAPH, "f", fma=False, names=None),
+    "cg.to_c": call(cg.to_c, GRAPH, "f", None, dtype="float64", box=None, time="t", fma=False, names=None),
     "cg.to_wasm": call(cg.to_wasm, GRAPH, None, time="t", host=()),
     "cg.variable": call(cg.variable, "x"),
     "cg.variables": call(cg.variables, "x y"),
