@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from dynamics.multibody.changes.pruning import PruneResult
     from dynamics.scenes.start import Start, moving_start, rest_text, with_start
     from dynamics.verification.certificate import certify
+    from dynamics.verification.same_bits import same_bits
 
     from .. import theme
     from ..animation.canvas import KINDS, check_can_animate
