@@ -44,7 +44,7 @@ def add(parser: Command) -> None:
         dest="language",
         action="store_const",
         const="wasm",
-        help="a WebAssembly module; of the state equation with steps of {tableaus}",
+        help="a WebAssembly module, and the .mjs that loads it; of the state equation with steps of {tableaus}",
     )
     language.add_argument(
         "--python", dest="language", action="store_const", const="python", help="a Python function of a list"
@@ -55,7 +55,7 @@ def add(parser: Command) -> None:
         help="default: forward_dynamics; of a first-order system state_equation",
     )
     parser.add_argument(
-        "--out", type=Path, help="file to write, in place of standard output: .c (and .h), .wasm or .py"
+        "--out", type=Path, help="file to write, in place of standard output: .c (and .h), .wasm (and .mjs) or .py"
     )
     parser.add_argument(
         "--float32",
@@ -91,7 +91,8 @@ def run(options: argparse.Namespace) -> None:
     name = re.sub("[^A-Za-z0-9_]", "_", scene.name) if out is None else out.stem
     methods = library.TABLEAUS if what == "state_equation" else None
     if options.language == "wasm":
-        files: dict[str, str | bytes] = {suffix: cg.to_wasm(graph, methods)}
+        script = cg.wasm_script(graph, methods)
+        files: dict[str, str | bytes] = {suffix: cg.to_wasm(graph, methods), ".mjs": script}
     elif options.language == "python":
         files = {suffix: python_text(graph)}
     else:
