@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
@@ -64,7 +63,7 @@ def error_bounds(
             pairs = zip(partials.get(node, ()), node.args, strict=True)
             inherited = [OPS["zero_safe_mul"].array(np.abs(found[slope]), errors[arg]) for slope, arg in pairs]
             if node.value is not None:
-                errors[node] = abs(stored(node.value) - node.value) if math.isfinite(node.value) else 0.0
+                errors[node] = abs(stored(node.value) - node.value)
                 continue
             own = unit * columns(node.op).rounding if node.args else of_inputs
             errors[node] = sum(inherited) + own * np.abs(found[node])
