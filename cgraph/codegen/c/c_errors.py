@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 import numpy as np
 
 from ...core.checks import GraphError
+from ...core.evaluation import Array, Value
 from ...core.graph import Graph
+from ...core.node import VARIABLE, Node
 from ...simplification.rounding_growth import error_bounds
 from ...util.inputs import box_interval
 from ...util.require import require_mapping
@@ -31,8 +34,15 @@ def checked_box(graph: Graph, box: object) -> dict[str, tuple[float, float]]:
     return found
 
 
-def largest_errors(graph: Graph, box: Mapping[str, tuple[float, float]], numbers: CNumbers) -> dict[str, float]:
-    """{output: the largest bound of its error} at POINTS points, to first order, NaN where there is no bound.
+class Errors(NamedTuple):
+    """Of an output in float: the largest bound of its error, NaN where there is none, and the largest error seen."""
+
+    bound: float
+    seen: float
+
+
+def largest_errors(graph: Graph, box: Mapping[str, tuple[float, float]], numbers: CNumbers) -> dict[str, Errors]:
+    """{output: bound of its error to first order, and error of the same operations each rounded}, at POINTS points.
 
     Half of the points are uniform in the box, half are corners of it, where bounds often are largest. Inputs and
     constants are rounded to the numbers of the program, too.
@@ -42,12 +52,29 @@ def largest_errors(graph: Graph, box: Mapping[str, tuple[float, float]], numbers
     share = rng.uniform(size=(len(ends), POINTS))
     share[:, POINTS // 2 :] = share[:, POINTS // 2 :].round()
     points = ends[:, :1] + (ends[:, 1:] - ends[:, :1]) * share
-    worst = dict.fromkeys(graph.outputs, 0.0)
+    worst = np.zeros((len(graph.outputs), 2))
     at_once = max(1, _ROOM // max(1, len(graph.nodes)))
     for start in range(0, POINTS, at_once):
         here = dict(zip(box, points[:, start : start + at_once], strict=True))
         values, errors = error_bounds(graph.nodes, here, numbers.unit, numbers.unit, numbers.stored)
-        for name, node in graph.outputs.items():
+        rounded = _rounded(graph, here, numbers)
+        for k, node in enumerate(graph.outputs.values()):
             bound = np.where(np.isfinite(values[node]), errors[node], np.nan)
-            worst[name] = float(np.maximum(worst[name], np.max(bound)))
-    return {name: bound if np.isfinite(bound) else float("nan") for name, bound in worst.items()}
+            with np.errstate(invalid="ignore"):
+                seen = np.abs(rounded[node] - values[node])
+            worst[k] = np.maximum(worst[k], (np.max(bound), np.max(seen)))  # NaN stays
+    worst[~np.isfinite(worst)] = np.nan
+    return {name: Errors(*map(float, row)) for name, row in zip(graph.outputs, worst, strict=True)}
+
+
+def _rounded(graph: Graph, points: Mapping[str, Array], numbers: CNumbers) -> dict[Node, Array]:
+    """Values of all nodes, every operation rounded to the numbers of the program; of + - * / and sqrt exactly so."""
+    found: dict[Node, Array] = {}
+    with np.errstate(all="ignore"):
+        for node in graph.nodes:
+            if node.op is VARIABLE:
+                value: Value = points[str(node.name)]
+            else:
+                value = node.value if node.value is not None else node.op.array(*[found[arg] for arg in node.args])
+            found[node] = np.asarray(value).astype(numbers.dtype).astype(float)
+    return found

@@ -13,7 +13,7 @@ from ...util.require import require_choice, require_flag, require_graph, require
 from ...util.version import __version__
 from ...writing.structure_hash import structure_hash
 from ..explicit_method import Tableau, checked_methods
-from .c_errors import POINTS, Box, checked_box, largest_errors
+from .c_errors import POINTS, Box, Errors, checked_box, largest_errors
 from .c_identifiers import check_function_name, distinct
 from .c_numbers import NUMBERS, CNumbers
 from .c_statements import comment, functions
@@ -50,8 +50,9 @@ void {name}(const {type} *x, {type} *y);
 #endif
 """
 _ERRORS = """
-   Beside a place: how far rounding to float takes the output off its exact value, at most, by a bound to first order
-   at {points} points of these inputs, half of them corners, rounding of inputs and constants included."""
+   Beside a place: how far rounding to float takes the output off its exact value. At most, by a bound to first order;
+   and as seen where every operation was rounded. Both are the largest of {points} points of these inputs, half of them
+   corners, with inputs and constants rounded, too. Bounds of an elimination are large: they add up what mostly cancels."""
 _RANGES = " Beside a place: the range for which errors are stated."
 
 # C++ has no `restrict`, and its compilers a word of their own for it.
@@ -158,7 +159,8 @@ def to_c(
         writes the rate out there has one copy of it.
     dtype : "float64" or "float32"
         The numbers. In float32 all are `float`, functions (`sinf`) and constants included, and the header says beside
-        each output how far rounding takes it off at most: the largest bound, to first order, at 1000 points of the box.
+        each output how far rounding takes it off at most: the largest bound, to first order, at 1000 points of the box,
+        and the largest error seen there.
         The bound is of one evaluation, and takes each comparison for decided as without rounding.
     box : mapping of str to (float, float) or float, optional
         {input: its range, or its value}, in which float32 is to be judged. Default -1 .. 1.
@@ -225,7 +227,6 @@ def to_c(
             )
         text.append(steps(name, method, tableau, numbers, clock))
     errors = largest_errors(graph, ranges, numbers) if single else {}
-    bounds = {key: "no bound" if math.isnan(bound) else f"to {_upwards(bound)}" for key, bound in errors.items()}
     header = _HEADER.format(
         name=name,
         NAME=name.upper(),
@@ -238,18 +239,27 @@ def to_c(
         ranges=_RANGES * single,
         errors=_ERRORS.format(points=POINTS) * single,
         inputs=_enumerators(places, input_names, called, f"{name.upper()}_N_IN", _texts(ranges)),
-        outputs=_enumerators(results, list(outputs), called, f"{name.upper()}_N_OUT", bounds),
+        outputs=_enumerators(results, list(outputs), called, f"{name.upper()}_N_OUT", _said(errors)),
         steps="".join([declaration(name, method, numbers) for method in chosen]),
     )
     restrict = _RESTRICT.format(NAME=name.upper())
     source = "\n".join([f'#include "{name}.h"\n\n#include <math.h>\n', contract, restrict, *text])
-    return CSource(name, source, header, errors)
+    return CSource(name, source, header, {key: each.bound for key, each in errors.items()})
 
 
 def _options(numbers: CNumbers, *, fma: bool, methods: Collection[str]) -> str:
     """Options of the text in words."""
     said = f"numbers are {numbers.type}, {'fused multiply-add is allowed' if fma else 'no fused multiply-add'}"
     return f"{said}, steps by {', '.join(methods)}" if methods else said
+
+
+def _said(errors: Mapping[str, Errors]) -> dict[str, str]:
+    return {
+        name: "no bound"
+        if math.isnan(bound)
+        else f"to {_upwards(bound)}, seen {'overflow' if math.isnan(seen) else _upwards(seen)}"
+        for name, (bound, seen) in errors.items()
+    }
 
 
 def _upwards(bound: float) -> str:
