@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
@@ -41,12 +41,17 @@ def _points(count: int) -> Array:
 
 
 def error_bounds(
-    nodes: Sequence[Node], values: Mapping[str, Value], unit: float = ERROR_UNIT, of_inputs: float = 0.0
+    nodes: Sequence[Node],
+    values: Mapping[str, Value],
+    unit: float = ERROR_UNIT,
+    of_inputs: float = 0.0,
+    stored: Callable[[float], float] = float,
 ) -> tuple[dict[Node, Value], dict[Node, Value]]:
     """Values of nodes, arguments first, and bounds of their errors to first order, with roundings to a part of `unit`.
 
     An error passes on through the local partials, in absolute value, and each operation adds its own.
-    values: {input: number or array}.  of_inputs: error of an input, relative to its value.
+    values: {input: number or array}.  of_inputs: error of an input, relative to its value.  stored: a constant, as the
+    program has it.
     """
     partials = {node: tuple(map(as_node, node.op.partials(node, *node.args))) for node in nodes if node.args}
     needed = topological([*nodes, *[slope for slopes in partials.values() for slope in slopes]])
@@ -57,7 +62,10 @@ def error_bounds(
         for node in nodes:
             pairs = zip(partials.get(node, ()), node.args, strict=True)
             inherited = [OPS["zero_safe_mul"].array(np.abs(found[slope]), errors[arg]) for slope, arg in pairs]
-            own = unit * columns(node.op).rounding if node.args else of_inputs if node.value is None else 0.0
+            if node.value is not None:
+                errors[node] = abs(stored(node.value) - node.value)
+                continue
+            own = unit * columns(node.op).rounding if node.args else of_inputs
             errors[node] = sum(inherited) + own * np.abs(found[node])
     return found, errors
 

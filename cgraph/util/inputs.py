@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from numbers import Real
 
 import numpy as np
 
@@ -10,7 +11,7 @@ from ..core.checks import GraphError
 from ..core.evaluation import Value
 from ..core.graph import Graph
 from ..core.node import Node, variable
-from .real_arrays import real_array
+from .real_arrays import real_array, real_number
 
 
 def input_values(names: Sequence[str], values: object) -> dict[str, Value]:
@@ -60,3 +61,14 @@ def chosen_inputs(graph: Graph, wrt: str | Node | Sequence[str | Node]) -> tuple
     if not chosen:
         raise GraphError(f"wrt must name at least one input (the graph has {', '.join(graph.input_names) or 'none'})")
     return tuple(chosen)
+
+
+def box_interval(name: str, value: object) -> tuple[float, float]:
+    """The interval of an input of a box, given as (low, high) or as a number. Raises ValueError for what is none."""
+    ends = (value, value) if isinstance(value, Real) else value
+    if not isinstance(ends, (tuple, list)) or len(ends) != 2:
+        raise ValueError(f"box: input {name!r} needs (low, high) or a number, got {value!r:.60}")
+    low, high = ends
+    if not all([isinstance(end, Real) and not isinstance(end, bool) for end in ends]) or not low <= high:
+        raise ValueError(f"box: input {name!r} needs numbers low <= high, got {value!r:.60}")
+    return real_number(f"box: input {name!r}", low), real_number(f"box: input {name!r}", high)

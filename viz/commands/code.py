@@ -1,4 +1,4 @@
-"""`cgraph code`: the equations of a scene as C, as WebAssembly or as Python."""
+"""`cgraph code`: the equations of a scene as C, in double or in float, as WebAssembly or as Python."""
 
 from __future__ import annotations
 
@@ -7,13 +7,14 @@ import math
 import re
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import cgraph as cg
 import dynamics as dyn
 from cgraph import extend
 
 from . import library
-from .arguments import answer, place, scene_of, takes_a_scene
+from .arguments import answer, box, place, scene_of, takes_a_scene
 from .command import Command
 
 EQUATIONS: dict[str, Callable[[dyn.scenes.Scene], cg.Graph]] = {
@@ -31,13 +32,19 @@ def add(parser: Command) -> None:
     takes_a_scene(parser)
     parser.names["tableaus"] = lambda: library.TABLEAUS
     language = parser.add_mutually_exclusive_group(required=True)
-    language.add_argument("--c", dest="language", action="store_const", const="c", help="C99, with its header")
+    language.add_argument(
+        "--c",
+        dest="language",
+        action="store_const",
+        const="c",
+        help="C99, with its header; of the state equation with steps of {tableaus}",
+    )
     language.add_argument(
         "--wasm",
         dest="language",
         action="store_const",
         const="wasm",
-        help="a WebAssembly module; of the state equation with steps of {tableaus}",
+        help="a WebAssembly module, and the .mjs that loads it; of the state equation with steps of {tableaus}",
     )
     language.add_argument(
         "--python", dest="language", action="store_const", const="python", help="a Python function of a list"
@@ -48,7 +55,18 @@ def add(parser: Command) -> None:
         help="default: forward_dynamics; of a first-order system state_equation",
     )
     parser.add_argument(
-        "--out", type=place, help="file to write, in place of standard output: .c (and .h), .wasm or .py"
+        "--out", type=place, help="file to write, in place of standard output: .c (and .h), .wasm (and .mjs) or .py"
+    )
+    parser.add_argument(
+        "--float32",
+        action="store_true",
+        help="C in float alone; the header says a bound of the rounding of each output",
+    )
+    parser.add_argument(
+        "--box",
+        type=box,
+        metavar="A=LOW:HIGH,...",
+        help="inputs for which the bound of --float32 is stated, -1:1 if left out, parameters at their values",
     )
     parser.set_defaults(run=run)
 
@@ -61,20 +79,26 @@ def run(options: argparse.Namespace) -> None:
         raise ValueError("--wasm needs --out: a module is no text")
     if out is not None and out.suffix != suffix:
         raise ValueError(f"--out must end in {suffix} for --{options.language}, got {out}")
+    if options.float32 and options.language != "c":
+        raise ValueError("--float32 is for --c")
+    if options.box is not None and not options.float32:
+        raise ValueError("--box says where the bound of --float32 is stated")
     if out is not None:
         extend.check_writable(out)
     scene = scene_of(options)
     what = options.what or ("forward_dynamics" if scene.ode is None else "state_equation")
     graph = EQUATIONS[what](scene)
     name = re.sub("[^A-Za-z0-9_]", "_", scene.name) if out is None else out.stem
+    methods = library.TABLEAUS if what == "state_equation" else None
     if options.language == "wasm":
-        methods = library.TABLEAUS if what == "state_equation" else None
-        files: dict[str, str | bytes] = {suffix: cg.to_wasm(graph, methods)}
+        script = cg.wasm_script(graph, methods)
+        files: dict[str, str | bytes] = {suffix: cg.to_wasm(graph, methods), ".mjs": script}
     elif options.language == "python":
         files = {suffix: python_text(graph)}
     else:
+        single = _single(options, scene, graph)
         try:
-            text = cg.to_c(graph, name, names=dyn.display_names(scene))
+            text = cg.to_c(graph, name, methods, names=dyn.display_names(scene), **single)
         except ValueError as error:
             raise ValueError(f"{out or scene.name} names the function: {error}") from None
         whole = text.source.replace(f'#include "{name}.h"\n', text.header)  # one text for standard output
@@ -87,6 +111,15 @@ def run(options: argparse.Namespace) -> None:
     inputs, outputs = extend.counted(len(graph.inputs), "input"), extend.counted(len(graph.outputs), "output")
     places = f"; {inputs} from byte 0, {outputs} from byte {8 * len(graph.inputs)}"
     answer(f"{sizes}{places if options.language == 'wasm' else ''}", written)
+
+
+def _single(options: argparse.Namespace, scene: dyn.scenes.Scene, graph: cg.Graph) -> dict[str, Any]:
+    """Options of C in float; parameters have their values unless the box has another range."""
+    if not options.float32:
+        return {}
+    values = {name: value for name, value in scene.parameters.items() if name in graph.input_names}
+    ranges = extend.Names(graph, dyn.display_names(scene)).inputs_of("--box", options.box or {})
+    return {"dtype": "float32", "box": values | ranges}
 
 
 def python_text(graph: cg.Graph) -> str:

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from dynamics.scenes.start import Start, moving_start, rest_text, with_start
     from dynamics.simulation.run_options import RunOptions
     from dynamics.verification.certificate import certify
+    from dynamics.verification.same_bits import same_bits
 
     from .. import theme
     from ..animation.canvas import KINDS, check_can_animate

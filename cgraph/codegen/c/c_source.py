@@ -2,19 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from ...core.graph import Graph
 from ...util.atomic_write import atomic_write
-from ...util.require import require_flag, require_graph, require_path, require_texts
+from ...util.require import require_choice, require_flag, require_graph, require_path, require_texts
+from ...util.version import __version__
 from ...util.words import counted
+from ...writing.structure_hash import structure_hash
+from ..explicit_method import Tableau, checked_methods
+from .c_errors import POINTS, Box, Errors, checked_box, largest_errors
 from .c_identifiers import check_function_name, distinct
+from .c_numbers import NUMBERS, CNumbers
 from .c_statements import comment, functions
+from .c_steps import declaration, steps
 
 _HEADER = """\
 /* {name}: {counts}, written by cgraph. Units are those of the equations behind it. */
+/* cgraph {version}, structure hash {hash}; {options}.
+   cgraph claims no rights in this text and in its {name}.c: they are under no license of cgraph's. */
 #ifndef {NAME}_H
 #define {NAME}_H
 
@@ -22,23 +31,39 @@ _HEADER = """\
 extern "C" {{
 #endif
 
-/* Places in x, and their number. */
+/* Places in x, and their number.{ranges} */
 enum {{
 {inputs}
 }};
 
-/* Places in y, and their number. */
+/* Places in y, and their number.{errors} */
 enum {{
 {outputs}
 }};
 
 /* y[{NAME}_N_OUT] at x[{NAME}_N_IN]; the arrays must not overlap. Any number of threads may call it. */
-void {name}(const double *x, double *y);
-
+void {name}(const {type} *x, {type} *y);
+{steps}
 #ifdef __cplusplus
 }}
 #endif
 
+#endif
+"""
+_ERRORS = """
+   Beside a place: how far rounding to float takes the output off its exact value. At most, by a bound to first order;
+   and as seen where every operation was rounded. Both are the largest of {points} points of these inputs, half of them
+   corners, with inputs and constants rounded, too. Bounds of an elimination are large: they add up what mostly cancels."""
+_RANGES = " Beside a place: the range for which errors are stated."
+
+# C++ has no `restrict`, and its compilers a word of their own for it.
+_RESTRICT = """\
+#ifndef __cplusplus
+#define {NAME}_RESTRICT restrict
+#elif defined(__GNUC__) || defined(_MSC_VER)
+#define {NAME}_RESTRICT __restrict
+#else
+#define {NAME}_RESTRICT
 #endif
 """
 
@@ -68,7 +93,7 @@ _ROUNDING = {
 
 
 class CSource(NamedTuple):
-    """A C99 function `void name(const double *x, double *y)`: the texts of name.c and name.h.
+    """A C99 function `void name(const double *x, double *y)`, or of floats: the texts of name.c and name.h.
 
     Parameters
     ----------
@@ -76,6 +101,8 @@ class CSource(NamedTuple):
         Of the function, and of both files.
     source, header : str
         The texts of name.c and name.h.
+    errors : dict of str to float
+        In float, {output: the largest bound of its error}, as the header says it; empty in double.
 
     Examples
     --------
@@ -88,6 +115,7 @@ class CSource(NamedTuple):
     name: str
     source: str
     header: str
+    errors: Mapping[str, float]
 
     def write(self, folder: str | Path) -> tuple[Path, Path]:
         """Write name.c and name.h into a folder, each by way of a temporary file; returns their paths.
@@ -99,20 +127,46 @@ class CSource(NamedTuple):
         return atomic_write(place / f"{self.name}.c", self.source), header
 
 
-def to_c(graph: Graph, name: str = "function", *, fma: bool = False, names: Mapping[str, str] | None = None) -> CSource:
+def to_c(
+    graph: Graph,
+    name: str = "function",
+    methods: Mapping[str, Tableau] | None = None,
+    *,
+    dtype: str = "float64",
+    box: Box | None = None,
+    time: str = "t",
+    fma: bool = False,
+    names: Mapping[str, str] | None = None,
+) -> CSource:
     """C99 source and header of `void name(const double *x, double *y)`; `.write(folder)` makes the two files.
 
     It needs the C library alone: no heap, no globals, no recursion. The header names the places of inputs in x and
-    of outputs in y, for name "arm" as in `x[ARM_IN_q0]`, `y[ARM_OUT_tau0]`, and their numbers ARM_N_IN, ARM_N_OUT.
+    of outputs in y, for name "arm" as in `x[ARM_IN_q0]`, `y[ARM_OUT_tau0]`, and their numbers ARM_N_IN, ARM_N_OUT; it
+    says the graph's structure hash, the version of cgraph and the options. The source is one of C++17, too.
     Values are those of `evaluate` to the last bit where both use the same C library (`hypot` to one unit of it),
     unless compiler options such as -ffast-math give that up.
 
     Parameters
     ----------
     graph : Graph
-        What the function computes.
+        What the function computes. With methods, a state equation such as `dynamics.state_equation(model)`: its first
+        inputs are the state, and output k is the rate of input k.
     name : str
         Of the function, and of both files.
+    methods : mapping of str to Tableau, optional
+        {name: explicit Runge-Kutta method}, such as those of `dynamics.integrators.TABLEAUS`. Each becomes a function
+        `void arm_rk4(double *x, double h, unsigned long n)`: n steps of size h from the inputs at x, whose state and
+        time are those at the end afterwards. Its stages are a loop with one call of the rate, so that a compiler which
+        writes the rate out there has one copy of it.
+    dtype : "float64" or "float32"
+        The numbers. In float32 all are `float`, functions (`sinf`) and constants included, and the header says beside
+        each output how far rounding takes it off at most: the largest bound, to first order, at 1000 points of the box,
+        and the largest error seen there.
+        The bound is of one evaluation, and takes each comparison for decided as without rounding.
+    box : mapping of str to (float, float) or float, optional
+        {input: its range, or its value}, in which float32 is to be judged. Default -1 .. 1.
+    time : str
+        The input that is the time, if there is one of this name, which steps move.
     fma : bool
         Let the compiler round a product and the sum that it goes into once.
     names : mapping of str to str, optional
@@ -122,14 +176,17 @@ def to_c(graph: Graph, name: str = "function", *, fma: bool = False, names: Mapp
     Returns
     -------
     CSource
-        The two texts.
+        The two texts, and the bounds.
 
     Raises
     ------
+    GraphError
+        With methods, for a graph that has more outputs than inputs; for an input of the box that is none.
     TypeError
-        For what is no Graph.
+        For what is no Graph, and methods that are no mapping to tableaus.
     ValueError
-        For a name that is no identifier of C, or a word of C, C++ or their library.
+        For a name that is no identifier of C, or a word of C, C++ or their library; an operation that was added
+        without a text in C, where <math.h> has no such function; a constant beyond float32; a box without float32.
 
     Examples
     --------
@@ -137,32 +194,91 @@ def to_c(graph: Graph, name: str = "function", *, fma: bool = False, names: Mapp
     >>> text = cg.to_c(cg.Graph([cg.variable("q0")], {"tau0": cg.sin(cg.variable("q0"))}), "arm")
     >>> "y[ARM_OUT_tau0] = v1;" in text.source, "ARM_N_IN = 1" in text.header
     (True, True)
+    >>> x, y = cg.variables("x y")
+    >>> small = cg.to_c(cg.Graph([x, y], {"f": x * y}), "area", dtype="float32", box={"x": (0.0, 10.0), "y": 0.5})
+    >>> "float v1 = x[AREA_IN_x] * x[AREA_IN_y]" in small.source, f"{small.errors['f']:.1e}"
+    (True, '8.9e-07')
     """
     require_graph("to_c", graph)
     check_function_name(name)
+    numbers = NUMBERS[require_choice("dtype", dtype, NUMBERS)]
+    chosen = checked_methods(methods, graph, time)
     inputs, outputs, input_names = graph.inputs, graph.outputs, graph.input_names
     called = require_texts("names", names)
+    single = numbers.dtype == "float32"
+    if box is not None and not single:
+        raise ValueError("box says for which inputs errors of dtype='float32' are stated, and dtype is 'float64'")
+    ranges = checked_box(graph, box) if single else {}
     places = [f"{name.upper()}_IN_{word}" for word in distinct(input_names)]
     results = [f"{name.upper()}_OUT_{word}" for word in distinct(list(outputs))]
+    contract = _CONTRACT.format(**_ROUNDING[require_flag("fma", fma)])
+    text = functions(
+        name,
+        graph.nodes,
+        dict(zip(inputs, places, strict=True)),
+        list(zip(results, outputs.values(), strict=True)),
+        numbers,
+    )
+    clock = places[input_names.index(time)] if time in input_names else None
+    for method, tableau in chosen.items():
+        check_function_name(f"{name}_{method}")
+        if any([f" {name}_{method}(" in part for part in text]):
+            raise ValueError(
+                f"a method must not be called {method}: {name}_{method} is a function of the source already"
+            )
+        text.append(steps(name, method, tableau, numbers, clock))
+    errors = largest_errors(graph, ranges, numbers) if single else {}
     header = _HEADER.format(
         name=name,
         NAME=name.upper(),
         counts=f"{counted(len(outputs), 'output')} of {counted(len(inputs), 'input')}",
-        inputs=_enumerators(places, input_names, called, f"{name.upper()}_N_IN"),
-        outputs=_enumerators(results, list(outputs), called, f"{name.upper()}_N_OUT"),
+        version=__version__,
+        hash=structure_hash(graph),
+        options=_options(numbers, fma=fma, methods=chosen),
+        type=numbers.type,
+        ranges=_RANGES * single,
+        errors=_ERRORS.format(points=POINTS) * single,
+        inputs=_enumerators(places, input_names, called, f"{name.upper()}_N_IN", _texts(ranges)),
+        outputs=_enumerators(results, list(outputs), called, f"{name.upper()}_N_OUT", _said(errors)),
+        steps="".join([declaration(name, method, numbers) for method in chosen]),
     )
-    contract = _CONTRACT.format(**_ROUNDING[require_flag("fma", fma)])
-    text = functions(
-        name, graph.nodes, dict(zip(inputs, places, strict=True)), list(zip(results, outputs.values(), strict=True))
-    )
-    source = "\n".join([f'#include "{name}.h"\n\n#include <math.h>\n', contract, *text])
-    return CSource(name, source, header)
+    restrict = _RESTRICT.format(NAME=name.upper())
+    source = "\n".join([f'#include "{name}.h"\n\n#include <math.h>\n', contract, restrict, *text])
+    return CSource(name, source, header, {key: each.bound for key, each in errors.items()})
 
 
-def _enumerators(places: Sequence[str], names: Sequence[str], called: Mapping[str, str], count: str) -> str:
-    shown = [called.get(name, name) for name in names]
-    lines = [
-        f"    {place} = {row}," + ("" if place.endswith(f"_{text}") else f" /* {comment(text)} */")
-        for row, (place, text) in enumerate(zip(places, shown, strict=True))
-    ]
+def _options(numbers: CNumbers, *, fma: bool, methods: Collection[str]) -> str:
+    """Options of the text in words."""
+    said = f"numbers are {numbers.type}, {'fused multiply-add is allowed' if fma else 'no fused multiply-add'}"
+    return f"{said}, steps by {', '.join(methods)}" if methods else said
+
+
+def _said(errors: Mapping[str, Errors]) -> dict[str, str]:
+    return {
+        name: "no bound"
+        if math.isnan(bound)
+        else f"to {_upwards(bound)}, seen {'overflow' if math.isnan(seen) else _upwards(seen)}"
+        for name, (bound, seen) in errors.items()
+    }
+
+
+def _upwards(bound: float) -> str:
+    """Two digits, not below the bound."""
+    text = f"{bound:.1e}"
+    return text if float(text) >= bound else f"{1.05 * bound:.1e}"
+
+
+def _texts(ranges: Mapping[str, tuple[float, float]]) -> dict[str, str]:
+    return {name: f"{low:g}" if low == high else f"{low:g} .. {high:g}" for name, (low, high) in ranges.items()}
+
+
+def _enumerators(
+    places: Sequence[str], names: Sequence[str], called: Mapping[str, str], count: str, remarks: Mapping[str, str]
+) -> str:
+    lines = []
+    for row, (place, name) in enumerate(zip(places, names, strict=True)):
+        shown = called.get(name, name)
+        said = [] if place.endswith(f"_{shown}") else [comment(shown)]
+        said += [remarks[name]] if name in remarks else []
+        lines.append(f"    {place} = {row}," + (f" /* {': '.join(said)} */" if said else ""))
     return "\n".join([*lines, f"    {count} = {len(places)}"])

@@ -6,21 +6,7 @@ import ast
 from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
-
-class Tableau(Protocol):
-    """The numbers of an explicit Runge-Kutta method, as `dynamics.integrators.Tableau` has them."""
-
-    @property
-    def c(self) -> tuple[float, ...]:
-        """Times of the stages, the first 0."""
-
-    @property
-    def a(self) -> tuple[tuple[float, ...], ...]:
-        """Row k the weights of the slopes before stage k."""
-
-    @property
-    def b(self) -> tuple[float, ...]:
-        """Weights of the slopes in the step."""
+from ..explicit_method import Tableau, weighted_sum
 
 
 class Embedded(Tableau, Protocol):
@@ -141,6 +127,5 @@ def _ahead(weights: Sequence[float], layout: Layout) -> str:
 
 
 def _weighted(weights: Sequence[float], layout: Layout) -> str:
-    """The sum of weight * slope, in the order of `dynamics`, without those of weight 0."""
-    used = [(float(weight), layout.slope(k)) for k, weight in enumerate(weights) if weight]
-    return " + ".join([f"load(i, {at})" if weight == 1.0 else f"{weight!r} * load(i, {at})" for weight, at in used])
+    """The sum of weight * slope."""
+    return weighted_sum(weights, repr, lambda k: f"load(i, {layout.slope(k)})")

@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 
-from ...core.checks import GraphError
 from ...core.graph import Graph
 from ...operations.operation import columns
-from ...util.require import require_graph, require_mapping, require_sequence
+from ...util.require import require_graph, require_sequence
+from ..explicit_method import Tableau, checked_methods
 from . import instructions as ins
 from .elementary_functions import ROOM
 from .evaluation import evaluation
 from .functions import HOST, WAVE_TABLE, called, library, text_of
 from .instructions import F64, I32
-from .steps import Layout, Tableau, chosen_steps, equal_steps
+from .steps import Layout, chosen_steps, equal_steps
 from .translate import Body, Signature, types_of
 
 PAGE = 65536  # bytes of memory
@@ -82,9 +82,9 @@ def to_wasm(
     """
     require_graph("to_wasm", graph)
     host = require_sequence("host", host, "names of functions", str)
-    chosen = {} if methods is None else require_mapping("methods", methods, "name: Tableau")
+    chosen = checked_methods(methods, graph, time)
     inputs, states = len(graph.inputs), len(graph.outputs)
-    _check(chosen, inputs, states, time, host)
+    _check(chosen, host)
     place = 8 * (inputs + states)
     texts = {op: text_of(columns(op), host) for op in dict.fromkeys([node.op for node in graph.nodes if node.args])}
     needed = called(texts.values(), place)
@@ -112,19 +112,11 @@ def to_wasm(
     return _module(kinds, [name.removeprefix(HOST) for name in imported], codes, exported, end, (place, data))
 
 
-def _check(methods: Mapping[str, Tableau], inputs: int, states: int, time: str, host: Collection[str]) -> None:
-    """Raise what is wrong about what is asked for."""
-    for name, method in methods.items():
-        if not all([hasattr(method, numbers) for numbers in "abc"]):
-            raise TypeError(f"method {name!r} must be a tableau with numbers a, b and c, got {method!r:.60}")
+def _check(methods: Collection[str], host: Collection[str]) -> None:
+    """Raise what is wrong about names that are asked for."""
+    for name in methods:
         if not isinstance(name, str) or name in ("evaluate", "memory"):
             raise ValueError(f"a method must not be called {name}, which is exported already or no text")
-    if methods and states > inputs:
-        raise GraphError(
-            f"steps need a state equation, whose first inputs are the state: {states} outputs of {inputs} inputs"
-        )
-    if not isinstance(time, str):
-        raise TypeError(f"time must be the name of an input, got {time!r:.60}")
     if unknown := [name for name in host if name not in library(0)]:
         raise ValueError(f"a module has no function {unknown[0]!s:.60} of its own to leave to the host")
 

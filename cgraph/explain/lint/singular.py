@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import numbers
 from collections.abc import Mapping
 
 from ...core.graph import Graph
 from ...core.node import CONSTANT, VARIABLE, Node
 from ...operations.bounds import REAL_LINE
 from ...operations.operation import Interval, Op, columns
+from ...util.inputs import box_interval
 from ...util.json_type import Json, json_number
-from ...util.real_arrays import real_number
 from ...util.require import require_mapping
 from ..names import Names
 from .finding import Finding
@@ -78,21 +77,7 @@ def singular_nodes(names: Names, box: Box) -> list[Finding]:
 def _given(names: Names, box: Box) -> dict[str, Interval]:
     """The box by the graph's names. Raises as `intervals` does."""
     known = names.inputs_of("box", require_mapping("box", box, "input: interval"))
-    return {name: _interval(names.shown(name), value) for name, value in known.items()}
-
-
-def _interval(name: str, value: object) -> Interval:
-    ends = (value, value) if isinstance(value, numbers.Real) else value
-    if not isinstance(ends, (tuple, list)) or len(ends) != 2:
-        raise ValueError(f"box: input {name!r} needs (low, high) or a number, got {value!r:.60}")
-    low, high = ends
-    if not all([isinstance(end, numbers.Real) and not isinstance(end, bool) for end in ends]) or not low <= high:
-        raise ValueError(f"box: input {name!r} needs numbers low <= high, got {value!r:.60}")
-    return _float(name, low), _float(name, high)
-
-
-def _float(name: str, end: float) -> float:
-    return real_number(f"box: input {name!r}", end)
+    return {name: box_interval(names.shown(name), value) for name, value in known.items()}
 
 
 def _shown(bound: Interval) -> str:

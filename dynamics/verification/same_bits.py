@@ -1,0 +1,341 @@
+"""The same bits: a motion's digest by every way in which its steps can be computed."""
+
+from __future__ import annotations
+
+import base64
+import ctypes
+import json
+import os
+import pickle
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, dataclass
+from hashlib import blake2b
+from pathlib import Path
+
+import numpy as np
+
+import cgraph as cg
+from cgraph import Graph, Node
+from cgraph.extend import Array, Json, columns
+
+from ..equations.state_equation import normalization, state_equation, state_inputs
+from ..equations.substitute import substitute
+from ..integrators.elementwise import weighted
+from ..integrators.tableau import RK4
+from ..scenes.scenes import Scene
+from ..simulation.simulate import simulate
+from ..systems.arguments import TIME
+
+STEP = 2.0**-10  # s: with it times are exact
+STEPS, EVERY = 1000, 100  # steps, and of how many the last state counts
+COMPILERS = ("cc", "gcc", "clang")
+FLAGS = ("-std=c99", "-O2", "-shared", "-fPIC")
+PATIENCE = 300.0  # s that another program may take
+LIBRARY, OWN = "C library", "WebAssembly"  # whose sine, exponential, ..
+NODE = {"baseline compiler": "--liftoff-only", "optimizing compiler": "--no-liftoff"}
+
+
+@dataclass(frozen=True)
+class Way:
+    """A way to compute the motion: whose functions it has, the digest, and whether that is the first way's with these.
+
+    Parameters
+    ----------
+    name, functions, digest : str
+        The way, "C library" or "WebAssembly", and 32 hexadecimal digits.
+    same : bool
+        Whether the digest is that of the first way with the same functions.
+
+    Examples
+    --------
+    >>> from dynamics.verification.same_bits import Way
+    >>> Way("loop", "C library", "00", True).same
+    True
+    """
+
+    name: str
+    functions: str
+    digest: str
+    same: bool
+
+
+@dataclass(frozen=True)
+class SameBits:
+    """Digests of a motion, one for each way, as `same_bits` makes it.
+
+    Parameters
+    ----------
+    ways : tuple of Way
+        What was run.
+    left_out : tuple of str
+        What was not, a sentence each.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> from dynamics.verification.same_bits import same_bits
+    >>> same_bits(dyn.scenes.load("spring_mass")).passed
+    True
+    """
+
+    ways: tuple[Way, ...]
+    left_out: tuple[str, ...]
+
+    @property
+    def passed(self) -> bool:
+        """Whether all that have the same functions have the same digest."""
+        return all([way.same for way in self.ways])
+
+    def __str__(self) -> str:
+        wide = max([len(way.name) for way in self.ways])
+        lines = [f"{'same   ' if way.same else 'DIFFERS'}  {way.digest}  {way.name:{wide}}" for way in self.ways]
+        lines.append(
+            f"{STEPS} steps of 2^-10 s by rk4 of the state equation; the digest is of the state after every {EVERY}."
+        )
+        if len({way.functions for way in self.ways}) > 1:
+            lines.append(
+                "Of WebAssembly, sine and the like are its own, the same on every machine; those of the C library "
+                "differ from them now and then in the last bit."
+            )
+        return "\n".join([*lines, *[f"left out: {each}" for each in self.left_out]])
+
+    def to_dict(self) -> dict[str, Json]:
+        """Dictionary for JSON."""
+        return {"passed": self.passed, **asdict(self)}
+
+
+def same_bits(scene: Scene) -> SameBits:
+    """Compute one motion of a scene in every way that there is here, and compare the bits.
+
+    Fused products are off, as by `fma=False`: which products a compiler fuses is its choice. Raises ValueError for a
+    motion that does not stay finite, and as `state_equation` does.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> from dynamics.verification.same_bits import same_bits
+    >>> {way.name: way.same for way in same_bits(dyn.scenes.load("spring_mass")).ways}["batch"]
+    True
+    """
+    motion = _Motion(scene)
+    found: list[tuple[str, str, str]] = []
+    left_out = ["simulate in machine code: it fuses products and sums where the processor can"]
+    for name, run in motion.ways():
+        try:
+            found.append((name, LIBRARY, run()))
+        except NotRunError as error:
+            left_out.append(f"{name}: {error}")
+    own = OWN if motion.calls_library else LIBRARY
+    for name, option in NODE.items():
+        try:
+            found.append((f"WebAssembly, {name}", own, motion.in_node(option)))
+        except NotRunError as error:
+            left_out.append(f"WebAssembly, {name}: {error}")
+    first: dict[str, str] = {}
+    ways = [Way(*row, same=first.setdefault(row[1], row[2]) == row[2]) for row in found]
+    return SameBits(tuple(ways), tuple(left_out))
+
+
+class NotRunError(Exception):
+    """What a way needs is not here."""
+
+
+class _Motion:
+    """The steps of a scene's motion and its start."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self.rate = state_equation(scene.model)
+        known = state_inputs(scene.model)
+        values = dict(zip(known.states, (*scene.q, *scene.qd), strict=True)) | known.parameters
+        self.start = [float(values.get(name, 0.0)) for name in self.rate.input_names]  # torques and the time are 0
+        self.states = len(self.rate.outputs)
+        self.step, self.carry = _step(self.rate)
+        self.calls_library = any([columns(node.op).calls_library for node in self.rate.nodes if node.args])
+        self.loop = cg.loop(self.step, self.carry, fma=False)
+        self.native = cg.compile(self.step, fma=False).backend != "python"
+        rows = rows_of(self.step, self.carry, self.start, self.states, "python")
+        self.in_python = _digest(rows)
+        if not np.isfinite(rows).all():
+            raise ValueError(f"the motion of {scene.name} does not stay finite over {STEPS} steps of 2^-10 s by rk4")
+
+    def ways(self) -> Iterator[tuple[str, Callable[[], str]]]:
+        """By name, what computes the digest."""
+        yield "loop in Python", lambda: self.in_python
+        yield "loop in machine code", self._native(self._loop)
+        yield "calls of machine code", self._native(self._calls)
+        yield "batch", self._native(self._batch)
+        yield "threads", self._native(self._threads)
+        yield "another process", self._process
+        yield "C", self._c
+        yield "simulate in Python", self._simulate
+
+    def _native(self, run: Callable[[], str]) -> Callable[[], str]:
+        if self.native:
+            return run
+
+        def missing() -> str:
+            raise NotRunError("there is no machine code, which needs llvmlite")
+
+        return missing
+
+    def _loop(self) -> str:
+        return _digest(self.loop(self.start, STEPS, EVERY)[:, : self.states])
+
+    def _calls(self) -> str:
+        step, x, rows = cg.compile(self.step, fma=False), np.array(self.start), []
+        places = [self.step.input_names.index(name) for name in self.carry]
+        for k in range(1, STEPS + 1):
+            x[places] = step(x)
+            if k % EVERY == 0:
+                rows.append(x[: self.states].copy())
+        return _digest(np.array(rows))
+
+    def _batch(self) -> str:
+        """Nine starts side by side, the motion's own the fifth."""
+        starts = np.repeat(np.array(self.start)[:, None], 9, axis=1)
+        starts[: self.states] += 0.01 * np.arange(-4, 5)
+        found = self.loop.batch(starts, STEPS, EVERY)
+        return _digest(found[:, : self.states, 4])
+
+    def _threads(self) -> str:
+        with ThreadPoolExecutor(4) as pool:
+            runs = pool.map(lambda _: self.loop(self.start, STEPS, EVERY), range(8))
+            found = {_digest(rows[:, : self.states]) for rows in runs}
+        return found.pop() if len(found) == 1 else "differs among threads"
+
+    def _process(self) -> str:
+        asked = pickle.dumps((self.step, self.carry, self.start, self.states, "auto"))
+        code = f"from {__name__} import other_process; other_process()"
+        return _run(
+            [sys.executable, "-c", code], asked, {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+        ).strip()
+
+    def _c(self) -> str:
+        compiler = next(filter(None, map(shutil.which, COMPILERS)), None)
+        if compiler is None:
+            raise NotRunError(f"none of {', '.join(COMPILERS)} is installed")
+        with tempfile.TemporaryDirectory() as folder:
+            source, _ = cg.to_c(self.rate, "motion", {"rk4": RK4}, time=TIME).write(folder)
+            library = Path(folder, "motion.so")
+            _run([compiler, *FLAGS, str(source), "-o", str(library), "-lm"])
+            steps = ctypes.CDLL(str(library)).motion_rk4
+            steps.argtypes, steps.restype = [ctypes.c_void_p, ctypes.c_double, ctypes.c_ulong], None
+            x, rows = np.array(self.start), []
+            for _ in range(STEPS // EVERY):
+                steps(x.ctypes.data, STEP, EVERY)
+                rows.append(x[: self.states].copy())
+        return _digest(np.array(rows))
+
+    def _simulate(self) -> str:
+        """A run brings unit quaternions and constraints back to where they hold, which the steps alone do not."""
+        scene = self.scene
+        if normalization(scene.model) is not None or (scene.ode is None and len(scene.system.constraints)):
+            raise NotRunError(
+                "it brings back the state onto unit quaternions and constraints, which steps alone do not"
+            )
+        times = STEP * np.arange(EVERY, STEPS + 1, EVERY)
+        qd = None if scene.ode is not None else scene.qd
+        run = simulate(
+            scene.model, scene.q, qd, times[-1], "rk4", dt=STEP, t_eval=times, backend="python", estimate_error=False
+        )
+        if not run.stats.success:
+            raise NotRunError(run.stats.message)
+        return _digest(run.q if qd is None else np.concatenate([run.q, run.qd], axis=1))
+
+    def in_node(self, option: str) -> str:
+        """The digest by WebAssembly in Node.js."""
+        node = shutil.which("node")
+        if node is None:
+            raise NotRunError("node is not installed")
+        module = base64.b64encode(cg.to_wasm(self.rate, {"rk4": RK4}, time=TIME)).decode()
+        asked = {
+            "module": module,
+            "x": self.start,
+            "states": self.states,
+            "h": STEP,
+            "rows": STEPS // EVERY,
+            "n": EVERY,
+        }
+        rows = bytes.fromhex(_run([node, option, "-e", _SCRIPT], json.dumps(asked).encode()))
+        return _digest(np.frombuffer(rows, dtype="<f8"))
+
+
+_SCRIPT = """\
+const asked = JSON.parse(require("fs").readFileSync(0, "utf8"));
+const module = new WebAssembly.Module(Buffer.from(asked.module, "base64"));
+const exports = new WebAssembly.Instance(module, { math: Math }).exports;
+const x = new Float64Array(exports.memory.buffer, 0, asked.x.length);
+x.set(asked.x);
+for (let row = 0; row < asked.rows; row++) {
+  exports.rk4(0, asked.h, asked.n);
+  process.stdout.write(Buffer.from(x.slice(0, asked.states).buffer).toString("hex"));
+}
+"""
+
+
+def rows_of(step: Graph, carry: dict[str, str], start: list[float], states: int, backend: str) -> Array:
+    """The states at every EVERY-th step."""
+    return cg.loop(step, carry, backend, fma=False)(start, STEPS, EVERY)[:, :states]
+
+
+def other_process() -> None:
+    """In another process: print the digest of what standard input asks for."""
+    asked = pickle.loads(sys.stdin.buffer.read())  # noqa: S301  # from the process that started this one
+    sys.stdout.write(_digest(rows_of(*asked)))
+
+
+def _digest(rows: Array) -> str:
+    return blake2b(np.ascontiguousarray(rows, dtype="<f8").tobytes(), digest_size=16).hexdigest()
+
+
+def _run(command: list[str], given: bytes = b"", environment: dict[str, str] | None = None) -> str:
+    try:
+        done = subprocess.run(
+            command,
+            input=given,
+            capture_output=True,
+            check=False,
+            timeout=PATIENCE,
+            env=os.environ | (environment or {}),
+        )
+    except subprocess.TimeoutExpired:
+        raise NotRunError(f"{Path(command[0]).name} was not done after {PATIENCE:g} s") from None
+    if done.returncode:
+        last = done.stderr.decode(errors="replace").strip().splitlines()[-1:]
+        raise NotRunError(f"{Path(command[0]).name} failed: {' '.join(last)}")
+    return done.stdout.decode()
+
+
+def _step(rate: Graph) -> tuple[Graph, dict[str, str]]:
+    """A step of rk4, operation by operation that of `to_c` and `to_wasm`, and what goes on into the next.
+
+    The time is count * h, as there.
+    """
+    states = rate.inputs[: len(rate.outputs)]
+    count = cg.variable("count" + "_" * sum([name.startswith("count") for name in rate.input_names]))
+    timed = TIME in rate.input_names
+    t = STEP * count
+    slopes: list[list[Node]] = []
+
+    def ahead(weights: tuple[float, ...]) -> list[Node]:
+        return [x + STEP * weighted([slope[i] for slope in slopes], weights) for i, x in enumerate(states)]
+
+    for c, weights in zip(RK4.c, RK4.a, strict=True):
+        at = dict(zip(states, ahead(weights), strict=True)) if slopes else {}
+        if timed:
+            at[cg.variable(TIME)] = t + c * STEP if slopes else t
+        slopes.append(substitute(list(rate.outputs.values()), at))
+    outputs = {f"x{i}": node for i, node in enumerate(ahead(RK4.b))}
+    carry = {str(state.name): f"x{i}" for i, state in enumerate(states)}
+    inputs = list(rate.inputs)
+    if timed:
+        inputs[rate.input_names.index(TIME)] = count
+        outputs["count"] = count + 1.0
+        carry[str(count.name)] = "count"
+    return Graph(inputs, outputs), carry

@@ -1,0 +1,61 @@
+"""The same bits: a motion computed in every way that there is here."""
+
+import json
+import shutil
+
+import pytest
+
+import cgraph as cg
+import dynamics as dyn
+from dynamics.scenes import of_model
+from dynamics.scenes.start import moving_start, with_start
+from dynamics.verification import same_bits as module
+from dynamics.verification.same_bits import same_bits
+from tests.slow import slow
+
+
+def pushed():
+    """Equations of first order with time and functions."""
+    return dyn.OdeSystem(lambda x, t: [x[1], -cg.sin(x[0]) + 0.1 * cg.cos(t) * x[0] ** 2], ["x", "v"])
+
+
+MODELS = {
+    "triple_pendulum": lambda: dyn.scenes.load("triple_pendulum"),
+    "pushed": pushed,
+    "free": lambda: dyn.Mechanism([dyn.Body("base", dyn.Joint("free"), mass=2.0, center=[0.1, 0.0, 0.2],
+                                            inertia=[[1, 0, 0], [0, 1.5, 0], [0, 0, 2]])]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ["pushed", *slow("triple_pendulum", "free")])
+def test_every_way_has_the_same_bits(name):
+    found = same_bits(moving_start(of_model(MODELS[name]())))
+    assert found.passed, str(found)
+    names = {way.name for way in found.ways}
+    assert {"loop in Python", "another process"} <= names
+    assert ("C" in names) == any(map(shutil.which, module.COMPILERS))
+    assert ("WebAssembly, baseline compiler" in names) == (shutil.which("node") is not None)
+    assert ("simulate in Python" in names) == (name != "free")
+    json.dumps(found.to_dict())
+
+
+@pytest.mark.skipif(not any(map(shutil.which, module.COMPILERS)), reason="no C compiler")
+def test_another_order_of_sums_is_seen_and_what_is_missing_is_said(monkeypatch):
+    # Of -ffast-math what changes sums: the whole, when linked, has the process drop subnormal numbers from then on.
+    loose = ("-O3", "-fassociative-math", "-freciprocal-math", "-fno-signed-zeros", "-fno-trapping-math")
+    monkeypatch.setattr(module, "FLAGS", ("-std=c99", *loose, "-shared", "-fPIC"))
+    scene = dyn.scenes.load("triple_pendulum")
+    motion = module._Motion(scene)
+    assert motion._c() != motion._simulate()
+    monkeypatch.setattr(module.shutil, "which", lambda name: None)
+    found = same_bits(scene)
+    assert found.passed
+    assert "C: none of cc, gcc, clang is installed" in found.left_out
+    assert "WebAssembly, baseline compiler: node is not installed" in found.left_out
+    assert "left out: simulate in machine code: it fuses products" in str(found)
+
+
+def test_a_motion_that_does_not_stay_finite_is_an_error():
+    blows_up = of_model(dyn.OdeSystem(lambda x, t: [x[0] * x[0]], ["x"]))
+    with pytest.raises(ValueError, match="does not stay finite over 1000 steps"):
+        same_bits(with_start(blows_up, {"x": 10.0}))
