@@ -95,12 +95,15 @@ def test_an_example_has_the_output_that_follows_it() -> None:
     assert program(page).splitlines()[5] == "print(x)"
 
 
-LONG = "docs/derivatives.md"  # its figures take most of the time
+LONG = ("docs/derivatives.md", "docs/optimal_control.md")  # some seconds each
+NEEDS = {"docs/environments.md": "gymnasium"}  # the package that a page is about, which no extra has
 
 
-@pytest.mark.parametrize("name", [*[name for name in RUN if name != LONG], *slow(LONG)])
+@pytest.mark.parametrize("name", [*[name for name in RUN if name not in LONG], *slow(*LONG)])
 def test_examples_print_what_is_shown(name: str, tmp_path: Path) -> None:
     """From top to bottom, in one namespace, in an empty folder, and write the pictures that the page shows."""
+    if name in NEEDS:
+        pytest.importorskip(NEEDS[name])
     if name in APART:
         run = run_examples(name, tmp_path)
         assert run.returncode == 0, run.stderr
