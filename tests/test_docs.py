@@ -34,7 +34,10 @@ RESULTS = "docs/reference/results.md"
 RUN = [name for name, page in PAGES.items() if "```python\n" in page]
 FENCE = re.compile(r"^```(\w*)[^\n]*\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 MARK = "-- end of example --"
-NEEDED = {"docs/bridges.md": ("casadi", "jax", "torch")}  # {page: packages without which it is not run}
+NEEDED = {  # {page: packages without which it is not run}
+    "docs/bridges.md": ("casadi", "jax", "torch"),
+    "docs/environments.md": ("gymnasium",),
+}
 SECONDS = 120  # for one page; each takes a few
 # In processes of their own: JAX is set to float64, rows are added, workers are started.
 APART = ("docs/bridges.md", "docs/extending.md", "docs/ensembles.md")
@@ -98,10 +101,10 @@ def test_an_example_has_the_output_that_follows_it() -> None:
     assert program(page).splitlines()[5] == "print(x)"
 
 
-LONG = "docs/derivatives.md"  # its figures take most of the time
+LONG = ("docs/derivatives.md", "docs/optimal_control.md")  # some seconds each
 
 
-@pytest.mark.parametrize("name", [*[name for name in RUN if name != LONG], *slow(LONG)])
+@pytest.mark.parametrize("name", [*[name for name in RUN if name not in LONG], *slow(*LONG)])
 def test_examples_print_what_is_shown(name: str, tmp_path: Path) -> None:
     """From top to bottom, in one namespace, in an empty folder, and write the pictures that the page shows."""
     for package in NEEDED.get(name, ()):

@@ -147,11 +147,17 @@ class ColoredMatrix:
             values[...] = 0.0
             return
         rows = values.reshape(len(points), -1)
-        width, columns = self._runner(values.ndim == 3, careful, 1)._columns("x", self._seeds(1))
-        directions = sum([part.directions(1) for part in self._parts])
+        seeds, directions, guarded = self._beside
+        width, columns = self._runner(values.ndim == 3, careful, 1)._columns("x", seeds)
         write_batch(max(width // (1 + directions) // LEAST_BLOCK, 1) * LEAST_BLOCK, columns, points.T, rows.T, threads)
-        if not careful and any([part.derivative.guarded for part in self._parts]):
+        if guarded and not careful:
             mend(values, lambda at, found: self.write(points[at], found, threads, careful=True))
+
+    @cached_property
+    def _beside(self) -> tuple[dict[str, Array], int, bool]:
+        """Of points side by side: seeds, the number of directions, and whether any derivative has a guarded split."""
+        guarded = any([part.derivative.guarded is not None for part in self._parts])
+        return self._seeds(1), sum([part.directions(1) for part in self._parts]), guarded
 
     def _seeds(self, lanes: int) -> dict[str, Array]:
         """Numbers in the registers of directions."""

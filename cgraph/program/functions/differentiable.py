@@ -80,14 +80,36 @@ class Differentiable:
     def jvp(self, x: ArrayLike, X_dot: ArrayLike, *, wrt: Inputs = None, threads: int | None = 1) -> Array:
         """Products y_dot = J x_dot of the Jacobian at x with directions, side by side in vectors: forward mode.
 
-        X_dot: (k, n_in), a direction a row; the result is (k, n_out). Of one direction, (n_in,), it is (n_out,). An
-        entry of x_dot that is zero counts for nothing, also where an operation has no slope in it; times a factor that
-        is infinite or NaN it is NaN.
-        x: (n_in,), or N points, (N, n_in). X_dot then is (N, n_in), a direction for each, or (N, k, n_in), and the
-        result (N, n_out) or (N, k, n_out); one direction (n_in,) is that of all points.
-        wrt: the inputs to differentiate by, n_in of them; by default all.
-        threads: how many may share the points, as of `batch`.
-        Raises GraphError for another shape, or an input that is not there.
+        An entry of x_dot that is zero counts for nothing, also where an operation has no slope in it; times a factor
+        that is infinite or NaN it is NaN.
+
+        Parameters
+        ----------
+        x : array_like, (n_in,) or (N, n_in)
+            The point, or points, a row each.
+        X_dot : array_like, (k, n_in) or (n_in,)
+            Directions, or one. At N points (N, n_in), one for each, (N, k, n_in), or (n_in,), the same for all.
+        wrt : optional
+            The inputs to differentiate by, n_in of them, in this order; by default all.
+        threads : int, optional
+            How many may share the points, as of `batch`.
+
+        Returns
+        -------
+        ndarray, (k, n_out) or (n_out,)
+            At N points (N, k, n_out), or (N, n_out) of a direction each.
+
+        Raises
+        ------
+        GraphError
+            For another shape, or an input that is not there.
+
+        Examples
+        --------
+        >>> x, y = cg.variables("x y")
+        >>> f = cg.compile(cg.Graph([x, y], {"area": x * y}))
+        >>> f.jvp([[1.0, 2.0], [3.0, 4.0]], [1.0, 10.0]).tolist()
+        [[12.0], [34.0]]
         """
         chosen = self._chosen(wrt)
         return self._products(self._pushed, chosen, x, "X_dot", X_dot, (self._count(chosen), self.n_out), threads)
@@ -95,29 +117,60 @@ class Differentiable:
     def vjp(self, x: ArrayLike, Y_bar: ArrayLike, *, wrt: Inputs = None, threads: int | None = 1) -> Array:
         """Products x_bar = J^T y_bar of the transposed Jacobian at x with cotangents, side by side: reverse mode.
 
-        Y_bar: (k, n_out), a cotangent a row; the result is (k, n_in). Of one cotangent, (n_out,), it is (n_in,).
-        x: (n_in,), or N points, (N, n_in). Y_bar then is (N, n_out), a cotangent for each, or (N, k, n_out), and the
-        result (N, n_in) or (N, k, n_in); one cotangent (n_out,) is that of all points.
-        wrt: the inputs to differentiate by, n_in of them; by default all.
-        threads: how many may share the points, as of `batch`.
-        Raises GraphError for another shape, or an input that is not there.
+        Parameters
+        ----------
+        Y_bar : array_like, (k, n_out) or (n_out,)
+            Cotangents, or one. At N points (N, n_out), one for each, (N, k, n_out), or (n_out,), the same for all.
+        x, wrt, threads
+            As of `jvp`, and so are errors.
+
+        Returns
+        -------
+        ndarray, (k, n_in) or (n_in,)
+            At N points (N, k, n_in), or (N, n_in) of a cotangent each; n_in counts the chosen inputs.
+
+        Examples
+        --------
+        >>> x, y = cg.variables("x y")
+        >>> f = cg.compile(cg.Graph([x, y], {"area": x * y}))
+        >>> f.vjp([[1.0, 2.0], [3.0, 4.0]], [[1.0], [10.0]]).tolist()
+        [[2.0, 1.0], [40.0, 30.0]]
         """
         chosen = self._chosen(wrt)
         return self._products(self._pulled, chosen, x, "Y_bar", Y_bar, (self.n_out, self._count(chosen)), threads)
 
     def jacobian(self, x: ArrayLike, *, wrt: Inputs = None, sparse: bool = False, threads: int | None = 1) -> Any:
-        """The Jacobian dy_i/dx_j at x, (n_out, n_in).
+        """The Jacobian dy_i/dx_j at x.
 
         Columns that share no row are one direction of a forward sweep, rows that share no column one of a reverse
         sweep, whichever costs less, or both: `cg.sparsity` tells the entries, greedy coloring the directions.
-        x: (n_in,), or N points, (N, n_in), side by side in vectors; the result then is (N, n_out, n_in). Of points in
-        columns, as `batch` takes them, it is `jacobian(X.T)`.
-        wrt: the inputs to differentiate by, n_in of them; by default all. With displacements as inputs, a quaternion
-        q + G(q) xi, the columns of these at xi = 0 are those of displacements.
-        sparse: give a scipy.sparse.csr_array with the entries of `cg.sparsity`; of N points a list of them.
-        threads: how many may share the points, as of `batch`.
-        Raises GraphError for another shape, or an input that is not there; ImportError with `sparse` without SciPy.
 
+        Parameters
+        ----------
+        x : array_like, (n_in,) or (N, n_in)
+            The point, or points, a row each, which lie side by side in vectors. Of points in columns, as `batch` takes
+            them, it is `jacobian(X.T)`.
+        wrt : optional
+            The inputs to differentiate by, n_in of them, in this order; by default all. With displacements as inputs,
+            a quaternion q + G(q) xi, the columns of these at xi = 0 are those of displacements.
+        sparse : bool
+            Give a scipy.sparse.csr_array with the entries of `cg.sparsity`; of N points a list of them.
+        threads : int, optional
+            How many may share the points, as of `batch`.
+
+        Returns
+        -------
+        ndarray, (n_out, n_in) or (N, n_out, n_in)
+
+        Raises
+        ------
+        GraphError
+            For another shape, or an input that is not there.
+        ImportError
+            With `sparse` without SciPy.
+
+        Examples
+        --------
         >>> x = cg.variable("x")
         >>> cg.compile(cg.Graph([x], {"y": x * x})).jacobian([[1.0], [2.0], [3.0]]).ravel().tolist()
         [2.0, 4.0, 6.0]
@@ -133,15 +186,27 @@ class Differentiable:
         sparse: bool = False,
         threads: int | None = 1,
     ) -> Any:
-        """The Hessian of y_bar . y at x, (n_in, n_in): forward sweeps over the reverse one, never a tensor.
+        """The Hessian of y_bar . y at x: forward sweeps over the reverse one, never a tensor.
 
         Columns are compressed by a star coloring, which reads an entry or its mirror image.
-        x: (n_in,), or N points, (N, n_in); the result then is (N, n_in, n_in).
-        y_bar: (n_out,), the weights of the outputs, or (N, n_out), of each point; not needed for one output.
-        wrt: the inputs to differentiate by, n_in of them; by default all.
-        sparse: give a scipy.sparse.csr_array; of N points a list of them.
-        threads: how many may share the points, as of `batch`.
-        Raises GraphError for another shape, or an input that is not there; ImportError with `sparse` without SciPy.
+
+        Parameters
+        ----------
+        y_bar : array_like, (n_out,) or (N, n_out), optional
+            The weights of the outputs, for all points or of each; not needed for one output.
+        x, wrt, sparse, threads
+            As of `jacobian`, and so are errors.
+
+        Returns
+        -------
+        ndarray, (n_in, n_in) or (N, n_in, n_in)
+            n_in counts the chosen inputs. With `sparse` a scipy.sparse.csr_array, or a list of them.
+
+        Examples
+        --------
+        >>> x = cg.variable("x")
+        >>> cg.compile(cg.Graph([x], {"y": x**3})).hessian([[1.0], [2.0], [3.0]]).ravel().tolist()
+        [6.0, 12.0, 18.0]
         """
         if y_bar is None and self.n_out != 1:
             raise GraphError(f"hessian needs y_bar, the weights of the {self.n_out} outputs")
@@ -159,16 +224,32 @@ class Differentiable:
     def bind_jacobian(
         self, x: Array, values: Array, *, wrt: Inputs = None, threads: int | None = 1
     ) -> Callable[[], None]:
-        """A function of nothing that reads x, (n_in,), and writes the Jacobian: the fastest way to it.
+        """A function of nothing that reads x and writes the Jacobian: the fastest way to it.
 
-        values: (n_out, n_in), or one number for each entry of `cg.sparsity`, row by row. What is zero whatever x is set
-        to zero here, and not touched by the function. As for `bind`, the arrays are checked here and kept alive, and
-        one thread at a time may call it.
-        Of N points x is (N, n_in), and values (N, n_out, n_in) or (N, entries).
-        wrt: the inputs to differentiate by, as many as `values` has columns; by default all.
-        threads: how many may share the points, as of `batch`.
-        Raises GraphError for arrays that are not contiguous float64 of these shapes, or share memory, and for an input
-        that is not there.
+        As for `bind`, the arrays are checked here and kept alive, and one thread at a time may call it. What is zero
+        whatever x is set to zero here, and not touched by the function.
+
+        Parameters
+        ----------
+        x : ndarray, (n_in,) or (N, n_in)
+        values : ndarray, (n_out, n_in) or (entries,)
+            The matrix, or a number for each entry of `cg.sparsity`, row by row; of N points (N, ..).
+        wrt, threads
+            As of `jacobian`; `values` has as many columns as inputs are chosen.
+
+        Raises
+        ------
+        GraphError
+            For arrays that are not contiguous float64 of these shapes, or share memory, and for an input that is not
+            there.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> x, slopes = cg.variable("x"), np.empty((3, 1, 1))
+        >>> cg.compile(cg.Graph([x], {"y": x * x})).bind_jacobian(np.array([[1.0], [2.0], [3.0]]), slopes)()
+        >>> slopes.ravel().tolist()
+        [2.0, 4.0, 6.0]
         """
         matrix, count = self._jacobian(self._chosen(wrt)), thread_count(threads)
         rows = x.shape[:1] if isinstance(x, np.ndarray) and x.ndim == 2 else ()

@@ -73,16 +73,14 @@ class DirectionProducts:
 
     def many(self, points: Array, directions: Array, results: Array, threads: int) -> None:
         """The results, (N, k, results), of N points, each along k directions of its own, (N, k, entries)."""
-        count = directions.shape[1]
-        size = max(1, PANEL_NUMBERS // (count * self._beside.program.registers["x"]))
+        count, n, width = directions.shape[1], points.shape[1], self._beside.program.registers["x"]
+        size = max(1, PANEL_NUMBERS // (count * width))
         for start in range(0, len(points), size):
             here = slice(start, start + size)
-            along, found = (
-                directions[here].reshape(-1, directions.shape[2]),
-                results[here].reshape(-1, results.shape[2]),
-            )
-            rows = np.concatenate([np.repeat(points[here], count, axis=0), along], axis=1)
-            write_batch(*self._beside._columns("x"), rows.T, found.T, threads)
+            found = results[here].reshape(-1, results.shape[2])
+            rows = np.empty((len(points[here]), count, width))
+            rows[:, :, :n], rows[:, :, n:] = points[here, None], directions[here]
+            write_batch(*self._beside._columns("x"), rows.reshape(-1, width).T, found.T, threads)
         if self._derivative.guarded is not None:
             mend(results, lambda at, found: self._guarded.many(points[at], directions[at], found, threads))
 
