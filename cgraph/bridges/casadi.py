@@ -20,8 +20,8 @@ def to_casadi(graph: Graph, name: str = "function") -> Function:
     """The graph as a casadi.Function of one vector x, the inputs, that gives one vector y, the outputs.
 
     Node for node, in scalars of CasADi (SX): derivatives, C code, maps and nonlinear programs are CasADi's from there
-    on. Values are those of `evaluate` but for rounding of functions, and for CasADi's conventions: `fmin` and `fmax`
-    leave out a NaN, and an infinite slope of a branch that is not taken makes a derivative NaN.
+    on. Values are those of `evaluate` but for rounding of functions, and but for NaN in a minimum or maximum: CasADi's
+    leaves it out.
 
     Parameters
     ----------

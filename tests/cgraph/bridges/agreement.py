@@ -74,6 +74,17 @@ def own_row(**columns: Any):
         del OPS["own"], cg.core.row.ROWS["own"]
 
 
+def lets_zero_win(bridge: Bridge) -> None:
+    """Assert that an exact zero wins over infinity and NaN, and that the product then has the slopes of a product."""
+    x, y = cg.variables("x y")
+    graph = cg.Graph([x, y], {"f": apply(OPS["zero_safe_mul"], x, y)})
+    value, slopes = bridge.function(graph), bridge.jacobian(graph)
+    for point, wanted in (((0.0, np.inf), 0.0), ((np.nan, 0.0), 0.0), ((2.0, np.inf), np.inf), ((2.0, 3.0), 6.0)):
+        assert np.array(value(np.array(point))).ravel().tolist() == [wanted]
+    for point in ((0.0, 2.0), (2.0, 0.0), (0.0, 0.0), (2.0, 3.0)):
+        assert np.array(slopes(np.array(point))).ravel().tolist() == [*reversed(point)]
+
+
 def refuses(make: Callable[[cg.Graph], Any], library: str) -> None:
     """Assert that an operation that says nothing of the library is refused, and one that does is taken."""
     with own_row() as graph, pytest.raises(cg.GraphError, match=f"{library} has no operation 'own'"):
