@@ -217,7 +217,7 @@ function makeTabs(app) {
   const tabs = versions.map((each, i) => {
     const button = tag("button", { type: "button", role: "tab", "aria-controls": "view" }, each.name);
     if (each.flawed) button.className = "flawed";
-    if (right.length > 1 && right.includes(each) && each.ops.length === fewest) button.append(" ", tag("small", {}, "smallest"));
+    if (right.some(({ ops }) => ops.length > fewest) && right.includes(each) && each.ops.length === fewest) button.append(" ", tag("small", {}, "smallest"));
     if (i && versions[i - 1].group !== each.group) button.classList.add("apart");
     return button;
   });
@@ -249,10 +249,20 @@ function choose(app, i) {
   showVersion(app, i);
 }
 
+/** The node of a version that is the output, or has the name, of a node of another one; -1 where there is none. */
+function namesake(version, other, node) {
+  const named = ({ names, inputs }) => [...Object.entries(names).map(([k, [name]]) => [name, +k]), ...inputs];
+  const result = other.outputs.find(([, , k]) => k === node)?.[0];
+  if (result !== undefined) return version.outputs.find(([name]) => name === result)?.[2] ?? -1;
+  const name = named(other).find(([, k]) => k === node)?.[0];
+  return named(version).find(([each]) => each === name)?.[1] ?? -1;
+}
+
 function showVersion(app, i) {
   const { versions } = app.state, was = room(app).height, old = app.version, apart = old?.group !== versions[i].group;
-  const keep = (node) => (node < 0 || apart ? -1 : app.plan.place[versions[i].index].indexOf(app.plan.place[old.index][node]));
-  const [picked, before] = [keep(app.picked), keep(app.before)];
+  const inPlace = (node) => (apart ? -1 : app.plan.place[versions[i].index].indexOf(app.plan.place[old.index][node]));
+  const keep = (node) => (node < 0 ? -1 : Math.max(inPlace(node), namesake(versions[i], old, node)));
+  const picked = keep(app.picked), before = picked < 0 ? -1 : keep(app.before);
   if (old) Object.assign(app.own, { view: app.view, seen: app.seen });
   app.bounds = null;
   Object.assign(app, { index: i, version: versions[i], picked, before, path: null, sweep: -1, lesson: -1 });

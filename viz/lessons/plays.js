@@ -106,8 +106,8 @@ function startPlay(board, play) {
 const PLAYS = {
   rows(board, play, at, redraw) {
     const run = named(play.graph);
-    slider(board, "dt [s]", 0, 1, 0.01, 0, (x) => { at.dt = x; redraw(); });
-    at.dt = 0;
+    at.dt = 0.1; // long enough to be seen
+    slider(board, "dt [s]", 0, 1, 0.01, at.dt, (x) => { at.dt = x; redraw(); });
     sliders(board, play, at, redraw);
     const write = grid(board, play.header);
     return () => {

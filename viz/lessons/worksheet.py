@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from html import escape
 
-from dynamics import inverse_dynamics
-
+from ..models.equations import model_equations
+from ..models.equations_text import equations_latex
 from ..pages import html
 from ..pages.html import Page, asset
 from .glossary import glossary
 from .introduction import introduction
 from .screen import Screen
-from .subject import Subject, lagrangian_graph
+from .subject import Subject
+
+LINES = 40  # of LaTeX, of each formula
 
 
 def worksheet(subject: Subject, screens: Sequence[Screen], title: str, author: str, *, key: bool) -> Page:
@@ -34,13 +36,6 @@ def worksheet(subject: Subject, screens: Sequence[Screen], title: str, author: s
 
 
 def _latex(subject: Subject) -> str:
-    """The Lagrangian and tau, to be copied."""
-    graphs = {
-        "The Lagrangian": lagrangian_graph(subject.system),
-        f"The {subject.force}, by the chain rule": inverse_dynamics(subject.system, "chain_rule"),
-    }
-    rows = [
-        f"<p>{name}</p><pre>{escape(graph.latex(names=subject.scene_names, lines=12))}</pre>"
-        for name, graph in graphs.items()
-    ]
-    return f'<section id="latex"><h2>Equations as LaTeX</h2>\n{"".join(rows)}</section>'
+    """The Lagrangian, the momenta and tau, to be copied: what `cgraph equations --latex` prints."""
+    text = equations_latex(model_equations(subject.scene), LINES)
+    return f'<section id="latex"><h2>Equations as LaTeX</h2>\n<pre>{escape(text)}</pre></section>'

@@ -99,7 +99,8 @@ function showWrong(wrong) {
   if (!wrong) { byId("wrong").replaceChildren(); return; }
   const { sentence, source, column, length } = wrong;
   byId("wrong").replaceChildren(tag("p", {}, sentence),
-    tag("pre", {}, source.slice(0, column), tag("mark", {}, source.slice(column, column + length) || " "), source.slice(column + length)));
+    tag("pre", {}, source.slice(0, column), tag("mark", {}, source.slice(column, column + length) || " "), source.slice(column + length)),
+    tag("small", {}, "Picture and results are still those of the text before."));
 }
 /** Counts, lint in words, and how exact the motion is. */
 function showDerived({ system, motion, record }) {

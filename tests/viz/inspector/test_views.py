@@ -93,6 +93,20 @@ def test_a_version_stands_beside_those_that_answer_the_same_question(show):
         assert page.locator("#results thead th").count() == columns
 
 
+def test_a_question_is_kept_from_view_to_view(show):
+    """q.joint 3 is a node inside of one graph, and an input of the others."""
+    page = show()
+    page.locator('[aria-label="what to explain"]').select_option(label="tau.joint 2")
+    page.locator('[aria-label="by what it depends on"]').select_option(label="by q.joint 3")
+    slopes, told = [], re.compile(r"^∂tau.joint 2 by q.joint 3 is (\S+) N m per rad", re.MULTILINE)
+    for name in ("by definition", "chain rule", "Newton-Euler"):
+        tab(page, name)
+        slopes.append(told.search(page.inner_text("#why"))[1])
+    assert slopes[0] != slopes[1] == slopes[2]
+    tab(page, "Hamilton")
+    assert "Choose an output" in page.inner_text("#why")  # it has no torque
+
+
 # The address.
 
 

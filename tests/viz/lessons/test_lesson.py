@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 import re
 import subprocess
@@ -14,6 +15,7 @@ import cgraph as cg
 import dynamics as dyn
 import viz
 from cgraph.extend import OPS
+from dynamics.scenes.scenes import of_model
 from tests.chromium import chromium
 from tests.each_row import each_row
 from tests.tolerances import EQUATIONS
@@ -29,6 +31,8 @@ from viz.lessons.screens.sweeps import backward_sweep
 from viz.lessons.screens.torque_parts import torque_parts
 from viz.lessons.screens.wrong_way import wrong_way
 from viz.lessons.subject import lagrangian_graph, subject_of
+from viz.models.equations import model_equations
+from viz.models.equations_text import equations_latex
 from viz.pages.operations import graph_data
 
 
@@ -73,7 +77,8 @@ def test_a_worksheet_asks_and_its_key_answers():
     assert sheet.count("<b>Mark.</b>") == 3  # values, slopes, and the edges of the step
     assert 'class="answer"' not in sheet
     assert key.count('class="answer"') == 5
-    assert "\\begin{aligned}" in key
+    formulas = equations_latex(model_equations(of_model(SYSTEMS["hoop"]())), 40)
+    assert html.escape(formulas) in key
 
 
 def test_the_pictures_of_a_key_have_the_marks():

@@ -79,6 +79,7 @@ def test_nonsense_gets_one_sentence_and_the_page_stays(show):
         typed(page, text)
         sentence = page.locator("#wrong p").inner_text()
         assert words in sentence
+        assert "the text before" in page.locator("#wrong small").inner_text()
         assert re.fullmatch(r"Line 1: [^.]+(\.|\?)", sentence)
         assert page.locator("#wrong pre").inner_text().strip() in text
         assert page.locator("#text").get_attribute("aria-invalid") == "true"

@@ -110,8 +110,8 @@ def _second_try(subject: Subject) -> str:
         right = subject.evaluate(inverse_dynamics(subject.system, "chain_rule"))
         off = np.abs(after_a_step(subject, verdict.graph, DT) - right).max()
         told = (
-            f"In the moving moment τ is then still off by {number(float(off))}, where the largest is "
-            f"{number(float(np.abs(right).max()))}: K depends on positions as well, and the edge acts on them."
+            f"In the moving moment τ is then still off by {number(float(off))}, where the right one is "
+            f"{number(float(np.abs(right).max()))}{' at most' if len(right) > 1 else ''}: K depends on positions as well, and the edge acts on them."
         )
     elif verdict.differs:
         told = "In this moment τ is then right. But K depends on positions, and at other states it is wrong."

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cgraph import Graph, Node, constant
+from cgraph import Graph, Node, constant, variable
 from dynamics.equations.formulations.lagrange_terms import COUPLING, EULER, after_a_step
 
 from ...graph_drawing.dot import to_dot
@@ -25,14 +25,14 @@ def euler_edge(subject: Subject) -> Screen:
     step = after_a_step(subject.system)
     play = subject.play(
         "rows",
-        {"graph": Graph(step.inputs, {name: step.outputs[name]})},
+        {"graph": Graph(step.inputs, {f"{name}_old": variable(f"{name}_old"), name: step.outputs[name]})},
         sliders=[
             {"name": f"{velocity}_old", "shown": f"{subject.told(velocity)} before the step", "low": -3.0, "high": 3.0,
              "value": subject.values[f"{velocity}_old"]},
         ],
         dt=True,
         header=["quantity", "value"],
-        rows=[[f"{subject.told(name)} after the step", name]],
+        rows=[[f"{subject.told(name)} {when} the step", each] for when, each in (("before", f"{name}_old"), ("after", name))],
     )  # fmt: skip
     return Screen(
         "euler-edge",

@@ -74,7 +74,7 @@ def formula_graph(subject: Subject) -> Screen:
         why + "<p>In this graph a coordinate q and its velocity q̇ are two inputs of their own: no edge leads from one "
         "to the other. Keep this in mind.</p>",
         f"L is {number(before)} in this moment.",
-        f"Press Next and watch the values go up, as in the picture, from the inputs to L.{_left_out(graph)}",
+        f"Press Next and watch the values go up{_as_drawn(graph)} from the inputs to L.{_left_out(graph)}",
         {"kind": "sweeps", "rows": _rows(subject, graph, "values"), "slopes": False},
         _picture(subject, graph, "values"),
         _figure(subject, graph, values=True),
@@ -86,7 +86,7 @@ def backward_sweep(subject: Subject) -> Screen:
     graph, slopes = lagrangian_graph(subject.system), subject.system.n + subject.system.nq
     return Screen(
         "sweeps",
-        "Backward: all slopes in one sweep",
+        "Backward: the slopes of L",
         5,
         f"<p>Lagrange’s equation asks for ∂L/∂q and for p = ∂L/∂q̇, here {slopes} {term('slope', 'slopes')} of L: by how "
         "much L changes for each unit of an input.</p><p>They are found by the "
@@ -100,7 +100,7 @@ def backward_sweep(subject: Subject) -> Screen:
         "hand, one would need a sweep for each input.</p>",
         "Forward, a sweep gives the slopes of all nodes by one input; backward, those of one output by all inputs, and L "
         "is one number.",
-        "Step through both sweeps, values upwards, then slopes downwards, as in the picture. Multiply a few of the slopes "
+        f"Step through both sweeps, values upwards, then slopes downwards{_as_drawn(graph, '')}. Multiply a few of the slopes "
         f"by hand.{_left_out(graph)}",
         {"kind": "sweeps", "rows": _rows(subject, graph, "slopes"), "slopes": True},
         _picture(subject, graph, "slopes"),
@@ -165,6 +165,10 @@ def _example(subject: Subject, graph: Graph) -> str:
 
 def _left_out(graph: Graph) -> str:
     return f" Of {len(graph.nodes)} nodes the last {ROWS} are shown." if len(graph.nodes) > ROWS else ""
+
+
+def _as_drawn(graph: Graph, end: str = ",") -> str:
+    return "" if len(graph.nodes) > DRAWN else f", as in the picture{end}"
 
 
 def _told_picture(graph: Graph) -> str:
