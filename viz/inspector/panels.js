@@ -193,7 +193,7 @@ function makeResults(app) {
   const [shown, cells] = numbers(app, versions.map((each) => each.name), app.names);
   app.cells = cells;
   byId("results").replaceChildren(tag("p", { id: "now" }), shown, ...(app.right < 0 ? []
-    : [quiet(`In vermillion: differs from ${versions[app.right].name}. All at the same state; values within rounding error are shown as 0.`)]));
+    : [quiet(`In vermillion: wrong at every dt. Other differences from ${versions[app.right].name} vanish with dt. All at the same state; values within rounding error are shown as 0.`)]));
   byId("statetables").replaceChildren();
   byId("wide").replaceChildren();
   tables.forEach((each) => showTable(app, each));
