@@ -131,7 +131,7 @@ function firstView(app) {
   const scale = (level) => fitting(size, arrange(app.plan, view(level)));
   const coarsest = app.plan.columns.length > 1 ? "bodies" : "clusters";
   const drawings = app.own.versions.map(({ drawing }) => drawing);
-  if (drawings.every(Boolean) && (innerWidth > NARROW || drawings.every((each) => fitting(size, each) >= READ))) return view("nodes");
+  if (drawings.every(Boolean) && drawings.every((each) => fitting(size, each) >= (innerWidth > NARROW ? LEGIBLE / TEXT : READ))) return view("nodes");
   if (innerWidth <= NARROW) return view(app.largest <= SMALL && scale("nodes") >= READ ? "nodes" : coarsest);
   const order = [...(app.largest <= READABLE ? ["nodes"] : []), "clusters", ...(app.plan.columns.length > 1 ? ["bodies"] : [])];
   const boxes = Math.max(...app.plan.place.map((places) => new Set(places.map((place) => app.plan.cluster[place])).size));

@@ -132,7 +132,7 @@ function drawClusters(canvas) {
     const item = shape(shapes, `c${c}`, at, `box ${role}`, first ? `${fitted(first, 10)} ${inside[c].length}` : count, count);
     item.group.setAttribute("data-cluster", c);
     item.group.setAttribute("aria-expanded", "false");
-    item.group.setAttribute("aria-label", [cluster.column, cluster.stage, words, count, "folded"].filter(Boolean).join(", "));
+    item.group.setAttribute("aria-label", [cluster.column, cluster.stage, cluster.marked ? cluster.title : "", [first, count].filter(Boolean).join(" "), "folded"].filter(Boolean).join(", "));
     element("title", {}, item.group).textContent = [cluster.column, words, cluster.stage, count].filter(Boolean).join(", ");
     keep(canvas, `c${c}`, item, inside[c], count);
   });
@@ -179,7 +179,7 @@ function drawBundles(canvas, side, leaves) {
     const at = layout[side === "i" ? "inputs" : "outputs"].get(key);
     const item = shape(shapes, `k${key}`, at, side === "i" ? "box input" : off ? "box output off" : "box output", `▸ ${kind}: ${counted(own.length, side === "i" ? "input" : "output")}`, "");
     item.group.setAttribute("data-bundle", key);
-    item.group.setAttribute("aria-label", `${kind}, ${own.length}, folded${off ? ", wrong" : ""}`);
+    item.group.setAttribute("aria-label", `${kind}: ${counted(own.length, side === "i" ? "input" : "output")}, folded${off ? ", wrong" : ""}`);
     canvas.names.push({ text: item.label, name: item.label.textContent, width: at.w - 8, size: 10 });
     const nodes = own.map((name) => node.get(name));
     if (side === "i") keep(canvas, `k${key}`, item, nodes, "");

@@ -238,8 +238,10 @@ def _spurious(scene: Scene, formulation: str) -> list[Block]:
         left = variable(f"tau_def{i}") - variable(name)
         slope = variable(f"∂{energy}") / variable(f"∂q{i}")
         held.append((left, right) if system.kinematics.quasi is not None else (left, slope, right))
-    if system.n > MATRICES and system.kinematics.quasi is None:
-        held.insert(0, (variable("tau_def") - variable("tau"), variable(f"∂{energy}") / variable("∂q")))
+    quasi = system.kinematics.quasi is not None
+    if system.n > MATRICES or quasi:
+        slope = variable(f"∂{energy}") / variable("∂q")
+        held.insert(0, (variable("tau_def") - variable("tau"), variable("Gᵀ") * slope if quasi else slope))
     about = (
         f"What the torque {had}, τ_def, has too much, however small the time step dt is: q = q̇ dt + q_old makes the "
         "momentum depend on q̇ through q as well. A further part, dt times the rate of this one, tends to 0 with dt."

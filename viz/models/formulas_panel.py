@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 from cgraph import Node, variable
-from cgraph.extend import ink
 from dynamics.scenes import Scene
 
 from ..pages.html import Panel
@@ -14,12 +14,12 @@ from .equations import Block, Equations, model_equations
 from .equations_text import equations_html
 
 LINES = 12  # of each block, at most
-BRIEF = 12.0  # symbols of a formula in the heading
+BRIEF = 36  # letters of a formula in the heading
 STYLE = """
 #formulas:has(details[open]) { padding: 6px 14px; border-top: 1px solid var(--edge); flex: none; }
-#formulas:has(details[open]) { max-height: 55vh; overflow-y: auto; }
+#formulas:has(details[open]) { max-height: 45vh; overflow-y: auto; }
 #formulas h3 { font-size: 1rem; margin: 10px 0 2px; } #formulas p { font-size: 15px; max-width: 75em; }
-#formulas math { font-size: 1.05rem; } #formulas summary math { padding: 0; margin-left: .8em; }
+#formulas math { font-size: 1.05rem; } #formulas summary math { padding: 0; margin-left: .8em; } #formulas mfrac :is(msub, msup) > :last-child { math-depth: 1; }
 #formulas .spurious { border-left: 6px solid var(--wrong); padding-left: 10px; margin: 6px 0; }
 #formulas :is(.spurious math, .spurious h3, summary math) { color: color-mix(in srgb, var(--wrong) 78%, var(--text)); }
 body:not(:has(#about.flawed)) #formulas :is(.first, summary math) { display: none; }
@@ -67,7 +67,9 @@ def _in_short(block: Block, equations: Equations) -> str:
     """The one statement of a block, if it is short, else what all of them are."""
     *lefts, right = block.statements[0]
     surplus, general = variable("tau_def") - variable("tau"), len(lefts) == 1
-    if (general or len(block.statements) == 1) and isinstance(right, Node) and ink(right) <= BRIEF:
-        return inline(block.statements[0], equations.names)
+    if (general or len(block.statements) == 1) and isinstance(right, Node):
+        whole = inline(block.statements[0], equations.names)
+        if len(re.sub("<[^>]*>", "", whole)) <= BRIEF:
+            return whole
     slopes = [each.args[0] / variable("∂q") for each in lefts[1:] if isinstance(each, Node)]
     return inline([surplus, *slopes], equations.names)

@@ -36,15 +36,15 @@ function verdict(system, formulation) {
     + `${shortList(gone)} ${gone.length > 1 ? "are" : "is"} missing.` : "";
   const why = `Why: the derivative by qd went through ${STEP}. That adds dt ${slope} to the momentum and ${slope} to its rate, `
     + `which cancels the -${slope} of Lagrange's equation.`;
-  const terms = off.length > 1 ? `${shortList(called)} are off, each by its ${slope}` : `${called[0]} is off by ${slope}.${system.coordinates[excess[0][0]]}`;
+  const terms = off.length > 1 ? `${shortList(called, NAMED)} are off, each by its ${slope}` : `${called[0]} is off by ${slope}.${system.coordinates[excess[0][0]]}`;
   const lines = [`${begin} wrong at every dt, however small. At ${where}:`, ...values, why,
     ...(edges.length ? [`${spuriousText(graph.nodes.length, nodes.size, edges.length)}.`] : []), ...(lacking ? [lacking] : [])];
   return { formulation, graph, energy, differs: true, sentence: `${begin} wrong at every dt, however small: ${terms}.`, lines, nodes, edges,
     off, missing: missing.map(([i]) => `tau${i}`), why, lacking };
 }
 
-const SHOWN = 6; // texts that a list shows
-const shortList = (texts) => (texts.length > SHOWN ? [...texts.slice(0, SHOWN), `and ${texts.length - SHOWN} more`] : texts).join(", ");
+const SHOWN = 6, NAMED = 3; // texts that a list shows, and names in a sentence
+const shortList = (texts, most = SHOWN) => (texts.length > most ? [...texts.slice(0, most), `and ${texts.length - most} more`] : texts).join(", ");
 const sixDigits = (value) => String(+value.toPrecision(6));
 
 /** Words on how many edges and nodes of a graph of so many nodes are spurious. */

@@ -41,7 +41,7 @@ if TYPE_CHECKING:
 
 STATES = 24  # tried where c does not fold to 0: a third of size 1, the rest of sizes from 1e-6 to 1e6
 WRITTEN = 200  # nodes of c that identities are tried on
-SHOWN, FORMULA = 6, 60  # coordinates that the text lists, and characters of a formula in it
+SHOWN, NAMED, FORMULA = 6, 3, 60  # coordinates in the text and in its summary, and characters of a formula
 HOW = {
     "by_definition": "By definition",
     "kinetic_only": "Kinetic only",
@@ -188,7 +188,7 @@ rate, which cancels the -dL/dq of Lagrange's equation.
         called = Names(self.graph, self.names)
         names, terms = [called.shown(name) for name in self.excess], list(self.excess.values())
         if len(terms) > 1:
-            off = f"{_listed(names)} are off, each by its {terms[0].symbol.partition('.')[0]}"
+            off = f"{_listed(names, NAMED)} are off, each by its {terms[0].symbol.partition('.')[0].strip('()')}"
         else:
             off = f"{names[0]} is off by {terms[0].symbol}{terms[0].formula and f' = {terms[0].formula}'}"
         return f"{begin} wrong at every dt, however small: {off}."
@@ -393,7 +393,7 @@ def _state(system: System, verdict: Verdict) -> tuple[dict[str, float], int]:
     return {name: (at | qdd)[name] for name in order}, finite
 
 
-def _listed(texts: Iterable[str]) -> str:
+def _listed(texts: Iterable[str], most: int = SHOWN) -> str:
     """Text of a few texts, or of the first of many."""
     shown = list(texts)
-    return ", ".join(shown if len(shown) <= SHOWN else [*shown[:SHOWN], f"and {len(shown) - SHOWN} more"])
+    return ", ".join(shown if len(shown) <= most else [*shown[:most], f"and {len(shown) - most} more"])

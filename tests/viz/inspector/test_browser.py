@@ -208,27 +208,27 @@ def test_two_clicks_ask_why(show):
 def test_why_is_asked_by_name_and_answered_by_cause(show):
     page = show()
     page.keyboard.press("3")
-    page.select_option('#why select[aria-label="what to explain"]', label="τ.joint 2")
+    page.select_option('#why select[aria-label="what to explain"]', label="tau.joint 2")
     told = page.inner_text("#why")
-    assert "τ.joint 2 is " in told
+    assert "tau.joint 2 is " in told
     assert " N m, the sum of" in told
     rows = page.locator("#why .causes tr")
     heads = [row.partition("\t")[0] for row in rows.all_inner_texts()]
     assert {"gravity", "inertia", "Coriolis", "sum"} <= set(heads)
     assert page.locator("#why .causebar span").first.evaluate("bar => bar.getBoundingClientRect().width") > 20
     page.select_option('#why select[aria-label="by what it depends on"]', label="by q.joint 1")
-    assert "∂τ.joint 2 by q.joint 1 is " in page.inner_text("#why")
+    assert "∂tau.joint 2 by q.joint 1 is " in page.inner_text("#why")
     assert page.locator("#why .path").count() == 5
     assert page.locator(".item.picked").count() >= 2
     assert page.locator("#why .wrong").count() == 0
     page.keyboard.press("1")
-    page.select_option('#why select[aria-label="what to explain"]', label="τ.joint 2")
+    page.select_option('#why select[aria-label="what to explain"]', label="tau.joint 2")
     assert page.locator("#why .cause.wrong").inner_text().startswith("spurious")
     assert "a mistake of the formulation. Without it" in page.inner_text("#why")
     page.select_option('#why select[aria-label="what to explain"]', label="gravity")
     assert page.locator("#why .causes tr").count() == 3
     page.locator("#otau0").click()
-    assert "τ.joint 1 is " in page.inner_text("#why")
+    assert "tau.joint 1 is " in page.inner_text("#why")
 
 
 def test_search_finds_by_name_tag_and_number(show):
