@@ -102,7 +102,9 @@ def test_a_question_is_kept_from_view_to_view(show):
     for name in ("by definition", "chain rule", "Newton-Euler"):
         tab(page, name)
         slopes.append(told.search(page.inner_text("#why"))[1])
-    assert slopes[0] != slopes[1] == slopes[2]
+        if name == "by definition":  # what is left of it without the mistake and the step is what the others say
+            corrected = re.search(r"vanishes with dt: (\S+) N m per rad", page.inner_text("#why"))[1]
+    assert slopes[0] != slopes[1] == slopes[2] == corrected
     tab(page, "Hamilton")
     assert "Choose an output" in page.inner_text("#why")  # it has no torque
 

@@ -29,8 +29,10 @@ function causeTable(what, unit, parts, whole) {
   if (!size) return [tag("p", {}, tag("b", {}, what), " is 0, and so is every part of it here.")];
   rows.push(causeRow("sum", "sum", Math.abs(addedUp(parts)) > LEAST * size ? addedUp(parts) : 0, null));
   const off = Math.abs(addedUp(parts) - whole) > 1e-9 * size ? quiet(`They add up to ${told(addedUp(parts))}, and it is ${told(whole)}.`) : "";
-  const wrong = groups.find(([cause]) => cause === SPURIOUS);
-  const said = wrong ? tag("p", { class: "off" }, `What is spurious is no physics, but a mistake of the formulation. Without it: ${told(whole - wrong[1])}${unit}.`) : "";
+  const [wrong, step] = [SPURIOUS, STEP].map((name) => groups.find(([cause]) => cause === name)?.[1]);
+  const right = told(whole - wrong - (step ?? 0));
+  const said = wrong === undefined ? "" : tag("p", { class: "off" }, "What is spurious is no physics, but a mistake of the formulation. "
+    + `Without it${step === undefined ? "" : `, and without the ${STEP}, which vanishes with dt`}: ${right}${unit}.`);
   return [tag("p", {}, tag("b", {}, what), ` is ${told(whole)}${unit}, the sum of`),
     tag("table", { class: "causes" }, tag("tbody", {}, ...rows)), off, said].filter(Boolean);
 }
