@@ -19,7 +19,8 @@ STYLE = """
 #formulas:has(details[open]) { padding: 6px 14px; border-top: 1px solid var(--edge); flex: none; }
 #formulas:has(details[open]) { max-height: 45vh; overflow-y: auto; }
 #formulas h3 { font-size: 1rem; margin: 10px 0 2px; } #formulas p { font-size: 15px; max-width: 75em; }
-#formulas math { font-size: 1.05rem; } #formulas summary math { padding: 0; margin-left: .8em; } #formulas mfrac :is(msub, msup) > :last-child { math-depth: 1; }
+#formulas math { font-size: 1.05rem; } #formulas summary math { padding: 0; margin-left: .8em; }
+#formulas mfrac :is(msub, msup) > :last-child { math-depth: 1; }
 #formulas .spurious { border-left: 6px solid var(--wrong); padding-left: 10px; margin: 6px 0; }
 #formulas :is(.spurious math, .spurious h3, summary math) { color: color-mix(in srgb, var(--wrong) 78%, var(--text)); }
 body:not(:has(#about.flawed)) #formulas :is(.first, summary math) { display: none; }
@@ -28,6 +29,7 @@ body:not(:has(#about.flawed)) #formulas :is(.first, summary math) { display: non
 # Closed, the panel is a line below the results; open, it is as wide as the page. It is of the page's model: a typed
 # system has formulas of its own.
 RUN = """
+const PAPER = 640; // pixels of its width
 const formulas = byId("formulas"), formulasOf = inspector.record(), wideFormulas = formulas.parentElement;
 const placeFormulas = (open) => {
   if (open) wideFormulas.append(formulas); else byId("results").parentElement.after(formulas);
@@ -39,6 +41,16 @@ formulas.querySelector("details").ontoggle = ({ target }) => {
   dispatchEvent(new Event("resize")); // the picture has other room
 };
 placeFormulas(false);
+// Paper has no scroll bar: what is wider than it is written smaller.
+const writeFormulas = (widest) => {
+  for (const each of formulas.querySelectorAll(".scroll > math")) {
+    each.style.fontSize = "";
+    const { width } = each.getBoundingClientRect();
+    if (width > widest) each.style.fontSize = `${widest / width}em`;
+  }
+};
+addEventListener("beforeprint", () => writeFormulas(PAPER));
+addEventListener("afterprint", () => writeFormulas(Infinity));
 """
 
 

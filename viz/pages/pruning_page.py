@@ -28,8 +28,8 @@ def document(content: ReportData) -> Document:
 
 def _section(graph: ReportData) -> Section:
     saved = graph["full"]["nodes"] - graph["pruned"]["nodes"]
-    share = f"{saved / graph['full']['nodes']:.0%}" if saved else "nothing"
-    blocks: list[Block] = [Paragraph(f"{saved} of {graph['full']['nodes']} nodes are left out: {share}.", point=True)]
+    share = f": {saved / graph['full']['nodes']:.0%}" if saved else ""
+    blocks: list[Block] = [Paragraph(f"{saved} of {graph['full']['nodes']} nodes are left out{share}.", point=True)]
     if graph["left_out"]:
         blocks.append(Table("Left out, in this order", HEADER, _rows(graph["left_out"])))
     if graph["absent"]:

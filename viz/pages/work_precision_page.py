@@ -62,10 +62,8 @@ def _fastest(content: ReportData) -> Section:
     for error in dict.fromkeys(target["error"] for target in content["targets"]):
         fastest = {target["group"]: target for target in content["targets"] if target["error"] == error}
         rows.append([_power(error), *[_target(fastest.get(group)) for group in groups]])
-    note = (
-        "In brackets: run time over that of cgraph, above 1 where cgraph is faster. "
-        "Only the settings in the table of all points were tried."
-    )
+    brackets = "In brackets: run time over that of cgraph, above 1 where cgraph is faster. " if len(groups) > 1 else ""
+    note = f"{brackets}Only the settings in the table of all points were tried."
     if not rows:
         return Section("fastest", "Fastest for an error", [Paragraph("No contender came near the exact motion.")])
     table = Table("The fastest run with an error at the end of at most", ["error", *groups], rows)

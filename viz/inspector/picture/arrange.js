@@ -50,7 +50,7 @@ function leavesOf(widths, side, unbundled, few) {
     kinds.set(key, [...(kinds.get(key) ?? []), name]);
   }
   return [...kinds].flatMap(([key, names]) => (unbundled.has(key) || names.length === 1
-    ? names.map((name) => [name, widths.get(name), null]) : [[key, 150, names]]));
+    ? names.map((name) => [name, widths.get(name), null]) : [[key, Math.max(150, widthOf(`▸ ${key.slice(1)}: ${names.length} outputs`)), names]]));
 }
 
 /** Boxes of clusters, columns, leaves and titles. folded: clusters; closed: columns; unbundled: kinds of leaves.
