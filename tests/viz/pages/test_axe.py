@@ -20,7 +20,7 @@ PLOT = '<svg xmlns="http://www.w3.org/2000/svg" width="900" height="300"/>'
 DOCUMENT = Document("d", [Paragraph("p")], [Section("s", "S", [WIDE, Picture("p", PLOT, "a caption")])])
 PAGES = {
     "inspector": lambda: viz.inspect(ARM, t_end=0.2),
-    "live": lambda: viz.live_page(ARM),
+    "live": lambda: viz.live(ARM),
     "typed": viz.typed_page,
     "lesson": lambda: viz.lesson(ARM),
     "document": lambda: to_html(DOCUMENT),
