@@ -77,18 +77,7 @@ def _drawn(
     else:
         tags = [tag for each in collapse for tag in tags_of(each, graph)]
     legend = words or True
-    wrong, edges = (verdict.nodes, verdict.edges) if verdict else (frozenset[cg.Node](), frozenset[cg.Edge]())
-    off = tuple(verdict.excess) if verdict else ()
-    drawing = library.to_dot(
-        graph,
-        names=names,
-        marked=wrong,
-        marked_edges=edges,
-        wrong_outputs=off,
-        collapse=tags,
-        caption=caption,
-        legend=legend,
-    )
+    drawing = library.judged_drawing(graph, verdict, names=names, collapse=tags, caption=caption, legend=legend)
     if kind == ".dot":
         return str(drawing.source)
     svg = library.render_svg(drawing)

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from cgraph import Graph
 from cgraph.extend import check_writable, require_path, write_files
 from dynamics import display_names, scenes
-from dynamics.equations.formulations.verdict import formulation_verdict
+from dynamics.equations.formulations.verdict import Verdict, formulation_verdict
 from dynamics.equations.state_equation import state_equation
 from dynamics.systems.model import Model
 
 from ..graph_drawing.dot import to_dot
 from ..graph_drawing.render import check_can_draw, render_png, render_svg, tags_to_collapse
+
+if TYPE_CHECKING:
+    from graphviz import Digraph
 
 KINDS = (".svg", ".png", ".dot")
 
@@ -79,18 +84,33 @@ def draw(
         verdict = None if scene.ode is not None else formulation_verdict(scene, formulation)
         graph = state_equation(scene) if verdict is None else verdict.graph
         what = "state equation" if verdict is None else f"inverse dynamics, {formulation.replace('_', ' ')}"
-        drawing = to_dot(
-            graph,
-            marked=() if verdict is None else verdict.nodes,
-            marked_edges=() if verdict is None else verdict.edges,
-            wrong_outputs=() if verdict is None else tuple(verdict.excess),
-            names=display_names(scene),
-            collapse=tags_to_collapse(graph),
-            caption=f"{scene.name}: {what}",
-        )
+        caption, names = f"{scene.name}: {what}", display_names(scene)
+        drawing = judged_drawing(graph, verdict, names=names, collapse=tags_to_collapse(graph), caption=caption)
     svg = Picture(render_svg(drawing))
     if target is not None:
         texts = {".svg": str(svg), ".dot": str(drawing.source)}
         content: str | bytes = render_png(svg) if target.suffix == ".png" else texts[target.suffix]
         write_files({target: content})
     return svg
+
+
+def judged_drawing(
+    graph: Graph,
+    verdict: Verdict | None,
+    *,
+    names: Mapping[str, str],
+    collapse: Sequence[str],
+    caption: str,
+    legend: bool | Mapping[str, str] = True,
+) -> Digraph:
+    """The drawing of equations, with nodes, edges and outputs painted that their verdict, if they have one, blames."""
+    return to_dot(
+        graph,
+        marked=verdict.nodes if verdict else (),
+        marked_edges=verdict.edges if verdict else (),
+        wrong_outputs=tuple(verdict.excess) if verdict else (),
+        names=names,
+        collapse=collapse,
+        caption=caption,
+        legend=legend,
+    )
