@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import cgraph as cg
 import dynamics as dyn
@@ -76,10 +76,8 @@ def run(options: argparse.Namespace) -> int | None:
     table = None if verdict is None else library.CauseTable(scene, graph, verdict.formulation, at)
     output = (table and table.named(options.output)) or names.meant(options.output)
     if output in graph.outputs or output in names.by_name or table is None:
-        if options.input is None:
-            _value(options, scene, names, table, output, at, state)
-        else:
-            _dependence(options, scene, names, verdict, table, output, at, state)
+        question = _Question(scene, names, verdict, table, output, at, state)
+        (_value if options.input is None else _dependence)(options, question)
         return None
     causes = table.in_all(options.output, options.input or "")
     if options.svg:
@@ -88,16 +86,21 @@ def run(options: argparse.Namespace) -> int | None:
     return None
 
 
-def _value(
-    options: argparse.Namespace,
-    scene: dyn.scenes.Scene,
-    names: extend.Names,
-    table: CauseTable | None,
-    output: str,
-    at: dict[str, float],
-    state: str,
-) -> None:
+class _Question(NamedTuple):
+    """What is asked of an output, and where: its scene, the names of its graph, and a state with its words."""
+
+    scene: dyn.scenes.Scene
+    names: extend.Names
+    verdict: dyn.Verdict | None
+    table: CauseTable | None  # of torques
+    output: str
+    at: dict[str, float]
+    state: str
+
+
+def _value(options: argparse.Namespace, question: _Question) -> None:
     """Causes of an output; of one that is no torque, its derivatives."""
+    scene, names, _, table, output, at, state = question
     graph = names.graph
     if table is not None and output in graph.outputs:
         causes = table.of(output)
@@ -108,17 +111,9 @@ def _value(
     answer(unless_json(options, {"at": at} | data, f"{state}\n{text}"))
 
 
-def _dependence(
-    options: argparse.Namespace,
-    scene: dyn.scenes.Scene,
-    names: extend.Names,
-    verdict: dyn.Verdict | None,
-    table: CauseTable | None,
-    output: str,
-    at: dict[str, float],
-    state: str,
-) -> None:
+def _dependence(options: argparse.Namespace, question: _Question) -> None:
     """Causes of a derivative, then the heaviest paths, in the listing's numbers, with a picture of these alone."""
+    scene, names, verdict, table, output, at, state = question
     graph = names.graph
     found = cg.why(graph, output, options.input, at=at, k=options.k, names=dyn.display_names(scene))
     if not found.count:
