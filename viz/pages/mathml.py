@@ -26,7 +26,6 @@ mtable.matrix { border: solid; border-width: 0 1.5px; border-radius: 9px; paddin
 mtable.matrix mtd { padding: 2px 6px; }
 """
 _ACCENTS = {"dot": "\u02d9", "ddot": "\u00a8", "bar": "\u00af"}
-_DRAWN = {"q\u0308": "qdd", "q\u0307": "qd", "τ": "tau"}  # letters of names that are drawn, see `theme.called`
 
 
 def equations(graph: Graph, names: Mapping[str, str], lines: int = 12) -> str:
@@ -101,8 +100,7 @@ def _names(names: Iterable[str]) -> dict[str, str]:
 
 
 def _name(name: str) -> str:
-    kind, dot, of = name.partition(".")
-    found = symbol(f"{_DRAWN.get(kind, kind)}{dot}{of}")
+    found = symbol(name)
     if found is None:
         return f"<mi>{escape(theme.pretty(name))}</mi>"
     text = f"<mi>{escape(GREEK.get(found.word, found.word))}</mi>"

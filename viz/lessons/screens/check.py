@@ -18,7 +18,7 @@ from ...pages.formulation_table import TITLES, WHY_FEWER, size_table
 from ..glossary import term
 from ..screen import Screen
 from ..subject import SHOWN, Subject, in_letters, number
-from .wrong_way import after_a_step
+from .wrong_way import outputs_after_step
 
 DRAWN = 60  # nodes, at most, of a graph that is drawn
 DT = 1e-6  # s, of the check
@@ -30,7 +30,7 @@ def check(subject: Subject) -> Screen:
     """The screen of a system."""
     right, wrong = inverse_dynamics(subject.system, "chain_rule"), subject.verdict.graph
     still = {f"{kind}{i}": 0.0 for kind in ("qd", "qdd") for i in range(subject.system.n)}
-    held, found = subject.evaluate(right, **still), after_a_step(subject, wrong, DT, **still)
+    held, found = subject.evaluate(right, **still), outputs_after_step(subject, wrong, DT, **still)
     k = int(np.abs(held).argmax())
     name, unit = escape(subject.joints[k]), subject.unit(f"tau{k}")
     rounding = ROUNDING * max(float(np.abs(subject.evaluate(right)).max()), float(np.abs(held).max()))
@@ -108,7 +108,7 @@ def _second_try(subject: Subject) -> str:
     verdict = formulation_verdict(subject.scene, "kinetic_only")
     if verdict.excess_at(subject.values):
         right = subject.evaluate(inverse_dynamics(subject.system, "chain_rule"))
-        off = np.abs(after_a_step(subject, verdict.graph, DT) - right).max()
+        off = np.abs(outputs_after_step(subject, verdict.graph, DT) - right).max()
         told = (
             f"In the moving moment τ is then still off by {number(float(off))}, where the right one is "
             f"{number(float(np.abs(right).max()))}{' at most' if len(right) > 1 else ''}: K depends on positions as well, and the edge acts on them."

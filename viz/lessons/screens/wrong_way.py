@@ -25,7 +25,7 @@ def wrong_way(subject: Subject) -> Screen:
     """The screen of a system."""
     right = inverse_dynamics(subject.system, "chain_rule")
     torque = subject.evaluate(right)
-    errors = [(dt, after_a_step(subject, subject.verdict.graph, dt) - torque) for dt in STEPS]
+    errors = [(dt, outputs_after_step(subject, subject.verdict.graph, dt) - torque) for dt in STEPS]
     answer = _answer(subject, errors, torque)
     k = subject.watched
     name = escape(subject.joints[k])
@@ -61,7 +61,7 @@ def wrong_way(subject: Subject) -> Screen:
     )
 
 
-def after_a_step(subject: Subject, wrong: Graph, dt: float, **other: float) -> Array:
+def outputs_after_step(subject: Subject, wrong: Graph, dt: float, **other: float) -> Array:
     """Outputs of an embedded graph at the same state after a step dt.  other: another state than the subject's."""
     values = subject.values | other
     before = {}
