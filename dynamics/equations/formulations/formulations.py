@@ -15,7 +15,7 @@ from cgraph.extend import Remarks, remarked, require_flag
 from ...systems.model import Model, as_system
 from ...systems.system import System
 from ..equation import LARGEST_REWRITTEN, Equation, Output
-from .lagrange_terms import INERTIAL, chain_rule, finished, formulation_name, momenta, newton_euler, torques
+from .lagrange_terms import INERTIAL, chain_rule, formulation_name, momenta, newton_euler, shortest, torques
 
 
 @Equation("q qd qdd", Output("tau{}", ("n",), "N m or N")).describes
@@ -26,7 +26,9 @@ def inverse_dynamics(model: Model, formulation: str | None = None, *, simplify: 
     ----------
     formulation : str, optional
         By default the smaller graph of "chain_rule", which is the paper's, and "newton_euler", which takes the
-        velocities in L in place of qd. "chain_rule_literal" is the first with every gradient written out.
+        velocities in L in place of qd, of a Lagrangian that identities such as sin^2 + cos^2 = 1 have shortened. By
+        name no formulation is shortened so, and their sizes compare. "chain_rule_literal" is the first with every
+        gradient written out.
         "by_definition", "kinetic_only" and "kinetic_only_exact" have the Euler relation in the graph; the first two
         are wrong, as the paper has them.
     simplify : bool
@@ -57,8 +59,8 @@ def inverse_dynamics(model: Model, formulation: str | None = None, *, simplify: 
     require_flag("simplify", simplify)
     if formulation is None:
         formulation, graph = _smaller(system)
-    elif simplify:
-        graph = finished(system, formulation)
+    else:
+        graph = cg.simplify(torques(system, formulation))
     if not simplify:
         graph = torques(system, formulation)
     return remarked(graph, partial(_remarks, model, formulation, torques))
@@ -109,15 +111,15 @@ def _remarks(model: Model, formulation: str, derive: Callable[..., Graph], graph
 
 
 def _smaller(system: System) -> tuple[str, Graph]:
-    """Name of the `SMALL` formulation whose finished graph is the smaller, and this graph.
+    """Name of the `SMALL` formulation whose shortened graph is the smaller, and this graph.
 
     Of bodies the chain rule gave it in none of 1600 random trees beyond 58 nodes, unless most joints are slides, which
     take 7 nodes each; so for large graphs, which take long, it is not asked.
     """
-    by_velocities = newton_euler.__name__, finished(system, newton_euler.__name__)
+    by_velocities = newton_euler.__name__, shortest(system, newton_euler.__name__)
     if system.body_terms is not None and len(by_velocities[1].nodes) > max(LARGEST_REWRITTEN, 10 * system.n):
         return by_velocities
-    by_state = chain_rule.__name__, finished(system, chain_rule.__name__)
+    by_state = chain_rule.__name__, shortest(system, chain_rule.__name__)
     return min(by_state, by_velocities, key=lambda pair: size(pair[1]))
 
 

@@ -14,6 +14,7 @@ from cgraph import Graph, Node
 from cgraph.extend import TANGENT, Builder, building, cotangents, require_choice, tangents
 
 from ...systems.kinematics import ONE, ZERO
+from ...systems.model import Model, as_system
 from ...systems.system import System
 from ..bias_terms import along_motion, bias_terms, state_rate
 from ..equation import shortened
@@ -131,11 +132,9 @@ def formulation_name(name: str, among: Collection[str] = FORMULATIONS) -> str:
     return require_choice("formulation", name, among)
 
 
-def finished(system: System, formulation: str) -> Graph:
-    """Inverse dynamics by one formulation, simplified, and of the `SMALL` ones shortened."""
-    if formulation in SMALL:
-        return shortened(system, lambda form: cg.simplify(torques(form, formulation)))
-    return cg.simplify(torques(system, formulation))
+def shortest(model: Model, formulation: str) -> Graph:
+    """Inverse dynamics by one of the `SMALL` formulations, simplified and shortened by identities."""
+    return shortened(as_system(model), lambda form: cg.simplify(torques(form, formulation)))
 
 
 def torques(system: System, formulation: str = "chain_rule", through: Node = ONE) -> Graph:

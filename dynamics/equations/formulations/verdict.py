@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from cgraph import Edge, Graph, Node, extend
+from cgraph import Edge, Graph, Node, extend, simplify
 from cgraph.extend import (
     Builder,
     Names,
@@ -34,7 +34,7 @@ from ...systems.model import Model, as_system
 from ...systems.system import System
 from ..equation import documented
 from .blame import Derive, Split, blame, split
-from .lagrange_terms import THROUGH_STEP, finished, formulation_name, torques
+from .lagrange_terms import THROUGH_STEP, formulation_name, torques
 
 if TYPE_CHECKING:
     from cgraph.extend import Json
@@ -278,7 +278,7 @@ def formulation_verdict(model: Model, formulation: str = "by_definition") -> Ver
     """
     system, names = as_system(model), display_names(model)
     formulation = formulation_name(formulation)
-    graph = remarked(finished(system, formulation), partial(remarks, model, formulation, torques))
+    graph = remarked(simplify(torques(system, formulation)), partial(remarks, model, formulation, torques))
     if formulation not in THROUGH_STEP:
         return Verdict(
             formulation, graph, reason="every derivative in it is taken at independent q and qd", names=names

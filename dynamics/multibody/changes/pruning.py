@@ -19,7 +19,7 @@ from cgraph.extend import (
 )
 
 from ...equations.formulations.formulations import inverse_dynamics, size
-from ...equations.formulations.lagrange_terms import SMALL
+from ...equations.formulations.lagrange_terms import SMALL, shortest
 from ...systems.model import Model, as_system
 from ..trees.mechanism import as_mechanism
 from .switched_effects import EFFECTS as EFFECTS, absent_parts, has_effect, without_effect  # noqa: PLC0414 (public with `prune`)
@@ -150,7 +150,7 @@ class _Step:
         """Graph of the equations; of inverse dynamics the smaller of two, which numbers may exchange."""
         if equations is not inverse_dynamics:
             return self._graph(equations)
-        return min([self._graph(partial(equations, formulation=name)) for name in SMALL], key=size)
+        return min([self._graph(partial(shortest, formulation=name)) for name in SMALL], key=size)
 
     def _graph(self, equations: Equations) -> Graph:
         graph = equations(self.model)

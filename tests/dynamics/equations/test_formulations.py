@@ -35,6 +35,22 @@ def test_simplification_keeps_the_value_and_never_grows_and_no_right_graph_has_s
         assert formulation in WRONG or not dyn.spurious_nodes(derived) | dyn.spurious_nodes(simplified)
 
 
+def test_formulations_by_name_are_shortened_by_no_identity_and_the_default_is() -> None:
+    def turning(q, qd, t):  # the point of a rod: cos^2 + sin^2 = 1
+        x, z = qd[0] * cg.cos(q[0]), qd[0] * cg.sin(q[0])
+        return 0.5 * (x * x + z * z) + 9.81 * cg.cos(q[0])
+
+    rod = dyn.System(turning, ["angle"])
+    sizes = {}
+    for name in dyn.FORMULATIONS:
+        graph = dyn.inverse_dynamics(rod, name)
+        derived = cg.simplify(dyn.inverse_dynamics(rod, name, simplify=False))
+        assert cg.structure_hash(graph) == cg.structure_hash(derived)
+        sizes[name] = len(graph.nodes)
+    assert sizes["chain_rule"] > len(dyn.momentum_rate(rod).nodes)  # its difference from dL/dq
+    assert len(dyn.inverse_dynamics(rod).nodes) < min(sizes.values()) / 2
+
+
 @mark.parametrize("formulation", dyn.FORMULATIONS)
 def test_every_formulation_has_the_promised_inputs_and_outputs(formulation: str) -> None:
     system = MODELS["driven pendulum"]()
