@@ -50,17 +50,9 @@ def takes_a_scene(command: Command, default: str | None = None) -> None:
 
 def reads_files(command: argparse.ArgumentParser) -> None:
     """The arguments that say how a model file is read, `READING`."""
-    command.add_argument(
-        "--ignore",
-        action="store_true",
-        help="leave out the elements of a model file that cgraph cannot model, and name them",
-    )
+    command.add_argument("--ignore", action="store_true", help="leave out and name what of a file cgraph cannot model")
     command.add_argument("--floating", action="store_true", help="let the root link of a URDF file move freely")
-    command.add_argument(
-        "--contacts",
-        choices=("compliant",),
-        help="take spheres and ends of capsules of a model file that may touch as springs with damping and friction",
-    )
+    command.add_argument("--contacts", choices=("compliant",), help="take contacts of spheres and capsules as forces")
 
 
 def reading(options: argparse.Namespace) -> dict[str, Any]:
