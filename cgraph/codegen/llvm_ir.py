@@ -192,7 +192,7 @@ def instructions(
     leaves = [(node, row) for node, places in outputs.items() if not node.args for row in places]
     for number, (node, row) in enumerate(leaves):
         if number % STEPS == STEPS // 2:  # the first of them go to the part that is there
-            written.append([])
+            written[-1:] = [written[-1] + parts.forget(), []]
         r, lines = leaf(node, f"%leaf{row}")
         written[-1] += [*lines, *store([row], r)]
     written[-1] += _last_stores(ends, parts, store)

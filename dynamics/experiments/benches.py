@@ -36,7 +36,7 @@ class Bench(NamedTuple):
         return measure(**((module.QUICK if quick else {}) | chosen))
 
 
-READING = ("ignore", "floating")
+READING = ("ignore", "floating", "contacts")
 BENCHES = {
     SPEED: Bench(
         "run times of tasks beside other software (default)",

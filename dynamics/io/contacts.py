@@ -33,6 +33,11 @@ class Ball(NamedTuple):
     normal: ArrayLike | None = None  # None: against gravity
 
 
+def untaken(takeable: bool) -> str:
+    """The sentence on contacts that are left out.  takeable: whether there are shapes of which they are taken."""
+    return f"contacts{' (the option contacts takes those of spheres and capsules)' * takeable}"
+
+
 def asked(contacts: str | None) -> bool:
     """Whether contacts are taken. Raises ValueError for what is neither None nor "compliant"."""
     return contacts is not None and require_choice("contacts", contacts, (COMPLIANT,)) == COMPLIANT

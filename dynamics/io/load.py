@@ -150,22 +150,23 @@ def load_urdf(
 
 
 def load_at_start(
-    source: Source, *, ignore: bool = False, floating: bool = False
+    source: Source, *, ignore: bool = False, floating: bool = False, contacts: str | None = None
 ) -> tuple[Mechanism, tuple[float, ...]]:
     """The mechanism of MJCF or URDF, by the root element, and the coordinates (nq,) at which the file has it.
 
-    Of MJCF these are the references of joints and the places of free bodies; of URDF they are neutral. Raises as
-    `load_mjcf` and `load_urdf` do, and for `floating` of MJCF, which says itself what is free.
+    Of MJCF these are the references of joints and the places of free bodies; of URDF they are neutral.
+    Options are those of `load_mjcf` and `load_urdf`. Raises as these do, and for `floating` of MJCF, which says itself
+    what is free.
     """
     if root_of(source) == "robot" or (not is_text(source) and str(source).lower().endswith(".urdf")):
-        mechanism = load_urdf(source, ignore=ignore, floating=floating)
+        mechanism = load_urdf(source, ignore=ignore, floating=floating, contacts=contacts)
         return mechanism, tuple(neutral(mechanism.moving))
     if require_flag("floating", floating):
         raise MechanismError(
             f"floating goes with URDF, and MJCF, as is {called(source)}, says itself which bodies float"
         )
-    mj = compiled_mjcf(source, called(source))
-    return warned(read_mjcf(mj, ignore), called(source)), tuple(mj.qpos0.tolist())
+    taken, mj = smooth(None, None, False, contacts), compiled_mjcf(source, called(source))
+    return warned(read_mjcf(mj, ignore, taken), called(source)), tuple(mj.qpos0.tolist())
 
 
 def compiled(source: Source, *, floating: bool = False) -> MjModel:

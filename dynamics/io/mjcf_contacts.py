@@ -21,6 +21,16 @@ if TYPE_CHECKING:
 SLIDING = 3  # dimensions of a contact with friction that slides and does no more
 
 
+def has_balls(mj: MjModel) -> bool:
+    """Whether spheres or capsules are among the shapes."""
+    return bool(np.isin(mj.geom_type, _kinds()[1:]).any())
+
+
+def _kinds() -> tuple[int, int, int]:
+    types = mujoco().mjtGeom
+    return int(types.mjGEOM_PLANE), int(types.mjGEOM_SPHERE), int(types.mjGEOM_CAPSULE)
+
+
 def mjcf_balls(mj: MjModel, ends: Sequence[tuple[str, Array]]) -> tuple[list[Ball], list[str]]:
     """Spheres and ends of capsules on planes, and sentences on contacts that are not such.
 
@@ -28,8 +38,7 @@ def mjcf_balls(mj: MjModel, ends: Sequence[tuple[str, Array]]) -> tuple[list[Bal
     """
     if disabled(mj, "CONSTRAINT", "CONTACT"):
         return [], []
-    types = mujoco().mjtGeom
-    plane, sphere, capsule = (int(getattr(types, f"mjGEOM_{name}")) for name in ("PLANE", "SPHERE", "CAPSULE"))
+    plane, sphere, capsule = _kinds()
     data = mujoco().MjData(mj)
     mujoco().mj_kinematics(mj, data)  # planes stand still
     balls: list[Ball] = []

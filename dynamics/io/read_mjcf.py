@@ -18,9 +18,9 @@ from cgraph.extend import Array
 from ..multibody.algebra import spatial
 from ..multibody.joints import TYPES
 from ..multibody.trees.mechanism import WORLD, Body, Joint, Mechanism, MechanismError, MechanismWarning
-from .contacts import with_contacts
+from .contacts import untaken, with_contacts
 from .left_out import listed, present, refused_or_left_out
-from .mjcf_contacts import mjcf_balls
+from .mjcf_contacts import has_balls, mjcf_balls
 from .mujoco_twin import mujoco
 from .read_equality import left_of_equalities, other_equalities, read_loops
 from .smooth_forces import (
@@ -208,7 +208,7 @@ def _acting_from_outside(mj: MjModel, smooth: Smooth) -> list[str]:
     servos = [f"{mj.actuator(i).name or f'number {i}'}: {force}" for i, force in acting.items() if force]
     others = present(
         {
-            "contacts": touching and not (smooth.contacts or disabled(mj, "CONSTRAINT", "CONTACT")),
+            untaken(has_balls(mj)): touching and not (smooth.contacts or disabled(mj, "CONSTRAINT", "CONTACT")),
             f"joint limits ({listed(_joint_names(mj, limits))})": limits and limited,
             "tendon limits": _any(mj, "tendon_limited") and limited,
             f"friction loss ({listed(losses)})": losses and rubbing and smooth.friction is None,

@@ -19,12 +19,13 @@ from ..multibody.forces.joint_force import JointForce, JointFriction
 from ..multibody.joints import COMPOSITIONS, TYPES
 from ..multibody.loops import Loop
 from ..multibody.trees.mechanism import WORLD, Body, Joint, Mechanism, MechanismError
-from .contacts import Ball, capsule_ends, with_contacts
+from .contacts import Ball, capsule_ends, untaken, with_contacts
 from .left_out import follows_itself, listed, present, refused_or_left_out
 from .smooth_forces import NONE, Smooth
 
 GRAVITY = (0.0, 0.0, -9.81)  # m/s^2, where the file says nothing
 FAR_LIMIT = 1e9  # in any unit: a limit that `to_urdf` writes because URDF asks for one; it stands for none
+BALLS = ("sphere", "capsule")  # shapes whose contacts are taken
 _OTHERS = {"revolute": "revolute", "planar": "planar"}  # beside the words of joint types: a hinge with limits, three
 _ENTRIES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _KNOWN = {
@@ -250,12 +251,13 @@ def _couplings(joints: Mapping[str, Element], leaders: Mapping[str, str]) -> lis
 
 def _outside(robot: Element, joints: Mapping[str, Element], smooth: Smooth) -> list[str]:
     """Sentences on forces and inputs on a mechanism that are not taken."""
+    takeable = any([robot.findall(f"link/collision/geometry/{shape}") for shape in BALLS])
     limited = [name for name, joint in joints.items() if _limits(joint, name)]
     wrong = [name for name, joint in joints.items() if _possible_limits(joint, name) is None]
     rubbing = [f"{name}: {force:g}" for name, joint in joints.items() if (force := _friction(joint, name))]
     return present(
         {
-            "contacts": robot.findall("link/collision") and not smooth.contacts,
+            untaken(takeable): robot.findall("link/collision") and not smooth.contacts,
             f"joint limits ({listed(limited)})": limited and smooth.limits is None,
             f"limits that cannot be ({listed(wrong)})": wrong,
             f"friction loss ({listed(rubbing)})": rubbing and smooth.friction is None,
@@ -287,7 +289,7 @@ def _balls(links: Mapping[str, Element]) -> tuple[list[Ball], list[str]]:
             where = f"the collision of link {name!r}"
             geometry = _one(collision, where, "geometry")
             shape = next(iter(geometry), None) if geometry is not None else None
-            if shape is None or shape.tag not in ("sphere", "capsule"):
+            if shape is None or shape.tag not in BALLS:
                 others.append(f"{name}: {'no shape' if shape is None else shape.tag}")
                 continue
             center, turn = origin_of(collision, where)

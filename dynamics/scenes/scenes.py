@@ -182,7 +182,9 @@ _SCENES: dict[str, Callable[..., Scene]] = {
 _SUFFIXES = (".xml", ".urdf")
 
 
-def of_file(path: str | os.PathLike[str], ignore: bool = False, floating: bool = False) -> Scene:
+def of_file(
+    path: str | os.PathLike[str], ignore: bool = False, floating: bool = False, contacts: str | None = None
+) -> Scene:
     """The mechanism of a model file, at rest where the file has it, named as the file is without its suffix.
 
     Parameters
@@ -193,6 +195,8 @@ def of_file(path: str | os.PathLike[str], ignore: bool = False, floating: bool =
         Leave out what a mechanism cannot have; `left_out` says what.
     floating : bool
         Of URDF, whether the root link moves freely.
+    contacts : "compliant", optional
+        Take contacts of spheres and ends of capsules as forces, as `load_mjcf` and `load_urdf` do.
 
     Returns
     -------
@@ -203,7 +207,7 @@ def of_file(path: str | os.PathLike[str], ignore: bool = False, floating: bool =
     ValueError
         As `load_mjcf` and `load_urdf` do, and for `floating` of MJCF.
     """
-    mechanism, q = load_at_start(path, ignore=ignore, floating=floating)
+    mechanism, q = load_at_start(path, ignore=ignore, floating=floating, contacts=contacts)
     about = f"{len(mechanism.moving)} moving bodies of {os.fspath(path)}"
     return Scene(Path(path).stem, about, mechanism, q, (0.0,) * mechanism.system.n, 3.0)
 

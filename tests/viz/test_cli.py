@@ -53,6 +53,7 @@ def test_a_scene_is_drawn_or_listed(tmp_path, capsys, suffix):
 
 MODEL = """<mujoco><worldbody><body name="a"><joint name="j" axis="0 1 0" range="-30 30" frictionloss="0.1"/>
 <geom size="0.1" pos="0.2 0 0" contype="0"/></body></worldbody></mujoco>"""
+TAKEN = ["--contacts", "compliant"]
 URDF = """<robot name="arm"><link name="base"/><link name="a"><inertial><mass value="1"/>
 <inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
 <joint name="j" type="continuous"><parent link="base"/><child link="a"/><axis xyz="0 1 0"/></joint></robot>"""
@@ -80,6 +81,14 @@ def test_a_model_file_stands_where_a_scene_s_name_does(tmp_path, capsys):
     assert cli.main(["draw", str(model), "--ignore", "--out", str(target)]) == 0
     said = f"cgraph: warning: {str(model)!r}: left out {fluid}; joint limits (j); friction loss (j: 0.1)\n"
     assert capsys.readouterr().err == said
+    model.write_text(
+        MODEL.replace("<worldbody>", '<worldbody><geom type="plane" size="1 1 1"/>').replace(' contype="0"', "")
+    )
+    for options, contacts in ([], "contacts (the option contacts takes those of spheres and capsules); "), (TAKEN, ""):
+        assert cli.main(["code", str(model), *options, "--c", "--out", str(tmp_path / "model.c")]) == 0
+        said = f"cgraph: warning: {str(model)!r}: left out {contacts}joint limits (j); friction loss (j: 0.1)\n"
+        assert capsys.readouterr().err == said
+    assert "sqrt" in (tmp_path / "model.c").read_text()
 
 
 @each_row(
@@ -92,6 +101,7 @@ def test_a_model_file_stands_where_a_scene_s_name_does(tmp_path, capsys):
         ("draw . --out x.dot", "'.' is a folder, and a model is a file"),
         ("draw chain --ignore --out x.dot", "scene 'chain' has no option 'ignore'"),
         ("draw chain --floating --out x.dot", "scene 'chain' has no option 'floating'"),
+        ("draw chain --contacts compliant --out x.dot", "scene 'chain' has no option 'contacts'"),
         ("draw spring_mass --out x.jpg", "must end in .svg, .png, .dot or .txt"),
         ("draw spring_mass --out missing/x.dot", "does not exist"),
         (["draw", "spring_mass", "--out", "x.dot", "--collapse", "link 9"], "link 9"),

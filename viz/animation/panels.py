@@ -12,6 +12,7 @@ import numpy as np
 from cgraph.extend import Array
 
 from .canvas import DARK, LIGHT, RATE, Canvas, Colors, Point
+from .surfaces import surfaces
 
 SIDE, TITLE, CLOCK, MARGIN = 340, 30, 26, 14  # pixels: of a panel, its title, the time below, and around
 SIZE, SMALL = 14, 12  # of letters
@@ -45,39 +46,64 @@ class FilmPanel(ABC):
 
 
 class Sticks(FilmPanel):
-    """Points that move, as sticks from their parents, (k,), -1 for what hangs in the world."""
+    """Points that move, as sticks from their parents, (k,), -1 for what hangs in the world.
 
-    def __init__(self, motions: Sequence[Motion], wanted: Array | None, parents: Sequence[int]) -> None:
+    Behind the k points come those of spheres of these radii [m] and of planes, see `surfaces`.
+    """
+
+    def __init__(
+        self, motions: Sequence[Motion], wanted: Array | None, parents: Sequence[int], radii: Sequence[float] = ()
+    ) -> None:
         super().__init__(motions, wanted)
-        self.parents = parents
-        low, high = self.all.min(axis=(0, 1)), self.all.max(axis=(0, 1))
+        self.parents, self.radii = parents, radii
+        joints, touching = np.split(self.all, [len(parents)], axis=1)
+        self.grounded = touching.shape[1] > 2 * len(radii)
+        size, centers = np.asarray(radii)[:, np.newaxis], touching[:, : 2 * len(radii) : 2]
+        seen = np.concatenate([joints, centers - size, centers + size], axis=1)
+        low, high = seen.min(axis=(0, 1)), seen.max(axis=(0, 1))
         low, high = np.minimum(low, 0.0), np.maximum(high, 0.0)
-        middles = (self.all.min(axis=1) + self.all.max(axis=1)) / 2.0
-        reach, way = float(np.abs(self.all - middles[:, np.newaxis]).max()), float((high - low).max())
+        middles = (joints.min(axis=1) + joints.max(axis=1)) / 2.0
+        reach, way = float(np.abs(seen - middles[:, np.newaxis]).max()), float((high - low).max())
         self.follows = way > FOLLOW * 2.0 * reach > 0.0
         self.half = 1.5 * reach if self.follows else 0.54 * (way or 1.0)
         self.center = (low + high) / 2.0
 
     def draw(self, canvas: Canvas, motion: Motion, k: int, colors: Colors) -> None:
         """A ghost of what was wanted, the way of the tip, and the sticks."""
-        points = motion.values[k]
+        points, touching = np.split(motion.values[k], [len(self.parents)])
         center = (points.min(axis=0) + points.max(axis=0)) / 2.0 if self.follows else self.center
         scale = SIDE / (2.0 * self.half)
-        if self.follows:
-            self._grid(canvas, center, scale, colors)
+        step = nice(0.6 * self.half)
+        drawn = surfaces(touching, self.radii, center, self.half, step)
+        if self.follows and not drawn.grids:
+            self._grid(canvas, center, scale, step, colors)
 
         def at(place: Array) -> Point:
             x, y = (place - center) * (scale, -scale)
             return MARGIN + SIDE / 2.0 + float(x), TITLE + SIDE / 2.0 + float(y)
 
+        for lines, color, width in ((drawn.grids, colors.faint, 0.5), (drawn.edges, colors.text, 1.5)):
+            for line in lines:
+                canvas.line([at(place) for place in line], color, width)
+        if drawn.grids:  # which also lie where the title comes
+            canvas.line([(0.0, TITLE / 2.0), (SIDE + 2.0 * MARGIN, TITLE / 2.0)], colors.page, TITLE)
         if self.wanted is not None:
-            self._sticks(canvas, [at(place) for place in self.wanted[k]], at(np.zeros(2)), [colors.faint], None)
-        tip = motion.values[max(0, k - TRACE) : k + 1, -1]
+            self._sticks(
+                canvas,
+                [at(place) for place in self.wanted[k, : len(self.parents)]],
+                at(np.zeros(2)),
+                [colors.faint],
+                None,
+            )
+        tip = motion.values[max(0, k - TRACE) : k + 1, len(self.parents) - 1]
         paint = [colors.wrong] if motion.wrong else list(colors.links)
         canvas.line([at(place) for place in tip], paint[max(self.parents[-1], 0) % len(paint)], 1.2)
-        if not self.follows:
+        if not (self.follows or self.grounded):
             x, y = at(np.zeros(2))
             canvas.line([(x - 12.0, y), (x + 12.0, y)], colors.text, 2.0)
+        for ring, mark in drawn.spheres:
+            for line in (ring, mark):
+                canvas.line([at(place) for place in line], colors.text, 1.5)
         self._sticks(canvas, [at(place) for place in points], at(np.zeros(2)), paint, colors.page)
 
     def _sticks(
@@ -96,9 +122,8 @@ class Sticks(FilmPanel):
             for i, point in enumerate(points):
                 canvas.circle(point, 0.9 * width, page, paint[max(self.parents[i], 0) % len(paint)], 2.0)
 
-    def _grid(self, canvas: Canvas, center: Array, scale: float, colors: Colors) -> None:
+    def _grid(self, canvas: Canvas, center: Array, scale: float, step: float, colors: Colors) -> None:
         """Lines that stand still in the world, for a frame that goes with the mechanism."""
-        step = nice(0.6 * self.half)
         for axis in (0, 1):
             first = math.ceil((center[axis] - self.half) / step)
             for i in range(first, math.floor((center[axis] + self.half) / step) + 1):

@@ -31,7 +31,7 @@ FORMULATIONS = (
 )
 FORMER_NAMES = {"euler_embedded": "by_definition"}  # of formulations, as `dynamics` takes them, too
 MOMENTUM_FORM = "Hamilton's equations, q_dot and p_dot of q and the momenta p"
-READING = ("ignore", "floating")  # options of `scenes.of_file`
+READING = ("ignore", "floating", "contacts")  # options of `scenes.of_file`
 IN_PYTHON = "file.py:name, a model of a Python file, which is executed"
 
 
@@ -50,17 +50,14 @@ def takes_a_scene(command: Command, default: str | None = None) -> None:
 
 def reads_files(command: argparse.ArgumentParser) -> None:
     """The arguments that say how a model file is read, `READING`."""
-    command.add_argument(
-        "--ignore",
-        action="store_true",
-        help="leave out the elements of a model file that cgraph cannot model, and name them",
-    )
+    command.add_argument("--ignore", action="store_true", help="leave out and name what of a file cgraph cannot model")
     command.add_argument("--floating", action="store_true", help="let the root link of a URDF file move freely")
+    command.add_argument("--contacts", choices=("compliant",), help="take contacts of spheres and capsules as forces")
 
 
-def reading(options: argparse.Namespace) -> dict[str, bool]:
+def reading(options: argparse.Namespace) -> dict[str, Any]:
     """Options that say how a model file is read, where they are given."""
-    return {name: True for name in READING if getattr(options, name)}
+    return {name: value for name in READING if (value := getattr(options, name))}
 
 
 def scene_of(options: argparse.Namespace) -> dyn.scenes.Scene:

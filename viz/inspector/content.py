@@ -109,6 +109,8 @@ class Motion:
     places: the points as a graph of inputs of the state, outputs x0, y0, x1, .., shown when a person changes the state.
     joints: for every velocity the point where its joint is.  turns: whether it turns what is seen, 1 counterclockwise,
     -1 the other way, or 0: torques are painted at the first two.
+    radii: of spheres [m].  surfaces: (T, m, 2) [m], or None: the center of each sphere and a mark on it, then of each
+    plane a point and those 1 m from it along two of its directions; `places` has these after the points.
     """
 
     t: Array
@@ -117,6 +119,8 @@ class Motion:
     places: Graph | None = None
     joints: Sequence[int] = ()
     turns: Sequence[int] = ()
+    radii: Sequence[float] = ()
+    surfaces: Array | None = None
 
     def check(self) -> None:
         """Raises ValueError for shapes that do not fit, or values that are not finite."""
@@ -133,9 +137,15 @@ class Motion:
             raise ValueError(f"joints must be points, 0 to {len(self.parents) - 1}, got {list(self.joints)}")
         if self.turns and (len(self.turns) != len(self.joints) or set(self.turns) - {-1, 0, 1}):
             raise ValueError(f"turns must be 1, -1 or 0 for {len(self.joints)} joints, got {list(self.turns)}")
-        wanted_names = [f"{axis}{i}" for i in range(len(self.parents)) for axis in "xy"]
+        surfaces = np.zeros((len(self.t), 0, 2)) if self.surfaces is None else self.surfaces
+        m = surfaces.shape[1] if surfaces.ndim == 3 else 0
+        planes = m - 2 * len(self.radii)
+        if surfaces.shape != (len(self.t), m, 2) or planes < 0 or planes % 3 or not np.isfinite(surfaces).all():
+            needed = f"m two for each of {len(self.radii)} spheres and three for each plane"
+            raise ValueError(f"surfaces must be finite (T, m, 2), {needed}, got shape {surfaces.shape}")
+        wanted_names = [f"{axis}{i}" for i in range(len(self.parents) + m) for axis in "xy"]
         if self.places is not None and list(self.places.outputs) != wanted_names:
-            raise ValueError(f"places must have the outputs x0, y0, .. of {len(self.parents)} points")
+            raise ValueError(f"places must have the outputs x0, y0, .. of {len(self.parents) + m} points")
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,11 +8,13 @@ const TURN = 1.5 * Math.PI; // what the largest torque is drawn as
 function armView(svg, motion) {
   const range = (values) => [values.reduce((a, b) => Math.min(a, b), Infinity), values.reduce((a, b) => Math.max(a, b), -Infinity)];
   const center = (points) => [0, 1].map((k) => { const [a, b] = range(points.map((each) => each[k])); return (a + b) / 2; });
-  const middles = motion.points.map(center);
-  const reach = motion.points.reduce((most, points, i) => points.reduce((far, [x, y]) => (
+  const middles = motion.points.map(center), { radii = [], surfaces } = motion;
+  const round = (i) => radii.flatMap((r, k) => [-r, r].map((off) => surfaces[i][2 * k].map((each) => each + off)));
+  const seen = motion.points.map((points, i) => [...points, ...round(i)]); // with the corners of spheres
+  const reach = seen.reduce((most, points, i) => points.reduce((far, [x, y]) => (
     Math.max(far, Math.abs(x - middles[i][0]), Math.abs(y - middles[i][1]))), most), 0);
-  const [left, right] = range([0, ...motion.points.flat().map(([x]) => x)]);
-  const [low, high] = range([0, ...motion.points.flat().map(([, y]) => y)]);
+  const [left, right] = range([0, ...seen.flat().map(([x]) => x)]);
+  const [low, high] = range([0, ...seen.flat().map(([, y]) => y)]);
   const way = Math.max(right - left, high - low), size = way || 1;
   const follows = way > FOLLOW * 2 * reach;
   const half = follows ? Math.max(1.5 * reach, size / 100) : 0.58 * size;
@@ -20,18 +22,20 @@ function armView(svg, motion) {
   svg.setAttribute("aria-label", "the mechanism in motion");
   const r = half / 26, step = nice(0.8 * half);
   const grid = element("path", { class: "grid", "stroke-width": r / 4 }, svg);
-  element("path", { class: "ground", d: `M${-4 * r} 0H${4 * r}`, "stroke-width": r / 2 }, svg);
+  const touching = surfaces ? surfaceView(svg, radii, surfaces[0].length) : () => false;
+  if (!surfaces) element("path", { class: "ground", d: `M${-4 * r} 0H${4 * r}`, "stroke-width": r / 2 }, svg);
   const trace = element("path", { class: "trace", "stroke-width": r / 3 }, svg);
   const sticks = motion.parents.map(() => element("path", { class: "stick", "stroke-width": 1.3 * r }, svg));
   const joints = motion.parents.map(() => element("circle", { class: "joint", r, "stroke-width": r / 3 }, svg));
   const turns = element("g", { class: "turns" }, svg);
   const last = motion.parents.length - 1;
   let points = motion.points[0];
-  const show = (frame, at = motion.points[frame]) => {
-    points = at;
+  const show = (frame, at = [...motion.points[frame], ...(surfaces?.[frame] ?? [])]) => {
+    points = at.slice(0, last + 1);
     const [cx, cy] = follows ? center(points) : [(left + right) / 2, (low + high) / 2];
     svg.setAttribute("viewBox", `${cx - half} ${-cy - half} ${2 * half} ${2 * half}`);
-    if (follows) grid.setAttribute("d", lines(cx, cy, 2 * half, step));
+    const floor = touching(at.slice(last + 1), cx, cy, half, step);
+    if (follows) grid.setAttribute("d", floor ? "" : lines(cx, cy, 2 * half, step));
     points.forEach(([x, y], i) => {
       const [px, py] = motion.parents[i] < 0 ? [x, y] : points[motion.parents[i]];
       sticks[i].setAttribute("d", `M${px} ${-py}L${x} ${-y}`);
@@ -56,12 +60,6 @@ function armView(svg, motion) {
   };
   const color = (parts) => sticks.forEach((each, i) => each.setAttribute("class", parts && motion.parents[i] >= 0 ? `stick part${motion.parents[i] % 7}` : "stick"));
   return { show, mark, paint, color, words: follows ? `The frame goes with it; the lines stand still, ${+step.toPrecision(1)} m apart.` : "" };
-}
-
-/** The largest of 1, 2 and 5 times a power of ten up to a length. */
-function nice(length) {
-  const power = 10 ** Math.floor(Math.log10(length));
-  return [5, 2, 1].find((each) => each * power <= length) * power;
 }
 
 /** Lines of the world around a place, a step apart; twice as wide as high, for a wide picture. */
@@ -98,10 +96,10 @@ function showTime(app) {
   byId("clock").textContent = `${motion.t[app.state.frame].toFixed(2)} s`;
 }
 
-/** The points at the state, which a person has changed. */
+/** The points at the state, which a person has changed, and then those of surfaces. */
 function pointsAt(app) {
   const values = app.state.evaluate(app.places), found = app.places.outputs.map(([, , node]) => values[node]);
-  return app.record.motion.parents.map((_, i) => [found[2 * i], found[2 * i + 1]]);
+  return Array.from({ length: found.length / 2 }, (_, i) => [found[2 * i], found[2 * i + 1]]);
 }
 
 /** Torques of the first table that has a row for every joint, at the joints that turn what is seen: by parts where these

@@ -196,7 +196,7 @@ def _versions(graph: Graph | Sequence[Version], about: str, marked: frozenset[No
 
 def scripts() -> str:
     """The page's JavaScript: operations from their table, then the files."""
-    shared = asset(html.__package__, "elements.js", "tables.js", "address.js", "graph.js", "slopes.js")
+    shared = asset(html.__package__, "elements.js", "tables.js", "address.js", "graph.js", "slopes.js", "surfaces.js")
     return "\n".join([operations(), shared, asset(__package__, *SCRIPTS)])
 
 

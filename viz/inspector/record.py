@@ -11,7 +11,8 @@
                           graph], see below
     tables                [{caption, header, rows: [[name, [numbers of nodes]]]} and a graph]: they follow the state
     causes                null, or such a table: parts of outputs that add up to them, a column for each cause
-    motion                null, or {t, points: null or [[[x, y]]], parents, joints, turns, places: null or a graph}
+    motion                null, or {t, points: null or [[[x, y]]], parents, joints, turns, radii, surfaces: null or
+                          [[[x, y]]], places: null or a graph}
 
 A graph is that of `graph_data`, with outputs [[name, letters, number of a node]], and with names, {number of a node:
 [name, letters]}. Versions of one group share a picture. stages are titles of its rows, from the bottom; [] leaves them
@@ -26,7 +27,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 from cgraph import Graph, Node
-from cgraph.extend import ADJOINT, PRIMAL, TANGENT, Json, columns
+from cgraph.extend import ADJOINT, PRIMAL, TANGENT, Array, Json, columns
 
 from .. import theme
 from ..graph_drawing.render import Positions, RenderError, positions
@@ -98,14 +99,18 @@ def _groups(versions: Sequence[Version]) -> list[list[Version]]:
 def _motion(motion: Motion, letters: Letters) -> dict[str, Json]:
     return {
         "t": [_short(t) for t in motion.t],
-        "points": None
-        if motion.points is None
-        else [[[_short(x), _short(y)] for x, y in each] for each in motion.points],
+        "points": _points(motion.points),
         "parents": list(motion.parents),
         "joints": list(motion.joints),
         "turns": list(motion.turns),
+        "radii": [_short(each) for each in motion.radii],
+        "surfaces": _points(motion.surfaces),
         "places": _graph(motion.places, letters) if motion.places is not None else None,
     }
+
+
+def _points(points: Array | None) -> list[Json] | None:
+    return None if points is None else [[[_short(x), _short(y)] for x, y in each] for each in points]
 
 
 def _letters(names: Mapping[str, str]) -> Letters:

@@ -85,6 +85,7 @@ async function startLive() {
   const svg = $("picture"), points = data.parents.length;
   const first = data.meters.length;
   const place = (values, k) => [values[first + 2 * k], -values[first + 2 * k + 1]];
+  const count = (data.shownCount - first) / 2 - points, touching = count ? surfaceView(svg, data.radii, count) : null;
   const reference = data.parents.map(() => element("path", { class: "live-reference" }, svg));
   const trace = element("path", { class: "live-trace" }, svg);
   const sticks = data.parents.map(() => element("path", { class: "live-stick" }, svg));
@@ -96,7 +97,10 @@ async function startLive() {
   function draw({ values, reference: right }) {
     if (drawCourse) { drawCourse(anew); anew = false; return; }
     for (let k = 0; k < points; k++) for (const each of place(values, k)) if (Number.isFinite(each)) reach = Math.max(reach, Math.abs(each));
+    const surfaces = Array.from({ length: count }, (_, k) => [values[first + 2 * (points + k)], values[first + 2 * (points + k) + 1]]);
+    data.radii.forEach((radius, k) => { for (const each of surfaces[2 * k]) if (Number.isFinite(each)) reach = Math.max(reach, Math.abs(each) + radius); });
     const half = 1.1 * (reach || 1), r = half / 40;
+    touching?.(surfaces, 0, 0, half, nice(0.8 * half));
     svg.setAttribute("viewBox", `${-half} ${-half} ${2 * half} ${2 * half}`);
     [[sticks, values, 1.6 * r], [reference, right, 0.7 * r]].forEach(([paths, at, width]) => paths.forEach((path, k) => {
       const [x, y] = place(at, k), parent = data.parents[k];

@@ -33,9 +33,9 @@ class Live:
 
     rate: the state equation, whose first inputs are the state, and output k the rate of input k.
     start: a value of every input.  dt: the step at first [s].  methods: those of `dynamics.integrators.TABLEAUS`.
-    shown: over the same inputs, an output for each meter, then x and y of each point [m].
+    shown: over the same inputs, an output for each meter, then x and y of each point [m], and of points of surfaces.
     meters: name, unit and group, the first three kinetic, potential and total energy, or none of group "energy".
-    notes: {group of meters: a sentence on what they are}.
+    notes: {group of meters: a sentence on what they are}.  radii: of spheres of contacts, see `inspector.Motion`.
     parents: of each point the earlier one that it hangs on, or -1.
     scales: {input: how far its slider reaches to both sides of 0}, by default three times the value, or 1.
     limits: {input: (lower, upper)}, where its slider ends, at an infinite one as it does without.
@@ -56,6 +56,7 @@ class Live:
     units: Mapping[str, str] = field(default_factory=dict)
     notes: Mapping[str, str] = field(default_factory=dict)
     limits: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    radii: Sequence[float] = ()
 
     def __post_init__(self) -> None:
         for name in self.rate.input_names:
@@ -75,6 +76,7 @@ class Live:
             "energy": ENERGIES - 1 if any(group == ENERGY for _, _, group in self.meters) else -1,
             "notes": dict(self.notes),
             "parents": list(self.parents),
+            "radii": list(self.radii),
             "methods": list(self.methods),
             "dt": float(self.dt),
         }
@@ -103,7 +105,7 @@ EVALUATION = "'wasm-unsafe-eval'"  # in the policy: WebAssembly may be compiled,
 def panel(live: Live, begin: str = "startLive();") -> Panel:
     """The panel of a live motion, for a page whose style has --text, --back, --soft and --edge.
 
-    The page's scripts need elements.js and address.js.  begin: JavaScript that begins it, or says when to.
+    The page's scripts need elements.js, address.js and surfaces.js.  begin: JavaScript that begins it, or says when to.
     """
     colors = {"kinetic": theme.BLUE, "potential": theme.ORANGE, "right": theme.GREEN, "wrong": theme.SPURIOUS}
     variables = ":root{" + "".join(f"--live-{name}:{color};" for name, color in colors.items()) + "}\n"
@@ -123,7 +125,7 @@ def page_text(live: Live, title: str, about: str = "") -> Page:
     shown = panel(live)
     words = f"<p>{escape(about)}</p>\n" if about else ""
     body = f"<main>\n<h1>{escape(title)}</h1>\n{words}{shown.body}</main>"
-    script = f'"use strict";\n{asset(html.__package__, "elements.js", "address.js")}\n{shown.run}'
+    script = f'"use strict";\n{asset(html.__package__, "elements.js", "address.js", "surfaces.js")}\n{shown.run}'
     return html.compose(
         title, body, f"{asset(__package__, 'alone.css')}{shown.style}", script, shown.data, shown.allowed
     )

@@ -192,8 +192,9 @@ def _panel(
     make: Callable[..., FilmPanel] = partial(Curves, names=list(model.coordinates), t=times)
     shown = rows
     if mechanism is not None:  # all at once, so that they are seen from one side
-        points, parents, *_ = skeleton(mechanism.bind(), np.concatenate(rows))
-        shown, make = np.split(points, len(rows)), partial(Sticks, parents=parents)
+        seen = skeleton(mechanism.bind(), np.concatenate(rows))
+        points = seen.points if seen.surfaces is None else np.concatenate([seen.points, seen.surfaces], axis=1)
+        shown, make = np.split(points, len(rows)), partial(Sticks, parents=seen.parents, radii=seen.radii)
     motions = [Motion(name, values, name in wrong) for name, values in zip(known, shown, strict=False)]
     return make(motions, None if wanted is None else shown[-1])
 

@@ -21,6 +21,7 @@ from dynamics.equations.momentum.hamiltonian import hamilton_equations, velociti
 from dynamics.equations.state_equation import state_equation, state_inputs
 from dynamics.integrators import TABLEAUS
 from dynamics.multibody.bodies.joint_coordinates import display_units
+from dynamics.multibody.trees.contact_surfaces import contact_surfaces
 from dynamics.multibody.trees.joint_positions import drawn_points, view
 from dynamics.multibody.trees.mechanism import Mechanism
 from dynamics.scenes import Scene
@@ -117,7 +118,7 @@ def live_of(scene: Scene, *, momentum: bool = False) -> Live:
     values |= _momenta(scene, values) if momentum else {}
     start = {name: values.get(name, 0.0) for name in rate.input_names}  # torques and the time are 0
     outputs, meters = _meters(scene, rate)
-    places_, parents = _places(scene, rate, start)
+    places_, parents, radii = _places(scene, rate, start)
     shown = cg.simplify(Graph(rate.inputs, outputs | places_))
     units = {} if scene.mechanism is None else display_units(scene.mechanism.moving)
     units |= {name: "kg" for name in start if name.startswith("mass.")} | {"g": "m/s²", "t": "s"}
@@ -129,7 +130,7 @@ def live_of(scene: Scene, *, momentum: bool = False) -> Live:
         reach = {name: abs(p) for name, p in _momenta(scene, values | usual).items()}
         scales |= {name: _round(p) for name, p in reach.items() if 0.0 < p < math.inf}  # of speeds that are none, NaN
     names, limits = display_names(scene), _limits(scene)
-    return Live(rate, start, shown, meters, parents, scales, _step(scene), TABLEAUS, names, units, NOTES, limits)
+    return Live(rate, start, shown, meters, parents, scales, _step(scene), TABLEAUS, names, units, NOTES, limits, radii)
 
 
 def _limits(scene: Scene) -> dict[str, tuple[float, float]]:
@@ -215,17 +216,23 @@ def _momenta(scene: Scene, values: Mapping[str, float]) -> dict[str, float]:
     return {name: float(value) for name, value in found.items()}
 
 
-def _places(scene: Scene, rate: Graph, start: dict[str, float]) -> tuple[dict[str, Node], tuple[int, ...]]:
-    """Places of joints and tips in the picture: x0, y0, x1, .. over the inputs of the state equation."""
+def _places(
+    scene: Scene, rate: Graph, start: dict[str, float]
+) -> tuple[dict[str, Node], tuple[int, ...], tuple[float, ...]]:
+    """Places of joints and tips in the picture, x0, y0, x1, .. over the inputs of the state equation, and parents.
+
+    Then come points of the surfaces of contacts; and the radii of their spheres.
+    """
     if scene.mechanism is None:
-        return {}, ()
+        return {}, (), ()
     inputs = dict(zip(rate.input_names, rate.inputs, strict=True))
-    marks = drawn_points(scene.mechanism)
-    graphs = [scene.mechanism.position(body, at) for body, at, _ in marks]
+    marks, touching = drawn_points(scene.mechanism), contact_surfaces(scene.mechanism.forces)
+    seen = [*[(body, at) for body, at, _ in marks], *touching.points]
+    graphs = [scene.mechanism.position(body, at) for body, at in seen]
     turns = np.linspace(0.0, 3.0, SAMPLES)
     at = {name: start[name] + np.sin((k + 2.0) * turns) for k, name in enumerate(start)}
     points = []
-    for graph in graphs:
+    for graph in graphs[: len(marks)]:
         found = graph.evaluate({name: at[name] for name in graph.input_names})
         points.append(np.stack([np.broadcast_to(found[axis], SAMPLES) for axis in "xyz"], axis=-1))
     sides = view(np.stack(points))
@@ -235,7 +242,7 @@ def _places(scene: Scene, rate: Graph, start: dict[str, float]) -> tuple[dict[st
         for name, side in zip("xy", sides, strict=True):
             terms = [float(part) * node for part, node in zip(side, nodes, strict=True) if part]
             outputs[f"{name}{k}"] = sum(terms[1:], start=terms[0])
-    return outputs, tuple([parent for _, _, parent in marks])
+    return outputs, tuple([parent for _, _, parent in marks]), touching.radii
 
 
 def _scale(name: str, value: float, unit: str, weight: float) -> float:

@@ -66,7 +66,7 @@ def bench(
     *,
     repeats: int = 15,
     budget: float = 60.0,
-    reading: Mapping[str, bool] | None = None,
+    reading: Mapping[str, Any] | None = None,
     say: Callable[[str], None] = lambda line: None,
 ) -> Iterator[Row]:
     """Rows, scene by scene, as they are measured. Ours is among the peers in any case.

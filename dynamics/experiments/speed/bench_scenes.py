@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -80,7 +81,7 @@ SCENES: dict[str, Callable[[], Scene]] = {
 }
 
 
-def load(name: str, **reading: bool) -> Scene:
+def load(name: str, **reading: Any) -> Scene:
     """The scene of that name, of `SCENES` or else of `dynamics.scenes` or a file.
 
     reading: options of `dynamics.scenes.of_file`. Raises ValueError for a name that is neither, and as

@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from ... import scenes
 from ...scenes.start import Start, with_start
@@ -32,7 +33,7 @@ def load(
     *,
     t_end: float | None = None,
     start: Start | None = None,
-    reading: Mapping[str, bool] | None = None,
+    reading: Mapping[str, Any] | None = None,
 ) -> AccuracyTask:
     """The task of that name: of `TASKS`, a scene, a case, or an MJCF or URDF file.
 

@@ -15,6 +15,7 @@ from cgraph.extend import Array, real_array
 from ..bodies.body import Body
 from ..bodies.joint_coordinates import coordinate_names, places
 from ..loops import Loop
+from .contact_surfaces import contact_surfaces
 
 _SEEN = 1e-6  # of the way that points go: how near to the plane of the picture they turn
 _FLAT = 1e-9  # of the largest extent: a direction in which nothing moves or lies
@@ -35,6 +36,10 @@ class Bodies(Protocol):
     def loops(self) -> Sequence[Loop]:
         """Loops that close the tree."""
 
+    @property
+    def forces(self) -> Sequence[object]:
+        """Forces, contacts among them."""
+
     def position(self, body: str, at: ArrayLike = ...) -> Graph:
         """Position of a point of a body: outputs x, y, z."""
 
@@ -42,9 +47,11 @@ class Bodies(Protocol):
 class Skeleton(NamedTuple):
     """points: (T, k, 2) [m], x to the right, y up.  parents: (k,), the earlier point each hangs on, or -1.
 
-    graph: the points at any q, outputs x0, y0, x1, ..  joints: for every velocity the point where its joint is.
+    graph: the points at any q, and then those of surfaces, outputs x0, y0, x1, ..
+    joints: for every velocity the point where its joint is.
     turns: for every velocity, whether it turns what hangs on it in the plane that is seen, 1 counterclockwise, -1 the
     other way, or 0.
+    radii: of the spheres of contacts [m].  surfaces: (T, m, 2), points of spheres and planes, see `contact_surfaces`.
     """
 
     points: Array
@@ -52,13 +59,15 @@ class Skeleton(NamedTuple):
     graph: Graph
     joints: tuple[int, ...]
     turns: tuple[int, ...]
+    radii: tuple[float, ...] = ()
+    surfaces: Array | None = None
 
 
 def skeleton(mechanism: Bodies, q: ArrayLike) -> Skeleton:
     """Places of joints and tips for q, (T, n).
 
-    A tip is a body without mass that is welded to the last moving one, or a point where a loop holds it, or else the
-    center of mass of that one.
+    A tip is a body without mass that is welded to the last moving one, or a point where a loop holds it or a contact
+    is, or else the center of mass of that one.
     A mechanism that moves in a plane of two axes is seen at a right angle to it, any other from above and one side.
     """
     q, n = np.atleast_2d(real_array("q", q)), len(coordinate_names(mechanism.moving))
@@ -67,14 +76,15 @@ def skeleton(mechanism: Bodies, q: ArrayLike) -> Skeleton:
     values = {f"q{i}": q[:, i] for i in range(q.shape[1])}
     points: list[Array] = []
     nodes: list[Sequence[Node]] = []
-    marks = drawn_points(mechanism)
-    for body, at, _ in marks:
+    marks, touching = drawn_points(mechanism), contact_surfaces(mechanism.forces)
+    for body, at in [*[(body, at) for body, at, _ in marks], *touching.points]:
         graph = mechanism.position(body, at)
         place = graph.evaluate({name: values[name] for name in graph.input_names})
         nodes.append([graph.outputs[axis] for axis in "xyz"])
         points.append(np.stack([np.broadcast_to(place[axis], len(q)) for axis in "xyz"], axis=-1))
     in_space = np.stack(points, axis=1)
-    axes, parents = view(in_space), tuple([parent for _, _, parent in marks])
+    k = len(marks)
+    axes, parents = view(in_space[:, :k]), tuple([parent for _, _, parent in marks])
     shown = {
         f"{name}{i}": axis @ np.array(point)
         for i, point in enumerate(nodes)
@@ -82,7 +92,11 @@ def skeleton(mechanism: Bodies, q: ArrayLike) -> Skeleton:
     }
     found = cg.simplify(Graph(cg.variables([f"q{i}" for i in range(n)]), shown))
     joints = [i for i, place in enumerate(places(mechanism.moving)) for _ in range(place.u.stop - place.u.start)]
-    return Skeleton(in_space @ axes.T, parents, found, tuple(joints), _turns(mechanism.moving, found, q[0], parents))
+    turns = _turns(mechanism.moving, found, q[0], parents)
+    joints_and_tips, surfaces = np.split(in_space @ axes.T, [k], axis=1)
+    return Skeleton(
+        joints_and_tips, parents, found, tuple(joints), turns, touching.radii, surfaces if touching.points else None
+    )
 
 
 def drawn_points(mechanism: Bodies) -> list[tuple[str, ArrayLike, int]]:
@@ -150,6 +164,8 @@ def _tips(mechanism: Bodies) -> Iterator[tuple[str, ArrayLike]]:
         ends = ((loop.body, loop.at), (loop.to, loop.to_at)) if loop.kind != "coupling" else ()
         for name, at in ends:
             pins.setdefault(name if name in moving else above.get(name, name), []).append((name, at))
+    for name, at in contact_surfaces(mechanism.forces).centers:
+        pins.setdefault(name if name in moving else above.get(name, name), []).append((name, at))
     for body in mechanism.moving:
         yield from pins.get(body.name, [])
         if body.name not in holding:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import cgraph as cg
+from cgraph.codegen.parts import STEPS
 from cgraph.extend import Call, If, Map, Program, Sum, While, runner
 from cgraph.program import fuse
 from tests.ulps import same
@@ -105,6 +106,11 @@ def test_a_call_may_write_what_it_reads():
     swap = Call(cg.Graph([a, b, c], {"first": b, "second": a + c}), ("x", "y", "x"), ("x", "y"))
     run = runner(Program({"x": 1, "y": 1}, [swap], record=["x", "y"]), "llvm")
     assert run.run(run.memory({"x": 3.0, "y": 5.0}), 2).rows.tolist() == [[5.0, 6.0], [6.0, 10.0]]
+    for constants in (10, 3 * STEPS):  # stored in functions of their own, and what x becomes behind them
+        zeros = {f"z{k}": cg.constant(0.0) for k in range(constants)}
+        square = Call(cg.Graph([a, b], {"next": a * b, **zeros}), ("x", "y"), ("x", "zeros"))
+        run = runner(Program({"x": 1, "y": 1, "zeros": constants}, [square], record=["x"]), "llvm")
+        assert run.run(run.memory({"x": 3.0, "y": 5.0}), 2).rows.tolist() == [[15.0], [75.0]]
 
 
 @pytest.mark.parametrize("count", [3, 8, 13, 40])

@@ -35,6 +35,9 @@ LEG = """<robot name="leg"><link name="base"/><link name="leg"><inertial><mass v
 <limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
 
 
+LEFT = "contacts (the option contacts takes those of spheres and capsules)"
+
+
 def silently(read: Any, *args: Any, **options: Any) -> dyn.Mechanism:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", dyn.MechanismWarning)
@@ -109,7 +112,7 @@ def test_what_is_no_sphere_on_a_plane_is_left_out_and_said() -> None:
         "contacts other than of spheres and capsules with planes",
         "torsional and rolling friction of contacts",
     ]
-    assert silently(dyn.load_mjcf, mj).left_out == ("contacts",)
+    assert silently(dyn.load_mjcf, mj).left_out == (LEFT,)
     off = mujoco.MjModel.from_xml_string(CROWD.format(flags='<flag contact="disable"/>'))
     assert not silently(dyn.load_mjcf, off, contacts="compliant").forces
 
@@ -129,7 +132,7 @@ def test_spheres_and_capsules_of_a_urdf_stand_on_the_ground() -> None:
     assert run.q[-1, 0] == approx(0.4 + 0.99 * 0.05, rel=1e-6)
     boxed = silently(dyn.load_urdf, LEG.format(shape='<box size="1 1 1"/>'), contacts="compliant")
     assert boxed.left_out == ("joint limits (slide)", "contacts of shapes other than spheres and capsules (leg: box)")
-    assert silently(dyn.load_urdf, text).left_out == ("contacts", "joint limits (slide)")
+    assert silently(dyn.load_urdf, text).left_out == (LEFT, "joint limits (slide)")
 
 
 def test_where_nothing_touches_or_weighs_it_is_said() -> None:

@@ -335,7 +335,7 @@ def test_what_acts_from_outside_is_left_out_with_a_warning_and_no_error() -> Non
         loaded = dyn.load_mjcf(text)
     servos = "servo: -50 length -2 velocity times gear 3, number 2: -4 velocity, number 3: input at least 0.5"
     assert loaded.left_out == (
-        "contacts",
+        "contacts (the option contacts takes those of spheres and capsules)",
         "joint limits (j)",
         "friction loss (j: 0.1)",
         "actuators (1)",

@@ -110,6 +110,13 @@ def test_a_notebook_shows_it_in_a_frame():
         (lambda graph: viz.page(graph, motion=Motion(np.zeros(0))), "motion"),
         (lambda graph: viz.page(graph, motion=Motion(np.zeros(2), np.zeros((2, 1, 3)), (-1,))), "(2, 1, 2)"),
         (lambda graph: viz.page(graph, motion=Motion(np.zeros(2), np.zeros((2, 1, 2)), (0,))), "parents"),
+        (
+            lambda graph: viz.page(
+                graph,
+                motion=Motion(np.zeros(2), np.zeros((2, 1, 2)), (-1,), radii=(0.1,), surfaces=np.zeros((2, 4, 2))),
+            ),
+            "surfaces must be finite",
+        ),
     ],
 )
 def test_a_mistake_is_told_in_one_line(make, said):

@@ -18,6 +18,7 @@ from cgraph.extend import Names
 from cgraph.operations.table import OPS
 from tests.page_script import run_script
 from tests.tolerances import SUMS
+from viz.animation.surfaces import surfaces
 from viz.inspector.content import Motion, State, StateTable, Version
 from viz.inspector.record import record
 from viz.models.inspection import PAPER, Inspection, inspection
@@ -373,6 +374,32 @@ def test_the_free_motion_takes_torques_of_zero_and_the_page_says_0():
 
 
 # The mechanism in motion.
+
+SURFACES = """(radii, points, box) => {
+  const svg = document.createElement("svg"), grid = surfaceView(svg, radii, points.length)(points, ...box);
+  return [grid, svg.inside.map(({ at }) => at.d.match(/-?[0-9.]+(e-?[0-9]+)?/g).map(Number))];
+}"""
+
+
+@pytest.mark.parametrize("edge_on", [True, False])
+def test_page_and_film_draw_the_same_surfaces(edge_on):
+    """A plane is a line, the tangent of a sphere that rests on it, or a grid."""
+    axes = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]) if edge_on else np.random.default_rng(0).normal(size=(2, 3))
+    points = np.array([[0.3, 0.2, 0.1], [0.35, 0.2, 0.1], *np.eye(3)[[2, 0, 1]] * [1.0, 1.0, 0.0]]) @ axes.T
+    center, half, step = np.array([0.1, 0.2]), 0.7, 0.5
+    lines = surfaces(points, [0.1], center, half, step)
+    grid, (plane, ball) = run_script(SURFACES, [0.1], points.tolist(), [*center, half, step])
+    ends = np.array(plane).reshape(-1, 2, 2) * [1.0, -1.0]
+    assert grid == bool(lines.grids) == (not edge_on)
+    ((ring, spoke),) = lines.spheres
+    assert np.linalg.norm(ring - points[0], axis=1) == pytest.approx(0.1)
+    assert [ball[0] + 0.1, -ball[1], *ball[-2:]] == pytest.approx([*points[0], spoke[1, 0], -spoke[1, 1]])
+    if grid:
+        assert ends == pytest.approx(np.array(lines.grids))
+    else:
+        assert ends[..., 1].tolist() == lines.edges[0][:, 1:].T.tolist() == [[0.0, 0.0]]
+        assert ring[:, 1].min() == pytest.approx(0.0, abs=1e-3)
+
 
 STICKS = """(motions) => motions.map((motion) => {
   const svg = document.createElement("svg"), { show, words } = armView(svg, motion);

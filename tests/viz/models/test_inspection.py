@@ -101,7 +101,7 @@ def test_both_forms_are_in_one_state_of_coordinates_and_momenta(name):
 
 def test_joints_of_a_planar_arm_are_a_link_apart():
     q = np.random.default_rng(0).uniform(-3, 3, (5, 3))
-    points, parents, graph, joints, turns = skeleton(dyn.planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7]), q)
+    points, parents, graph, joints, turns, *_ = skeleton(dyn.planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7]), q)
     assert joints == (0, 1, 2)
     assert turns == (1, 1, 1)
     again = graph.evaluate({f"q{i}": q[:, i] for i in range(3)})
@@ -109,6 +109,32 @@ def test_joints_of_a_planar_arm_are_a_link_apart():
     assert parents == (-1, 0, 1, 2)
     assert np.linalg.norm(np.diff(points, axis=1), axis=2) == pytest.approx(np.tile([1.0, 0.8, 0.7], (5, 1)))
     assert points[:, 1] == pytest.approx(np.stack([np.sin(q[:, 0]), -np.cos(q[:, 0])], axis=1))
+
+
+def test_contacts_are_seen_where_they_touch():
+    """Spheres and planes, of the world and of bodies that move, each once; in the picture at any state, too."""
+    balls = [dyn.Body(name, dyn.Joint("free"), mass=1.0, inertia=(1.0, 1.0, 1.0)) for name in "ab"]
+    tray = dyn.Body("tray", dyn.Joint("revolute", axis=(0.0, 1.0, 0.0)), mass=1.0, inertia=(1.0, 1.0, 1.0))
+    floor = {"to_at": (7.0, 0.0, -0.5), "radius": 0.2, "stiffness": "k"}
+    contacts = [
+        dyn.Contact("a", **floor),
+        dyn.Contact("b", **floor | {"to_at": (0.0, 3.0, -0.5)}),
+        dyn.Contact("a", "b", radius=0.2, to_radius=0.2, stiffness=1.0),
+        dyn.Contact("a", "tray", at=(0.1, 0.0, 0.0), normal=(0.0, 0.0, 2.0), stiffness=1.0),
+    ]
+    model = dyn.Mechanism([*balls, tray], forces=contacts, parameters={"k": 1.0})
+    q = np.array([[0.5, 0.0, -0.3, 1.0, 0.0, 0.0, 0.0, 0.9, 0.0, -0.3, 1.0, 0.0, 0.0, 0.0, 0.25]] * 2)
+    q[1, [2, 9]] += 0.1
+    seen = skeleton(model.bind(), q)
+    assert seen.radii == (0.2, 0.2, 0.0)
+    (a, mark, b, _, c, _), floor_plane, tilted = np.split(seen.surfaces[0], [6, 9])
+    assert [*a, *b, *c] == pytest.approx([0.5, -0.3, 0.9, -0.3, 0.6, -0.3])  # from the side, as all moves in a plane
+    assert np.linalg.norm(mark - a) == pytest.approx(0.2 * np.sqrt(2.0 / 3.0))
+    assert floor_plane.tolist() == [[0.0, -0.5], [1.0, -0.5], [0.0, -0.5]]
+    assert tilted == pytest.approx(np.array([[0.0, 0.0], [np.cos(0.25), -np.sin(0.25)], [0.0, 0.0]]))
+    again = seen.graph.evaluate({name: q[:, int(name[1:])] for name in seen.graph.input_names})
+    places = np.stack([np.broadcast_to(each, 2) for each in again.values()], axis=1).reshape(2, -1, 2)
+    assert places == pytest.approx(np.concatenate([seen.points, seen.surfaces], axis=1))
 
 
 def test_a_mechanism_hangs_together():
