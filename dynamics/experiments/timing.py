@@ -139,7 +139,7 @@ def single_core() -> Iterator[None]:
 
 
 def run_fresh(module: str, function: str, *arguments: Any, timeout: float | None = None) -> Any:
-    """What a function of that module returns in a process of its own; all of it goes as JSON.
+    """What a function of that module returns in a process of its own, which imports what this one would; as JSON.
 
     Raises RuntimeError with the last line of its errors, or where it takes longer than `timeout` s.
     """
@@ -147,10 +147,10 @@ def run_fresh(module: str, function: str, *arguments: Any, timeout: float | None
         f"import json, sys; from {module} import {function} as run; "
         f"sys.stdout.write('\\n{ANSWER}' + json.dumps(run(*json.loads(sys.stdin.read()))))"
     )
-    environment = os.environ | {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([each or str(Path.cwd()) for each in sys.path])}
     try:
         done = subprocess.run(
-            [sys.executable, "-c", program], input=json.dumps(arguments), capture_output=True, text=True,
+            [sys.executable, "-P", "-c", program], input=json.dumps(arguments), capture_output=True, text=True,
             timeout=timeout, check=False, env=environment,
         )  # fmt: skip
     except subprocess.TimeoutExpired:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import cgraph as cg
@@ -84,7 +85,7 @@ class Problem:
         q, qd = self.system.lengths[: self.nq], self.system.lengths[self.nq :]
         return (*q, *[1.0 / length if length else 0.0 for length in qd]) if self.momenta else (*q, *qd)
 
-    @property
+    @cached_property
     def timed(self) -> bool:
         """Whether f depends on t."""
         return reaches(self.rate.outputs.values(), [cg.variable(TIME)])

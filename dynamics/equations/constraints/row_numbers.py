@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cached_property
 from typing import NamedTuple
 
@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 import cgraph as cg
 from cgraph import Graph, extend
-from cgraph.extend import Array, Builder, building, cotangents, kept_by_first
+from cgraph.extend import Array, Builder, cotangents, kept_by_first
 
 from ...systems.constraints import ConstraintError, Constraints
-from ...systems.kinematics import ZERO
+from ...systems.kinematics import ONE
 from ..substitute import substitute
 
 SPREADS = (0.3, 1.0, 0.1, 3.0, 0.01, 0.001, 10.0, 0.0001) * 3  # of random starts about the neutral coordinates
@@ -38,13 +38,9 @@ class RowNumbers:
     def __init__(self, constraints: Constraints) -> None:
         self.constraints, kinematics = constraints, constraints.kinematics
         self.n, self.nq = len(kinematics.u), len(kinematics.q)
-        weights = cg.variables([f"lambda{k}" for k in range(len(constraints))])
         build = Builder()
-        with building(build):
-            total = ZERO
-            for weight, rate in zip(weights, constraints.rates, strict=True):
-                total = total + weight * rate
-        bars = cotangents({total: cg.constant(1.0)}, kinematics.u, build)
+        slopes = [cotangents({rate: ONE}, kinematics.u, build) for rate in constraints.rates]
+        entries = {(k, i): bar for k, row in enumerate(slopes) for i, bar in enumerate(row) if bar.value != 0.0}
         self.steps = step_names(self.n, constraints.parameters)
         displaced = dict(zip(kinematics.u, cg.variables(self.steps), strict=True))
         moved = [
@@ -53,7 +49,8 @@ class RowNumbers:
         self.inputs = [*kinematics.q, constraints.t, *cg.variables(list(constraints.parameters))]
         numbered = [(f"phi{k}", phi) for k, phi in enumerate(constraints.positions)]
         self.phi = Graph(self.inputs, dict(numbered)) if numbered else None
-        self.columns = Graph([*self.inputs, *weights], {f"J{i}": bar for i, bar in enumerate(bars)})
+        self.entries = Graph(self.inputs, {f"J{k}_{i}": bar for (k, i), bar in entries.items()}) if entries else None
+        self._places = tuple(np.array(list(entries), dtype=np.intp).reshape(-1, 2).T)
         normalized = kinematics.normalized(moved)
         self.moved = Graph([*kinematics.q, *displaced.values()], {f"{i}": node for i, node in enumerate(normalized)})
         self.landed: Graph | None = None
@@ -144,10 +141,13 @@ class RowNumbers:
 
     def matrix(self, point: Mapping[str, float]) -> Array:
         """J, (m, n)."""
-        m = len(self.constraints)
-        weights = dict(zip([f"lambda{k}" for k in range(m)], np.eye(m), strict=True))
-        columns = self.columns.evaluate({**point, **weights})
-        return np.stack([np.broadcast_to(column, m) for column in columns.values()], axis=1)
+        return self._filled(() if self.entries is None else _numbers(self.entries, point))
+
+    def _filled(self, entries: Sequence[float]) -> Array:
+        """The matrix of entries that are not the constant 0."""
+        matrix = np.zeros((len(self.constraints), self.n))
+        matrix[self._places] = entries
+        return matrix
 
     def finite_matrix(self, point: Mapping[str, float]) -> Array | None:
         """J; None where it has an entry that is no finite number."""
@@ -157,14 +157,11 @@ class RowNumbers:
 
     def certain_matrix(self, point: Mapping[str, float]) -> Array:
         """J with 0 for entries that are rounding alone."""
-        m, roundoff = len(self.constraints), np.finfo(float).eps / 2.0
-        weights = dict(zip([f"lambda{k}" for k in range(m)], np.eye(m), strict=True))
-        nodes = self.columns.nodes
-        values, errors = extend.error_bounds(nodes, {**point, **weights}, roundoff, of_inputs=roundoff)
-        columns = self.columns.outputs.values()
-        matrix, rounding = (
-            np.stack([np.broadcast_to(each[column], m) for column in columns], axis=1) for each in (values, errors)
-        )
+        if self.entries is None:
+            return self._filled(())
+        roundoff, outputs = np.finfo(float).eps / 2.0, self.entries.outputs.values()
+        both = extend.error_bounds(self.entries.nodes, point, roundoff, of_inputs=roundoff)
+        matrix, rounding = (self._filled([float(each[node]) for node in outputs]) for each in both)
         with np.errstate(invalid="ignore"):
             return np.where(rounding <= UNCERTAIN * np.abs(matrix), matrix, 0.0)
 
@@ -213,7 +210,7 @@ class RowNumbers:
 
     def gaps(self, point: Mapping[str, float]) -> Array:
         """phi."""
-        return np.zeros(0) if self.phi is None else np.array(list(self.phi.evaluate(dict(point)).values()))
+        return np.zeros(0) if self.phi is None else np.array(_numbers(self.phi, point))
 
     def _open_rows(self, before: Mapping[str, float], step: Array, most: float = OPEN) -> Indices:
         """The rows of phi that are not 0 to their rounding, that of the step included, after a step."""
@@ -230,12 +227,20 @@ class RowNumbers:
 
     def moved_by(self, point: Mapping[str, float], step: Array) -> Array:
         """q after a step along the velocities, (nq,)."""
-        at = {name: point[name] for name in self.moved.input_names if name in point}
-        at |= dict(zip(self.steps, step.tolist(), strict=True))
-        return np.array(list(self.moved.evaluate(at).values()), dtype=np.float64)
+        return np.array(_numbers(self.moved, {**point, **dict(zip(self.steps, step.tolist(), strict=True))}))
 
 
 row_numbers = kept_by_first(RowNumbers)
+
+
+def _numbers(graph: Graph, point: Mapping[str, float]) -> tuple[float, ...]:
+    """The outputs at a point, {input: number}, by generated Python: hundreds of points follow one another."""
+    return _compiled(graph).values([point[name] for name in graph.input_names])
+
+
+@kept_by_first
+def _compiled(graph: Graph) -> cg.Compiled:
+    return cg.compile(graph, "python")
 
 
 class Closing(NamedTuple):
@@ -277,9 +282,9 @@ def factors(constraints: Constraints, matrix: Array) -> tuple[Array, Array]:
         if looped and not looped.angle:
             rows[k] = -1.0  # a length
     for members in groups.values():
-        lengths = [k for k in members if rows[k] < 0.0]
-        lever = np.abs(matrix[lengths][:, constraints.turning]).max(initial=0.0)
-        rows[lengths] = 1.0 / (lever or 1.0)
+        straight = [k for k in members if rows[k] < 0.0]
+        lever = np.abs(matrix[straight][:, constraints.turning]).max(initial=0.0)
+        rows[straight] = 1.0 / (lever or 1.0)
     largest = [np.abs(rows[members, None] * matrix[members]).max(axis=0) for members in groups.values()]
     scales, columns = alike(np.array(largest).reshape(-1, matrix.shape[1]))
     for members, scale in zip(groups.values(), scales, strict=True):
@@ -287,9 +292,9 @@ def factors(constraints: Constraints, matrix: Array) -> tuple[Array, Array]:
     for _ in range(ROUNDS):
         sizes = np.abs(rows[:, None] * matrix * columns).max(axis=0, initial=0.0)
         columns /= np.where(sizes > 0.0, sizes, 1.0)
+        lengths = np.linalg.norm(rows[:, None] * matrix * columns, axis=1)
         for members in groups.values():
-            longest = np.linalg.norm(rows[members, None] * matrix[members] * columns, axis=1).max()
-            rows[members] /= longest or 1.0
+            rows[members] /= lengths[members].max() or 1.0
     return rows, columns
 
 

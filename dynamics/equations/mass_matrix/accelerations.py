@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 import cgraph as cg
-from cgraph import Graph
-from cgraph.extend import Builder, Order, SingularError, building, rounding_spread
+from cgraph import Graph, Node
+from cgraph.extend import Builder, Order, SingularError, building, rounding_spread, topological
 
 from ...systems.constraints import ConstraintError
 from ...systems.system import System
@@ -34,7 +34,7 @@ def _require_inertia_without_constraints(system: System) -> None:
     """A coordinate whose inertia is the constant zero may leave with a constraint; one that is rounding must not."""
     free = system.without_constraints
     try:
-        graph = _solved(free, bias_terms(free), "recursive", check=False)
+        graph = cg.simplify(_solved(free, bias_terms(free), "recursive", check=False))
     except SingularError:
         return
     require_inertia(free, graph)
@@ -53,9 +53,16 @@ def accelerations(system: System, method: str = "auto", check: bool = False) -> 
     if (whole := system.whole) is not None:
         ways.insert(0, (whole, bias_terms(whole), methods[0]))
     graphs: list[Graph] = []  # the safest first
+    merged = 0  # nodes that simplification took from the last one
     for form, given, each in ways:  # the dense matrix may lose in its entries what elimination keeps
+        if graphs and each == "dense":  # what both need of a potential of many terms may be too much already
+            least = _cost(topological(given.gradient)) - merged
+            if least >= WORTH * _cost(graphs[-1].nodes):
+                break
         try:
-            graphs.append(_solved(form, given, each, check))
+            written = _solved(form, given, each, check)
+            graphs.append(_simplified(written, each))
+            merged = _cost(written.nodes) - _cost(graphs[-1].nodes)
         except SingularError as error:
             failure = error
     if not graphs and failure.index >= system.n:
@@ -84,7 +91,7 @@ def _smallest(system: System, graphs: Sequence[Graph], worth: float) -> Graph:
     chosen, limits = graphs[0], None
     for graph in graphs[1:]:
         limit = worth if graph is graphs[-1] else 1.0
-        if _cost(graph) >= limit * _cost(chosen):
+        if _cost(graph.nodes) >= limit * _cost(chosen.nodes):
             continue
         regimes = _regimes(system, graphs[0])
         limits = limits or [GROWTH * rounding_spread(graphs[0], system.parameters, sizes) for sizes in regimes]
@@ -134,13 +141,19 @@ def _sizes(system: System, accelerations: Graph) -> dict[str, float]:
     return sizes | dict.fromkeys(others, np.inf)  # multipliers, which have units of rows: they are not compared
 
 
-def _cost(graph: Graph) -> int:
+def _cost(nodes: Sequence[Node]) -> int:
     """Nodes, with sines and cosines for what they take."""
-    return len(graph.nodes) + TURN * sum([node.op.name in ("sin", "cos") for node in graph.nodes])
+    return len(nodes) + TURN * sum([node.op.name in ("sin", "cos") for node in nodes])
+
+
+def _simplified(written: Graph, method: str) -> Graph:
+    """The graph of a method, as it is given on."""
+    graph = cg.simplify(written)
+    return cg.balanced_sums(graph) if method == "balanced" else graph
 
 
 def _solved(system: System, terms: BiasTerms, method: str, check: bool) -> Graph:
-    """M qdd - J^T lambda = tau + forces - D qd - bias, J qdd = -(dJ/dt) qd, solved by one method."""
+    """M qdd - J^T lambda = tau + forces - D qd - bias, J qdd = -(dJ/dt) qd, solved by one method; not simplified."""
     build = Builder()
     rows = constraint_rows(system, terms.rates)
     with building(build):
@@ -164,5 +177,4 @@ def _solved(system: System, terms: BiasTerms, method: str, check: bool) -> Graph
     outputs = {f"qdd{i}": node for i, node in enumerate(solved[: system.n])}
     outputs |= multiplier_outputs(system, rows, solved[system.n : end], build)
     outputs |= dict(zip(("info",), solved[end:], strict=False))
-    graph = cg.simplify(system.graph(outputs, system.q, system.qd, system.tau))
-    return cg.balanced_sums(graph) if method == "balanced" else graph
+    return system.graph(outputs, system.q, system.qd, system.tau)

@@ -9,6 +9,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import asdict
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -235,6 +236,14 @@ def test_a_process_of_its_own_answers_or_says_why_not(
     assert run_fresh("math", "sqrt", 4.0) == 2.0
     with pytest.raises(RuntimeError, match=said):
         run_fresh(module, function, *arguments, timeout=timeout)
+
+
+def test_a_process_of_its_own_imports_what_this_one_does_in_any_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "cgraph.py").write_text("raise ImportError('another one')")
+    monkeypatch.chdir(tmp_path)
+    assert run_fresh("dynamics.experiments.timing", "machine") == machine()
 
 
 def test_torques_after_a_change_of_structure_have_to_agree() -> None:
