@@ -82,6 +82,8 @@ def run_chunks(task: Task, x: Array, p: Array, width: int, workers: Team, store:
         if store is not None and (part := store.part(chunk)) is not None:
             put(part)
     left = [chunk for chunk in chunks if not arrived[chunk.first]]
+    if store is not None and left:
+        store.lock()
     try:
         with (
             Progress("simulate", len(arrived), task.options.progress) as report,
@@ -99,7 +101,7 @@ def run_chunks(task: Task, x: Array, p: Array, width: int, workers: Team, store:
             )
     except KeyboardInterrupt:
         if store is not None:
-            raise
+            raise KeyboardInterrupt(store.kept(int(arrived.sum()))) from None
         whole.rows[~arrived] = math.nan
     return whole if store is None else replace(whole, rows=store.read_only())
 

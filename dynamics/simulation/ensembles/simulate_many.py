@@ -7,6 +7,7 @@ import os
 import time
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import closing, nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -100,8 +101,8 @@ def simulate_many(
         rounded up to whole vectors, multiples of 8.
     store : path, optional
         A folder, empty or not there, in which chunks are kept as they end. The same call again takes up where the first
-        was ended, by whatever, with the chunks as they were cut then, and at last reads all from the folder. Ctrl-C is
-        then a KeyboardInterrupt.
+        was ended, by whatever, with the chunks as they were cut then, and at last reads all from the folder, which one
+        call at a time writes. Ctrl-C is then a KeyboardInterrupt, which says how many trajectories the folder keeps.
 
     Returns
     -------
@@ -118,7 +119,7 @@ def simulate_many(
     MemoryError
         For a result that would not fit.
     OSError
-        For a `store` that cannot be written, or has no room.
+        For a `store` that cannot be written, has no room, or is being written by another call.
     RuntimeError
         Where a process of `workers` is ended from outside.
     SingularMassMatrixError
@@ -156,8 +157,10 @@ def simulate_many(
     width = chunk_width(len(x), chunk, team, count * program.steps.width if lanes else 0, grids)
 
     # Integrate, by whoever takes the chunks and compiles the steps
-    kept = None if folder is None else Store(folder, sweep_of(problem, task, x, p), width, (len(x), count, x.shape[1]))
-    whole = run_chunks(task, x, p, width, team, kept)
+    shape = len(x), count, x.shape[1]
+    opened = nullcontext() if folder is None else closing(Store(folder, sweep_of(problem, task, x, p), width, shape))
+    with opened as kept:
+        whole = run_chunks(task, x, p, width, team, kept)
 
     # Put the result together
     result = _ensemble(problem, watch, options, whole, (start, x, p), time.perf_counter() - begin)
