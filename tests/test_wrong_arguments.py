@@ -232,6 +232,7 @@ CALLS = {
         first_step=None, form="velocity", varied=(), **RUNS
     ),
     "dyn.PreparedMotion.end": call(MOTION.end, [0.1], [0.0], 0.02, 0.0, parameters=None),
+    "dyn.PreparedMotion.ends": call(MOTION.ends, [[0.1], [0.2]], [0.0], 0.02, 0.0, parameters=None, workers=1),
     "dyn.PreparedMotion.start": call(MOTION.start, [0.1], [0.0], 0.02, 0.0, parameters=None),
     "dyn.MotionSteps.propagate_until": call(MOTION.start([0.1], [0.0], 1.0).propagate_until, 0.02),
     "dyn.gradient": call(

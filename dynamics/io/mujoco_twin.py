@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 from types import ModuleType
 from typing import TYPE_CHECKING
 
@@ -15,7 +16,7 @@ from cgraph.extend import Array, install
 from ..multibody.builders.planar_arm import planar_links
 from ..multibody.trees.mechanism import Mechanism, MechanismError, require_mechanism
 from ..systems.model import Model
-from .write_mjcf import moving_alone, to_mjcf
+from .write_mjcf import to_mjcf
 
 if TYPE_CHECKING:
     from mujoco import MjModel
@@ -65,6 +66,12 @@ def rollout(mj: MjModel, starts: Array, states: Array) -> Callable[[], None]:
     return run
 
 
+def _tree(mechanism: Mechanism) -> Mechanism:
+    """The tree of the bodies that move, those welded to them merged in, without loops and limits."""
+    bodies = [replace(body, joint=replace(body.joint, limits=None)) for body in mechanism.moving]
+    return replace(mechanism, bodies=bodies, locked={}, loops=())
+
+
 class MujocoTwin:
     """MuJoCo's model of a mechanism, asked for the quantities that the graphs give.
 
@@ -76,7 +83,7 @@ class MujocoTwin:
     def __init__(self, of: Model, timestep: float = 1e-3) -> None:
         self.mujoco = mujoco()
         self.mechanism = require_mechanism(of, "MuJoCo").bind()
-        self.model = self.mujoco.MjModel.from_xml_string(to_mjcf(moving_alone(self.mechanism), timestep))
+        self.model = self.mujoco.MjModel.from_xml_string(to_mjcf(_tree(self.mechanism), timestep))
         self.data = self.mujoco.MjData(self.model)
 
     def require_tree(self, what: str) -> None:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+import warnings
+from collections.abc import Sequence
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -11,16 +12,18 @@ import numpy as np
 from cgraph.extend import Array, real_number
 
 from ..multibody.algebra import spatial
+from ..multibody.bodies.limits import ANYTHING, NO_LIMITS, Pair
 from ..multibody.quantities.body_quantity import of_bodies
-from ..multibody.trees.mechanism import WORLD, Body, Mechanism, MechanismError, require_mechanism
+from ..multibody.trees.mechanism import WORLD, Body, MechanismError, MechanismWarning, require_mechanism
 from ..systems.model import Model
+from .left_out import listed, present
 from .stand_ins import INERTIA_ROUNDING, with_stand_ins
 from .write_loops import equality_lines, numbers, site_lines
 
 
 @of_bodies
 def to_mjcf(model: Model, timestep: float = 1e-3) -> str:
-    """The bodies of a model as MJCF text: masses and inertias explicit, RK4, contacts off.
+    """The bodies of a model as MJCF text: masses and inertias explicit, RK4, contacts and limits off.
 
     `load_mjcf` reads the same bodies from it, those that one carries before the next. Names, positions, centers, masses
     and coefficients are the same to the last bit; axes, orientations and inertias to a few roundings, which quaternions
@@ -28,6 +31,10 @@ def to_mjcf(model: Model, timestep: float = 1e-3) -> str:
     zero for the mass and moments of a body that moves: 1e-15 stands for it there, and is zero again when it is read.
     Of parameters the values are written. Of loops, points and welds are equality constraints of sites, and couplings
     those of joints: MuJoCo has them soft.
+
+    Limits of position are the joints' `range`, those of effort their `actuatorfrcrange`. As in the model, they are
+    numbers and hold no motion, by `<flag limit="disable">`; without it MuJoCo holds them. MJCF has no limits
+    of velocity, nor such whose ends are one number; a warning names those that are left out.
 
     Parameters
     ----------
@@ -60,6 +67,7 @@ def to_mjcf(model: Model, timestep: float = 1e-3) -> str:
     if mechanism.forces:
         raise MechanismError(f"MJCF has no forces, there is one on body {mechanism.forces[0].body!r}")
     bodies = mechanism.parts
+    _tell_left_out(bodies)
     moments = {body.name: _principal(body) for body in bodies}
     inertial = {
         name: (mass, _diagonal(values, moments[name][1]))
@@ -72,7 +80,7 @@ def to_mjcf(model: Model, timestep: float = 1e-3) -> str:
         '<mujoco model="mechanism">',
         '  <compiler angle="radian" inertiafromgeom="false"/>',
         f'  <option timestep="{timestep!r}" integrator="RK4" gravity="{numbers(mechanism.gravity)}">',
-        '    <flag contact="disable"/>',
+        '    <flag contact="disable" limit="disable"/>',
         "  </option>",
         "  <worldbody>",
     ]
@@ -93,11 +101,6 @@ def to_mjcf(model: Model, timestep: float = 1e-3) -> str:
     return "\n".join([*lines, "  </worldbody>", *equality_lines(mechanism), "</mujoco>"]) + "\n"
 
 
-def moving_alone(mechanism: Mechanism) -> Mechanism:
-    """The tree of the bodies that move, those welded to them merged in, without loops."""
-    return replace(mechanism, bodies=mechanism.moving, locked={}, loops=())
-
-
 def _body_lines(body: Body, mass: float, moments: str) -> list[str]:
     joint = body.joint
     x, y, _ = np.asarray(joint.orientation).T
@@ -110,9 +113,31 @@ def _body_lines(body: Body, mass: float, moments: str) -> list[str]:
             spring = f'springref="{joint.spring_reference!r}" axis="{numbers(joint.axis)}" {spring}'
         if joint.type.sprung:
             spring = f'stiffness="{joint.stiffness!r}" {spring}'
+        limits = joint.limits or NO_LIMITS
+        for attribute, ends in (("range", limits.position), ("actuatorfrcrange", limits.effort)):
+            if _ranged(ends):
+                spring += f' {attribute}="{numbers(ends)}"'
         lines.append(f'  <joint name={quoteattr(body.coordinate)} type="{joint.type.mjcf}" {spring}/>')
     lines.append(f'  <inertial pos="{numbers(body.center)}" mass="{mass!r}" {moments}/>')
     return lines
+
+
+def _ranged(ends: Pair) -> bool:
+    """Whether MuJoCo takes a limit for one: by a range of which both ends are the same it means none."""
+    return ends != ANYTHING and ends[0] < ends[1]
+
+
+def _tell_left_out(bodies: Sequence[Body]) -> None:
+    """A warning with the names of coordinates whose limits MJCF has not."""
+    limits = {body.coordinate: body.joint.limits or NO_LIMITS for body in bodies if body.joint.type.moves}
+    fast = [name for name, each in limits.items() if each.velocity != ANYTHING]
+    narrow = [name for name, each in limits.items() if not all([a < b for a, b in (each.position, each.effort)])]
+    what = {
+        f"limits of velocity ({listed(fast)})": fast,
+        f"limits whose ends are one number ({listed(narrow)})": narrow,
+    }
+    if left_out := present(what):
+        warnings.warn(f"MJCF has no {' and no '.join(left_out)}: left out", MechanismWarning, stacklevel=3)
 
 
 def _require_joint(body: Body) -> None:

@@ -6,7 +6,7 @@ import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 from numpy.typing import ArrayLike
 
@@ -24,6 +24,7 @@ from .events.event import Event, EventProgram, event_program
 from .run_options import RunOptions
 from .sampled_controller import Hold, SampledController
 
+Made = TypeVar("Made")
 Constant: TypeAlias = float | Sequence[float]
 Tau: TypeAlias = Constant | Callable[..., Sequence[Node | float]] | SampledController
 
@@ -130,6 +131,7 @@ class Moving:
         self.stepped, self._varied = in_form(self.problem, form), bool(varied)
         self.events: EventProgram | None = event_program(self.stepped, events) if events else None
         self.kept = threading.local()  # the run of each thread, one after another
+        self._shared: tuple[Any, Any] = None, None
         self.plain = self.problem.normalization is None and self.problem.projection is None
 
     def values(self, parameters: Mapping[str, Any] | None) -> list[float]:
@@ -137,12 +139,25 @@ class Moving:
         if not self._varied:
             return []
         given = parameters or {}
-        if missing := [name for name in self._needed if name not in given]:
-            raise ValueError(f"parameter {missing[0]!r} of the controller needs a value")
+        self.require_given(given)
         values = self.numbers | {name: parameter_value(name, value) for name, value in given.items()}
         if given and self.model.system is not None:
             self.model.system.require_values(values)
         return [values[name] for name in self.problem.parameters]
+
+    def shared_out(self, key: Any, make: Callable[[], Made]) -> Made:
+        """How many motions are run side by side, made once for calls that are alike: that of the last is kept."""
+        known, made = self._shared
+        if known != key:
+            made = make()
+            self._shared = key, made
+        result: Made = made
+        return result
+
+    def require_given(self, parameters: Mapping[str, Any] | None) -> None:
+        """Raises ValueError where a parameter of the controller has no value."""
+        if missing := [name for name in self._needed if name not in (parameters or {})]:
+            raise ValueError(f"parameter {missing[0]!r} of the controller needs a value")
 
     def start(self, q: ArrayLike, qd: ArrayLike | None, t0: float, p: Sequence[float]) -> Array:
         """The state (m,) of q and qd in which a run starts."""

@@ -1,11 +1,11 @@
-"""Prepared motions: a model, a method and options fixed once, for motions from many starts; and how they are."""
+"""Prepared motions: one model, one method and its options, and how its motions from many starts are run."""
 
 from __future__ import annotations
 
 import math
 import sys
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -13,39 +13,37 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import Array, HoldsNodes, floats, require_choice, require_flag, require_sequence
+from cgraph.extend import Array, HoldsNodes, floats
 
-from ..equations.state_equation import FORMS
-from ..equations.states.initial_value import other_inputs
-from ..systems.model import Model, as_equations
-from .events.event import Event, as_events
-from .moving import Moving, Tau, check_varied
+from ..systems.model import Model
+from .events.event import Event
+from .moving import Moving, Tau
 from .outcome import INTERRUPTED, REACHED, MotionError, outcome
 from .progress_bar import Progress
 from .row_values import converted, unreached_momenta
-from .run_options import METHOD, RunOptions
-from .sampled_controller import SampledController
+from .run_options import RunOptions
 from .steps.dense_output import Solution, StepBlock
 from .steps.integration import integration_of
 from .steps.stepping import NativeIntegration
 from .trajectory import SimulationWarning, Trajectory
 
 if TYPE_CHECKING:
+    from .ensembles.workers import Workers
     from .motion_steps import MotionSteps
 
-ANY = 1.0  # s: the span of options, in place of which each run has its own
 KEPT_PARAMETERS = 16  # sets of parameter values, whose equations a motion keeps
 
 
 class MotionEnd(NamedTuple):
-    """End of a motion, as `PreparedMotion.end` gives it.
+    """End of a motion, as `PreparedMotion.end` gives it, or of N, as `ends` does.
 
     Parameters
     ----------
     t : float
         The end of the run, or the instant of the event that ended it [s].
     q, qd : ndarray
-        The state there, (nq,) and (n,) [rad or m, per second]; of an OdeSystem q is the state, and qd empty.
+        The state there, (nq,) and (n,) [rad or m, per second], or (N, nq) and (N, n); of an OdeSystem q is the state,
+        and qd empty.
 
     Examples
     --------
@@ -165,6 +163,61 @@ class PreparedMotion(HoldsNodes):
         if alone.status:
             raise MotionError(f"the motion did not reach t_end, {alone.status}")
         return MotionEnd(float(t_end), alone.q.copy(), alone.qd.copy())
+
+    def ends(
+        self,
+        q: ArrayLike,
+        qd: ArrayLike | None,
+        t_end: float,
+        t0: float = 0.0,
+        parameters: Mapping[str, ArrayLike] | None = None,
+        workers: Workers = 1,
+    ) -> MotionEnd:
+        """The ends of motions from N starts at t0, side by side: the last rows of `simulate_many`, to the bit.
+
+        All that is not a step is done once, in the first call: what follows, as in a loop of control, pays the steps.
+        A motion that stops before its end is NaN, and a `SimulationWarning` says of how many and why.
+
+        Parameters
+        ----------
+        q, qd, workers
+            As of `simulate_many`, whose options the motion has.
+        t_end, t0
+            As of `simulate`.
+        parameters : mapping, optional
+            {name: value}; of those that the motion keeps open, `varied`, also one for each start, (N,).
+
+        Returns
+        -------
+        MotionEnd
+            t_end, q (N, nq) and qd (N, n).
+
+        Raises
+        ------
+        TypeError, ValueError
+            As of `simulate_many`, for a parameter with many values that is not kept open, and for a motion with events.
+
+        Examples
+        --------
+        >>> import dynamics as dyn
+        >>> spring = dyn.System(lambda q, qd, t, p: qd[0]**2 / 2 - p["k"] * q[0]**2 / 2, "x", parameters={"k": 1.0})
+        >>> motion = dyn.prepare(spring, "rk4", dt=0.01, varied="k", estimate_error=False)
+        >>> motion.ends([1.0], [0.0], t_end=1.0, parameters={"k": [1.0, 4.0]}).q.round(6).tolist()
+        [[0.540302], [-0.416147]]
+        """
+        from .ensembles.ends import ends_of, single_values  # which a trajectory does not need
+
+        if self._events:
+            raise ValueError("ends of many motions are of those without events: simulate_many looks for them")
+        if self._options.scipy_solver is not None:
+            given = f"got {self._options.method!r}"
+            raise ValueError(f"ends of many motions are by methods of dyn.METHODS, and none of SciPy, {given}")
+        moving = self._moving(None if parameters is None else single_values(parameters, self._varied))
+        if moving.applied.controller is not None:
+            one = "a SampledController may remember what it has seen, and so controls one motion"
+            raise TypeError(f"{one}: ends of many are without")
+        options = self._options.over(t0, t_end, [t_end])
+        return MotionEnd(options.t_end, *ends_of(moving, options, q, qd, parameters, workers))
 
     def start(
         self,
@@ -316,70 +369,6 @@ class PreparedMotion(HoldsNodes):
             names.velocities,
             rows[1][:, nq:] if stepped.momenta else None,
         )
-
-
-def prepare(
-    model: Model,
-    method: str = METHOD,
-    *,
-    dt: float | None = None,
-    max_step: float | None = None,
-    rtol: float | None = None,
-    atol: ArrayLike | None = None,
-    events: Event | Iterable[Event] = (),
-    dense_output: bool = False,
-    tau: Tau = 0.0,
-    first_step: float | None = None,
-    max_steps: float = math.inf,
-    estimate_error: bool | None = None,
-    backend: str = "auto",
-    progress: bool | None = None,
-    form: str = "velocity",
-    varied: str | Iterable[str] = (),
-) -> PreparedMotion:
-    """A model, a method and its options, fixed once for many motions.
-
-    Parameters
-    ----------
-    model, method, dt, max_step, rtol, atol, events, dense_output, tau, first_step, max_steps
-        As of `simulate`, which is this and a call.
-    estimate_error, backend, progress, form
-        As of `simulate`, too.
-    varied : str or iterable of str
-        Parameters of the model or of a controller whose values stay open, so that those of a call cost nothing. Values
-        of others are built into the machine code, as `simulate` does, and other ones compile anew. Not with a
-        SampledController, nor SciPy's solvers. With a controller that is a function the first call checks the names.
-
-    Returns
-    -------
-    PreparedMotion
-        `motion(q, qd, t_end)` gives the trajectory of `simulate`, `motion.end(q, qd, t_end)` its end alone, at the
-        price of its steps and some microseconds, and `motion.start(q, qd)` the motion step by step.
-
-    Raises
-    ------
-    TypeError, ValueError
-        As `simulate`, for what is fixed here; what belongs to a start or to parameters is checked with these.
-
-    Examples
-    --------
-    >>> import dynamics as dyn
-    >>> motion = dyn.prepare(dyn.planar_arm([1.0, 0.8], [1.0, 0.8]), "dop853", rtol=1e-10)
-    >>> ends = [motion.end([angle, 0.0], [0.0, 0.0], t_end=0.5).q.round(3).tolist() for angle in (0.1, 0.2)]
-    >>> ends
-    [[0.005, 0.039], [0.011, 0.077]]
-    """
-    options = RunOptions(
-        ANY, method, dt, max_step, rtol, atol, None, first_step, max_steps, backend, progress, 0.0, estimate_error
-    )
-    equations = as_equations(model)
-    require_choice("form", form, FORMS)
-    if not (callable(tau) or isinstance(tau, float | SampledController)):
-        other_inputs(equations, tau)
-    names = require_sequence("varied", [varied] if isinstance(varied, str) else varied, "names of parameters", str)
-    check_varied(equations, tau, options, names)
-    dense_output = require_flag("dense_output", dense_output)
-    return PreparedMotion(model, options, tau, as_events(events), form, dense_output, names)
 
 
 def _level_of_caller() -> int:

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from ..systems.model import Model
 from .events.event import Event
 from .moving import Tau
-from .prepared_motion import prepare
+from .prepare import prepare
 from .run_options import METHOD, time_span
 from .trajectory import Trajectory
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 from pathlib import Path
 from typing import Any
 
@@ -61,6 +62,7 @@ def run(options: argparse.Namespace) -> int:
         rtol=options.rtol,
         dt=options.dt,
         t_eval=at,
+        dense_output=at is None and any(_limited(scene).values()),  # of few rows of a long run, steps may be too many
         form=form,
     )
     data = {"scene": scene.name, "rows": len(run.t), "form": form} | _summary(run) | _beyond(scene, run)
@@ -98,21 +100,27 @@ def _summary(run: dyn.Trajectory) -> dict[str, Any]:
     }
 
 
-def _beyond(scene: dyn.Scene, run: dyn.Trajectory) -> dict[str, Any]:
-    """Sentences on the limits of joints that rows of the run lie beyond; nothing of a model that has no limits."""
-    from dynamics.multibody.bodies.joint_coordinates import display_units
-    from dynamics.multibody.bodies.limits import NO_LIMITS, beyond_limits
-
-    limits = {name: each for name, each in scene.limits.items() if each != NO_LIMITS}
-    if not limits or scene.mechanism is None:
-        return {}
-    units = display_units(scene.mechanism.moving)
-    columns = {
-        "position": {name: run.q[:, run.coordinates.index(name)] for name in limits},
-        "velocity": {name: run.qd[:, run.velocities.index(name)] for name in limits},
+def _limited(scene: dyn.Scene) -> dict[str, dict[str, tuple[float, float]]]:
+    """{"position" or "velocity": {coordinate: the ends of its limit}} of those that are limited."""
+    kinds = ("position", "velocity")
+    ends = {kind: {name: getattr(each, kind) for name, each in scene.limits.items()} for kind in kinds}
+    return {
+        kind: {name: pair for name, pair in found.items() if pair != (-math.inf, math.inf)}
+        for kind, found in ends.items()
     }
-    unit_of = {name: units[f"q{run.coordinates.index(name)}"] for name in limits}
-    return {"beyond_limits": beyond_limits(limits, run.t, columns, unit_of)}
+
+
+def _beyond(scene: dyn.Scene, run: dyn.Trajectory) -> dict[str, Any]:
+    """Sentences on the limits of joints that the run has left, and where it was looked at; nothing without limits."""
+    if scene.mechanism is None or not any((limits := _limited(scene)).values()):
+        return {}
+    from dynamics.multibody.bodies.joint_coordinates import display_units
+    from dynamics.simulation.limits_left import limits_left
+
+    units = display_units(scene.mechanism.moving)
+    unit_of = {name: units[f"q{k}"] for k, name in enumerate(run.coordinates)}
+    read = "rows" if run.dense is None else "steps"
+    return {"beyond_limits": limits_left(run, limits, unit_of), "limits_looked_at_in": read}
 
 
 def _text(run: dyn.Trajectory, data: dict[str, Any]) -> str:
@@ -133,7 +141,8 @@ def _text(run: dyn.Trajectory, data: dict[str, Any]) -> str:
             f"changed by {data['energy_drift']:.2g} J at most"
         )
     if "beyond_limits" in data:
-        lines += [f"  limits  {each}" for each in data["beyond_limits"] or ["kept in every row"]]
+        looked = "" if data["limits_looked_at_in"] == "steps" else ", by the rows alone"
+        lines += [f"  limits  {each}{looked}" for each in data["beyond_limits"] or ["kept throughout"]]
     return "\n".join(lines)
 
 

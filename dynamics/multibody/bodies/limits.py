@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, fields
 
-import numpy as np
-
-from cgraph.extend import Array, real_array
+from cgraph.extend import real_array
 
 Pair = tuple[float, float]
 ANYTHING: Pair = (-math.inf, math.inf)
@@ -58,29 +55,3 @@ class Limits:
 
 
 NO_LIMITS = Limits()
-
-
-def beyond_limits(
-    limits: Mapping[str, Limits], t: Array, columns: Mapping[str, Mapping[str, Array]], units: Mapping[str, str]
-) -> list[str]:
-    """A sentence on every limit that a motion has left in one of its rows: where first, and how far it went.
-
-    t: (T,) [s].  columns: {"position" or "velocity": {coordinate: (T,)}}.  units: {coordinate: of its position}.
-    """
-    return [
-        sentence
-        for what, values in columns.items()
-        for name, column in values.items()
-        for sentence in _beyond(
-            f"{what} of {name}", getattr(limits[name], what), t, column, units[name] + "/s" * (what == "velocity")
-        )
-    ]
-
-
-def _beyond(what: str, ends: Pair, t: Array, values: Array, unit: str) -> list[str]:
-    over = np.nan_to_num(np.maximum(ends[0] - values, values - ends[1]), nan=-math.inf)
-    if not (over > 0.0).any():
-        return []
-    first, most = int(np.argmax(over > 0.0)), int(np.argmax(over))
-    left = f"{what} leaves {ends[0]:.6g} to {ends[1]:.6g} {unit} at {t[first]:.4g} s"
-    return [f"{left}, and is {values[most]:.6g} {unit} at {t[most]:.4g} s"]

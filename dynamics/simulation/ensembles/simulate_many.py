@@ -7,7 +7,7 @@ import os
 import time
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import closing
+from contextlib import closing, nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -23,27 +23,17 @@ from ...systems.model import Model
 from ..events.event import Event, EventProgram, as_events, event_program
 from ..events.event_log import split_crossings
 from ..moving import with_applied
-from ..outcome import INTERRUPTED
-from ..progress_bar import Progress
 from ..row_values import converted, unreached_momenta
 from ..run_options import METHOD, SCIPY, RunOptions, require_room, time_span
 from ..sampled_controller import SampledController
-from ..steps.equal_steps import EqualSteps, even_steps, step_count
-from ..steps.step_program import StepProgram, step_program
+from ..steps.equal_steps import step_count
+from ..steps.step_program import step_program
 from ..trajectory import SimulationWarning
-from .ensemble import Ensemble, EnsembleStats
-from .lanes import fits_lanes, iterates
+from .ensemble import Ensemble
+from .shares import chunk_width, doubts, run_chunks, side_by_side
 from .store import Store, sweep_of
-from .task import Chunk, Part, Task, not_begun
-from .workers import Team, Workers, checked, finished
-
-VECTOR = 8  # lanes, or a multiple of them, of every processor: a chunk of trajectories side by side is whole vectors
-LARGEST_CHUNK = 256  # trajectories in a chunk, unless asked for
-LONGEST_CHUNK = 4096  # of those in lanes, of which a chunk's rows of steps have no more than ..
-NUMBERS = 2**22  # .. so many numbers
-SHORT = 2**20  # equal steps of all trajectories, which take some hundredths of a second: a chunk for each worker
-SHARES = 4  # chunks for each worker, so that workers of unlike speed finish together
-UNKNOWN = 16  # workers behind a map, which does not say
+from .task import Part, Task
+from .workers import Workers, checked
 
 
 def simulate_many(
@@ -111,8 +101,8 @@ def simulate_many(
         rounded up to whole vectors, multiples of 8.
     store : path, optional
         A folder, empty or not there, in which chunks are kept as they end. The same call again takes up where the first
-        was ended, by whatever, with the chunks as they were cut then, and at last reads all from the folder. Ctrl-C is
-        then a KeyboardInterrupt.
+        was ended, by whatever, with the chunks as they were cut then, and at last reads all from the folder, which one
+        call at a time writes. Ctrl-C is then a KeyboardInterrupt, which says how many trajectories the folder keeps.
 
     Returns
     -------
@@ -129,7 +119,7 @@ def simulate_many(
     MemoryError
         For a result that would not fit.
     OSError
-        For a `store` that cannot be written, or has no room.
+        For a `store` that cannot be written, has no room, or is being written by another call.
     RuntimeError
         Where a process of `workers` is ended from outside.
     SingularMassMatrixError
@@ -160,19 +150,21 @@ def simulate_many(
     watch = event_program(problem, watched)
 
     # Share out the work: what a worker is sent, and the starts of chunks of trajectories
-    grids, lanes = ([], False) if watched else _side_by_side(program, options, len(start.x))
+    grids, lanes = ([], False) if watched else side_by_side(program, options, len(start.x))
     sent = replace(options, t_eval=options.row_times) if watched else options
     task = Task(program, sent, count, tuple(grids), watch if watched else None, lanes)
     x, p = _stepped(problem, start, t0)
-    width = _width(len(x), chunk, team, count * program.steps.width if lanes else 0, grids)
+    width = chunk_width(len(x), chunk, team, count * program.steps.width if lanes else 0, grids)
 
     # Integrate, by whoever takes the chunks and compiles the steps
-    kept = None if folder is None else Store(folder, sweep_of(problem, task, x, p), width, (len(x), count, x.shape[1]))
-    whole = _run(task, x, p, width, team, kept)
+    shape = len(x), count, x.shape[1]
+    opened = nullcontext() if folder is None else closing(Store(folder, sweep_of(problem, task, x, p), width, shape))
+    with opened as kept:
+        whole = run_chunks(task, x, p, width, team, kept)
 
     # Put the result together
     result = _ensemble(problem, watch, options, whole, (start, x, p), time.perf_counter() - begin)
-    for text in _warnings(result.stats):
+    for text in doubts(result.stats):
         warnings.warn(text, SimulationWarning, stacklevel=2)
     return result
 
@@ -234,26 +226,6 @@ def _ensemble(
     )
 
 
-def _warnings(stats: EnsembleStats) -> list[str]:
-    """Warnings of the first trajectory that stopped early and of the first in doubt, with their numbers."""
-    early = {
-        k: str(stats.message[k]).removeprefix("stopped ")
-        for k in np.flatnonzero(stats.status < 0).tolist()
-        if not stats.message[k].startswith(INTERRUPTED)
-    }
-    doubtful = {k: texts[0] for k, texts in enumerate(stats.warnings) if texts} if any(stats.warnings) else {}
-    many = f"of {len(stats.warnings)} trajectories"
-    said = []
-    if early:
-        first = min(early)
-        said.append(f"{len(early)} {many} stopped early: trajectory {first} {early[first]}")
-    if doubtful:
-        first = min(doubtful)
-        have = "has" if len(doubtful) == 1 else "have"
-        said.append(f"{len(doubtful)} {many} {have} a warning: trajectory {first}: {doubtful[first]}")
-    return said
-
-
 def _check(method: str, chunk: int | None, tau: object, store: str | os.PathLike[str] | None) -> Path | None:
     """The folder of a store. Raises for what is wrong with these arguments alone."""
     if isinstance(method, str) and method.startswith(SCIPY):
@@ -266,76 +238,3 @@ def _check(method: str, chunk: int | None, tau: object, store: str | os.PathLike
             "or write the controller in closed form"
         )
     return None if store is None else require_path("store", store)
-
-
-def _side_by_side(program: StepProgram, options: RunOptions, count: int) -> tuple[list[EqualSteps], bool]:
-    """The equal steps of trajectories side by side, and whether they go in lanes; neither of what goes one by one."""
-    grids = [] if program.adaptive else _grids(program, options, count)
-    return grids, fits_lanes(program, options, count) and (program.adaptive or len(grids) == 1)
-
-
-def _grids(program: StepProgram, options: RunOptions, count: int) -> list[EqualSteps]:
-    """Equal steps; empty where trajectories have to go, or are done sooner, one by one."""
-    if count < VECTOR and iterates(program):
-        return []
-    grids = even_steps(options.instants, options.step)
-    if options.times is None:  # every step is a row
-        grids = [each._replace(rows=each.steps) for each in grids]
-    return grids if sum(grid.steps for grid in grids) <= options.max_steps else []
-
-
-def _width(count: int, chunk: int | None, workers: Team, rows: int, grids: Sequence[EqualSteps]) -> int:
-    """Trajectories in a chunk, of so many.
-
-    rows: numbers in the rows of steps that a trajectory keeps in its lane, 0 where it is in none.
-    grids: of trajectories side by side, whose chunks are of whole vectors, so that each has the same neighbors in any.
-    """
-    largest = min(LONGEST_CHUNK, max(VECTOR, NUMBERS // rows)) if rows else LARGEST_CHUNK
-    if rows and chunk is not None:
-        chunk = min(chunk, largest)
-    if chunk is None:
-        short = rows and grids and count * grids[0].steps <= SHORT
-        shares = 1 if short else SHARES
-        chunk = min(largest, math.ceil(count / (shares * (workers if isinstance(workers, int) else UNKNOWN))))
-    return math.ceil(chunk / VECTOR) * VECTOR if grids else int(chunk)
-
-
-def _run(task: Task, x: Array, p: Array, width: int, workers: Team, store: Store | None) -> Part:
-    """Run the chunks, by whoever shares them, until all parts have come, or Ctrl-C; rows that have not are NaN.
-
-    Those that a store has are taken from there, and others are kept there as they end.
-    Raises ValueError unless all parts come.
-    """
-    rows = np.empty((len(x), task.count, x.shape[1])) if store is None else store.rows
-    whole, width = not_begun(0, rows, events=task.events is not None), width if store is None else store.width
-    chunks = [Chunk(k, x[k : k + width], p[k : k + width]) for k in range(0, len(x), width)]
-    arrived = np.zeros(len(whole.rows), dtype=bool)
-
-    def put(part: Part) -> None:
-        whole.put(part)
-        arrived[part.first : part.first + len(part.rows)] = True
-
-    for chunk in chunks if store is not None else ():
-        if store is not None and (part := store.part(chunk)) is not None:
-            put(part)
-    left = [chunk for chunk in chunks if not arrived[chunk.first]]
-    try:
-        with (
-            Progress("simulate", len(arrived), task.options.progress) as report,
-            closing(finished(task, left, workers, whole.rows)) as parts,
-        ):
-            for part in parts:
-                put(part)
-                if store is not None and not part.runs.interrupted:
-                    store.keep(part)
-                report(int(arrived.sum()))
-        if not arrived.all():
-            raise ValueError(
-                "workers must give a result for each item, as map does: of "
-                f"{len(arrived)} trajectories came back {arrived.sum()}"
-            )
-    except KeyboardInterrupt:
-        if store is not None:
-            raise
-        whole.rows[~arrived] = math.nan
-    return whole if store is None else replace(whole, rows=store.read_only())

@@ -12,7 +12,7 @@ from hashlib import blake2b
 from importlib.metadata import PackageNotFoundError, version
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 from zipfile import BadZipFile
 
 import numpy as np
@@ -24,7 +24,10 @@ from ...integrators import Problem
 from .ensemble import RunTable
 from .task import Chunk, Part, Task
 
-SWEEP, ROWS = "sweep.json", "rows.npy"
+if TYPE_CHECKING:
+    import sqlite3
+
+SWEEP, ROWS, LOCK = "sweep.json", "rows.npy", "lock.sqlite"
 FORMAT = 1
 
 
@@ -33,7 +36,7 @@ class Store:
 
     sweep.json: what the sweep is, see `sweep_of`, and how many trajectories are in a chunk.  rows.npy: the states
     (N, T, m) of all, in place.  chunk-000000000.npz, ..: how the trajectories from that number on went, a file each,
-    which is there once their rows are.
+    which is there once their rows are.  lock.sqlite: what one call at a time holds, see `lock`; it has nothing in it.
 
     width: trajectories in a chunk, as the sweep began.  rows: the table, written through to the file.
     """
@@ -41,23 +44,73 @@ class Store:
     def __init__(self, folder: Path, sweep: dict[str, Json], width: int, shape: tuple[int, ...]) -> None:
         """Open the folder, or begin it. Raises ValueError where it keeps something else, OSError where it cannot be."""
         self._folder = folder
+        self._lock: sqlite3.Connection | None = None
+        self.width = width
         folder.mkdir(parents=True, exist_ok=True)
+        try:
+            self._open(sweep, shape)
+        except BaseException:
+            self.close()
+            raise
+
+    def _open(self, sweep: dict[str, Json], shape: tuple[int, ...]) -> None:
+        folder, width = self._folder, self.width
+        if not self._whole(shape[0]):
+            self.lock()
         if (folder / SWEEP).exists():
             known = self._read()
             _require_same(folder, known, sweep)
-            width = int(known["chunk"])
-        elif any(folder.iterdir()):
+            self.width = int(known["chunk"])
+        elif any(path.name != LOCK for path in folder.iterdir()):
             raise ValueError(
                 f"store {str(folder)!r} is a folder with other files and without a sweep: name an empty one"
             )
         else:
             atomic_write(folder / SWEEP, json.dumps({**sweep, "chunk": width}, indent=1))
-        self.width = width
         if not (folder / ROWS).exists():
             self._make_rows(shape)
         self.rows: Array = np.load(folder / ROWS, mmap_mode="r+")
         if self.rows.shape != shape:
             raise ValueError(f"store {str(folder)!r} is damaged: its {ROWS} has shape {self.rows.shape}, not {shape}")
+
+    def lock(self) -> None:
+        """Take the folder for this call alone, until `close` or the end of the process, however that ends.
+
+        SQLite's lock does that on every system. Raises OSError where another call has taken it.
+        """
+        import sqlite3  # for what is written alone
+
+        if self._lock is not None:
+            return
+        lock = sqlite3.connect(self._folder / LOCK, timeout=0.0, check_same_thread=False)
+        try:
+            lock.execute("PRAGMA journal_mode = MEMORY")  # no file beside
+            lock.execute("BEGIN EXCLUSIVE")
+        except sqlite3.OperationalError as error:
+            lock.close()
+            if error.sqlite_errorcode != sqlite3.SQLITE_BUSY:
+                raise OSError(f"store {str(self._folder)!r} cannot be locked: {error}") from None
+            raise OSError(
+                f"store {str(self._folder)!r} is being written by another call of simulate_many, here or in another "
+                "process: wait for it, or name another folder"
+            ) from None
+        self._lock = lock
+
+    def close(self) -> None:
+        """Leave the folder to others."""
+        if self._lock is not None:
+            self._lock.close()
+            self._lock = None
+
+    def _whole(self, count: int) -> bool:
+        """Whether all chunks of so many trajectories are there, so that the folder is read alone."""
+        if not (self._folder / SWEEP).exists():
+            return False
+        return all(self._file(first).exists() for first in range(0, count, int(self._read()["chunk"])))
+
+    def kept(self, done: int) -> str:
+        """Sentence on what the folder has of a sweep that was interrupted."""
+        return f"store {str(self._folder)!r} keeps {done} of {len(self.rows)} trajectories: the same call goes on"
 
     def part(self, chunk: Chunk) -> Part | None:
         """The results of a chunk, if they are there."""

@@ -35,7 +35,7 @@ from ..steps.stepping import (
     failed_step,
 )
 from .ensemble import RunTable
-from .lanes import ChosenInLanes, EqualInLanes, InLanes, iterates, lanes_of
+from .lanes import ChosenInLanes, EqualInLanes, InLanes, Lanes, iterates, lanes_of
 from .unseen_run import run_unseen
 
 WORK = 2**21  # nodes computed in a block: half a millisecond for each vector
@@ -314,17 +314,19 @@ class Task:
         alone.seconds += time.perf_counter() - begin
         return done
 
+    def lane_run(self, lanes: Lanes, x: Array, p: Array) -> InLanes:
+        """The run in lanes from states x (k, m) with parameters p (k, ..)."""
+        if self.grids:
+            return EqualInLanes(lanes, self.options, x, p, self.grids[0])
+        return ChosenInLanes(lanes, self.options, x, p)
+
     def _in_lanes(self, chunk: Chunk, part: Part, first: int, stopped: Callable[[], bool]) -> bool:
         """Whether that can be, from the first on: else nothing is done. Runs that end early are made again, alone."""
         with _lock:
             lanes = lanes_of(self.program, self.options.backend)
         if lanes is None:
             return False
-        run: InLanes
-        if self.grids:
-            run = EqualInLanes(lanes, self.options, chunk.x, chunk.p, self.grids[0])
-        else:
-            run = ChosenInLanes(lanes, self.options, chunk.x[first:], chunk.p[first:])
+        run = self.lane_run(lanes, chunk.x[first:], chunk.p[first:])
         interrupted = False
         try:
             while run.advance(BLOCK_TIME):

@@ -6,6 +6,8 @@ import json
 import math
 import pickle
 import re
+from contextlib import nullcontext
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +15,7 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
+from dynamics.multibody.bodies.limits import ANYTHING
 from tests.each_row import each_row
 from viz import cli
 from viz.models.live_motion import live_of
@@ -61,9 +64,27 @@ def test_those_of_urdf_come_back_from_text() -> None:
 
 
 @LEFT_OUT
-def test_those_of_urdf_are_pinocchios() -> None:
+def test_mujoco_reads_what_is_written() -> None:
+    mujoco = pytest.importorskip("mujoco")
+    for arm in (dyn.load_urdf(ROBOT), dyn.load_mjcf(MODEL)):
+        with pytest.warns(dyn.MechanismWarning, match="left out") if arm.limits.get("j_hinge") else nullcontext():
+            text = dyn.to_mjcf(arm)
+        model = mujoco.MjModel.from_xml_string(text)
+        again = dyn.load_mjcf(text)
+        assert not again.left_out  # MuJoCo holds no motion to them, as we do not
+        assert again.limits == {name: replace(each, velocity=ANYTHING) for name, each in arm.limits.items()}
+        for j in [j for j in range(model.njnt) if model.joint(j).name in again.limits]:  # a ball has four coordinates
+            name = model.joint(j).name
+            position = tuple(model.jnt_range[j]) if model.jnt_limited[j] else ANYTHING
+            effort = tuple(model.jnt_actfrcrange[j]) if model.jnt_actfrclimited[j] else ANYTHING
+            assert (position, effort) == (again.limits[name].position, again.limits[name].effort)
+
+
+@LEFT_OUT
+@pytest.mark.parametrize("written", [False, True])
+def test_those_of_urdf_are_pinocchios(written: bool) -> None:
     pin, arm = pytest.importorskip("pinocchio"), dyn.load_urdf(ROBOT)
-    model: Any = pin.buildModelFromXML(ROBOT)
+    model: Any = pin.buildModelFromXML(dyn.to_urdf(arm) if written else ROBOT)
     for name, each in arm.limits.items():
         joint = model.joints[model.getJointId(name)]
         assert (model.velocityLimit[joint.idx_v], model.effortLimit[joint.idx_v]) == (each.velocity[1], each.effort[1])
@@ -137,6 +158,12 @@ def test_what_cannot_be_in_a_file_is_said() -> None:
     one_way = dyn.Joint("revolute", limits=dyn.Limits(effort=(0.0, 5.0)))
     with pytest.warns(dyn.MechanismWarning, match="one effort limit for both ways: that of 'b', 0 to 5, is left out"):
         assert 'effort="1000000000.0"' in dyn.to_urdf(dyn.Mechanism([dyn.Body("b", one_way, inertia=(1.0, 1.0, 1.0))]))
+    pytest.importorskip("mujoco")
+    half = dyn.Joint("revolute", limits=dyn.Limits((-1.0, math.inf), (0.0, 1.0), (0.0, 0.0)))
+    said = "MJCF has no limits of velocity (b) and no limits whose ends are one number (b): left out"
+    with pytest.warns(dyn.MechanismWarning, match=re.escape(said)):
+        text = dyn.to_mjcf(dyn.Mechanism([dyn.Body("b", half, mass=1.0, inertia=(1.0, 1.0, 1.0))]))
+    assert dyn.load_mjcf(text).limits == {"b": dyn.Limits((-1.0, math.inf))}
 
 
 @LEFT_OUT

@@ -7,6 +7,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -18,6 +19,7 @@ import pytest
 import cgraph as cg
 import dynamics as dyn
 from dynamics.simulation.ensembles import task
+from dynamics.simulation.ensembles.store import Store
 from tests.dynamics.ensembles import arms, same
 from tests.dynamics.models import oscillator
 
@@ -88,13 +90,34 @@ def test_a_sweep_that_was_killed_goes_on(tmp_path: Path) -> None:
 
 
 @pytest.mark.filterwarnings("ignore::dynamics.SimulationWarning")
+def test_one_call_at_a_time_writes_and_any_number_read(tmp_path: Path) -> None:
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
+    refused = "is being written by another call of simulate_many, here or in another process: wait for it"
+
+    def meanwhile(function: Callable[..., Any], chunks: Iterable[Any]) -> Iterator[Any]:
+        with pytest.raises(OSError, match=refused):
+            sweep(**options, store=tmp_path)
+        command = [sys.executable, "-c", KILLED, tmp_path]
+        ended = subprocess.run(command, check=False, env=environment, capture_output=True, text=True)
+        assert refused in ended.stderr
+        yield from map(function, chunks)
+
+    options = KINDS["side by side"]
+    first = sweep(**options, store=tmp_path, workers=meanwhile)
+    known = json.loads((tmp_path / "sweep.json").read_text())
+    with closing(Store(tmp_path, known, 8, (40, 2, 4))) as writing:
+        writing.lock()
+        assert same(first, sweep(**options, store=tmp_path))
+
+
+@pytest.mark.filterwarnings("ignore::dynamics.SimulationWarning")
 def test_ctrl_c_keeps_the_chunks_that_are_done(tmp_path: Path) -> None:
     def interrupted(function: Callable[..., Any], chunks: Iterable[Any]) -> Iterator[Any]:
         yield function(next(iter(chunks)))
         raise KeyboardInterrupt
 
     options = KINDS["side by side"]
-    with pytest.raises(KeyboardInterrupt):
+    with pytest.raises(KeyboardInterrupt, match="keeps 8 of 40 trajectories: the same call goes on"):
         sweep(**options, store=tmp_path, workers=interrupted)
     assert [path.name for path in tmp_path.glob("chunk-*")] == ["chunk-000000000.npz"]
     assert same(sweep(**options), sweep(**options, store=tmp_path))
