@@ -36,7 +36,7 @@ class Bench(NamedTuple):
         return measure(**((module.QUICK if quick else {}) | chosen))
 
 
-READING = ("ignore", "floating", "contacts")
+READING = ("ignore", "floating", "limits", "friction", "actuators", "contacts")
 BENCHES = {
     SPEED: Bench(
         "run times of tasks beside other software (default)",

@@ -150,22 +150,33 @@ def load_urdf(
 
 
 def load_at_start(
-    source: Source, *, ignore: bool = False, floating: bool = False, contacts: str | None = None
+    source: Source,
+    *,
+    ignore: bool = False,
+    floating: bool = False,
+    limits: Sequence[float] | None = None,
+    friction: float | None = None,
+    actuators: bool = False,
+    contacts: str | None = None,
 ) -> tuple[Mechanism, tuple[float, ...]]:
     """The mechanism of MJCF or URDF, by the root element, and the coordinates (nq,) at which the file has it.
 
     Of MJCF these are the references of joints and the places of free bodies; of URDF they are neutral.
-    Options are those of `load_mjcf` and `load_urdf`. Raises as these do, and for `floating` of MJCF, which says itself
-    what is free.
+    Options are those of `load_mjcf` and `load_urdf`. Raises as these do, for `floating` of MJCF, which says itself what
+    is free, and for `actuators` of URDF, which has none.
     """
     if root_of(source) == "robot" or (not is_text(source) and str(source).lower().endswith(".urdf")):
-        mechanism = load_urdf(source, ignore=ignore, floating=floating, contacts=contacts)
+        if require_flag("actuators", actuators):
+            raise MechanismError(f"actuators go with MJCF, and URDF, as is {called(source)}, has none")
+        mechanism = load_urdf(
+            source, ignore=ignore, floating=floating, limits=limits, friction=friction, contacts=contacts
+        )
         return mechanism, tuple(neutral(mechanism.moving))
     if require_flag("floating", floating):
         raise MechanismError(
             f"floating goes with URDF, and MJCF, as is {called(source)}, says itself which bodies float"
         )
-    taken, mj = smooth(None, None, False, contacts), compiled_mjcf(source, called(source))
+    taken, mj = smooth(limits, friction, actuators, contacts), compiled_mjcf(source, called(source))
     return warned(read_mjcf(mj, ignore, taken), called(source)), tuple(mj.qpos0.tolist())
 
 

@@ -183,7 +183,14 @@ _SUFFIXES = (".xml", ".urdf")
 
 
 def of_file(
-    path: str | os.PathLike[str], ignore: bool = False, floating: bool = False, contacts: str | None = None
+    path: str | os.PathLike[str],
+    ignore: bool = False,
+    floating: bool = False,
+    *,
+    limits: Sequence[float] | None = None,
+    friction: float | None = None,
+    actuators: bool = False,
+    contacts: str | None = None,
 ) -> Scene:
     """The mechanism of a model file, at rest where the file has it, named as the file is without its suffix.
 
@@ -195,8 +202,8 @@ def of_file(
         Leave out what a mechanism cannot have; `left_out` says what.
     floating : bool
         Of URDF, whether the root link moves freely.
-    contacts : "compliant", optional
-        Take contacts of spheres and ends of capsules as forces, as `load_mjcf` and `load_urdf` do.
+    limits, friction, actuators, contacts
+        Forces that stand for these, as `load_mjcf` and `load_urdf` take them.
 
     Returns
     -------
@@ -205,9 +212,17 @@ def of_file(
     Raises
     ------
     ValueError
-        As `load_mjcf` and `load_urdf` do, and for `floating` of MJCF.
+        As `load_mjcf` and `load_urdf` do, for `floating` of MJCF, and for `actuators` of URDF.
     """
-    mechanism, q = load_at_start(path, ignore=ignore, floating=floating, contacts=contacts)
+    mechanism, q = load_at_start(
+        path,
+        ignore=ignore,
+        floating=floating,
+        limits=limits,
+        friction=friction,
+        actuators=actuators,
+        contacts=contacts,
+    )
     about = f"{len(mechanism.moving)} moving bodies of {os.fspath(path)}"
     return Scene(Path(path).stem, about, mechanism, q, (0.0,) * mechanism.system.n, 3.0)
 

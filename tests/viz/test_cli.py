@@ -89,6 +89,9 @@ def test_a_model_file_stands_where_a_scene_s_name_does(tmp_path, capsys):
         said = f"cgraph: warning: {str(model)!r}: left out {contacts}joint limits (j); friction loss (j: 0.1)\n"
         assert capsys.readouterr().err == said
     assert "sqrt" in (tmp_path / "model.c").read_text()
+    every = [*TAKEN, "--limits", "1000,10", "--friction", "0.01", "--actuators"]
+    assert cli.main(["code", str(model), *every, "--c", "--out", str(tmp_path / "model.c")]) == 0
+    assert capsys.readouterr().err == "" and "tanh" in (tmp_path / "model.c").read_text()
 
 
 @each_row(
@@ -102,6 +105,7 @@ def test_a_model_file_stands_where_a_scene_s_name_does(tmp_path, capsys):
         ("draw chain --ignore --out x.dot", "scene 'chain' has no option 'ignore'"),
         ("draw chain --floating --out x.dot", "scene 'chain' has no option 'floating'"),
         ("draw chain --contacts compliant --out x.dot", "scene 'chain' has no option 'contacts'"),
+        ("draw chain --limits 0,1 --out x.dot", "scene 'chain' has no option 'limits'"),
         ("draw spring_mass --out x.jpg", "must end in .svg, .png, .dot or .txt"),
         ("draw spring_mass --out missing/x.dot", "does not exist"),
         (["draw", "spring_mass", "--out", "x.dot", "--collapse", "link 9"], "link 9"),

@@ -31,7 +31,7 @@ FORMULATIONS = (
 )
 FORMER_NAMES = {"euler_embedded": "by_definition"}  # of formulations, as `dynamics` takes them, too
 MOMENTUM_FORM = "Hamilton's equations, q_dot and p_dot of q and the momenta p"
-READING = ("ignore", "floating", "contacts")  # options of `scenes.of_file`
+READING = ("ignore", "floating", "limits", "friction", "actuators", "contacts")  # options of `scenes.of_file`
 IN_PYTHON = "file.py:name, a model of a Python file, which is executed"
 
 
@@ -52,6 +52,13 @@ def reads_files(command: argparse.ArgumentParser) -> None:
     """The arguments that say how a model file is read, `READING`."""
     command.add_argument("--ignore", action="store_true", help="leave out and name what of a file cgraph cannot model")
     command.add_argument("--floating", action="store_true", help="let the root link of a URDF file move freely")
+    command.add_argument(
+        "--limits", type=_spring, metavar="K,D", help="take limits of joints as springs of this stiffness and damping"
+    )
+    command.add_argument(
+        "--friction", type=positive, metavar="V", help="take friction loss, most of which acts from this velocity on"
+    )
+    command.add_argument("--actuators", action="store_true", help="take motors and servos of MJCF, with inputs at 0")
     command.add_argument("--contacts", choices=("compliant",), help="take contacts of spheres and capsules as forces")
 
 
@@ -180,6 +187,14 @@ def place(text: str) -> Path:
 def listed(text: str) -> tuple[str, ...]:
     """Names between commas, for argparse."""
     return tuple(filter(None, text.split(",")))
+
+
+def _spring(text: str) -> tuple[float, float]:
+    """Stiffness and damping, for argparse."""
+    stiffness, comma, damping = text.partition(",")
+    if not comma:
+        raise argparse.ArgumentTypeError(f"expected a stiffness and a damping, as 1000,10, got {text!r}")
+    return number(stiffness), number(damping)
 
 
 def formulation(text: str) -> str:
