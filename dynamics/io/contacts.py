@@ -1,4 +1,4 @@
-"""Contacts of a robot file: its spheres and the ends of its capsules on planes, of a material that its weight gives."""
+"""Contacts of a robot file: spheres and ends of capsules on planes and spheres, of a material that its weight gives."""
 
 from __future__ import annotations
 
@@ -17,20 +17,22 @@ from ..multibody.trees.mechanism import WORLD, Mechanism, MechanismError
 from .left_out import present
 
 COMPLIANT = "compliant"
-SINK = 0.01  # of its radius: how far a sphere sinks that carries the weight of the whole model
+SINK = 0.01  # of r: how far a sphere sinks that carries the weight of the whole model; of two, 1/r = 1/r_1 + 1/r_2
 CREEP = 0.1  # of sqrt(g sink): the transition velocity of friction
 FRICTION = 1.0  # where the file says nothing, as in MuJoCo
 
 
 class Ball(NamedTuple):
-    """A sphere of a body on a plane of the world."""
+    """A sphere of a body on a plane, or a sphere, of the world or of another body."""
 
     body: str
     at: Array  # (3,), in the body's frame [m]
     radius: float  # m
     friction: float = FRICTION
-    plane: ArrayLike = (0.0, 0.0, 0.0)  # a point of it [m]
-    normal: ArrayLike | None = None  # None: against gravity
+    to: str = WORLD
+    to_at: ArrayLike = (0.0, 0.0, 0.0)  # a point of the plane, or the center of the sphere [m]
+    to_radius: float | None = None  # m; None: a plane
+    normal: ArrayLike | None = None  # of the plane; None: against gravity
 
 
 def untaken(takeable: bool) -> str:
@@ -54,7 +56,7 @@ def with_contacts(mechanism: Mechanism, balls: Sequence[Ball], left_out: Sequenc
     left_out: sentences on contacts that are not among them.
     """
     balls = [ball for ball in balls if mechanism.carriers[ball.body].name != WORLD]
-    said = (*left_out, *present({"contacts, as no sphere or capsule of a body that moves is on a plane": not balls}))
+    said = (*left_out, *present({"contacts, as there are none of spheres or capsules of bodies that move": not balls}))
     mechanism = replace(mechanism, left_out=(*mechanism.left_out, *said))
     if not balls:
         return mechanism
@@ -66,13 +68,27 @@ def with_contacts(mechanism: Mechanism, balls: Sequence[Ball], left_out: Sequenc
     return replace(mechanism, forces=(*mechanism.forces, *[_contact(ball, weight, pull, gravity) for ball in balls]))
 
 
+def standing(mechanism: Mechanism, q: Sequence[float], floating: bool) -> list[float]:
+    """Coordinates, (nq,), with a root that floats, whose place they begin with, moved until a sphere just touches."""
+    found, contacts = list(q), [each for each in mechanism.forces if isinstance(each, Contact)]
+    if not (floating and contacts):
+        return found
+    state = {f"q{i}": value for i, value in enumerate(q)} | {f"qd{i}": 0.0 for i in range(mechanism.system.n)}
+    depth = max([float(mechanism.contact(each).evaluate(state)["depth"]) for each in contacts])
+    found[:3] = (np.array(q[:3]) + depth * np.asarray(contacts[0].normal)).tolist()
+    return found
+
+
 def _contact(ball: Ball, weight: float, pull: Array, gravity: float) -> Contact:
-    sink = SINK * ball.radius
+    size = ball.radius if ball.to_radius is None else 1.0 / (1.0 / ball.radius + 1.0 / ball.to_radius)
+    sink = SINK * size
     falling = float(np.sqrt(gravity * sink))  # m/s
     return Contact(
         ball.body,
+        ball.to,
         at=ball.at,
-        to_at=ball.plane,
+        to_at=ball.to_at,
+        to_radius=ball.to_radius,
         normal=spatial.snapped(-pull / gravity) if ball.normal is None else ball.normal,
         radius=ball.radius,
         stiffness=weight / sink**1.5,

@@ -13,6 +13,7 @@ from cgraph.extend import require_flag
 
 from ..multibody.bodies.joint_coordinates import neutral
 from ..multibody.trees.mechanism import Mechanism, MechanismError
+from .contacts import standing
 from .left_out import warned
 from .mujoco_twin import mujoco
 from .read_mjcf import compiled_mjcf, read_mjcf
@@ -154,13 +155,14 @@ def load_at_start(
 ) -> tuple[Mechanism, tuple[float, ...]]:
     """The mechanism of MJCF or URDF, by the root element, and the coordinates (nq,) at which the file has it.
 
-    Of MJCF these are the references of joints and the places of free bodies; of URDF they are neutral.
+    Of MJCF these are the references of joints and the places of free bodies; of URDF they are neutral,
+    but that a root link that floats stands on the ground, where it has contacts: its lowest sphere touches it.
     Options are those of `load_mjcf` and `load_urdf`. Raises as these do, and for `floating` of MJCF, which says itself
     what is free.
     """
     if root_of(source) == "robot" or (not is_text(source) and str(source).lower().endswith(".urdf")):
         mechanism = load_urdf(source, ignore=ignore, floating=floating, contacts=contacts)
-        return mechanism, tuple(neutral(mechanism.moving))
+        return mechanism, tuple(standing(mechanism, neutral(mechanism.moving), floating))
     if require_flag("floating", floating):
         raise MechanismError(
             f"floating goes with URDF, and MJCF, as is {called(source)}, says itself which bodies float"

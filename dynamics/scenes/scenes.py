@@ -196,7 +196,8 @@ def of_file(
     floating : bool
         Of URDF, whether the root link moves freely.
     contacts : "compliant", optional
-        Take contacts of spheres and ends of capsules as forces, as `load_mjcf` and `load_urdf` do.
+        Take contacts of spheres and ends of capsules as forces, as `load_mjcf` and `load_urdf` do. A URDF that floats
+        then starts with its lowest sphere on the ground.
 
     Returns
     -------
