@@ -183,7 +183,10 @@ _SUFFIXES = (".xml", ".urdf")
 
 
 def of_file(
-    path: str | os.PathLike[str], ignore: bool = False, floating: bool = False, contacts: str | None = None
+    path: str | os.PathLike[str],
+    ignore: bool = False,
+    floating: bool = False,
+    contacts: str | Mapping[str, float | str] | None = None,
 ) -> Scene:
     """The mechanism of a model file, at rest where the file has it, named as the file is without its suffix.
 
@@ -195,7 +198,7 @@ def of_file(
         Leave out what a mechanism cannot have; `left_out` says what.
     floating : bool
         Of URDF, whether the root link moves freely.
-    contacts : "compliant", optional
+    contacts : "compliant" or mapping, optional
         Take contacts of spheres and ends of capsules as forces, as `load_mjcf` and `load_urdf` do. A URDF that floats
         then starts with its lowest sphere on the ground.
 

@@ -166,6 +166,30 @@ def test_spheres_and_capsules_of_a_urdf_stand_on_the_ground() -> None:
     assert silently(dyn.load_urdf, text).left_out == (LEFT, "joint limits (slide)")
 
 
+def test_numbers_of_contacts_are_given_or_named() -> None:
+    text = LEG.format(shape='<sphere radius="0.05"/>')
+    usual = silently(dyn.load_urdf, text, contacts="compliant")
+    given = {"stiffness": 3e4, "friction": "mu", "dissipation": 0.5}
+    model = silently(dyn.load_urdf, text, contacts=given)
+    assert model.parameters == {"mu": 1.0}
+    for own, one in zip(usual.forces, model.forces, strict=True):
+        assert isinstance(own, dyn.Contact)
+        assert isinstance(one, dyn.Contact)
+        assert {name: getattr(one, name) for name in given} == given
+        assert (one.velocity, one.radius) == (own.velocity, own.radius)
+    same = silently(dyn.load_urdf, text.replace("0.02", "0.05"), contacts={"stiffness": "k", "friction": "mu"})
+    assert same.parameters == {"k": same.bind().forces[0].stiffness, "mu": 1.0}  # type: ignore[union-attr]
+    wrong: dict[str, Any] = {
+        "stiffness of the contacts is from .* to .*, and the parameter 'k' would have one value": {"stiffness": "k"},
+        "there is a parameter 'mu' already": {"friction": "mu", "stiffness": "mu"},
+        "a quantity of contacts must be": {"radius": 1.0},
+        "stiffness must be": {"stiffness": -1.0},
+    }
+    for said, contacts in wrong.items():
+        with raises(ValueError, match=said):
+            dyn.load_urdf(text.replace("0.02", "0.05") if "already" in said else text, contacts=contacts)
+
+
 def test_where_nothing_touches_or_weighs_it_is_said() -> None:
     rotor = dyn.Mechanism([dyn.Body("rotor", dyn.Joint("revolute"), mass=1.0, inertia=(0.1, 0.1, 0.1))])
     text = "contacts, as there are none of spheres or capsules of bodies that move"
