@@ -1,36 +1,39 @@
-"""Contacts of a robot file: its spheres and the ends of its capsules on planes, of a material that its weight gives."""
+"""Contacts of a robot file: spheres and ends of capsules on planes and spheres, of a material that its weight gives."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import Array, require_choice
+from cgraph.extend import Array, real_number, require_choice, require_mapping
 
 from ..multibody.algebra import spatial
-from ..multibody.forces.contact import Contact
+from ..multibody.forces.contact import CONTACT_QUANTITIES, Contact
 from ..multibody.trees.mechanism import WORLD, Mechanism, MechanismError
 from .left_out import present
 
 COMPLIANT = "compliant"
-SINK = 0.01  # of its radius: how far a sphere sinks that carries the weight of the whole model
+Material: TypeAlias = str | Mapping[str, float | str]  # "compliant", or quantities of `Contact` beside it
+SINK = 0.01  # of r: how far a sphere sinks that carries the weight of the whole model; of two, 1/r = 1/r_1 + 1/r_2
 CREEP = 0.1  # of sqrt(g sink): the transition velocity of friction
 FRICTION = 1.0  # where the file says nothing, as in MuJoCo
 
 
 class Ball(NamedTuple):
-    """A sphere of a body on a plane of the world."""
+    """A sphere of a body on a plane, or a sphere, of the world or of another body."""
 
     body: str
     at: Array  # (3,), in the body's frame [m]
     radius: float  # m
     friction: float = FRICTION
-    plane: ArrayLike = (0.0, 0.0, 0.0)  # a point of it [m]
-    normal: ArrayLike | None = None  # None: against gravity
+    to: str = WORLD
+    to_at: ArrayLike = (0.0, 0.0, 0.0)  # a point of the plane, or the center of the sphere [m]
+    to_radius: float | None = None  # m; None: a plane
+    normal: ArrayLike | None = None  # of the plane; None: against gravity
 
 
 def untaken(takeable: bool) -> str:
@@ -38,9 +41,21 @@ def untaken(takeable: bool) -> str:
     return f"contacts{' (the option contacts takes those of spheres and capsules)' * takeable}"
 
 
-def asked(contacts: str | None) -> bool:
-    """Whether contacts are taken. Raises ValueError for what is neither None nor "compliant"."""
-    return contacts is not None and require_choice("contacts", contacts, (COMPLIANT,)) == COMPLIANT
+def asked(contacts: Material | None) -> Mapping[str, float | str] | None:
+    """What contacts have in place of numbers that follow from the file; None where they are not taken.
+
+    Raises ValueError for a text that is not "compliant" and for what is no quantity of a `Contact`, and TypeError.
+    """
+    if contacts is None:
+        return None
+    if isinstance(contacts, str):
+        require_choice("contacts", contacts, (COMPLIANT,))
+        return {}
+    for name, value in require_mapping("contacts", contacts, "quantity of a Contact: number or name").items():
+        require_choice("a quantity of contacts", name, tuple(CONTACT_QUANTITIES))
+        if not isinstance(value, str):
+            real_number(f"contacts: {name}", value)
+    return dict(contacts)
 
 
 def capsule_ends(center: Array, axis: Array, half: float) -> list[Array]:
@@ -48,13 +63,17 @@ def capsule_ends(center: Array, axis: Array, half: float) -> list[Array]:
     return [center - half * axis, center + half * axis]
 
 
-def with_contacts(mechanism: Mechanism, balls: Sequence[Ball], left_out: Sequence[str]) -> Mechanism:
-    """The mechanism with contacts of the balls, of those that move. Raises MechanismError where nothing has weight.
+def with_contacts(
+    mechanism: Mechanism, material: Mapping[str, float | str], balls: Sequence[Ball], left_out: Sequence[str]
+) -> Mechanism:
+    """The mechanism with contacts of the balls, of those that move.
 
-    left_out: sentences on contacts that are not among them.
+    material: see `asked`; a name is a parameter of the number that all contacts have.  left_out: sentences on contacts
+    that are not among them.
+    Raises MechanismError where nothing has weight, and for a parameter in place of different numbers.
     """
     balls = [ball for ball in balls if mechanism.carriers[ball.body].name != WORLD]
-    said = (*left_out, *present({"contacts, as no sphere or capsule of a body that moves is on a plane": not balls}))
+    said = (*left_out, *present({"contacts, as there are none of spheres or capsules of bodies that move": not balls}))
     mechanism = replace(mechanism, left_out=(*mechanism.left_out, *said))
     if not balls:
         return mechanism
@@ -63,16 +82,43 @@ def with_contacts(mechanism: Mechanism, balls: Sequence[Ball], left_out: Sequenc
     weight = gravity * sum([float(body.mass) for body in mechanism.moving])
     if not weight:
         raise MechanismError("the stiffness of contacts follows from the weight of the model, and it has none")
-    return replace(mechanism, forces=(*mechanism.forces, *[_contact(ball, weight, pull, gravity) for ball in balls]))
+    contacts = [_contact(ball, weight, pull, gravity) for ball in balls]
+    parameters = dict(mechanism.parameters)
+    for what, name in material.items():
+        if isinstance(name, str):
+            own = [getattr(contact, what) for contact in contacts]
+            if min(own) < max(own):
+                differ = f"{what} of the contacts is from {min(own):.6g} to {max(own):.6g}"
+                raise MechanismError(f"{differ}, and the parameter {name!r:.60} would have one value; give it a number")
+            if name in parameters:
+                raise MechanismError(f"{what} of the contacts: there is a parameter {name!r:.60} already")
+            parameters[name] = own[0]
+    options: Any = material
+    contacts = [replace(contact, **options) for contact in contacts]
+    return replace(mechanism, forces=(*mechanism.forces, *contacts), parameters=parameters)
+
+
+def standing(mechanism: Mechanism, q: Sequence[float], floating: bool) -> list[float]:
+    """Coordinates, (nq,), with a root that floats, whose place they begin with, moved until a sphere just touches."""
+    found, contacts = list(q), [each for each in mechanism.forces if isinstance(each, Contact)]
+    if not (floating and contacts):
+        return found
+    state = {f"q{i}": value for i, value in enumerate(q)} | {f"qd{i}": 0.0 for i in range(mechanism.system.n)}
+    depth = max([float(mechanism.contact(each).evaluate(state)["depth"]) for each in contacts])
+    found[:3] = (np.array(q[:3]) + depth * np.asarray(contacts[0].normal)).tolist()
+    return found
 
 
 def _contact(ball: Ball, weight: float, pull: Array, gravity: float) -> Contact:
-    sink = SINK * ball.radius
+    size = ball.radius if ball.to_radius is None else 1.0 / (1.0 / ball.radius + 1.0 / ball.to_radius)
+    sink = SINK * size
     falling = float(np.sqrt(gravity * sink))  # m/s
     return Contact(
         ball.body,
+        ball.to,
         at=ball.at,
-        to_at=ball.plane,
+        to_at=ball.to_at,
+        to_radius=ball.to_radius,
         normal=spatial.snapped(-pull / gravity) if ball.normal is None else ball.normal,
         radius=ball.radius,
         stiffness=weight / sink**1.5,

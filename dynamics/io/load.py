@@ -13,6 +13,7 @@ from cgraph.extend import require_flag
 
 from ..multibody.bodies.joint_coordinates import neutral
 from ..multibody.trees.mechanism import Mechanism, MechanismError
+from .contacts import Material, standing
 from .left_out import warned
 from .mujoco_twin import mujoco
 from .read_mjcf import compiled_mjcf, read_mjcf
@@ -33,7 +34,7 @@ def load_mjcf(
     limits: Sequence[float] | None = None,
     friction: float | None = None,
     actuators: bool = False,
-    contacts: str | None = None,
+    contacts: Material | None = None,
 ) -> Mechanism:
     """The mechanism of a MuJoCo model: its trees of joints and welds, springs, damping and armature, and its loops.
 
@@ -57,12 +58,14 @@ def load_mjcf(
     actuators : bool
         Take motors, position and velocity servos and the like on hinges and slides, see `Actuator`. Their inputs are
         parameters, "ctrl_" and the actuator's name (or number), 0 where nothing else is said.
-    contacts : "compliant", optional
-        Take spheres, and the ends of capsules, on planes, where MuJoCo lets them collide, as compliant contacts, see
-        `Contact`. The file's softness is not taken, its sliding friction is. With the weight W of all that moves, g of
-        gravity, the radius r and a sink s = 0.01 r, the stiffness is W / s^(3/2), so that a sphere that carries it all
-        sinks by s; dissipation is 1 / sqrt(g s), which damps that motion with a ratio of 0.4; the velocity of friction
-        is 0.1 sqrt(g s). Other shapes and pairs are left out. Other numbers go in by `dataclasses.replace`.
+    contacts : "compliant" or mapping of str to float or str, optional
+        Take spheres on planes and on spheres, and the ends of capsules on planes, where MuJoCo lets them collide, as
+        compliant contacts, see `Contact`. The file's softness is not taken, its sliding friction is. With the weight W
+        of all that moves, g of gravity, the radius r (of two spheres 1/r = 1/r_1 + 1/r_2) and a sink s = 0.01 r, the
+        stiffness is W / s^(3/2), so that a sphere that carries it all sinks by s; dissipation is 1 / sqrt(g s), which
+        damps that motion with a ratio of 0.4; the velocity of friction is 0.1 sqrt(g s). A mapping, such as
+        {"stiffness": 1e5, "friction": "mu"}, has other numbers in place of these, the same for all contacts, and names
+        of parameters, whose values are these. Other shapes and pairs are left out.
 
     Returns
     -------
@@ -97,7 +100,7 @@ def load_urdf(
     floating: bool = False,
     limits: Sequence[float] | None = None,
     friction: float | None = None,
-    contacts: str | None = None,
+    contacts: Material | None = None,
 ) -> Mechanism:
     """The mechanism of a URDF file, with the numbers of the file; its root link stands still, or floats.
 
@@ -122,7 +125,7 @@ def load_urdf(
         (stiffness, damping) of springs that stand for the limits of hinges and slides, see `JointLimit`.
     friction : float, optional
         A velocity [rad/s or m/s]; friction loss then acts as loss tanh(qd / friction), see `JointFriction`.
-    contacts : "compliant", optional
+    contacts : "compliant" or mapping of str to float or str, optional
         Take collision shapes that are spheres, and the ends of capsules, as compliant contacts with the ground, the
         plane through the world's origin across gravity, with the numbers of `load_mjcf` and a friction of 1. Other
         shapes, and contacts of links with one another, are left out.
@@ -157,11 +160,12 @@ def load_at_start(
     limits: Sequence[float] | None = None,
     friction: float | None = None,
     actuators: bool = False,
-    contacts: str | None = None,
+    contacts: Material | None = None,
 ) -> tuple[Mechanism, tuple[float, ...]]:
     """The mechanism of MJCF or URDF, by the root element, and the coordinates (nq,) at which the file has it.
 
-    Of MJCF these are the references of joints and the places of free bodies; of URDF they are neutral.
+    Of MJCF these are the references of joints and the places of free bodies; of URDF they are neutral,
+    but that a root link that floats stands on the ground, where it has contacts: its lowest sphere touches it.
     Options are those of `load_mjcf` and `load_urdf`. Raises as these do, for `floating` of MJCF, which says itself what
     is free, and for `actuators` of URDF, which has none.
     """
@@ -171,7 +175,7 @@ def load_at_start(
         mechanism = load_urdf(
             source, ignore=ignore, floating=floating, limits=limits, friction=friction, contacts=contacts
         )
-        return mechanism, tuple(neutral(mechanism.moving))
+        return mechanism, tuple(standing(mechanism, neutral(mechanism.moving), floating))
     if require_flag("floating", floating):
         raise MechanismError(
             f"floating goes with URDF, and MJCF, as is {called(source)}, says itself which bodies float"

@@ -1,9 +1,9 @@
-"""Contacts of MuJoCo's model: which of its geoms meet, and the spheres among them that are on planes."""
+"""Contacts of MuJoCo's model: which of its geoms meet, and the spheres and capsules among them that are taken."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -32,7 +32,7 @@ def _kinds() -> tuple[int, int, int]:
 
 
 def mjcf_balls(mj: MjModel, ends: Sequence[tuple[str, Array]]) -> tuple[list[Ball], list[str]]:
-    """Spheres and ends of capsules on planes, and sentences on contacts that are not such.
+    """Spheres that meet planes and spheres, ends of capsules on planes, and sentences on other contacts.
 
     ends: of each of MuJoCo's bodies, the name of ours, and the origin of its frame in that one's.
     """
@@ -43,24 +43,29 @@ def mjcf_balls(mj: MjModel, ends: Sequence[tuple[str, Array]]) -> tuple[list[Bal
     mujoco().mj_kinematics(mj, data)  # planes stand still
     balls: list[Ball] = []
     others: list[str] = []
-    rolling = False
+    rolling, weld = False, mj.body_weldid[mj.geom_bodyid]
     for (first, second), (friction, dimensions) in _meetings(mj).items():
-        ground, geom = sorted((first, second), key=lambda g: int(mj.geom_type[g]) != plane)
-        kind = int(mj.geom_type[geom])
-        if int(mj.geom_type[ground]) != plane or kind not in (sphere, capsule):
+        ground, geom = sorted((first, second), key=lambda g: (int(mj.geom_type[g]) != plane, weld[g] != 0))
+        kinds = int(mj.geom_type[ground]), int(mj.geom_type[geom])
+        known = kinds in ((plane, sphere), (plane, capsule), (sphere, sphere)) and weld[ground] != weld[geom]
+        if not known or (kinds[0] == sphere and (data.geom_xpos[ground] == data.geom_xpos[geom]).all()):
             others.append(f"{_called(mj, first)} and {_called(mj, second)}")
             continue
         rolling |= dimensions > SLIDING
-        body, origin = ends[int(mj.geom_bodyid[geom])]
+        (body, origin), (to, to_origin) = (ends[int(mj.geom_bodyid[each])] for each in (geom, ground))
         center, radius = origin + mj.geom_pos[geom], float(mj.geom_size[geom, 0])
+        against: dict[str, Any] = {"friction": friction if dimensions >= SLIDING else 0.0}
+        if kinds[0] == plane:
+            normal = spatial.snapped(data.geom_xmat[ground].reshape(3, 3)[:, 2])
+            against |= {"to_at": data.geom_xpos[ground].copy(), "normal": normal}
+        else:
+            against |= {"to": to, "to_at": spatial.cleaned(to_origin + mj.geom_pos[ground])}
+            against |= {"to_radius": float(mj.geom_size[ground, 0])}
         axis = spatial.from_quaternion(mj.geom_quat[geom])[:, 2]
-        centers = capsule_ends(center, axis, float(mj.geom_size[geom, 1])) if kind == capsule else [center]
-        normal = spatial.snapped(data.geom_xmat[ground].reshape(3, 3)[:, 2])
-        for at in centers:
-            rubbing = friction if dimensions >= SLIDING else 0.0
-            balls.append(Ball(body, spatial.cleaned(at), radius, rubbing, data.geom_xpos[ground].copy(), normal))
+        centers = capsule_ends(center, axis, float(mj.geom_size[geom, 1])) if kinds[1] == capsule else [center]
+        balls += [Ball(body, spatial.cleaned(at), radius, **against) for at in centers]
     sentences = {
-        f"contacts other than of spheres and capsules with planes ({listed(others)})": others,
+        f"contacts other than of spheres, and of capsules with planes ({listed(others)})": others,
         "torsional and rolling friction of contacts": rolling,
     }
     return balls, present(sentences)

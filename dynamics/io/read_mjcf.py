@@ -70,7 +70,7 @@ def read_mjcf(mj: MjModel, ignore: bool, smooth: Smooth = NONE) -> Mechanism:
     moving = [body for body in bodies if body.joint.type.moves]
     forces, loops = mjcf_forces(mj, moving, smooth), read_loops(mj, moving, ends)
     mechanism = Mechanism(bodies, gravity, forces, left_out=left_out, loops=loops)
-    return with_contacts(mechanism, *mjcf_balls(mj, ends)) if smooth.contacts else mechanism
+    return mechanism if smooth.contacts is None else with_contacts(mechanism, smooth.contacts, *mjcf_balls(mj, ends))
 
 
 def compiled_mjcf(source: object, called: str) -> MjModel:
@@ -208,7 +208,7 @@ def _acting_from_outside(mj: MjModel, smooth: Smooth) -> list[str]:
     servos = [f"{mj.actuator(i).name or f'number {i}'}: {force}" for i, force in acting.items() if force]
     others = present(
         {
-            untaken(has_balls(mj)): touching and not (smooth.contacts or disabled(mj, "CONSTRAINT", "CONTACT")),
+            untaken(has_balls(mj)): touching and smooth.contacts is None and not disabled(mj, "CONSTRAINT", "CONTACT"),
             f"joint limits ({listed(_joint_names(mj, limits))})": limits and limited,
             "tendon limits": _any(mj, "tendon_limited") and limited,
             f"friction loss ({listed(losses)})": losses and rubbing and smooth.friction is None,

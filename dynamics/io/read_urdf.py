@@ -70,7 +70,7 @@ def read_urdf(robot: Element, called: str, ignore: bool, floating: bool = False,
             left_out=left_out,
             loops=_couplings(joints, mimics.leaders),
         )
-        return with_contacts(mechanism, *_balls(links)) if smooth.contacts else mechanism
+        return mechanism if smooth.contacts is None else with_contacts(mechanism, smooth.contacts, *_balls(links))
     except MechanismError as error:
         raise MechanismError(f"URDF, {called}: {error}") from None
 
@@ -257,7 +257,7 @@ def _outside(robot: Element, joints: Mapping[str, Element], smooth: Smooth) -> l
     rubbing = [f"{name}: {force:g}" for name, joint in joints.items() if (force := _friction(joint, name))]
     return present(
         {
-            untaken(takeable): robot.findall("link/collision") and not smooth.contacts,
+            untaken(takeable): robot.findall("link/collision") and smooth.contacts is None,
             f"joint limits ({listed(limited)})": limited and smooth.limits is None,
             f"limits that cannot be ({listed(wrong)})": wrong,
             f"friction loss ({listed(rubbing)})": rubbing and smooth.friction is None,

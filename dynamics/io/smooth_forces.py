@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -14,7 +14,7 @@ from cgraph.extend import Array, real_array, real_number, require_flag
 from ..multibody.bodies.body import Body, MechanismError
 from ..multibody.bodies.limits import ANYTHING, Limits
 from ..multibody.forces.joint_force import Actuator, JointForce, JointFriction, JointLimit, Range
-from .contacts import asked
+from .contacts import Material, asked
 from .mujoco_twin import mujoco
 
 if TYPE_CHECKING:
@@ -27,13 +27,14 @@ class Smooth:
 
     limits: stiffness and damping of springs in place of joint limits, see `JointLimit`; None leaves limits out.
     friction: the velocity of `JointFriction`; None leaves friction loss out.
-    actuators, contacts: whether they are taken.
+    actuators: whether they are taken.
+    contacts: what these have in place of numbers that follow from the file; None leaves contacts out.
     """
 
     limits: tuple[float, float] | None = None
     friction: float | None = None
     actuators: bool = False
-    contacts: bool = False
+    contacts: Mapping[str, float | str] | None = None
 
     def limit(self, body: str, lower: float, upper: float) -> JointLimit:
         """The limit of a joint."""
@@ -44,7 +45,9 @@ class Smooth:
 NONE = Smooth()
 
 
-def smooth(limits: Sequence[float] | None, friction: float | None, actuators: bool, contacts: str | None) -> Smooth:
+def smooth(
+    limits: Sequence[float] | None, friction: float | None, actuators: bool, contacts: Material | None
+) -> Smooth:
     """Choice of forces, checked. Raises MechanismError, TypeError and ValueError."""
     springs = None
     if limits is not None:

@@ -190,7 +190,7 @@ def of_file(
     limits: Sequence[float] | None = None,
     friction: float | None = None,
     actuators: bool = False,
-    contacts: str | None = None,
+    contacts: str | Mapping[str, float | str] | None = None,
 ) -> Scene:
     """The mechanism of a model file, at rest where the file has it, named as the file is without its suffix.
 
@@ -203,7 +203,8 @@ def of_file(
     floating : bool
         Of URDF, whether the root link moves freely.
     limits, friction, actuators, contacts
-        Forces that stand for these, as `load_mjcf` and `load_urdf` take them.
+        Forces that stand for these, as `load_mjcf` and `load_urdf` take them. A URDF that floats and has contacts starts
+        with its lowest sphere on the ground.
 
     Returns
     -------

@@ -105,7 +105,7 @@ EVALUATION = "'wasm-unsafe-eval'"  # in the policy: WebAssembly may be compiled,
 def panel(live: Live, begin: str = "startLive();") -> Panel:
     """The panel of a live motion, for a page whose style has --text, --back, --soft and --edge.
 
-    The page's scripts need elements.js, address.js and surfaces.js.  begin: JavaScript that begins it, or says when to.
+    The page's scripts need elements.js, address.js and, of contacts, surfaces.js.  begin: JavaScript that begins it, or says when to.
     """
     colors = {"kinetic": theme.BLUE, "potential": theme.ORANGE, "right": theme.GREEN, "wrong": theme.SPURIOUS}
     variables = ":root{" + "".join(f"--live-{name}:{color};" for name, color in colors.items()) + "}\n"
@@ -125,7 +125,9 @@ def page_text(live: Live, title: str, about: str = "") -> Page:
     shown = panel(live)
     words = f"<p>{escape(about)}</p>\n" if about else ""
     body = f"<main>\n<h1>{escape(title)}</h1>\n{words}{shown.body}</main>"
-    script = f'"use strict";\n{asset(html.__package__, "elements.js", "address.js", "surfaces.js")}\n{shown.run}'
+    touching = len(live.shown.outputs) > len(live.meters) + 2 * len(live.parents)
+    shared = asset(html.__package__, "elements.js", "address.js", *["surfaces.js"] * touching)
+    script = f'"use strict";\n{shared}\n{shown.run}'
     return html.compose(
         title, body, f"{asset(__package__, 'alone.css')}{shown.style}", script, shown.data, shown.allowed
     )

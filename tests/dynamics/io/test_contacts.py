@@ -8,6 +8,7 @@ import pytest
 from pytest import approx, raises
 
 import dynamics as dyn
+from dynamics.io.load import load_at_start
 from dynamics.io.mjcf_contacts import _meetings
 from tests.tolerances import EQUATIONS
 
@@ -21,7 +22,8 @@ CROWD = """<mujoco><option>{flags}</option><default><geom size="1"/></default><w
 <body name="c" pos="0 0.1 0.1"><geom name="c1" type="sphere" priority="1" friction="0.1"/>
 <body name="d" pos="0 0.1 0"><joint axis="1 0 0"/><geom name="d1" type="sphere" contype="0"/></body></body>
 </body></body>
-<body name="e" pos="0 0 0.3"><freejoint/><geom name="e1" type="sphere" condim="4"/></body></worldbody>
+<body name="e" pos="0 0 0.3"><freejoint/><geom name="e1" type="sphere" condim="4"/>
+<geom name="e2" type="capsule" size="1 1"/></body></worldbody>
 <contact><exclude body1="a" body2="e"/>
 <pair geom1="b1" geom2="floor" friction="0.25 0.25 0.1 0.1 0.1" condim="3"/></contact>
 </mujoco>"""
@@ -86,6 +88,26 @@ def test_spheres_and_ends_of_capsules_are_where_mujoco_has_them() -> None:
         assert contact.friction == 1.0  # the larger: that of the ball, by default
 
 
+def test_two_spheres_touch_where_mujoco_has_it() -> None:
+    """Of bodies that move, of one that stands and of the world; those that MuJoCo lets meet, and no others."""
+    mujoco = pytest.importorskip("mujoco")
+    mj = mujoco.MjModel.from_xml_string(CROWD.format(flags=""))
+    data = mujoco.MjData(mj)
+    data.qpos[:] += np.random.default_rng(0).normal(scale=0.2, size=mj.nq)
+    mujoco.mj_normalizeQuat(mj, data.qpos)
+    mujoco.mj_forward(mj, data)
+    spheres = [g for g in range(mj.ngeom) if mj.geom_type[g] == mujoco.mjtGeom.mjGEOM_SPHERE]
+    met = [each for each in data.contact[: data.ncon] if {int(each.geom1), int(each.geom2)} <= set(spheres)]
+    model = silently(dyn.load_mjcf, mj, contacts="compliant")
+    pairs = [each for each in model.forces if isinstance(each, dyn.Contact) and each.to_radius is not None]
+    touches = [dyn.arrays_at(model, model.contact(each), q=data.qpos, qd=np.zeros(mj.nv)) for each in pairs]
+    ours = [[float(each[name]) for name in ("depth", "x", "y", "z")] for each in touches]
+    theirs = [[-float(each.dist), *each.pos.tolist()] for each in met]
+    assert len(ours) == len(theirs) > 3
+    assert np.array(sorted(ours)) == approx(np.array(sorted(theirs)), abs=EQUATIONS)
+    assert {each.to for each in pairs} > {"world"}
+
+
 def test_a_sphere_that_carries_all_sinks_by_a_hundredth_of_its_radius() -> None:
     """In any units, and however strong gravity is."""
     pytest.importorskip("mujoco")
@@ -96,6 +118,10 @@ def test_a_sphere_that_carries_all_sinks_by_a_hundredth_of_its_radius() -> None:
         model = dyn.load_mjcf(text, contacts="compliant")
         rest = {"q0": 0.99 * radius, "qd0": 0.0, "tau0": 0.0}
         assert dyn.forward_dynamics(model).evaluate(rest)["qdd0"] == approx(0.0, abs=EQUATIONS * gravity)
+        large = f'size="{3.0 * radius}" pos="0 0 {-radius}"'
+        onto = dyn.load_mjcf(text.replace('type="plane" size="1 1 1"', large), contacts="compliant")
+        rest["q0"] = (3.0 - 0.01 * 0.75) * radius  # 3/4 = 1 / (1/1 + 1/3)
+        assert dyn.forward_dynamics(onto).evaluate(rest)["qdd0"] == approx(0.0, abs=EQUATIONS * gravity)
         A, _ = dyn.linearize(model, [0.99 * radius], [0.0])
         poles = np.linalg.eigvals(A)
         assert (-poles.real / np.abs(poles)).tolist() == approx([0.5 * 1.5**-0.5] * 2, rel=1e-6)  # damped as said
@@ -104,12 +130,15 @@ def test_a_sphere_that_carries_all_sinks_by_a_hundredth_of_its_radius() -> None:
 def test_what_is_no_sphere_on_a_plane_is_left_out_and_said() -> None:
     mujoco = pytest.importorskip("mujoco")
     mj = mujoco.MjModel.from_xml_string(CROWD.format(flags=""))
-    with pytest.warns(dyn.MechanismWarning, match="left out contacts other than of spheres and capsules with planes"):
+    with pytest.warns(
+        dyn.MechanismWarning, match="left out contacts other than of spheres, and of capsules with planes"
+    ):
         model = dyn.load_mjcf(mj, contacts="compliant")
-    friction = {each.body: each.friction for each in model.forces if isinstance(each, dyn.Contact)}
+    found = [each for each in model.forces if isinstance(each, dyn.Contact)]
+    friction = {each.body: each.friction for each in found if each.to_radius is None}
     assert friction == {"a": 0.7, "b": 0.25, "c": 0.1, "d": 1.0, "e": 1.0}
     assert [text.split(" (")[0] for text in model.left_out] == [
-        "contacts other than of spheres and capsules with planes",
+        "contacts other than of spheres, and of capsules with planes",
         "torsional and rolling friction of contacts",
     ]
     assert silently(dyn.load_mjcf, mj).left_out == (LEFT,)
@@ -130,14 +159,40 @@ def test_spheres_and_capsules_of_a_urdf_stand_on_the_ground() -> None:
     assert [each.radius for each in contacts] == [0.02, 0.02, 0.05]
     run = dyn.simulate(model, [0.6], [0.0], 2.0)
     assert run.q[-1, 0] == approx(0.4 + 0.99 * 0.05, rel=1e-6)
+    _, q = silently(load_at_start, text, floating=True, contacts="compliant")
+    assert q == approx((0.0, 0.0, 0.45, 1.0, 0.0, 0.0, 0.0, 0.0))  # the lowest sphere touches
     boxed = silently(dyn.load_urdf, LEG.format(shape='<box size="1 1 1"/>'), contacts="compliant")
     assert boxed.left_out == ("joint limits (slide)", "contacts of shapes other than spheres and capsules (leg: box)")
     assert silently(dyn.load_urdf, text).left_out == (LEFT, "joint limits (slide)")
 
 
+def test_numbers_of_contacts_are_given_or_named() -> None:
+    text = LEG.format(shape='<sphere radius="0.05"/>')
+    usual = silently(dyn.load_urdf, text, contacts="compliant")
+    given = {"stiffness": 3e4, "friction": "mu", "dissipation": 0.5}
+    model = silently(dyn.load_urdf, text, contacts=given)
+    assert model.parameters == {"mu": 1.0}
+    for own, one in zip(usual.forces, model.forces, strict=True):
+        assert isinstance(own, dyn.Contact)
+        assert isinstance(one, dyn.Contact)
+        assert {name: getattr(one, name) for name in given} == given
+        assert (one.velocity, one.radius) == (own.velocity, own.radius)
+    same = silently(dyn.load_urdf, text.replace("0.02", "0.05"), contacts={"stiffness": "k", "friction": "mu"})
+    assert same.parameters == {"k": same.bind().forces[0].stiffness, "mu": 1.0}  # type: ignore[union-attr]
+    wrong: dict[str, Any] = {
+        "stiffness of the contacts is from .* to .*, and the parameter 'k' would have one value": {"stiffness": "k"},
+        "there is a parameter 'mu' already": {"friction": "mu", "stiffness": "mu"},
+        "a quantity of contacts must be": {"radius": 1.0},
+        "stiffness must be": {"stiffness": -1.0},
+    }
+    for said, contacts in wrong.items():
+        with raises(ValueError, match=said):
+            dyn.load_urdf(text.replace("0.02", "0.05") if "already" in said else text, contacts=contacts)
+
+
 def test_where_nothing_touches_or_weighs_it_is_said() -> None:
     rotor = dyn.Mechanism([dyn.Body("rotor", dyn.Joint("revolute"), mass=1.0, inertia=(0.1, 0.1, 0.1))])
-    text = "contacts, as no sphere or capsule of a body that moves is on a plane"
+    text = "contacts, as there are none of spheres or capsules of bodies that move"
     with pytest.warns(dyn.MechanismWarning, match=text):
         assert dyn.load_urdf(dyn.to_urdf(rotor), contacts="compliant").left_out == (text,)
     light = LEG.format(shape='<sphere radius="0.05"/>').replace(
