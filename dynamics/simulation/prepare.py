@@ -36,6 +36,7 @@ def prepare(
     max_steps: float = math.inf,
     estimate_error: bool | None = None,
     backend: str = "auto",
+    fma: bool = True,
     progress: bool | None = None,
     form: str = "velocity",
     varied: str | Iterable[str] = (),
@@ -46,7 +47,7 @@ def prepare(
     ----------
     model, method, dt, max_step, rtol, atol, events, dense_output, tau, first_step, max_steps
         As of `simulate`, which is this and a call.
-    estimate_error, backend, progress, form
+    estimate_error, backend, fma, progress, form
         As of `simulate`, too.
     varied : str or iterable of str
         Parameters of the model or of a controller whose values stay open, so that those of a call cost nothing. Values
@@ -73,7 +74,7 @@ def prepare(
     [[0.005, 0.039], [0.011, 0.077]]
     """
     options = RunOptions(
-        ANY, method, dt, max_step, rtol, atol, None, first_step, max_steps, backend, progress, 0.0, estimate_error
+        ANY, method, dt, max_step, rtol, atol, None, first_step, max_steps, backend, progress, 0.0, estimate_error, fma
     )
     equations = as_equations(model)
     require_choice("form", form, FORMS)

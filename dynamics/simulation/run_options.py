@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import Array, nearest, real_array, real_number
+from cgraph.extend import Array, nearest, real_array, real_number, require_flag
 
 from ..equations.states.initial_value import times_to_record
 from ..integrators import METHODS, MOST_STAGES, Method
@@ -37,7 +37,7 @@ class RunOptions:
 
     Parameters
     ----------
-    t_end, method, dt, max_step, rtol, atol, t_eval, first_step, max_steps, backend, progress, t0, estimate_error
+    t_end, method, dt, max_step, rtol, atol, t_eval, first_step, max_steps, backend, progress, t0, estimate_error, fma
         As for `simulate`.
 
     Raises
@@ -68,6 +68,7 @@ class RunOptions:
     progress: bool | None = None
     t0: float = 0.0
     estimate_error: bool | None = None
+    fma: bool = True
 
     def __post_init__(self) -> None:
         check_method(self.method)
@@ -89,6 +90,8 @@ class RunOptions:
                 )
         self._check_tolerances()
         self._check_estimate()
+        if not require_flag("fma", self.fma) and self.scipy_solver is not None:
+            raise ValueError(f"fma=False is about the steps of dyn.METHODS, and {self.method!r} is SciPy's")
         most = real_number("max_steps", self.max_steps)
         if not (most >= 1.0 and (most == math.inf or most == int(most))):
             raise ValueError(f"max_steps must be a whole number, at least 1, or infinite, got {self.max_steps!r}")

@@ -37,6 +37,7 @@ def simulate(
     max_steps: float = math.inf,
     estimate_error: bool | None = None,
     backend: str = "auto",
+    fma: bool = True,
     progress: bool | None = None,
     form: str = "velocity",
 ) -> Trajectory:
@@ -106,6 +107,9 @@ def simulate(
         (`Stats.error`), which takes three quarters as long again; by default they do. The rows are the same without.
     backend : str
         "llvm", "python", or "auto" for machine code where llvmlite is installed; the steps are the same.
+    fma : bool
+        Whether the steps may fuse a product and a sum where the processor can, as in `cgraph.compile`. Without they
+        have the bits that they have in Python, in C and on any other machine with the same C library.
     progress : bool, optional
         A progress line on standard error; None shows it on a terminal, for runs over a second.
     form : {"velocity", "momentum"}
@@ -150,6 +154,7 @@ def simulate(
         max_steps=max_steps,
         estimate_error=estimate_error,
         backend=backend,
+        fma=fma,
         progress=progress,
         form=form,
     )

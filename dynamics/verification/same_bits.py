@@ -14,6 +14,7 @@ import tempfile
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
+from functools import partial
 from hashlib import blake2b
 from pathlib import Path
 
@@ -28,7 +29,7 @@ from ..equations.substitute import substitute
 from ..integrators.elementwise import weighted
 from ..integrators.tableau import RK4
 from ..scenes.scenes import Scene
-from ..simulation.simulate import simulate
+from ..simulation.prepare import prepare
 from ..systems.arguments import TIME
 
 STEP = 2.0**-10  # s: with it times are exact
@@ -124,7 +125,7 @@ def same_bits(scene: Scene) -> SameBits:
     """
     motion = _Motion(scene)
     found: list[tuple[str, str, str]] = []
-    left_out = ["simulate in machine code: it fuses products and sums where the processor can"]
+    left_out: list[str] = []
     for name, run in motion.ways():
         try:
             found.append((name, LIBRARY, run()))
@@ -173,7 +174,8 @@ class _Motion:
         yield "threads", self._native(self._threads)
         yield "another process", self._process
         yield "C", self._c
-        yield "simulate in Python", self._simulate
+        yield "simulate in Python", partial(self._simulate, "python")
+        yield "simulate in machine code", self._native(partial(self._simulate, "auto"))
 
     def _native(self, run: Callable[[], str]) -> Callable[[], str]:
         if self.native:
@@ -232,7 +234,7 @@ class _Motion:
                 rows.append(x[: self.states].copy())
         return _digest(np.array(rows))
 
-    def _simulate(self) -> str:
+    def _simulate(self, backend: str) -> str:
         """A run brings unit quaternions and constraints back to where they hold, which the steps alone do not."""
         scene = self.scene
         if normalization(scene.model) is not None or (scene.ode is None and len(scene.system.constraints)):
@@ -241,9 +243,8 @@ class _Motion:
             )
         times = STEP * np.arange(EVERY, STEPS + 1, EVERY)
         qd = None if scene.ode is not None else scene.qd
-        run = simulate(
-            scene.model, scene.q, qd, times[-1], "rk4", dt=STEP, t_eval=times, backend="python", estimate_error=False
-        )
+        moving = prepare(scene.model, "rk4", dt=STEP, backend=backend, fma=False, estimate_error=False)
+        run = moving(scene.q, qd, times[-1], t_eval=times)
         if not run.stats.success:
             raise NotRunError(run.stats.message)
         return _digest(run.q if qd is None else np.concatenate([run.q, run.qd], axis=1))

@@ -143,12 +143,12 @@ class Ours(Solver):
 
     @cached_property
     def _plain(self) -> CompiledSteps:
-        return compile_steps(step_program(self.problem, self.method, dense=False), self.backend)
+        return compile_steps(step_program(self.problem, self.method, dense=False), self.backend, True)
 
     @cached_property
     def _dense(self) -> CompiledSteps:
         program = step_program(self.problem, self.method, dense=self.method.adaptive)
-        return compile_steps(program, self.backend)
+        return compile_steps(program, self.backend, True)
 
     def _options(self, knob: float, times: Sequence[float], max_steps: float = math.inf) -> RunOptions:
         t_end = self.task.t_end

@@ -71,7 +71,7 @@ class _Shared:
         grids, in_lanes = side_by_side(program, options, count)
         self._task = Task(program, options, 1, tuple(grids), None, in_lanes)
         self._width = chunk_width(count, None, team, program.steps.width if in_lanes else 0, grids)
-        self._lanes = lanes_of(program, options.backend) if in_lanes else None
+        self._lanes = lanes_of(program, options.backend, options.fma) if in_lanes else None
 
     def by_lanes(self, x: Array, p: Array) -> Array | None:
         """The ends, (N, m), of motions in lanes alone; None where one needs more, or has a remark."""

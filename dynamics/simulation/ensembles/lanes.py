@@ -37,16 +37,17 @@ class Lanes(NamedTuple):
 
 
 @kept_by_first
-def lanes_of(program: StepProgram, backend: str) -> Lanes | None:
+def lanes_of(program: StepProgram, backend: str, fma: bool) -> Lanes | None:
     """The lanes of a program; None in Python, and where a statement has no vectors."""
     if not program.adaptive:  # sines are those of vectors, as beside an estimate of the error
-        code = runner(program.steps, backend).lane_code("count", ("t", "evaluations", "nonfinite"), alike=False)
+        kept = "t", "evaluations", "nonfinite"
+        code = runner(program.steps, backend, fma=fma).lane_code("count", kept, alike=False)
         return None if code is None else Lanes(program, code)
     toward, t = inputs = cg.variables("toward t")
     clock = Call(Graph(inputs, {"clock": toward * t}), ("lanes.toward", "t"), ("lanes.clock",))
     lengths = {**program.steps.registers, "lanes.toward": 1, "lanes.clock": 1}
     steps = replace(program.steps, registers=lengths, body=[*program.steps.body, clock])
-    code = runner(steps, backend).lane_code("lanes.clock", RESULTS)
+    code = runner(steps, backend, fma=fma).lane_code("lanes.clock", RESULTS)
     return None if code is None else Lanes(program, code)
 
 

@@ -7,7 +7,7 @@ import os
 import time
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import closing, nullcontext
+from contextlib import AbstractContextManager, closing, nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -59,6 +59,7 @@ def simulate_many(
     max_steps: float = math.inf,
     estimate_error: bool | None = None,
     backend: str = "auto",
+    fma: bool = True,
     progress: bool | None = None,
     form: str = "velocity",
     store: str | os.PathLike[str] | None = None,
@@ -77,8 +78,10 @@ def simulate_many(
     q, qd : array_like
         The starts, (N, nq) and (N, n) [rad or m, per second], or (nq,) and (n,) for all, as in `simulate`; of an
         OdeSystem q is the state, and qd None.
-    t_end, method, t0, t_span, dt, max_step, rtol, atol, first_step, max_steps, estimate_error, backend, progress, form
+    t_end, method, t0, t_span, dt, max_step, rtol, atol, first_step, max_steps, estimate_error
         As in `simulate`, without SciPy's methods.
+    backend, fma, progress, form
+        As in `simulate`.
     t_eval : array_like, optional
         Times from t0 to t_end to record, in this order, (T,) [s]; by default every step. Methods that choose their
         steps need it.
@@ -136,7 +139,7 @@ def simulate_many(
     folder = _check(method, chunk, tau, store)
     t0, t_end = time_span(t_end, t0, t_span)
     arguments = (dt, max_step, rtol, atol, t_eval, first_step, max_steps, backend, progress)
-    options = RunOptions(t_end, method, *arguments, t0, estimate_error)
+    options = RunOptions(t_end, method, *arguments, t0, estimate_error, fma)
     watched, team = as_events(events), checked(workers)
     model, applied = with_applied(model, tau, parameters)
     start = initial_values(model, q, qd, applied.constant, parameters, t0)
@@ -144,8 +147,7 @@ def simulate_many(
     count = _row_count(options, *start.x.shape, stored=store is not None)
 
     # Derive the equations as graphs, and write the steps of the method over them
-    begin = time.perf_counter()
-    problem = in_form(derive(model, start.bound), form)
+    begin, problem = time.perf_counter(), in_form(derive(model, start.bound), form)
     program = step_program(problem, options.integrator, dense=bool(watched) or options.between)
     watch = event_program(problem, watched)
 
@@ -157,9 +159,7 @@ def simulate_many(
     width = chunk_width(len(x), chunk, team, count * program.steps.width if lanes else 0, grids)
 
     # Integrate, by whoever takes the chunks and compiles the steps
-    shape = len(x), count, x.shape[1]
-    opened = nullcontext() if folder is None else closing(Store(folder, sweep_of(problem, task, x, p), width, shape))
-    with opened as kept:
+    with _opened(folder, problem, task, x, p, width) as kept:
         whole = run_chunks(task, x, p, width, team, kept)
 
     # Put the result together
@@ -173,6 +173,15 @@ def _stepped(problem: Problem, start: InitialValues, t0: float) -> tuple[Array, 
     """The states (N, m) that the steps start from, and the parameters of the problem, (N, ..)."""
     p = np.array([start.varied[name] for name in problem.parameters]).reshape(-1, len(start.x)).T.copy()
     return converted(problem.momentum, t0, start.x, p), p
+
+
+def _opened(
+    folder: Path | None, problem: Problem, task: Task, x: Array, p: Array, width: int
+) -> AbstractContextManager[Store | None]:
+    """The store in that folder, for this call alone."""
+    if folder is None:
+        return nullcontext()
+    return closing(Store(folder, sweep_of(problem, task, x, p), width, (len(x), task.count, x.shape[1])))
 
 
 def _row_count(options: RunOptions, many: int, m: int, *, stored: bool) -> int:

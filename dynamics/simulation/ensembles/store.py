@@ -183,7 +183,7 @@ def sweep_of(problem: Problem, task: Task, x: Array, p: Array) -> dict[str, Json
         "cgraph": cg.__version__,
         "llvmlite": _version("llvmlite"),
         "machine": platform.machine(),
-        **{name: getattr(options, name) for name in ("method", "backend", "estimate_error")},
+        **{name: getattr(options, name) for name in ("method", "backend", "fma", "estimate_error")},
         **{name: _number(getattr(options, name)) for name in ("t0", "t_end", "dt", "max_step", "first_step")},
         "max_steps": _number(options.max_steps),
         "rtol": options.relative,

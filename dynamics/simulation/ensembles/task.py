@@ -90,7 +90,7 @@ class VectorCode(NamedTuple):
 
 
 @kept_by_first
-def vector_code(program: StepProgram, backend: str) -> VectorCode:
+def vector_code(program: StepProgram, backend: str, fma: bool) -> VectorCode:
     """The steps of a program, without its `stop`: lanes that go on do not stop for one that failed."""
     steps = replace(program.steps, stop=None)
     first, start = steps.body[0], None
@@ -102,7 +102,8 @@ def vector_code(program: StepProgram, backend: str) -> VectorCode:
         body = (Call(_LIVE, ("nonfinite",), ("live",)), If("live", tuple(steps.body)))
         start = start and replace(start, registers=registers)
         steps = replace(steps, registers=registers, body=body)
-    code = VectorCode(program, None if start is None else runner(start, backend), runner(steps, backend), stops)
+    begin = None if start is None else runner(start, backend, fma=fma)
+    code = VectorCode(program, begin, runner(steps, backend, fma=fma), stops)
     for each in (code.start, code.one_pass):
         if each is not None:
             each.run_many(np.zeros((each.size, 0)), 0)  # the code for vectors is compiled at its first use
@@ -287,7 +288,7 @@ class Task:
 
     def _side_by_side(self, chunk: Chunk, part: Part, stopped: Callable[[], bool]) -> None:
         with _lock:
-            code = vector_code(self.program, self.options.backend)
+            code = vector_code(self.program, self.options.backend, self.options.fma)
         estimator = None
         if self.options.estimated:
             estimator = Estimator(code.program, self.options, chunk.p, partial(beside, code), sparse=True)
@@ -323,7 +324,7 @@ class Task:
     def _in_lanes(self, chunk: Chunk, part: Part, first: int, stopped: Callable[[], bool]) -> bool:
         """Whether that can be, from the first on: else nothing is done. Runs that end early are made again, alone."""
         with _lock:
-            lanes = lanes_of(self.program, self.options.backend)
+            lanes = lanes_of(self.program, self.options.backend, self.options.fma)
         if lanes is None:
             return False
         run = self.lane_run(lanes, chunk.x[first:], chunk.p[first:])
@@ -348,7 +349,7 @@ class Task:
     ) -> int:
         """Number of these that were run, or given up for Ctrl-C: no more once they took so long [s]."""
         with _lock:
-            compiled = compile_steps(self.program, self.options.backend)
+            compiled = compile_steps(self.program, self.options.backend, self.options.fma)
         run: Integration | None = None
         ends = self.options.row_times[-1] == self.options.t_end
         whole, end, count = True, time.perf_counter() + seconds, 0

@@ -265,7 +265,7 @@ def integration_of(
         return segment(options) if events is None else _watched(segment, options, events)
     method = options.integrator
     program = step_program(problem, method, dense=method.adaptive and (between or options.between))
-    run = NativeRun(compile_steps(program, options.backend), options, parameters, control=hold)
+    run = NativeRun(compile_steps(program, options.backend, options.fma), options, parameters, control=hold)
     return integration(run, every_step=between, events=events)
 
 

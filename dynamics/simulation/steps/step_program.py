@@ -162,6 +162,6 @@ def _arrived(pickled: bytes) -> StepProgram:
 
 
 @kept_by_first
-def compile_steps(program: StepProgram, backend: str) -> CompiledSteps:
+def compile_steps(program: StepProgram, backend: str, fma: bool) -> CompiledSteps:
     """The steps, ready to run."""
-    return CompiledSteps(program, runner(program.steps, backend).prepared())
+    return CompiledSteps(program, runner(program.steps, backend, fma=fma).prepared())
