@@ -75,7 +75,7 @@ def quick_machine_code(request: pytest.FixtureRequest) -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         if not users:
             patch.setattr(llvm_engine, "LEVEL", 0)
-            patch.setattr(llvm_engine.Host, "_translated", _translated)
+            patch.setattr(llvm_engine.Host, "_translated", lambda host, text, level: _translated(host, text, 0))
         yield
 
 

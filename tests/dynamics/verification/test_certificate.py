@@ -93,7 +93,7 @@ def test_loops_are_those_of_pinocchio() -> None:
 
 
 @pytest.mark.filterwarnings("ignore::dynamics.ConstraintWarning")
-@pytest.mark.parametrize("count", [3, pytest.param(150, marks=[pytest.mark.slow, pytest.mark.timeout(3600)])])
+@pytest.mark.parametrize("count", [2, pytest.param(150, marks=[pytest.mark.slow, pytest.mark.timeout(3600)])])
 def test_random_linkages_with_more_rows_than_they_need_pass(count: int) -> None:
     """Newton's method is drawn to singular positions of theirs; tilted, some are so everywhere, or held."""
     models = {}
@@ -108,18 +108,19 @@ def test_random_linkages_with_more_rows_than_they_need_pass(count: int) -> None:
     assert len(judged) > 0.9 * len(models)
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_states_of_a_linkage_are_no_singular_positions(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_states_of_a_linkage_are_no_singular_positions(monkeypatch: pytest.MonkeyPatch) -> None:
     """Peaucellier's linkage folds, long bar on long bar, at most states that Newton's method finds."""
-    system = peaucellier().system
+    linkage = peaucellier()
+    system = linkage.system
     folded, _ = nearest_state(system, [-1.3, -1.4, -1.3, 4.9, 4.5, -0.2, -0.2], [0.0] * 7)
     assert abs(math.remainder(folded[0] - folded[2], 2.0 * math.pi)) < 1e-12
     assert new_rows(system, folded, 0.0) == 0.0
-    states = random_states(system, 5, 0.0, 1.0, np.random.default_rng(seed))
-    assert min(new_rows(system, q, 0.0) for q in states["q"]) > 0.05
-    assert failed(certify(peaucellier(), 3, seed)) == {}
+    for seed in range(3):
+        states = random_states(system, 5, 0.0, 1.0, np.random.default_rng(seed))
+        assert min(new_rows(system, q, 0.0) for q in states["q"]) > 0.05
+    assert failed(certify(linkage, 3)) == {}
     monkeypatch.setattr(certificate, "state_space", lambda system: scaled(dyn.state_space(system), 1.0 + 1e-6))
-    assert [each.split(" along")[0] for each in failed(certify(peaucellier(), 3, seed))] == [
+    assert [each.split(" along")[0] for each in failed(certify(linkage, 3))] == [
         "derivatives: A and B of the linearization"
     ]
 
@@ -166,11 +167,12 @@ def test_a_wrong_rule_of_differentiation_is_found() -> None:
     assert "energy: dE/dqd = M qd" not in found
 
 
-@pytest.mark.parametrize("seed", [0, 8, 12])
-def test_what_does_not_turn_at_a_state_is_measured_by_others(seed: int) -> None:
+def test_what_does_not_turn_at_a_state_is_measured_by_others() -> None:
     """A disk, whose mass is a sum of squares of sines and cosines, at states where little else changes."""
-    (skew,) = [each for each in dyn.certify(disk(), 20, seed, speed=0.5).residuals if "skew" in each.equation]
-    assert skew.value < 0.5 * skew.bound.value
+    model = disk()
+    for seed in (0, 8, 12):
+        (skew,) = [each for each in dyn.certify(model, 20, seed, speed=0.5).residuals if "skew" in each.equation]
+        assert skew.value < 0.5 * skew.bound.value
 
 
 @pytest.mark.parametrize(
