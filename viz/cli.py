@@ -7,7 +7,9 @@ import os
 import select
 import signal
 import sys
-from collections.abc import Sequence
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 
 from .commands.signals import ENDING, ignore_late, settled, stoppable, stopped, watch_loading
 
@@ -61,16 +63,30 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _command(arguments: Sequence[str] | None) -> int:
-    from .commands.arguments import show_warnings  # here, where a signal is awaited: with all else it takes a second
-    from .commands.command import parse
+    from .commands.command import parse  # here, where a signal is awaited: with all else it takes a second
 
     options = parse(arguments)
-    with show_warnings():
+    with _shown_warnings():
         status: int | None = options.run(options)
     settled()
     if sys.stdout is not None:
         sys.stdout.flush()
     return status or SUCCESS
+
+
+@contextmanager
+def _shown_warnings() -> Iterator[None]:
+    """Show a warning as a line of standard error, once, without the line of our code that gave it."""
+    with warnings.catch_warnings():
+        shown: set[str] = set()
+
+        def show(message: Warning | str, *_: object, **__: object) -> None:
+            if str(message) not in shown:
+                shown.add(str(message))
+                _say(f"warning: {message}")
+
+        warnings.showwarning = show
+        yield
 
 
 def _say(line: str) -> None:

@@ -187,14 +187,14 @@ def needed(statements: Sequence[Statement], results: Iterable[str]) -> list[Stat
     return kept[::-1]
 
 
-def length_of(lengths: Lengths, where: str, name: str) -> int:
+def length_of(lengths: Lengths, where: object, name: str) -> int:
     """Length of a register. Raises GraphError for an unknown one, in the words of `where`."""
     if not isinstance(name, str) or name not in lengths:
         raise GraphError(f"{where} names register {name!r}, not among {', '.join(lengths) or 'none'}")
     return lengths[name]
 
 
-def require_length(lengths: Lengths, where: str, name: str, length: int) -> None:
+def require_length(lengths: Lengths, where: object, name: str, length: int) -> None:
     """Raises GraphError if a register of that name is unknown or has another length; for the `check` of a row.
 
     >>> from cgraph.extend import require_length
@@ -206,7 +206,7 @@ def require_length(lengths: Lengths, where: str, name: str, length: int) -> None
         raise GraphError(f"{where} needs register {name!r} to have length {length}, got {actual}")
 
 
-def require_once(where: str, names: Sequence[str]) -> None:
+def require_once(where: object, names: Sequence[str]) -> None:
     """Raises GraphError if a register is written twice by one statement."""
     if twice := [name for name in names if names.count(name) > 1]:
         raise GraphError(f"{where} writes register {twice[0]!r} twice")

@@ -203,8 +203,8 @@ def of_file(
     floating : bool
         Of URDF, whether the root link moves freely.
     limits, friction, actuators, contacts
-        Forces that stand for these, as `load_mjcf` and `load_urdf` take them. A URDF that floats and has contacts starts
-        with its lowest sphere on the ground.
+        Forces that stand for these, as `load_mjcf` and `load_urdf` take them. A URDF that floats and has contacts
+        starts with its lowest sphere on the ground.
 
     Returns
     -------

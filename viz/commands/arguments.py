@@ -6,10 +6,9 @@ import argparse
 import json
 import math
 import sys
-import warnings
 import webbrowser
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -122,21 +121,6 @@ def answer(
         print(text)
     if show is not None and not webbrowser.open(show.resolve().as_uri()):
         say(f"warning: no browser was found that opens {show}")
-
-
-@contextmanager
-def show_warnings() -> Iterator[None]:
-    """Show a warning as a line of standard error, once, without the line of our code that gave it."""
-    with warnings.catch_warnings():
-        shown: set[str] = set()
-
-        def show(message: Warning | str, *_: object, **__: object) -> None:
-            if str(message) not in shown:
-                shown.add(str(message))
-                say(f"warning: {message}")
-
-        warnings.showwarning = show
-        yield
 
 
 def takes_equations(command: argparse.ArgumentParser) -> None:

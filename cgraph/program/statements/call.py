@@ -7,7 +7,7 @@ import math
 import operator
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -168,9 +168,18 @@ _ADDED = Graph([_A, _B], {"sum": _A + _B})
 # what registers must fit
 
 
+class _Named(NamedTuple):
+    """How an error calls a statement; text only where there is one, since edges of a large graph take long to count."""
+
+    statement: Call | Map | Sum
+
+    def __str__(self) -> str:
+        return f"{type(self.statement).__name__} of {self.statement.graph!r}"
+
+
 def check_call(call: Call, lengths: Lengths) -> None:
     """Raises GraphError if the registers do not hold as many numbers as the graph has inputs and outputs."""
-    where = f"Call of {call.graph!r}"
+    where = _Named(call)
     sides = (("inputs", call.inputs, len(call.graph.inputs)), ("outputs", call.outputs, len(call.graph.outputs)))
     for what, names, wanted in sides:
         if (total := sum([length_of(lengths, where, name) for name in names])) != wanted:
@@ -180,7 +189,7 @@ def check_call(call: Call, lengths: Lengths) -> None:
 
 def check_elements(statement: Map | Sum, lengths: Lengths) -> None:
     """Raises GraphError if registers have neither one length nor length 1, or are too many or too few."""
-    where, graph, outputs = f"{type(statement).__name__} of {statement.graph!r}", statement.graph, statement.outputs
+    where, graph, outputs = _Named(statement), statement.graph, statement.outputs
     known = sum([length_of(lengths, where, name) for name in statement.shared])
     if known > len(graph.inputs):
         raise GraphError(f"{where} has {len(graph.inputs)} inputs, the shared registers hold {known}")
