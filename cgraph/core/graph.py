@@ -210,13 +210,8 @@ class Graph:
         return from_networkx(network)
 
     def __repr__(self) -> str:
-        ends = map(_short, (self.input_names, tuple(self.outputs)))
-        return f"<Graph ({') -> ('.join(ends)}): {len(self.nodes)} nodes, {self._edge_count} edges>"
-
-    @cached_property
-    def _edge_count(self) -> int:
-        """The uses of nodes by others: messages of checks that pass have it, too."""
-        return sum([len(node.args) for node in self.nodes])
+        ends, edges = map(_short, (self.input_names, tuple(self.outputs))), sum(len(node.args) for node in self.nodes)
+        return f"<Graph ({') -> ('.join(ends)}): {len(self.nodes)} nodes, {edges} edges>"
 
     def _repr_html_(self) -> str | None:
         """The drawing that a notebook shows, when a drawing package is installed (extra `viz`)."""

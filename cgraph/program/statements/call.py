@@ -16,6 +16,7 @@ from ...core.checks import GraphError
 from ...core.evaluation import Array
 from ...core.graph import Graph
 from ...core.node import Node
+from ...util.caches import kept_by_first
 from ...writing.naming import variables
 from ..statement import (
     Execution,
@@ -168,9 +169,15 @@ _ADDED = Graph([_A, _B], {"sum": _A + _B})
 # what registers must fit
 
 
+@kept_by_first
+def _shown(graph: Graph) -> str:
+    """The graph in a message, which checks that pass have, too."""
+    return repr(graph)
+
+
 def check_call(call: Call, lengths: Lengths) -> None:
     """Raises GraphError if the registers do not hold as many numbers as the graph has inputs and outputs."""
-    where = f"Call of {call.graph!r}"
+    where = f"Call of {_shown(call.graph)}"
     sides = (("inputs", call.inputs, len(call.graph.inputs)), ("outputs", call.outputs, len(call.graph.outputs)))
     for what, names, wanted in sides:
         if (total := sum([length_of(lengths, where, name) for name in names])) != wanted:
@@ -180,7 +187,8 @@ def check_call(call: Call, lengths: Lengths) -> None:
 
 def check_elements(statement: Map | Sum, lengths: Lengths) -> None:
     """Raises GraphError if registers have neither one length nor length 1, or are too many or too few."""
-    where, graph, outputs = f"{type(statement).__name__} of {statement.graph!r}", statement.graph, statement.outputs
+    graph, outputs = statement.graph, statement.outputs
+    where = f"{type(statement).__name__} of {_shown(graph)}"
     known = sum([length_of(lengths, where, name) for name in statement.shared])
     if known > len(graph.inputs):
         raise GraphError(f"{where} has {len(graph.inputs)} inputs, the shared registers hold {known}")
