@@ -290,8 +290,10 @@ def _step(
         return r, _product_and_sum(step, merged.products[step], r, args, arithmetic)
     t, kind = arithmetic.type, "each" if step in merged.of_libm else "lanes"
     call = f"@{f'{kind}{arithmetic.lanes}.' if arithmetic.lanes > 1 else ''}{columns(step.op).library}"
-    if columns(step.op).llvm == LLVM_WHERE and args[0].startswith("%v") and _compares(step.args[0]):
-        return r, [f"  {r} = select {words['b']} {args[0]}.is, {t} {args[1]}, {t} {args[2]}"]
+    if columns(step.op).llvm == LLVM_WHERE and _compares(step.args[0]):
+        known = args[0].startswith("%v")
+        compared = [] if known else [f"  {r}.is = fcmp one {t} {args[0]}, {words['zero']}"]  # never NaN: one flag
+        return r, [*compared, f"  {r} = select {words['b']} {args[0] if known else r}.is, {t} {args[1]}, {t} {args[2]}"]
     if columns(step.op).llvm:
         return r, [f"  {line.format(*args, r=r, call=call, **words)}" for line in columns(step.op).llvm]
     return r, [f"  {r} = call {t} {call}({', '.join(f'{t} {arg}' for arg in args)})"]

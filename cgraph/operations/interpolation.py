@@ -42,8 +42,8 @@ def interp(
     Returns
     -------
     Node
-        The value. Of n knots it takes n comparisons, and n selections with them for each of 3 numbers of a "linear"
-        table, 5 of another one; a derivative adds a few operations to these.
+        The value. Of n knots it takes log2 n comparisons, by bisection, and n selections for each of 3 numbers of a
+        "linear" table, 5 of another one: a knot and coefficients. A derivative adds a few operations to these.
 
     Raises
     ------
@@ -73,10 +73,9 @@ def interp(
         pieces = _pieces(knots, _values(ys, len(knots)), _SLOPES[kind], straight=outside == "linear")
     if any([each.value is not None and not math.isfinite(each.value) for piece in pieces for each in piece]):
         raise ValueError("interp: a slope of the table is too large for float64")
-    below = [less(at, knot) for knot in knots]
-    starts = [as_node(knot) for knot in (knots[0], *knots)]
-    t = at - _chosen(below, starts)
-    *coefficients, y = [_chosen(below, [*row]) for row in reversed([*zip(*pieces, strict=True)])]
+    bits, start = _searched(at, [as_node(knot) for knot in knots])
+    t = at - start
+    *coefficients, y = [_chosen([*row], bits) for row in reversed([*zip(*pieces, strict=True)])]
     value = coefficients[0]
     for each in (*coefficients[1:], y):  # Horner's scheme
         value = value * t + each
@@ -184,10 +183,34 @@ def _natural(h: list[float], rise: list[Node]) -> list[Node]:
 _SLOPES = {"linear": None, "monotone": _monotone, "natural": _natural}
 
 
-def _chosen(below: Sequence[Node], nodes: Sequence[Node]) -> Node:
-    """nodes[k] where `below` is 0 up to k and 1 from there: a tree of selections, log2 n deep."""
+def _searched(at: Node, knots: list[Node]) -> tuple[list[Node], Node]:
+    """Bisection: whether x is left of a knot, step by step, and the knot that it ends at, left of x, or the first.
+
+    The last knot stands for those that are missing to a power of two, less one.
+    """
+    steps, start = len(knots).bit_length(), knots[0]
+    knots = [*knots, *[knots[-1]] * (2**steps - 1 - len(knots))]
+    bits: list[Node] = []
+    for step in reversed(range(steps)):
+        knot = _chosen(knots[2**step - 1 :: 2 ** (step + 1)], bits)
+        bits.append(less(at, knot))
+        start = start if start is knot else where(bits[-1], start, knot)
+    return bits, start
+
+
+def _chosen(nodes: Sequence[Node], bits: Sequence[Node]) -> Node:
+    """The node at a place, of which these are the bits, 1 for the left half; the last one for places behind the last.
+
+    A tree of selections, by the latest bit last, so that the others need not wait for it; but halves first where one is
+    missing or nodes at an end are the same, since what is alike needs no selection.
+    """
     if len(nodes) == 1:
         return nodes[0]
-    half = len(nodes) // 2
-    left, right = _chosen(below[: half - 1], nodes[:half]), _chosen(below[half:], nodes[half:])
-    return left if left is right else where(below[half - 1], left, right)
+    half = 2 ** (len(bits) - 1)
+    if len(nodes) <= half:
+        return _chosen(nodes, bits[1:])
+    if len(nodes) < 2 * half or nodes[0] is nodes[1] or nodes[-2] is nodes[-1]:
+        bit, left, right = bits[0], _chosen(nodes[:half], bits[1:]), _chosen(nodes[half:], bits[1:])
+    else:
+        bit, left, right = bits[-1], _chosen(nodes[::2], bits[:-1]), _chosen(nodes[1::2], bits[:-1])
+    return left if left is right else where(bit, left, right)

@@ -53,16 +53,15 @@ def accelerations(system: System, method: str = "auto", check: bool = False) -> 
     if (whole := system.whole) is not None:
         ways.insert(0, (whole, bias_terms(whole), methods[0]))
     graphs: list[Graph] = []  # the safest first
-    merged = 0  # nodes that simplification took from the last one
+    written: list[Graph] = []  # these before they were simplified
     for form, given, each in ways:  # the dense matrix may lose in its entries what elimination keeps
         if graphs and each == "dense":  # what both need of a potential of many terms may be too much already
-            least = _cost(topological(given.gradient)) - merged
-            if least >= WORTH * _cost(graphs[-1].nodes):
+            merged = _cost(written[-1].nodes) - _cost(graphs[-1].nodes)
+            if _cost(topological(given.gradient)) - merged >= WORTH * _cost(graphs[-1].nodes):
                 break
         try:
-            written = _solved(form, given, each, check)
-            graphs.append(_simplified(written, each))
-            merged = _cost(written.nodes) - _cost(graphs[-1].nodes)
+            written.append(_solved(form, given, each, check))
+            graphs.append(_simplified(written[-1], each))
         except SingularError as error:
             failure = error
     if not graphs and failure.index >= system.n:
