@@ -105,7 +105,8 @@ EVALUATION = "'wasm-unsafe-eval'"  # in the policy: WebAssembly may be compiled,
 def panel(live: Live, begin: str = "startLive();") -> Panel:
     """The panel of a live motion, for a page whose style has --text, --back, --soft and --edge.
 
-    The page's scripts need elements.js, address.js and, of contacts, surfaces.js.  begin: JavaScript that begins it, or says when to.
+    The page's scripts need elements.js, address.js and, of contacts, surfaces.js.
+    begin: JavaScript that begins it, or says when to.
     """
     colors = {"kinetic": theme.BLUE, "potential": theme.ORANGE, "right": theme.GREEN, "wrong": theme.SPURIOUS}
     variables = ":root{" + "".join(f"--live-{name}:{color};" for name, color in colors.items()) + "}\n"

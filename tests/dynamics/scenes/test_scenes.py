@@ -65,8 +65,12 @@ def test_options_go_to_the_scene_s_function() -> None:
         ("chain", {"links": 4}, "scene 'chain' has no option 'links'; its options are n"),
         ("chain", {"name": "x"}, "scene 'chain' has no option 'name'; its options are n"),
         ("spring_mass", {"k": 2.0}, "scene 'spring_mass' has no option 'k'; it has none"),
-        ("robot.xml", {"n": 4}, "scene 'robot.xml' has no option 'n'; its options are ignore, floating"),
-        ("robot.xml", {"path": "x"}, "scene 'robot.xml' has no option 'path'; its options are ignore, floating"),
+        ("robot.xml", {"n": 4}, "scene 'robot.xml' has no option 'n'; its options are ignore, floating, contacts"),
+        (
+            "robot.xml",
+            {"path": "x"},
+            "scene 'robot.xml' has no option 'path'; its options are ignore, floating, contacts",
+        ),
     ],
 )
 def test_an_unknown_option_is_named_with_those_that_there_are(name: str, options: Any, message: str) -> None:
