@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from functools import partial
-from hashlib import blake2b
+from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
@@ -48,7 +48,7 @@ class Way:
     Parameters
     ----------
     name, functions, digest : str
-        The way, "C library" or "WebAssembly", and 32 hexadecimal digits.
+        The way, "C library", "WebAssembly" or "live page", and 32 hexadecimal digits.
     same : bool
         Whether the digest is that of the first way with the same functions.
 
@@ -96,9 +96,10 @@ class SameBits:
         wide = max([len(way.name) for way in self.ways])
         lines = [f"{'same   ' if way.same else 'DIFFERS'}  {way.digest}  {way.name:{wide}}" for way in self.ways]
         lines.append(
-            f"{STEPS} steps of 2^-10 s by rk4 of the state equation; the digest is of the state after every {EVERY}."
+            f"{STEPS} steps of 2^-10 s by rk4 of the state equation; the digest is of the state after every {EVERY}, "
+            "SHA-256 of its numbers, half of it."
         )
-        if len({way.functions for way in self.ways}) > 1:
+        if {way.functions for way in self.ways} >= {LIBRARY, OWN}:
             lines.append(
                 "Of WebAssembly, sine and the like are its own, the same on every machine; those of the C library "
                 "differ from them now and then in the last bit."
@@ -110,8 +111,10 @@ class SameBits:
         return {"passed": self.passed, **asdict(self)}
 
 
-def same_bits(scene: Scene) -> SameBits:
+def same_bits(scene: Scene, page: Scene | None = None) -> SameBits:
     """Compute one motion of a scene in every way that there is here, and compare the bits.
+
+    page: the scene that the live page shows of it, where that has more parameters, and so another digest.
 
     Fused products are off, as by `fma=False`: which products a compiler fuses is its choice. Raises ValueError for a
     motion that does not stay finite, and as `state_equation` does.
@@ -131,12 +134,15 @@ def same_bits(scene: Scene) -> SameBits:
             found.append((name, LIBRARY, run()))
         except NotRunError as error:
             left_out.append(f"{name}: {error}")
-    own = OWN if motion.calls_library else LIBRARY
-    for name, option in NODE.items():
-        try:
-            found.append((f"WebAssembly, {name}", own, motion.in_node(option)))
-        except NotRunError as error:
-            left_out.append(f"WebAssembly, {name}: {error}")
+    modules = [("WebAssembly", OWN if motion.calls_library else LIBRARY, (motion.rate, motion.start))]
+    if page is not None:
+        modules.append(("live page (masses and gravity are inputs)", "live page", _rate_and_start(page)))
+    for what, functions, module in modules:
+        for name, option in NODE.items():
+            try:
+                found.append((f"{what}, {name}", functions, _in_node(*module, option)))
+            except NotRunError as error:
+                left_out.append(f"{what}, {name}: {error}")
     first: dict[str, str] = {}
     ways = [Way(*row, same=first.setdefault(row[1], row[2]) == row[2]) for row in found]
     return SameBits(tuple(ways), tuple(left_out))
@@ -151,10 +157,7 @@ class _Motion:
 
     def __init__(self, scene: Scene) -> None:
         self.scene = scene
-        self.rate = state_equation(scene.model)
-        known = state_inputs(scene.model)
-        values = dict(zip(known.states, (*scene.q, *scene.qd), strict=True)) | known.parameters
-        self.start = [float(values.get(name, 0.0)) for name in self.rate.input_names]  # torques and the time are 0
+        self.rate, self.start = _rate_and_start(scene)
         self.states = len(self.rate.outputs)
         self.step, self.carry = _step(self.rate)
         self.calls_library = any([columns(node.op).calls_library for node in self.rate.nodes if node.args])
@@ -243,28 +246,30 @@ class _Motion:
             )
         times = STEP * np.arange(EVERY, STEPS + 1, EVERY)
         qd = None if scene.ode is not None else scene.qd
-        moving = prepare(scene.model, "rk4", dt=STEP, backend=backend, fma=False, estimate_error=False)
+        names = [*scene.model.parameters]  # open, as in the other ways: numbers of bodies would be folded
+        moving = prepare(scene.model, "rk4", dt=STEP, backend=backend, fma=False, estimate_error=False, varied=names)
         run = moving(scene.q, qd, times[-1], t_eval=times)
         if not run.stats.success:
             raise NotRunError(run.stats.message)
         return _digest(run.q if qd is None else np.concatenate([run.q, run.qd], axis=1))
 
-    def in_node(self, option: str) -> str:
-        """The digest by WebAssembly in Node.js."""
-        node = shutil.which("node")
-        if node is None:
-            raise NotRunError("node is not installed")
-        module = base64.b64encode(cg.to_wasm(self.rate, {"rk4": RK4}, time=TIME)).decode()
-        asked = {
-            "module": module,
-            "x": self.start,
-            "states": self.states,
-            "h": STEP,
-            "rows": STEPS // EVERY,
-            "n": EVERY,
-        }
-        rows = bytes.fromhex(_run([node, option, "-e", _SCRIPT], json.dumps(asked).encode()))
-        return _digest(np.frombuffer(rows, dtype="<f8"))
+
+def _rate_and_start(scene: Scene) -> tuple[Graph, list[float]]:
+    """The state equation and the start, a value of every input."""
+    rate, known = state_equation(scene.model), state_inputs(scene.model)
+    values = dict(zip(known.states, (*scene.q, *scene.qd), strict=True)) | known.parameters
+    return rate, [float(values.get(name, 0.0)) for name in rate.input_names]  # torques and the time are 0
+
+
+def _in_node(rate: Graph, start: list[float], option: str) -> str:
+    """The digest by WebAssembly in Node.js."""
+    node = shutil.which("node")
+    if node is None:
+        raise NotRunError("node is not installed")
+    module = base64.b64encode(cg.to_wasm(rate, {"rk4": RK4}, time=TIME)).decode()
+    shape = {"states": len(rate.outputs), "h": STEP, "rows": STEPS // EVERY, "n": EVERY}
+    asked = json.dumps({"module": module, "x": start} | shape).encode()
+    return _digest(np.frombuffer(bytes.fromhex(_run([node, option, "-e", _SCRIPT], asked)), dtype="<f8"))
 
 
 _SCRIPT = """\
@@ -292,7 +297,7 @@ def other_process() -> None:
 
 
 def _digest(rows: Array) -> str:
-    return blake2b(np.ascontiguousarray(rows, dtype="<f8").tobytes(), digest_size=16).hexdigest()
+    return sha256(np.ascontiguousarray(rows, dtype="<f8").tobytes()).hexdigest()[:32]
 
 
 def _run(command: list[str], given: bytes = b"", environment: dict[str, str] | None = None) -> str:

@@ -55,7 +55,8 @@ def _bits(scene: dyn.scenes.Scene, options: argparse.Namespace) -> int:
     moving = library.moving_start(scene)
     if moving is not scene:
         say(f"{scene.name}: {library.rest_text(scene, moving)}")
-    found = library.same_bits(moving)
+    page = library.adjustable(moving)
+    found = library.same_bits(moving, None if page.model is moving.mechanism or page is moving else page)
     answer(unless_json(options, {"scene": scene.name} | found.to_dict(), found))
     if found.passed:
         return 0

@@ -108,8 +108,7 @@ def live_of(scene: Scene, *, momentum: bool = False) -> Live:
 
     Raises as `state_equation`, `hamilton_equations` and `simulate` do.
     """
-    model = _adjustable(scene.mechanism) if scene.mechanism is not None else scene.model
-    scene = replace(scene, model=model)
+    scene = adjustable(scene)
     if scene.ode is not None:
         return _first_order(scene)
     rate = hamilton_equations(scene.model) if momentum else state_equation(scene.model)
@@ -131,6 +130,11 @@ def live_of(scene: Scene, *, momentum: bool = False) -> Live:
         scales |= {name: _round(p) for name, p in reach.items() if 0.0 < p < math.inf}  # of speeds that are none, NaN
     names, limits = display_names(scene), _limits(scene)
     return Live(rate, start, shown, meters, parents, scales, _step(scene), TABLEAUS, names, units, NOTES, limits, radii)
+
+
+def adjustable(scene: Scene) -> Scene:
+    """The scene that the page computes: of a small mechanism without parameters, masses and gravity are some."""
+    return scene if scene.mechanism is None else replace(scene, model=_adjustable(scene.mechanism))
 
 
 def _limits(scene: Scene) -> dict[str, tuple[float, float]]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from cgraph import GraphError, to_jax
 from cgraph.extend import Array
 
 from ...integrators import Problem
@@ -17,7 +18,7 @@ from ...io.mujoco_twin import rollout
 from ...peers import PeerModel, UnavailableError
 from ...peers.casadi import casadi, our_function
 from ...peers.heyoka import expressions, heyoka
-from ...peers.jax import NAMES as JAX_NAMES, double_precision
+from ...peers.jax import double_precision
 from ...peers.mujoco import MujocoPeer
 from ...peers.peer import required
 from ...peers.translate import translated
@@ -205,14 +206,12 @@ class Diffrax(Solver):
         if len(problem.rate.nodes) > JITTED:
             raise UnavailableError(f"XLA takes minutes for more than {JITTED} nodes")
         diffrax, jax = required("diffrax", "diffrax"), double_precision()
-        graph, method, numpy = problem.rate, getattr(diffrax, solver)(), jax.numpy
-
-        def rate(t: object, x: object, _: object) -> object:
-            env = dict(zip(graph.inputs, [*x, t], strict=True))  # type: ignore[misc]
-            values = translated(graph.nodes, env, numpy, JAX_NAMES)
-            return numpy.stack([numpy.asarray(values[node], dtype=float) for node in graph.outputs.values()])
-
-        term = diffrax.ODETerm(rate)
+        method, numpy = getattr(diffrax, solver)(), jax.numpy
+        try:
+            rate = to_jax(problem.rate)
+        except GraphError as error:
+            raise UnavailableError(str(error)) from None
+        term = diffrax.ODETerm(lambda t, x, _: rate(numpy.append(x, t)))
 
         def end(x: object, t_end: float, rtol: float, atol: float) -> tuple[object, ...]:
             found = diffrax.diffeqsolve(

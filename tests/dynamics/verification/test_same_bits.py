@@ -12,6 +12,7 @@ from dynamics.scenes.start import moving_start, with_start
 from dynamics.verification import same_bits as module
 from dynamics.verification.same_bits import same_bits
 from tests.slow import slow
+from viz.models.live_motion import adjustable
 
 
 def pushed():
@@ -19,7 +20,13 @@ def pushed():
     return dyn.OdeSystem(lambda x, t: [x[1], -cg.sin(x[0]) + 0.1 * cg.cos(t) * x[0] ** 2], ["x", "v"])
 
 
+def open_masses():
+    """A mechanism whose masses and gravity are parameters, which a run may not build in."""
+    return adjustable(dyn.scenes.load("triple_pendulum")).model
+
+
 MODELS = {
+    "open masses": open_masses,
     "triple_pendulum": lambda: dyn.scenes.load("triple_pendulum"),
     "pushed": pushed,
     "free": lambda: dyn.Mechanism([dyn.Body("base", dyn.Joint("free"), mass=2.0, center=[0.1, 0.0, 0.2],
@@ -27,7 +34,7 @@ MODELS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", ["pushed", *slow("triple_pendulum", "free")])
+@pytest.mark.parametrize("name", ["pushed", *slow("triple_pendulum", "free", "open masses")])
 def test_every_way_has_the_same_bits(name):
     found = same_bits(moving_start(of_model(MODELS[name]())))
     assert found.passed, str(found)
