@@ -40,7 +40,8 @@ class Source:
         typing = {
             id(inner)
             for node in self.nodes
-            if isinstance(node, ast.If) and ast.unparse(node.test).endswith("TYPE_CHECKING")
+            if isinstance(node, ast.If) and isinstance(node.test, ast.Name | ast.Attribute)
+            if ast.unparse(node.test).endswith("TYPE_CHECKING")
             for line in node.body
             for inner in ast.walk(line)
         }

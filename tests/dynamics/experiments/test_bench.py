@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-from copy import deepcopy
-from functools import partial
+from copy import copy
+from functools import cache, partial
 
 import numpy as np
 import pytest
@@ -123,9 +123,20 @@ def difference(found, expected, start=0.0):
     return np.abs(found - expected).max() / np.abs(expected - start).max()
 
 
+@cache
+def planar():
+    """Three links, which keep what peers derive of them."""
+    return PeerModel("planar 3", load("planar 3").model)
+
+
+@cache
+def peer(name, case):
+    return PEERS[name].make(case)
+
+
 def prepared(name, case, task, mode):
     pytest.importorskip(PEERS[name].package)
-    contender = PEERS[name].make(case).prepare(task, mode)
+    contender = peer(name, case).prepare(task, mode)
     return contender, contender.result(contender.run())
 
 
@@ -141,7 +152,7 @@ OFFERED = [
 
 @each_row(("name", "task", "mode"), [each for each in OFFERED if "gradient" not in each.values[1]], by="name")
 def test_a_peer_finds_what_mujoco_finds(name, task, mode):
-    case = PeerModel("planar 3", load("planar 3").model)
+    case = planar()
     reference, x = Reference(case), case.point(task)
     _, found = prepared(name, case, task, mode)
     if mode == "batch":
@@ -161,7 +172,7 @@ def test_a_peer_finds_what_mujoco_finds(name, task, mode):
 @pytest.fixture(scope="module")
 def pushed():
     """Directions of the start and of the torques, and how far |q|^2 of MuJoCo's motion goes along them."""
-    case = PeerModel("planar 3", load("planar 3").model)
+    case = planar()
     reference, x, n = Reference(case), case.point("gradient"), case.n
     start, torques = np.zeros((2, len(x)))
     start[: 2 * n], torques[2 * n :] = [0.3, -0.5, 0.2, 1.0, 0.4, -0.7], np.resize([1.0, -1.5, 0.5], PASSES * n)
@@ -184,7 +195,7 @@ def test_a_gradient_is_the_slope_of_mujoco_s_motion(name, task, mode, pushed):
 
 
 def test_a_gradient_by_inertial_numbers_is_that_of_motions_with_other_numbers():
-    case = PeerModel("planar 3", load("planar 3").model)
+    case = planar()
     _, found = prepared("ours", case, "inertial-gradient", "call")
     model, numbers = with_inertial_parameters(case.model)
     q, qd, tau = np.split(case.point("gradient"), [3, 6])
@@ -203,6 +214,11 @@ def test_a_gradient_by_inertial_numbers_is_that_of_motions_with_other_numbers():
     assert found[len(case.point("gradient")) :] @ along == pytest.approx(expected, rel=DIFFERENCES)
 
 
+@cache
+def branched():
+    return PeerModel("tree", tree())
+
+
 @each_row(
     ("name", "task"),
     [
@@ -214,7 +230,7 @@ def test_a_gradient_by_inertial_numbers_is_that_of_motions_with_other_numbers():
     by="name",
 )
 def test_a_peer_knows_springs_armature_slides_and_the_order_of_joints(name, task):
-    case = PeerModel("tree", tree())
+    case = branched()
     _, found = prepared(name, case, task, "call")
     x = case.point(task)
     assert difference(found, Reference(case).value(task, x), x if task == "rk4" else 0.0) < rounding(task)
@@ -246,6 +262,7 @@ def test_derivatives_of_a_large_model_by_one_piece_of_code_for_all_columns(model
     for each in (ours, linearize_many):
         monkeypatch.setattr(each, "WRITTEN_OUT", 0)
     cg.clear_caches()
+    peer.cache_clear()
     assert difference(prepared("ours", case, "derivatives", mode)[1], expected) < SCALAR
 
 
@@ -256,9 +273,11 @@ def test_a_model_with_quaternions_has_no_motions():
 
 @pytest.fixture(scope="module")
 def floating():
-    """A free base with a link, and the results of our code without LLVM at the states of a batch."""
+    """A free base with a link, the same at the first state of a batch, and results of our code without LLVM at all."""
     case = PeerModel("free", free_tree(7))
-    return case, {task: prepared("ours-numpy", case, task, "batch")[1] for task in TASKS if task not in MOTIONS}
+    one = copy(case)
+    one.point = lambda task: case.points(task)[:, 0].copy()
+    return case, one, {task: prepared("ours-numpy", case, task, "batch")[1] for task in TASKS if task not in MOTIONS}
 
 
 @each_row(
@@ -275,7 +294,7 @@ def floating():
     by="name",
 )
 def test_a_peer_moves_a_free_base_as_we_do(name, task, mode, floating):
-    case, ours = floating
+    case, one, ours = floating
     if name in ("heyoka", "sympy", "torch") or (name, task) == ("pinocchio", "rk4"):
         with pytest.raises(UnavailableError, match="rates of"):
             prepared(name, case, task, mode)
@@ -284,9 +303,7 @@ def test_a_peer_moves_a_free_base_as_we_do(name, task, mode, floating):
     if mode == "batch":
         found, expected = prepared(name, case, task, mode)[1], ours[task]
     else:
-        case = deepcopy(case)
-        case.point = lambda task: case.points(task)[:, 0].copy()
-        found, expected, x = prepared(name, case, task, mode)[1], ours[task][:, 0], x[:, 0]
+        found, expected, x = prepared(name, one, task, mode)[1], ours[task][:, 0], x[:, 0]
     assert difference(found, expected, x if task == "rk4" else 0.0) < ROUNDING
 
 

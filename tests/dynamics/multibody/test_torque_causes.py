@@ -1,6 +1,7 @@
 """Torque by cause: what adds up to tau, each part against the model with a body changed or an effect switched off."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -17,6 +18,7 @@ SEEDS = range(4)
 STEPPED = ("by_definition", "kinetic_only", "kinetic_only_exact")
 
 
+@cache
 def forced_tree(seed):
     """A random tree under gravity, with springs, damping and armature, and forces of every kind."""
     tree = random_tree(seed, 5, EVERY_KIND)
