@@ -75,10 +75,11 @@ def simulate_many(
 ) -> Ensemble:
     """The motions of a system from N starts at t0 to t_end, by one program that is compiled once.
 
-    In equal steps trajectories run side by side, a vector of them at a time; in chosen ones one by one, as do fewer
-    than eight by a method that iterates. One
-    whose state is not finite is NaN from there on, `stats.message` and a `SimulationWarning` name the time and the
-    coordinate, and the others go on. Ctrl-C keeps the chunks that are done, without a warning.
+    Trajectories run side by side, a vector of them at a time, in equal steps and in chosen ones. One by one, to the
+    same bits, go those with events, fewer than eight by a method that iterates, and in chosen steps fewer than 32, those
+    with constraints and those whose tolerance is below the rounding of a step. One whose state is not finite is NaN from
+    there on, `stats.message` and a `SimulationWarning` name the time and the coordinate, and the others go on. Ctrl-C
+    keeps the chunks that are done, without a warning.
 
     Parameters
     ----------
@@ -107,12 +108,13 @@ def simulate_many(
         Dask's `client.get_executor()`; or any map, `workers(function, iterable)`. The numbers are the same to the last
         bit.
     chunk : int, optional
-        Trajectories that a worker takes at a time; by default some chunks for each, of at most 256. Side by side it is
-        rounded up to whole vectors, multiples of 8.
+        Trajectories that a worker takes at a time; by default up to four chunks for each worker, of at most 4096
+        trajectories, fewer where they have many rows, and of at most 256 one by one or with a `store`. Side by side it
+        is rounded up to whole vectors, multiples of 8.
     store : path, optional
         A folder, empty or not there, in which chunks are kept as they end. The same call again takes up where the first
-        was ended, by whatever, with the chunks as they were cut then, and at last reads all from the folder. Ctrl-C is
-        then a KeyboardInterrupt.
+        was ended, by whatever, with the chunks as they were cut then, and at last reads all from the folder. A chunk
+        that had not ended is lost. Ctrl-C is then a KeyboardInterrupt.
 
     Returns
     -------
@@ -125,7 +127,8 @@ def simulate_many(
     ------
     TypeError, ValueError
         For arguments of another type, shape or range, each by name, for `workers` that give no results, and for a
-        `store` that keeps another sweep, by what differs: model, starts, parameters, options, versions.
+        `store` that keeps another sweep, by what differs: model, starts, parameters, options, versions; and for a
+        `store` that is damaged.
     MemoryError
         For a result that would not fit.
     OSError
@@ -167,6 +170,8 @@ def simulate_many(
     width = _width(len(x), chunk, team, count * program.steps.width if lanes else 0, grids)
 
     # Integrate, by whoever takes the chunks and compiles the steps
+    if folder is not None and chunk is None:
+        width = min(width, LARGEST_CHUNK)  # of which no more is lost when the process is ended
     kept = None if folder is None else Store(folder, sweep_of(problem, task, x, p), width, (len(x), count, x.shape[1]))
     whole = _run(task, x, p, width, team, kept)
 

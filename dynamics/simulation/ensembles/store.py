@@ -14,6 +14,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile
+from zlib import crc32
 
 import numpy as np
 
@@ -26,14 +27,15 @@ from .task import Chunk, Part, Task
 
 SWEEP, ROWS = "sweep.json", "rows.npy"
 FORMAT = 1
+AGAIN = "remove the folder, and the sweep begins anew"
 
 
 class Store:
     """The folder of a sweep.
 
     sweep.json: what the sweep is, see `sweep_of`, and how many trajectories are in a chunk.  rows.npy: the states
-    (N, T, m) of all, in place.  chunk-000000000.npz, ..: how the trajectories from that number on went, a file each,
-    which is there once their rows are.
+    (N, T, m) of all, in place.  chunk-000000000.npz, ..: how the trajectories from that number on went and the checksum
+    of their rows, a file each, which is there once their rows are.
 
     width: trajectories in a chunk, as the sweep began.  rows: the table, written through to the file.
     """
@@ -53,11 +55,10 @@ class Store:
         else:
             atomic_write(folder / SWEEP, json.dumps({**sweep, "chunk": width}, indent=1))
         self.width = width
+        self._remove_temporaries()
         if not (folder / ROWS).exists():
             self._make_rows(shape)
-        self.rows: Array = np.load(folder / ROWS, mmap_mode="r+")
-        if self.rows.shape != shape:
-            raise ValueError(f"store {str(folder)!r} is damaged: its {ROWS} has shape {self.rows.shape}, not {shape}")
+        self.rows = self._table(shape)
 
     def part(self, chunk: Chunk) -> Part | None:
         """The results of a chunk, if they are there."""
@@ -67,20 +68,25 @@ class Store:
             with np.load(self._file(chunk.first), allow_pickle=False) as kept:
                 for name, column in runs.columns.items():
                     column[:] = kept[name]
-                texts = json.loads(kept["texts"].tobytes())
+                texts, checksum = json.loads(kept["texts"].tobytes()), int(kept["checksum"])
         except (OSError, ValueError, KeyError, EOFError, BadZipFile):  # not there, or damaged: the chunk is run again
+            return None
+        rows = self.rows[chunk.first : chunk.first + count]
+        if crc32(rows.data) != checksum:
             return None
         runs.messages, runs.warnings = texts["messages"], [tuple(each) for each in texts["warnings"]]
         happened = [[(number, t, np.array(x)) for number, t, x in log] for log in texts["happened"]]
-        return Part(chunk.first, self.rows[chunk.first : chunk.first + count], runs, happened)
+        return Part(chunk.first, rows, runs, happened)
 
     def keep(self, part: Part) -> None:
         """Write how the trajectories of a part went; their rows are in the table."""
         self.rows.flush()  # type: ignore[attr-defined]  # of a memmap
         happened = [[(number, t, x.tolist()) for number, t, x in log] for log in part.happened]
         texts = {"messages": part.runs.messages, "warnings": part.runs.warnings, "happened": happened}
+        kept = {"texts": np.frombuffer(json.dumps(texts).encode(), np.uint8), **part.runs.columns}
+        checksum = crc32(self.rows[part.first : part.first + len(part.rows)].data)
         written = BytesIO()
-        np.savez(written, texts=np.frombuffer(json.dumps(texts).encode(), np.uint8), **part.runs.columns)
+        np.savez(written, checksum=np.array(checksum, np.uint32), **kept)
         atomic_write(self._file(part.first), written.getvalue())
 
     def read_only(self) -> Array:
@@ -99,6 +105,28 @@ class Store:
         if not isinstance(known, dict) or not isinstance(known.get("chunk"), int):
             raise ValueError(f"store {str(self._folder)!r} is damaged: its {SWEEP} is not one that was written here")
         return known
+
+    def _table(self, shape: tuple[int, ...]) -> Array:
+        """The table, in its file. Raises ValueError for a file that was cut: a memory map would fill it with zeros."""
+        path, header = self._folder / ROWS, BytesIO()
+        described: dict[str, Any] = {"descr": "<f8", "fortran_order": False, "shape": shape}
+        np.lib.format.write_array_header_1_0(header, described)
+        size, expected = path.stat().st_size, header.tell() + 8 * math.prod(shape)
+        damaged = f"store {str(self._folder)!r} is damaged: its {ROWS}"
+        if size != expected:
+            raise ValueError(f"{damaged} has {size} bytes, not {expected}; {AGAIN}")
+        try:
+            table: Array = np.load(path, mmap_mode="r+")
+        except ValueError:
+            raise ValueError(f"{damaged} is no table of NumPy; {AGAIN}") from None
+        if table.shape != shape:
+            raise ValueError(f"{damaged} has shape {table.shape}, not {shape}; {AGAIN}")
+        return table
+
+    def _remove_temporaries(self) -> None:
+        """Remove what a process that was ended has left of files that it was writing."""
+        for path in self._folder.glob(".*.tmp"):
+            path.unlink(missing_ok=True)
 
     def _make_rows(self, shape: tuple[int, ...]) -> None:
         if any(self._folder.glob("chunk-*.npz")):
