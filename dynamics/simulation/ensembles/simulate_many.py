@@ -76,10 +76,10 @@ def simulate_many(
     """The motions of a system from N starts at t0 to t_end, by one program that is compiled once.
 
     Trajectories run side by side, a vector of them at a time, in equal steps and in chosen ones. One by one, to the
-    same bits, go those with events, fewer than eight by a method that iterates, and in chosen steps fewer than 32, those
-    with constraints and those whose tolerance is below the rounding of a step. One whose state is not finite is NaN from
-    there on, `stats.message` and a `SimulationWarning` name the time and the coordinate, and the others go on. Ctrl-C
-    keeps the chunks that are done, without a warning.
+    same bits, go those with events, fewer than eight by a method that iterates, and in chosen steps fewer than 32,
+    those with constraints and those whose tolerance is below the rounding of a step. One whose state is not finite is
+    NaN from there on, `stats.message` and a `SimulationWarning` name the time and the coordinate, and the others go on.
+    Ctrl-C keeps the chunks that are done, without a warning.
 
     Parameters
     ----------
@@ -101,8 +101,9 @@ def simulate_many(
         controller in closed form, see `with_controller`. A `SampledController`, which may remember what it has seen, is
         refused: it controls one run of `simulate`.
     parameters : mapping, optional
-        {name: value} in place of the model's own, and of those of a controller, a number for all or one for each
-        trajectory, (N,).
+        {name: value} in place of the model's own, and of those of a controller, one for each trajectory, (N,), or a
+        number for all. A number is built into the machine code, and another one compiles anew: what changes from call
+        to call is an array (N,).
     workers : int, Executor, callable or None
         How many threads share the work, None for one on each core; or an executor of `concurrent.futures`, such as
         Dask's `client.get_executor()`; or any map, `workers(function, iterable)`. The numbers are the same to the last
