@@ -87,7 +87,8 @@ class Link:
     @cached_property
     def is_numeric(self) -> bool:
         """Whether there are no parameters among the numbers of place and inertia."""
-        return not any([isinstance(each, Node) for each in self.numbers[:19]])
+        moved = len(self.numbers) - 4  # the last four are those of the joint
+        return not any([isinstance(each, Node) for each in self.numbers[:moved]])
 
     @property
     def inertial(self) -> Numbers:

@@ -30,7 +30,7 @@ from ..steps.equal_steps import step_count
 from ..steps.step_program import step_program
 from ..trajectory import SimulationWarning
 from .ensemble import Ensemble
-from .shares import chunk_width, doubts, run_chunks, side_by_side
+from .shares import LARGEST_CHUNK, chunk_width, doubts, run_chunks, side_by_side
 from .store import Store, sweep_of
 from .task import Part, Task
 from .workers import Workers, checked
@@ -66,10 +66,11 @@ def simulate_many(
 ) -> Ensemble:
     """The motions of a system from N starts at t0 to t_end, by one program that is compiled once.
 
-    In equal steps trajectories run side by side, a vector of them at a time; in chosen ones one by one, as do fewer
-    than eight by a method that iterates. One
-    whose state is not finite is NaN from there on, `stats.message` and a `SimulationWarning` name the time and the
-    coordinate, and the others go on. Ctrl-C keeps the chunks that are done, without a warning.
+    Trajectories run side by side, a vector of them at a time, in equal steps and in chosen ones. One by one, to the
+    same bits, go those with events, fewer than eight by a method that iterates, and in chosen steps fewer than 32,
+    those with constraints and those whose tolerance is below the rounding of a step. One whose state is not finite is
+    NaN from there on, `stats.message` and a `SimulationWarning` name the time and the coordinate, and the others go on.
+    Ctrl-C keeps the chunks that are done, without a warning.
 
     Parameters
     ----------
@@ -93,19 +94,22 @@ def simulate_many(
         controller in closed form, see `with_controller`. A `SampledController`, which may remember what it has seen, is
         refused: it controls one run of `simulate`.
     parameters : mapping, optional
-        {name: value} in place of the model's own, and of those of a controller, a number for all or one for each
-        trajectory, (N,).
+        {name: value} in place of the model's own, and of those of a controller, one for each trajectory, (N,), or a
+        number for all. A number is built into the machine code, and another one compiles anew: what changes from call
+        to call is an array (N,).
     workers : int, Executor, callable or None
         How many threads share the work, None for one on each core; or an executor of `concurrent.futures`, such as
         Dask's `client.get_executor()`; or any map, `workers(function, iterable)`. The numbers are the same to the last
         bit.
     chunk : int, optional
-        Trajectories that a worker takes at a time; by default some chunks for each, of at most 256. Side by side it is
-        rounded up to whole vectors, multiples of 8.
+        Trajectories that a worker takes at a time; by default up to four chunks for each worker, of at most 4096
+        trajectories, fewer where they have many rows, and of at most 256 one by one or with a `store`. Side by side it
+        is rounded up to whole vectors, multiples of 8.
     store : path, optional
         A folder, empty or not there, in which chunks are kept as they end. The same call again takes up where the first
         was ended, by whatever, with the chunks as they were cut then, and at last reads all from the folder, which one
-        call at a time writes. Ctrl-C is then a KeyboardInterrupt, which says how many trajectories the folder keeps.
+        call at a time writes. A chunk that had not ended is lost. Ctrl-C is then a KeyboardInterrupt, which says how
+        many trajectories the folder keeps.
 
     Returns
     -------
@@ -118,7 +122,8 @@ def simulate_many(
     ------
     TypeError, ValueError
         For arguments of another type, shape or range, each by name, for `workers` that give no results, and for a
-        `store` that keeps another sweep, by what differs: model, starts, parameters, options, versions.
+        `store` that keeps another sweep, by what differs: model, starts, parameters, options, versions; and for a
+        `store` that is damaged.
     MemoryError
         For a result that would not fit.
     OSError
@@ -159,6 +164,8 @@ def simulate_many(
     width = chunk_width(len(x), chunk, team, count * program.steps.width if lanes else 0, grids)
 
     # Integrate, by whoever takes the chunks and compiles the steps
+    if folder is not None and chunk is None:
+        width = min(width, LARGEST_CHUNK)  # of which no more is lost when the process is ended
     with _opened(folder, problem, task, x, p, width) as kept:
         whole = run_chunks(task, x, p, width, team, kept)
 

@@ -14,6 +14,7 @@ from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from zipfile import BadZipFile
+from zlib import crc32
 
 import numpy as np
 
@@ -29,14 +30,16 @@ if TYPE_CHECKING:
 
 SWEEP, ROWS, LOCK = "sweep.json", "rows.npy", "lock.sqlite"
 FORMAT = 1
+AGAIN = "remove the folder, and the sweep begins anew"
 
 
 class Store:
     """The folder of a sweep.
 
     sweep.json: what the sweep is, see `sweep_of`, and how many trajectories are in a chunk.  rows.npy: the states
-    (N, T, m) of all, in place.  chunk-000000000.npz, ..: how the trajectories from that number on went, a file each,
-    which is there once their rows are.  lock.sqlite: what one call at a time holds, see `lock`; it has nothing in it.
+    (N, T, m) of all, in place.  chunk-000000000.npz, ..: how the trajectories from that number on went and the checksum
+    of their rows, a file each, which is there once their rows are.  lock.sqlite: what one call at a time holds, see
+    `lock`; it has nothing in it.
 
     width: trajectories in a chunk, as the sweep began.  rows: the table, written through to the file.
     """
@@ -55,8 +58,11 @@ class Store:
 
     def _open(self, sweep: dict[str, Json], shape: tuple[int, ...]) -> None:
         folder, width = self._folder, self.width
-        if not self._whole(shape[0]):
+        left_over = list(folder.glob(".*.tmp"))  # of files that a process was writing when it was ended
+        if left_over or not self._whole(shape[0]):
             self.lock()
+            for path in left_over:
+                path.unlink(missing_ok=True)
         if (folder / SWEEP).exists():
             known = self._read()
             _require_same(folder, known, sweep)
@@ -69,9 +75,7 @@ class Store:
             atomic_write(folder / SWEEP, json.dumps({**sweep, "chunk": width}, indent=1))
         if not (folder / ROWS).exists():
             self._make_rows(shape)
-        self.rows: Array = np.load(folder / ROWS, mmap_mode="r+")
-        if self.rows.shape != shape:
-            raise ValueError(f"store {str(folder)!r} is damaged: its {ROWS} has shape {self.rows.shape}, not {shape}")
+        self.rows = self._table(shape)
 
     def lock(self) -> None:
         """Take the folder for this call alone, until `close` or the end of the process, however that ends.
@@ -120,20 +124,25 @@ class Store:
             with np.load(self._file(chunk.first), allow_pickle=False) as kept:
                 for name, column in runs.columns.items():
                     column[:] = kept[name]
-                texts = json.loads(kept["texts"].tobytes())
+                texts, checksum = json.loads(kept["texts"].tobytes()), int(kept["checksum"])
         except (OSError, ValueError, KeyError, EOFError, BadZipFile):  # not there, or damaged: the chunk is run again
+            return None
+        rows = self.rows[chunk.first : chunk.first + count]
+        if crc32(rows.data) != checksum:
             return None
         runs.messages, runs.warnings = texts["messages"], [tuple(each) for each in texts["warnings"]]
         happened = [[(number, t, np.array(x)) for number, t, x in log] for log in texts["happened"]]
-        return Part(chunk.first, self.rows[chunk.first : chunk.first + count], runs, happened)
+        return Part(chunk.first, rows, runs, happened)
 
     def keep(self, part: Part) -> None:
         """Write how the trajectories of a part went; their rows are in the table."""
         self.rows.flush()  # type: ignore[attr-defined]  # of a memmap
         happened = [[(number, t, x.tolist()) for number, t, x in log] for log in part.happened]
         texts = {"messages": part.runs.messages, "warnings": part.runs.warnings, "happened": happened}
+        kept = {"texts": np.frombuffer(json.dumps(texts).encode(), np.uint8), **part.runs.columns}
+        checksum = crc32(self.rows[part.first : part.first + len(part.rows)].data)
         written = BytesIO()
-        np.savez(written, texts=np.frombuffer(json.dumps(texts).encode(), np.uint8), **part.runs.columns)
+        np.savez(written, checksum=np.array(checksum, np.uint32), **kept)
         atomic_write(self._file(part.first), written.getvalue())
 
     def read_only(self) -> Array:
@@ -152,6 +161,23 @@ class Store:
         if not isinstance(known, dict) or not isinstance(known.get("chunk"), int):
             raise ValueError(f"store {str(self._folder)!r} is damaged: its {SWEEP} is not one that was written here")
         return known
+
+    def _table(self, shape: tuple[int, ...]) -> Array:
+        """The table, in its file. Raises ValueError for a file that was cut: a memory map would fill it with zeros."""
+        path, header = self._folder / ROWS, BytesIO()
+        described: dict[str, Any] = {"descr": "<f8", "fortran_order": False, "shape": shape}
+        np.lib.format.write_array_header_1_0(header, described)
+        size, expected = path.stat().st_size, header.tell() + 8 * math.prod(shape)
+        damaged = f"store {str(self._folder)!r} is damaged: its {ROWS}"
+        if size != expected:
+            raise ValueError(f"{damaged} has {size} bytes, not {expected}; {AGAIN}")
+        try:
+            table: Array = np.load(path, mmap_mode="r+")
+        except ValueError:
+            raise ValueError(f"{damaged} is no table of NumPy; {AGAIN}") from None
+        if table.shape != shape:
+            raise ValueError(f"{damaged} has shape {table.shape}, not {shape}; {AGAIN}")
+        return table
 
     def _make_rows(self, shape: tuple[int, ...]) -> None:
         if any(self._folder.glob("chunk-*.npz")):

@@ -80,6 +80,29 @@ def test_every_graph_is_that_of_the_numbers(base: str, seed: int) -> None:
             assert set(mechanism.parameters) <= set(mine.input_names)
 
 
+# Each number of a body alone, each with another, and all but one; xx, yx, yy, zx, zy and zz of the inertia
+INERTIAL = ("mass", "x", "y", "z", "xx", "yx", "yy", "zx", "zy", "zz")
+MIXTURES = [{a, b} for i, a in enumerate(INERTIAL) for b in INERTIAL[i:]] + [{*INERTIAL} - {a} for a in INERTIAL]
+
+
+def test_any_numbers_of_a_body_may_be_parameters() -> None:
+    """Beside numbers: a parameter in any place of mass, center and inertia."""
+    at = dict(zip(INERTIAL, (1.3, 0.2, -0.1, 0.4, 0.31, 0.02, 0.27, -0.03, 0.01, 0.24), strict=True))
+
+    def arm(names: Any) -> Mechanism:
+        n = {name: name if name in names else value for name, value in at.items()}
+        inertia = [[n["xx"], n["yx"], n["zx"]], [n["yx"], n["yy"], n["zy"]], [n["zx"], n["zy"], n["zz"]]]
+        shoulder = Body("a", Joint("revolute"), "world", n["mass"], (n["x"], n["y"], n["z"]), inertia)
+        elbow = Body("b", Joint("revolute", (1.0, 0.0, 0.0), (0.0, 0.0, 0.5)), "a", 0.7, (0.0, 0.2, 0.1))
+        return Mechanism([shoulder, elbow], parameters={name: at[name] for name in INERTIAL if name in names})
+
+    state_ = state(arm(()))
+    right = values(dyn.inverse_dynamics(arm(())), state_)
+    for names in MIXTURES:
+        mixed = arm(names)
+        assert near(values(dyn.inverse_dynamics(mixed), state_ | mixed.parameter_values), right), names
+
+
 @mark.parametrize("family", ["mixed", "welded"])
 def test_base_parameters_are_nodes_too(family: str) -> None:
     numbers = replace(FAMILIES[family](4), base_parameters=True)

@@ -160,7 +160,20 @@ def test_a_folder_of_something_else_or_damaged_is_a_sentence(tmp_path: Path) -> 
     whole = springs(store, [1.0, 2.0])
     (store / "chunk-000000000.npz").write_bytes(b"PK")  # a chunk that cannot be read is run again
     assert same(whole, springs(store, [1.0, 2.0]))
-    (store / "rows.npy").unlink()
+    rows, unfinished = store / "rows.npy", store / ".rows.npy.1.tmp"
+    bits = rows.read_bytes()
+    unfinished.touch()
+    rows.write_bytes(bits[:-8] + bytes(8))  # so are rows that are not those that were written
+    assert same(whole, springs(store, [1.0, 2.0]))
+    assert not unfinished.exists()  # what a process that was killed was writing
+    for cut in (len(bits) - 8, 130, 0):
+        os.truncate(rows, cut)
+        with pytest.raises(ValueError, match=rf"sweep' is damaged: its rows\.npy has {cut} bytes, not {len(bits)}; "):
+            springs(store, [1.0, 2.0])
+    rows.write_bytes(bytes(len(bits)))
+    with pytest.raises(ValueError, match=r"is damaged: its rows\.npy is no table of NumPy"):
+        springs(store, [1.0, 2.0])
+    rows.unlink()
     with pytest.raises(ValueError, match=r"is damaged: it has results of chunks, and no rows\.npy"):
         springs(store, [1.0, 2.0])
     (store / "sweep.json").write_text(json.dumps([1]))
