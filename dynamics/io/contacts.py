@@ -49,7 +49,9 @@ def asked(contacts: Material | None) -> Mapping[str, float | str] | None:
     if contacts is None:
         return None
     if isinstance(contacts, str):
-        require_choice("contacts", contacts, (COMPLIANT,))
+        if contacts != COMPLIANT:
+            known = ", ".join(CONTACT_QUANTITIES)
+            raise ValueError(f"contacts must be {COMPLIANT!r}, or numbers or names of {known}, got {contacts!r:.60}")
         return {}
     for name, value in require_mapping("contacts", contacts, "quantity of a Contact: number or name").items():
         require_choice("a quantity of contacts", name, tuple(CONTACT_QUANTITIES))

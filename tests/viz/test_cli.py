@@ -93,6 +93,13 @@ def test_a_model_file_stands_where_a_scene_s_name_does(tmp_path, capsys):
     assert cli.main(["code", str(model), *every, "--c", "--out", str(tmp_path / "model.c")]) == 0
     assert capsys.readouterr().err == ""
     assert "tanh" in (tmp_path / "model.c").read_text()
+    given = ["--contacts", "friction=mu,stiffness=1e5"]
+    assert cli.main(["code", str(model), *given, "--c", "--out", str(tmp_path / "model.c")]) == 0
+    assert "_IN_mu" in (tmp_path / "model.h").read_text()
+    capsys.readouterr()
+    for wrong in ("rigid", "radius=2"):
+        assert cli.main(["draw", str(model), "--contacts", wrong, "--out", str(target)]) == 2
+        assert capsys.readouterr().err.startswith("cgraph: error: ")
 
 
 @each_row(

@@ -58,7 +58,13 @@ def reads_files(command: argparse.ArgumentParser) -> None:
         "--friction", type=positive, metavar="V", help="take friction loss, most of which acts from this velocity on"
     )
     command.add_argument("--actuators", action="store_true", help="take motors and servos of MJCF, with inputs at 0")
-    command.add_argument("--contacts", choices=("compliant",), help="take contacts of spheres and capsules as forces")
+    command.add_argument(
+        "--contacts",
+        type=material,
+        metavar="compliant | A=1,B=NAME",
+        help="take contacts of spheres and capsules of a model file as forces: with the stiffness, dissipation, "
+        "friction and velocity that follow from it, or numbers or names of parameters in their place",
+    )
 
 
 def reading(options: argparse.Namespace) -> dict[str, Any]:
@@ -286,6 +292,17 @@ def point(text: str) -> dict[str, float]:
     return {name: _number(name, value) for name, value in _pairs(text)}
 
 
+def material(text: str) -> str | dict[str, float | str]:
+    """`compliant`, or numbers and names of parameters such as `stiffness=1e5,friction=mu`, for argparse."""
+    if "=" not in text:
+        return text
+    numbers = ("inf", "nan")
+    return {
+        name: value if value.isidentifier() and value not in numbers else _number(name, value)
+        for name, value in _pairs(text)
+    }
+
+
 def box(text: str) -> dict[str, tuple[float, float]]:
     """`q0=-1:1,qd0=0:2` as intervals by name, for argparse."""
     intervals = {}
@@ -375,22 +392,3 @@ def _number(name: str, text: str) -> float:
         return number(text)
     except argparse.ArgumentTypeError as error:
         raise argparse.ArgumentTypeError(f"{name}: {error}") from None
-
-
-SIZES = ("nodes", "edges", "depth", "width")
-
-
-def size_data(forms: Mapping[str, cg.Graph]) -> dict[str, dict[str, int]]:
-    """{name of a form: {"nodes": .., "edges": .., "depth": .., "width": ..}}.  forms: as of `both_forms`."""
-    return {name: {size: getattr(counts, size) for size in SIZES} for name, counts in library.form_sizes(forms).items()}
-
-
-def size_table(sizes: Mapping[str, Mapping[str, int]]) -> str:
-    """A line for each form of `size_data`, under a header."""
-    words = {
-        library.LAGRANGE: f"{library.LAGRANGE}, of (q, qd)",
-        library.HAMILTON: f"{library.HAMILTON}, of (q, p), p = dL/dqd",
-        library.VELOCITIES_ALONE: f"  the {library.VELOCITIES_ALONE}",
-    }
-    rows = [(words[name], *map(str, each.values())) for name, each in sizes.items()]
-    return "\n".join(library.table(("", *SIZES), rows))
