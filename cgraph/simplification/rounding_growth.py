@@ -53,21 +53,62 @@ def error_bounds(
     values: {input: number or array}.  of_inputs: error of an input, relative to its value.  stored: a constant, as the
     program has it.
     """
-    partials = {node: tuple(map(as_node, node.op.partials(node, *node.args))) for node in nodes if node.args}
-    needed = topological([*nodes, *[slope for slopes in partials.values() for slope in slopes]])
-    numbered = {str(i): node for i, node in enumerate(needed)}
-    found = dict(zip(needed, evaluate(needed, numbered, values).values(), strict=True))
+    partials, found = _with_partials(nodes, values)
     errors: dict[Node, Value] = {}
     with np.errstate(all="ignore"):
         for node in nodes:
             pairs = zip(partials.get(node, ()), node.args, strict=True)
             inherited = [OPS["zero_safe_mul"].array(np.abs(found[slope]), errors[arg]) for slope, arg in pairs]
-            if node.value is not None:
-                errors[node] = abs(stored(node.value) - node.value)
-                continue
-            own = unit * columns(node.op).rounding if node.args else of_inputs
-            errors[node] = sum(inherited) + own * np.abs(found[node])
+            errors[node] = sum(inherited) + _own_error(node, found[node], unit, of_inputs, stored)
     return found, errors
+
+
+def output_bounds(
+    nodes: Sequence[Node],
+    outputs: Sequence[Node],
+    values: Mapping[str, Array],
+    unit: float,
+    of_inputs: float,
+    stored: Callable[[float], float],
+) -> tuple[dict[Node, Value], Array]:
+    """Values of nodes, arguments first, and bounds, (outputs, points), of the errors of some of them to first order.
+
+    The error of an output is the sum of the own errors of all nodes times its derivatives by them, which a sweep back
+    gives: what passes on by several ways cancels with its signs, where `error_bounds` adds up sizes. In an elimination
+    that makes many decades.  Arguments as there, values of (points,).
+    """
+    partials, found = _with_partials(nodes, values)
+    bars: dict[Node, Array] = {}  # derivatives of the outputs by a node, (outputs, points)
+    for k, node in enumerate(outputs):
+        bars.setdefault(node, np.zeros((len(outputs), 1)))[k] = 1.0
+    points = np.broadcast_shapes(*[np.shape(value) for value in values.values()])
+    total = np.zeros((len(outputs), *(points or (1,))))  # without inputs there is one point
+    with np.errstate(all="ignore"):
+        for node in reversed(nodes):
+            if (bar := bars.pop(node, None)) is None:
+                continue
+            total += OPS["zero_safe_mul"].array(np.abs(bar), _own_error(node, found[node], unit, of_inputs, stored))
+            for slope, arg in zip(partials.get(node, ()), node.args, strict=True):
+                share = OPS["zero_safe_mul"].array(found[slope], bar)
+                bars[arg] = bars[arg] + share if arg in bars else share
+    return found, total
+
+
+def _with_partials(
+    nodes: Sequence[Node], values: Mapping[str, Value]
+) -> tuple[dict[Node, tuple[Node, ...]], dict[Node, Value]]:
+    """Local partials of operations, and values of all nodes and of these."""
+    partials = {node: tuple(map(as_node, node.op.partials(node, *node.args))) for node in nodes if node.args}
+    needed = topological([*nodes, *[slope for slopes in partials.values() for slope in slopes]])
+    numbered = {str(i): node for i, node in enumerate(needed)}
+    return partials, dict(zip(needed, evaluate(needed, numbered, values).values(), strict=True))
+
+
+def _own_error(node: Node, value: Value, unit: float, of_inputs: float, stored: Callable[[float], float]) -> Value:
+    """The error that a node adds by itself: of an operation, an input, or a constant as it is stored."""
+    if node.value is not None:
+        return abs(stored(node.value) - node.value)
+    return (unit * columns(node.op).rounding if node.args else of_inputs) * np.abs(value)
 
 
 _POINTS, _SIGNS = 256, 1021  # samples, whose mean is certain to a tenth; operations with signs of their own

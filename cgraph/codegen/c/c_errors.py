@@ -11,7 +11,7 @@ from ...core.checks import GraphError
 from ...core.evaluation import Array, Value
 from ...core.graph import Graph
 from ...core.node import VARIABLE, Node
-from ...simplification.rounding_growth import error_bounds
+from ...simplification.rounding_growth import output_bounds
 from ...util.inputs import box_interval
 from ...util.require import require_mapping
 from .c_numbers import CNumbers
@@ -56,10 +56,11 @@ def largest_errors(graph: Graph, box: Mapping[str, tuple[float, float]], numbers
     at_once = max(1, _ROOM // max(1, len(graph.nodes)))
     for start in range(0, POINTS, at_once):
         here = dict(zip(box, points[:, start : start + at_once], strict=True))
-        values, errors = error_bounds(graph.nodes, here, numbers.unit, numbers.unit, numbers.stored)
+        outputs = [*graph.outputs.values()]
+        values, bounds = output_bounds(graph.nodes, outputs, here, numbers.unit, numbers.unit, numbers.stored)
         rounded = _rounded(graph, here, numbers)
-        for k, node in enumerate(graph.outputs.values()):
-            bound = np.where(np.isfinite(values[node]), errors[node], np.nan)
+        for k, node in enumerate(outputs):
+            bound = np.where(np.isfinite(values[node]), bounds[k], np.nan)
             with np.errstate(invalid="ignore"):
                 seen = np.abs(rounded[node] - values[node])
             worst[k] = np.maximum(worst[k], (np.max(bound), np.max(seen)))  # NaN stays

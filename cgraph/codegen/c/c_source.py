@@ -53,7 +53,7 @@ void {name}(const {type} *x, {type} *y);
 _ERRORS = """
    Beside a place: how far rounding to float takes the output off its exact value. At most, by a bound to first order;
    and as seen where every operation was rounded. Both are the largest of {points} points of these inputs, half of them
-   corners, with inputs and constants rounded, too. Bounds of an elimination are large: they add what mostly cancels."""
+   corners, with inputs and constants rounded, too."""
 _RANGES = " Beside a place: the range for which errors are stated."
 
 # C++ has no `restrict`, and its compilers a word of their own for it.

@@ -54,6 +54,7 @@ def turning():
 
 MODELS = {
     "arm": lambda: dyn.forward_dynamics(dyn.planar_arm([1.0, 0.7, 0.3], [0.7, 0.6, 0.5], damping=0.1)),
+    "chain": lambda: dyn.forward_dynamics(dyn.planar_arm([1.0] * 8, [1.0] * 8)),
     "torques": lambda: dyn.inverse_dynamics(dyn.scenes.load("triple_pendulum")),
     "base": lambda: dyn.state_equation(
         dyn.Mechanism([dyn.Body("body", dyn.Joint("free"), "world", 2.0, [0.1, 0.0, 0.2], np.diag([0.3, 0.4, 0.5]))])
@@ -73,7 +74,7 @@ def test_errors_of_float_stay_below_the_bound_that_the_header_states(name, tmp_p
     off = np.abs(called(library, name, points, len(graph.outputs)) - evaluated(graph, points)).max(axis=0)
     bounds = np.array([*source.errors.values()])
     assert np.all(off <= bounds)
-    assert np.all(off >= 1e-3 * bounds)  # and say something
+    assert np.all(off >= 1e-2 * bounds)  # and say something, also of an elimination
     stated = np.array(re.findall(r"_OUT_\w+ = \d+, /\* (?:.*: )?to (\S+), seen (\S+) \*/", source.header), dtype=float)
     assert np.all((bounds <= stated[:, 0]) & (stated[:, 0] <= 1.1 * bounds))
     assert np.all((0.2 * off <= stated[:, 1]) & (stated[:, 1] <= 1.1 * bounds))
