@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..core.checks import GraphError
 from ..core.evaluation import Array
 from ..core.graph import Graph
 from ..core.node import CONSTANT, VARIABLE, Node
@@ -25,7 +26,7 @@ class OnFloats:
 
     def __init__(self, graph: Graph) -> None:
         self._graph, self.source = graph, source(graph, lambda op: op.python, {*OPS, *_PLAIN})
-        self._function = _executable(self.source, {name: op.raising for name, op in OPS.items()})
+        self._function = _executable(self.source, {name: op.raising for name, op in _rows(graph).items()})
 
     def __call__(self, x: Sequence[float]) -> tuple[float, ...]:
         """The outputs; IEEE values where a function of `math` raises."""
@@ -43,7 +44,8 @@ class OnArrays:
     """
 
     def __init__(self, graph: Graph, *, exact: bool) -> None:
-        apart = {name for name, op in OPS.items() if exact and op.rounding >= LIBRARY}
+        rows = _rows(graph)
+        apart = {name for name, op in rows.items() if exact and op.rounding >= LIBRARY}
 
         def text(op: Op) -> str:
             if op.name in apart:
@@ -51,7 +53,7 @@ class OnArrays:
             return str(op.numpy)
 
         self.source = source(graph, text, {*OPS, *_PLAIN})
-        values = {name: by_element(op.scalar) if name in apart else op.array for name, op in OPS.items()}
+        values = {name: by_element(op.scalar) if name in apart else op.array for name, op in rows.items()}
         self._function = _executable(self.source, values)
 
     def __call__(self, points: Array, result: Array) -> None:
@@ -59,6 +61,18 @@ class OnArrays:
         with np.errstate(all="ignore"):  # here, as every thread has its own
             for row, value in zip(result, self._function(points), strict=True):
                 row[:] = value
+
+
+def _rows(graph: Graph) -> dict[str, Op]:
+    """The table, with the rows that the graph's nodes have, of which one may be replaced in the table.
+
+    Raises GraphError for two of one name.
+    """
+    found = dict.fromkeys([columns(node.op) for node in graph.nodes if node.args])
+    rows = {op.name: op for op in found}
+    if twice := [op.name for op in found if rows[op.name] is not op]:
+        raise GraphError(f"the graph has two operations called {twice[0]!r}: the row of one was replaced since")
+    return {**OPS, **rows}
 
 
 def _executable(text: str, operations: dict[str, Any]) -> Callable[[Any], tuple[Any, ...]]:

@@ -19,6 +19,7 @@ Interval = tuple[float, float]
 # How strongly a text binds: in parentheses goes what binds less than its place asks for.
 RELATION, SUM, PRODUCT, FUNCTION, LEAF = range(5)
 LIBRARY = 2.0  # units of rounding: libraries promise an ulp or so
+_IN_BROWSER = "Math.{} ?? (() => NaN)"
 
 
 class MathML(NamedTuple):
@@ -95,8 +96,9 @@ class Op(Row):
         Units of rounding, 2**-53, of its own result. Default two, as for a function of the C library.
     python, numpy : str
         Text over floats and over arrays, with {} or {0}, {1} for arguments. Default name(..), with `scalar` and `array`
-        behind the name; of a ufunc np.ufunc(..). WebAssembly is made of the one in Python; a function that it calls and
-        a module has not is imported from `math`, which in a page is Math.
+        behind the name; of a ufunc np.ufunc(..). WebAssembly is made of the one in Python: of numbers, {0}, + - * / and
+        **, comparisons, `and`, `or`, `a if c else b`, which computes both, and calls. A function that is called and a
+        module has not is imported from `math`: in a page that is Math, and of the operation's name `javascript`.
     library : str
         Its function in the C library. Default of that name.
     llvm : tuple of str
@@ -108,7 +110,8 @@ class Op(Row):
         C expression with {0}, {1} for arguments, and a C function that it calls, with {name} for the name of the one
         being written. Default the call of the library's function, and none.
     javascript : str
-        A function. Default Math.name, and NaN where a browser has none.
+        A function. Default Math.name. Where a browser has none the inspector and lessons show no number, and what needs
+        WebAssembly with that function, `viz.live` and `cg.wasm_script`, raises ValueError.
     operator : callable
         Of numbers and expressions of any kind, made by their operators. Default none.
     precise : callable
@@ -181,7 +184,7 @@ class Op(Row):
             "numpy": f"np.{self.array.__name__}{call}" if in_numpy else f"{self.name}{call}",
             "library": library,
             "c": f"{library}{call}",
-            "javascript": f"Math.{self.name} ?? (() => NaN)",
+            "javascript": _IN_BROWSER.format(self.name),
         }
         for column, default in filled.items():
             if not getattr(self, column):
@@ -197,6 +200,11 @@ class Op(Row):
     def parameters(self) -> list[str]:
         """Names of the arguments."""
         return self.arguments.split()
+
+    @property
+    def own_javascript(self) -> str:
+        """The column `javascript` where it is given."""
+        return "" if self.javascript == _IN_BROWSER.format(self.name) else self.javascript
 
     @cached_property
     def calls_library(self) -> bool:
@@ -217,11 +225,14 @@ _LEAVES = {row.name: Op(row.name, 0, row.scalar, row.array, row.partials) for ro
 
 def columns(row: Row) -> Op:
     """All columns of a node's operation, its `op`; those of a leaf are empty."""
-    return OPS.get(row.name) or _LEAVES[row.name]
+    return row if isinstance(row, Op) else _LEAVES[row.name]
 
 
 def enter(op: Op) -> None:
-    """Put a row into the table as it is."""
+    """Put a row into the table as it is, in place of one of its name."""
+    before = columns(ROWS[op.name]) if op.name in ROWS else None
+    if before is not None and BY_UFUNC.get(before.ufunc or "") is before:
+        del BY_UFUNC[before.ufunc or ""]
     OPS[op.name] = ROWS[op.name] = op
     if op.ufunc is not None:
         BY_UFUNC[op.ufunc] = op

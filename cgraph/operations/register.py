@@ -2,34 +2,67 @@
 
 from __future__ import annotations
 
+import math
 import sys
 from keyword import iskeyword
 
+import numpy as np
+
+from ..core.graph import Graph
 from ..core.node import Node, variable
 from .operation import OPS, Op, enter
+from .table import ROWS
 
 _GENERATED = ("float", "function", "inf", "np", "x")  # which mean something in generated Python
 _LIBRARY = sys.modules[__name__.partition(".")[0]]  # `cg.name` of one of its names would not be the row's function
+_VALUES, _SLOPES = 1e-6, 1e-4  # relative: far above rounding, and the error of differences, and below a wrong formula
+_STEP = 1e-3  # of differences, relative to the argument
 
 
-def register(op: Op) -> None:
+def register(op: Op, *, replace: bool = False) -> None:
     """Add a row to the operation table: from then on every part of the library knows the operation.
 
-    `cg.name` is then the function that makes its nodes, and its `ufunc` makes them too. Raises TypeError for what is no
-    Op, or has no function in its first columns, ValueError for a name, samples or partials that do not fit.
+    `cg.name` is then the function that makes its nodes, and its `ufunc` makes them too. The row is tried at its
+    samples: `scalar` beside `array`, and `partials` beside differences of `scalar`.
 
-    >>> from cgraph.extend import OPS, register
+    Parameters
+    ----------
+    op : Op
+        The row.
+    replace : bool
+        True puts it in the place of one of its name that `register` added before, as when a notebook's cell is run
+        again. Nodes that were made by then keep the row that they were made with; a file that has them takes the new.
+
+    Raises
+    ------
+    TypeError
+        For what is no Op, or has no function in its first columns.
+    ValueError
+        For a name, samples or partials that do not fit, and for columns that disagree at a sample.
+
+    Examples
+    --------
+    >>> import math, numpy as np
+    >>> import cgraph as cg
+    >>> from cgraph.extend import OPS, Op, register
     >>> register(OPS["sin"])
     Traceback (most recent call last):
-    ValueError: operation 'sin' is in the table already
+    ValueError: operation 'sin' is in the table already, as one of the library's
+    >>> values = lambda x: 1.0 - math.cos(x), lambda x: 1.0 - np.cos(x)
+    >>> register(Op("versin", 1, *values, lambda y, x: (cg.cos(x),), samples=((0.6,),)))
+    Traceback (most recent call last):
+    ValueError: operation 'versin': at x=0.6 its partial by x is 0.825336, where differences of scalar give 0.564642
     """
     if not isinstance(op, Op):
         raise TypeError(f"register takes an Op, got {type(op).__name__}: {op!r:.60}")
-    if op.name in OPS:
-        raise ValueError(f"operation {op.name!r} is in the table already")
+    before = OPS.get(op.name)
+    if before in ROWS:
+        raise ValueError(f"operation {op.name!r} is in the table already, as one of the library's")
+    if before is not None and not replace:
+        raise ValueError(f"operation {op.name!r} is in the table already; replace=True puts this row in its place")
     if not op.name.isidentifier() or iskeyword(op.name):
         raise ValueError(f"an operation's name must be an identifier of Python, got {op.name!r}")
-    if op.name in _GENERATED or op.name in dir(_LIBRARY):
+    if op.name in _GENERATED or (before is None and op.name in dir(_LIBRARY)):
         raise ValueError(f"an operation cannot be called {op.name!r}, which means something else in cgraph")
     for column in ("scalar", "array", "partials"):
         if not callable(getattr(op, column)):
@@ -40,18 +73,62 @@ def register(op: Op) -> None:
         raise ValueError(f"operation {op.name!r} needs samples of {op.arity} number(s) each, got {op.samples!r}")
     OPS[op.name] = op  # partials may have nodes of the operation itself
     try:
-        _check_partials(op)
+        partials = _partials(op)
+        for sample in op.samples:
+            _check_columns(op, partials, sample)
     except BaseException:
-        del OPS[op.name]
+        if before is None:
+            del OPS[op.name]
+        else:
+            OPS[op.name] = before
         raise
     enter(op)
 
 
-def _check_partials(op: Op) -> None:
-    """See that there is a partial for each argument."""
-    args = tuple([variable(f"argument{slot}") for slot in range(op.arity)])
+def _partials(op: Op) -> Graph:
+    """The partials, one for each argument, as a graph."""
+    args = tuple([variable(name) for name in op.parameters])
     partials = op.partials(Node(op, args), *args)
     if not isinstance(partials, tuple):
         raise TypeError(f"operation {op.name!r}: partials must give a tuple, got {partials!r:.60}")
     if len(partials) != op.arity:
         raise ValueError(f"operation {op.name!r} takes {op.arity} argument(s), its partials are {len(partials)}")
+    return Graph(args, dict(zip(op.parameters, partials, strict=True)))
+
+
+def _check_columns(op: Op, partials: Graph, sample: tuple[float, ...]) -> None:
+    """See that scalar, array and partials are of one function at a sample."""
+    where = (
+        f"operation {op.name!r}: at {', '.join([f'{x}={at:g}' for x, at in zip(op.parameters, sample, strict=True)])}"
+    )
+    value = _scalar(op, sample)
+    try:
+        with np.errstate(all="ignore"):
+            array = float(np.broadcast_to(op.array(*[np.array([x, x]) for x in sample]), 2)[1])
+    except (TypeError, ValueError) as error:
+        raise TypeError(f"operation {op.name!r}: array must take and give arrays: {error}") from error
+    slopes = partials.evaluate(dict(zip(op.parameters, sample, strict=True)))
+    sizes = [abs(value)]
+    for slot, (name, slope) in enumerate(zip(op.parameters, map(float, slopes.values()), strict=True)):
+        h = _STEP * (abs(sample[slot]) or 1.0)
+        high, low, near, below = (
+            _scalar(op, (*sample[:slot], sample[slot] + step, *sample[slot + 1 :]))
+            for step in (h, -h, h / 2.0, -h / 2.0)
+        )
+        sizes += [abs(high), abs(low)]
+        wide, narrow = (high - low) / (2.0 * h), (near - below) / h
+        found = (4.0 * narrow - wide) / 3.0  # Richardson's extrapolation
+        allowed = _SLOPES * max(abs(found), abs(slope)) + abs(narrow - wide) + 1e-9 * max(sizes) / h
+        if math.isfinite(found) and not abs(found - slope) <= allowed:
+            told = f"is {slope:.6g}, where differences of scalar give {found:.6g}"
+            raise ValueError(f"{where} its partial by {name} {told}")
+    if not (value == array or abs(value - array) <= _VALUES * max(sizes) or (value != value and array != array)):
+        raise ValueError(f"{where} scalar is {value:.6g} and array {array:.6g}")
+
+
+def _scalar(op: Op, at: tuple[float, ...]) -> float:
+    """The value on floats, NaN where it raises."""
+    try:
+        return float(op.scalar(*at))
+    except (ValueError, OverflowError, ZeroDivisionError):
+        return math.nan

@@ -71,7 +71,7 @@ _SMALLEST_FLOAT = math.ulp(0.0)
 # By place: name, arity, value on floats, value on arrays, partials of (output y, arguments), samples. The rest by name.
 # A table is read by columns, so the formatter leaves it alone.
 # fmt: off
-_ROWS = (
+ROWS = (
     Op("add", 2, operator.add, np.add, lambda y, a, b: (1.0, 1.0), ((0.3, -0.7),), about="The sum a + b.",
        symbol="+", infix=("+", SUM), mathml=MathML("{0}<mo>+</mo>{1}", (SUM, PRODUCT), SUM), commutative=True, signs=(1, 1),
        fold=folding.add, double_double=dd.add, operator=operator.add, domain=(_REAL, _REAL),
@@ -254,7 +254,7 @@ _ROWS = (
 )
 # fmt: on
 
-for _row in _ROWS:
+for _row in ROWS:
     enter(_row)
 
 sqrt: Function = function(OPS["sqrt"])

@@ -276,17 +276,6 @@ def _svg_file(text: str) -> Path:
     return Path(text)
 
 
-SEED, DIGITS = 20250814, 3  # of the numbers that nobody gave: always the same, and short enough to be typed again
-
-DT = 1e-3  # s, the step of an embedded relation
-SHOWN = 12  # inputs that a line of text names
-
-REST = (
-    f"of the inputs that it leaves out, parameters keep their values, dt is {DT} s, t is 0, "
-    "and the rest have numbers between -1 and 1, always the same"
-)
-
-
 def point(text: str) -> dict[str, float]:
     """`q0=0.1,qd0=2` as numbers by name, for argparse."""
     return {name: _number(name, value) for name, value in _pairs(text)}
@@ -314,19 +303,6 @@ def box(text: str) -> dict[str, tuple[float, float]]:
         if intervals[name][0] > intervals[name][1]:
             raise argparse.ArgumentTypeError(f"{name} needs its lower end first, got {value!r}")
     return intervals
-
-
-def filled(graph: cg.Graph, scene: dyn.scenes.Scene, given: dict[str, float]) -> dict[str, float]:
-    """The given numbers with the rest that the graph's inputs need, by the graph's names. Raises for unknown names."""
-    import numpy as np
-
-    chosen = np.random.default_rng(SEED)
-    parameters = scene.parameters
-    values = {}
-    for name in graph.input_names:
-        drawn = round(chosen.uniform(-1.0, 1.0), DIGITS)
-        values[name] = parameters[name] if name in parameters else {"dt": DT, "t": 0.0}.get(name, drawn)
-    return values | extend.Names(graph, dyn.display_names(scene)).inputs_of("--at", given)
 
 
 def takes_a_start(command: argparse.ArgumentParser) -> None:
@@ -365,13 +341,6 @@ def started(options: argparse.Namespace, *, free: bool = True) -> tuple[dyn.scen
     why = library.rest_text(scene, moving)
     say(f"{scene.name}: {why}; --start chooses another")
     return moving, why
-
-
-def point_text(at: Mapping[str, float]) -> str:
-    """`q.knee=0.1, qd.knee=2`, and of many inputs the first."""
-    shown = [f"{name}={value:g}" for name, value in list(at.items())[:SHOWN]]
-    rest = [f"and {len(at) - SHOWN} more"] if len(at) > SHOWN else []
-    return ", ".join([*shown, *rest])
 
 
 def _pairs(text: str, form: str = "NAME=VALUE") -> list[tuple[str, str]]:

@@ -16,7 +16,6 @@ from .arguments import (
     MOMENTUM_FORM,
     answer_and_draw,
     check_picture,
-    filled,
     formulation,
     may_draw_and_print,
     scene_of,
@@ -25,6 +24,7 @@ from .arguments import (
     unless_json,
 )
 from .command import Command
+from .points import filled
 
 SIZES = ("nodes", "edges", "depth", "width")
 
@@ -69,7 +69,7 @@ def run(options: argparse.Namespace) -> int:
     ]
     data = {"scene": scene.name} | named | sizes | comparison.to_dict()
     data |= {"verdicts": {name: each.to_dict() for name, each in verdicts.items()}} if verdicts else {}
-    told = [str(each) for each in verdicts.values()]
+    told = [f"{each}\n{each.off}" if each.excess else str(each) for each in verdicts.values()]
     if options.momentum:
         agreement, text = _forms(scene, graphs)
         data, lines = data | agreement, [text, *lines]

@@ -10,12 +10,10 @@ from cgraph import extend
 
 from . import library
 from .arguments import (
-    REST,
     answer_and_draw,
     box,
     check_picture,
     equations_of,
-    filled,
     may_draw_and_print,
     point,
     scene_of,
@@ -27,6 +25,7 @@ from .arguments import (
 )
 from .command import Command
 from .compare import size_data, size_table
+from .points import REST, filled
 
 
 def add(parser: Command) -> None:
@@ -52,12 +51,15 @@ def run(options: argparse.Namespace) -> int:
     scene = scene_of(options)
     verdict = verdict_of(options, scene)
     graph, what = equations_of(options, scene, verdict)
+    at = None if options.at is None else filled(graph, scene, options.at)
+    if verdict is not None and verdict.differs and options.at:
+        verdict = dyn.formulation_verdict(scene, options.formulation, _after(scene, at or {}))
     q, qd = state_names(graph, scene, momentum=options.momentum)
     report = cg.lint(
         graph,
         independent=[(q, qd)] if q and qd else [],
         box=options.box,
-        at=None if options.at is None else filled(graph, scene, options.at),
+        at=at,
         function="K" if options.formulation.startswith("kinetic") else "L",
         names=dyn.display_names(scene),
     )
@@ -96,11 +98,17 @@ def run(options: argparse.Namespace) -> int:
     return 0 if ok and held.ok else 1
 
 
+def _after(scene: dyn.scenes.Scene, at: dict[str, float]) -> dict[str, float]:
+    """The state after the embedded step, with the other inputs but dt."""
+    others = {name: value for name, value in at.items() if name != "dt" and not name.endswith("_old")}
+    return library.after_step(scene.system, at) | others
+
+
 def lint_text(report: extend.Lint, verdict: dyn.Verdict | None) -> str:
     """The report with the verdict before it, which tells better than tags what is gained on a path from qd to q."""
     if verdict is None:
         return str(report)
-    lines = [str(verdict)]
+    lines = [str(verdict), *([str(verdict.off)] if verdict.excess else [])]
     for each in report.findings:
         told = str(each)
         lines.append(told.rpartition("\n")[0] if each.data.get("derivatives_through") else told)

@@ -11,16 +11,13 @@ from cgraph import extend
 
 from . import library
 from .arguments import (
-    REST,
     answer,
     answer_and_draw,
     check_picture,
     counting,
     equations_of,
-    filled,
     may_draw_and_print,
     point,
-    point_text,
     scene_of,
     takes_a_scene,
     takes_equations,
@@ -28,6 +25,7 @@ from .arguments import (
     verdict_of,
 )
 from .command import Command
+from .points import REST, SHOWN, filled, point_text
 
 if TYPE_CHECKING:
     from ..models.causes import CauseTable
@@ -70,7 +68,9 @@ def run(options: argparse.Namespace) -> int | None:
     graph, _ = equations_of(options, scene, verdict)
     names = extend.Names(graph, dyn.display_names(scene))
     at = filled(graph, scene, options.at)
-    state = f"At {point_text({names.shown(name): value for name, value in at.items()})}:"
+    state = (
+        f"At {point_text({names.shown(name): value for name, value in at.items()}, len(at) if options.at else SHOWN)}:"
+    )
     if options.nan:
         return _nan(options, scene, names, at)
     table = None if verdict is None else library.CauseTable(scene, graph, verdict.formulation, at)

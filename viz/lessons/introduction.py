@@ -62,9 +62,23 @@ def _moment(subject: Subject) -> str:
         table = Table("This moment", header, lines).html()
     else:
         table = Table("This moment", ["quantity", "value"], rows).html()
-    units = "" if subject.units else "<p>The model states no units: any that fit one another, such as those of SI.</p>"
+    told = bool(subject.units or subject.scene.about)
+    units = (
+        "" if told else "<p>The numbers have no units here: any that fit one another will do, such as those of SI.</p>"
+    )
+    units += f"<p>{_chosen(subject)}</p>"
     more = subject.system.n - SHOWN
     return table + units + (f"<p>{more} more {'is' if more == 1 else 'are'} not shown.</p>" if more > 0 else "")
+
+
+def _chosen(subject: Subject) -> str:
+    """Sentence on what of this moment is the model's own start, and what the lesson has put in its place."""
+    scene = subject.scene
+    starts = {"q": [*subject.q] == [*scene.q], "q̇": [*subject.qd] == [*scene.qd], "q̈": False}
+    kept, chosen = (" and ".join([name for name, own in starts.items() if own is kind]) for kind in (True, False))
+    is_kept = f" {kept} {'are those' if ' and ' in kept else 'is that'} of the model’s start." if kept else ""
+    chosen = chosen.replace(" and ", ", ", max(0, chosen.count(" and ") - 1))
+    return f"The lesson has chosen {chosen}, so that every {subject.joint} moves.{is_kept}"
 
 
 def _parameters(subject: Subject) -> str:

@@ -44,12 +44,13 @@ LESSONS = {
         MINUTES + 25,
         (formula_graph, backward_sweep, euler_edge, wrong_way, check),
     ),
-    "sweeps": Lesson("The chain rule in sweeps", MINUTES + 13, (formula_graph, backward_sweep, forward_sweep)),
+    "sweeps": Lesson("The chain rule in sweeps", MINUTES + 14, (formula_graph, backward_sweep, forward_sweep)),
     "torque": Lesson("The parts of a torque or force", MINUTES + 3, (torque_parts,)),
     "elimination": Lesson("Accelerations by elimination", MINUTES + 5, (elimination,)),
     "loops": Lesson("A constraint and its force", MINUTES + 5, (closed_loop,)),
     "energy": Lesson("Energy and the size of a step", MINUTES + 5, (energy_and_step,)),
 }
+TRIALS = 20  # orders of the choices
 FORMS = ("page", "worksheet", "key")
 
 
@@ -112,7 +113,7 @@ def lesson(
             raise TypeError(f"{what} must be text, got {type(given).__name__}: {given!r:.60}")
     check_can_draw(png=False)
     on = subject_of(model)
-    screens = [screen(on) for screen in chosen.screens]
+    screens = arranged([screen(on) for screen in chosen.screens], f"{subject} {on.scene.name} {' '.join(on.joints)}")
     heading = title or chosen.title
     if form == "page":
         text = page(on, screens, heading, author, chosen.minutes, subject)
@@ -121,6 +122,15 @@ def lesson(
     if target is not None:
         write_files({target: text})
     return text
+
+
+def arranged(screens: Sequence[Screen], seed: str) -> list[Screen]:
+    """The screens, each with its choices in another order than others have, so that no letter is always right."""
+    for trial in range(TRIALS):
+        made = [screen.arranged(f"{seed} {trial}") for screen in screens]
+        if len({screen.answer for screen in made}) > len(made) // 2:
+            break
+    return made
 
 
 def page(

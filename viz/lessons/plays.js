@@ -149,15 +149,16 @@ const PLAYS = {
     let step = 0;
     const buttons = board.appendChild(tag("div", { class: "buttons" }));
     button(buttons, "Next", () => { step = Math.min(step + 1, last); redraw(); });
-    button(buttons, "All values", () => { step = Math.max(step, count); redraw(); });
+    button(buttons, play.rates ? "All" : "All values", () => { step = Math.max(step, count); redraw(); });
     if (play.slopes) button(buttons, "All slopes", () => { step = last; redraw(); });
     button(buttons, "Again", () => { step = 0; redraw(); });
-    const write = grid(board, ["node", "value", ...(play.slopes ? ["slope of L", "it is"] : []), "is"]);
+    const write = grid(board, ["node", "value", ...(play.rates ? ["rate"] : []), ...(play.slopes ? ["slope of L", "it is"] : []), "is"]);
     return () => {
       const now = step > count ? 2 * count - step : step - 1; // the row whose value or slope is new
       const cells = rows.map((row, i) => [row.node, i < step ? digits(row.value) : "·",
+        ...(play.rates ? [i < step ? digits(row.rate) : "·"] : []),
         ...(play.slopes ? (2 * count - i <= step ? [digits(row.slope), row.what] : ["·", ""]) : []), row.text]);
-      write(cells.reverse(), (i, j) => (count - 1 - i === now && j === (step > count ? 2 : 1) ? "lit" : "")); // as in the picture
+      write(cells.reverse(), (i, j) => (count - 1 - i === now && (j === (step > count ? 2 : 1) || (play.rates && j === 2)) ? "lit" : "")); // as in the picture
       rows.forEach((row, i) => document.getElementById(row.box)?.classList.toggle("lit", i === now));
     };
   },

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from html import escape
+
+import numpy as np
 
 from ..graph_drawing.legend import to_adaptive
 from ..pages.document import Picture
@@ -56,6 +60,16 @@ class Screen:
     play: Mapping[str, object] | None = None
     picture: str = ""  # what the play is about
     figure: Figure | None = None
+
+    def arranged(self, seed: str) -> Screen:
+        """The screen with its choices in an order that only the seed knows; those that are numbers by size."""
+        numbers = [re.match(r"[−-]?\d+(\.\d+)?(e[−-]?\d+)?", choice) for choice in self.choices]
+        if numbers.count(None) <= 1:
+            values = [math.inf if each is None else float(each[0].replace("−", "-")) for each in numbers]
+            order = sorted(range(len(values)), key=values.__getitem__)
+        else:
+            order = np.random.default_rng([*f"{seed} {self.anchor}".encode()]).permutation(len(numbers)).tolist()
+        return replace(self, choices=[self.choices[k] for k in order], answer=order.index(self.answer))
 
     def to_html(self, number: int) -> str:
         """The screen as a section of the page."""

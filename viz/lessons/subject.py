@@ -117,14 +117,20 @@ class Subject:
         return display_names(self.scene)
 
     @cached_property
+    def rates(self) -> dict[str, float]:
+        """Rates of coordinates, velocities and the time at the state."""
+        moved = Graph([*self.system.q, *self.system.qd], {f"q{i}": rate for i, rate in enumerate(self.system.q_dot)})
+        found = moved.evaluate(dict(zip(moved.input_names, (*self.q.tolist(), *self.qd.tolist()), strict=True)))
+        known = {name: float(rate) for name, rate in found.items()}
+        return known | {f"qd{i}": float(rate) for i, rate in enumerate(self.qdd)} | {"t": 1.0}
+
+    @cached_property
     def values(self) -> dict[str, float]:
         """All inputs of the graphs at the state, without applied torques, at t = 0."""
-        rates = Graph([*self.system.q, *self.system.qd], {str(i): rate for i, rate in enumerate(self.system.q_dot)})
         known: dict[str, float] = {"t": 0.0, "dt": DT, **self.system.parameters}
         for name, array in (("q", self.q), ("qd", self.qd), ("qdd", self.qdd), ("tau", 0.0 * self.qd)):
             known |= {f"{name}{i}": float(value) for i, value in enumerate(array)}
-        moved = rates.evaluate({name: known[name] for name in rates.input_names})
-        known |= {f"q{i}_old": known[f"q{i}"] - DT * float(moved[str(i)]) for i in range(len(self.q))}
+        known |= {f"q{i}_old": known[f"q{i}"] - DT * self.rates[f"q{i}"] for i in range(len(self.q))}
         return known | {f"qd{i}_old": known[f"qd{i}"] - DT * known[f"qdd{i}"] for i in range(len(self.qd))}
 
     def evaluate(self, graph: Graph, **other: float) -> Array:
@@ -173,7 +179,9 @@ def subject_of(model: Model) -> Subject:
     scene = of_model(model)
     system = scene.system  # a first-order one has none
     scene = moving_start(scene)
-    q, qd, qdd = np.array(scene.q), _in_turn(_SPEEDS, system.n), _in_turn(_ACCELERATIONS, system.n)
+    q, qd, qdd = np.array(scene.q), np.array(scene.qd), _in_turn(_ACCELERATIONS, system.n)
+    qd = np.where(qd == 0.0, _in_turn(_SPEEDS, system.n), qd)
+    qdd[qdd == qd] *= 2.0  # a value and its rate are two numbers
     if system.n > 1 and system.kinematics.quasi is None:
         q = q + _in_turn(_BENDS, system.n)  # a straight arm is a special place, and so is 0
         q[q == 0.0] = 0.4

@@ -11,7 +11,7 @@ from typing import Any
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import Json
+from cgraph.extend import Json, page_functions
 
 from .. import theme
 from ..pages import html
@@ -111,7 +111,9 @@ def panel(live: Live, begin: str = "startLive();") -> Panel:
     colors = {"kinetic": theme.BLUE, "potential": theme.ORANGE, "right": theme.GREEN, "wrong": theme.SPURIOUS}
     variables = ":root{" + "".join(f"--live-{name}:{color};" for name, color in colors.items()) + "}\n"
     dark = f"@media (prefers-color-scheme: dark){{:root{{--live-kinetic:{theme.SKY_BLUE};}}}}\n"
-    script = f"{{\n{asset(__package__, *SCRIPTS)}\n{begin}\n}}"  # in a block it shares no name with a page's
+    functions = page_functions(live.rate, live.shown)
+    run = f"const LIVE_MATH = {functions};\n{asset(__package__, *SCRIPTS)}\n{begin}"
+    script = f"{{\n{run}\n}}"  # in a block it shares no name with a page's
     style = f"{variables}{dark}{asset(__package__, 'live.css')}"
     return Panel(
         asset(__package__, "live.html"), style, run=script, allowed=EVALUATION, data={"live-data": live.to_dict()}

@@ -7,11 +7,10 @@ const LOOKS = 40; // states at which the size of a group of meters is looked at
 const OTHERS = 1e-6; // of the largest state of its group, below which one counts as no smaller: it may be rounding
 
 const decoded = (base64) => Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
-const LIVE_IMPORTS = { math: Math };
 
 /** The two modules, of the rate and of what is shown. */
 async function liveModules(data) {
-  return Promise.all([data.rate, data.shown].map(async (text) => (await WebAssembly.instantiate(decoded(text), LIVE_IMPORTS)).instance));
+  return Promise.all([data.rate, data.shown].map(async (text) => (await WebAssembly.instantiate(decoded(text), { math: LIVE_MATH })).instance));
 }
 
 /** Two runs of one system from one start: `run` by the steps that are asked for, `fine` by much shorter ones. */

@@ -84,10 +84,12 @@ class Causes:
 
     def _blame(self) -> list[str]:
         wrong = math.fsum([part for name, part in self.parts.items() if name.startswith(SPURIOUS)])
+        if abs(wrong) <= ROUNDING * math.fsum(map(abs, self.parts.values())):
+            return []
         right = self.value - wrong
         right = right if abs(right) > ROUNDING * (abs(self.value) + abs(wrong)) else 0.0
         told = f"without it {self.what} would be {right:.6g}"
-        return [f"  What is spurious is no physics, but a mistake of the formulation: {told}."] if wrong else []
+        return [f"  What is spurious is no physics, but a mistake of the formulation: {told}."]
 
     def to_dict(self) -> dict[str, Json]:
         """Dictionary for JSON."""

@@ -112,6 +112,11 @@ def inspection_page(
     lively = scene.ode is not None or scene.system.n <= LIVELY
     notices = [f"Left out of the model: {'; '.join(scene.left_out)}."] if scene.left_out else []
     notices += [each for each in (tree_alone(scene), content.lacking) if each]
+    try:
+        motions = [live_panel(scene, momentum=view == MOMENTUM)] if lively else []
+    except ValueError as error:  # an operation that no browser has
+        motions = []
+        notices.append(f"No live motion: {error}.")
     notices += [f"{moved[0].upper()}{moved[1:]}."] if moved else []
     return page(
         versions,
@@ -127,7 +132,7 @@ def inspection_page(
         notices=[*notices, *([cut_short(content)] if content.stopped else [])],
         panels=[
             box(text_or_none(scene, scene.q, scene.qd)),
-            *([live_panel(scene, momentum=view == MOMENTUM)] if lively else []),
+            *motions,
             formulas_panel(scene, momenta=view == MOMENTUM),
         ],
         view=next((each.name for each in versions if each.group == view), ""),

@@ -23,7 +23,7 @@ def evaluation(graph: Graph, texts: Mapping[Row, ast.expr], signatures: Mapping[
     Arguments are computed right before their operation, by a stack of what is still to be written; a value with
     several uses is computed before the first of them and kept in a local until the last.
     """
-    parts = {op: _parts(text, signatures) for op, text in texts.items()}
+    parts = {op: _parts(op, text, signatures) for op, text in texts.items()}
     places = {node: 8 * k for k, node in enumerate(graph.inputs)}
     uses = Counter([_key(node) for node in graph.outputs.values()])
     for node in graph.nodes:
@@ -69,9 +69,15 @@ def evaluation(graph: Graph, texts: Mapping[Row, ast.expr], signatures: Mapping[
     return ins.sized(ins.counted(runs) + bytes(code) + ins.END)
 
 
-def _parts(text: ast.expr, signatures: Mapping[str, Signature]) -> list[bytes | int]:
+def _parts(op: Row, text: ast.expr, signatures: Mapping[str, Signature]) -> list[bytes | int]:
     body = Body(signatures)
-    body.expression(text, ins.F64)
+    try:
+        body.expression(text, ins.F64)
+    except (KeyError, NotImplementedError):
+        raise ValueError(
+            f"operation {op.name!r} has no WebAssembly: its column `python` may have numbers, arguments, + - * / **, "
+            f"comparisons, and, or, `a if c else b` and calls of functions, got {ast.unparse(text)}"
+        ) from None
     return body.parts
 
 

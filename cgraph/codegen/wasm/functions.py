@@ -8,7 +8,8 @@ from __future__ import annotations
 import ast
 from collections.abc import Collection, Iterable
 
-from ...operations.operation import Op
+from ...core.graph import Graph
+from ...operations.operation import Op, columns
 from ...util.caches import memo
 from .elementary_functions import DIGITS, TEXT
 from .instructions import INTRINSICS
@@ -18,6 +19,10 @@ HELPERS = {"wave", "product", "quickly", "scaled", "growth", "exponential", "log
 HELPERS |= {"by_series", "by_fraction"}
 PRIMITIVES = {*INTRINSICS, "load", "store", "word", "address"}
 HOST = "math."  # before the name of a function that the host supplies
+MATH = frozenset(
+    "abs acos acosh asin asinh atan atan2 atanh cbrt ceil clz32 cos cosh exp expm1 floor fround hypot imul log log10 "
+    "log1p log2 max min pow random round sign sin sinh sqrt tan tanh trunc".split()
+)  # of JavaScript, ECMAScript 2015
 
 
 def _table() -> bytes:
@@ -48,12 +53,43 @@ def library(at: int) -> dict[str, ast.FunctionDef]:
 
 def text_of(op: Op, imported: Collection[str]) -> ast.expr:
     """The operation on _0, _1, ..: its row's text in Python, with the host's functions marked as such."""
-    text = ast.parse(op.python.format(*[f"_{slot}" for slot in range(op.arity)]), mode="eval").body
+    read = ast.parse(op.python.format(*[f"_{slot}" for slot in range(op.arity)]), mode="eval")
+    text: ast.expr = _PowersCalled().visit(read).body
     own = {*library(0), "abs", "ceil", "floor", "round", "sqrt", "float"} - HELPERS - {*imported}
     for node in ast.walk(text):
         if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id not in own:
             node.func.id = HOST + node.func.id
     return text
+
+
+class _PowersCalled(ast.NodeTransformer):
+    """a ** b as pow(a, b)."""
+
+    def visit_BinOp(self, node: ast.BinOp) -> ast.expr:
+        self.generic_visit(node)
+        if isinstance(node.op, ast.Pow):
+            return ast.Call(ast.Name("pow", ast.Load()), [node.left, node.right], [])
+        return node
+
+
+def page_functions(*graphs: Graph) -> str:
+    """JavaScript of what modules of the graphs import as `math` in a page: Math, and what rows have for it.
+
+    Raises ValueError for an operation that calls a function which neither a module nor a page has.
+    """
+    own = {}
+    for op in dict.fromkeys([columns(node.op) for graph in graphs for node in graph.nodes if node.args]):
+        for name in called([text_of(op, ())], 0):
+            name = name.removeprefix(HOST) if name.startswith(HOST) else ""
+            if name == op.name and op.own_javascript:
+                own[name] = op.javascript
+            elif name and name not in MATH:
+                raise ValueError(
+                    f"operation {op.name!r} calls {name}, which no page has: its row needs the column `javascript`, a "
+                    f"function, or a `python` of functions that are known, such as sin, sqrt and pow"
+                )
+    texts = "".join([f", {name}: {text}" for name, text in own.items()])
+    return f"{{ __proto__: Math{texts} }}" if own else "Math"
 
 
 def called(texts: Iterable[ast.AST], at: int) -> dict[str, int]:

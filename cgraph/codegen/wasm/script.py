@@ -10,6 +10,7 @@ from ...util.require import require_graph
 from ...util.version import __version__
 from ...writing.structure_hash import structure_hash
 from ..explicit_method import Tableau, checked_methods
+from .functions import page_functions
 
 _TEXT = """\
 // __N_OUT__ outputs of __N_IN__ inputs, for the module that cgraph.to_wasm wrote of them. cgraph __VERSION__, structure
@@ -45,7 +46,7 @@ function known(method, among) {
 /** The functions of a module: its bytes, or the response of `fetch`. */
 export async function load(source) {
   const bytes = typeof source?.arrayBuffer === "function" ? await source.arrayBuffer() : source;
-  const { exports } = (await WebAssembly.instantiate(bytes, { math: Math })).instance;
+  const { exports } = (await WebAssembly.instantiate(bytes, { math: __MATH__ })).instance;
   const at = (byte, count) => new Float64Array(exports.memory.buffer, byte, count);
   const given = (x) => at(0, inputs.length).set(numbers(x));
   return {
@@ -97,6 +98,8 @@ def wasm_script(graph: Graph, methods: Mapping[str, Tableau] | None = None, *, t
     ------
     GraphError, TypeError
         As of `to_wasm`.
+    ValueError
+        For an operation that calls a function which neither the module nor JavaScript has.
 
     Examples
     --------
@@ -115,6 +118,7 @@ def wasm_script(graph: Graph, methods: Mapping[str, Tableau] | None = None, *, t
         "INPUTS": json.dumps(graph.input_names),
         "OUTPUTS": json.dumps([*graph.outputs]),
         "METHODS": json.dumps([*chosen]),
+        "MATH": page_functions(graph),
         "CHOOSING": json.dumps([name for name, each in chosen.items() if len(getattr(each, "error", ())) == 1]),
     }
     text = _TEXT

@@ -70,7 +70,8 @@ def to_wasm(
     TypeError
         For what is no Graph, methods that are no mapping to tableaus, or a time that is no name.
     ValueError
-        For a method called evaluate or memory, or a function of the host that the module has not.
+        For a method called evaluate or memory, a function of the host that the module has not, or an operation whose
+        column `python` has more than `Op` says.
 
     Examples
     --------

@@ -9,10 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, NamedTuple
-
-import numpy as np
 
 from cgraph import Edge, Graph, Node, extend, simplify
 from cgraph.extend import (
@@ -35,11 +33,12 @@ from ...systems.system import System
 from ..equation import documented
 from .blame import Derive, Split, blame, split
 from .lagrange_terms import THROUGH_STEP, formulation_name, torques
+from .off import Off, off_at
+from .verdict_state import STATES, asked_state, chosen_state
 
 if TYPE_CHECKING:
     from cgraph.extend import Json
 
-STATES = 24  # tried where c does not fold to 0: a third of size 1, the rest of sizes from 1e-6 to 1e6
 WRITTEN = 200  # nodes of c that identities are tried on
 SHOWN, NAMED, FORMULA = 6, 3, 60  # coordinates in the text and in its summary, and characters of a formula
 HOW = {
@@ -102,6 +101,8 @@ class Verdict:
     terms : Graph, optional
         c at any state: what each torque is off by as dt tends to 0, from q0.., qd0.., then t and parameters; None of
         a formulation that takes no derivative through the step.
+    asked : bool
+        Whether `at` is a state that was asked for.
 
     Examples
     --------
@@ -127,6 +128,14 @@ rate, which cancels the -dL/dq of Lagrange's equation.
     edges: frozenset[Edge] = frozenset()
     names: Mapping[str, str] = field(default_factory=dict)
     terms: Graph | None = None
+    asked: bool = False
+
+    @cached_property
+    def off(self) -> Off:
+        """How many torques and slopes d tau / d(q, qd) are off at `at`: 0 where nothing differs."""
+        return off_at(
+            self.terms, self.at, len(self.excess), len([name for name in self.graph.outputs if name.startswith("tau")])
+        )
 
     def excess_at(self, at: Mapping[str, float]) -> dict[str, float]:
         """{"tau1": what it is off by} at a state, of the outputs where that is not 0, as dt tends to 0.
@@ -136,7 +145,8 @@ rate, which cancels the -dL/dq of Lagrange's equation.
         Parameters
         ----------
         at : mapping of str to float
-            {name: number} of all inputs of `terms`, finite; other names are left alone.
+            {name: number} of all inputs of `terms`, finite, by the graph's names or a person's; other names are left
+            alone.
 
         Returns
         -------
@@ -160,6 +170,8 @@ rate, which cancels the -dL/dq of Lagrange's equation.
         given = require_mapping("at", at, "name: number")
         if self.terms is None:
             return {}
+        meant = {shown: name for name, shown in self.names.items()}
+        given = {meant.get(name, name): value for name, value in given.items()}
         known = {name: given[name] for name in self.terms.input_names if name in given}
         digits, values = extend.certain_digits(self.terms, known), self.terms.evaluate(known)
         return {name: float(value) for name, value in values.items() if value and digits[name] >= 1.0}
@@ -168,7 +180,8 @@ rate, which cancels the -dL/dq of Lagrange's equation.
         if not self.excess:
             return self.summary
         called = Names(self.graph, self.names)
-        where = _listed([f"{self.names.get(name, name)}={value:g}" for name, value in self.at.items()])
+        texts = [f"{self.names.get(name, name)}={value:g}" for name, value in self.at.items()]
+        where = _listed(texts, len(texts) if self.asked else SHOWN)
         lines = [f"{HOW[self.formulation]}, the torque is wrong at every dt, however small. At {where}:"]
         for name, each in [*self.excess.items()][:SHOWN]:
             values = f"{each.torque:.6g}, by the chain rule {each.right:.6g}"
@@ -241,19 +254,25 @@ rate, which cancels the -dL/dq of Lagrange's equation.
             "excess": {name: each._asdict() for name, each in self.excess.items()},
             "missing": {name: each._asdict() for name, each in self.missing.items()},
             "at": dict(self.at),
+            "off": self.off._asdict(),
             "nodes": sorted([number[node] for node in self.nodes]),
             "edges": sorted([[number[edge.source], number[edge.target], edge.slot] for edge in self.edges]),
         }
 
 
 @documented
-def formulation_verdict(model: Model, formulation: str = "by_definition") -> Verdict:
+def formulation_verdict(
+    model: Model, formulation: str = "by_definition", at: Mapping[str, float] | None = None
+) -> Verdict:
     """Whether the torque by a formulation is that of the chain rule, by how much it is off, and what is to blame.
 
     Parameters
     ----------
     formulation : str
         One of `FORMULATIONS`.
+    at : mapping of str to float, optional
+        The state after the step at which the torques are told, {name: number} by the graph's names or a person's; what
+        it leaves out is as without it, where the verdict chooses a state at which something is off.
 
     Returns
     -------
@@ -264,6 +283,8 @@ def formulation_verdict(model: Model, formulation: str = "by_definition") -> Ver
     ------
     ValueError
         For an unknown formulation.
+    GraphError
+        For a name in `at` that is no coordinate, velocity, acceleration, parameter or t.
 
     Examples
     --------
@@ -291,17 +312,20 @@ def formulation_verdict(model: Model, formulation: str = "by_definition") -> Ver
         free = "L does not depend on q" if formulation == "by_definition" else "the mass matrix does not depend on q"
         reason = f"{free}, {slope} is 0, and the derivative through {_step(slope)} adds nothing"
         return replace(alike, reason=reason)
-    at, finite = _state(system, alike)
+    chosen, finite = chosen_state(system, terms, alike.excess_at)
     if not finite:
         reason = f"{slope} is finite at none of the {STATES} states tried"
         return replace(alike, differs=True, proved=False, reason=reason)
-    values = alike.excess_at(at)
-    if not values:
+    found = alike.excess_at(chosen)
+    if not found:
         reason = f"{slope} is 0 to rounding at all {finite} states tried, though its form does not prove it"
         return replace(alike, proved=False, reason=reason)
+    state = chosen | asked_state(names, chosen, at or {})
+    there = alike.excess_at(state) if at else found
+    values = {name: there.get(name, 0.0) for name in terms.outputs if name in found or name in there}
     marked = split(system, formulation, torques)
-    found = blame(system, formulation, torques, graph, marked)
-    wrong, right = (_torques(marked, at, through) for through in (1.0, 0.0))
+    faults = blame(system, formulation, torques, graph, marked)
+    wrong, right = (_torques(marked, state, through) for through in (1.0, 0.0))
     called = Names(terms, names)
 
     def term(name: str, sign: int) -> Excess:
@@ -318,10 +342,11 @@ def formulation_verdict(model: Model, formulation: str = "by_definition") -> Ver
         alike,
         differs=True,
         excess={name: term(name, 1) for name in values},
-        missing={name: term(name, -1) for name in values if name in found.cancelled},
-        at={name: number for name, number in at.items() if name in used},
-        nodes=found.nodes,
-        edges=found.edges,
+        missing={name: term(name, -1) for name in values if name in faults.cancelled},
+        at={name: number for name, number in state.items() if name in used},
+        nodes=faults.nodes,
+        edges=faults.edges,
+        asked=bool(at),
     )
 
 
@@ -366,31 +391,6 @@ def _terms(system: System, formulation: str) -> Graph:
     if len(graph.nodes) > WRITTEN:
         return graph
     return Graph(graph.inputs, dict(zip(graph.outputs, shortened(folded(nodes, Builder())), strict=True)))
-
-
-def _state(system: System, verdict: Verdict) -> tuple[dict[str, float], int]:
-    """The first state at which c is not 0, else the last; and at how many it was finite.
-
-    States are about the neutral one, always the same, of three digits, so that a person can type them again.
-    """
-    assert verdict.terms is not None
-    names, accelerations = verdict.terms.input_names, [str(node.name) for node in system.qdd]
-    rng, finite, at = np.random.default_rng(0), 0, dict[str, float]()
-    neutral = {f"q{i}": number for i, number in enumerate(system.kinematics.neutral)}
-    for k in range(STATES):
-        sizes = 10.0 ** rng.uniform(-6.0, 6.0, len(names)) if k >= STATES // 3 else np.ones(len(names))
-        drawn = rng.uniform(-1.0, 1.0, len(names)) * sizes
-        drawn = np.abs(drawn) if k % 2 else drawn  # where a root or a logarithm is
-        numbers = {name: neutral.get(name, 0.0) + x for name, x in zip(names, drawn, strict=True)}
-        at = {name: float(f"{x:.3g}") for name, x in numbers.items()} | system.parameters
-        if np.isfinite([float(value) for value in verdict.terms.evaluate(at).values()]).all():
-            finite += 1
-            if verdict.excess_at(at):
-                break
-    drawn = np.random.default_rng(1).uniform(-1.0, 1.0, system.n)
-    qdd = {name: float(f"{x:.3g}") for name, x in zip(accelerations, drawn, strict=True)}
-    order = [*names[: system.nq + system.n], *qdd, *names[system.nq + system.n :]]
-    return {name: (at | qdd)[name] for name in order}, finite
 
 
 def _listed(texts: Iterable[str], most: int = SHOWN) -> str:

@@ -10,8 +10,9 @@ from hypothesis import given, settings
 
 import cgraph as cg
 import dynamics as dyn
-from cgraph.codegen.wasm.functions import library, text_of
-from cgraph.operations.operation import OPS
+from cgraph.codegen.wasm.functions import library, page_functions, text_of
+from cgraph.core.node import apply
+from cgraph.operations.operation import OPS, Op
 from dynamics.experiments.speed.bench_scenes import turned_arm
 from dynamics.integrators import TABLEAUS
 from tests.cgraph.engines import SPECIAL, graph_of
@@ -217,6 +218,22 @@ def test_memory_has_room_for_all_that_is_documented():
     assert ulps_apart(before, np.sin(point)) <= 2.0
 
 
+def versin(python: str, javascript: str = "") -> cg.Graph:
+    """An operation of a program's own, with a text in Python."""
+    op = Op("versin", 1, lambda x: 2.0 * math.sin(x / 2.0) ** 2, lambda x: 2.0 * np.sin(x / 2.0) ** 2,
+            lambda y, x: (cg.sin(x),), samples=((0.6,),), python=python, javascript=javascript)  # fmt: skip
+    return cg.Graph([X], {"y": apply(op, X)})
+
+
+def test_an_operation_of_ones_own_is_computed_in_a_module_or_imported():
+    made = instance(versin("2.0 * sin({0} / 2.0) ** 2"))
+    assert made.imports == []
+    assert made(0.6) == pytest.approx([2.0 * math.sin(0.3) ** 2], rel=1e-15)
+    function = "(x) => 2 * Math.sin(x / 2) ** 2"
+    assert page_functions(versin("", function)) == f"{{ __proto__: Math, versin: {function} }}"
+    assert page_functions(cg.Graph([X], {"y": cg.sin(X)}), versin("sin({0})")) == "Math"
+
+
 @each_row(
     ("make", "kind", "said"),
     [
@@ -227,6 +244,13 @@ def test_memory_has_room_for_all_that_is_documented():
         (lambda: cg.to_wasm(cg.Graph([X], {"a": X, "b": X}), TABLEAUS), cg.GraphError, "2 outputs of 1 input"),
         (lambda: cg.to_wasm(STATE, host=3), TypeError, "host"),
         (lambda: cg.to_wasm(STATE, host=("sine",)), ValueError, "no function sine"),
+        (
+            lambda: cg.to_wasm(versin("{0} % 2.0")),
+            ValueError,
+            "'versin' has no WebAssembly: its column .* got _0 % 2.0",
+        ),
+        (lambda: cg.to_wasm(versin("1 - math.cos({0})")), ValueError, "'versin' has no WebAssembly"),
+        (lambda: cg.wasm_script(versin("")), ValueError, "'versin' calls versin, which no page has"),
         (lambda: cg.to_wasm(STATE, time=3), TypeError, "time must be the name of an input, got 3"),
     ],
 )

@@ -2,6 +2,7 @@
 
 import doctest
 import inspect
+import math
 import pickle
 from collections.abc import Callable
 from dataclasses import replace
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 import cgraph as cg
+from cgraph.core.row import ROWS
 from cgraph.extend import OPS, Op, register
 
 
@@ -53,7 +55,7 @@ def test_a_wrong_number_of_arguments_is_told() -> None:
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ({}, "'sin' is in the table already"),
+        ({}, "'sin' is in the table already, as one of the library's"),
         ({"name": "my sine"}, "must be an identifier of Python, got 'my sine'"),
         ({"name": "lambda"}, "must be an identifier of Python, got 'lambda'"),
         ({"name": "sine", "partials": None}, "operation 'sine': partials must be a function, got None"),
@@ -67,6 +69,12 @@ def test_a_wrong_number_of_arguments_is_told() -> None:
             {"name": "sine", "partials": lambda y, x: (cg.sine(y), 1.0)},
             "'sine' takes 1 argument.s., its partials are 2",
         ),
+        (
+            {"name": "sine", "partials": lambda y, x: (cg.sin(x),)},
+            "at x=0.3 its partial by x is 0.29552, where.*give 0.955336",
+        ),
+        ({"name": "sine", "array": lambda x: 1.0 + np.sin(x)}, "at x=0.3 scalar is 0.29552 and array 1.29552"),
+        ({"name": "sine", "array": math.sin}, "'sine': array must take and give arrays"),
         ({"name": "sine", "arguments": "x y"}, "takes 1 argument.s., got the names 'x y'"),
         ({"name": "sine", "samples": ()}, "needs samples of 1 number.s. each"),
         ({"name": "sine", "samples": ((1.0, 2.0),)}, "needs samples of 1 number.s. each, got .*2.0"),
@@ -78,6 +86,36 @@ def test_a_row_that_does_not_fit_is_refused(change: dict[str, object], said: str
         register(replace(OPS["sin"], domain=((0.0, 1.0),), **change))
     assert before == OPS
     assert not hasattr(cg, "sine")
+
+
+def versin(factor: float) -> Op:
+    values = lambda x: factor * (1.0 - math.cos(x)), lambda x: factor * (1.0 - np.cos(x))
+    return Op("versin", 1, *values, lambda y, x: (factor * cg.sin(x),), samples=((0.6,), (-2.0,)))
+
+
+def test_a_row_of_ones_own_can_be_replaced_and_earlier_graphs_keep_theirs() -> None:
+    try:
+        register(versin(1.0))
+        x = cg.variable("x")
+        graph, was = cg.Graph([x], {"y": cg.versin(x)}), 1.0 - math.cos(0.3)
+        with pytest.raises(ValueError, match="replace=True puts this row in its place"):
+            register(versin(2.0))
+        with pytest.raises(ValueError, match="one of the library's"):
+            register(OPS["sin"], replace=True)
+        with pytest.raises(ValueError, match="its partial by x"):
+            register(replace(versin(2.0), partials=lambda y, x: (cg.sin(x),)), replace=True)
+        register(versin(2.0), replace=True)
+        again = cg.Graph([x], {"y": cg.versin(x)})
+        for made, factor in ((graph, 1.0), (again, 2.0)):
+            assert made.evaluate({"x": 0.3})["y"] == factor * was
+            assert cg.compile(made, "python")([0.3])[0] == factor * was
+            assert cg.gradient(made).evaluate({"x": 0.3})["dy/dx"] == pytest.approx(factor * math.sin(0.3))
+        both = cg.Graph([x], {"y": graph.outputs["y"] + again.outputs["y"]})
+        with pytest.raises(cg.GraphError, match="two operations called 'versin'"):
+            cg.compile(both, "python")
+    finally:
+        for table in (OPS, ROWS):
+            table.pop("versin", None)
 
 
 def test_a_graph_is_not_read_without_the_row_of_its_operation(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -7,13 +7,15 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from mpmath import mp, mpf
-from pytest import approx, mark
+from pytest import approx, mark, raises
 
 import cgraph as cg
 import dynamics as dyn
 from dynamics.equations.formulations.blame import blame
 from dynamics.equations.formulations.lagrange_terms import THROUGH_STEP, torques
+from dynamics.equations.formulations.step_state import after_step, before_step
 from dynamics.equations.formulations.verdict import HOW
 from tests import high_precision
 from tests.slow import slow
@@ -232,3 +234,32 @@ def test_marked_by_a_factor_the_graph_is_the_same_node_by_node(seed: int, formul
     found = blame(system, formulation, torques, graph)
     assert found.nodes.issubset(graph.nodes)
     assert all([edge.source in edge.target.args for edge in found.edges])
+
+
+def test_a_state_after_the_step_is_reached_from_the_one_before_it():
+    """Also where q_dot = G(q_old) qd, of a ball joint."""
+    top = dyn.Mechanism(
+        [dyn.Body("top", dyn.Joint("ball"), mass=1.0, center=(0.1, 0.0, -0.5), inertia=(0.1, 0.1, 0.02))]
+    )
+    graph = dyn.inverse_dynamics(top, "by_definition")
+    at = dict(
+        zip(graph.input_names, np.random.default_rng(3).uniform(-1.0, 1.0, len(graph.inputs)).tolist(), strict=True)
+    )
+    at["dt"] = 0.01
+    after = {"q1": 0.3, "q2": -0.4, "qd0": 2.0}
+    before = before_step(top.system, at, after)
+    found = after_step(top.system, before)
+    assert {name: found[name] for name in after} == approx(after, rel=1e-12)
+    assert [before[name] for name in ("q0_old", "qd1_old", "qdd0")] == [
+        at[name] for name in ("q0_old", "qd1_old", "qdd0")
+    ]
+
+
+def test_a_verdict_takes_the_names_that_it_prints():
+    verdict = dyn.formulation_verdict(dyn.scenes.load("triple_pendulum"), "by_definition")
+    printed = {verdict.names.get(name, name): value for name, value in verdict.at.items()}
+    assert verdict.excess_at(printed) == {name: each.value for name, each in verdict.excess.items()}
+    again = dyn.formulation_verdict(dyn.scenes.load("triple_pendulum"), "by_definition", printed)
+    assert again.excess == verdict.excess
+    with raises(cg.GraphError, match=r"there is no q\.elbow"):
+        dyn.formulation_verdict(dyn.scenes.load("triple_pendulum"), "by_definition", {"q.elbow": 1.0})

@@ -11,9 +11,10 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
+from dynamics.equations.formulations.step_state import after_step
 from tests.each_row import each_row
 from viz import cli, theme
-from viz.commands.arguments import filled
+from viz.commands.points import filled
 
 RIGHT, FLAWED = ("chain_rule", "chain_rule_literal"), ("by_definition", "kinetic_only", "kinetic_only_exact")
 MODEL = """<mujoco><compiler angle="radian"/><worldbody>
@@ -54,6 +55,42 @@ def test_lint_blames_the_edges_of_the_embedding(figures, formulation):
     assert [each["gains"] for each in finding["corrupted"]] == [f"dt * d{energy}/dq.joint {i}" for i in (1, 2, 3)]
     assert found["verdict"]["differs"] == (len(found["verdict"]["edges"]) == 3) == (not found["ok"]) == (not exact)
     assert (finding["derivatives_through"] == 0) == exact
+
+
+@each_row("scene", ["triple_pendulum", "two_link"])
+def test_a_state_that_is_asked_for_is_where_the_verdict_is_told(figures, said, scene):
+    """With the Euler relation it is the state after the step, in the names that the text prints."""
+    model = dyn.scenes.load(scene)
+    names = dyn.display_names(model)
+    at = {names["q1"]: 0.3, names["qd0"]: -0.7, names["qdd1"]: 0.2}
+    point = ",".join([f"{name}={value}" for name, value in at.items()])
+    asked = scene, "--formulation", "by_definition", "--at", point
+    found = figures("lint", *asked, status=1)["verdict"]
+    told = {names.get(name, name): value for name, value in found["at"].items()}
+    assert {name: told[name] for name in at} == pytest.approx(at)
+    assert len(said("lint", *asked, status=1).partition(" At ")[2].partition(":\n")[0].split(", ")) == len(told)
+    verdict = dyn.formulation_verdict(model, "by_definition")
+    excess = verdict.excess_at(told | dict(model.parameters))
+    assert {name: each["value"] for name, each in found["excess"].items()} == pytest.approx(excess)
+    right = dyn.inverse_dynamics(model, "chain_rule").evaluate(found["at"] | dict(model.parameters))
+    assert all(each["right"] == pytest.approx(right[name]) for name, each in found["excess"].items())
+    causes = figures("why", scene, names["tau0"], *asked[1:])
+    system = model.system
+    assert after_step(system, causes["at"])["q1"] == pytest.approx(0.3)
+    assert after_step(system, causes["at"])["qd0"] == pytest.approx(-0.7)
+
+
+def test_what_is_off_is_counted(figures):
+    """Nothing of K depends on the first angle, and by its velocities dL/dq of it does not change."""
+    off = figures("lint", "triple_pendulum", "--formulation", "by_definition", status=1)["verdict"]["off"]
+    assert off == {"torques": 3, "of_torques": 3, "slopes": 15, "of_slopes": 18}
+    off = figures("compare", "triple_pendulum", status=1)["verdicts"]["chain_rule"]["off"]
+    assert (off["torques"], off["slopes"]) == (0, 0)
+
+
+def test_nothing_spurious_is_not_blamed(said):
+    assert "What is spurious" not in said("why", "triple_pendulum", "tau.joint 1", "--formulation", "kinetic_only")
+    assert "What is spurious" in said("why", "triple_pendulum", "tau.joint 2", "--formulation", "kinetic_only")
 
 
 def test_a_file_with_a_coordinate_that_nothing_uses_and_with_forces_and_torques(tmp_path, said, figures):

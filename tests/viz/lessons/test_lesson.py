@@ -23,6 +23,7 @@ from tests.viz.lessons.systems import SYSTEMS, block
 from tests.viz.page_elements import Elements
 from viz import cli
 from viz.lessons import lesson as module
+from viz.lessons.screen import Screen
 from viz.lessons.screens.check import check
 from viz.lessons.screens.closed_loop import closed_loop
 from viz.lessons.screens.elimination import elimination
@@ -92,6 +93,29 @@ def test_the_guesses_are_scored_by_the_marked_answers():
     data = json.loads(re.findall(r'<script id="data" type="application/json">(.*?)</script>', text, re.DOTALL)[0])
     listed = re.findall(r'<p class="answer"><b>([A-F])\.</b>', text)
     assert ["ABCDEF".index(letter) for letter in listed] == data["answers"]
+
+
+@each_row("name", SYSTEMS)
+def test_no_letter_is_always_right(name):
+    for chosen in ("euler", "sweeps"):
+        screens = [
+            Screen(str(k), "", 1, "", "", ("one", "two", "three"), 0, "", "")
+            for k in range(len(module.LESSONS[chosen].screens))
+        ]
+        answers = [screen.answer for screen in module.arranged(screens, f"{chosen} {name}")]
+        assert len({*answers}) > 1
+        assert answers == [screen.answer for screen in module.arranged(screens, f"{chosen} {name}")]
+    sizes = Screen("", "", 1, "", "", ("12 N", "−3 N", "0 N", "none of these"), 1, "", "").arranged(name)
+    assert (list(sizes.choices), sizes.answer) == (["−3 N", "0 N", "12 N", "none of these"], 0)
+
+
+def test_the_second_try_keeps_its_sign():
+    subject = subject_of(SYSTEMS["hoop"]())
+    (off, right) = re.findall(r"still off by ([−\d.e]+), where the right one is ([−\d.e]*\d)", check(subject).reveal)[0]
+    torque, excess = (float(each.replace("−", "-")) for each in (right, off))
+    assert torque == pytest.approx(subject.evaluate(dyn.inverse_dynamics(subject.system, "chain_rule"))[0], rel=1e-3)
+    verdict = dyn.formulation_verdict(subject.scene, "kinetic_only")
+    assert excess == pytest.approx(verdict.excess_at(subject.values)["tau0"], rel=1e-2)
 
 
 @each_row("name", ["two_link", "ball", "hoop"])

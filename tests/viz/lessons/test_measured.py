@@ -118,6 +118,11 @@ def check(subject: Subject, screen: Screen) -> bool:
 
 
 def forward_sweep(subject: Subject, screen: Screen) -> bool:
+    """At the top of the sweep stands dp/dt."""
+    assert screen.play
+    rates = {row["node"]: row["rate"] for row in screen.play["rows"]}
+    for i, rate in enumerate(subject.evaluate(dyn.momentum_rate(subject.system))):
+        assert rates.get(subject.shown(f"p{i}"), rate) == pytest.approx(rate, rel=1e-9, abs=1e-9)
     swept, written = (len(dyn.inverse_dynamics(subject.system, f"chain_rule{end}").nodes) for end in ("", "_literal"))
     return screen.choices[screen.answer] == ("fewer" if swept < written else "more" if swept > written else "as many")
 

@@ -40,7 +40,7 @@ class Script:
         )
         codes = [list(base64.b64decode(data[name])) for name in ("rate", "shown")]  # V8 alone has no atob
         modules = [f"new WebAssembly.Module(Uint8Array.of({str(code)[1:-1]}))" for code in codes]
-        instances = ", ".join([f"new WebAssembly.Instance({module}, LIVE_IMPORTS)" for module in modules])
+        instances = ", ".join([f"new WebAssembly.Instance({module}, {{ math: Math }})" for module in modules])
         self.engine.eval(f"machine = liveMachine(data, [{instances}])")
         self.engine.eval("run = liveRun(machine, data)")
 

@@ -108,10 +108,11 @@ def _second_try(subject: Subject) -> str:
     verdict = formulation_verdict(subject.scene, "kinetic_only")
     if verdict.excess_at(subject.values):
         right = subject.evaluate(inverse_dynamics(subject.system, "chain_rule"))
-        off = np.abs(outputs_after_step(subject, verdict.graph, DT) - right).max()
+        off = outputs_after_step(subject, verdict.graph, DT) - right
+        k = int(np.abs(off).argmax())
         told = (
-            f"In the moving moment τ is then still off by {number(float(off))}, where the right one is "
-            f"{number(float(np.abs(right).max()))}{' at most' if len(right) > 1 else ''}: K depends on positions as well, and the edge acts on them."
+            f"In the moving moment τ at {escape(subject.joints[k])} is then still off by {number(float(off[k]))}, where the "
+            f"right one is {number(float(right[k]))}: K depends on positions as well, and the edge acts on them."
         )
     elif verdict.differs:
         told = "In this moment τ is then right. But K depends on positions, and at other states it is wrong."

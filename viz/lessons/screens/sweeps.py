@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Names, columns, cotangents, counted
-from dynamics import inverse_dynamics
+from cgraph.extend import Names, columns, cotangents, counted, tangents
+from dynamics import inverse_dynamics, momentum
 
 from ...graph_drawing.dot import to_dot
 from ...graph_drawing.levels import levels_of
@@ -75,26 +75,39 @@ def formula_graph(subject: Subject) -> Screen:
         "to the other. Keep this in mind.</p>",
         f"L is {number(before)} in this moment.",
         f"Press Next and watch the values go up{_as_drawn(graph)} from the inputs to L.{_left_out(graph)}",
-        {"kind": "sweeps", "rows": _rows(subject, graph, "values"), "slopes": False},
+        {"kind": "sweeps", "rows": _rows(subject, graph, "values"), "slopes": False, "rates": False},
         _picture(subject, graph, "values"),
-        _figure(subject, graph, values=True),
+        _figure(
+            subject,
+            graph,
+            {},
+            _values(subject, graph),
+            "",
+            " = ",
+            (
+                "The graph of L. Inputs are at the bottom.",
+                "Write the value of every node beside it, from the bottom to the top, with four digits.",
+                "The values of all nodes.",
+            ),
+        ),
     )
 
 
 def backward_sweep(subject: Subject) -> Screen:
     """The screen on slopes."""
-    graph, slopes = lagrangian_graph(subject.system), subject.system.n + subject.system.nq
+    graph, count = lagrangian_graph(subject.system), subject.system.n + subject.system.nq
+    slopes = _slopes(subject, graph)
     return Screen(
         "sweeps",
         "Backward: the slopes of L",
         5,
-        f"<p>Lagrange’s equation asks for ∂L/∂q and for p = ∂L/∂q̇, here {slopes} {term('slope', 'slopes')} of L: by how "
+        f"<p>Lagrange’s equation asks for ∂L/∂q and for p = ∂L/∂q̇, here {count} {term('slope', 'slopes')} of L: by how "
         "much L changes for each unit of an input.</p><p>They are found by the "
         f"{term('chain rule')}, node by node, in a {term('backward sweep')} from the top to the bottom. L itself has the "
         "slope 1. Then every node passes its slope down to what it is made of:</p>"
-        f"<ul>{_rules(graph)}</ul>{_example(subject, graph)}<p>Where several edges leave a node, what comes back by them adds up.</p>",
-        f"How many backward sweeps over the graph give all {slopes} slopes?",
-        ("1", f"{slopes}, one for each slope", f"{len(graph.nodes)}, one for each node"),
+        f"<ul>{_rules(graph)}</ul>{_example(subject, graph, slopes)}<p>Where several edges leave a node, what comes back by them adds up.</p>",
+        f"How many backward sweeps over the graph give all {count} slopes?",
+        ("1", f"{count}, one for each slope", f"{len(graph.nodes)}, one for each node"),
         0,
         "<p>One sweep, because it passes every node and arrives at every input. From the bottom to the top, on the other "
         "hand, one would need a sweep for each input.</p>",
@@ -102,26 +115,42 @@ def backward_sweep(subject: Subject) -> Screen:
         "is one number.",
         f"Step through both sweeps, values upwards, then slopes downwards{_as_drawn(graph, '')}. Multiply a few of the slopes "
         f"by hand.{_left_out(graph)}",
-        {"kind": "sweeps", "rows": _rows(subject, graph, "slopes"), "slopes": True},
+        {"kind": "sweeps", "rows": _rows(subject, graph, "slopes", slopes), "slopes": True, "rates": False},
         _picture(subject, graph, "slopes"),
-        _figure(subject, graph, values=False),
+        _figure(
+            subject,
+            graph,
+            _values(subject, graph),
+            slopes,
+            " = ",
+            ": slope ",
+            (
+                "The graph of L, with the values of all nodes.",
+                "Write the slope of L by every node beside it, from the top to the bottom, with four digits. Begin with 1 at the top.",
+                "The slopes of L by all nodes. At the bottom are ∂L/∂q and p = ∂L/∂q̇.",
+            ),
+        ),
     )
 
 
 def forward_sweep(subject: Subject) -> Screen:
     """The screen on the rate of the momentum."""
+    graph = cg.simplify(momentum(subject.system))
+    rates = _rates(subject, graph)
     counts = {name: len(inverse_dynamics(subject.system, name).nodes) for name in ("chain_rule", "chain_rule_literal")}
     swept, written = counts.values()
     return Screen(
         "forward-sweep",
         "Forward: a rate in one sweep",
-        4,
+        5,
         f"<p>The {term('momentum')} p depends on q and q̇, which change at the rates q̇ and q̈. By the "
         f"{term('chain rule')}</p>"
         '<p class="display">dp/dt = (∂p/∂q) q̇ + (∂p/∂q̇) q̈.</p>'
         f"<p>Written out, these are tables of {subject.system.n} × {subject.system.nq + subject.system.n} slopes times the rates. But a "
         f"{term('forward sweep')} over the graph of p carries with every node the rate of its value: it starts with the "
-        "rates q̇ and q̈ at the inputs and ends with dp/dt at the top. No table is ever made.</p>",
+        "rates q̇ and q̈ at the inputs and ends with dp/dt at the top. No table is ever made. By the chain rule the rate of a node "
+        "is the sum, over what it is made of, of slope times rate: a product a b has the rate ȧ b + a ḃ.</p>"
+        + _told_picture(graph),
         f"The graph of τ with every slope written out has {counted(written, 'node')}. The one by a forward sweep has …",
         ("fewer", "as many", "more"),
         0 if swept < written else 1 if swept == written else 2,
@@ -133,7 +162,17 @@ def forward_sweep(subject: Subject) -> Screen:
         )
         + " q and q̇ stay two separate inputs: there is no dt and no earlier state.</p>",
         "Both are right, to the last digits; they differ in size alone.",
-    )
+        f"Press Next: every node of p computes its value and, with it, its rate{_as_drawn(graph, '')}. The inputs q and q̇ have the "
+        f"rates q̇ and q̈, a parameter has 0, and at p stands dp/dt. Work a few of the rates out by hand.{_left_out(graph)}",
+        {"kind": "sweeps", "rows": _rows(subject, graph, "rates", rates=rates), "slopes": False, "rates": True},
+        _picture(subject, graph, "rates"),
+        _figure(subject, graph, _values(subject, graph), rates, " = ", ": rate ", (
+            "The graph of p, with the values of all nodes. Inputs are at the bottom.",
+            ("Write the rate of every node beside it, from the bottom to the top, with four digits. Begin with q̇ at q and q̈ at q̇; "
+            "a parameter has the rate 0."),
+            "The rates of all nodes. At the top is dp/dt.",
+        )),
+    )  # fmt: skip
 
 
 def _rules(graph: Graph) -> str:
@@ -143,9 +182,8 @@ def _rules(graph: Graph) -> str:
     return "".join([f"<li>{text};</li>" for text in rules + [OTHERS] * bool(ops - {*RULES})])
 
 
-def _example(subject: Subject, graph: Graph) -> str:
-    """The rule of a product at the highest node that is a number times another node."""
-    _, slopes = _numbers(subject, graph)
+def _example(subject: Subject, graph: Graph, slopes: Mapping[Node, float]) -> str:
+    """The rule of a product at the highest node that is a number times another node, in the digits that are shown."""
     called, levels = _called(graph), levels_of(graph)
     products = [
         node for node in called if node.op.name == "mul" and sum([arg.value is not None for arg in node.args]) == 1
@@ -156,7 +194,8 @@ def _example(subject: Subject, graph: Graph) -> str:
     factor, other = sorted(node.args, key=lambda arg: arg.value is None)
     assert factor.value is not None
     name = called.get(other) or subject.shown(str(other.name))
-    slope, passed = number(slopes[node]), number(slopes[node] * factor.value)
+    slope = number(slopes[node])
+    passed = number(float(f"{slopes[node]:.4g}") * float(f"{factor.value:.4g}"))
     return (
         f"<p>For example, {called[node]} = {number(factor.value)} × {escape(name)} has the slope {slope}, so it passes "
         f"{slope} × {number(factor.value)} = {passed} down to {escape(name)}.</p>"
@@ -186,42 +225,31 @@ def _picture(subject: Subject, graph: Graph, name: str) -> str:
     """The graph of L to light up, where it is small enough."""
     if len(graph.nodes) > DRAWN:
         return ""
-    return inline(
-        subject.svg(_drawing(graph, subject.names, _called(graph))), name, "The graph of L, inputs at the bottom"
-    )
+    return inline(subject.svg(_drawing(graph, subject.names, _called(graph))), name, "The graph, inputs at the bottom")
 
 
-def _figure(subject: Subject, graph: Graph, *, values: bool) -> Figure | None:
-    """The graph of L to write values at, or slopes where the values are there."""
+def _figure(
+    subject: Subject,
+    graph: Graph,
+    given: Mapping[Node, float],
+    found: Mapping[Node, float],
+    known: str,
+    sign: str,
+    words: tuple[str, str, str],
+) -> Figure | None:
+    """The graph to write `found` at, beside what is given, after these signs.  words: its caption, the task, and the answer."""
     if len(graph.nodes) > DRAWN:
         return None
-    found, slopes = ({node: number(x) for node, x in each.items()} for each in _numbers(subject, graph))
-    texts = [
-        (_called(graph), ""),
-        (found, " = "),
-        (slopes, ": slope "),
-    ]  # at operations, and after the name of an input
-    plain, marked = (
-        subject.svg(_drawing(graph, _after(subject, at, sign) if sign else subject.names, at))
-        for at, sign in (texts[:2] if values else texts[1:])
-    )
-    if values:
-        return Figure(
-            plain,
-            marked,
-            f"The graph of L. Inputs are at the bottom.{_signs(graph)}",
-            "Write the value of every node beside it, from the bottom to the top, with two digits.",
-            "The values of all nodes.",
-        )
-    return Figure(
-        plain,
-        marked,
-        "The graph of L. Its values were computed on the screen before.",
-        "Write the slope of L by every node beside it, from the top to the bottom. Begin with 1 at the top, and take the "
-        "values from picture 1.",
-        "The slopes of L by all nodes. At the bottom are ∂L/∂q and p = ∂L/∂q̇.",
-        subject.svg(_drawing(graph, subject.names, _called(graph))),
-    )
+    called = _called(graph)
+    names = {**called, **{node: subject.shown(str(node.name)) for node in graph.nodes if not node.args and node.name}}
+
+    def drawn(at: Mapping[Node, float], after: str) -> str:
+        texts = {node: f"{names[node]}{after}{number(at[node])}" for node in names if node in at}
+        inputs = {str(node.name): text for node, text in texts.items() if not node.args}
+        return subject.svg(_drawing(graph, {**subject.names, **inputs}, {**called, **texts}))
+
+    caption, task, answer = words
+    return Figure(drawn(given, known), drawn(found, sign), f"{caption}{_signs(graph)}", task, answer)
 
 
 def _signs(graph: Graph) -> str:
@@ -237,44 +265,65 @@ def _drawing(graph: Graph, names: Mapping[str, str], at: Mapping[Node, str]) -> 
     return to_dot(graph, names=names, formulas=operations, clusters=False, legend=False)
 
 
-def _after(subject: Subject, at: Mapping[Node, str], sign: str) -> dict[str, str]:
-    """Names of the inputs with their numbers."""
-    shown = {
-        str(node.name): f"{subject.shown(str(node.name))}{sign}{text}" for node, text in at.items() if not node.args
-    }
-    return {**subject.names, **shown}
-
-
 def _called(graph: Graph) -> dict[Node, str]:
     """v7 of every operation: the numbers of the listing, and of the equations on the page."""
     numbers = Names(graph).number
     return {node: f"v{numbers[node]}" for node in graph.nodes if node.args}
 
 
-def _numbers(subject: Subject, graph: Graph) -> tuple[dict[Node, float], dict[Node, float]]:
-    """Values, and slopes of L, of all nodes that are no numbers."""
-    (end,) = graph.outputs.values()
+def _values(subject: Subject, graph: Graph) -> dict[Node, float]:
+    """Values of all nodes that are no numbers."""
+    return _evaluated(subject, graph, {node: node for node in graph.nodes if node.value is None})
+
+
+def _slopes(subject: Subject, graph: Graph) -> dict[Node, float]:
+    """Slopes of the one output by all nodes that are no numbers, by a backward sweep."""
     nodes = [node for node in graph.nodes if node.value is None]
-    bars = cotangents({end: cg.constant(1.0)}, nodes)
-    values = subject.evaluate(Graph(graph.inputs, {str(k): node for k, node in enumerate(nodes)}))
-    slopes = subject.evaluate(Graph(graph.inputs, {str(k): bar for k, bar in enumerate(bars)}))
-    return dict(zip(nodes, values.tolist(), strict=True)), dict(zip(nodes, slopes.tolist(), strict=True))
+    bars = cotangents({graph.only_output(): cg.constant(1.0)}, nodes)
+    return _evaluated(subject, graph, dict(zip(nodes, bars, strict=True)))
 
 
-def _rows(subject: Subject, graph: Graph, picture: str) -> list[dict[str, object]]:
-    """The nodes from the bottom of the picture up: formula, value, slope of L by the node, and what an input's slope is."""
-    (end,) = graph.outputs.values()
+def _rates(subject: Subject, graph: Graph) -> dict[Node, float]:
+    """Rates of all nodes that are no numbers, by a forward sweep from those of q, q̇ and the time."""
+    nodes = [node for node in graph.nodes if node.value is None]
+    seeds = {node: cg.constant(subject.rates.get(str(node.name), 0.0)) for node in nodes if not node.args}
+    dots = tangents(seeds, nodes)
+    return _evaluated(subject, graph, {node: dots.get(node, cg.constant(0.0)) for node in nodes})
+
+
+def _evaluated(subject: Subject, graph: Graph, nodes: Mapping[Node, Node]) -> dict[Node, float]:
+    """{node: the value of what it stands for}."""
+    if not nodes:
+        return {}
+    found = subject.evaluate(Graph(graph.inputs, {str(k): node for k, node in enumerate(nodes.values())}))
+    return dict(zip(nodes, found.tolist(), strict=True))
+
+
+def _rows(
+    subject: Subject,
+    graph: Graph,
+    picture: str,
+    slopes: Mapping[Node, float] | None = None,
+    rates: Mapping[Node, float] | None = None,
+) -> list[dict[str, object]]:
+    """The nodes from the bottom of the picture up: formula, value, slope of L or rate, and what an input's slope is."""
+    ends = {node: name if name == "L" else subject.shown(name) for name, node in graph.outputs.items() if node.args}
     levels, place = levels_of(graph), {node: k for k, node in enumerate(graph.nodes)}
-    values, slopes = _numbers(subject, graph)
+    values = _values(subject, graph)
     nodes = sorted(values, key=lambda node: (levels[node], place[node]))[-ROWS:]
     called = {**{node: subject.shown(str(node.name)) for node in nodes if not node.args}, **_called(graph)}
+
+    def finite(found: Mapping[Node, float] | None, node: Node) -> float | None:
+        return found[node] if found is not None and math.isfinite(found[node]) else None
+
     return [
         {
-            "node": "L" if node is end else called[node],
+            "node": ends.get(node, called[node]),
             "box": f"{picture}-n{place[node]}",
             "text": _text(node, called) if node.args else "",
-            "value": values[node] if math.isfinite(values[node]) else None,
-            "slope": slopes[node] if math.isfinite(slopes[node]) else None,
+            "value": finite(values, node),
+            "slope": finite(slopes, node),
+            "rate": finite(rates, node),
             "what": _what(node),
         }
         for node in nodes

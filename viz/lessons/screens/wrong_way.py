@@ -54,9 +54,9 @@ def wrong_way(subject: Subject) -> Screen:
         _reveal(subject, answer, errors, slope, k),
         f"At dt = 1e-6 s the error at {name} is {number(float(errors[-1][1][k]))}{subject.unit(f'tau{k}')}. "
         + (
-            "Expect hands for A: a smaller step cures almost every other error of a simulation."
+            "Expect hands for “It vanishes with dt”: a smaller step cures almost every other error of a simulation."
             if answer == STAYS
-            else "Ask for a system for which B is right: one with a weight or a spring."
+            else "Ask for a system for which it tends to a number that is not zero: one with a weight or a spring."
         ),
     )
 

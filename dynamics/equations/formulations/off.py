@@ -1,0 +1,44 @@
+"""How many torques of a formulation are off, and how many of their slopes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import cgraph as cg
+from cgraph import Graph, extend
+from cgraph.extend import counted
+
+
+class Off(NamedTuple):
+    """How many torques are off, and how many of their slopes d tau / d(q, qd), at a state at which something is.
+
+    torques, slopes: of these many `of_torques`, n, and `of_slopes`, n (nq + n).
+
+    >>> import dynamics as dyn
+    >>> print(dyn.formulation_verdict(dyn.scenes.load("triple_pendulum"), "by_definition").off)
+    Off are 3 of 3 torques and 15 of 18 slopes d tau/d(q, qd).
+    """
+
+    torques: int
+    of_torques: int
+    slopes: int
+    of_slopes: int
+
+    def __str__(self) -> str:
+        slopes = f"{self.slopes} of {self.of_slopes} slopes d tau/d(q, qd)"
+        return f"Off are {self.torques} of {counted(self.of_torques, 'torque')} and {slopes}."
+
+
+def off_at(terms: Graph | None, at: Mapping[str, float], torques: int, of_torques: int) -> Off:
+    """The count at a state.  terms: what each torque is off by.  torques: how many of how many are off."""
+    if terms is None:
+        return Off(0, of_torques, 0, 2 * of_torques**2)
+    state = [name for name in terms.input_names if name.startswith("q") and name.strip("qd").isdecimal()]
+    slopes = cg.jacobian(terms, wrt=state)
+    if not torques:
+        return Off(0, of_torques, 0, len(slopes.outputs))
+    known = {name: at.get(name, 1.0) for name in slopes.input_names}  # of what no torque uses any number
+    digits, values = extend.certain_digits(slopes, known), slopes.evaluate(known)
+    wrong = [name for name, value in values.items() if value and digits[name] >= 1.0]
+    return Off(torques, of_torques, len(wrong), len(slopes.outputs))
