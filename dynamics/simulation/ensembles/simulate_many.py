@@ -23,7 +23,6 @@ from ...systems.model import Model
 from ..events.event import Event, EventProgram, as_events, event_program
 from ..events.event_log import split_crossings
 from ..moving import with_applied
-from ..outcome import INTERRUPTED
 from ..progress_bar import Progress
 from ..row_values import converted, unreached_momenta
 from ..run_options import METHOD, SCIPY, RunOptions, require_room, time_span
@@ -78,7 +77,7 @@ def simulate_many(
     In equal steps trajectories run side by side, a vector of them at a time; in chosen ones one by one, as do fewer
     than eight by a method that iterates. One
     whose state is not finite is NaN from there on, `stats.message` and a `SimulationWarning` name the time and the
-    coordinate, and the others go on. Ctrl-C keeps the chunks that are done, without a warning.
+    coordinate, and the others go on. Ctrl-C is a KeyboardInterrupt; a store keeps the chunks that are done.
 
     Parameters
     ----------
@@ -111,8 +110,7 @@ def simulate_many(
         rounded up to whole vectors, multiples of 8.
     store : path, optional
         A folder, empty or not there, in which chunks are kept as they end. The same call again takes up where the first
-        was ended, by whatever, with the chunks as they were cut then, and at last reads all from the folder. Ctrl-C is
-        then a KeyboardInterrupt.
+        was ended, by whatever, with the chunks as they were cut then, and at last reads all from the folder.
 
     Returns
     -------
@@ -236,11 +234,7 @@ def _ensemble(
 
 def _warnings(stats: EnsembleStats) -> list[str]:
     """Warnings of the first trajectory that stopped early and of the first in doubt, with their numbers."""
-    early = {
-        k: str(stats.message[k]).removeprefix("stopped ")
-        for k in np.flatnonzero(stats.status < 0).tolist()
-        if not stats.message[k].startswith(INTERRUPTED)
-    }
+    early = {k: str(stats.message[k]).removeprefix("stopped ") for k in np.flatnonzero(stats.status < 0).tolist()}
     doubtful = {k: texts[0] for k, texts in enumerate(stats.warnings) if texts} if any(stats.warnings) else {}
     many = f"of {len(stats.warnings)} trajectories"
     said = []
@@ -301,7 +295,7 @@ def _width(count: int, chunk: int | None, workers: Team, rows: int, grids: Seque
 
 
 def _run(task: Task, x: Array, p: Array, width: int, workers: Team, store: Store | None) -> Part:
-    """Run the chunks, by whoever shares them, until all parts have come, or Ctrl-C; rows that have not are NaN.
+    """Run the chunks, by whoever shares them, until all parts have come.
 
     Those that a store has are taken from there, and others are kept there as they end.
     Raises ValueError unless all parts come.
@@ -319,23 +313,18 @@ def _run(task: Task, x: Array, p: Array, width: int, workers: Team, store: Store
         if store is not None and (part := store.part(chunk)) is not None:
             put(part)
     left = [chunk for chunk in chunks if not arrived[chunk.first]]
-    try:
-        with (
-            Progress("simulate", len(arrived), task.options.progress) as report,
-            closing(finished(task, left, workers, whole.rows)) as parts,
-        ):
-            for part in parts:
-                put(part)
-                if store is not None and not part.runs.interrupted:
-                    store.keep(part)
-                report(int(arrived.sum()))
-        if not arrived.all():
-            raise ValueError(
-                "workers must give a result for each item, as map does: of "
-                f"{len(arrived)} trajectories came back {arrived.sum()}"
-            )
-    except KeyboardInterrupt:
-        if store is not None:
-            raise
-        whole.rows[~arrived] = math.nan
+    with (
+        Progress("simulate", len(arrived), task.options.progress) as report,
+        closing(finished(task, left, workers, whole.rows)) as parts,
+    ):
+        for part in parts:
+            put(part)
+            if store is not None:
+                store.keep(part)
+            report(int(arrived.sum()))
+    if not arrived.all():
+        raise ValueError(
+            "workers must give a result for each item, as map does: of "
+            f"{len(arrived)} trajectories came back {arrived.sum()}"
+        )
     return whole if store is None else replace(whole, rows=store.read_only())
