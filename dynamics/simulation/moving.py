@@ -104,6 +104,14 @@ def check_varied(model: Equations, tau: Tau, options: RunOptions, varied: Sequen
         scipy_module("integrate", f"method {options.method!r}")
 
 
+def values_key(parameters: Mapping[str, Any]) -> Any:
+    """Key that tells parameter values apart, 0.0 and -0.0 too; a key of its own for what are none."""
+    try:
+        return tuple([(name, type(value), float(value).hex()) for name, value in parameters.items()])
+    except (TypeError, ValueError, OverflowError, AttributeError):
+        return object()
+
+
 class Moving:
     """Moving parts of the runs of a motion with these parameters: the equations, bound to numbers, and the events.
 

@@ -13,8 +13,8 @@ from cgraph.extend import Array, counted
 from .estimates.error_estimate import RunEstimate
 from .run_options import SMALL_MEMORY, TABLES, RunOptions, room
 from .steps.dense_output import StepBlock
-from .steps.stepping import Integration, StoppedError
-from .trajectory import Stats
+from .steps.stepping import Integration
+from .trajectory import Stats, Trajectory
 
 IMPLICIT = ("radau", "rodas")
 OTHERS = ("radau", "dop853")  # of the rate the first takes no derivative by the time, and the second none at all
@@ -35,6 +35,14 @@ class MotionError(ValueError):
     Traceback (most recent call last):
     dynamics.simulation.outcome.MotionError: the motion did not reach t_end, stopped at t = 1 s: ...
     """
+
+
+class InterruptedMotion(KeyboardInterrupt):
+    """Ctrl-C in a motion, whose rows until then are `run`."""
+
+    def __init__(self, run: Trajectory) -> None:
+        super().__init__(f"the motion was {run.message}")
+        self.run = run
 
 
 class Recorder:
@@ -95,7 +103,7 @@ def outcome(
     """
     recorder = Recorder(x, options.times, options.t0, options.direction)
     begin, estimate = time.perf_counter(), RunEstimate(run, x, options)
-    error, at_end = None, None
+    error, at_end, end = None, None, None
     doubts: tuple[str, ...] = ()
     try:
         with np.errstate(all="ignore"):
@@ -104,10 +112,11 @@ def outcome(
                 estimate.add(block)
             if not run.status:
                 error, at_end, doubts = estimate.result()
-    except (KeyboardInterrupt, StoppedError):
+        end = time.perf_counter()
+        advise(run, recorder.last, options, x, again)
+    except KeyboardInterrupt:
         run.status = f"{INTERRUPTED} after t = {recorder.last:.6g} s"
-    seconds = time.perf_counter() - begin - estimate.seconds
-    advise(run, recorder.last, options, x, again)
+    seconds = (time.perf_counter() if end is None else end) - begin - estimate.seconds
     stats = Stats(
         options.method,
         run.steps,
@@ -166,13 +175,14 @@ def advise(
         return
     length = LONGER_STEPS * abs(reached - options.t0) / max(run.steps, 1)
     for name in OTHERS if run.slope else IMPLICIT:
-        trial, t = again(replace(options, method=name, t_eval=None, max_steps=TRIED)), options.t0
+        t = options.t0
         try:
+            trial = again(replace(options, method=name, t_eval=None, max_steps=TRIED))
             with np.errstate(all="ignore"):
                 for block in trial.blocks(x):
                     t = float(block.t[-1]) if len(block.t) else t
-        except KeyboardInterrupt:  # of a run that is done
-            return
+        except Exception:  # noqa: BLE001, S112 -- whatever another method lacks: the run that was asked for is done
+            continue
         text = f"; try method={name!r}, which comes to t = {t:.6g} s in {counted(trial.steps, 'step')}"
         if run.slope and not trial.status:
             run.status += text

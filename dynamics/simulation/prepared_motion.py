@@ -17,8 +17,8 @@ from cgraph.extend import Array, HoldsNodes, floats
 
 from ..systems.model import Model
 from .events.event import Event
-from .moving import Moving, Tau
-from .outcome import INTERRUPTED, REACHED, MotionError, outcome
+from .moving import Moving, Tau, values_key
+from .outcome import INTERRUPTED, REACHED, InterruptedMotion, MotionError, outcome
 from .progress_bar import Progress
 from .row_values import converted, unreached_momenta
 from .run_options import RunOptions
@@ -102,7 +102,10 @@ class PreparedMotion(HoldsNodes):
         t_eval: ArrayLike | None = None,
         parameters: Mapping[str, float] | None = None,
     ) -> Trajectory:
-        """The motion from (q, qd) at t0 to t_end, to the bit that of `simulate`; arguments and errors as there."""
+        """The motion from (q, qd) at t0 to t_end, to the bit that of `simulate`; arguments and errors as there.
+
+        Ctrl-C is a KeyboardInterrupt, so that a loop of calls ends; `run` of it is the motion until then.
+        """
         return self._run(q, qd, self._options.over(t0, t_end, t_eval), parameters)
 
     def end(
@@ -313,7 +316,7 @@ class PreparedMotion(HoldsNodes):
         """Moving parts with these values of built-in parameters, kept for the last few values."""
         if self._varied and isinstance(parameters, Mapping):
             parameters = {name: value for name, value in parameters.items() if name not in self._varied}
-        key = None if parameters is None else _key(parameters)
+        key = None if parameters is None else values_key(parameters)
         if (found := self._known.get(key)) is None:
             found = self._make(parameters)
             if len(self._known) >= KEPT_PARAMETERS:
@@ -328,7 +331,7 @@ class PreparedMotion(HoldsNodes):
         options: RunOptions,
         parameters: Mapping[str, float] | None,
     ) -> Trajectory:
-        """The motion over the span of options."""
+        """The motion over the span of options. Raises InterruptedMotion by Ctrl-C."""
         moving = self._moving(parameters)
         p = moving.values(parameters)
         start, values = moving.start(q, qd, options.t0, p), p or 0.0
@@ -356,7 +359,7 @@ class PreparedMotion(HoldsNodes):
             warnings.warn(text, SimulationWarning, stacklevel=_level_of_caller())
         nq, names = stepped.nq, moving.model
         times, states = rows[0], converted(stepped.velocities, *rows, values)
-        return Trajectory(
+        done = Trajectory(
             times,
             states[:, :nq],
             states[:, nq:],
@@ -369,6 +372,9 @@ class PreparedMotion(HoldsNodes):
             names.velocities,
             rows[1][:, nq:] if stepped.momenta else None,
         )
+        if stats.message.startswith(INTERRUPTED):
+            raise InterruptedMotion(done)
+        return done
 
 
 def _level_of_caller() -> int:
@@ -377,11 +383,3 @@ def _level_of_caller() -> int:
     while frame.f_back is not None and frame.f_globals["__name__"].startswith("dynamics.simulation."):
         level, frame = level + 1, frame.f_back
     return level
-
-
-def _key(parameters: Mapping[str, Any]) -> Any:
-    """Key that tells parameter values apart, 0.0 and -0.0 too; a key of its own for what are none."""
-    try:
-        return tuple([(name, type(value), float(value).hex()) for name, value in parameters.items()])
-    except (TypeError, ValueError, OverflowError, AttributeError):
-        return object()

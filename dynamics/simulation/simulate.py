@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from ..systems.model import Model
 from .events.event import Event
 from .moving import Tau
+from .outcome import InterruptedMotion
 from .prepare import prepare
 from .run_options import METHOD, time_span
 from .trajectory import Trajectory
@@ -158,4 +159,7 @@ def simulate(
         progress=progress,
         form=form,
     )
-    return motion(q, qd, t_end, t0, t_eval=t_eval, parameters=parameters)
+    try:
+        return motion(q, qd, t_end, t0, t_eval=t_eval, parameters=parameters)
+    except InterruptedMotion as stop:
+        return stop.run

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Graph
-from cgraph.extend import Array, require_choice
+from cgraph.extend import Array, kept_by_first, require_choice
 
 from ...systems.model import Model, as_system
 from ...systems.system import System
@@ -18,7 +18,7 @@ from ..mass_matrix.singular_mass_matrix import raise_if_singular
 from ..state_equation import FORMS
 from ..states.evaluate import evaluate
 from ..states.initial_value import normalized
-from .linearization_parts import LinearizationParts, linearization_parts
+from .linearization_parts import ColumnGraphs, LinearizationParts, linearization_parts
 from .momentum_parts import momentum_parts, of_momenta
 
 
@@ -139,8 +139,8 @@ def linearize(
     >>> A.round(3).tolist()
     [[0.0, 0.0, 1.714, -4.286], [0.0, 0.0, -4.286, 13.714], [-19.62, -4.905, 0.0, 0.0], [-4.905, -4.905, 0.0, 0.0]]
     """
-    system, parts = as_system(model), parts_of(as_system(model), require_choice("form", form, FORMS))
-    graphs = parts.in_columns()
+    system = as_system(model)
+    parts, graphs = _in_columns(system, require_choice("form", form, FORMS))
     flat = evaluate(system, graphs.shared, {"q": q, "qd": qd, "tau": tau}, t, parameters)
     if flat.ndim != 1:
         raise ValueError("linearize takes one state, got rows of several; see linearize_many")
@@ -151,6 +151,13 @@ def linearize(
     if not (np.isfinite(a).all() and np.isfinite(b).all()):
         _raise_what_is_not_finite(system, {"q": q, "qd": qd, "tau": tau}, t, parameters)
     return a, b
+
+
+@kept_by_first
+def _in_columns(system: System, form: str) -> tuple[LinearizationParts, ColumnGraphs]:
+    """The parts of a form, and their graphs."""
+    parts = parts_of(system, form)
+    return parts, parts.in_columns()
 
 
 def _raise_what_is_not_finite(

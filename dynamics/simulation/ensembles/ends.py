@@ -91,8 +91,6 @@ class _Shared:
     def by_chunks(self, x: Array, p: Array, team: Team) -> Array:
         """The ends, (N, m), NaN of motions that stop before, with a warning of how many and why."""
         whole = run_chunks(self._task, x, p, self._width, team, None)
-        if whole.runs.interrupted:
-            raise KeyboardInterrupt
         for text in doubts(whole.runs.stats(self._task.options.method, 0.0, {})):
             warnings.warn(text, SimulationWarning, stacklevel=4)
         return whole.rows[:, 0]

@@ -10,7 +10,7 @@ import numpy as np
 
 from cgraph.extend import Array
 
-from ..outcome import INTERRUPTED, REACHED
+from ..outcome import REACHED
 from ..trajectory import Crossings, Stats
 
 if TYPE_CHECKING:
@@ -39,7 +39,8 @@ class EnsembleStats:
     message : tuple of str
         N sentences: "reached t_end", or where and why it stopped.
     status : ndarray
-        0: its end was reached; -1: it failed or was interrupted, (N,).
+        0: its end was reached; 1: an event ended it, where its end is: `success` is True, and its rows from there on
+        NaN; -1: it failed, (N,).
     error, error_at_end : ndarray
         Of equal steps, the estimated errors of `Stats`, (N,); NaN of a trajectory that has none.
     warnings : tuple of tuple of str
@@ -72,7 +73,7 @@ COLUMNS |= dict.fromkeys(("dt", "error", "error_at_end"), np.float64)  # None is
 
 
 class RunTable:
-    """Statistics of runs side by side, a row of `Stats` each, set as they end; before, they are interrupted.
+    """Statistics of runs side by side, a row of `Stats` each, set as they end.
 
     columns: {name: numbers of all}.  messages, warnings: of each.
     """
@@ -81,7 +82,7 @@ class RunTable:
         self.columns: dict[str, Any] = {name: np.zeros(count, dtype=kind) for name, kind in COLUMNS.items()}
         self.columns["status"][:] = -1
         self.columns["error"][:] = self.columns["error_at_end"][:] = np.nan
-        self.messages: list[str] = [INTERRUPTED] * count
+        self.messages: list[str] = [""] * count
         self.warnings: list[tuple[str, ...]] = [()] * count
 
     def set(self, k: int, stats: Stats) -> None:
@@ -104,12 +105,6 @@ class RunTable:
             self.messages = [REACHED] * len(which)
         for k in which.tolist() if len(which) < len(self.messages) else ():
             self.messages[k] = REACHED
-
-    @property
-    def interrupted(self) -> bool:
-        """Whether a run has been interrupted."""
-        failed = np.flatnonzero(self.columns["status"] < 0).tolist()
-        return any(self.messages[k].startswith(INTERRUPTED) for k in failed)
 
     def put(self, here: slice, part: RunTable) -> None:
         """The rows of a part, in their place."""

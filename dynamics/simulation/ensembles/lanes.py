@@ -116,10 +116,6 @@ class InLanes(ABC):
         rows[:, first:][np.arange(len(self._marks)) >= self._passes[:, 1:]] = np.nan
         return self._whole(), self._columns()
 
-    def reached(self, k: int) -> str:
-        """Progress of run k, in words; empty before its first step."""
-        return f" after t = {self.read('t')[k]:.6g} s" if self._passes[k, 0] else ""
-
     def read(self, name: str) -> Array:
         """A number of each."""
         return self._memories[:, self.code.numbers[name]][:, 0]

@@ -11,7 +11,6 @@ import numpy as np
 
 from cgraph.extend import Array
 
-from ..outcome import INTERRUPTED
 from ..progress_bar import Progress
 from ..run_options import RunOptions
 from ..steps.equal_steps import EqualSteps, even_steps
@@ -47,13 +46,18 @@ def _grids(program: StepProgram, options: RunOptions, count: int) -> list[EqualS
     return grids if sum(grid.steps for grid in grids) <= options.max_steps else []
 
 
-def chunk_width(count: int, chunk: int | None, workers: Team, rows: int, grids: Sequence[EqualSteps]) -> int:
+def chunk_width(
+    count: int, chunk: int | None, workers: Team, rows: int, grids: Sequence[EqualSteps], *, stored: bool = False
+) -> int:
     """Trajectories in a chunk, of so many.
 
     rows: numbers in the rows of steps that a trajectory keeps in its lane, 0 where it is in none.
+    stored: whether a chunk that has not ended is lost when the process is, so that it should be small.
     grids: of trajectories side by side, whose chunks are of whole vectors, so that each has the same neighbors in any.
     """
     largest = min(LONGEST_CHUNK, max(VECTOR, NUMBERS // rows)) if rows else LARGEST_CHUNK
+    if chunk is None and stored:
+        largest = min(largest, LARGEST_CHUNK)
     if rows and chunk is not None:
         chunk = min(chunk, largest)
     if chunk is None:
@@ -64,7 +68,7 @@ def chunk_width(count: int, chunk: int | None, workers: Team, rows: int, grids: 
 
 
 def run_chunks(task: Task, x: Array, p: Array, width: int, workers: Team, store: Store | None) -> Part:
-    """Run the chunks, by whoever shares them, until all parts have come, or Ctrl-C; rows that have not are NaN.
+    """Run the chunks, by whoever shares them, until all parts have come.
 
     Those that a store has are taken from there, and others are kept there as they end.
     Raises ValueError unless all parts come.
@@ -91,28 +95,24 @@ def run_chunks(task: Task, x: Array, p: Array, width: int, workers: Team, store:
         ):
             for part in parts:
                 put(part)
-                if store is not None and not part.runs.interrupted:
+                if store is not None:
                     store.keep(part)
                 report(int(arrived.sum()))
-        if not arrived.all():
-            raise ValueError(
-                "workers must give a result for each item, as map does: of "
-                f"{len(arrived)} trajectories came back {arrived.sum()}"
-            )
     except KeyboardInterrupt:
-        if store is not None:
-            raise KeyboardInterrupt(store.kept(int(arrived.sum()))) from None
-        whole.rows[~arrived] = math.nan
+        if store is None:
+            raise
+        raise KeyboardInterrupt(store.kept(int(arrived.sum()))) from None
+    if not arrived.all():
+        raise ValueError(
+            "workers must give a result for each item, as map does: of "
+            f"{len(arrived)} trajectories came back {arrived.sum()}"
+        )
     return whole if store is None else replace(whole, rows=store.read_only())
 
 
 def doubts(stats: EnsembleStats) -> list[str]:
     """Warnings of the first trajectory that stopped early and of the first in doubt, with their numbers."""
-    early = {
-        k: str(stats.message[k]).removeprefix("stopped ")
-        for k in np.flatnonzero(stats.status < 0).tolist()
-        if not stats.message[k].startswith(INTERRUPTED)
-    }
+    early = {k: str(stats.message[k]).removeprefix("stopped ") for k in np.flatnonzero(stats.status < 0).tolist()}
     doubtful = {k: texts[0] for k, texts in enumerate(stats.warnings) if texts} if any(stats.warnings) else {}
     many = f"of {len(stats.warnings)} trajectories"
     said = []

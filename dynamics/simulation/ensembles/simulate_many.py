@@ -30,7 +30,7 @@ from ..steps.equal_steps import step_count
 from ..steps.step_program import step_program
 from ..trajectory import SimulationWarning
 from .ensemble import Ensemble
-from .shares import LARGEST_CHUNK, chunk_width, doubts, run_chunks, side_by_side
+from .shares import chunk_width, doubts, run_chunks, side_by_side
 from .store import Store, sweep_of
 from .task import Part, Task
 from .workers import Workers, checked
@@ -70,7 +70,7 @@ def simulate_many(
     same bits, go those with events, fewer than eight by a method that iterates, and in chosen steps fewer than 32,
     those with constraints and those whose tolerance is below the rounding of a step. One whose state is not finite is
     NaN from there on, `stats.message` and a `SimulationWarning` name the time and the coordinate, and the others go on.
-    Ctrl-C keeps the chunks that are done, without a warning.
+    Ctrl-C is a KeyboardInterrupt; a store keeps the chunks that are done, and the error says how many trajectories.
 
     Parameters
     ----------
@@ -108,8 +108,7 @@ def simulate_many(
     store : path, optional
         A folder, empty or not there, in which chunks are kept as they end. The same call again takes up where the first
         was ended, by whatever, with the chunks as they were cut then, and at last reads all from the folder, which one
-        call at a time writes. A chunk that had not ended is lost. Ctrl-C is then a KeyboardInterrupt, which says how
-        many trajectories the folder keeps.
+        call at a time writes. A chunk that had not ended is lost.
 
     Returns
     -------
@@ -161,11 +160,10 @@ def simulate_many(
     sent = replace(options, t_eval=options.row_times) if watched else options
     task = Task(program, sent, count, tuple(grids), watch if watched else None, lanes)
     x, p = _stepped(problem, start, t0)
-    width = chunk_width(len(x), chunk, team, count * program.steps.width if lanes else 0, grids)
+    stored, in_rows = folder is not None, count * program.steps.width if lanes else 0
+    width = chunk_width(len(x), chunk, team, in_rows, grids, stored=stored)
 
     # Integrate, by whoever takes the chunks and compiles the steps
-    if folder is not None and chunk is None:
-        width = min(width, LARGEST_CHUNK)  # of which no more is lost when the process is ended
     with _opened(folder, problem, task, x, p, width) as kept:
         whole = run_chunks(task, x, p, width, team, kept)
 

@@ -178,7 +178,7 @@ class VectorizedIntegration:
         self._memories = _start_memories(code, chunk.x, chunk.p)
         self._live = np.ones(count, dtype=bool)
         self._good = np.full(count, total)  # rows that count
-        self._done, self._longest, self._reached = 0, 0.0, options.t0  # steps; s, a step; s, the time of the last block
+        self._done, self._longest = 0, 0.0  # steps; s, a step
         self._at = int(options.times is None or options.times[0] == options.t0)  # row
         part.rows[:, : self._at] = chunk.x[:, None]
         passes, rows = _block_limits(code, count)
@@ -211,15 +211,9 @@ class VectorizedIntegration:
         if failed.any() and self._live.any():
             self._memories[:, ~self._live] = self._memories[:, np.flatnonzero(self._live)[:1]]
         self._done += steps
-        self._reached = float(self.runner.read(self._memories, "t")[0, 0])
 
-    def interrupt(self) -> None:
-        """End the runs that have not failed, with the rows that they have."""
-        self._good[self._live] = self._at
-        self.end(f"{INTERRUPTED} after t = {self._reached:.6g} s")
-
-    def end(self, status: str = "", errors: ErrorEstimates | None = None) -> None:
-        """End the runs that have not failed, at their end or for a reason.  errors: of all, if they are estimated."""
+    def end(self, errors: ErrorEstimates | None = None) -> None:
+        """End the runs that have not failed, at their end.  errors: of all, if they are estimated."""
         evaluations = self.runner.read(self._memories, "evaluations")[0]
         live, runs = np.flatnonzero(self._live), self.part.runs
         columns: dict[str, Any] = {}
@@ -227,10 +221,7 @@ class VectorizedIntegration:
             columns = {"error": errors.largest[live], "error_at_end": errors.last[live]}
             for k in live.tolist():
                 runs.warnings[k] = tuple(filter(None, [errors.warnings[k]]))
-        for k in live.tolist() if status else ():
-            runs.stopped(k, status, steps=self._done, nfev=int(evaluations[k]), dt=self._longest)
-        if not status:
-            runs.reached(live, steps=self._done, nfev=evaluations[live], dt=self._longest, **columns)
+        runs.reached(live, steps=self._done, nfev=evaluations[live], dt=self._longest, **columns)
         for k in np.flatnonzero(self._good < self.part.rows.shape[1]).tolist():
             self.part.rows[k, self._good[k] :] = np.nan
 
@@ -268,13 +259,13 @@ class Task:
 
     def __call__(self, chunk: Chunk) -> Part:
         """Run the chunk."""
-        part = self.run(chunk, np.empty((len(chunk.x), self.count, chunk.x.shape[1])), lambda: False)
-        if part.runs.interrupted:
-            raise KeyboardInterrupt
-        return part
+        return self.run(chunk, np.empty((len(chunk.x), self.count, chunk.x.shape[1])), lambda: False)
 
     def run(self, chunk: Chunk, rows: Array, stopped: Callable[[], bool]) -> Part:
-        """Run the chunk into rows (k, T, m), to its end, or until soon after Ctrl-C or `stopped`: see the part."""
+        """Run the chunk into rows (k, T, m).
+
+        Raises KeyboardInterrupt soon after Ctrl-C, and StoppedError after `stopped`.
+        """
         part = not_begun(chunk.first, rows, events=self.events is not None)
         with np.errstate(all="ignore"):
             done = 0 if self.grids or not self.lanes else self._before_lanes(chunk, part, stopped)
@@ -294,16 +285,13 @@ class Task:
             estimator = Estimator(code.program, self.options, chunk.p, partial(beside, code), sparse=True)
             estimator.begin(chunk.x, equal_steps(self.options.instants, self.options.step))
         run = VectorizedIntegration(code, self.options, chunk, part, estimator, even=len(self.grids) == 1)
-        try:
-            for grid in self.grids:
-                run.begin(grid)
-                for block in grid.blocks(*run.limits):
-                    if stopped():
-                        raise StoppedError
-                    run.advance(*block)
-            run.end(errors=estimator.estimates() if estimator else None)
-        except (KeyboardInterrupt, StoppedError):
-            run.interrupt()
+        for grid in self.grids:
+            run.begin(grid)
+            for block in grid.blocks(*run.limits):
+                if stopped():
+                    raise StoppedError
+                run.advance(*block)
+        run.end(errors=estimator.estimates() if estimator else None)
 
     def _before_lanes(self, chunk: Chunk, part: Part, stopped: Callable[[], bool]) -> int:
         """Number of trajectories done one by one first: until that took as long as lanes take to be made, about.
@@ -328,38 +316,28 @@ class Task:
         if lanes is None:
             return False
         run = self.lane_run(lanes, chunk.x[first:], chunk.p[first:])
-        interrupted = False
-        try:
-            while run.advance(BLOCK_TIME):
-                if stopped():
-                    raise StoppedError
-        except (KeyboardInterrupt, StoppedError):
-            interrupted = True
+        while run.advance(BLOCK_TIME):
+            if stopped():
+                raise StoppedError
         whole, columns = run.result(part.rows[first:])
         done, others = np.flatnonzero(whole), np.flatnonzero(~whole).tolist()
         part.runs.reached(first + done, **{name: values[done] for name, values in columns.items()})
-        if not interrupted:
-            self._one_by_one(chunk, part, [first + k for k in others], stopped)
-        for k in others if interrupted else ():
-            part.runs.messages[first + k] = f"{INTERRUPTED}{run.reached(k)}"
+        self._one_by_one(chunk, part, [first + k for k in others], stopped)
         return True
 
     def _one_by_one(
         self, chunk: Chunk, part: Part, which: Iterable[int], stopped: Callable[[], bool], seconds: float = math.inf
     ) -> int:
-        """Number of these that were run, or given up for Ctrl-C: no more once they took so long [s]."""
+        """Number of these that were run: no more once they took so long [s]."""
         with _lock:
             compiled = compile_steps(self.program, self.options.backend, self.options.fma)
         run: Integration | None = None
         ends = self.options.row_times[-1] == self.options.t_end
-        whole, end, count = True, time.perf_counter() + seconds, 0
+        end, count = time.perf_counter() + seconds, 0
         for k in which:
-            if whole and time.perf_counter() >= end:
+            if time.perf_counter() >= end:
                 break
             count += 1
-            if not whole:
-                part.rows[k] = np.nan
-                continue
             x, native = chunk.x[k], NativeRun(compiled, self.options, chunk.p[k].tolist(), stopped)
             if isinstance(run, NativeIntegration):
                 run.set_parameters(native.parameters)
@@ -369,12 +347,13 @@ class Task:
             if by_end is None or not run_unseen(by_end, x, part.runs, k, part.rows[k]):
                 run = run if by_end is None else integration(native)  # whose first blocks are short: it says when
                 stats, recorder = outcome(run, x, self.options)
+                if stats.message.startswith(INTERRUPTED):
+                    raise KeyboardInterrupt
                 part.runs.set(k, stats)
                 if isinstance(run, WatchedIntegration):
                     part.happened[k] = run.log.happened
                 states = recorder.table()[1]
                 part.rows[k, : len(states)], part.rows[k, len(states) :] = states, np.nan
-            whole = not part.runs.messages[k].startswith(INTERRUPTED)
         return count
 
 

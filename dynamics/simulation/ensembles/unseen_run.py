@@ -2,27 +2,20 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from cgraph.extend import Array
 
-from ..outcome import INTERRUPTED, REACHED
+from ..outcome import REACHED
 from ..steps.integration import AdaptiveIntegration
-from ..steps.stepping import StoppedError
 from .ensemble import RunTable
 
 
 def run_unseen(run: AdaptiveIntegration, x: Array, runs: RunTable, k: int, rows: Array) -> bool:
-    """Whether trajectory k could be run so from x (m,), to its end or to Ctrl-C; else it is to be run anew.
+    """Whether trajectory k could be run so from x (m,), to its end; else it is to be run anew.
 
     rows: (T, m), receives x before the end.
     """
-    try:
-        done, status = run.unseen(x), REACHED
-    except (KeyboardInterrupt, StoppedError):
-        done, status = True, f"{INTERRUPTED} after t = {run.t:.6g} s"
+    done = run.unseen(x)
     if done:
-        reached = status is REACHED
-        runs.stopped(k, status, **run.counts, success=reached, status=reached - 1)
-        rows[:-1], rows[-1] = x, run.x if reached else np.nan
+        runs.stopped(k, REACHED, **run.counts, success=True, status=0)
+        rows[:-1], rows[-1] = x, run.x
     return done

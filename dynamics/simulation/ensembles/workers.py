@@ -15,6 +15,7 @@ import numpy as np
 
 from cgraph.extend import Array, thread_count
 
+from ..steps.stepping import StoppedError
 from .task import Chunk, Part, Task
 
 Map = Callable[[Callable[[Chunk], Part], Sequence[Chunk]], Iterable[Part]]
@@ -58,10 +59,7 @@ def finished(task: Task, chunks: Sequence[Chunk], workers: Team, table: Array) -
             ) from None
     elif workers == 1 or len(chunks) <= 1:
         for chunk in chunks:
-            part = task.run(chunk, _rows(table, chunk), lambda: False)
-            yield part
-            if part.runs.interrupted:
-                raise KeyboardInterrupt
+            yield task.run(chunk, _rows(table, chunk), lambda: False)
     else:
         with closing(_by_threads(task, chunks, min(workers, len(chunks)), table)) as parts:
             yield from parts
@@ -128,7 +126,8 @@ def _by_threads(task: Task, chunks: Sequence[Chunk], threads: int, table: Array)
             stop.set()
             running = [future for future in futures if not future.cancel()]
             for future in running:
-                yield future.result()
+                with suppress(StoppedError):
+                    yield future.result()
             raise
         except BaseException:  # an error in a thread, or nobody wants the rest
             stop.set()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, reduce
 from typing import Any
 
 import numpy as np
@@ -26,12 +26,14 @@ class StateKinds:
     kinds, groups: the same number for those of one kind, as coordinates, or of one quantity, as a quaternion's.
     lengths: what 1 of a component stands for beside 1 of others of its kind, see `System.lengths`.
     ordinary: whether it is that of a first-order system, whose components may all round each other.
+    moved: of a velocity the coordinates that velocities like it move, by number; () of all else.
     """
 
     kinds: tuple[int, ...]
     groups: tuple[int, ...]
     lengths: tuple[float, ...]
     ordinary: bool
+    moved: tuple[tuple[int, ...], ...]
 
     def largest_of_kind(self, values: Array) -> Array:
         """Largest size among components of one kind, as one of each component's own, (.., m)."""
@@ -51,6 +53,16 @@ class StateKinds:
         pairs = list(zip(values, self.lengths, strict=True))
         sizes = _largest_nodes([abs(value if length == 1.0 else length * value) for value, length in pairs], self.kinds)
         return _numbered(values, [size / length for size, length in zip(sizes, self.lengths, strict=True)])
+
+    @cached_property
+    def coordinate(self) -> Graph:
+        """Largest of the coordinates that velocities like this one move, of each component, (m) to (m); 0 of none."""
+        sizes = cg.variables([f"x{k}" for k in range(len(self.moved))])
+        weighed = [length * abs(size) for size, length in zip(sizes, self.lengths, strict=True)]
+        largest = {those: reduce(cg.maximum, [weighed[k] for k in those], cg.constant(0.0)) for those in self.moved}
+        return _numbered(
+            sizes, [largest[those] / length for those, length in zip(self.moved, self.lengths, strict=True)]
+        )
 
     @cached_property
     def together(self) -> Graph | None:

@@ -22,6 +22,7 @@ from cgraph.extend import Call, If, Map, Program, Statement, Sum, While, copied
 from ...integrators import Problem
 from ...integrators.step_control import COLLAPSE, RESOLUTION, SMALLEST_ATOL
 from ..estimates.state_sizes import OTHERS, StateKinds
+from .at_rest import at_rest, at_rest_registers
 
 # Registers of its own, whose names no method has to keep clear of, see `_at`
 STATES = "x_start rate_start rate_look tolerance size whole pointing x_ahead rate_ahead rate_before size_ahead".split()
@@ -72,9 +73,11 @@ def with_first_step(steps: Program, problem: Problem, kinds: StateKinds, order: 
         found = [If(_at("begins"), (*_begin(), *_rates_at_start(problem, kinds))), _look(problem, kinds)]
         turn = [If("search", _turn(m, order), seldom=True)]
     set_out = If("anew", (*found, *_set_out(problem, AT_ONCE if starts else FIRST_LOOK)), seldom=True)
-    raised = (*_tolerance(kinds), _copy("tolerance", "atol"), _rule("seen", lambda n: {"seen": 2.0 * n, "due": 0.0}))
+    later = _rule("seen", lambda n: {"seen": 2.0 * n, "due": 0.0})
+    raised = (*_tolerance(kinds), *at_rest(kinds), _copy("tolerance", "atol"), later)
     sizes = [If("row", (_over(_LARGER, "size x", "size"),)), If("due", raised, seldom=True)]
-    return replace(steps, registers={**steps.registers, **own}, body=[set_out, *steps.body, *turn, *sizes])
+    registers = {**steps.registers, **own, **at_rest_registers(kinds)}
+    return replace(steps, registers=registers, body=[set_out, *steps.body, *turn, *sizes])
 
 
 def _graph(names: str, rule: Callable[..., Node]) -> Graph:

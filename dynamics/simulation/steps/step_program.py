@@ -110,14 +110,17 @@ def state_kinds(problem: Problem) -> StateKinds:
     system, every = problem.system, tuple(range(problem.size))
     lengths = tuple([size or 1.0 for size in problem.lengths])
     if system is None:
-        return StateKinds(every, every, lengths, ordinary=True)
+        return StateKinds(every, every, lengths, ordinary=True, moved=((),) * problem.size)
     groups = [system.kinematics.groups.index(group) for group in system.kinematics.groups]  # by their first
     alone = [group if groups.count(group) > 1 else None for group in groups] + [None] * system.n
     kinds = [
         (k < problem.nq, not size, group) for k, (size, group) in enumerate(zip(problem.lengths, alone, strict=True))
     ]
     alike = tuple([kinds.index(kind) for kind in kinds])
-    return StateKinds(alike, (*groups, *every[problem.nq :]), lengths, ordinary=False)
+    known = [bool(size) for size in problem.lengths]
+    moved = [tuple([j for j in every[: problem.nq] if known[j] == known[k]]) for k in every[problem.nq :]]
+    moved = [()] * problem.nq + ([()] * system.n if problem.momenta else moved)
+    return StateKinds(alike, (*groups, *every[problem.nq :]), lengths, ordinary=False, moved=tuple(moved))
 
 
 def _normalized(steps: Program, problem: Problem, method: Method) -> Program:

@@ -229,6 +229,20 @@ def test_ctrl_c_in_a_controller_keeps_what_was_run() -> None:
         assert np.isnan(run.tau).any() == (last == 0.0)
 
 
+def test_ctrl_c_in_a_prepared_motion_is_raised_with_what_was_run() -> None:
+    def control(q: Array, qd: Array, t: float) -> Array:
+        if t > 0.45:
+            raise KeyboardInterrupt
+        return -q
+
+    motion = dyn.prepare(SPRINGS, tau=dyn.SampledController(control, 0.1))
+    with raises(KeyboardInterrupt, match=r"interrupted after t = 0\.5 s") as stop:
+        motion(**START, t_end=1.0)
+    assert stop.value.run.t[-1] == 0.5
+    with raises(KeyboardInterrupt):
+        motion.end(**START, t_end=1.0)
+
+
 @mark.parametrize(
     ("options", "error", "message"),
     [

@@ -5,6 +5,7 @@ import warnings
 from collections.abc import Callable
 from functools import partial
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from pytest import mark
 import cgraph as cg
 import dynamics as dyn
 from dynamics import METHODS
+from dynamics.simulation import prepared_motion
 from tests.slow import slow
 
 USUAL = "dop853 radau rk4 verlet".split()
@@ -104,6 +106,36 @@ def test_a_method_is_advised_that_gets_through(method: str) -> None:
     assert found is not None
     other = dyn.simulate(relaxing(False), [1.0], None, 0.1, found[1])
     assert (other.success, other.stats.steps, other.stats.steps < run.stats.steps) == (True, int(found[2]), True)
+
+
+@mark.parametrize("broken", [["radau"], ["radau", "rodas"]])
+def test_advice_never_costs_the_run(broken: list[str]) -> None:
+    made = prepared_motion.integration_of
+
+    def failing(problem: Any, options: Any, *arguments: Any, **named: Any) -> Any:
+        if options.method in broken:
+            raise RuntimeError("no code")
+        return made(problem, options, *arguments, **named)
+
+    with (
+        patch.object(prepared_motion, "integration_of", failing),
+        pytest.warns(dyn.SimulationWarning, match="the system is stiff") as caught,
+    ):
+        run = dyn.simulate(relaxing(False), [1.0], None, 0.1, "dopri5")
+    assert run.success
+    assert ("try method='rodas'" in str(caught[0].message)) == (len(broken) == 1)
+
+
+def test_ctrl_c_while_a_method_is_sought_is_said() -> None:
+    def interrupted(problem: Any, options: Any, *arguments: Any, **named: Any) -> Any:
+        if options.method == "radau":
+            raise KeyboardInterrupt
+        return made(problem, options, *arguments, **named)
+
+    made = prepared_motion.integration_of
+    with patch.object(prepared_motion, "integration_of", interrupted), pytest.warns(dyn.SimulationWarning):
+        run = dyn.simulate(relaxing(False), [1.0], None, 0.1, "dopri5")
+    assert (run.message, run.t[-1]) == ("interrupted after t = 0.1 s", 0.1)
 
 
 def test_a_method_that_stops_is_not_advised() -> None:

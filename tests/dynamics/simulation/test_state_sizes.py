@@ -91,6 +91,20 @@ def test_an_angle_that_is_rounding_alone_does_not_hold_the_steps_of_a_slide() ->
     assert 0.0 < np.abs(run.q[:, 1]).max() < 1e-14
 
 
+@mark.parametrize("metre", [1.0, *slow(1e-6, 1e6)])
+def test_velocities_of_rounding_do_not_hold_a_body_that_rests_in_contact(metre: float) -> None:
+    """Its weight and the force of the ground cancel but for rounding; in units of so many metres."""
+    stiffness, weight = 1e6 * metre**0.5, 2.0 * 9.81 / metre
+    ball = dyn.Body("ball", dyn.Joint("prismatic", (0, 0, 1)), mass=2.0)
+    ground = dyn.Contact("ball", radius=0.1 / metre, stiffness=stiffness, dissipation=1.0 * metre)
+    resting = dyn.Mechanism([ball], (0.0, 0.0, -9.81 / metre), forces=[ground])
+    height = 0.1 / metre - (weight / stiffness) ** (2 / 3)
+    for method in ("dop853", "rodas"):
+        run = dyn.simulate(resting, [height], [0.0], 1.0, method, max_steps=200)
+        assert run.success
+        np.testing.assert_allclose(run.q, height, rtol=1e-9)
+
+
 def test_a_tolerance_that_is_given_stays() -> None:
     decay = dyn.OdeSystem(lambda x, t: [-x[0]], ["x"])
     loose = dyn.simulate(decay, [1e-3], None, 5.0, atol=1e-3).stats.steps
