@@ -80,8 +80,8 @@ class Mechanism(Structure):
     locked : mapping
         {body: coordinate [rad or m]} of joints that stand still: their bodies are welded on, see `lock`.
     base_parameters : bool
-        Written with the fewest inertial numbers (`base_parameters.py`). Smaller graphs of the same motion; but a
-        partial Lagrangian is then not the energy of its body.
+        Written with few inertial numbers, a body's given to its parent where they move alike. Smaller graphs of the
+        same motion; but a partial Lagrangian is then not the energy of its body. See `dyn.base_parameters`.
     left_out : tuple of str
         Of a mechanism that was read from a file: what the file has and the mechanism has not, a sentence each.
     loops : sequence of Loop

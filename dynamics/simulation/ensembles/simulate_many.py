@@ -168,11 +168,9 @@ def simulate_many(
     sent = replace(options, t_eval=options.row_times) if watched else options
     task = Task(program, sent, count, tuple(grids), watch if watched else None, lanes)
     x, p = _stepped(problem, start, t0)
-    width = _width(len(x), chunk, team, count * program.steps.width if lanes else 0, grids)
+    width = _width(len(x), chunk, team, count * program.steps.width if lanes else 0, grids, stored=folder is not None)
 
     # Integrate, by whoever takes the chunks and compiles the steps
-    if folder is not None and chunk is None:
-        width = min(width, LARGEST_CHUNK)  # of which no more is lost when the process is ended
     kept = None if folder is None else Store(folder, sweep_of(problem, task, x, p), width, (len(x), count, x.shape[1]))
     whole = _run(task, x, p, width, team, kept)
 
@@ -290,11 +288,14 @@ def _grids(program: StepProgram, options: RunOptions, count: int) -> list[EqualS
     return grids if sum(grid.steps for grid in grids) <= options.max_steps else []
 
 
-def _width(count: int, chunk: int | None, workers: Team, rows: int, grids: Sequence[EqualSteps]) -> int:
+def _width(
+    count: int, chunk: int | None, workers: Team, rows: int, grids: Sequence[EqualSteps], *, stored: bool
+) -> int:
     """Trajectories in a chunk, of so many.
 
     rows: numbers in the rows of steps that a trajectory keeps in its lane, 0 where it is in none.
     grids: of trajectories side by side, whose chunks are of whole vectors, so that each has the same neighbors in any.
+    stored: then no more than this is lost when a process is ended.
     """
     largest = min(LONGEST_CHUNK, max(VECTOR, NUMBERS // rows)) if rows else LARGEST_CHUNK
     if rows and chunk is not None:
@@ -302,7 +303,9 @@ def _width(count: int, chunk: int | None, workers: Team, rows: int, grids: Seque
     if chunk is None:
         short = rows and grids and count * grids[0].steps <= SHORT
         shares = 1 if short else SHARES
-        chunk = min(largest, math.ceil(count / (shares * (workers if isinstance(workers, int) else UNKNOWN))))
+        chunk = min(
+            largest, most or largest, math.ceil(count / (shares * (workers if isinstance(workers, int) else UNKNOWN)))
+        )
     return math.ceil(chunk / VECTOR) * VECTOR if grids else int(chunk)
 
 
