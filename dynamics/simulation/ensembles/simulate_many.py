@@ -303,9 +303,8 @@ def _width(
     if chunk is None:
         short = rows and grids and count * grids[0].steps <= SHORT
         shares = 1 if short else SHARES
-        chunk = min(
-            largest, most or largest, math.ceil(count / (shares * (workers if isinstance(workers, int) else UNKNOWN)))
-        )
+        largest = min(largest, LARGEST_CHUNK) if stored else largest
+        chunk = min(largest, math.ceil(count / (shares * (workers if isinstance(workers, int) else UNKNOWN))))
     return math.ceil(chunk / VECTOR) * VECTOR if grids else int(chunk)
 
 
