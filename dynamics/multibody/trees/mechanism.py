@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph, Node, extend
-from cgraph.extend import Array, Builder, building, real_array, require_flag, require_mapping
+from cgraph.extend import Array, Builder, building, or_nearest, real_array, require_flag, require_mapping
 
 from ...systems.arguments import parameter_value
 from ...systems.body_terms import BodyTerms
@@ -310,8 +310,8 @@ class Mechanism(Structure):
         given = require_mapping("values", values, "name: number")
         chosen = {name: parameter_value(name, value) for name, value in given.items()}
         if unknown := [name for name in chosen if name not in self.parameter_values]:
-            has = ", ".join(self.parameter_values) or "none"
-            raise MechanismError(f"the mechanism has no parameter {unknown[0]!r} (it has {has})")
+            known = or_nearest(unknown[0], list(self.parameter_values))
+            raise MechanismError(f"the mechanism has no parameter {unknown[0]!r} ({known})")
         if not chosen:
             return self
         self._require_values({**self.parameter_values, **chosen})
