@@ -128,7 +128,10 @@ class Mechanism(Structure):
         used = used_names(self.bodies, self.gravity, self.forces)
         for name in self.parameters:
             if name not in used:
-                raise MechanismError(f"the mechanism has no body, joint or force that uses the parameter {name!r}")
+                raise MechanismError(
+                    f"the mechanism has no body, joint or force that uses the parameter {name!r}: put its name in "
+                    "place of a number, or have `components` of a JointForce of your own name it"
+                )
         for name, value in self.parameter_values.items():
             parameter_value(name, value)
 
