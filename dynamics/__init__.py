@@ -72,6 +72,7 @@ if TYPE_CHECKING:
         JointFriction as JointFriction,
         JointLimit as JointLimit,
     )
+    from .multibody.quantities.base_parameters import base_parameters as base_parameters
     from .multibody.quantities.frames import (
         frame_acceleration as frame_acceleration,
         frame_bias_acceleration as frame_bias_acceleration,

@@ -9,7 +9,7 @@ from typing import Any
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import kept_by_first, memo, topological
+from cgraph.extend import is_finite, kept_by_first, memo, topological
 
 from ..equations.constraints.constraint_rank import independent_rows
 from ..equations.constraints.projection import projection
@@ -200,10 +200,17 @@ def time_derivative(problem: Problem) -> Graph:
     return cg.simplify(cg.jacobian(problem.rate, [TIME]))
 
 
-def quantity(problem: Problem, what: str, function: Callable[..., Any], tau: Sequence[Node] | None = None) -> Node:
+def quantity(
+    problem: Problem,
+    what: str,
+    function: Callable[..., Any],
+    tau: Sequence[Node] | None = None,
+    *,
+    constant: bool = False,
+) -> Node:
     """A quantity of the state, function(q, qd, t[, p]) or (x, t[, p]), as a node over inputs that are not bound yet.
 
-    tau: of a quantity of the applied force besides, function(q, qd, tau, t[, p]).
+    tau: of a quantity of the applied force besides, function(q, qd, tau, t[, p]).  constant: or a number.
     Raises TypeError for what is no such function, ValueError for a result that is no node of the state.
     """
     arguments = state_arguments(problem)
@@ -212,6 +219,8 @@ def quantity(problem: Problem, what: str, function: Callable[..., Any], tau: Seq
     else:
         q, qd, *rest = arguments
         node = call_user_function(what, function, q, qd, list(tau), *rest, state="q, qd, tau")
+    if constant and is_finite(node):
+        node = cg.constant(float(node))
     known = _known(problem)
     if not isinstance(node, Node) or any(
         other.op.name == "variable" and other not in known for other in topological([node])

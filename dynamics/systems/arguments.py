@@ -12,7 +12,7 @@ from typing import Any, NoReturn
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import check_name, is_finite, real_number, require_mapping, topological
+from cgraph.extend import check_name, is_finite, or_nearest, real_number, require_mapping, topological
 
 TIME = "t"
 _RESERVED = re.compile(r"(q|qd|qdd|tau|lambda)\d+(_old)?|t|dt")
@@ -25,8 +25,9 @@ class Parameters(dict[str, Node]):
         super().__init__({name: cg.variable(name) for name in names})
 
     def __missing__(self, name: str) -> NoReturn:
-        has = ", ".join(self) or "none"
-        raise ValueError(f"the system has no parameter {name!r} (it has {has}); give it to `parameters`")
+        raise ValueError(
+            f"the system has no parameter {name!r} ({or_nearest(name, list(self))}); give it to `parameters`"
+        )
 
 
 def names_of(what: str, kind: str, names: Sequence[str] | str, *, spaces: bool = True) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import memo, topological
+from cgraph.extend import memo, or_nearest, topological
 
 from .arguments import Parameters, parameter_items, parameter_value
 from .model import Equations, Model, as_equations
@@ -85,8 +85,8 @@ def controlled(
     system.require_known("the controller", forces, p)
     used = {node.name for node in topological(forces)}
     if unused := [name for name in gains if name not in used]:
-        has = ", ".join(system.parameters) or "none"
-        raise ValueError(f"neither the system nor the controller has a parameter {unused[0]!r} (the system has {has})")
+        known = or_nearest(unused[0], list(system.parameters))
+        raise ValueError(f"neither the system nor the controller has a parameter {unused[0]!r}; of the system, {known}")
     graph = Graph([*system.q, *system.qd, system.t, *p.values()], _numbered(forces))
     return _controlled(_Request(system, cg.structure_hash(graph), tuple(gains.items()), tuple(forces)))
 

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import Array, real_array
+from cgraph.extend import Array, or_nearest, real_array
 
 from ...systems.arguments import parameter_value, per_coordinate
 from ...systems.model import Model
@@ -188,7 +188,8 @@ def _parameters(
         raise TypeError(f"parameters must be a mapping of names to numbers, got {parameters!r:.60}")
     chosen, bound, varied = dict(parameters or {}), dict(model.parameters), dict[str, Array]()
     if unknown := [str(name) for name in chosen if name not in bound]:
-        raise ValueError(f"the system has no parameter {', '.join(unknown)} (it has {', '.join(bound) or 'none'})")
+        known = or_nearest(unknown[0], list(bound))
+        raise ValueError(f"the system has no parameter {', '.join(unknown)} ({known})")
     for name, value in chosen.items():
         if many and np.ndim(value):
             varied[name] = _column(name, value)

@@ -6,6 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -15,9 +16,10 @@ from cgraph.extend import Builder, building, check_name, cotangents, real_array,
 
 from ...systems.kinematics import gathered
 from ..algebra.spatial import ZERO
-from ..bodies.body import Body, MechanismError
+from ..bodies.body import Body, MechanismError, quantity
 from ..bodies.joint_coordinates import places
 from ..joints import COMPOSITIONS
+from ..parameters import Quantity, names_in, symbol
 from ..sweeps.kinematic_chain import KinematicChain
 from .contact import Contact, check_contact, touch
 from .external_force import FORCE, Force, check_force, powers
@@ -30,7 +32,8 @@ class JointForce(ABC):
     """A force along the freedoms of a joint, smooth or with kinks, one of the `forces` of a mechanism.
 
     On a joint that is locked it has no effect. `JointLimit`, `JointFriction` and `Actuator` are such forces; one of
-    your own says its force in `along` and what it refuses in `check`.
+    your own says its force in `along` and what it refuses in `check`. Parameters that `along` reads are named by the
+    property `components`, and are 0 where the mechanism's `parameters` say nothing else.
 
     Parameters
     ----------
@@ -41,27 +44,35 @@ class JointForce(ABC):
     --------
     >>> import dynamics as dyn
     >>> class Cubic(dyn.JointForce):
+    ...     components = ("c",)
     ...     def check(self, body):
     ...         pass
     ...     def along(self, q, qd, parameters):
-    ...         return [-8.0 * q[0] ** 3]
+    ...         return [-parameters["c"] * q[0] ** 3]
     >>> cart = dyn.Body("cart", dyn.Joint("prismatic", (1.0, 0.0, 0.0)), mass=2.0)
-    >>> sprung = dyn.Mechanism([cart], forces=[Cubic("cart")])
-    >>> dyn.forward_dynamics(sprung).evaluate({"q0": 0.5, "qd0": 0.0, "tau0": 0.0})
+    >>> sprung = dyn.Mechanism([cart], forces=[Cubic("cart")], parameters={"c": 8.0})
+    >>> dyn.forward_dynamics(sprung).evaluate({"q0": 0.5, "qd0": 0.0, "tau0": 0.0, "c": 8.0})
     {'qdd0': -0.5}
     """
+
+    quantities: ClassVar[Mapping[str, Callable[[str, object], object]]] = {}  # fields that may be parameters, checked
 
     body: str
 
     @property
     def components(self) -> tuple[str, ...]:
-        """Names of the parameters that it uses."""
+        """Names of the parameters that it uses, and that are 0 without a value; of one of your own what it reads."""
         return ()
 
     @property
     def names(self) -> set[str]:
         """Set of the names of its parameters."""
-        return set(self.components)
+        return {*self.components, *names_in([getattr(self, name) for name in self.quantities])}
+
+    @property
+    def label(self) -> str:
+        """What errors call it."""
+        return f"{type(self).__name__} on body {self.body!r}"
 
     @abstractmethod
     def check(self, body: Body) -> None:
@@ -72,7 +83,7 @@ class JointForce(ABC):
         """The force on every velocity of the joint."""
 
     def _require(self, what: str, value: object, at_least: float = -math.inf) -> None:
-        where = f"{type(self).__name__} on body {self.body!r}"
+        where = self.label
         number = real_number(f"{where}: {what}", value)
         if not (math.isfinite(number) and number >= at_least):
             bound = f" and at least {at_least:g}" if math.isfinite(at_least) else ""
@@ -149,7 +160,7 @@ class JointFriction(JointForce):
     body : str
         The body on the joint.
     loss : float
-        The force of every freedom that slides [N m or N].
+        The force of every freedom that slides [N m or N]. In its place may stand a parameter, as in a `Body`.
     velocity : float
         At which about three quarters of it act, > 0 [rad/s or m/s].
 
@@ -162,19 +173,21 @@ class JointFriction(JointForce):
     {'qdd0': -2.0}
     """
 
-    loss: float
+    quantities = {"loss": quantity}  # noqa: RUF012  # of the class, never changed
+
+    loss: Quantity
     velocity: float
 
     def check(self, body: Body) -> None:
         """Raises MechanismError for numbers out of range."""
-        self._require("loss", self.loss, 0.0)
+        quantity(f"{self.label}: loss", self.loss)
         self._require("velocity", self.velocity, 0.0)
         if self.velocity == 0.0:
             raise MechanismError(f"JointFriction on body {self.body!r}: velocity must be positive, got 0.0")
 
     def along(self, q: Sequence[Node], qd: Sequence[Node], parameters: Mapping[str, Node]) -> list[Node]:
         """The force on every velocity."""
-        return [-self.loss * cg.tanh(rate / self.velocity) for rate in qd]
+        return [-symbol(self.loss) * cg.tanh(rate / self.velocity) for rate in qd]
 
 
 @dataclass(frozen=True, eq=False)

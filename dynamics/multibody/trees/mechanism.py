@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph, Node, extend
-from cgraph.extend import Array, Builder, building, real_array, require_flag, require_mapping
+from cgraph.extend import Array, Builder, building, or_nearest, real_array, require_flag, require_mapping
 
 from ...systems.arguments import parameter_value
 from ...systems.body_terms import BodyTerms
@@ -80,8 +80,8 @@ class Mechanism(Structure):
     locked : mapping
         {body: coordinate [rad or m]} of joints that stand still: their bodies are welded on, see `lock`.
     base_parameters : bool
-        Written with the fewest inertial numbers (`base_parameters.py`). Smaller graphs of the same motion; but a
-        partial Lagrangian is then not the energy of its body.
+        Written with few inertial numbers, a body's given to its parent where they move alike. Smaller graphs of the
+        same motion; but a partial Lagrangian is then not the energy of its body. See `dyn.base_parameters`.
     left_out : tuple of str
         Of a mechanism that was read from a file: what the file has and the mechanism has not, a sentence each.
     loops : sequence of Loop
@@ -128,7 +128,10 @@ class Mechanism(Structure):
         used = used_names(self.bodies, self.gravity, self.forces)
         for name in self.parameters:
             if name not in used:
-                raise MechanismError(f"the mechanism has no body, joint or force that uses the parameter {name!r}")
+                raise MechanismError(
+                    f"the mechanism has no body, joint or force that uses the parameter {name!r}: put its name in "
+                    "place of a number, or have `components` of a JointForce of your own name it"
+                )
         for name, value in self.parameter_values.items():
             parameter_value(name, value)
 
@@ -310,8 +313,8 @@ class Mechanism(Structure):
         given = require_mapping("values", values, "name: number")
         chosen = {name: parameter_value(name, value) for name, value in given.items()}
         if unknown := [name for name in chosen if name not in self.parameter_values]:
-            has = ", ".join(self.parameter_values) or "none"
-            raise MechanismError(f"the mechanism has no parameter {unknown[0]!r} (it has {has})")
+            known = or_nearest(unknown[0], list(self.parameter_values))
+            raise MechanismError(f"the mechanism has no parameter {unknown[0]!r} ({known})")
         if not chosen:
             return self
         self._require_values({**self.parameter_values, **chosen})

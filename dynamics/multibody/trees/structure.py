@@ -309,9 +309,10 @@ class Use(NamedTuple):
 def uses(bodies: Sequence[Body], gravity: Quantities, forces: Iterable[AnyForce]) -> Iterator[Use]:
     """The quantities of bodies, their joints, gravity and contacts in which there are parameters."""
     yield from _of_parameters([("gravity", gravity, quantities)])
-    for force in [each for each in forces if isinstance(each, Contact)]:
-        rows = CONTACT_QUANTITIES.items()
-        yield from _of_parameters([(f"{force.label}: {name}", getattr(force, name), check) for name, check in rows])
+    for force in [each for each in forces if isinstance(each, Contact | JointForce)]:
+        yield from _of_parameters(
+            [(f"{force.label}: {name}", getattr(force, name), check) for name, check in _quantities(force).items()]
+        )
     for body in bodies:
         yield from _uses_of(body)
 
@@ -366,6 +367,11 @@ def require_values(
                 raise MechanismError(f"{error}, where {listed}") from None
 
 
+def _quantities(force: Contact | JointForce) -> Mapping[str, Callable[[str, object], object]]:
+    """The checks of fields that may be parameters."""
+    return CONTACT_QUANTITIES if isinstance(force, Contact) else force.quantities
+
+
 def bound_body(body: Body, values: Mapping[str, float]) -> Body:
     """The body with numbers in place of these parameters; itself where it has none of them."""
     if not any([use.names.keys() & values.keys() for use in _uses_of(body)]):
@@ -376,10 +382,11 @@ def bound_body(body: Body, values: Mapping[str, float]) -> Body:
 
 
 def bound_force(force: AnyForce, values: Mapping[str, float]) -> AnyForce:
-    """The force likewise; one along a joint keeps its input, which then has that value."""
-    if isinstance(force, JointForce) or not force.names & values.keys():
+    """The force likewise; an input of one along a joint stays, and then has that value."""
+    if not force.names & values.keys():
         return force
-    if isinstance(force, Contact):
-        return replace(force, **{name: bound(getattr(force, name), values) for name in CONTACT_QUANTITIES})
+    if isinstance(force, Contact | JointForce):
+        numbers = {name: bound(getattr(force, name), values) for name in _quantities(force)}
+        return replace(force, **numbers) if numbers else force
     value, torque = ([bound(each, values) for each in three] for three in (force.value, force.torque))
     return replace(force, value=value, torque=torque)

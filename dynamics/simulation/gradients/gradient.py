@@ -15,7 +15,9 @@ from cgraph import Graph, Node
 from cgraph.extend import Array, Builder, kept_by_first, memo, topological
 
 from ...integrators import Problem, quantity
-from ...systems.model import Model
+from ...systems.arguments import Parameters, call_user_function
+from ...systems.model import Model, as_equations
+from ...systems.ode_system import OdeSystem
 from ...systems.system import System
 from ..events.event import Event, as_events
 from ..moving import Constant
@@ -25,7 +27,7 @@ from .motion import START, TORQUE, VELOCITY, MotionRequest, motion_of
 from .motion_equations import at
 from .segments import Bars, MotionSegments, segments_of
 
-Loss = Callable[..., Node]
+Loss = Callable[..., Node | float]
 LOSSES_KEPT = 64  # losses whose graphs stay for another run
 
 
@@ -107,10 +109,13 @@ def gradient(
     model : System, OdeSystem, Mechanism or Scene
         What moves.
     loss : callable, optional
-        (q, qd, t) or (q, qd, t, p) of the state and time where the motion ends, to a node; of an OdeSystem (x, t) or
-        (x, t, p). None for a running loss alone.
-    q, qd, t_end, t0, t_span, dt, max_step, rtol, atol, first_step, parameters, backend, form
+        (q, qd, t) or (q, qd, t, p) of the state and time where the motion ends, to a node or a number; of an OdeSystem
+        (x, t) or (x, t, p). None for a running loss alone.
+    q, qd, t_end, t0, t_span, dt, max_step, rtol, atol, first_step, backend, form
         As for `simulate`.
+    parameters : mapping, optional
+        {name: value} in place of the model's own, and of those of a controller, as for `simulate`; and of those that
+        the losses alone read, such as a goal.
     method : str, optional
         A name of `dyn.METHODS`, of equal or chosen steps. By default that of `simulate`, "dop853", which chooses its
         steps; and "rk4" where `dt` or a row of forces a step asks for equal ones. Equations that are
@@ -160,6 +165,7 @@ def gradient(
     options: dict[str, Any] = {"dt": dt, "max_step": max_step, "rtol": rtol, "atol": atol, "first_step": first_step}
     options |= {"estimate_error": estimate_error, "backend": backend}
     span, watched = (t_end, t0, t_span), as_events(events)
+    model = with_loss_parameters(model, parameters, loss, running)
     motion = motion_of(model, q, qd, span, method, tau, parameters, wrt, form, watched, **options)
     values, slopes, segments, ends = differentiated(motion, loss, running, watched)
     for text in doubts(segments, values, slopes, ends)[0]:
@@ -169,6 +175,25 @@ def gradient(
     return MotionGradient(float(values[0]), gradients, segments.t, x[:nq], x[nq:], checkpoints)
 
 
+def with_loss_parameters(model: Model, parameters: object, loss: Loss | None, running: Loss | None) -> Model:
+    """The model, with those given parameters that it has not and a loss reads: inputs that its equations do not use."""
+    own = as_equations(model)
+    given = parameters if isinstance(parameters, Mapping) else {}
+    new = [name for name in given if name not in own.parameters]
+    if not new or not all([isinstance(name, str) for name in new]):
+        return model
+    p, t, system = Parameters([*own.parameters, *new]), cg.variable("t"), own.system
+    state = [cg.variables(list(own.coordinates))] if system is None else [system.q, system.qd]
+    force = [] if system is None else [list(system.tau)]
+    called = [("loss", loss, state), ("running", running, [*state, *force])]
+    read = [call_user_function(what, each, *at, t, p) for what, each, at in called if each is not None]
+    used = {node.name for node in topological([node for node in read if isinstance(node, Node)])}
+    extended = dict(own.parameters) | {name: 0.0 for name in new if name in used}
+    if isinstance(own, OdeSystem):
+        return OdeSystem(lambda x, t: own.rates, own.states, extended)
+    return own.changed(parameters=extended)
+
+
 def differentiated(
     motion: MotionRequest, loss: Loss | None, running: Loss | None, watched: Sequence[Event] = ()
 ) -> tuple[Array, dict[str, Array], MotionSegments, tuple[Array, Array]]:
@@ -176,8 +201,10 @@ def differentiated(
     problem = motion.problem
     if loss is None and running is None:
         raise ValueError("a loss is needed: of the end of the motion, `loss`, of how it goes, `running`, or both")
-    final = None if loss is None else loss_graph(problem, quantity(problem, "loss", loss))
-    total = None if running is None else loss_graph(problem, quantity(problem, "running", running, motion.applied))
+    final = None if loss is None else loss_graph(problem, quantity(problem, "loss", loss, constant=True))
+    total = None
+    if running is not None:
+        total = loss_graph(problem, quantity(problem, "running", running, motion.applied, constant=True))
     segments = segments_of(motion, watched, total, forwards=False)
     values, end = _final(final, motion, segments)
     start, inputs, rows = segments.pulled(end)

@@ -18,7 +18,7 @@ from ...systems.model import Model
 from ..outcome import MotionError
 from ..trajectory import SimulationWarning
 from .doubts import doubts
-from .gradient import Loss, differentiated
+from .gradient import Loss, differentiated, with_loss_parameters
 from .motion import START, TORQUE, VELOCITY, MotionRequest, motion_of
 
 FEW_MOTIONS = 4  # motions: fewer by a method that iterates are done sooner one by one
@@ -103,7 +103,7 @@ def gradient_many(
     tau : float, array_like or callable
         Applied force [N m or N]: constant, (n,) or (N, n); a row a step, (N, steps, n); or a controller in closed form.
     parameters : mapping, optional
-        {name: value}, a number for all or one for each motion, (N,).
+        As for `gradient`, a number for all or one for each motion, (N,).
 
     Returns
     -------
@@ -126,6 +126,7 @@ def gradient_many(
     options: dict[str, Any] = {"dt": dt, "max_step": max_step, "rtol": rtol, "atol": atol, "first_step": first_step}
     options |= {"estimate_error": estimate_error, "backend": backend}
     span = (t_end, t0, t_span)
+    model = with_loss_parameters(model, parameters, loss, running)
     motions = motion_of(model, q, qd, span, method, tau, parameters, wrt, form, many=True, **options)
     count, problem, run = motions.many, motions.problem, motions.options
     parts = _parts(motions)

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Node
-from cgraph.extend import Array, memo, real_array, require_sequence
+from cgraph.extend import Array, memo, or_nearest, real_array, require_sequence
 
 from ...equations.state_equation import state_inputs
 from ...equations.states.initial_value import initial_values
@@ -252,11 +252,11 @@ def names_of(model: Model, wrt: str | Iterable[str] | None, *, closed: bool) -> 
     known = dict.fromkeys([*usual, *inputs.parameters])
     for name in names:
         if not isinstance(name, str) or name not in known:
-            raise ValueError(f"wrt must be among {', '.join(known)}, got {name!r:.60}")
+            raise ValueError(f"wrt: the motion has no input {name!r:.60} ({or_nearest(str(name), list(known))})")
     if clash := [name for name in names if name in usual and name in inputs.parameters]:
         raise ValueError(f"wrt {clash[0]!r} is the start or the applied force, and a parameter: rename the parameter")
     if not names:
-        raise ValueError(f"wrt needs at least one of {', '.join(known)}")
+        raise ValueError(f"wrt needs at least one of {', '.join(usual)} and the parameters")
     return tuple(dict.fromkeys(names))
 
 

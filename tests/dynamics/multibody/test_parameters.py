@@ -201,6 +201,22 @@ START = ([0.3, -0.2], [0.0, 0.5], 0.3)
 PLAIN: dict[str, Any] = {"method": "rk4", "dt": 0.05, "backend": "python"}
 
 
+def test_dry_friction_may_be_one() -> None:
+    """A motion that slides is slower by loss t / m, by which its place is off by loss t^2 / 2 m."""
+    cart = Body("cart", Joint("prismatic", (1.0, 0.0, 0.0)), mass=2.0)
+    rough = Mechanism([cart], forces=[dyn.JointFriction("cart", loss="c", velocity=0.001)], parameters={"c": 4.0})
+    numbers = replace(rough, forces=[dyn.JointFriction("cart", loss=4.0, velocity=0.001)], parameters={})
+    assert same(dyn.forward_dynamics(rough.bind()), dyn.forward_dynamics(numbers))
+    found = dyn.gradient(rough, lambda q, qd, t: q[0], [0.0], [1.0], 0.2, dt=0.02, wrt="c", backend="python")
+    assert (found.value, found["c"]) == (approx(0.2 - 0.04), approx(-0.01))
+    with raises(MechanismError, match="loss has the parameter 'c', which needs a value"):
+        replace(rough, parameters={})
+    with raises(MechanismError, match=r"loss must be finite and at least 0, got -1\.0, where c = -1\.0"):
+        replace(rough, parameters={"c": -1.0})
+    with raises(MechanismError, match=r"uses the parameter 'cc': put its name .* or have `components` of a JointForce"):
+        replace(rough, parameters={"c": 4.0, "cc": 1.0})
+
+
 def test_simulate_binds_them() -> None:
     heavy = pendulums(load=0.7, length=1.1)
     chosen = dyn.simulate(pendulums(), *START, **PLAIN, parameters={"load": 0.7, "length": 1.1}).q[-1]

@@ -80,3 +80,17 @@ def test_its_columns_are_the_slopes_of_torques_by_the_numbers_of_bodies(family: 
     found = np.array([*slopes.evaluate({name: point[name] for name in slopes.input_names}).values()])
     expected = value(mechanism, state)[0].ravel()
     assert found == approx(expected, abs=10.0 * ROUNDING * abs(expected).max())
+
+
+@pytest.mark.parametrize("family", EVERY_FAMILY)
+def test_base_parameters_are_what_motion_shows(family: str) -> None:
+    """Torques as those of all parameters, and as many as the rank, at other states."""
+    mechanism = FAMILIES[family](4)
+    base, width = dyn.base_parameters(mechanism), 10 * mechanism.system.n
+    matrix = value(mechanism, states(mechanism, 60)).reshape(-1, width)
+    own = matrix[:, base.columns]
+    assert own @ base.grouping == approx(matrix, abs=ROUNDING * abs(matrix).max() * 10)
+    assert base.grouping[:, base.columns].tolist() == np.eye(base.rank).tolist()
+    lengths = np.linalg.norm(matrix, axis=0)
+    assert base.rank == np.linalg.matrix_rank(matrix / np.where(lengths, lengths, 1.0), tol=1e-9)
+    assert len(set(base.names)) == base.rank

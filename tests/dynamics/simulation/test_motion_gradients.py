@@ -362,6 +362,25 @@ def test_a_controller_s_gain_and_a_first_order_system() -> None:
     assert both["q"] == approx([0.02 * (1.0 - math.exp(-2.0)) / (1.0 - math.exp(-0.04))], rel=1e-7)
 
 
+def test_a_parameter_of_losses_alone_is_an_input_of_them() -> None:
+    """As the same number written into the loss, with the slope that the square says; of many, and of a rate alone."""
+    steps: dict[str, Any] = {"t_end": 0.1, "dt": 0.05, "backend": "python", "parameters": {"goal": 0.3}}
+    decay = dyn.OdeSystem(lambda x, t: [-2.0 * x[0]], ["x"])
+    for model, qd in ((BEAD, [0.2]), (decay, None)):
+        named = dyn.gradient(model, lambda *at: (at[0][0] - at[-1]["goal"]) ** 2, [0.5], qd, wrt=["q", "goal"], **steps)
+        plain = dyn.gradient(
+            model, lambda *at: (at[0][0] - 0.3) ** 2, [0.5], qd, wrt="q", **(steps | {"parameters": {}})
+        )
+        assert named.value == plain.value
+        assert named["q"] == approx(plain["q"], rel=SHORT_SUM)
+        assert named["goal"] == approx(-2.0 * (named.q[0] - 0.3), rel=SHORT_SUM)
+    both = {"loss": lambda q, qd, t: 0.0, "running": lambda q, qd, tau, t, p: p["goal"] * q[0], "wrt": "goal"}
+    many = dyn.gradient_many(BEAD, q=[0.5], qd=[0.2], **both, **(steps | {"parameters": {"goal": [0.3, 0.6]}}))
+    assert many.value == approx(many["goal"] * [0.3, 0.6], rel=SHORT_SUM)
+    with raises(ValueError, match=r"has no parameter 'goal' \(did you mean 'gaol'\?\)"):
+        dyn.gradient(BEAD, q=[0.5], qd=[0.2], **both, **(steps | {"parameters": {"gaol": 0.3}}))
+
+
 def test_what_is_not_there_is_said_in_a_sentence() -> None:
     def end(**given: Any) -> Any:
         return dyn.gradient(BEAD, loss, [0.5], [0.2], **({"t_end": 0.1, "dt": 0.05, "backend": "python"} | given))
@@ -370,7 +389,7 @@ def test_what_is_not_there_is_said_in_a_sentence() -> None:
         end(method="scipy:Radau", dt=None)
     with raises(TypeError, match="SampledController calls Python"):
         end(tau=dyn.SampledController(lambda q, qd, t: q, 0.1))
-    with raises(ValueError, match=r"wrt must be among q, qd, tau, m, k, got 'mass'"):
+    with raises(ValueError, match=r"wrt: the motion has no input 'mass' \(it has q, qd, tau, m, k\)"):
         end(wrt="mass")
     with raises(ValueError, match=r"tau must have shape \(n,\) or \(steps, n\) with n = 1"):
         end(tau=np.zeros((2, 3)))
