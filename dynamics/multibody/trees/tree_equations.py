@@ -49,18 +49,6 @@ class TreeEquations:
         return parents_of(self.bodies)
 
     @cached_property
-    def _outwards(self) -> list[int]:
-        """Indices of the bodies, behind each one all that it carries: what a sweep makes of a body is used next."""
-        carried: dict[int, list[int]] = {}
-        for i, parent in reversed(list(enumerate(self.parents))):
-            carried.setdefault(parent, []).append(i)
-        order, waiting = list[int](), carried.get(-1, [])
-        while waiting:
-            order.append(waiting.pop())
-            waiting += carried.get(order[-1], [])
-        return order
-
-    @cached_property
     def links(self) -> list[Link]:
         """Links of the bodies, in the bodies' own frames."""
         return self._regrouped(self._own)[0] if self.base_parameters else self._own
@@ -153,17 +141,16 @@ class TreeEquations:
 
     def bias_forces(self, q: Sequence[Node], qd: Sequence[Node], qdd: Sequence[Node] | None) -> list[BiasForce]:
         """The wrenches of all bodies at these accelerations, with the velocities that they work on."""
-        accelerations, forces = dict[int, Acceleration](), dict[int, list[BiasForce]]()
+        forces, accelerations = list[BiasForce](), list[Acceleration]()
         with building(Builder()):
             base = base_acceleration(self.ground)
-            states, all_moved = self.states(q, qd, self._fewest, qdd), self._moved(q, qd)
-            for i in self._outwards:
-                at, moved = states[i], all_moved[i]
+            states = self.states(q, qd, self._fewest, qdd)
+            for at, moved in zip(states, self._moved(q, qd), strict=True):
                 with cg.tag(at.name):
-                    parent = accelerations.get(at.parent, base)
-                    accelerations[i] = propagate_acceleration(parent, moved.parent, moved.motion, at)
-                    forces[i] = wrench(accelerations[i], moved.motion, at)
-        return [force for i in range(len(states)) for force in forces[i]]
+                    parent = accelerations[at.parent] if at.parent >= 0 else base
+                    accelerations.append(propagate_acceleration(parent, moved.parent, moved.motion, at))
+                    forces += wrench(accelerations[-1], moved.motion, at)
+        return forces
 
     def mass_matrix(self, q: Sequence[Node], qd: Sequence[Node], lagrangian: Node, build: Builder) -> list[list[Node]]:
         """The lower triangle of M by composite inertias; or from the Lagrangian, where that takes fewer nodes."""
@@ -218,11 +205,11 @@ class TreeEquations:
             return torque_derivatives(self.states(q, u, self._links[0], u_dot), up, build)
 
     def _moved(self, q: Sequence[Node], qd: Sequence[Node], links: Sequence[Link] | None = None) -> list[Moved]:
-        states, result = self.states(q, qd, links or self._links[0]), dict[int, Moved]()
-        for i in self._outwards:
-            parent = result[states[i].parent].motion if states[i].parent >= 0 else self.ground
-            result[i] = self.shared.moved(parent, states[i])
-        return [result[i] for i in range(len(states))]
+        result: list[Moved] = []
+        for at in self.states(q, qd, links or self._links[0]):
+            parent = result[at.parent].motion if at.parent >= 0 else self.ground
+            result.append(self.shared.moved(parent, at))
+        return result
 
 
 def _size(link: Link) -> float:

@@ -71,6 +71,16 @@ def test_a_linear_table_is_that_of_numpy_outside_too():
     assert np.abs(found - np.interp(points, xs, ys)).max() <= ROUNDING * np.abs(ys).max()
 
 
+@each_row("n", [2, 3, 4, 7, 8, 9, 31, 32, 33, 100])
+def test_a_table_of_any_size_is_searched_by_bisection(n):
+    xs = np.arange(n) + 0.0
+    ys = np.random.default_rng(n).normal(size=n)
+    graph = cg.Graph([X], {"y": cg.interp(X, xs, ys, "linear")})
+    points = np.concatenate([xs, np.nextafter(xs, -np.inf), xs + 0.5, [-1e3, 1e3]])
+    assert np.abs(graph.evaluate({"x": points})["y"] - np.interp(points, xs, ys)).max() <= ROUNDING
+    assert sum(node.op.name == "less" for node in graph.nodes) == n.bit_length()
+
+
 @each_row("kind, outside", [(kind, outside) for kind in KINDS for outside in OUTSIDE])
 def test_outside_it_goes_on_as_it_is_told(kind, outside):
     xs, ys = [0.0, 1.0, 3.0], [1.0, 2.0, 7.0]
