@@ -6,7 +6,7 @@ import os
 import signal
 import sys
 from collections.abc import Callable, Generator, Iterator
-from functools import lru_cache
+from hashlib import sha256
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 from hypothesis import HealthCheck, settings
 
+from cgraph import clear_caches
 from cgraph.codegen import llvm_engine
 from tests.chromium import chromium
 
@@ -60,7 +61,15 @@ def pytest_collection_finish() -> None:
     gc.set_threshold(50_000, 20, 20)
 
 
-_translated = lru_cache(256)(llvm_engine.Host._translated)
+_translate = llvm_engine.Host._translated
+_made: dict[bytes, bytes] = {}  # {digest of a text: its machine code}
+
+
+def _quickly(host: llvm_engine.Host, text: str, level: int) -> bytes:
+    digest = sha256(text.encode()).digest()
+    if digest not in _made:
+        _made[digest] = _translate(host, text, 0)
+    return _made[digest]
 
 
 @pytest.fixture(autouse=True)
@@ -68,14 +77,16 @@ def quick_machine_code(request: pytest.FixtureRequest) -> Iterator[None]:
     """LLVM's code generator does not optimize, in a quarter of the time, but where its code is what a test is about.
 
     Products and sums are then not fused, so that last bits are those of a processor without such an instruction. What
-    it has lately made of the same text is taken again: a third of all. With HYPOTHESIS_PROFILE all code is optimized,
-    as users have it.
+    it has made of the same text is taken again: a third of all. With HYPOTHESIS_PROFILE all code is optimized, as users
+    have it; a test about it takes none of what others have left.
     """
     users = "optimized" in request.keywords or "HYPOTHESIS_PROFILE" in os.environ
     with pytest.MonkeyPatch.context() as patch:
+        if "optimized" in request.keywords:
+            clear_caches()
         if not users:
             patch.setattr(llvm_engine, "LEVEL", 0)
-            patch.setattr(llvm_engine.Host, "_translated", lambda host, text, level: _translated(host, text, 0))
+            patch.setattr(llvm_engine.Host, "_translated", _quickly)
         yield
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -31,6 +32,7 @@ def scaled_four_bar(length: float, mass: float) -> dyn.Mechanism:
     return dyn.Mechanism(bars, (0.0, 0.0, -9.81 * length), loops=[loop])
 
 
+@cache
 def peaucellier() -> dyn.Mechanism:
     """Peaucellier's linkage: long bars of 0.5 m from the world, a rhombus of 0.2 m, and a crank of 0.3 m at 0.3 m."""
     places = {"long 1": "world", "side 1": "long 1", "long 2": "world", "side 2": "long 2"}
@@ -42,6 +44,7 @@ def peaucellier() -> dyn.Mechanism:
     return dyn.Mechanism(bars, loops=loops)
 
 
+@cache
 def four_bar(kind: str = "point", *, cut: int = 3) -> dyn.Mechanism:
     """Bars of 0.3, 0.8 and 0.6 m on hinges 0.9 m apart, closed between the second and the third, or at the ground."""
     loop = dyn.Loop(kind, "coupler", "rocker", at=(0.8, 0, 0), to_at=(0.6, 0, 0), axis=ACROSS, to_axis=ACROSS)
@@ -56,6 +59,7 @@ def four_bar(kind: str = "point", *, cut: int = 3) -> dyn.Mechanism:
     return dyn.Mechanism(bars, loops=[loop])
 
 
+@cache
 def squeezer() -> dyn.Mechanism:
     """Andrews' squeezing mechanism: E. Hairer, G. Wanner, Solving Ordinary Differential Equations II, section VI.9.
 

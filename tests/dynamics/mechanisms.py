@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -71,6 +72,7 @@ FAMILIES: dict[str, Callable[[int], Mechanism]] = {
     "branched": lambda n: random_mechanism(n, ["revolute"], 4),
     "welded": lambda n: random_mechanism(n, ["revolute", "prismatic", "fixed"], 3),
 }
+FAMILIES = {name: cache(make) for name, make in FAMILIES.items()}  # one model, which keeps what is derived of it
 PLAIN = ("serial", "branched")  # of hinges alone, which the others have too
 EVERY_FAMILY = [*[name for name in FAMILIES if name not in PLAIN], *slow(*PLAIN)]
 
@@ -171,3 +173,4 @@ TREES: dict[str, Callable[[], Mechanism]] = {
     "turned by quarters": lambda: turned_arm(4),
     "trees": lambda: forest(random_mechanism(4, ["revolute", "prismatic"], 1)),
 }
+TREES = {name: cache(make) for name, make in TREES.items()}  # one model, which keeps what is derived of it

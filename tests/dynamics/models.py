@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -147,3 +148,4 @@ MODELS: dict[str, Callable[[], Any]] = {
     "magnetic": magnetic,
     "relativistic": relativistic,
 }
+MODELS = {name: cache(make) for name, make in MODELS.items()}  # one model, which keeps what is derived of it

@@ -1,6 +1,7 @@
 """Two systems that integrators are tried on: a planet, whose motion is known, and a pendulum on a cart."""
 
 import math
+from functools import cache
 
 import cgraph as cg
 from dynamics import System
@@ -9,6 +10,7 @@ ECCENTRICITY = 0.3
 PERIHELION = ([1.0 - ECCENTRICITY, 0.0], [0.0, math.sqrt((1.0 + ECCENTRICITY) / (1.0 - ECCENTRICITY))])
 
 
+@cache
 def planet() -> System:
     return System(lambda q, qd, t: 0.5 * (qd[0] ** 2 + qd[1] ** 2) + 1.0 / cg.sqrt(q[0] ** 2 + q[1] ** 2), ["x", "y"])
 
@@ -21,6 +23,7 @@ def position(t: float) -> list[float]:
     return [math.cos(anomaly) - ECCENTRICITY, math.sqrt(1.0 - ECCENTRICITY**2) * math.sin(anomaly)]
 
 
+@cache
 def cart() -> System:
     """A pendulum on a cart with friction between them: a mass matrix of q, and a force of the velocities."""
     return System(

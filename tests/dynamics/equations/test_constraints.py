@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ def plane(q: Any, qd: Any, t: Any) -> Any:
     return 0.5 * (qd[0] ** 2 + qd[1] ** 2 + 0.3 * qd[2] ** 2) - 9.81 * q[1]
 
 
+@cache
 def sleigh(a: float = 0.4, m: float = 1.3, inertia: float = 0.2) -> dyn.System:
     """Chaplygin's: a blade at (x, y), the center of mass a ahead of it."""
 
@@ -147,6 +149,7 @@ def test_brackets_of_quasi_velocities_count() -> None:
     assert dyn.integrable_rows(held(2)) == {"z": True, "y": True}
 
 
+@cache
 def moving_wall() -> dyn.System:
     """x = sin(w t)."""
     return dyn.System(plane, "x y a", {"w": 3.0}, constraints=lambda q, t, p: {"wall": q[0] - cg.sin(p["w"] * t)})
@@ -201,6 +204,7 @@ def test_info_names_the_constraint_that_says_nothing_new_at_a_state() -> None:
         dyn.raise_if_singular(held, info)
 
 
+@cache
 def pulleys() -> dyn.System:
     """A rope over two pulleys: the hook y between masses has no inertia, and 2 y = x - z."""
 

@@ -2,6 +2,7 @@
 
 import math
 import warnings
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,7 @@ FOLLOWED = 1e-6  # of a solution at tolerances of 1e-9
 MOST = 20000  # trials, far more than a collapse takes
 
 
+@cache
 def first_order(*rates: Any) -> dyn.OdeSystem:
     return dyn.OdeSystem(lambda x, t: [rate(x, t) for rate in rates], [f"x{k}" for k in range(len(rates))])
 

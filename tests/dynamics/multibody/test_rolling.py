@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -28,6 +29,7 @@ def inertia(xx: float, yy: float, zz: float, xz: float = 0.0) -> list[list[float
     return [[xx, 0.0, xz], [0.0, yy, 0.0], [xz, 0.0, zz]]
 
 
+@cache
 def bicycle() -> dyn.Mechanism:
     """J. P. Meijaard, J. M. Papadopoulos, A. Ruina, A. L. Schwab, Proc. R. Soc. A 463, 2007: table 1."""
     base, trail, tilt = 1.02, 0.08, math.pi / 10.0
@@ -106,6 +108,7 @@ def test_the_benchmark_bicycle_has_the_published_matrices_and_eigenvalues() -> N
             assert np.abs(eigenvalues - mode).min() < 1e-10 * abs(mode)
 
 
+@cache
 def disk(radius: float = 0.4, mass: float = 1.5) -> dyn.Mechanism:
     """A uniform thin disk on a plane, in axes of heading, lean and spin."""
     moments = (0.25 * mass * radius**2, 0.5 * mass * radius**2, 0.25 * mass * radius**2)

@@ -2,6 +2,7 @@
 
 import warnings
 from collections.abc import Iterator
+from functools import cache
 from typing import Any
 from unittest.mock import patch
 
@@ -34,6 +35,7 @@ def _lanes_at_once() -> Iterator[None]:
         yield
 
 
+@cache
 def spring() -> dyn.System:
     """A pendulum on a spring, pushed by a force in time, with parameters."""
     return dyn.System(
@@ -44,6 +46,7 @@ def spring() -> dyn.System:
     )
 
 
+@cache
 def lone() -> dyn.OdeSystem:
     """A sine, an exponential and a power that have no company: of one point libm computes them."""
 

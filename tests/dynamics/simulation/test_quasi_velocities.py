@@ -24,6 +24,7 @@ COARSE = {"euler": 0.05, "midpoint": 3e-4, "yoshida4": 1e-7}  # as accurate as t
 TURN = [1.0, 0.2, 0.3, 0.1]
 
 
+@cache
 def top(gravity: float = 9.81) -> dyn.Mechanism:
     """A body on a ball joint."""
     inertia = np.diag([1.0, 1.5, 2.0])
@@ -31,6 +32,7 @@ def top(gravity: float = 9.81) -> dyn.Mechanism:
     return dyn.Mechanism([body], gravity=(0.0, 0.0, -gravity))
 
 
+@cache
 def drone() -> dyn.Mechanism:
     """A free body with a hinged arm."""
     base = dyn.Body("base", dyn.Joint("free"), mass=2.0, center=[0.1, 0.0, 0.0], inertia=np.diag([1.0, 1.5, 2.0]))
