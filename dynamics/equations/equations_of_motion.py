@@ -199,10 +199,10 @@ def forward_dynamics(model: Model, method: str = "auto", *, check: bool = False)
         raise ValueError('check needs method="recursive" or "auto" where there are constraints, got "dense"')
     if method == "balanced":
         require_no_constraints(system)
-    return called(_solved(system, method, check), model)
+    return called(_solved(system, method, check, (tuple(system.forces), tuple(system.damping))), model)
 
 
 @kept_by_first
-def _solved(system: System, method: str, check: bool) -> Graph:
-    """Forward dynamics, which the state equation has, too."""
+def _solved(system: System, method: str, check: bool, applied: tuple[object, ...]) -> Graph:
+    """Forward dynamics, which the state equation has, too.  applied: of the system, where it may be given anew."""
     return shortened(system, lambda form: accelerations(form, method, check))

@@ -6,6 +6,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import ClassVar
 
 import numpy as np
@@ -55,7 +56,8 @@ class JointForce(ABC):
     {'qdd0': -0.5}
     """
 
-    quantities: ClassVar[Mapping[str, Callable[[str, object], object]]] = {}  # fields that may be parameters, checked
+    # fields that may be parameters, and how their numbers are checked
+    quantities: ClassVar[Mapping[str, Callable[[str, object], object]]] = MappingProxyType({})
 
     body: str
 
@@ -173,7 +175,7 @@ class JointFriction(JointForce):
     {'qdd0': -2.0}
     """
 
-    quantities = {"loss": quantity}  # noqa: RUF012  # of the class, never changed
+    quantities = MappingProxyType({"loss": quantity})
 
     loss: Quantity
     velocity: float

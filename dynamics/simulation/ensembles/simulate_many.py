@@ -160,8 +160,7 @@ def simulate_many(
     sent = replace(options, t_eval=options.row_times) if watched else options
     task = Task(program, sent, count, tuple(grids), watch if watched else None, lanes)
     x, p = _stepped(problem, start, t0)
-    stored, in_rows = folder is not None, count * program.steps.width if lanes else 0
-    width = chunk_width(len(x), chunk, team, in_rows, grids, stored=stored)
+    width = chunk_width(len(x), chunk, team, count * program.steps.width * lanes, grids, stored=folder is not None)
 
     # Integrate, by whoever takes the chunks and compiles the steps
     with _opened(folder, problem, task, x, p, width) as kept:

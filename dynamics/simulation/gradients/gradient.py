@@ -189,9 +189,11 @@ def with_loss_parameters(model: Model, parameters: object, loss: Loss | None, ru
     read = [call_user_function(what, each, *at, t, p) for what, each, at in called if each is not None]
     used = {node.name for node in topological([node for node in read if isinstance(node, Node)])}
     extended = dict(own.parameters) | {name: 0.0 for name in new if name in used}
-    if isinstance(own, OdeSystem):
-        return OdeSystem(lambda x, t: own.rates, own.states, extended)
-    return own.changed(parameters=extended)
+    if system is not None:
+        return system.changed(parameters=extended)
+    ode = own.ode
+    assert ode is not None
+    return OdeSystem(lambda x, t: ode.rates, ode.states, extended)
 
 
 def differentiated(
