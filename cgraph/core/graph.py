@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -59,10 +60,8 @@ class Graph:
 
     Attributes
     ----------
-    inputs : tuple of Node
-        The variables.
-    outputs : dict of str to Node
-        The results.
+    inputs, outputs : tuple of Node, dict of str to Node
+        The variables, and the results.
     nodes : tuple of Node
         All nodes that the outputs reach, arguments first.
 
@@ -155,14 +154,17 @@ class Graph:
 
         Raises
         ------
-        GraphError
-            If an input is missing or unknown, or shapes do not broadcast.
-        TypeError
-            If a value is not real.
+        GraphError, TypeError
+            If an input is missing or unknown, or shapes do not broadcast; and if a value is not real.
         """
         from ..util.inputs import input_values
 
         return evaluate(self.nodes, self.outputs, input_values(self.input_names, values))
+
+    def values(self, values: Mapping[str, Value]) -> dict[Node, Value]:
+        """{node: its value} of all nodes. Takes and raises what `evaluate` does."""
+        found = Graph(self.inputs, {str(k): node for k, node in enumerate(self.nodes)}).evaluate(values)
+        return dict(zip(self.nodes, found.values(), strict=True))
 
     def counts(self) -> Counts:
         """Nodes, edges, depth, width, and nodes by operation, tag and role."""
@@ -179,13 +181,11 @@ class Graph:
     def latex(self, *, names: Mapping[str, str] | None = None, lines: int | None = None) -> str:
         """The equations as LaTeX, an aligned block; a node that several need, or that has a name, has a line.
 
-        names: {name in the graph: what a person calls it}.  lines: at most, by default 40; a last one says how many are
-        left out.
+        names: {name in the graph: what a person calls it}.  lines: at most, by default 40; a last one counts the rest.
         """
-        from ..writing.formulas import LINES
         from ..writing.latex import graph_latex
 
-        return graph_latex(self.nodes, self.outputs, names, LINES if lines is None else lines)
+        return graph_latex(self.nodes, self.outputs, names, lines)
 
     def check(self) -> None:
         """Raise GraphError unless every node is well formed and the order is topological."""
@@ -229,13 +229,10 @@ def _checked_inputs(inputs: Sequence[Node]) -> tuple[Node, ...]:
     if isinstance(inputs, Node) or not isinstance(inputs, Iterable):
         raise TypeError(f"inputs must be a sequence of variables, got {inputs!r:.60}; write [x]")
     nodes = tuple(inputs)
-    for node in nodes:
-        if not isinstance(node, Node) or node.op is not VARIABLE:
-            raise TypeError(f"an input must be a variable, got {node!r:.60}")
-    names = [node.name for node in nodes]
-    if len(set(names)) < len(names):
-        twice = next(name for name in names if names.count(name) > 1)
-        raise GraphError(f"input {twice!r} is listed more than once")
+    if wrong := [node for node in nodes if not isinstance(node, Node) or node.op is not VARIABLE]:
+        raise TypeError(f"an input must be a variable, got {wrong[0]!r:.60}")
+    if twice := [name for name, count in Counter([node.name for node in nodes]).items() if count > 1]:
+        raise GraphError(f"input {twice[0]!r} is listed more than once")
     return nodes
 
 

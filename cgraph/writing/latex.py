@@ -63,9 +63,12 @@ def latex(node: Node, *, names: Mapping[str, str] | None = None, lines: int = LI
     return found.equations[0][1] if len(found.equations) == 1 and not found.left_out else latex_block(found)
 
 
-def graph_latex(nodes: Sequence[Node], outputs: Mapping[str, Node], names: Mapping[str, str] | None, lines: int) -> str:
+def graph_latex(
+    nodes: Sequence[Node], outputs: Mapping[str, Node], names: Mapping[str, str] | None, lines: int | None
+) -> str:
     """The equations of a graph's outputs as an aligned block."""
-    return latex_block(Formulas(nodes, outputs, LATEX, names).lines(list(outputs.values()), lines))
+    most = LINES if lines is None else lines
+    return latex_block(Formulas(nodes, outputs, LATEX, names).lines(list(outputs.values()), most))
 
 
 def latex_block(lines: Lines) -> str:

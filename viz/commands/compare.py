@@ -14,6 +14,7 @@ from . import library
 from .arguments import (
     FORMULATIONS,
     MOMENTUM_FORM,
+    answer,
     answer_and_draw,
     check_picture,
     formulation,
@@ -43,6 +44,9 @@ def add(parser: Command) -> None:
         help=f"two of {', '.join(FORMULATIONS)} (default: by_definition chain_rule)",
     )
     which.add_argument("--momentum", action="store_true", help=f"the state equation and {MOMENTUM_FORM}")
+    which.add_argument(
+        "--sizes", action="store_true", help="sizes of p and dp/dt and of tau by the paper's three formulations alone"
+    )
     may_draw_and_print(parser)
     parser.set_defaults(run=run)
 
@@ -51,6 +55,9 @@ def run(options: argparse.Namespace) -> int:
     """Print the totals of both sides and the classes of what only one of them has; 1 where one has anything."""
     check_picture(options)
     scene = scene_of(options)
+    if options.sizes:
+        _sizes(options, scene)
+        return 0
     names = [] if options.momentum else dict.fromkeys(options.formulations)
     verdicts = {name: dyn.formulation_verdict(scene, name) for name in names}
     graphs = library.both_forms(scene) if options.momentum else {name: each.graph for name, each in verdicts.items()}
@@ -84,6 +91,18 @@ def run(options: argparse.Namespace) -> int:
         caption=f"{scene.name}: {' and '.join(named.values())} in one".replace("_", " "),
     )
     return 1 if any(only) else 0
+
+
+def _sizes(options: argparse.Namespace, scene: dyn.scenes.Scene) -> None:
+    """Print `formulation_sizes`. Raises for --svg."""
+    if options.svg:
+        raise ValueError("--sizes has no picture: `cgraph draw` draws one graph of them")
+    sizes = dyn.formulation_sizes(scene)
+    rows = [(*key, *map(str, size)) for key, size in sizes.items()]
+    fields = next(iter(sizes.values()))._fields
+    text = "\n".join(library.table(("", "", *[name.replace("_", " ") for name in fields]), rows, (0, 1)))
+    data = [{"term": term, "formulation": name} | size._asdict() for (term, name), size in sizes.items()]
+    answer(unless_json(options, data, text))
 
 
 def _forms(scene: dyn.scenes.Scene, graphs: Mapping[str, cg.Graph]) -> tuple[dict[str, extend.Json], str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import cgraph as cg
 import dynamics as dyn
@@ -21,6 +22,11 @@ def add(parser: Command) -> None:
     """The command's arguments."""
     takes_a_scene(parser)
     takes_equations(parser)
+    parser.add_argument(
+        "--inertial-term",
+        action="store_true",
+        help="p and dp/dt alone, as in the paper's figures, by the --formulation",
+    )
     parser.add_argument("--out", type=place, required=True, help="file to write: .svg, .png, .dot or .txt")
     parser.add_argument(
         "--collapse",
@@ -42,8 +48,15 @@ def run(options: argparse.Namespace) -> None:
     if kind in PICTURES:
         library.check_can_draw(png=kind == ".png")
     scene = scene_of(options)
+    if options.inertial_term and (options.forward or options.momentum or scene.ode is not None):
+        raise ValueError("--inertial-term is of a Lagrangian, by a --formulation")
     verdict = verdict_of(options, scene)
     graph, what = equations_of(options, scene, verdict)
+    if options.inertial_term:
+        graph, wrong = library.blamed(scene, library.INERTIAL_TERM, options.formulation)
+        off = {name.replace("tau", "p") + "_dot": each for name, each in verdict.excess.items()} if verdict else {}
+        verdict = verdict and replace(verdict, graph=graph, nodes=wrong.nodes, edges=wrong.edges, excess=off)
+        what = what.replace("inverse dynamics", library.INERTIAL_TERM)
     caption = f"{scene.name}: {what}"
     names = dyn.display_names(scene)
     words = library.theme.MOTION_WORDS if options.momentum else {}

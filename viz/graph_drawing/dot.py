@@ -55,7 +55,7 @@ def to_dot(
     Tooltips call operations by their numbers in `graph.listing()`. Ids are stable: node i of `graph.nodes` is `n<i>`, a
     constant's copy `n<i>-<use>-<slot>`, output j `o<j>`, collapsed box k `c<k>`; an edge is
     `e<source>-<target>-<slot>`. The same graph gives the same text in every run.
-    Up to some 500 nodes this draws well. Above, collapse tags.
+    Some 200 nodes are read by scrolling. Above, collapse tags.
 
     Parameters
     ----------

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from html import escape
 from typing import NamedTuple
 
+from cgraph import Graph
 from cgraph.extend import require_choice, write_files
 from dynamics.scenes.scenes import names
 from dynamics.systems.model import Model
@@ -111,6 +112,8 @@ def lesson(
     for what, given in (("title", title), ("author", author)):
         if not isinstance(given, str):
             raise TypeError(f"{what} must be text, got {type(given).__name__}: {given!r:.60}")
+    if isinstance(model, Graph):
+        raise TypeError("a lesson is about a System, a Mechanism or a Scene; viz.page(graph) is the page of a cg.Graph")
     check_can_draw(png=False)
     on = subject_of(model)
     screens = arranged([screen(on) for screen in chosen.screens], f"{subject} {on.scene.name} {' '.join(on.joints)}")

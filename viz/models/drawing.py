@@ -6,7 +6,7 @@ import os
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from cgraph import Graph
+from cgraph import Graph, Node
 from cgraph.extend import check_writable, require_path, write_files
 from dynamics import display_names, scenes
 from dynamics.equations.formulations.verdict import Verdict, formulation_verdict
@@ -80,6 +80,10 @@ def draw(
     if isinstance(model, Graph):
         drawing = to_dot(model, collapse=tags_to_collapse(model))
     else:
+        if isinstance(model, Node):
+            raise TypeError(
+                f"draw takes a model or a graph, got {model!r:.60}: cg.Graph(inputs, {{name: node}}) has it"
+            )
         scene = scenes.of_model(model)
         verdict = None if scene.ode is not None else formulation_verdict(scene, formulation)
         graph = state_equation(scene) if verdict is None else verdict.graph

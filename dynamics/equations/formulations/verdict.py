@@ -34,7 +34,7 @@ from ..equation import documented
 from .blame import Derive, Split, blame, split
 from .lagrange_terms import THROUGH_STEP, formulation_name, torques
 from .off import Off, off_at
-from .verdict_state import STATES, asked_state, chosen_state
+from .verdict_state import STATES, asked_state, chosen_state, numbers_of
 
 if TYPE_CHECKING:
     from cgraph.extend import Json
@@ -298,7 +298,7 @@ def formulation_verdict(
 = qd dt + q_old adds nothing.
     """
     system, names = as_system(model), display_names(model)
-    formulation = formulation_name(formulation)
+    formulation, given = formulation_name(formulation), numbers_of(at)
     graph = remarked(simplify(torques(system, formulation)), partial(remarks, model, formulation, torques))
     if formulation not in THROUGH_STEP:
         return Verdict(
@@ -320,8 +320,8 @@ def formulation_verdict(
     if not found:
         reason = f"{slope} is 0 to rounding at all {finite} states tried, though its form does not prove it"
         return replace(alike, proved=False, reason=reason)
-    state = chosen | asked_state(names, chosen, at or {})
-    there = alike.excess_at(state) if at else found
+    state = chosen | asked_state(names, chosen, given)
+    there = alike.excess_at(state) if given else found
     values = {name: there.get(name, 0.0) for name in terms.outputs if name in found or name in there}
     marked = split(system, formulation, torques)
     faults = blame(system, formulation, torques, graph, marked)
@@ -346,7 +346,7 @@ def formulation_verdict(
         at={name: number for name, number in state.items() if name in used},
         nodes=faults.nodes,
         edges=faults.edges,
-        asked=bool(at),
+        asked=bool(given),
     )
 
 

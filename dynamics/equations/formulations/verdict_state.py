@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from cgraph import Graph, GraphError
-from cgraph.extend import or_nearest, require_mapping
+from cgraph.extend import or_nearest, real_number, require_mapping
 
 from ...systems.system import System
 
@@ -46,4 +46,10 @@ def asked_state(names: Mapping[str, str], known: Mapping[str, float], at: Mappin
     for name in at:
         if name not in known and name not in meant:
             raise GraphError(f"at: there is no {name!s:.80}; {or_nearest(str(name), [*meant])}")
-    return {meant.get(name, name): float(value) for name, value in require_mapping("at", at, "name: number").items()}
+    return {meant.get(name, name): value for name, value in at.items()}
+
+
+def numbers_of(at: Mapping[str, float] | None) -> dict[str, float]:
+    """What was given as a state. Raises TypeError and ValueError for what is none."""
+    given = {} if at is None else require_mapping("at", at, "name: number")
+    return {name: real_number(f"at: {name!s:.80}", value) for name, value in given.items()}

@@ -34,6 +34,20 @@ def test_inverse_dynamics_of_the_paper_s_arm_is_small() -> None:
     assert counts.edges <= 335
 
 
+def test_edges_of_equal_rods_follow_the_laws_of_the_page() -> None:
+    """Of 1 kg and 1 m without damping, from three links on: docs/paper.md."""
+    laws = {
+        "by_definition": lambda n: 196 * n - 172,
+        "kinetic_only": lambda n: 204 * n - 178,
+        "chain_rule": lambda n: 130 * n - 132,
+        "chain_rule_literal": lambda n: 46 * n**2 + 26 * n - 68,
+    }
+    for n in (3, 4, 7):
+        arm = dyn.planar_arm([1.0] * n, [1.0] * n)
+        found = {name: len(dyn.inverse_dynamics(arm, name).edges) for name in laws}
+        assert found == {name: law(n) for name, law in laws.items()}
+
+
 def test_damping_adds_a_product_and_a_sum_for_each_joint_and_one_constant() -> None:
     plain = dyn.inverse_dynamics(dyn.planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7]), "chain_rule").counts()
     damped = dyn.inverse_dynamics(dyn.scenes.load("triple_pendulum"), "chain_rule").counts()

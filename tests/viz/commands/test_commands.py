@@ -88,6 +88,18 @@ def test_what_is_off_is_counted(figures):
     assert (off["torques"], off["slopes"]) == (0, 0)
 
 
+def test_the_inertial_term_is_drawn_and_its_sizes_are_printed(tmp_path, said, figures, capsys):
+    place = tmp_path / "inertial.txt"
+    printed = said("draw", "spring_mass", "--inertial-term", "--formulation", "by_definition", "--out", str(place))
+    assert "20 nodes" in printed
+    assert "p0_dot is" in place.read_text(encoding="utf-8")
+    sizes = dyn.formulation_sizes(dyn.scenes.load("spring_mass"))
+    rows = figures("compare", "spring_mass", "--sizes")
+    assert [tuple(row.values()) for row in rows] == [(*key, *size) for key, size in sizes.items()]
+    assert cli.main(["draw", "spring_mass", "--inertial-term", "--forward", "--out", str(place)]) == 2
+    assert "--inertial-term is of a Lagrangian" in capsys.readouterr().err
+
+
 def test_nothing_spurious_is_not_blamed(said):
     assert "What is spurious" not in said("why", "triple_pendulum", "tau.joint 1", "--formulation", "kinetic_only")
     assert "What is spurious" in said("why", "triple_pendulum", "tau.joint 2", "--formulation", "kinetic_only")

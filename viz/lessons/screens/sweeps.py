@@ -273,7 +273,8 @@ def _called(graph: Graph) -> dict[Node, str]:
 
 def _values(subject: Subject, graph: Graph) -> dict[Node, float]:
     """Values of all nodes that are no numbers."""
-    return _evaluated(subject, graph, {node: node for node in graph.nodes if node.value is None})
+    found = graph.values({name: subject.values[name] for name in graph.input_names})
+    return {node: float(value) for node, value in found.items() if node.value is None}
 
 
 def _slopes(subject: Subject, graph: Graph) -> dict[Node, float]:
