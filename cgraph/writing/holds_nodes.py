@@ -52,8 +52,10 @@ class HoldsNodes:
         except (pickle.PicklingError, AttributeError, TypeError) as error:
             if _TOLD in str(error):  # of what it holds
                 raise
+            name = type(self).__name__
+            article = "an" if name[0] in "AEIOU" else "a"
             raise pickle.PicklingError(
-                f"a {type(self).__name__}{_TOLD}: {error}; give it functions that are written in a module by def, "
+                f"{article} {name}{_TOLD}: {error}; give it functions that are written in a module by def, "
                 "which another process finds, in place of a lambda or one inside another"
             ) from None
         return _restored, (type(self), written.getvalue(), pickler.graph())

@@ -10,13 +10,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import Array, real_array, real_number
+from cgraph.extend import Array, HoldsNodes, real_array, real_number
 
 from .steps.equal_steps import SAME_INSTANT
 
 
 @dataclass(frozen=True)
-class SampledController:
+class SampledController(HoldsNodes):
     """A controller as a computer runs it: called at the start of every period, its forces held until the next.
 
     Steps end where periods do, with every method, so that none goes over a jump of the forces. A reset by an event

@@ -364,7 +364,8 @@ def require_values(
             except MechanismError as error:
                 shown = {name: each[k] if each.ndim else each for name, each in at.items()}
                 listed = ", ".join([f"{name} = {float(value)!r}" for name, value in shown.items()])
-                raise MechanismError(f"{error}, where {listed}") from None
+                of = f" of trajectory {k}" if varied else ""
+                raise MechanismError(f"{error}, where {listed}{of}") from None
 
 
 def _quantities(force: Contact | JointForce) -> Mapping[str, Callable[[str, object], object]]:

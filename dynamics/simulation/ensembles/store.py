@@ -189,10 +189,15 @@ class Store:
                 f"rows of {shape[2]} numbers, and {free / 2**30:.3g} GiB are free: record fewer times (t_eval)"
             )
         made = self._folder / f".{ROWS}.{os.getpid()}.tmp"
-        np.lib.format.open_memmap(made, "w+", np.float64, shape=shape)
-        if hasattr(os, "posix_fallocate"):  # now, as nobody else may then take the room
-            with made.open("r+b") as file:
-                os.posix_fallocate(file.fileno(), 0, made.stat().st_size)
+        try:
+            np.lib.format.open_memmap(made, "w+", np.float64, shape=shape)
+            if hasattr(os, "posix_fallocate"):  # now, as nobody else may then take the room
+                with made.open("r+b") as file:
+                    os.posix_fallocate(file.fileno(), 0, made.stat().st_size)
+        except OSError as error:
+            made.unlink(missing_ok=True)
+            needs = f"needs a {ROWS} of {size / 2**30:.3g} GiB, which cannot be made"
+            raise OSError(error.errno, f"store {str(self._folder)!r} {needs}: {error.strerror}") from None
         made.replace(self._folder / ROWS)
 
 

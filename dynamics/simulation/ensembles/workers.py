@@ -27,6 +27,10 @@ MOST_THREADS = 2**31  # threads
 
 def checked(workers: Workers) -> Team:
     """The number of threads, the executor or the map. Raises ValueError for what is none of these."""
+    kind: object = workers
+    if isinstance(kind, type) and issubclass(kind, Executor):
+        name = kind.__name__
+        raise ValueError(f"workers must be an executor, and {name} is the class of one: give it {name}()")
     if isinstance(workers, Executor) or callable(workers):
         return workers
     if workers is None:

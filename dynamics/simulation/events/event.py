@@ -10,7 +10,7 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Array, Builder, building, check_name, columns, topological
+from cgraph.extend import Array, Builder, HoldsNodes, building, check_name, columns, topological
 
 from ...equations.substitute import substitute
 from ...integrators import Problem, quantity, quantity_inputs, state_arguments
@@ -22,7 +22,7 @@ ROUNDINGS = 8.0  # that the interpolation of a state, and the sum of a motion, m
 
 
 @dataclass(frozen=True)
-class Event:
+class Event(HoldsNodes):
     """Event: a quantity that passes through zero, and what happens there.
 
     A quantity that touches zero and turns back counts too, with direction 0, where its extremum is zero to the rounding

@@ -2,6 +2,7 @@
 
 import math
 import warnings
+from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 from unittest.mock import patch
 
@@ -172,6 +173,7 @@ Q = np.zeros((4, 2))
             {"workers": 0},
             "workers must be a whole number from 1, None for one on each core, an executor or a function",
         ),
+        (Q, Q, {"workers": ThreadPoolExecutor}, "an executor, and ThreadPoolExecutor is the class of one"),
         (Q, Q, {"workers": lambda f, each: []}, "a result for each item, as map does: of 4 trajectories came back 0"),
     ],
 )

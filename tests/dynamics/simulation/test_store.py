@@ -187,3 +187,6 @@ def test_a_store_that_has_no_room_is_a_sentence(tmp_path: Path) -> None:
     full = patch("shutil.disk_usage", return_value=SimpleNamespace(free=0))
     with full, pytest.raises(OSError, match="GiB for 2 trajectories of 2 rows of 2 numbers, and 0 GiB are free"):
         springs(tmp_path, [1.0, 2.0])
+    large = patch("numpy.lib.format.open_memmap", side_effect=OSError(27, "File too large"))
+    with large, pytest.raises(OSError, match=rf"store '{tmp_path}' needs a rows\.npy of .* GiB, .*: File too large"):
+        springs(tmp_path, [1.0, 2.0])

@@ -94,9 +94,11 @@ def test_a_function_that_nobody_finds_is_a_sentence() -> None:
     turning = dyn.System(lambda q, u, t: 0.5 * u[0] ** 2, "angle", quasi_velocities=spin)
     scene = dyn.scenes.Scene("wheel", "turns", turning, (0.0,), (1.0,), 1.0)
     motion = dyn.prepare(held(), tau=lambda q, qd, t: [0.0, 0.0])
-    for given, name in ((turning, "System"), (scene, "System"), (motion, "PreparedMotion")):
+    event, hold = dyn.Event("up", lambda q, qd, t: q[0]), dyn.SampledController(lambda q, qd, t: q, 0.1)
+    rows = (turning, "a System"), (scene, "a System"), (motion, "a PreparedMotion"), (event, "an Event")
+    for given, name in (*rows, (hold, "a SampledController")):
         with pytest.raises(
             pickle.PicklingError,
-            match=rf"^a {name} does not pickle: .*lambda.*; give it functions .* in a module by def",
+            match=rf"^{name} does not pickle: .*lambda.*; give it functions .* in a module by def",
         ):
             pickle.dumps(given)
