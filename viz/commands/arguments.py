@@ -280,8 +280,8 @@ DT = 1e-3  # s, the step of an embedded relation
 SHOWN = 12  # inputs that a line of text names
 
 REST = (
-    f"of the inputs that it leaves out, parameters keep their values, dt is {DT} s, t is 0, "
-    "and the rest have numbers between -1 and 1, always the same"
+    f"of the inputs that it leaves out, parameters keep their values, dt is {DT} s, t is 0, q and qd of a file "
+    "are its start, as q of any model with quaternions, and the rest are numbers between -1 and 1, always the same"
 )
 
 
@@ -307,13 +307,18 @@ def filled(graph: cg.Graph, scene: dyn.scenes.Scene, given: dict[str, float]) ->
     """The given numbers with the rest that the graph's inputs need, by the graph's names. Raises for unknown names."""
     import numpy as np
 
-    chosen = np.random.default_rng(SEED)
-    parameters = scene.parameters
-    values = {}
-    for name in graph.input_names:
-        drawn = round(chosen.uniform(-1.0, 1.0), DIGITS)
-        values[name] = parameters[name] if name in parameters else {"dt": DT, "t": 0.0}.get(name, drawn)
-    return values | extend.Names(graph, dyn.display_names(scene)).inputs_of("--at", given)
+    names, of_library = extend.Names(graph, dyn.display_names(scene)), scene.name in dyn.scenes.names()
+    q = () if scene.ode or (of_library and len(scene.q) == len(scene.qd)) else scene.q
+    qd, chosen = () if of_library else scene.qd, np.random.default_rng(SEED)
+    start = {f"q{k}": x for k, x in enumerate(q)} | {f"qd{k}": x for k, x in enumerate(qd)}
+    known: dict[str, float] = {"dt": DT, "t": 0.0, **start, **scene.parameters}
+    values = {name: known.get(name, round(chosen.uniform(-1.0, 1.0), DIGITS)) for name in graph.input_names}
+    bare = {name: f"q{k}" for k, name in enumerate(scene.coordinates) if names.meant(name) not in values}
+    spelled, called = ({name: x for name, x in given.items() if (name in bare) == here} for here in (False, True))
+    found = names.inputs_of("--at", spelled)
+    if twice := [name for name in called if bare[name] in found]:
+        raise ValueError(f"--at gives {twice[0]} twice")
+    return values | found | names.inputs_of("--at", {bare[name]: x for name, x in called.items()})
 
 
 def takes_a_start(command: argparse.ArgumentParser) -> None:
@@ -379,22 +384,3 @@ def _number(name: str, text: str) -> float:
         return number(text)
     except argparse.ArgumentTypeError as error:
         raise argparse.ArgumentTypeError(f"{name}: {error}") from None
-
-
-SIZES = ("nodes", "edges", "depth", "width")
-
-
-def size_data(forms: Mapping[str, cg.Graph]) -> dict[str, dict[str, int]]:
-    """{name of a form: {"nodes": .., "edges": .., "depth": .., "width": ..}}.  forms: as of `both_forms`."""
-    return {name: {size: getattr(counts, size) for size in SIZES} for name, counts in library.form_sizes(forms).items()}
-
-
-def size_table(sizes: Mapping[str, Mapping[str, int]]) -> str:
-    """A line for each form of `size_data`, under a header."""
-    words = {
-        library.LAGRANGE: f"{library.LAGRANGE}, of (q, qd)",
-        library.HAMILTON: f"{library.HAMILTON}, of (q, p), p = dL/dqd",
-        library.VELOCITIES_ALONE: f"  the {library.VELOCITIES_ALONE}",
-    }
-    rows = [(words[name], *map(str, each.values())) for name, each in sizes.items()]
-    return "\n".join(library.table(("", *SIZES), rows))

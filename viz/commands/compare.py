@@ -20,8 +20,6 @@ from .arguments import (
     formulation,
     may_draw_and_print,
     scene_of,
-    size_data,
-    size_table,
     state_names,
     takes_a_scene,
     unless_json,
@@ -95,3 +93,22 @@ def _forms(scene: dyn.scenes.Scene, graphs: Mapping[str, cg.Graph]) -> tuple[dic
     )
     told = {name: each if math.isfinite(each) else None for name, each in apart._asdict().items()}
     return {"sizes": sizes, "agreement": told}, f"{size_table(sizes)}\n{agreement}"
+
+
+SIZES = ("nodes", "edges", "depth", "width")
+
+
+def size_data(forms: Mapping[str, cg.Graph]) -> dict[str, dict[str, int]]:
+    """{name of a form: {"nodes": .., "edges": .., "depth": .., "width": ..}}.  forms: as of `both_forms`."""
+    return {name: {size: getattr(counts, size) for size in SIZES} for name, counts in library.form_sizes(forms).items()}
+
+
+def size_table(sizes: Mapping[str, Mapping[str, int]]) -> str:
+    """A line for each form of `size_data`, under a header."""
+    words = {
+        library.LAGRANGE: f"{library.LAGRANGE}, of (q, qd)",
+        library.HAMILTON: f"{library.HAMILTON}, of (q, p), p = dL/dqd",
+        library.VELOCITIES_ALONE: f"  the {library.VELOCITIES_ALONE}",
+    }
+    rows = [(words[name], *map(str, each.values())) for name, each in sizes.items()]
+    return "\n".join(library.table(("", *SIZES), rows))

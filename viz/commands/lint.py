@@ -19,8 +19,6 @@ from .arguments import (
     may_draw_and_print,
     point,
     scene_of,
-    size_data,
-    size_table,
     state_names,
     takes_a_scene,
     takes_equations,
@@ -28,6 +26,7 @@ from .arguments import (
     verdict_of,
 )
 from .command import Command
+from .compare import size_data, size_table
 
 
 def add(parser: Command) -> None:
