@@ -6,9 +6,10 @@ import math
 import sys
 import warnings
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,7 +21,7 @@ from ..equations.states.initial_value import other_inputs
 from ..systems.model import Model, as_equations
 from .events.event import Event, as_events
 from .moving import Moving, Tau, check_varied, values_key
-from .outcome import INTERRUPTED, REACHED, InterruptedMotion, MotionError, outcome
+from .outcome import INTERRUPTED, REACHED, InterruptedMotion, MotionEnd, MotionError, outcome
 from .progress_bar import Progress
 from .row_values import converted, unreached_momenta
 from .run_options import METHOD, RunOptions
@@ -35,28 +36,6 @@ if TYPE_CHECKING:
 
 ANY = 1.0  # s: the span of options, in place of which each run has its own
 KEPT_PARAMETERS = 16  # sets of parameter values, whose equations a motion keeps
-
-
-class MotionEnd(NamedTuple):
-    """End of a motion, as `PreparedMotion.end` gives it.
-
-    Parameters
-    ----------
-    t : float
-        The end of the run, or the instant of the event that ended it [s].
-    q, qd : ndarray
-        The state there, (nq,) and (n,) [rad or m, per second]; of an OdeSystem q is the state, and qd empty.
-
-    Examples
-    --------
-    >>> import dynamics as dyn
-    >>> dyn.prepare(dyn.planar_arm([1.0], [1.0])).end([0.1], [0.0], t_end=1.0).q.round(3)
-    array([-0.077])
-    """
-
-    t: float
-    q: Array
-    qd: Array
 
 
 class PreparedMotion(HoldsNodes):
@@ -223,6 +202,14 @@ class PreparedMotion(HoldsNodes):
         run.set_parameters(moving.values(parameters))
         return MotionSteps(run, x, float(t0), t_end)
 
+    def compile(self) -> None:
+        """Make the machine code of an end, and of rows at steps, with the model's own values of parameters."""
+        moving, options = self._moving(None), self._options
+        if self._alone(moving) is None:
+            zeros, hold = [0.0] * len(moving.problem.parameters), moving.applied.hold(options, moving.stepped)
+            between = moving.events is not None or self._dense
+            integration_of(moving.stepped, options, zeros, hold, events=moving.events, between=between)
+
     def _steps(self, moving: Moving) -> bool:
         """Whether the motion's steps are ours alone, with nothing done between them."""
         options = self._options
@@ -263,7 +250,7 @@ class PreparedMotion(HoldsNodes):
         """Moving parts with these values of built-in parameters, kept for the last few values."""
         if self._varied and isinstance(parameters, Mapping):
             parameters = {name: value for name, value in parameters.items() if name not in self._varied}
-        key = None if parameters is None else values_key(parameters)
+        key = values_key(parameters) if parameters is not None and parameters != {} else None
         if (found := self._known.get(key)) is None:
             found = self._make(parameters)
             if len(self._known) >= KEPT_PARAMETERS:
@@ -360,7 +347,9 @@ def prepare(
     -------
     PreparedMotion
         `motion(q, qd, t_end)` gives the trajectory of `simulate`, `motion.end(q, qd, t_end)` its end alone, at the
-        price of its steps and some microseconds, and `motion.start(q, qd)` the motion step by step.
+        price of its steps and some microseconds, and `motion.start(q, qd)` the motion step by step. Its machine code is
+        made here; rows between steps (`t_eval`) and other values of parameters that are not `varied` compile at the
+        first call with them.
 
     Raises
     ------
@@ -375,9 +364,23 @@ def prepare(
     >>> ends
     [[0.005, 0.039], [0.011, 0.077]]
     """
-    options = RunOptions(
-        ANY, method, dt, max_step, rtol, atol, None, first_step, max_steps, backend, progress, 0.0, estimate_error
-    )
+    chosen = (dt, max_step, rtol, atol, None, first_step, max_steps, backend, progress, 0.0, estimate_error)
+    motion = motion_of(model, RunOptions(ANY, method, *chosen), tau, events, form, dense_output, varied)
+    with suppress(Exception):  # what is wrong with the model is said by a call, which may bring the numbers it lacks
+        motion.compile()
+    return motion
+
+
+def motion_of(
+    model: Model,
+    options: RunOptions,
+    tau: Tau,
+    events: Event | Iterable[Event],
+    form: str,
+    dense_output: bool,
+    varied: str | Iterable[str] = (),
+) -> PreparedMotion:
+    """A motion by options of any span, its arguments checked, not compiled."""
     equations = as_equations(model)
     require_choice("form", form, FORMS)
     if not (callable(tau) or isinstance(tau, float | SampledController)):
