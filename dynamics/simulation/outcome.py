@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -35,6 +36,29 @@ class MotionError(ValueError):
     Traceback (most recent call last):
     dynamics.simulation.outcome.MotionError: the motion did not reach t_end, stopped at t = 1 s: ...
     """
+
+
+class MotionEnd(NamedTuple):
+    """End of a motion, as `PreparedMotion.end` gives it, or of N, as `ends` does.
+
+    Parameters
+    ----------
+    t : float
+        The end of the run, or the instant of the event that ended it [s].
+    q, qd : ndarray
+        The state there, (nq,) and (n,) [rad or m, per second], or (N, nq) and (N, n); of an OdeSystem q is the state,
+        and qd empty.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> dyn.prepare(dyn.planar_arm([1.0], [1.0])).end([0.1], [0.0], t_end=1.0).q.round(3)
+    array([-0.077])
+    """
+
+    t: float
+    q: Array
+    qd: Array
 
 
 class InterruptedMotion(KeyboardInterrupt):

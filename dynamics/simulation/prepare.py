@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from contextlib import suppress
 
 from numpy.typing import ArrayLike
 
@@ -58,7 +59,9 @@ def prepare(
     -------
     PreparedMotion
         `motion(q, qd, t_end)` gives the trajectory of `simulate`, `motion.end(q, qd, t_end)` its end alone, at the
-        price of its steps and some microseconds, and `motion.start(q, qd)` the motion step by step.
+        price of its steps and some microseconds, and `motion.start(q, qd)` the motion step by step. Its machine code is
+        made here; rows between steps (`t_eval`) and other values of parameters that are not `varied` compile at the
+        first call with them.
 
     Raises
     ------
@@ -73,9 +76,23 @@ def prepare(
     >>> ends
     [[0.005, 0.039], [0.011, 0.077]]
     """
-    options = RunOptions(
-        ANY, method, dt, max_step, rtol, atol, None, first_step, max_steps, backend, progress, 0.0, estimate_error, fma
-    )
+    chosen = (dt, max_step, rtol, atol, None, first_step, max_steps, backend, progress, 0.0, estimate_error, fma)
+    motion = motion_of(model, RunOptions(ANY, method, *chosen), tau, events, form, dense_output, varied)
+    with suppress(Exception):  # what is wrong with the model is said by a call, which may bring the numbers it lacks
+        motion.compile()
+    return motion
+
+
+def motion_of(
+    model: Model,
+    options: RunOptions,
+    tau: Tau,
+    events: Event | Iterable[Event],
+    form: str,
+    dense_output: bool,
+    varied: str | Iterable[str] = (),
+) -> PreparedMotion:
+    """A motion by options of any span, its arguments checked, not compiled."""
     equations = as_equations(model)
     require_choice("form", form, FORMS)
     if not (callable(tau) or isinstance(tau, float | SampledController)):

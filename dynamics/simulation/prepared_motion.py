@@ -8,7 +8,7 @@ import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -18,7 +18,7 @@ from cgraph.extend import Array, HoldsNodes, floats
 from ..systems.model import Model
 from .events.event import Event
 from .moving import Moving, Tau, values_key
-from .outcome import INTERRUPTED, REACHED, InterruptedMotion, MotionError, outcome
+from .outcome import INTERRUPTED, REACHED, InterruptedMotion, MotionEnd, MotionError, outcome
 from .progress_bar import Progress
 from .row_values import converted, unreached_momenta
 from .run_options import RunOptions
@@ -32,29 +32,6 @@ if TYPE_CHECKING:
     from .motion_steps import MotionSteps
 
 KEPT_PARAMETERS = 16  # sets of parameter values, whose equations a motion keeps
-
-
-class MotionEnd(NamedTuple):
-    """End of a motion, as `PreparedMotion.end` gives it, or of N, as `ends` does.
-
-    Parameters
-    ----------
-    t : float
-        The end of the run, or the instant of the event that ended it [s].
-    q, qd : ndarray
-        The state there, (nq,) and (n,) [rad or m, per second], or (N, nq) and (N, n); of an OdeSystem q is the state,
-        and qd empty.
-
-    Examples
-    --------
-    >>> import dynamics as dyn
-    >>> dyn.prepare(dyn.planar_arm([1.0], [1.0])).end([0.1], [0.0], t_end=1.0).q.round(3)
-    array([-0.077])
-    """
-
-    t: float
-    q: Array
-    qd: Array
 
 
 class PreparedMotion(HoldsNodes):
@@ -276,6 +253,14 @@ class PreparedMotion(HoldsNodes):
         run.set_parameters(moving.values(parameters))
         return MotionSteps(run, x, float(t0), t_end)
 
+    def compile(self) -> None:
+        """Make the machine code of an end, and of rows at steps, with the model's own values of parameters."""
+        moving, options = self._moving(None), self._options
+        if self._alone(moving) is None:
+            zeros, hold = [0.0] * len(moving.problem.parameters), moving.applied.hold(options, moving.stepped)
+            between = moving.events is not None or self._dense
+            integration_of(moving.stepped, options, zeros, hold, events=moving.events, between=between)
+
     def _steps(self, moving: Moving) -> bool:
         """Whether the motion's steps are ours alone, with nothing done between them."""
         options = self._options
@@ -316,7 +301,7 @@ class PreparedMotion(HoldsNodes):
         """Moving parts with these values of built-in parameters, kept for the last few values."""
         if self._varied and isinstance(parameters, Mapping):
             parameters = {name: value for name, value in parameters.items() if name not in self._varied}
-        key = None if parameters is None else values_key(parameters)
+        key = values_key(parameters) if parameters is not None and parameters != {} else None
         if (found := self._known.get(key)) is None:
             found = self._make(parameters)
             if len(self._known) >= KEPT_PARAMETERS:

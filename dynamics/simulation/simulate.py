@@ -11,8 +11,8 @@ from ..systems.model import Model
 from .events.event import Event
 from .moving import Tau
 from .outcome import InterruptedMotion
-from .prepare import prepare
-from .run_options import METHOD, time_span
+from .prepare import ANY, motion_of
+from .run_options import METHOD, RunOptions, time_span
 from .trajectory import Trajectory
 
 
@@ -141,24 +141,8 @@ def simulate(
     [[1.0, 0.5], [0.31, -0.04], [-0.989, 0.108]]
     """
     t0, t_end = time_span(t_end, t0, t_span)
-    motion = prepare(
-        model,
-        method,
-        dt=dt,
-        max_step=max_step,
-        rtol=rtol,
-        atol=atol,
-        events=events,
-        dense_output=dense_output,
-        tau=tau,
-        first_step=first_step,
-        max_steps=max_steps,
-        estimate_error=estimate_error,
-        backend=backend,
-        fma=fma,
-        progress=progress,
-        form=form,
-    )
+    chosen = (dt, max_step, rtol, atol, None, first_step, max_steps, backend, progress, 0.0, estimate_error, fma)
+    motion = motion_of(model, RunOptions(ANY, method, *chosen), tau, events, form, dense_output)
     try:
         return motion(q, qd, t_end, t0, t_eval=t_eval, parameters=parameters)
     except InterruptedMotion as stop:

@@ -16,8 +16,8 @@ DT = 1e-3  # s, the step of an embedded relation
 SHOWN = 12  # inputs that a line of text names
 
 REST = (
-    f"of the inputs that it leaves out, parameters keep their values, dt is {DT} s, t is 0, "
-    "and the rest have numbers between -1 and 1, always the same"
+    f"of the inputs that it leaves out, parameters keep their values, dt is {DT} s, t is 0, q and qd of a file "
+    "are its start, as q of any model with quaternions, and the rest are numbers between -1 and 1, always the same"
 )
 
 
@@ -28,17 +28,26 @@ def filled(graph: cg.Graph, scene: dyn.scenes.Scene, given: dict[str, float]) ->
     """
     import numpy as np
 
-    chosen = np.random.default_rng(SEED)
-    parameters = scene.parameters
-    values = {}
-    for name in graph.input_names:
-        drawn = round(chosen.uniform(-1.0, 1.0), DIGITS)
-        values[name] = parameters[name] if name in parameters else {"dt": DT, "t": 0.0}.get(name, drawn)
-    names, called = extend.Names(graph, dyn.display_names(scene)), dyn.display_names(scene)
-    now = {old.removesuffix("_old"): old for old in values if old.endswith("_old")}
-    meant = {spelled: name for name in now for spelled in (name, called[name])}
-    after = {meant[name]: value for name, value in given.items() if name in meant}
-    before = names.inputs_of("--at", {name: value for name, value in given.items() if name not in meant})
+    called, of_library = dyn.display_names(scene), scene.name in dyn.scenes.names()
+    names = extend.Names(graph, called)
+
+    # What is not given: the start of a scene of the user's, its parameters, and numbers by lot
+    q = () if scene.ode or (of_library and len(scene.q) == len(scene.qd)) else scene.q
+    qd, chosen = () if of_library else scene.qd, np.random.default_rng(SEED)
+    start = {f"q{k}": x for k, x in enumerate(q)} | {f"qd{k}": x for k, x in enumerate(qd)}
+    known: dict[str, float] = {"dt": DT, "t": 0.0, **start, **scene.parameters}
+    drawn = {name: round(chosen.uniform(-1.0, 1.0), DIGITS) for name in graph.input_names}
+    now = {old.removesuffix("_old"): old for old in drawn if old.endswith("_old")}
+    values = {name: known.get(name, known.get(name.removesuffix("_old"), x)) for name, x in drawn.items()}
+
+    # What is given: of inputs, of the state after the step, and of coordinates by their bare names
+    bare = {name: f"q{k}" for k, name in enumerate(scene.coordinates) if names.meant(name) not in values}
+    spelled = {bare.get(name, name): x for name, x in given.items()}
+    if len(spelled) < len(given):
+        raise ValueError(f"--at gives {next(name for name in given if bare.get(name) in given)} twice")
+    meant = {text: name for name in now for text in (name, called[name])}
+    after = {meant[name]: x for name, x in spelled.items() if name in meant}
+    before = names.inputs_of("--at", {name: x for name, x in spelled.items() if name not in meant})
     if twice := [name for name in after if now[name] in before]:
         raise ValueError(f"--at gives {called[twice[0]]} after the step, and {called[now[twice[0]]]} before it")
     values |= before

@@ -7,6 +7,7 @@ import threading
 import warnings
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -236,6 +237,16 @@ def test_threads_have_a_memory_each() -> None:
     with ThreadPoolExecutor(4) as pool:
         together = list(pool.map(lambda q: motion.end(q, [0.0, 0.0], SPAN).q.tolist(), starts))
     assert together == alone
+
+
+@mark.parametrize("named", [{}, {"events": dyn.Event("low", lambda q, qd, t: q[0] + 9.0)}, {"varied": ["k"]}])
+def test_prepare_makes_the_machine_code(named: dict[str, Any]) -> None:
+    spring = dyn.System(lambda q, qd, t, p: 0.5 * qd[0] ** 2 - 0.5 * p["k"] * q[0] ** 2, "x", {"k": 1.0})
+    motion = dyn.prepare(spring, **named)
+    with patch("dynamics.simulation.steps.step_program.runner", side_effect=AssertionError("compiled in a call")):
+        end = motion.end([1.0], [0.0], 1.0, parameters={"k": 4.0} if "varied" in named else None)
+        assert motion([1.0], [0.0], 1.0, parameters={"k": 4.0} if "varied" in named else None).success
+    assert end.q[0] == pytest.approx(np.cos(2.0 if "varied" in named else 1.0))
 
 
 @mark.usefixtures("ctrl_c")

@@ -457,6 +457,18 @@ def test_a_point_keeps_parameters_and_is_always_the_same():
     assert np.isfinite(list(graph.evaluate(at).values())).all()
 
 
+def test_a_point_of_a_file_is_its_start_and_takes_bare_names(tmp_path: Path) -> None:
+    file = tmp_path / "slide.xml"
+    free = '<body name="r" pos="0 0 2"><freejoint name="root"/><geom size="0.1" contype="0"/></body>'
+    file.write_text(MODEL.replace("<worldbody>", f"<worldbody>{free}"))
+    scene = dyn.scenes.load(str(file))
+    at = filled(dyn.inverse_dynamics(scene), scene, {"hinge": 0.5})
+    assert [at[f"q{k}"] for k in range(9)] == [*scene.q[:8], 0.5]
+    assert not any(at[f"qd{k}"] for k in range(8))
+    with pytest.raises(ValueError, match="--at gives hinge twice"):
+        filled(dyn.inverse_dynamics(scene), scene, {"hinge": 0.5, "q.hinge": 1.0})
+
+
 def test_one_node_is_no_plural(tmp_path, capsys):
     model = tmp_path / "free.py"
     model.write_text(
