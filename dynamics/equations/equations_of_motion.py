@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from cgraph import Graph, Node
-from cgraph.extend import Builder, cotangents, kept_by_first, require_choice, require_flag
+from cgraph.extend import Builder, cotangents, require_choice, require_flag
 
 from ..systems.kinematics import ONE, ZERO
 from ..systems.model import Model, as_system
@@ -199,10 +199,4 @@ def forward_dynamics(model: Model, method: str = "auto", *, check: bool = False)
         raise ValueError('check needs method="recursive" or "auto" where there are constraints, got "dense"')
     if method == "balanced":
         require_no_constraints(system)
-    return called(_solved(system, method, check, (tuple(system.forces), tuple(system.damping))), model)
-
-
-@kept_by_first
-def _solved(system: System, method: str, check: bool, applied: tuple[object, ...]) -> Graph:
-    """Forward dynamics, which the state equation has, too.  applied: of the system, where it may be given anew."""
-    return shortened(system, lambda form: accelerations(form, method, check))
+    return called(shortened(system, lambda form: accelerations(form, method, check)), model)
