@@ -281,7 +281,8 @@ SHOWN = 12  # inputs that a line of text names
 
 REST = (
     f"of the inputs that it leaves out, parameters keep their values, dt is {DT} s, t is 0, q and qd of a file "
-    "are its start, as q of any model with quaternions, and the rest are numbers between -1 and 1, always the same"
+    "are its start unless that is 0, as q of any model with quaternions, and the rest have numbers between -1 and 1, "
+    "always the same"
 )
 
 
@@ -308,8 +309,9 @@ def filled(graph: cg.Graph, scene: dyn.scenes.Scene, given: dict[str, float]) ->
     import numpy as np
 
     names, of_library = extend.Names(graph, dyn.display_names(scene)), scene.name in dyn.scenes.names()
-    q = () if scene.ode or (of_library and len(scene.q) == len(scene.qd)) else scene.q
-    qd, chosen = () if of_library else scene.qd, np.random.default_rng(SEED)
+    starts = any([*scene.q, *scene.qd]) and not scene.ode  # all at 0 nobody has chosen, and it may be singular
+    q = scene.q if starts and (not of_library or len(scene.q) > len(scene.qd)) else ()
+    qd, chosen = scene.qd if starts and not of_library else (), np.random.default_rng(SEED)
     start = {f"q{k}": x for k, x in enumerate(q)} | {f"qd{k}": x for k, x in enumerate(qd)}
     known: dict[str, float] = {"dt": DT, "t": 0.0, **start, **scene.parameters}
     values = {name: known.get(name, round(chosen.uniform(-1.0, 1.0), DIGITS)) for name in graph.input_names}
