@@ -301,7 +301,7 @@ class PreparedMotion(HoldsNodes):
         """Moving parts with these values of built-in parameters, kept for the last few values."""
         if self._varied and isinstance(parameters, Mapping):
             parameters = {name: value for name, value in parameters.items() if name not in self._varied}
-        key = values_key(parameters) if parameters is not None and parameters != {} else None
+        key = None if parameters is None or parameters == {} else values_key(parameters)
         if (found := self._known.get(key)) is None:
             found = self._make(parameters)
             if len(self._known) >= KEPT_PARAMETERS:

@@ -102,7 +102,7 @@ def simulate(
     first_step : float, optional
         In place of the first step that the method chooses [s].
     max_steps : float
-        Steps after which the run stops.
+        Trials of steps, rejected ones too, after which the run stops.
     estimate_error : bool, optional
         Of equal steps, whether runs beside, of steps two and four times as long, estimate their error
         (`Stats.error`), which takes three quarters as long again; by default they do. The rows are the same without.

@@ -17,7 +17,8 @@ SHOWN = 12  # inputs that a line of text names
 
 REST = (
     f"of the inputs that it leaves out, parameters keep their values, dt is {DT} s, t is 0, q and qd of a file "
-    "are its start, as q of any model with quaternions, and the rest are numbers between -1 and 1, always the same"
+    "are its start unless that is 0, as q of any model with quaternions, and the rest have numbers between -1 and 1, "
+    "always the same"
 )
 
 
@@ -32,8 +33,9 @@ def filled(graph: cg.Graph, scene: dyn.scenes.Scene, given: dict[str, float]) ->
     names = extend.Names(graph, called)
 
     # What is not given: the start of a scene of the user's, its parameters, and numbers by lot
-    q = () if scene.ode or (of_library and len(scene.q) == len(scene.qd)) else scene.q
-    qd, chosen = () if of_library else scene.qd, np.random.default_rng(SEED)
+    starts = any([*scene.q, *scene.qd]) and not scene.ode  # all at 0 nobody has chosen, and it may be singular
+    q = scene.q if starts and (not of_library or len(scene.q) > len(scene.qd)) else ()
+    qd, chosen = scene.qd if starts and not of_library else (), np.random.default_rng(SEED)
     start = {f"q{k}": x for k, x in enumerate(q)} | {f"qd{k}": x for k, x in enumerate(qd)}
     known: dict[str, float] = {"dt": DT, "t": 0.0, **start, **scene.parameters}
     drawn = {name: round(chosen.uniform(-1.0, 1.0), DIGITS) for name in graph.input_names}
@@ -43,8 +45,8 @@ def filled(graph: cg.Graph, scene: dyn.scenes.Scene, given: dict[str, float]) ->
     # What is given: of inputs, of the state after the step, and of coordinates by their bare names
     bare = {name: f"q{k}" for k, name in enumerate(scene.coordinates) if names.meant(name) not in values}
     spelled = {bare.get(name, name): x for name, x in given.items()}
-    if len(spelled) < len(given):
-        raise ValueError(f"--at gives {next(name for name in given if bare.get(name) in given)} twice")
+    if twice := [name for name in given if name in bare and {bare[name], called[bare[name]]} & set(given)]:
+        raise ValueError(f"--at gives {twice[0]} twice")
     meant = {text: name for name in now for text in (name, called[name])}
     after = {meant[name]: x for name, x in spelled.items() if name in meant}
     before = names.inputs_of("--at", {name: x for name, x in spelled.items() if name not in meant})

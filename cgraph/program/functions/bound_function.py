@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from struct import Struct
 from typing import Any
 
@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from ...core.checks import GraphError
 from ...core.evaluation import Array
 from ...util.real_arrays import real_array
+from ...util.words import listed
 
 Bind = Callable[[Array, Array], Callable[[], None]]  # x, y -> a function of nothing
 _Buffers = tuple[Any, Array, memoryview, Callable[[], None]]  # memory of x; y, as an array and as memory; the call
@@ -24,8 +25,9 @@ class BoundFunction:
     What `bind` gives may leave numbers of y as they are, zeros.
     """
 
-    def __init__(self, bind: Bind, n_in: int, shape: tuple[int, ...]) -> None:
-        self._bind, self._sizes = bind, (n_in, shape)
+    def __init__(self, bind: Bind, n_in: int, shape: tuple[int, ...], names: Sequence[str] = ()) -> None:
+        """names: of the inputs, for errors."""
+        self._bind, self._sizes, self._names = bind, (n_in, shape), names
         self._free: list[_Buffers] = []  # pop and append are atomic: no lock, and a call inside a call is safe
         self._pack, self._unpack = Struct(f"{n_in}d").pack_into, Struct(f"{math.prod(shape)}d").unpack_from
 
@@ -64,5 +66,6 @@ class BoundFunction:
     def _point(self, x: ArrayLike) -> Array:
         point, n_in = real_array("x", x), self._sizes[0]
         if point.shape != (n_in,):
-            raise GraphError(f"x must have shape ({n_in},), one value for each input, got {point.shape}")
+            these = f" ({listed(self._names)})" if self._names else ""
+            raise GraphError(f"x must have shape ({n_in},), one value for each input{these}, got {point.shape}")
         return point

@@ -67,7 +67,7 @@ class Compiled(BoundFunction, Differentiable):
         self._runner = own(Program({"x": self.n_in, "y": self.n_out}, [Call(graph, ("x",), ("y",))], ["y"]))
         self.lanes, self.vectors, self.vector_cost = self._runner.lanes, self._runner.vectors, self._runner.vector_cost
         self.source = self._runner._point_text("x", "y")
-        BoundFunction.__init__(self, self._bound, self.n_in, (self.n_out,))
+        BoundFunction.__init__(self, self._bound, self.n_in, (self.n_out,), graph.input_names)
         if (on_lists := self._runner._on_lists("x")) is not None:
             self.values = on_lists  # type: ignore[assignment, method-assign]  # without arrays on the way
 

@@ -3,6 +3,7 @@
 import gc
 import math
 import pickle
+import subprocess
 import sys
 import weakref
 from array import array
@@ -305,3 +306,13 @@ def test_a_bound_function_lets_its_arrays_go():
     del run
     gc.collect()
     assert alive() is None
+
+
+def test_a_point_of_another_size_names_the_inputs() -> None:
+    with pytest.raises(cg.GraphError, match=r"x must have shape \(2,\), one value for each input \(a, b\), got \(1,\)"):
+        cg.compile(cg.Graph(cg.variables("a b"), {"y": cg.constant(1.0)}))([1.0])
+
+
+def test_python_m_cgraph_is_the_command() -> None:
+    done = subprocess.run([sys.executable, "-m", "cgraph", "--version"], capture_output=True, text=True, check=True)
+    assert done.stdout == f"cgraph {cg.__version__}\n"
