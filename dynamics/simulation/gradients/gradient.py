@@ -16,7 +16,7 @@ from cgraph.extend import Array, Builder, kept_by_first, memo, topological
 
 from ...integrators import Problem, quantity
 from ...systems.arguments import Parameters, call_user_function
-from ...systems.model import Model, as_equations
+from ...systems.model import Model, as_equations, as_ode, as_system
 from ...systems.ode_system import OdeSystem
 from ...systems.system import System
 from ..events.event import Event, as_events
@@ -189,9 +189,10 @@ def with_loss_parameters(model: Model, parameters: object, loss: Loss | None, ru
     read = [call_user_function(what, each, *at, t, p) for what, each, at in called if each is not None]
     used = {node.name for node in topological([node for node in read if isinstance(node, Node)])}
     extended = dict(own.parameters) | {name: 0.0 for name in new if name in used}
-    if isinstance(own, OdeSystem):
-        return OdeSystem(lambda x, t: own.rates, own.states, extended)
-    return own.changed(parameters=extended)
+    ode = as_ode(model)
+    if ode is not None:
+        return OdeSystem(lambda x, t: ode.rates, ode.states, extended)
+    return as_system(model).changed(parameters=extended)
 
 
 def differentiated(
