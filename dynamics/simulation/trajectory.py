@@ -236,13 +236,13 @@ class Trajectory:
         return self.dense(t)
 
     def to_csv(self) -> str:
-        """The rows as CSV: t, coordinates, velocities and energy by their names, every digit of the numbers.
+        """The rows as CSV: t, coordinates, velocities, energy and applied forces by their names, with every digit.
 
         Returns
         -------
         str
-            A line of names, as "t", "q.elbow", "qd.elbow", "energy" (of an OdeSystem "t" and its states), and a line
-            for each row.
+            A line of names, as "t", "q.elbow", "qd.elbow", "energy", and "tau.elbow" where a run has applied forces (of
+            an OdeSystem "t" and its states), and a line for each row.
 
         Examples
         --------
@@ -256,6 +256,10 @@ class Trajectory:
             names += [f"q.{name}" for name in self.coordinates] + [f"qd.{name}" for name in self.velocities]
             columns += [self.qd, self.energy[:, np.newaxis]]
             names.append("energy")
+            applied = self.graphs["tau"].outputs.values() if "tau" in self.graphs else ()
+            if self.held is not None or any([node.value != 0.0 for node in applied]):
+                names += [f"tau.{name}" for name in self.velocities]
+                columns.append(self.tau)
         else:
             names += self.coordinates
         text = io.StringIO()

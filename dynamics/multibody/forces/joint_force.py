@@ -6,8 +6,6 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
-from typing import ClassVar
 
 import numpy as np
 
@@ -56,15 +54,17 @@ class JointForce(ABC):
     {'qdd0': -0.5}
     """
 
-    # fields that may be parameters, and how their numbers are checked
-    quantities: ClassVar[Mapping[str, Callable[[str, object], object]]] = MappingProxyType({})
-
     body: str
 
     @property
     def components(self) -> tuple[str, ...]:
         """Names of the parameters that it uses, and that are 0 without a value; of one of your own what it reads."""
         return ()
+
+    @property
+    def quantities(self) -> Mapping[str, Callable[[str, object], object]]:
+        """Fields that may be parameters, and the checks of their values."""
+        return {}
 
     @property
     def names(self) -> set[str]:
@@ -175,10 +175,13 @@ class JointFriction(JointForce):
     {'qdd0': -2.0}
     """
 
-    quantities = MappingProxyType({"loss": quantity})
-
     loss: Quantity
     velocity: float
+
+    @property
+    def quantities(self) -> Mapping[str, Callable[[str, object], object]]:
+        """The loss."""
+        return {"loss": quantity}
 
     def check(self, body: Body) -> None:
         """Raises MechanismError for numbers out of range."""

@@ -267,3 +267,15 @@ def test_an_ensemble_refuses_a_controller_with_a_memory() -> None:
 def test_a_period_is_positive_and_finite(period: float) -> None:
     with raises(ValueError, match="period of a controller"):
         dyn.SampledController(Regulator(), period)
+
+
+def test_a_table_has_the_applied_forces_where_there_are_any() -> None:
+    """As NumPy reads it back; none where nothing is applied."""
+    hold = dyn.SampledController(lambda q, qd, t: -q, 0.1)
+    for tau in (0.0, [1.0, 0.0], lambda q, qd, t: [-q[0], 0.0], hold):
+        run = dyn.simulate(SPRINGS, **START, t_end=0.2, t_eval=[0.0, 0.2], tau=tau, backend="python")
+        names, *rows = run.to_csv().splitlines()
+        applied = [] if tau == 0.0 else [run.tau]
+        assert names.split(",")[5:] == ["energy", *(["tau.a", "tau.b"] if applied else [])]
+        table = np.loadtxt(rows, delimiter=",")
+        assert table.tolist() == np.column_stack([run.t, run.q, run.qd, run.energy, *applied]).tolist()
