@@ -109,10 +109,9 @@ if TYPE_CHECKING:
     from .simulation.gradients.gradient_many import gradient_many as gradient_many
     from .simulation.gradients.sensitivities import sensitivities as sensitivities
     from .simulation.outcome import MotionError as MotionError
-    from .simulation.prepare import prepare as prepare
     from .simulation.prepared_motion import PreparedMotion as PreparedMotion
     from .simulation.sampled_controller import SampledController as SampledController
-    from .simulation.simulate import simulate as simulate
+    from .simulation.simulate import prepare as prepare, simulate as simulate
     from .simulation.trajectory import SimulationWarning as SimulationWarning, Trajectory as Trajectory
     from .systems.constraints import ConstraintError as ConstraintError
     from .systems.controller import with_controller as with_controller

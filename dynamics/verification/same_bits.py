@@ -29,7 +29,7 @@ from ..equations.substitute import substitute
 from ..integrators.elementwise import weighted
 from ..integrators.tableau import RK4
 from ..scenes.scenes import Scene
-from ..simulation.prepare import prepare
+from ..simulation.simulate import prepare
 from ..systems.arguments import TIME
 
 STEP = 2.0**-10  # s: with it times are exact

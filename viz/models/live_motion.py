@@ -21,8 +21,7 @@ from dynamics.equations.momentum.hamiltonian import hamilton_equations, velociti
 from dynamics.equations.state_equation import state_equation, state_inputs
 from dynamics.integrators import TABLEAUS
 from dynamics.multibody.bodies.joint_coordinates import display_units
-from dynamics.multibody.trees.contact_surfaces import contact_surfaces
-from dynamics.multibody.trees.joint_positions import drawn_points, view
+from dynamics.multibody.trees.joint_positions import contact_surfaces, drawn_points, view
 from dynamics.multibody.trees.mechanism import Mechanism
 from dynamics.scenes import Scene
 from dynamics.scenes.start import Start, moving_start, with_start

@@ -17,7 +17,7 @@ from ...peers.heyoka import heyoka
 from ...simulation.ensembles.lanes import FEW_TRAJECTORIES
 from ...simulation.ensembles.simulate_many import simulate_many
 from ...simulation.ensembles.task import MAKING
-from ...simulation.prepare import prepare
+from ...simulation.simulate import prepare
 from ...simulation.trajectory import Stats
 from ..accuracy_task import AccuracyTask
 from .trajectory_peers import MOST_STEPS, Heyoka

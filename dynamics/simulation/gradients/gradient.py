@@ -16,7 +16,7 @@ from cgraph.extend import Array, Builder, kept_by_first, memo, topological
 
 from ...integrators import Problem, quantity
 from ...systems.arguments import Parameters, call_user_function
-from ...systems.model import Model, as_equations, as_ode, as_system
+from ...systems.model import Model, as_equations
 from ...systems.ode_system import OdeSystem
 from ...systems.system import System
 from ..events.event import Event, as_events
