@@ -189,13 +189,7 @@ class PreparedMotion(HoldsNodes):
 
         if self._events:
             raise ValueError("ends of many motions are of those without events: simulate_many looks for them")
-        if self._options.scipy_solver is not None:
-            given = f"got {self._options.method!r}"
-            raise ValueError(f"ends of many motions are by methods of dyn.METHODS, and none of SciPy, {given}")
         moving = self._moving(None if parameters is None else single_values(parameters, self._varied))
-        if moving.applied.controller is not None:
-            one = "a SampledController may remember what it has seen, and so controls one motion"
-            raise TypeError(f"{one}: ends of many are without")
         options = self._options.over(t0, t_end, [t_end])
         return MotionEnd(options.t_end, *ends_of(moving, options, q, qd, parameters, workers))
 
@@ -301,7 +295,9 @@ class PreparedMotion(HoldsNodes):
         """Moving parts with these values of built-in parameters, kept for the last few values."""
         if self._varied and isinstance(parameters, Mapping):
             parameters = {name: value for name, value in parameters.items() if name not in self._varied}
-        key = None if parameters is None or parameters == {} else values_key(parameters)
+        if isinstance(parameters, Mapping) and not parameters:
+            parameters = None
+        key = None if parameters is None else values_key(parameters)
         if (found := self._known.get(key)) is None:
             found = self._make(parameters)
             if len(self._known) >= KEPT_PARAMETERS:

@@ -129,6 +129,8 @@ def read(result: Any) -> Any:
         return result.tolist()
     if isinstance(result, dict):
         return result
+    if hasattr(result, "grouping"):
+        return result.names, result.columns.tolist(), result.grouping.tolist()
     return getattr(result, "graph", result).listing()  # tags too
 
 

@@ -13,7 +13,6 @@ from hypothesis import given, settings, strategies as st
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.equations.formulations.lagrange_terms import torques
 from tests.each_row import each_row
 from tests.strategies import examples
 from tests.viz.typed.typed_script import run_typed
@@ -131,9 +130,7 @@ def point(graph: cg.Graph, numbers: list[float]) -> dict[str, float]:
 def test_typed_equations_are_those_of_the_library(case):
     n, tree = case
     text, system = both(tree, n)
-    expected = {name: dyn.inverse_dynamics(system, name) for name in ("by_definition", "kinetic_only")}
-    # By the chain rule the library also writes L anew by identities such as sin^2 + cos^2 = 1; the page does not.
-    expected["chain_rule"] = cg.simplify(torques(system))
+    expected = {name: dyn.inverse_dynamics(system, name) for name in ("by_definition", "kinetic_only", "chain_rule")}
     at = {name: point(graph, [0.3, -0.7, 0.45, 0.9, -0.2]) for name, graph in expected.items()}
     found = run_typed(
         """(text, at) => {
@@ -166,6 +163,7 @@ def test_typed_equations_are_those_of_the_library(case):
                 names=dyn.display_names(system),
             )
             told = lint_text(lint, verdict).splitlines()[len(str(verdict).splitlines()) :]
+            told = [line for line in told if not line.startswith("Off are ")]  # the page counts nodes alone
             assert mine["lint"][len(mine["lines"]) :] == told
         if mine["largest"] is None:  # infinite on the way
             continue
