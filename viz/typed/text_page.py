@@ -49,7 +49,8 @@ def typed_page(text: str | None = None) -> Page:
     The text is read by a parser, never run; what it cannot read it says in one sentence with the place. The equations
     are derived in the page, from the operation table of this library: inverse dynamics by definition with Euler's step
     embedded, with the kinetic energy alone, and by the chain rule, as `dynamics.inverse_dynamics` has them by these
-    names, node for node. Torques and accelerations are those of a `dynamics.System` to 1e-12. The text is kept in the fragment of the page's address.
+    names, node for node. Torques and accelerations are those of a `dynamics.System` to 1e-12. The text is kept in the
+    fragment of the page's address.
 
     Parameters
     ----------

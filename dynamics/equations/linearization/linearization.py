@@ -140,7 +140,9 @@ def linearize(
     [[0.0, 0.0, 1.714, -4.286], [0.0, 0.0, -4.286, 13.714], [-19.62, -4.905, 0.0, 0.0], [-4.905, -4.905, 0.0, 0.0]]
     """
     system = as_system(model)
-    parts, graphs = _in_columns(system, require_choice("form", form, FORMS))
+    parts, graphs = _in_columns(
+        system, require_choice("form", form, FORMS), (tuple(system.forces), tuple(system.damping))
+    )
     flat = evaluate(system, graphs.shared, {"q": q, "qd": qd, "tau": tau}, t, parameters)
     if flat.ndim != 1:
         raise ValueError("linearize takes one state, got rows of several; see linearize_many")
@@ -154,8 +156,8 @@ def linearize(
 
 
 @kept_by_first
-def _in_columns(system: System, form: str) -> tuple[LinearizationParts, ColumnGraphs]:
-    """The parts of a form, and their graphs."""
+def _in_columns(system: System, form: str, applied: tuple[object, ...]) -> tuple[LinearizationParts, ColumnGraphs]:
+    """The parts of a form, and their graphs.  applied: forces and damping of the system, which may be given anew."""
     parts = parts_of(system, form)
     return parts, parts.in_columns()
 
