@@ -59,8 +59,8 @@ function drawTitles({ plan, layout, frames, titles, names, version }) {
     group.setAttribute("aria-label", `fold ${name || "no tag"} to one box`);
     element("rect", { x: each.x - 6, y: each.y, width: each.w + 12, height: each.h, rx: 8 }, group);
     const words = element("text", { class: "column-title", x: each.x + each.w / 2, y: each.y + 17 }, titles);
-    words.textContent = fitted(name || "no tag", each.w / 8);
-    names.push({ text: words, name: name || "no tag", width: each.w, size: 13 });
+    words.textContent = fitted(name || "no tag", NAME.most);
+    names.push({ text: words, name: name || "no tag", width: each.w, size: 13, lines: 1 });
     element("title", {}, group).textContent = name;
   }
   for (const each of layout.titles) {
@@ -82,12 +82,13 @@ function drawBodies(canvas) {
   for (const [column, nodes] of [...inside].sort((a, b) => a[0] - b[0])) {
     const name = plan.columns[column] || "no tag", at = layout.bodies[column];
     const wrong = nodes.filter((node) => version.marked.has(node)).length;
-    const second = wrong ? `${nodes.length}, ${wrong} spurious` : counted(nodes.length, "node");
-    const item = shape(shapes, `b${column}`, at, `body${wrong ? " wrong" : " several"}`, fitted(name, 17), second);
+    const second = wrong ? `${wrong} of ${nodes.length} spurious` : counted(nodes.length, "node");
+    const item = shape(shapes, `b${column}`, at, `body${wrong ? " wrong" : " several"}`, "", second);
+    writeName(item.label, name, NAME.line);
     item.group.setAttribute("data-column", column);
-    item.group.setAttribute("aria-label", `${name}, ${counted(nodes.length, "node")}${wrong ? `, ${wrong} spurious` : ""}, folded`);
+    item.group.setAttribute("aria-label", `${name}, ${second}, folded`);
     element("title", {}, item.group).textContent = name;
-    canvas.names.push({ text: item.label, name, width: at.w - 8, size: 13 });
+    canvas.names.push({ text: item.label, name, width: at.w - 2, size: 13, lines: 2 });
     share(item.group, at, nodes.map((node) => roleOf(version, node)));
     keep(canvas, `b${column}`, item, nodes, second);
   }
@@ -129,7 +130,7 @@ function drawClusters(canvas) {
       return;
     }
     const first = cluster.marked ? "spurious" : cluster.title;
-    const item = shape(shapes, `c${c}`, at, `box ${role}`, first ? `${fitted(first, 10)} ${inside[c].length}` : count, count);
+    const item = shape(shapes, `c${c}`, at, `box ${role}`, foldedTitle(cluster, inside[c].length), count);
     item.group.setAttribute("data-cluster", c);
     item.group.setAttribute("aria-expanded", "false");
     item.group.setAttribute("aria-label", [cluster.column, cluster.stage, cluster.marked ? cluster.title : "", [first, count].filter(Boolean).join(" "), "folded"].filter(Boolean).join(", "));
@@ -180,7 +181,7 @@ function drawBundles(canvas, side, leaves) {
     const item = shape(shapes, `k${key}`, at, side === "i" ? "box input" : off ? "box output off" : "box output", `▸ ${kind}: ${counted(own.length, side === "i" ? "input" : "output")}`, "");
     item.group.setAttribute("data-bundle", key);
     item.group.setAttribute("aria-label", `${kind}: ${counted(own.length, side === "i" ? "input" : "output")}, folded${off ? ", wrong" : ""}`);
-    canvas.names.push({ text: item.label, name: item.label.textContent, width: at.w - 8, size: 10 });
+    canvas.names.push({ text: item.label, name: item.label.textContent, width: at.w - 8, size: 10, lines: 1 });
     const nodes = own.map((name) => node.get(name));
     if (side === "i") keep(canvas, `k${key}`, item, nodes, "");
     else {
@@ -211,7 +212,8 @@ function shape(parent, id, at, kind, words, second, round = false) {
   const tall = at.h > 40;
   const label = element("text", { class: "label", x: at.x + at.w / 2, y: at.y + (tall ? 18 : at.h / 2 - 2) }, group);
   label.textContent = words;
-  const value = element("text", { class: "value", x: at.x + at.w / 2, y: at.y + (tall ? 34 : at.h - 4) }, group);
+  group.append(" "); // else what is read aloud has the two as one word
+  const value = element("text", { class: "value", x: at.x + at.w / 2, y: at.y + (tall ? at.h - 12 : at.h - 4) }, group);
   value.textContent = second;
   return { group, label, value, at };
 }

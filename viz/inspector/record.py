@@ -37,7 +37,7 @@ from .content import Motion, State, StateTable, Version
 STAGES = {PRIMAL: "as written", ADJOINT: "reverse sweep", TANGENT: "forward sweep"}
 SMALL_GRAPH = 60  # nodes of a graph that is laid out by Graphviz
 NODE_HEIGHT, LEAF_HEIGHT = 34.0, 30.0  # pixels, as in arrange.js
-LONGEST_NAME = 24  # letters of a name for which a box has room
+LONGEST_NAME = 42  # letters of a name for which a box has room
 Letters = Callable[[str], str]
 
 

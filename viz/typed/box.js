@@ -155,13 +155,14 @@ function motionWords(system, motion) {
 }
 /** Coordinates over time. */
 function curves({ coordinates }, { t, q }) {
-  const svg = drawn("svg", { id: "curves", viewBox: "0 0 320 130", role: "img", "aria-label": `${coordinates.join(", ")} over time` });
+  const places = namesIn(coordinates, 315), high = NAMED.line * places.at(-1)[1];
+  const svg = drawn("svg", { id: "curves", viewBox: `0 ${-high} 320 ${130 + high}`, role: "img", "aria-label": `${coordinates.join(", ")} over time` });
   const all = q.flat(), low = Math.min(...all), size = Math.max(...all) - low || 1;
   const place = (k, i) => `${(310 * t[k] / (t.at(-1) || 1) + 5).toFixed(1)} ${(122 - 94 * (q[k][i] - low) / size).toFixed(1)}`;
   coordinates.forEach((name, i) => {
     element("path", { class: `curve${i}`, d: `M${t.map((_, k) => place(k, i)).join("L")}` }, svg);
-    element("path", { class: `curve${i}`, d: `M${5 + 78 * i} 11h14` }, svg);
-    element("text", { x: 23 + 78 * i, y: 15 }, svg).textContent = fitted(name, 7);
+    element("path", { class: `curve${i}`, d: `M${5 + places[i][0]} ${11 + NAMED.line * places[i][1] - high}h14` }, svg);
+    element("text", { x: 23 + places[i][0], y: 15 + NAMED.line * places[i][1] - high }, svg).textContent = name;
   });
   return svg;
 }

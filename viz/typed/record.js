@@ -1,6 +1,6 @@
 // What the inspector is handed of a system: its graphs as viz/inspector/record.py describes them, one state, a motion.
 
-const LONGEST = 24; // letters of a name for which a box has room
+const LONGEST = 42; // letters of a name for which a box has room
 
 /** A name in mathematical letters: theta1 is θ₁. */
 const pretty = (name) => name.replace(/(?<![A-Za-z0-9])([A-Za-z]+)([0-9]*)(?![A-Za-z0-9])/g, (_, word, digits) => (

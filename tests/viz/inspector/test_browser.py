@@ -126,11 +126,11 @@ def test_detail_goes_from_nodes_to_bodies_and_back(show):
     bodies = page.locator(".item.body")
     assert bodies.count() == 5
     counts = [
-        re.search(r"(\d+)(?: nodes?)?(?:, (\d+) spurious)?", text)
+        re.fullmatch(r"(?:(\d+) of )?(\d+) (?:spurious|nodes?)", text)
         for text in bodies.locator(".value").all_text_contents()
     ]
-    assert sum(int(found[2] or 0) for found in counts) == 55
-    drawn = sum(int(found[1]) for found in counts) + sums + len(graph_of(EMBEDDED).inputs)
+    assert sum(int(found[1] or 0) for found in counts) == 55
+    drawn = sum(int(found[2]) for found in counts) + sums + len(graph_of(EMBEDDED).inputs)
     assert drawn == sum(node.value is None for node in nodes)
     bodies.first.click()
     assert page.locator(".item.body").count() == 4

@@ -1,13 +1,19 @@
 // Where everything is in the picture: columns by body, rows by sweep, folded or not; the same for all versions.
 
 const BOX = { width: 100, height: 28, gap: 6, title: 18, pad: 8 };
-const BODY = { width: 148, height: 46, gap: 28, beside: 26 }; // a body as one box
+const BODY = { width: 148, height: 46, line: 15, gap: 28, beside: 26 }; // a body as one box, with a line more for long names
+const NAME = { most: 34, line: 17 }; // letters of a name for which a box or column has room, and of one line of a body's
 const CELL = { gap: 22, beside: 14, title: 24, aspect: 1.35 };
 const LEAF = { height: 30, gap: 6, row: 38, sum: 42 };
 const NODE = 34; // height of a node's ellipse or box
 const FEW_LEAVES = [8, 24]; // inputs or outputs beside bodies, and beside parts of them; more of them are boxes by kind
 
 const titleOf = (cluster) => [cluster.marked ? "spurious" : "", cluster.title].filter(Boolean).join(" ");
+/** What a folded cluster of so many nodes says. */
+function foldedTitle(cluster, many) {
+  const first = cluster.marked ? "spurious" : cluster.title;
+  return first ? `${fitted(first, NAME.most)} ${many}` : counted(many, "node");
+}
 const widthOf = (words) => Math.max(46, 7.4 * [...words.replace(/[\u0307\u0308]/g, "")].length + 10);
 
 /** What the layout reads and keeps of a record: places, widths of nodes, nodes inside clusters, kinds of leaves. */
@@ -26,6 +32,7 @@ function makePlan(record, versions) {
     o: new Map(version.outputs.map(([name, pretty]) => [name, Math.max(66, widthOf(pretty) + 6)])),
   }));
   plan.limbs = limbsOf(plan);
+  plan.body = { ...BODY, height: BODY.height + (plan.columns.some((name) => [...name].length > NAME.line) ? BODY.line : 0) };
   plan.sums = plan.cluster.includes(RESULT_PLACE);
   return plan;
 }
@@ -50,7 +57,7 @@ function leavesOf(widths, side, unbundled, few) {
     kinds.set(key, [...(kinds.get(key) ?? []), name]);
   }
   return [...kinds].flatMap(([key, names]) => (unbundled.has(key) || names.length === 1
-    ? names.map((name) => [name, widths.get(name), null]) : [[key, Math.max(150, widthOf(`▸ ${key.slice(1)}: ${names.length} outputs`)), names]]));
+    ? names.map((name) => [name, widths.get(name), null]) : [[key, Math.max(150, 1.35 * widthOf(`▸ ${key.slice(1)}: ${names.length} outputs`)), names]]));
 }
 
 /** Boxes of clusters, columns, leaves and titles. folded: clusters; closed: columns; unbundled: kinds of leaves.
@@ -100,7 +107,7 @@ function overview(plan, aspect = CELL.aspect) {
   const all = plan.columns.map((_, i) => i), tree = all.filter((i) => plan.tree[i]), rest = all.filter((i) => !plan.tree[i]);
   const local = new Map(tree.map((i, k) => [i, k]));
   const edges = tree.filter((i) => local.has(plan.parents[i])).map((i) => [local.get(plan.parents[i]), local.get(i)]);
-  const across = BODY.width + BODY.beside, down = BODY.height + BODY.gap;
+  const body = plan.body, across = body.width + body.beside, down = body.height + body.gap;
   const limbs = plan.limbs, spots = limbs.length > 1 ? inLimbs(plan, limbs, local, across, down) : [];
   if (!spots.length) {
     const deep = layered(tree.map(() => across - LAYERS.gap), edges, down);
@@ -110,10 +117,10 @@ function overview(plan, aspect = CELL.aspect) {
       spots.push(tree.map((_, k) => [(k % per) * across, (lines - 1 - Math.floor(k / per)) * down])); // the base at the bottom left
     }
   }
-  const sizeOf = (at) => [Math.max(0, ...at.map(([x]) => x + BODY.width)), Math.max(0, ...at.map(([, y]) => y + down))];
+  const sizeOf = (at) => [Math.max(0, ...at.map(([x]) => x + body.width)), Math.max(0, ...at.map(([, y]) => y + down))];
   const found = spots.map((at) => {
-    const [wide, high] = sizeOf(at), per = Math.max(1, Math.floor((Math.max(wide, 3 * across) + BODY.beside) / across));
-    const shift = Math.max(0, wide - Math.min(per, rest.length) * across + BODY.beside) / 2;
+    const [wide, high] = sizeOf(at), per = Math.max(1, Math.floor((Math.max(wide, 3 * across) + body.beside) / across));
+    const shift = Math.max(0, wide - Math.min(per, rest.length) * across + body.beside) / 2;
     const below = rest.map((_, k) => [shift + (k % per) * across, high + Math.floor(k / per) * down]);
     const [w, h] = sizeOf([...at, ...below]);
     return { at: [...at, ...below], w, h, scale: Math.min(aspect / w, 1 / (h + 2 * LEAF.row + LEAF.sum)) };
@@ -121,7 +128,7 @@ function overview(plan, aspect = CELL.aspect) {
   const best = found.reduce((a, b) => (b.scale > a.scale ? b : a));
   const { at, w, h } = edges.length && found[0].scale > 0.85 * best.scale ? found[0] : best;
   const bodies = [];
-  [...tree, ...rest].forEach((i, k) => { bodies[i] = { column: i, x: at[k][0], y: at[k][1], w: BODY.width, h: BODY.height }; });
+  [...tree, ...rest].forEach((i, k) => { bodies[i] = { column: i, x: at[k][0], y: at[k][1], w: body.width, h: body.height }; });
   return { boxes: [], bodies, titles: [], width: w, height: h };
 }
 
@@ -152,7 +159,7 @@ function linesOf({ columns, limbs, tree }, most) {
 /** Columns side by side, in as few bands as the picture needs; rows by sweep. */
 function columnsIn(plan, folded, closed, aspect) {
   const sizes = plan.clusters.map((cluster, c) => {
-    if (folded.has(c) || closed.has(plan.columnOf[c])) return { w: BOX.width, h: BOX.height };
+    if (folded.has(c) || closed.has(plan.columnOf[c])) return { w: Math.max(BOX.width, widthOf(foldedTitle(cluster, plan.members[c].length))), h: BOX.height };
     const { width, height } = innerOf(plan, c);
     return { w: Math.max(width + 2 * BOX.pad, 7 * titleOf(cluster).length + 54), h: height + BOX.title + BOX.pad };
   });
@@ -163,8 +170,8 @@ function columnsIn(plan, folded, closed, aspect) {
   });
   const flowed = new Map([...cells].map(([key, own]) => [key, flow(own, sizes)]));
   const cell = (column, stage) => flowed.get(`${column} ${stage}`) ?? { w: 0, h: 0, at: [] };
-  const widths = plan.columns.map((name, i) => (closed.has(i) ? BODY.width
-    : Math.max(70, Math.min(160, 8 * name.length), ...plan.stages.map((stage) => cell(i, stage).w))));
+  const widths = plan.columns.map((name, i) => (closed.has(i) ? plan.body.width
+    : Math.max(70, 8.4 * Math.min(NAME.most, [...name].length), ...plan.stages.map((stage) => cell(i, stage).w))));
   const bands = bandsFor(widths, plan.stages.map((stage) => Math.max(...widths.map((_, i) => cell(i, stage).h))), aspect);
   const boxes = [], bodies = [], titles = [];
   const reach = (own) => own.reduce((sum, i) => sum + widths[i] + CELL.beside, -CELL.beside);
@@ -186,9 +193,9 @@ function columnsIn(plan, folded, closed, aspect) {
       titles.push({ stage, x: left[0], y: y - 6, columns: own });
       y += height + CELL.gap;
     }
-    y = Math.max(y, start + BODY.height + CELL.gap);
+    y = Math.max(y, start + plan.body.height + CELL.gap);
     own.forEach((i, k) => {
-      if (closed.has(i)) bodies[i] = { column: i, x: left[k], y: (start + y - CELL.gap - BODY.height) / 2, w: BODY.width, h: BODY.height };
+      if (closed.has(i)) bodies[i] = { column: i, x: left[k], y: (start + y - CELL.gap - plan.body.height) / 2, w: plan.body.width, h: plan.body.height };
       else titles.push({ column: i, x: left[k], y: start, w: widths[i], h: y - start - CELL.gap / 2 });
     });
   }
@@ -213,7 +220,7 @@ function bandsFor(widths, heights, aspect = CELL.aspect) {
 
 /** Boxes of a cell from left to right, in lines. */
 function flow(own, sizes) {
-  const limit = Math.max(2 * BOX.width + BOX.gap,
+  const limit = Math.max(2 * BOX.width + BOX.gap, ...own.map((c) => sizes[c].w),
     1.5 * Math.sqrt(own.reduce((sum, c) => sum + sizes[c].w * sizes[c].h, 0)));
   const at = [];
   let x = 0, y = 0, high = 0, w = 0;

@@ -1,25 +1,38 @@
 // Coordinates over time, of a model without points: in place of the mechanism in motion.
 
-const COURSE = { width: 420, height: 200, left: 52, right: 10, top: 24, bottom: 22, most: 5 };
+const COURSE = { width: 420, height: 200, left: 52, right: 10, bottom: 22, most: 5 };
+const NAMED = { line: 18, letter: 7, sign: 30 }; // names of curves: a line, a letter, and the sign beside one
+
+/** Places of names of curves beside their signs, in lines as wide as that: [[x, line]]. */
+function namesIn(names, wide) {
+  let x = 0, line = 0;
+  return names.map((name) => {
+    const own = NAMED.sign + NAMED.letter * [...name].length;
+    if (x && x + own > wide) { x = 0; line += 1; }
+    x += own;
+    return [x - own, line];
+  });
+}
 
 /** A view as `armView` has it, or null where nothing moves. */
 function courseView(svg, { record, state }) {
-  const { t } = record.motion, { width, height, left, right, top, bottom } = COURSE;
+  const { t } = record.motion, { width, height, left, right, bottom } = COURSE;
   const moves = (name, values) => name !== "t" && ["q", undefined].includes(KINDS.exec(name)?.[1]) && values.some((value) => value !== values[0]);
   const lines = record.inputs.map((name, i) => ({ name, values: record.rows.map((row) => row[i]) })).filter(({ name, values }) => moves(name, values)).slice(0, COURSE.most);
   if (!lines.length) return null;
+  const names = lines.map(({ name }) => state.called.get(name) ?? name), places = namesIn(names, width - left - right), top = 6 + NAMED.line * (places.at(-1)[1] + 1);
   const all = lines.flatMap(({ values }) => values), low = Math.min(...all), high = Math.max(...all);
   const x = (time) => left + (width - left - right) * (time - t[0]) / (t.at(-1) - t[0] || 1), y = (value) => height - bottom - (height - bottom - top) * (value - low) / (high - low);
   svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
-  svg.setAttribute("aria-label", `${lines.map(({ name }) => state.called.get(name) ?? name).join(", ")} over time`);
+  svg.setAttribute("aria-label", `${names.join(", ")} over time`);
   const word = (words, at, foot, anchor) => { element("text", { x: at, y: foot, class: `tick ${anchor}` }, svg).textContent = words; };
   svg.replaceChildren(drawn("path", { class: "grid", d: `M${left} ${top}V${height - bottom}H${width - right}${low < 0 && high > 0 ? `M${left} ${y(0)}H${width - right}` : ""}` }));
   [low, high].forEach((value) => word(brief(value), left - 5, y(value) + 4, "end"));
   [t[0], t.at(-1)].forEach((time, k) => word(`${brief(time)} s`, x(time), height - 6, k ? "end" : "start"));
-  lines.forEach(({ name, values }, k) => {
+  lines.forEach(({ values }, k) => {
     element("path", { class: `turn part${k}`, "stroke-width": 2, d: `M${values.map((value, i) => `${x(t[i]).toFixed(1)} ${y(value).toFixed(1)}`).join("L")}` }, svg);
-    element("path", { class: `turn part${k}`, "stroke-width": 3, d: `M${left + 74 * k} 12h14` }, svg);
-    word(fitted(state.called.get(name) ?? name, 8), left + 74 * k + 18, 16, "start");
+    element("path", { class: `turn part${k}`, "stroke-width": 3, d: `M${left + places[k][0]} ${12 + NAMED.line * places[k][1]}h14` }, svg);
+    word(names[k], left + places[k][0] + 18, 16 + NAMED.line * places[k][1], "start");
   });
   const now = element("path", { class: "ground" }, svg), dots = lines.map((_, k) => element("circle", { class: `joint part${k}`, r: 4 }, svg));
   const show = (frame) => {
