@@ -60,7 +60,7 @@ function drawTitles({ plan, layout, frames, titles, names, version }) {
     element("rect", { x: each.x - 6, y: each.y, width: each.w + 12, height: each.h, rx: 8 }, group);
     const words = element("text", { class: "column-title", x: each.x + each.w / 2, y: each.y + 17 }, titles);
     words.textContent = fitted(name || "no tag", NAME.most);
-    names.push({ text: words, name: name || "no tag", width: each.w, size: 13, lines: 1 });
+    names.push({ text: words, name: name || "no tag", width: each.w, size: 13 });
     element("title", {}, group).textContent = name;
   }
   for (const each of layout.titles) {
@@ -88,7 +88,7 @@ function drawBodies(canvas) {
     item.group.setAttribute("data-column", column);
     item.group.setAttribute("aria-label", `${name}, ${second}, folded`);
     element("title", {}, item.group).textContent = name;
-    canvas.names.push({ text: item.label, name, width: at.w - 2, size: 13, lines: 2 });
+    canvas.names.push({ text: item.label, name, width: at.w + 4, size: 13, height: at.h - 14 });
     share(item.group, at, nodes.map((node) => roleOf(version, node)));
     keep(canvas, `b${column}`, item, nodes, second);
   }
@@ -181,7 +181,7 @@ function drawBundles(canvas, side, leaves) {
     const item = shape(shapes, `k${key}`, at, side === "i" ? "box input" : off ? "box output off" : "box output", `▸ ${kind}: ${counted(own.length, side === "i" ? "input" : "output")}`, "");
     item.group.setAttribute("data-bundle", key);
     item.group.setAttribute("aria-label", `${kind}: ${counted(own.length, side === "i" ? "input" : "output")}, folded${off ? ", wrong" : ""}`);
-    canvas.names.push({ text: item.label, name: item.label.textContent, width: at.w - 8, size: 10, lines: 1 });
+    canvas.names.push({ text: item.label, name: item.label.textContent, width: at.w - 8, size: 10 });
     const nodes = own.map((name) => node.get(name));
     if (side === "i") keep(canvas, `k${key}`, item, nodes, "");
     else {

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
-from html import escape
+from html import escape, unescape
 
 from ..models.equations import model_equations
 from ..models.equations_text import equations_latex
@@ -15,6 +16,7 @@ from .screen import Screen
 from .subject import Subject
 
 LINES = 40  # of LaTeX, of each formula
+WIDEST = 112  # letters of a formula in a line of paper
 
 
 def worksheet(subject: Subject, screens: Sequence[Screen], title: str, author: str, *, key: bool) -> Page:
@@ -30,9 +32,19 @@ def worksheet(subject: Subject, screens: Sequence[Screen], title: str, author: s
     heading = f"Key: {title}" if key else title
     return html.compose(
         heading,
-        f"<header><h1>{escape(heading)}</h1>{by}</header>\n<main>\n{text}\n{'' if key else glossary(text).replace('<details', '<details open', 1)}\n</main>",
+        f"<header><h1>{escape(heading)}</h1>{by}</header>\n<main>\n{_on_paper(text)}\n{'' if key else glossary(text).replace('<details', '<details open', 1)}\n</main>",
         asset(__package__, "worksheet.css"),
     )
+
+
+def _on_paper(text: str) -> str:
+    """Formulas as small as the widest row needs: paper has no scroll bar."""
+    return re.sub(r'<math display="block">(?=(.*?)</math>)', _small, text, flags=re.DOTALL)
+
+
+def _small(found: re.Match[str]) -> str:
+    letters = max([len(unescape(re.sub("<[^>]*>", "", row))) for row in found[1].split("</mtr>")])
+    return found[0] if letters <= WIDEST else f'{found[0][:-1]} style="font-size: {WIDEST / letters:.2f}em">'
 
 
 def _latex(subject: Subject) -> str:

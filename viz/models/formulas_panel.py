@@ -24,6 +24,7 @@ STYLE = """
 #formulas .spurious { border-left: 6px solid var(--wrong); padding-left: 10px; margin: 6px 0; }
 #formulas :is(.spurious math, .spurious h3, summary math) { color: color-mix(in srgb, var(--wrong) 78%, var(--text)); }
 body:not(:has(#about.flawed)) #formulas :is(.first, summary math) { display: none; }
+@media (min-width: 821px) { body:has(#formulas details[open]) main { min-height: 120vh; } }
 @media print { #formulas { max-height: none; overflow: visible; } }
 """
 # Closed, the panel is a line below the results; open, it is as wide as the page. It is of the page's model: a typed

@@ -178,6 +178,7 @@ def test_another_record_is_shown_in_place_of_the_first(show):
     assert page.locator('#versions button:text-is("live")').count() == 0  # it moves the page's first model
     assert page.locator("#results tbody tr").count() == 1
     assert page.locator("#arm").get_attribute("aria-label") == "q.theta over time"  # it has no places
+    assert "x1, y1" in page.locator("#frame").inner_text()
     assert not page.locator("#statetables").is_visible()
 
 

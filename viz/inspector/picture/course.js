@@ -39,6 +39,8 @@ function courseView(svg, { record, state }) {
     now.setAttribute("d", `M${x(t[frame])} ${top}V${height - bottom}`);
     dots.forEach((dot, k) => { dot.setAttribute("cx", x(t[frame])); dot.setAttribute("cy", y(state.get(lines[k].name))); });
   };
-  const nothing = () => {};
-  return { show, mark: nothing, paint: nothing, color: nothing, words: lines.length === COURSE.most ? `The first ${COURSE.most} that move, over time.` : "" };
+  const nothing = () => {}, first = lines.length === COURSE.most ? `The first ${COURSE.most} that move, over time.` : "";
+  const how = lines.some(({ name }) => KINDS.exec(name)?.[1] === "q") ? "The model has no bodies to draw. “type L” draws points that a text names x1, y1, x2, y2; from Python, viz.page draws those of its motion." : "";
+  const words = [first, how].filter(Boolean).join(" ");
+  return { show, mark: nothing, paint: nothing, color: nothing, words };
 }

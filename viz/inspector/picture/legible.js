@@ -3,16 +3,16 @@
 const TEXT = 13, LEGIBLE = 9; // pixels: of texts in the picture at scale 1, and the least on the screen
 const WIDE = 0.57; // width of a letter for its height
 
-/** Fit texts to the scale: { names: [{ text, name, width, size }] } of what is drawn. */
+/** Fit texts to the scale: { names: [{ text, name, width, size, height }] } of what is drawn. */
 function legible(app) {
   const { k } = app.seen, small = TEXT * k < LEGIBLE;
   if (!small && !app.drawn.small) return;
   app.drawn.small = small;
   app.svg.classList.toggle("small", small);
-  for (const { text, name, width, size, lines } of app.drawn.names) {
+  for (const { text, name, width, size, height = 0 } of app.drawn.names) {
     const letters = Math.floor(width * k / (WIDE * LEGIBLE));
     if (small && letters < Math.min(4, name.length)) text.textContent = "";
-    else if (lines > 1) writeName(text, name, small ? letters : NAME.line, small ? LEGIBLE / k : undefined);
+    else if (height && (!small || height * k >= 2 * LEGIBLE)) writeName(text, name, small ? letters : NAME.line, small ? LEGIBLE / k : undefined);
     else text.textContent = fitted(name, small ? letters : width / (WIDE * size));
     text.style.fontSize = small ? `${LEGIBLE / k}px` : "";
   }
