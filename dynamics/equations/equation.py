@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import string
 import textwrap
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -19,6 +20,8 @@ from ..systems.model import Model, as_system
 from ..systems.system import System
 
 LARGEST_REWRITTEN = 200  # nodes of a graph whose outputs are written anew
+SIZES = ("n", "2n", "nq")  # of a system, in the shape of an output
+VARIABLES = ("q", "qd", "qdd", "tau")
 WIDTH = 116  # letters of a line in a docstring
 COMMON = {  # parameters that mean the same in every function that has them
     "model": "model : Model\n    A system, a mechanism or a scene, with nq coordinates and n velocities.",
@@ -59,9 +62,23 @@ class Output:
     shape: tuple[str, ...] = ()
     unit: str = ""
 
+    def __post_init__(self) -> None:
+        """Raise ValueError unless each index has a place: outputs of one name would be one, the last."""
+        places = sum(field is not None for _, field, _, _ in string.Formatter().parse(self.names))
+        if places != len(self.shape):
+            raise ValueError(
+                f"output {self.names!r} of shape {self.shape} needs a place {{}} for each index, {len(self.shape)} in "
+                f"all, got {places}: as 'tau{{}}' of ('n',)"
+            )
+        for each in self.shape:
+            if each not in SIZES and not (isinstance(each, str) and each.isdecimal()):
+                raise ValueError(
+                    f"a size of output {self.names!r} is one of {', '.join(SIZES)} or a number as '3', got {each!r}"
+                )
+
     def of(self, system: System) -> list[str]:
         """The names of its entries, row by row."""
-        sizes = {"n": system.n, "2n": 2 * system.n, "nq": system.nq}
+        sizes = dict(zip(SIZES, (system.n, 2 * system.n, system.nq), strict=True))
         counts = [sizes[each] if each in sizes else int(each) for each in self.shape]
         return [self.names.format(*index) for index in product(*map(range, counts))]
 
@@ -87,6 +104,8 @@ class Equation:
 
     def __init__(self, inputs: str, *outputs: Output, rewritten: bool = True) -> None:
         self.inputs, self.outputs, self.rewritten = tuple(inputs.split()), outputs, rewritten
+        if unknown := [kind for kind in self.inputs if kind not in VARIABLES]:
+            raise ValueError(f"inputs of an equation are among {', '.join(VARIABLES)}, got {unknown[0]!r}")
 
     def __call__(self, derivation: Derivation) -> GraphOfModel:
         """The public function of a derivation."""
@@ -104,7 +123,9 @@ class Equation:
     def graph(self, system: System, nodes: Sequence[Node]) -> Graph:
         """The graph of the outputs of a system, given row by row, not simplified."""
         names = [name for output in self.outputs for name in output.of(system)]
-        variables = {"q": system.q, "qd": system.qd, "qdd": system.qdd, "tau": system.tau}
+        if len(nodes) != len(names):
+            raise ValueError(f"a derivation must give a node for each of {len(names)} outputs, gave {len(nodes)}")
+        variables = dict(zip(VARIABLES, (system.q, system.qd, system.qdd, system.tau), strict=True))
         return system.graph(dict(zip(names, nodes, strict=True)), *[variables[kind] for kind in self.inputs])
 
     def describes(self, function: Documented) -> Documented:

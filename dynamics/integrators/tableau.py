@@ -10,6 +10,11 @@ from cgraph.extend import kept_by_first
 RowOfWeights = tuple[float, ...]
 
 
+def _count(row: object) -> int:
+    """Numbers of a row, -1 of what is none."""
+    return len(row) if isinstance(row, tuple | list) else -1
+
+
 @dataclass(frozen=True)
 class Tableau:
     """The numbers of an explicit Runge-Kutta method of s stages.
@@ -31,12 +36,17 @@ class Tableau:
         Weights of h slope_k in an estimate of the error of the step, s + 1 numbers, the last for the slope at the end
         of the step. DOP853 has two estimates, which are combined.
     estimate : int, optional
-        q, where the estimate falls as h^q.
+        q, where the estimate falls as h^q; needed with `error`.
     dense : tuple of tuples, optional
         Row k the weights of slope k in the coefficients of s, s^2, .. of the dense output; without them the cubic
         through states and slopes at both ends.
     extra : tuple of (float, tuple), optional
         Stages (c_k, a_k) that only the dense output needs.
+
+    Raises
+    ------
+    ValueError
+        For weights that are not as many as their stages, and for `error` without `estimate`.
 
     Examples
     --------
@@ -63,6 +73,21 @@ class Tableau:
     estimate: int = 0
     dense: tuple[RowOfWeights, ...] = ()
     extra: tuple[tuple[float, RowOfWeights], ...] = ()
+
+    def __post_init__(self) -> None:
+        stages = len(self.b)
+        if len(self.c) != stages or [_count(row) for row in self.a] != [*range(stages)]:
+            raise ValueError(
+                f"a tableau of {stages} weights b needs as many times c and rows a of 0 to {stages - 1} numbers, got "
+                f"{len(self.c)} times and rows of {', '.join(str(_count(row)) for row in self.a) or 'none'}"
+            )
+        if wrong := [row for row in self.error if _count(row) != stages + 1]:
+            raise ValueError(
+                f"error of a tableau is a tuple of rows of {stages + 1} weights, one a stage and one for the slope at "
+                f"the end of the step, got {wrong[0]!r:.60} for a row"
+            )
+        if self.error and self.estimate < 1:
+            raise ValueError(f"error of a tableau needs estimate, q where it falls as h^q, got {self.estimate!r}")
 
     @property
     def interpolant(self) -> tuple[RowOfWeights, ...]:

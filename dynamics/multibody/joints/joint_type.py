@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -142,11 +143,17 @@ class JointType(ABC):
 class AxialJoint(JointType):
     """A joint with one coordinate, which turns the body about the joint's axis, slides it along that, or both.
 
-    The body turns by `angle` and moves by `shift`, of which a type of joint gives one or both.
+    The body turns by `angle` and moves by `shift`, of which a type of joint gives one or both, linear in the
+    coordinate. Raises TypeError for a type that gives neither.
     """
 
     sprung = True
     has_axis = True
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        if cls.angle is AxialJoint.angle and cls.shift is AxialJoint.shift:
+            raise TypeError(f"{cls.__name__} gives neither angle nor shift, and so would not move its body")
 
     @property
     def turns(self) -> bool:

@@ -1,6 +1,8 @@
 """The row of an equation is what its graph has: names and shapes of outputs, inputs, docstring, refusal."""
 
 import inspect
+import re
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ import dynamics as dyn
 from dynamics.equations.equation import EQUATIONS, Equation, Output
 from tests.dynamics.mechanisms import floating, random_mechanism
 from tests.dynamics.units import Units, in_units
+from tests.each_row import each_row
 from tests.test_docstrings import lacks
 
 ROWS = [name for name in dyn.__all__ if getattr(dyn, name) is not None and name in EQUATIONS]
@@ -98,3 +101,26 @@ def test_of_several_forms_the_smallest_graph_counts() -> None:
     arm = dyn.planar_arm([1.0], [1.0])
     assert len([node for node in loss(arm).nodes if node.args]) == 1
     assert str(inspect.signature(loss)) == "(model: 'Model') -> 'Graph'"
+
+
+@each_row(
+    ("make", "said"),
+    [
+        (
+            lambda: Output("P", ("n",), "W"),
+            "output 'P' of shape ('n',) needs a place {} for each index, 1 in all, got 0",
+        ),
+        (lambda: Output("M_{}", ("n", "n")), "2 in all, got 1"),
+        (lambda: Output("P{}", ("k",)), "a size of output 'P{}' is one of n, 2n, nq or a number as '3', got 'k'"),
+        (lambda: Equation("q zz", Output("P")), "inputs of an equation are among q, qd, qdd, tau, got 'zz'"),
+        (
+            lambda: Equation("q", Output("P{}", ("n",)), rewritten=False)(lambda system: [[system.q[0]]])(
+                MODELS["chain"]
+            ),
+            "a derivation must give a node for each of 2 outputs, gave 1",
+        ),
+    ],
+)
+def test_a_row_that_would_lose_outputs_is_refused(make: Callable[[], object], said: str) -> None:
+    with pytest.raises(ValueError, match=re.escape(said)):
+        make()

@@ -1,6 +1,7 @@
 """Tableaus: the numbers of methods meet the conditions of their orders, and a new tableau is a new method."""
 
 import math
+import re
 from collections.abc import Iterator
 from fractions import Fraction
 from functools import partial
@@ -20,6 +21,7 @@ from dynamics.integrators.rosenbrock import RODAS5P
 from dynamics.integrators.symplectic_tableaus import PARTITIONED, Partitioned, gauss
 from dynamics.integrators.tableau import TABLEAUS, Tableau
 from tests.dynamics.planet import PERIHELION, planet, position
+from tests.each_row import each_row
 from tests.registered import registered
 
 FITTED_ORDER = 0.05  # of a fitted order: what the next order adds at these steps
@@ -169,3 +171,18 @@ def test_a_tableau_with_an_estimate_chooses_its_steps_and_has_dense_output() -> 
     assert np.abs(dense.q - [position(t) for t in times]).max() < 2.0 * at_steps
     many = dyn.simulate_many(planet(), [PERIHELION[0]] * 3, PERIHELION[1], 1.0, "bs23", t_eval=times, **options)
     assert np.array_equal(many.q[1], dense.q)
+
+
+@each_row(
+    ("given", "said"),
+    [
+        ({"c": (0.0,)}, "a tableau of 2 weights b needs as many times c and rows a of 0 to 1 numbers, got 1 times"),
+        ({"a": ((), ())}, "rows of 0, 0"),
+        ({"error": (0.1, -0.1, 0.0)}, "a tuple of rows of 3 weights, one a stage and one for the slope at the end"),
+        ({"error": ((0.1, -0.1, 0.0),)}, "error of a tableau needs estimate, q where it falls as h^q, got 0"),
+    ],
+)
+def test_weights_that_do_not_fit_are_refused_where_they_are_written(given: dict[str, Any], said: str) -> None:
+    heun: dict[str, Any] = {"c": (0.0, 1.0), "a": ((), (1.0,)), "b": (0.5, 0.5)}
+    with pytest.raises(ValueError, match=re.escape(said)):
+        Tableau(2, **(heun | given))

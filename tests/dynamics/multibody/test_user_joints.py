@@ -17,6 +17,7 @@ from dynamics.multibody.algebra.spatial import Triple
 from dynamics.multibody.algebra.spatial_vectors import Twist
 from dynamics.multibody.joints import TYPES, SpatialJoint
 from dynamics.multibody.joints.consistency import contradiction
+from dynamics.multibody.joints.joint_type import AxialJoint
 from tests.dynamics.mechanisms import random_body
 from tests.dynamics.models import Array
 from tests.dynamics.units import Units, in_units
@@ -251,3 +252,10 @@ def test_the_certificate_looks_at_bias_and_derivatives() -> None:
     assert said["angles"] == said["polar"] == set()
     assert "bias" in said["still"]
     assert said["constant"] == {"derivatives:"}
+
+
+def test_a_type_that_neither_turns_nor_moves_its_body_is_refused() -> None:
+    with raises(TypeError, match="Still gives neither angle nor shift, and so would not move its body"):
+
+        class Still(AxialJoint):
+            kind = "still"
