@@ -104,8 +104,8 @@ class Equation:
 
     def __init__(self, inputs: str, *outputs: Output, rewritten: bool = True) -> None:
         self.inputs, self.outputs, self.rewritten = tuple(inputs.split()), outputs, rewritten
-        if unknown := [kind for kind in self.inputs if kind not in VARIABLES]:
-            raise ValueError(f"inputs of an equation are among {', '.join(VARIABLES)}, got {unknown[0]!r}")
+        if unknown := [kind for kind in self.inputs if kind not in (*VARIABLES, "p")]:
+            raise ValueError(f"inputs of an equation are among {', '.join(VARIABLES)}, p, got {unknown[0]!r}")
 
     def __call__(self, derivation: Derivation) -> GraphOfModel:
         """The public function of a derivation."""

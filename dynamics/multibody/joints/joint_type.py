@@ -152,7 +152,7 @@ class AxialJoint(JointType):
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
-        if cls.angle is AxialJoint.angle and cls.shift is AxialJoint.shift:
+        if cls.moves and cls.angle is AxialJoint.angle and cls.shift is AxialJoint.shift:
             raise TypeError(f"{cls.__name__} gives neither angle nor shift, and so would not move its body")
 
     @property

@@ -112,7 +112,7 @@ def test_of_several_forms_the_smallest_graph_counts() -> None:
         ),
         (lambda: Output("M_{}", ("n", "n")), "2 in all, got 1"),
         (lambda: Output("P{}", ("k",)), "a size of output 'P{}' is one of n, 2n, nq or a number as '3', got 'k'"),
-        (lambda: Equation("q zz", Output("P")), "inputs of an equation are among q, qd, qdd, tau, got 'zz'"),
+        (lambda: Equation("q zz", Output("P")), "inputs of an equation are among q, qd, qdd, tau, p, got 'zz'"),
         (
             lambda: Equation("q", Output("P{}", ("n",)), rewritten=False)(lambda system: [[system.q[0]]])(
                 MODELS["chain"]
