@@ -129,16 +129,16 @@ def _check_columns(op: Op, partials: Graph, sample: tuple[float, ...]) -> None:
             told = f"is {slope:.6g}, where differences of scalar give {found:.6g}"
             raise ValueError(f"{where} its partial by {name} {told}")
     points = [np.array([x, x]) for x in sample]
-    texts = {
+    values: dict[str, float | None] = {
         "array": array,
         "python": _text_value(op, "python", sample, {row.name: row.raising for row in OPS.values()}),
         "numpy": _text_value(op, "numpy", points, {row.name: row.array for row in OPS.values()}),
     }
-    for column, found in texts.items():
-        if found is not None and not (
-            value == found or abs(value - found) <= _VALUES * max(sizes) or (value != value and found != found)
-        ):
-            raise ValueError(f"{where} scalar is {value:.6g} and {column} {found:.6g}")
+    for column, other in values.items():
+        if other is None or value == other or (value != value and other != other):
+            continue
+        if not abs(value - other) <= _VALUES * max(sizes):
+            raise ValueError(f"{where} scalar is {value:.6g} and {column} {other:.6g}")
 
 
 def _filled(op: Op, column: str, text: str, args: Sequence[str], words: Mapping[str, str]) -> str:
@@ -187,8 +187,8 @@ def _check_interval(op: Op) -> None:
             )
         for point, value in values.items():
             inside = all([a <= x <= b for x, (a, b) in zip(point, box, strict=True)])
-            error = op.rounding * 2.0**-53 * abs(value)  # of the value itself
-            if inside and (value < low - error or value > high + error):
+            own = op.rounding * 2.0**-53 * abs(value)  # rounding of the value itself
+            if inside and (value < low - own or value > high + own):
                 told = f"for {given} the interval [{low:.6g}, {high:.6g}] does not hold it"
                 raise ValueError(f"{_where(op, point)} scalar is {value:.6g}, and {told}")
 
