@@ -141,6 +141,18 @@ def test_a_row_of_ones_own_can_be_replaced_and_earlier_graphs_keep_theirs() -> N
             table.pop("versin", None)
 
 
+def test_instructions_that_llvm_does_not_know_are_told() -> None:
+    pytest.importorskip("llvmlite")
+    try:
+        register(replace(versin(1.0), llvm=("{r} = sinus {t} {0}",)))
+        x = cg.variable("x")
+        with pytest.raises(ValueError, match=r"LLVM refuses instructions, .* error: .* = sinus double"):
+            cg.compile(cg.Graph([x], {"y": cg.versin(x)}))([0.3])
+    finally:
+        for table in (OPS, ROWS):
+            table.pop("versin", None)
+
+
 def test_a_graph_is_not_read_without_the_row_of_its_operation(monkeypatch: pytest.MonkeyPatch) -> None:
     x = cg.variable("x")
     text = pickle.dumps(cg.Graph([x], {"y": cg.tan(x)}))
