@@ -94,7 +94,11 @@ class Host:
 
     def _translated(self, text: str, level: int) -> bytes:
         """An object file of the text. LLVM's own cache wants the text parsed even when it has the object."""
-        module = self._binding.parse_assembly(text, self._binding.create_context())
+        try:
+            module = self._binding.parse_assembly(text, self._binding.create_context())
+        except RuntimeError as error:
+            told = " ".join(str(error).rstrip(" ^\n").split())
+            raise ValueError(f"LLVM refuses instructions, as of an operation's column `llvm`: {told}") from error
         return bytes(self._machine(level).emit_object(module))
 
     def _loaded(self, object_file: bytes) -> Code:

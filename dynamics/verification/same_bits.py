@@ -7,12 +7,14 @@ import ctypes
 import json
 import os
 import pickle
+import re
 import shutil
 import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from functools import partial
 from hashlib import sha256
@@ -22,12 +24,13 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Array, Json, columns
+from cgraph.extend import Array, Json, columns, page_functions
 
 from ..equations.state_equation import normalization, state_equation, state_inputs
 from ..equations.substitute import substitute
 from ..integrators.elementwise import weighted
 from ..integrators.tableau import RK4
+from ..scenes.python_model import is_python, python_model
 from ..scenes.scenes import Scene
 from ..simulation.simulate import prepare
 from ..systems.arguments import TIME
@@ -36,6 +39,7 @@ STEP = 2.0**-10  # s: with it times are exact
 STEPS, EVERY = 1000, 100  # steps, and of how many the last state counts
 COMPILERS = ("cc", "gcc", "clang")
 FLAGS = ("-std=c99", "-O2", "-shared", "-fPIC")
+NEAR = 1e-6  # relative: far above rounding, and below a wrong formula
 PATIENCE = 300.0  # s that another program may take
 LIBRARY, OWN = "C library", "WebAssembly"  # whose sine, exponential, ..
 NODE = {"baseline compiler": "--liftoff-only", "optimizing compiler": "--no-liftoff"}
@@ -111,13 +115,15 @@ class SameBits:
         return {"passed": self.passed, **asdict(self)}
 
 
-def same_bits(scene: Scene, page: Scene | None = None) -> SameBits:
+def same_bits(scene: Scene, page: Scene | None = None, source: str = "") -> SameBits:
     """Compute one motion of a scene in every way that there is here, and compare the bits.
 
     page: the scene that the live page shows of it, where that has more parameters, and so another digest.
+    source: the model's name, FILE.py:NAME, where it is a model of Python, whose operations another process registers.
 
     Fused products are off, as by `fma=False`: which products a compiler fuses is its choice. Raises ValueError for a
-    motion that does not stay finite, and as `state_equation` does.
+    motion that does not stay finite, for a row whose `javascript` is another function than its `scalar`, and as
+    `state_equation` does.
 
     Examples
     --------
@@ -126,7 +132,7 @@ def same_bits(scene: Scene, page: Scene | None = None) -> SameBits:
     >>> {way.name: way.same for way in same_bits(dyn.scenes.load("spring_mass")).ways}["batch"]
     True
     """
-    motion = _Motion(scene)
+    motion = _Motion(scene, source)
     found: list[tuple[str, str, str]] = []
     left_out: list[str] = []
     for name, run in motion.ways():
@@ -155,8 +161,8 @@ class NotRunError(Exception):
 class _Motion:
     """The steps of a scene's motion and its start."""
 
-    def __init__(self, scene: Scene) -> None:
-        self.scene = scene
+    def __init__(self, scene: Scene, source: str = "") -> None:
+        self.scene, self.source = scene, source
         self.rate, self.start = _rate_and_start(scene)
         self.states = len(self.rate.outputs)
         self.step, self.carry = _step(self.rate)
@@ -215,7 +221,8 @@ class _Motion:
         return found.pop() if len(found) == 1 else "differs among threads"
 
     def _process(self) -> str:
-        asked = pickle.dumps((self.step, self.carry, self.start, self.states, "auto"))
+        motion = pickle.dumps((self.step, self.carry, self.start, self.states, "auto"))
+        asked = pickle.dumps((self.source if is_python(self.source) else "", motion))
         code = f"from {__name__} import other_process; other_process()"
         return _run(
             [sys.executable, "-c", code], asked, {"PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
@@ -226,10 +233,12 @@ class _Motion:
         if compiler is None:
             raise NotRunError(f"none of {', '.join(COMPILERS)} is installed")
         with tempfile.TemporaryDirectory() as folder:
-            source, _ = cg.to_c(self.rate, "motion", {"rk4": RK4}, time=TIME).write(folder)
+            with _left_out(ValueError):  # an operation without a text in C
+                source, _ = cg.to_c(self.rate, "motion", {"rk4": RK4}, time=TIME).write(folder)
             library = Path(folder, "motion.so")
-            _run([compiler, *FLAGS, str(source), "-o", str(library), "-lm"])
-            steps = ctypes.CDLL(str(library)).motion_rk4
+            _run([compiler, *FLAGS, source.name, "-o", library.name, "-lm"], folder=folder)
+            with _left_out(OSError):  # a function that no library has
+                steps = ctypes.CDLL(str(library)).motion_rk4
             steps.argtypes, steps.restype = [ctypes.c_void_p, ctypes.c_double, ctypes.c_ulong], None
             x, rows = np.array(self.start), []
             for _ in range(STEPS // EVERY):
@@ -266,16 +275,40 @@ def _in_node(rate: Graph, start: list[float], option: str) -> str:
     node = shutil.which("node")
     if node is None:
         raise NotRunError("node is not installed")
-    module = base64.b64encode(cg.to_wasm(rate, {"rk4": RK4}, time=TIME)).decode()
+    _check_javascript(rate, node)
+    with _left_out(ValueError):  # a function that no page has
+        script = _SCRIPT.replace("MATH", page_functions(rate))
+        module = base64.b64encode(cg.to_wasm(rate, {"rk4": RK4}, time=TIME)).decode()
     shape = {"states": len(rate.outputs), "h": STEP, "rows": STEPS // EVERY, "n": EVERY}
     asked = json.dumps({"module": module, "x": start} | shape).encode()
-    return _digest(np.frombuffer(bytes.fromhex(_run([node, option, "-e", _SCRIPT], asked)), dtype="<f8"))
+    return _digest(np.frombuffer(bytes.fromhex(_run([node, option, "-e", script], asked)), dtype="<f8"))
 
 
+def _check_javascript(rate: Graph, node: str) -> None:
+    """Raise ValueError where the column `javascript` is not the function of `scalar` at a sample."""
+    rows = dict.fromkeys([columns(each.op) for each in rate.nodes if each.args and columns(each.op).own_javascript])
+    if not rows:
+        return
+    asked = json.dumps([[op.javascript, op.samples] for op in rows]).encode()
+    found = map(float, _run([node, "-e", _VALUES_SCRIPT], asked).split())
+    for op in rows:
+        values = [op.scalar(*sample) for sample in op.samples]
+        allowed = NEAR * max(map(abs, values))
+        for sample, value, other in zip(op.samples, values, found, strict=False):
+            if not abs(value - other) <= allowed:
+                at = ", ".join([f"{name}={x:g}" for name, x in zip(op.parameters, sample, strict=True)])
+                raise ValueError(f"operation {op.name!r}: at {at} scalar is {value:.6g} and javascript {other:.6g}")
+
+
+_VALUES_SCRIPT = """\
+const asked = JSON.parse(require("fs").readFileSync(0, "utf8"));
+const values = ([text, samples]) => samples.map((sample) => String(eval(`(${text})`)(...sample)));
+console.log(asked.flatMap(values).join(" "));
+"""
 _SCRIPT = """\
 const asked = JSON.parse(require("fs").readFileSync(0, "utf8"));
 const module = new WebAssembly.Module(Buffer.from(asked.module, "base64"));
-const exports = new WebAssembly.Instance(module, { math: Math }).exports;
+const exports = new WebAssembly.Instance(module, { math: MATH }).exports;
 const x = new Float64Array(exports.memory.buffer, 0, asked.x.length);
 x.set(asked.x);
 for (let row = 0; row < asked.rows; row++) {
@@ -291,16 +324,29 @@ def rows_of(step: Graph, carry: dict[str, str], start: list[float], states: int,
 
 
 def other_process() -> None:
-    """In another process: print the digest of what standard input asks for."""
-    asked = pickle.loads(sys.stdin.buffer.read())  # noqa: S301  # from the process that started this one
-    sys.stdout.write(_digest(rows_of(*asked)))
+    """In another process: print the digest of what standard input asks for, with the operations that a model adds."""
+    source, motion = pickle.loads(sys.stdin.buffer.read())  # noqa: S301  # from the process that started this one
+    if source:
+        python_model(source)
+    sys.stdout.write(_digest(rows_of(*pickle.loads(motion))))  # noqa: S301  # as above
 
 
 def _digest(rows: Array) -> str:
     return sha256(np.ascontiguousarray(rows, dtype="<f8").tobytes()).hexdigest()[:32]
 
 
-def _run(command: list[str], given: bytes = b"", environment: dict[str, str] | None = None) -> str:
+@contextmanager
+def _left_out(*errors: type[Exception]) -> Iterator[None]:
+    """Raise NotRunError in place of these."""
+    try:
+        yield
+    except errors as error:
+        raise NotRunError(str(error)) from error
+
+
+def _run(
+    command: list[str], given: bytes = b"", environment: dict[str, str] | None = None, folder: str | None = None
+) -> str:
     try:
         done = subprocess.run(
             command,
@@ -309,13 +355,20 @@ def _run(command: list[str], given: bytes = b"", environment: dict[str, str] | N
             check=False,
             timeout=PATIENCE,
             env=os.environ | (environment or {}),
+            cwd=folder,
         )
     except subprocess.TimeoutExpired:
         raise NotRunError(f"{Path(command[0]).name} was not done after {PATIENCE:g} s") from None
     if done.returncode:
-        last = done.stderr.decode(errors="replace").strip().splitlines()[-1:]
-        raise NotRunError(f"{Path(command[0]).name} failed: {' '.join(last)}")
+        raise NotRunError(f"{Path(command[0]).name} failed: {_reason(done.stderr.decode(errors='replace'))}")
     return done.stdout.decode()
+
+
+def _reason(text: str) -> str:
+    """The line that has the error: of Python and Node.js the last such as `TypeError: ..`, of a compiler the first."""
+    raised = re.findall(r"^[\w.]*Error: .*", text, re.MULTILINE)
+    compiled = re.findall(r"^.*\berror: .*", text, re.MULTILINE)
+    return next(iter([*raised[-1:], *compiled, *text.strip().splitlines()[-1:]]), "it said nothing")
 
 
 def _step(rate: Graph) -> tuple[Graph, dict[str, str]]:

@@ -56,7 +56,8 @@ def _bits(scene: dyn.scenes.Scene, options: argparse.Namespace) -> int:
     if moving is not scene:
         say(f"{scene.name}: {library.rest_text(scene, moving)}")
     page = library.adjustable(moving)
-    found = library.same_bits(moving, None if page.model is moving.mechanism or page is moving else page)
+    shown = None if page.model is moving.mechanism or page is moving else page
+    found = library.same_bits(moving, shown, options.scene)
     answer(unless_json(options, {"scene": scene.name} | found.to_dict(), found))
     if found.passed:
         return 0

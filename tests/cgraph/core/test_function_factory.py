@@ -75,6 +75,29 @@ def test_a_wrong_number_of_arguments_is_told() -> None:
         ),
         ({"name": "sine", "array": lambda x: 1.0 + np.sin(x)}, "at x=0.3 scalar is 0.29552 and array 1.29552"),
         ({"name": "sine", "array": math.sin}, "'sine': array must take and give arrays"),
+        ({"name": "sine", "python": "({0}*{0})"}, "at x=0.3 scalar is 0.29552 and python 0.09"),
+        ({"name": "sine", "numpy": "np.cos({0})"}, "at x=0.3 scalar is 0.29552 and numpy 0.955336"),
+        (
+            {"name": "sine", "python": "sinus({0})"},
+            "python must be an expression of Python: 'sinus.x0.' raises NameError",
+        ),
+        ({"name": "sine", "numpy": "np.sin({0}"}, "numpy must be an expression of Python: .* raises SyntaxError"),
+        ({"name": "sine", "python": "sin({1})"}, "'sine': python has the places .0., got 'sin.*1"),
+        ({"name": "sine", "llvm": ("{y} = fneg {t} {0}",)}, "'sine': llvm has the places .0., .r., .t..*, got '.y. = "),
+        (
+            {"name": "sine", "interval": lambda x: (0.0, 0.1)},
+            "x=0.3 scalar is 0.29552, and for x in .0.3, 0.3. the interval",
+        ),
+        (
+            {"name": "sine", "interval": lambda x: (1.0, -1.0)},
+            "interval must give low <= high, got .1, -1. for x in .0.3, 0",
+        ),
+        ({"name": "sine", "interval": lambda x: (math.nan, 1.0)}, "interval must give low <= high"),
+        ({"name": "sine", "interval": lambda x: 1.0}, "interval must give two numbers for x in .0.3, 0.3."),
+        (  # right at every point, and not between two
+            {"name": "sine", "interval": lambda x: (math.sin(x[0]), math.sin(x[0]))},
+            "x=0.3 scalar is 0.29552, and for x in .-2, 0.3. the interval",
+        ),
         ({"name": "sine", "arguments": "x y"}, "takes 1 argument.s., got the names 'x y'"),
         ({"name": "sine", "samples": ()}, "needs samples of 1 number.s. each"),
         ({"name": "sine", "samples": ((1.0, 2.0),)}, "needs samples of 1 number.s. each, got .*2.0"),
@@ -113,6 +136,18 @@ def test_a_row_of_ones_own_can_be_replaced_and_earlier_graphs_keep_theirs() -> N
         both = cg.Graph([x], {"y": graph.outputs["y"] + again.outputs["y"]})
         with pytest.raises(cg.GraphError, match="two operations called 'versin'"):
             cg.compile(both, "python")
+    finally:
+        for table in (OPS, ROWS):
+            table.pop("versin", None)
+
+
+def test_instructions_that_llvm_does_not_know_are_told() -> None:
+    pytest.importorskip("llvmlite")
+    try:
+        register(replace(versin(1.0), llvm=("{r} = sinus {t} {0}",)))
+        x = cg.variable("x")
+        with pytest.raises(ValueError, match=r"LLVM refuses instructions, .* error: .* = sinus double"):
+            cg.compile(cg.Graph([x], {"y": cg.versin(x)}))([0.3])
     finally:
         for table in (OPS, ROWS):
             table.pop("versin", None)
