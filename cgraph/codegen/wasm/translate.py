@@ -91,7 +91,7 @@ class Body:
             case ast.Expr(value):
                 self.expression(value)
             case _:
-                raise NotImplementedError(f"no WebAssembly for this text of an operation: {ast.unparse(node):.60}")
+                raise _untold(node)
 
     def condition(self, node: ast.expr) -> None:
         """Instructions that leave an integer of 32 bits, not 0 where the condition holds."""
@@ -143,7 +143,7 @@ class Body:
             case ast.Call(ast.Name(name), arguments):
                 self._call(name, arguments)
             case _:
-                raise NotImplementedError(f"no WebAssembly for this text of an operation: {ast.unparse(node):.60}")
+                raise _untold(node)
 
     def _call(self, name: str, arguments: list[ast.expr]) -> None:
         if name in ("load", "store", "word"):  # of an address and, at the end, its offset
@@ -191,3 +191,7 @@ class Body:
             case ast.Call(ast.Name(name)):
                 return (ins.INTRINSICS[name][1],)
         return (0,)
+
+
+def _untold(node: ast.AST) -> NotImplementedError:
+    return NotImplementedError(f"no WebAssembly for this text of an operation: {ast.unparse(node):.60}")

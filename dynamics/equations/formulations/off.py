@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import NamedTuple
 
@@ -30,15 +31,20 @@ class Off(NamedTuple):
         return f"Off are {self.torques} of {counted(self.of_torques, 'torque')} and {slopes}."
 
 
-def off_at(terms: Graph | None, at: Mapping[str, float], torques: int, of_torques: int) -> Off:
-    """The count at a state.  terms: what each torque is off by.  torques: how many of how many are off."""
-    if terms is None:
-        return Off(0, of_torques, 0, 2 * of_torques**2)
-    state = [name for name in terms.input_names if name.startswith("q") and name.strip("qd").isdecimal()]
-    slopes = cg.jacobian(terms, wrt=state)
-    if not torques:
-        return Off(0, of_torques, 0, len(slopes.outputs))
+def off_at(graph: Graph, terms: Graph | None, at: Mapping[str, float], torques: int) -> Off:
+    """The count at a state.  graph: the torques.  terms: what each is off by.  torques: how many are off."""
+    state = [name for name in map(_coordinate, graph.input_names) if name]
+    of_torques = sum([name.startswith("tau") for name in graph.outputs])
+    if terms is None or not torques:
+        return Off(0, of_torques, 0, of_torques * len(state))
+    slopes = cg.jacobian(terms, wrt=[name for name in state if name in terms.input_names])
     known = {name: at.get(name, 1.0) for name in slopes.input_names}  # of what no torque uses any number
     digits, values = extend.certain_digits(slopes, known), slopes.evaluate(known)
     wrong = [name for name, value in values.items() if value and digits[name] >= 1.0]
-    return Off(torques, of_torques, len(wrong), len(slopes.outputs))
+    return Off(torques, of_torques, len(wrong), of_torques * len(state))
+
+
+def _coordinate(name: str) -> str:
+    """Name of the coordinate or velocity, after the step, that an input is one of; empty for any other input."""
+    found = re.fullmatch(r"(qd?\d+)(?:_old)?", name)
+    return found[1] if found else ""

@@ -133,9 +133,7 @@ rate, which cancels the -dL/dq of Lagrange's equation.
     @cached_property
     def off(self) -> Off:
         """How many torques and slopes d tau / d(q, qd) are off at `at`: 0 where nothing differs."""
-        return off_at(
-            self.terms, self.at, len(self.excess), len([name for name in self.graph.outputs if name.startswith("tau")])
-        )
+        return off_at(self.graph, self.terms, self.at, len(self.excess))
 
     def excess_at(self, at: Mapping[str, float]) -> dict[str, float]:
         """{"tau1": what it is off by} at a state, of the outputs where that is not 0, as dt tends to 0.

@@ -18,6 +18,7 @@ from dynamics.equations.formulations.lagrange_terms import THROUGH_STEP, torques
 from dynamics.equations.formulations.step_state import after_step, before_step
 from dynamics.equations.formulations.verdict import HOW
 from tests import high_precision
+from tests.dynamics.mechanisms import floating, random_mechanism
 from tests.slow import slow
 from viz import cli
 
@@ -263,3 +264,13 @@ def test_a_verdict_takes_the_names_that_it_prints():
     assert again.excess == verdict.excess
     with raises(cg.GraphError, match=r"there is no q\.elbow"):
         dyn.formulation_verdict(dyn.scenes.load("triple_pendulum"), "by_definition", {"q.elbow": 1.0})
+
+
+@mark.parametrize("formulation", dyn.FORMULATIONS)
+def test_what_is_counted_as_off_is_among_the_slopes_that_a_model_has(formulation: str) -> None:
+    """Of a free body on, as it has more coordinates than velocities, and of one that the formulations agree on."""
+    for model in (floating("free", random_mechanism(1, ["revolute"], 1)), random_mechanism(2, ["prismatic"], 1)):
+        system, verdict = dyn.as_system(model), dyn.formulation_verdict(model, formulation)
+        counted = verdict.off
+        assert counted[1::2] == (system.n, system.n * (system.nq + system.n))
+        assert (counted.torques > 0) == (counted.slopes > 0) == verdict.differs
