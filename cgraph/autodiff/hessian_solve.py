@@ -15,6 +15,7 @@ from ..core.scope import building
 from ..core.traversal import topological
 from ..util.explain_failure import explain_failure
 from ..util.require import require_choice, require_flag, require_graph, require_sequence
+from .balanced_elimination import BalancedElimination, written_rows
 from .elimination_order import EliminationStep, elimination_steps, nodes_of
 from .schur_elimination import EdgePushing
 
@@ -130,10 +131,6 @@ def solve_nodes(
     build = build or Builder()
     equations = _solved(output, wrt, rhs, build, at or {}, multipliers, order)
     x = [equations.dots[node] for node in wrt]
-    if order == "balanced":
-        from .balanced.running_sums import balanced
-
-        x = balanced(x, build)
     if check:
         with building(build) as set_label:
             set_label(output.label.derived(ADJOINT))
@@ -183,8 +180,6 @@ def _solved(
         passed = equations.arguments(_rows(output, multipliers, wrt))
         plan = elimination_steps(passed, equations.rotations)
     if order == "balanced":
-        from .balanced.elimination import BalancedElimination, written_rows
-
         if multipliers:
             raise ValueError('order "balanced" needs a function without multipliers')
         fewest = elimination_steps(passed, equations.rotations, fewest=True)

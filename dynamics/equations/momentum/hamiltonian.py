@@ -152,8 +152,7 @@ def _equations(system: System, iterations: int, check: bool, order: Order) -> Gr
     outputs |= {f"p{i}_dot": node for i, node in enumerate(moved[system.nq :])}
     if check:
         outputs |= _missing(transform)
-    graph = cg.simplify(system.graph(outputs, system.q, transform.p, system.tau))
-    return cg.balanced_sums(graph) if order == "balanced" else graph
+    return cg.simplify(system.graph(outputs, system.q, transform.p, system.tau))
 
 
 def _missing(transform: Legendre) -> dict[str, Node]:

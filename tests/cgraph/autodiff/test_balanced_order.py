@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import cgraph as cg
-from cgraph.autodiff.balanced import dissection
+from cgraph.autodiff import nested_dissection as dissection
 from cgraph.autodiff.hessian_solve import solve_nodes
 from cgraph.autodiff.jacobian import hessian_nodes
 from cgraph.autodiff.symmetric_elimination import SingularError

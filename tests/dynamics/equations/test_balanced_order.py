@@ -10,7 +10,7 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
-from cgraph.autodiff.balanced import dissection
+from cgraph.autodiff import nested_dissection as dissection
 from cgraph.extend import solve_nodes
 from dynamics import as_system
 from dynamics.experiments.speed.bench_scenes import chain

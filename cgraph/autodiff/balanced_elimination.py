@@ -17,13 +17,13 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from heapq import heapify, heappop, heappush
 from typing import NamedTuple
 
-from ...core.builder import Builder
-from ...core.node import Node, as_node, variable
-from ..elimination_order import EliminationStep, nodes_of
-from ..schur_elimination import ONE, EdgePushing
-from ..symmetric_elimination import PivotRow
-from ..symmetric_matrix import ZERO, SymmetricMatrix
-from .dissection import Piece, dissect
+from ..core.builder import Builder
+from ..core.node import Node, as_node, variable
+from .elimination_order import EliminationStep, nodes_of
+from .nested_dissection import Piece, dissect
+from .schur_elimination import ONE, EdgePushing
+from .symmetric_elimination import PivotRow
+from .symmetric_matrix import ZERO, SymmetricMatrix
 
 
 class Copy(NamedTuple):
