@@ -52,9 +52,9 @@ def hessian_solve(
     order : {"recursive", "balanced"}
         "recursive": from the output down, for a chain or a tree from its tips to its base, one after another: the
         fewest nodes, and a depth in proportion to the length of a chain. "balanced": by nested dissection, halves of a
-        chain at the same time, seen from their two ends only, and long sums in blocks (`cg.balanced_sums`): a depth in
-        proportion to the logarithm, for about twice the nodes, three times where a link has few; where it is not
-        shallower, the recursive order stays. Pieces are eliminated with the inertia that they have by themselves: a
+        chain at the same time, seen from their two ends only: a depth in proportion to the logarithm, but for sums
+        along the chain, for about twice the nodes, three times where a link has few; where it is not shallower, the
+        recursive order stays. Pieces are eliminated with the inertia that they have by themselves: a
         body of next to none beside its neighbors costs digits, and with `check` their pivots have to be positive too.
 
     Returns
