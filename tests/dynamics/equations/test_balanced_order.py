@@ -10,7 +10,7 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
-from cgraph.autodiff import nested_dissection as dissection
+from cgraph.autodiff import balanced_elimination
 from cgraph.extend import solve_nodes
 from dynamics import as_system
 from dynamics.experiments.speed.bench_scenes import chain
@@ -80,7 +80,7 @@ def test_it_loses_no_digits() -> None:
 def equal_by_both_orders(model: Any, leaf: float, seed: int = 1) -> None:
     """In pieces of so many variables."""
     for derive in (dyn.forward_dynamics, dyn.hamilton_equations):
-        with patch.object(dissection, "LEAF", leaf):
+        with patch.object(balanced_elimination, "LEAF", leaf):
             graphs = [derive(model, method) for method in ("recursive", "balanced")]
         at = point(model, graphs, seed)
         first, second = (values(graph, at, "qdd" if derive is dyn.forward_dynamics else "") for graph in graphs)
