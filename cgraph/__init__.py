@@ -6,7 +6,6 @@ from .util.version import __version__ as __version__
 TYPE_CHECKING = False  # as a checker knows it; typing takes a while to load
 
 if TYPE_CHECKING:
-    from .autodiff.balanced.running_sums import balanced_sums as balanced_sums
     from .autodiff.hessian_solve import hessian_solve as hessian_solve
     from .autodiff.jacobian import hessian as hessian, jacobian as jacobian
     from .autodiff.products import gradient as gradient, jvp as jvp, vjp as vjp
@@ -70,7 +69,6 @@ if TYPE_CHECKING:
     from .program.functions.compile import compile as compile
     from .program.functions.compiled import Compiled as Compiled
     from .program.loop import loop as loop
-    from .simplification.double_double import double_double as double_double
     from .simplification.simplify import simplify as simplify, specialize as specialize
     from .util.caches import clear_caches as clear_caches
     from .writing.counts import Counts as Counts

@@ -9,10 +9,6 @@ if TYPE_CHECKING:
 
     from . import scenes as scenes
     from .equations.constraints.constraint_rank import ConstraintWarning as ConstraintWarning
-    from .equations.constraints.integrability import (
-        integrable_rows as integrable_rows,
-        lint_constraints as lint_constraints,
-    )
     from .equations.coriolis import coriolis as coriolis
     from .equations.energies import (
         energy as energy,

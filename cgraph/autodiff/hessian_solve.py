@@ -15,6 +15,7 @@ from ..core.scope import building
 from ..core.traversal import topological
 from ..util.explain_failure import explain_failure
 from ..util.require import require_choice, require_flag, require_graph, require_sequence
+from .balanced_elimination import BalancedElimination, written_rows
 from .elimination_order import EliminationStep, elimination_steps, nodes_of
 from .schur_elimination import EdgePushing
 
@@ -51,9 +52,9 @@ def hessian_solve(
     order : {"recursive", "balanced"}
         "recursive": from the output down, for a chain or a tree from its tips to its base, one after another: the
         fewest nodes, and a depth in proportion to the length of a chain. "balanced": by nested dissection, halves of a
-        chain at the same time, seen from their two ends only, and long sums in blocks (`cg.balanced_sums`): a depth in
-        proportion to the logarithm, for about twice the nodes, three times where a link has few; where it is not
-        shallower, the recursive order stays. Pieces are eliminated with the inertia that they have by themselves: a
+        chain at the same time, seen from their two ends only: a depth in proportion to the logarithm, but for sums
+        along the chain, for about twice the nodes, three times where a link has few; where it is not shallower, the
+        recursive order stays. Pieces are eliminated with the inertia that they have by themselves: a
         body of next to none beside its neighbors costs digits, and with `check` their pivots have to be positive too.
 
     Returns
@@ -130,10 +131,6 @@ def solve_nodes(
     build = build or Builder()
     equations = _solved(output, wrt, rhs, build, at or {}, multipliers, order)
     x = [equations.dots[node] for node in wrt]
-    if order == "balanced":
-        from .balanced.running_sums import balanced
-
-        x = balanced(x, build)
     if check:
         with building(build) as set_label:
             set_label(output.label.derived(ADJOINT))
@@ -183,8 +180,6 @@ def _solved(
         passed = equations.arguments(_rows(output, multipliers, wrt))
         plan = elimination_steps(passed, equations.rotations)
     if order == "balanced":
-        from .balanced.elimination import BalancedElimination, written_rows
-
         if multipliers:
             raise ValueError('order "balanced" needs a function without multipliers')
         fewest = elimination_steps(passed, equations.rotations, fewest=True)

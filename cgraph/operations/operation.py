@@ -80,9 +80,6 @@ class Op(Row):
         Of a sum, the sign of each argument. Default: no sum.
     fold : callable
         Of the arguments' nodes: the simpler node that stands for the operation on them, or None. Default none.
-    double_double : callable
-        Of pairs (hi, lo) of nodes: the pair of the result, or None. Default float64's value of the high parts, and the
-        low parts through the partials.
     domain : tuple of (float, float)
         For each argument an interval well inside, from which tests draw. Default half to 3/2 times the samples.
     interval : callable
@@ -145,7 +142,6 @@ class Op(Row):
     mathml: MathML | None = None
     # algebra
     signs: tuple[int, ...] = ()
-    double_double: Callable[..., Any] | None = None
     # bounds and errors
     domain: tuple[Interval, ...] = ()
     interval: Callable[..., Interval] | None = None

@@ -1,1 +1,1 @@
-"""Simplification: how derived nodes are built, graphs made smaller, and arithmetic of twice the digits."""
+"""Simplification: how derived nodes are built, and graphs made smaller."""

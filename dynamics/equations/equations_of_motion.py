@@ -151,9 +151,9 @@ def forward_dynamics(model: Model, method: str = "auto", *, check: bool = False)
         "recursive": elimination on the graph of L without forming M (`cg.hessian_solve`); for a tree of bodies the
         number of nodes is linear in n. "dense": M factored as LDL^T; smaller for some short arms, and less accurate
         where masses or lengths differ by decades. "auto": recursive, but up to 7 coordinates dense where that saves
-        more than a tenth of the nodes. "balanced": elimination of halves of a chain at the same time, and long sums in
-        blocks, so that of a planar chain the depth is O(log n), for about twice the nodes (`cg.hessian_solve`); not
-        with constraints.
+        more than a tenth of the nodes. "balanced": elimination of halves of a chain at the same time, so that of
+        the depth of a planar chain about an operation a link is left, for up to twice the nodes (`cg.hessian_solve`);
+        not with constraints.
     check : bool
         One more output, `info`: 0 where M is positive definite, else 1 + the index of the coordinate whose inertia
         is zero or negative after elimination; the accelerations mean nothing there. `raise_if_singular` raises on it.

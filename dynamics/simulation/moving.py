@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Array, kept_by_first, or_nearest, scipy_module
+from cgraph.extend import Array, kept_by_first, or_nearest
 
 from ..equations.state_equation import state_inputs
 from ..equations.states.initial_value import other_inputs, start_state
@@ -54,8 +54,6 @@ class Applied:
         """
         if self.controller is None:
             return None
-        if options.scipy_solver is not None:
-            raise ValueError(f"method {options.method!r} does not end its steps with periods: take one of dyn.METHODS")
         if options.direction < 0.0:
             raise ValueError("a SampledController holds what it has seen, so that t_end has to be later than t0")
         observed = None if problem.velocities is None else _compiled(problem.velocities, options.backend)
@@ -88,20 +86,13 @@ def with_applied(model: Model, tau: Any, parameters: Mapping[str, Any] | None) -
     return moving, Applied(moving, constant, forces)
 
 
-def check_varied(model: Equations, tau: Tau, options: RunOptions, varied: Sequence[str]) -> None:
-    """Raise for parameters that cannot be varied, and ImportError for a solver of SciPy, where there is no SciPy.
-
-    The parameters of a controller that is a function are those that a run gives it.
-    """
-    if varied and (isinstance(tau, SampledController) or options.scipy_solver is not None):
-        raise ValueError(
-            f"varied = {varied} needs one of dyn.METHODS, and no SampledController, which holds its forces"
-        )
+def check_varied(model: Equations, tau: Tau, varied: Sequence[str]) -> None:
+    """Raise for parameters that cannot be varied. Those of a controller that is a function are what a run gives it."""
+    if varied and isinstance(tau, SampledController):
+        raise ValueError(f"varied = {varied} cannot be with a SampledController, which holds its forces")
     if unknown := [name for name in varied if name not in model.parameters and not callable(tau)]:
         known = or_nearest(unknown[0], list(model.parameters))
         raise ValueError(f"varied: the system has no parameter {unknown[0]!r:.80}; {known}")
-    if options.scipy_solver is not None:
-        scipy_module("integrate", f"method {options.method!r}")
 
 
 def values_key(parameters: Mapping[str, Any]) -> Any:

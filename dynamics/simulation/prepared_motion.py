@@ -219,8 +219,7 @@ class PreparedMotion(HoldsNodes):
         Raises
         ------
         TypeError, ValueError
-            As of `simulate`, and for a motion with events, a sampled controller, momenta, `max_steps`, or by one of
-            SciPy's solvers.
+            As of `simulate`, and for a motion with events, a sampled controller, momenta, or `max_steps`.
 
         Examples
         --------
@@ -239,7 +238,7 @@ class PreparedMotion(HoldsNodes):
         moving = self._moving(parameters)
         if not self._steps(moving):
             raise ValueError(
-                "single steps are of motions without events, sampled controllers, max_steps and SciPy's solvers, in "
+                "single steps are of motions without events, sampled controllers and max_steps, in "
                 'form="velocity": call the motion, which gives its rows'
             )
         x = self._start(moving, q, qd, t0, t0 + 1.0 if t_end is None else t_end, parameters)
@@ -256,15 +255,9 @@ class PreparedMotion(HoldsNodes):
             integration_of(moving.stepped, options, zeros, hold, events=moving.events, between=between)
 
     def _steps(self, moving: Moving) -> bool:
-        """Whether the motion's steps are ours alone, with nothing done between them."""
-        options = self._options
-        return not (
-            self._events
-            or moving.applied.controller is not None
-            or options.scipy_solver is not None
-            or moving.stepped.momenta
-            or options.max_steps < math.inf
-        )
+        """Whether nothing is done between the motion's steps."""
+        watched = self._events or moving.applied.controller is not None
+        return not (watched or moving.stepped.momenta or self._options.max_steps < math.inf)
 
     def _native(self, moving: Moving) -> NativeIntegration:
         """A memory in which motions run by steps alone."""

@@ -27,8 +27,6 @@ ERROR_BOUND = 1e-3  # of the estimated error of equal steps, relative
 TABLES = 3  # that the rows are in at most at once, while they are put together
 SMALL_MEMORY = 2.0**24  # bytes, below which nobody asks how many are free
 MEMORY_SHARE = 0.9  # of the free memory
-SCIPY = "scipy:"
-SCIPY_SOLVERS = ("Radau", "BDF", "LSODA", "DOP853", "RK45")
 
 
 @dataclass(frozen=True)
@@ -90,8 +88,7 @@ class RunOptions:
                 )
         self._check_tolerances()
         self._check_estimate()
-        if not require_flag("fma", self.fma) and self.scipy_solver is not None:
-            raise ValueError(f"fma=False is about the steps of dyn.METHODS, and {self.method!r} is SciPy's")
+        require_flag("fma", self.fma)
         most = real_number("max_steps", self.max_steps)
         if not (most >= 1.0 and (most == math.inf or most == int(most))):
             raise ValueError(f"max_steps must be a whole number, at least 1, or infinite, got {self.max_steps!r}")
@@ -134,15 +131,10 @@ class RunOptions:
         """Whether runs beside the main one estimate the error."""
         return not self.adaptive and self.estimate_error is not False
 
-    @property
-    def scipy_solver(self) -> str | None:
-        """The name of SciPy's solver; None for a method of `METHODS`."""
-        return self.method.removeprefix(SCIPY) if self.method.startswith(SCIPY) else None
-
     @cached_property
     def adaptive(self) -> bool:
         """Whether the method chooses its steps."""
-        return self.scipy_solver is not None or METHODS[self.method].adaptive
+        return METHODS[self.method].adaptive
 
     @property
     def integrator(self) -> Method:
@@ -241,15 +233,12 @@ def span(t0: float, t_end: float, t_eval: ArrayLike | None) -> dict[str, Any]:
 def check_method(method: str) -> None:
     """Raises TypeError or ValueError for what is no method."""
     if not isinstance(method, str):
-        raise TypeError(f"method must be one of {', '.join(METHODS)} or scipy:..., got {method!r:.60}")
-    if method.startswith(SCIPY):
-        if method.removeprefix(SCIPY) not in SCIPY_SOLVERS:
-            raise ValueError(f"SciPy's methods are {', '.join(SCIPY + name for name in SCIPY_SOLVERS)}, got {method!r}")
-    elif method not in METHODS:
+        raise TypeError(f"method must be one of {', '.join(METHODS)}, got {method!r:.60}")
+    if method not in METHODS:
         if method.startswith("gauss"):
             raise ValueError(f"Gauss methods are gauss2, gauss4, .. up to gauss{2 * MOST_STAGES}, got {method!r:.60}")
         near = " or ".join(map(repr, nearest(method, METHODS)))
-        hint = f"did you mean {near}?" if near else f"there are {', '.join(METHODS)} and scipy:..."
+        hint = f"did you mean {near}?" if near else f"there are {', '.join(METHODS)}"
         raise ValueError(f"there is no method {method!r:.60}; {hint}")
 
 

@@ -70,10 +70,9 @@ def simulate(
         Where the run ends [s], before t0 for a run back in time.
     method : str
         A name of `dyn.METHODS`. Steps chosen by error: "dop853", "dopri5", and for stiff systems "rodas", "radau";
-        equal steps: "rk4", "euler" and the symplectic "verlet", "midpoint", "gauss4", ... With SciPy, "scipy:Radau",
-        "scipy:BDF", "scipy:LSODA", "scipy:DOP853", "scipy:RK45". With ball and free joints and constraints the
-        symplectic ones step the state, which keeps what is quadratic in it, as a free rotor's energy; "verlet" and
-        "symplectic_euler" cannot.
+        equal steps: "rk4", "euler" and the symplectic "verlet", "midpoint", "gauss4", ... With ball and free joints and
+        constraints the symplectic ones step the state, which keeps what is quadratic in it, as a free rotor's energy;
+        "verlet" and "symplectic_euler" cannot.
     t0 : float
         Where the run starts [s].
     t_span : array_like, optional
@@ -88,10 +87,9 @@ def simulate(
         one for each of q and then qd. By default 1e-9, and for atol rtol times the largest value that the
         component has had so far, or a ten-thousandth of the largest coordinate or velocity, in whatever unit: of a
         mechanism an angle counts as the way that it moves its bodies by. All entries of a quaternion are as large as 1.
-        A jump of a force in time is passed then, as well as a hundredth of the longest of the last steps allows. For
-        SciPy's solvers 1e-10, and a warning where that is more than 1e-4 of the largest component of a kind. Of equal
-        steps the estimated error that is no cause of a warning, relative to the largest of a component over
-        the run; 1e-3 and 0 by default.
+        A jump of a force in time is passed then, as well as a hundredth of the longest of the last steps allows. Of
+        equal steps the estimated error that is no cause of a warning, relative to the largest of a component over the
+        run; 1e-3 and 0 by default.
     t_eval : array_like, optional
         Times from t0 to t_end to record, in this order, (T,) [s]; by default every step. Chosen steps are not changed
         by it.
@@ -188,7 +186,7 @@ def prepare(
     varied : str or iterable of str
         Parameters of the model or of a controller whose values stay open, so that those of a call cost nothing. Values
         of others are built into the machine code, as `simulate` does, and other ones compile anew. Not with a
-        SampledController, nor SciPy's solvers. With a controller that is a function the first call checks the names.
+        SampledController. With a controller that is a function the first call checks the names.
 
     Returns
     -------
@@ -233,6 +231,6 @@ def motion_of(
     if not (callable(tau) or isinstance(tau, float | SampledController)):
         other_inputs(equations, tau)
     names = require_sequence("varied", [varied] if isinstance(varied, str) else varied, "names of parameters", str)
-    check_varied(equations, tau, options, names)
+    check_varied(equations, tau, names)
     dense_output = require_flag("dense_output", dense_output)
     return PreparedMotion(model, options, tau, as_events(events), form, dense_output, names)

@@ -7,7 +7,6 @@ from cgraph.extend import doors
 TYPE_CHECKING = False
 
 if TYPE_CHECKING:
-    from dynamics.equations.constraints.integrability import ConstraintLint
     from dynamics.equations.formulations.formulation_sizes import INERTIAL_TERM, blamed
     from dynamics.equations.formulations.step_state import after_step, before_step
     from dynamics.experiments.benches import BENCHES, SPEED, Bench

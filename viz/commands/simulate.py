@@ -25,12 +25,7 @@ def add(parser: Command) -> None:
     takes_a_start(parser)
     parser.names["methods"] = lambda: dyn.METHODS
     parser.add_argument("--t-end", type=positive, metavar="S", help="how long, in place of the scene's time")
-    parser.add_argument(
-        "--method",
-        default=METHOD,
-        metavar="NAME",
-        help=f"{{methods}}, or a solver of SciPy, as scipy:Radau (default: {METHOD})",
-    )
+    parser.add_argument("--method", default=METHOD, metavar="NAME", help=f"{{methods}} (default: {METHOD})")
     parser.add_argument("--momentum", action="store_true", help=f"step {MOMENTUM_FORM}")
     parser.add_argument("--dt", type=positive, metavar="S", help="the largest of equal steps (default: 0.001)")
     parser.add_argument("--rtol", type=positive, metavar="R", help="relative error of a chosen step (default: 1e-9)")

@@ -74,7 +74,7 @@ def _target(target: ReportData | None) -> str:
     if target is None:
         return "-"
     ratio = "" if target["group"] == "ours" or target["ratio"] is None else f" [{_digits(target['ratio'])}]"
-    name = target["name"].removeprefix("MuJoCo ").removeprefix("scipy:").removeprefix("heyoka ")
+    name = target["name"].removeprefix("MuJoCo ").removeprefix("heyoka ")
     return f"{_time(target['seconds'])} {name}{ratio}"
 
 

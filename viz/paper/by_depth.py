@@ -136,7 +136,8 @@ def _remedy(orders: Mapping[str, Graph]) -> str:
     nodes = {title: len(graph.nodes) for title, graph in orders.items()}
     return (
         "A balanced order of elimination makes the graph parallel: it reduces pieces of the chain to their two ends, all at the "
-        "same time, and joins them in pairs. The depth of either form then grows as the logarithm of the number of links: "
+        "same time, and joins them in pairs. Of the depth of either form there remain one or two operations for each link, "
+        "of the sums along the chain: "
         f"{depths['Lagrange, balanced']} and {depths['Hamilton, balanced']} operations in place of "
         f"{depths['Lagrange, recursive']} and {depths['Hamilton, recursive']}, for "
         f"{nodes['Lagrange, balanced'] / nodes['Lagrange, recursive']:.1f} and "

@@ -149,12 +149,6 @@ class RowNumbers:
         matrix[self._places] = entries
         return matrix
 
-    def finite_matrix(self, point: Mapping[str, float]) -> Array | None:
-        """J; None where it has an entry that is no finite number."""
-        with np.errstate(all="ignore"):
-            matrix = self.matrix(point)
-        return matrix if np.isfinite(matrix).all() else None
-
     def certain_matrix(self, point: Mapping[str, float]) -> Array:
         """J with 0 for entries that are rounding alone."""
         if self.entries is None:

@@ -61,7 +61,7 @@ def accelerations(system: System, method: str = "auto", check: bool = False) -> 
                 break
         try:
             written.append(_solved(form, given, each, check))
-            graphs.append(_simplified(written[-1], each))
+            graphs.append(cg.simplify(written[-1]))
         except SingularError as error:
             failure = error
     if not graphs and failure.index >= system.n:
@@ -143,12 +143,6 @@ def _sizes(system: System, accelerations: Graph) -> dict[str, float]:
 def _cost(nodes: Sequence[Node]) -> int:
     """Nodes, with sines and cosines for what they take."""
     return len(nodes) + TURN * sum([node.op.name in ("sin", "cos") for node in nodes])
-
-
-def _simplified(written: Graph, method: str) -> Graph:
-    """The graph of a method, as it is given on."""
-    graph = cg.simplify(written)
-    return cg.balanced_sums(graph) if method == "balanced" else graph
 
 
 def _solved(system: System, terms: BiasTerms, method: str, check: bool) -> Graph:

@@ -87,8 +87,8 @@ def hamilton_equations(
     Parameters
     ----------
     method : {"recursive", "balanced"}
-        How the velocities are solved for: "recursive", the fewest nodes, or "balanced", with long sums in blocks, which
-        is O(log n) deep for a planar chain and takes more nodes, see `cg.hessian_solve`.
+        How the velocities are solved for: "recursive", the fewest nodes, or "balanced", which takes more nodes and is
+        less deep, see `cg.hessian_solve`.
     iterations : int
         Newton's steps to the velocities where L is not quadratic in them; a good part of the nodes for every one. They
         go downhill on L - p qd, from rest, and reach the velocities of an L that is strictly convex in them: the usual
@@ -152,8 +152,7 @@ def _equations(system: System, iterations: int, check: bool, order: Order) -> Gr
     outputs |= {f"p{i}_dot": node for i, node in enumerate(moved[system.nq :])}
     if check:
         outputs |= _missing(transform)
-    graph = cg.simplify(system.graph(outputs, system.q, transform.p, system.tau))
-    return cg.balanced_sums(graph) if order == "balanced" else graph
+    return cg.simplify(system.graph(outputs, system.q, transform.p, system.tau))
 
 
 def _missing(transform: Legendre) -> dict[str, Node]:

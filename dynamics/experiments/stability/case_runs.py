@@ -15,7 +15,6 @@ from ...equations.state_equation import state_inputs
 from ...integrators import METHODS
 from ...multiprecision import Reference
 from ...multiprecision.solution import from_text
-from ...simulation.run_options import SCIPY
 from ...simulation.simulate import simulate
 from ...simulation.trajectory import Trajectory
 from ...systems.arguments import TIME
@@ -78,7 +77,7 @@ def trajectory(case: StabilityCase, method: str) -> Trajectory:
     """The run of a case."""
     start = case.model, case.q, case.qd or None
     run = partial(simulate, *start, case.t_end, method, max_steps=MOST_STEPS, progress=False)
-    if method.startswith(SCIPY) or METHODS[method].adaptive:
+    if METHODS[method].adaptive:
         return run(rtol=RTOL, atol=case.atol)
     return run(dt=EQUAL_STEPS.get(case.name, {}).get(method), estimate_error=False)  # the error is measured
 

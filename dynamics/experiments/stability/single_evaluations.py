@@ -7,9 +7,6 @@ The sum is what a relative change of each x_j makes of y_i: the componentwise co
 what rounding the data once would do, whatever the algorithm. The derivatives are the graph's own (`cg.jvp`, of an arm
 whose parameters are inputs), the exact values come from Newton-Euler equations in multiprecision.
 
-In double-double the parameters are inputs too. Built in, products of them are rounded when the graph is made, each on
-its own, and then m l_1 l_2, m l_1 and m g no longer belong to one m: with a mass of 1e12 that moves the light links.
-
 Besides, sine and cosine of the backends at random angles of every size, in ulps of the exact value.
 """
 
@@ -45,17 +42,15 @@ SEED = 2025
 
 
 class Task(NamedTuple):
-    """Quantity to evaluate.  doubled: in double-double, see above."""
+    """Quantity to evaluate."""
 
     derive: Callable[..., Graph]
     exact: Callable[..., Pair]
-    doubled: bool = False
 
 
 TASKS = {
     "inverse dynamics": Task(inverse_dynamics, torques),
     "forward dynamics": Task(forward_dynamics, accelerations),
-    "forward dynamics in double-double": Task(forward_dynamics, accelerations, doubled=True),
 }
 
 
@@ -127,10 +122,9 @@ def measurement(family: Family, arms: Arms) -> Measurement:
         qd, third = family.velocity * rng.normal(size=n), 5.0 * rng.normal(size=n)
         exact, point = arms.task.exact(arm, q, qd, third), np.concatenate([q, qd, third])
         size = np.max(np.abs(exact.high) + arms.condition(arm, point))
-        x = arms.with_parameters(arm, point) if arms.task.doubled else point
         for function in functions:
-            lanes = function.batch(np.repeat(x[:, None], LANES, axis=1))
-            for values in (function(x), lanes[:, 0], lanes[:, -1]):
+            lanes = function.batch(np.repeat(point[:, None], LANES, axis=1))
+            for values in (function(point), lanes[:, 0], lanes[:, -1]):
                 error = np.max(np.abs(exact.deviation(values))) / (ULP * size)
                 worst = float(np.maximum(worst, error))  # NaN stays NaN
     why = "of the condition: some operations one after another, each an ulp"
@@ -154,14 +148,8 @@ class Arms:
         self._graph = task.derive(arm_with_parameters(n))
 
     def functions(self, arm: Mechanism) -> list[Compiled]:
-        """Functions of the task, one for each backend; in double-double one for all arms."""
-        return self._doubled if self.task.doubled else self._compiled(self.task.derive(arm))
-
-    @cached_property
-    def _doubled(self) -> list[Compiled]:
-        return self._compiled(cg.double_double(self._graph))
-
-    def _compiled(self, graph: Graph) -> list[Compiled]:
+        """Functions of the task, one for each backend."""
+        graph = self.task.derive(arm)
         return [cg.compile(graph, backend) for backend in self.backends]
 
     def with_parameters(self, arm: Mechanism, point: Array) -> Array:

@@ -14,14 +14,13 @@ from typing import NamedTuple
 import numpy as np
 
 import cgraph as cg
-from cgraph.extend import Array, NoSeriesError
+from cgraph.extend import Array, NoSeriesError, scipy_module
 
 from ...integrators import METHODS
 from ...multiprecision import Reference, ReferenceFailedError
 from ...multiprecision.solution import from_text
 from ...simulation.run_options import METHOD, RunOptions
 from ...simulation.simulate import simulate
-from ...simulation.steps.scipy_solvers import solve_ivp
 from ...simulation.trajectory import Trajectory
 from ..accuracy_task import AccuracyTask
 from ..text_table import Table
@@ -87,7 +86,11 @@ def size_and_growth(task: AccuracyTask, times: Sequence[float], size: Array) -> 
 
     def motion(x: Array, at: Sequence[float] | None = times) -> Array:
         options = {"rtol": RTOL, "atol": RTOL * unit, "method": "Radau" if task.stiff else "DOP853", "t_eval": at}
-        return np.asarray(solve_ivp()(lambda t, x: rate([*x, t]), (0.0, task.t_end), x, **options).y.T)
+        return np.asarray(
+            scipy_module("integrate", "solve_ivp")
+            .solve_ivp(lambda t, x: rate([*x, t]), (0.0, task.t_end), x, **options)
+            .y.T
+        )
 
     start = np.array(task.start)
     size = np.maximum(size, np.abs(motion(start, None)).max(axis=0))  # of all its steps, layers included

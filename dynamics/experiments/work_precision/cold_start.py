@@ -14,13 +14,12 @@ from typing import Any
 from ...peers import PeerModel, UnavailableError
 from ...peers.casadi import CasadiPeer, casadi
 from ...peers.heyoka import heyoka, leave_cache
-from ...simulation.run_options import SCIPY
 from ...simulation.simulate import simulate
 from ..accuracy_task import AccuracyTask
 from ..timing import run_fresh, spent
 from .named_tasks import load
 from .trajectory_peers import MOST_STEPS, casadi_equations, heyoka_derivatives, heyoka_equations
-from .trajectory_runs import problem_of
+from .trajectory_runs import Scipy, problem_of
 
 RTOL = 1e-9  # of all but heyoka, whose default is the resolution of float64
 LONG_START = 5.0  # s; what takes longer is started once
@@ -50,10 +49,11 @@ class _Start:
     primed: bool = False  # the first start is there to fill a cache, and does not count
 
 
-def _ours(task: AccuracyTask, method: str | None = None) -> None:
-    method = method or ("radau" if task.stiff else "dop853")
+def _ours(task: AccuracyTask) -> None:
     start = task.q, task.qd or None
-    run = simulate(task.model, *start, task.t_end, method, rtol=RTOL, atol=RTOL, progress=False)
+    run = simulate(
+        task.model, *start, task.t_end, "radau" if task.stiff else "dop853", rtol=RTOL, atol=RTOL, progress=False
+    )
     if not run.stats.success:
         raise RuntimeError(run.stats.message)
 
@@ -92,7 +92,7 @@ STARTS = {
     "scipy": _Start(
         "our graph, LLVM, and SciPy's DOP853 (Radau where it is stiff) on it",
         ("llvmlite.binding", "scipy.integrate"),
-        lambda task: _ours(task, SCIPY + ("Radau" if task.stiff else "DOP853")),
+        lambda task: Scipy("Radau" if task.stiff else "DOP853", task, 1.0, problem_of(task)).ready(RTOL)(),
     ),
     "CasADi": _Start("CasADi's own derivatives in its virtual machine, and a run of CVODES", ("casadi",), _casadi),
     "heyoka compact": _Start(

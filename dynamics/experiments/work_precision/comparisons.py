@@ -13,14 +13,13 @@ from functools import partial
 import numpy as np
 
 import cgraph as cg
-from cgraph.extend import Array
+from cgraph.extend import Array, scipy_module
 
 from ...equations.energies import energy as energy_graph
 from ...integrators import METHODS, Problem
 from ...multibody.builders.planar_arm import planar_arm
 from ...peers.peer import made
 from ...simulation.simulate import simulate
-from ...simulation.steps.scipy_solvers import solve_ivp
 from ..accuracy_task import AccuracyTask
 from ..stability.energy_drift import SYMPLECTIC, drift
 from ..text_table import Table, table
@@ -180,7 +179,7 @@ class SolveIvp(Solver):
 
     def __init__(self, rate: Callable[[float, Array], object], task: AccuracyTask, smallest: float, _: Problem) -> None:
         super().__init__("solve_ivp", "SciPy's solve_ivp, DOP853", task, smallest)
-        self.rate, self.solve = rate, solve_ivp()
+        self.rate, self.solve = rate, scipy_module("integrate", "solve_ivp").solve_ivp
 
     def ready(self, knob: float) -> Run:
         """The run with that knob, everything before it done: what is timed."""

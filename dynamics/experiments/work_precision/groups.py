@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from ...simulation.run_options import SCIPY
-
 OURS = "ours"
 # How the names of peers' solvers begin.
-PEERS = {"MuJoCo": "MuJoCo", "SciPy": SCIPY, "heyoka": "heyoka", "CasADi": "CVODES", "diffrax": "diffrax"}
+PEERS = {"MuJoCo": "MuJoCo", "SciPy": "scipy:", "heyoka": "heyoka", "CasADi": "CVODES", "diffrax": "diffrax"}
 COMPARISONS = ("orders", "taylor", "stiff", "loops", "energy")  # functions of the module `comparisons`
 
 

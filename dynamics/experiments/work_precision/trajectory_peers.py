@@ -22,10 +22,9 @@ from ...peers.jax import double_precision
 from ...peers.mujoco import MujocoPeer
 from ...peers.peer import required
 from ...peers.translate import translated
-from ...simulation.run_options import SCIPY, SCIPY_SOLVERS
 from ...systems.arguments import TIME
 from ..accuracy_task import INTERVALS, AccuracyTask
-from .trajectory_runs import EQUAL, Outcome, Run, Scipy, Solver
+from .trajectory_runs import EQUAL, SCIPY_SOLVERS, Outcome, Run, Scipy, Solver
 
 if TYPE_CHECKING:
     from casadi import DM, SX, Function
@@ -293,7 +292,7 @@ def offers(task: AccuracyTask, smallest: float, problem: Problem, backend: str) 
     """The peers that could be asked, by name; making one raises ImportError, UnavailableError or ValueError."""
     makers: dict[str, Callable[[], Solver]] = {}
     for solver in SCIPY_SOLVERS:
-        makers[f"{SCIPY}{solver}"] = partial(Scipy, solver, task, smallest, problem, backend)
+        makers[f"scipy:{solver}"] = partial(Scipy, solver, task, smallest, problem, backend)
     for integrator in MUJOCO:
         makers[f"MuJoCo {integrator}"] = partial(Mujoco, integrator, task, smallest)
     makers["heyoka Taylor"] = partial(Heyoka, task, smallest, problem)

@@ -13,14 +13,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cgraph.extend import Array
+import cgraph as cg
+from cgraph.extend import Array, scipy_module
 
 from ...equations.state_equation import state_inputs
 from ...integrators import METHODS, Problem, derive
 from ...simulation.outcome import Recorder
-from ...simulation.run_options import SCIPY, RunOptions
+from ...simulation.run_options import RunOptions
 from ...simulation.steps.integration import integration
-from ...simulation.steps.scipy_solvers import ScipyIntegration, scipy_solver
 from ...simulation.steps.step_program import CompiledSteps, compile_steps, step_program
 from ...simulation.steps.stepping import Integration, NativeRun
 from ..accuracy_task import AccuracyTask
@@ -29,6 +29,7 @@ from ..timing import Timed
 EQUAL, CHOSEN = "equal steps", "chosen steps"
 TRIAL = 4096  # steps that tell how long many more take
 LONGEST_RUN = 3.0  # s; a run that takes longer is given up
+SCIPY_SOLVERS = ("Radau", "BDF", "LSODA", "DOP853", "RK45")
 
 
 class Outcome(NamedTuple):
@@ -184,19 +185,28 @@ class Scipy(Solver):
     def __init__(
         self, solver: str, task: AccuracyTask, smallest: float, problem: Problem, backend: str = "auto"
     ) -> None:
-        super().__init__(SCIPY + solver, "SciPy's solver on our compiled rate", task, smallest)
-        self._solver = scipy_solver(problem, solver, backend)
+        super().__init__(f"scipy:{solver}", "SciPy's solver on our compiled rate", task, smallest)
+        self._solve, rate = scipy_module("integrate", self.name).solve_ivp, cg.compile(problem.rate, backend)
+        self._rate, self._how = lambda t, x: rate([*x, t]), dict[str, Any](method=solver)
+        if solver in ("Radau", "BDF", "LSODA"):
+            self._how["jac"] = lambda t, x: rate.jacobian([*x, t])[:, : problem.size]
         self.order = {"DOP853": 8, "Radau": 5, "RK45": 5}.get(solver)
 
-    def _options(self, knob: float, times: Sequence[float] | None) -> RunOptions:
-        return RunOptions(self.task.t_end, self.name, rtol=knob, atol=self.absolute(knob), t_eval=times)
+    def _run(self, knob: float, times: Sequence[float] | None) -> Any:
+        limits = {"rtol": knob, "atol": self.absolute(knob), "t_eval": times}
+        return self._solve(self._rate, (0.0, self.task.t_end), self.start, **self._how, **limits)
 
     def ready(self, knob: float) -> Run:
         """The run to t_end, which records its steps alone."""
-        solver, options = self._solver, self._options(knob, None)
-        return Run(lambda: finished(ScipyIntegration(solver, options), self.start)._replace(rejected=None))
+
+        def outcome(run: Any) -> Outcome:
+            return Outcome(run.y[:, -1], len(run.t) - 1, None, run.nfev, "" if run.success else run.message)
+
+        return Run(lambda: outcome(self._run(knob, None)))
 
     def rows(self, knob: float) -> Array:
         """The states at the task's times, (T, m); NaN from where it stopped."""
-        times = self.task.times
-        return recorded(ScipyIntegration(self._solver, self._options(knob, times)), self.start, times)
+        states = self._run(knob, self.task.times).y.T
+        result = np.full((len(self.task.times), len(self.start)), math.nan)
+        result[: len(states)] = states
+        return result

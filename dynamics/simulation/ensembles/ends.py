@@ -46,11 +46,8 @@ def ends_of(
 ) -> tuple[Array, Array]:
     """The ends, (N, nq) and (N, n), of motions to the only row of the options.
 
-    Raises as `simulate_many`, for SciPy's solvers, and for a sampled controller.
+    Raises as `simulate_many`, and for a sampled controller.
     """
-    if options.scipy_solver is not None:
-        given = f"got {options.method!r}"
-        raise ValueError(f"ends of many motions are by methods of dyn.METHODS, and none of SciPy, {given}")
     if moving.applied.controller is not None:
         one = "a SampledController may remember what it has seen, and so controls one motion"
         raise TypeError(f"{one}: ends of many are without")

@@ -24,7 +24,7 @@ from ..events.event import Event, EventProgram, as_events, event_program
 from ..events.event_log import split_crossings
 from ..moving import with_applied
 from ..row_values import converted, unreached_momenta
-from ..run_options import METHOD, SCIPY, RunOptions, require_room, time_span
+from ..run_options import METHOD, RunOptions, require_room, time_span
 from ..sampled_controller import SampledController
 from ..steps.equal_steps import step_count
 from ..steps.step_program import step_program
@@ -80,9 +80,9 @@ def simulate_many(
         The starts, (N, nq) and (N, n) [rad or m, per second], or (nq,) and (n,) for all, as in `simulate`; of an
         OdeSystem q is the state, and qd None.
     t_end, method, t0, t_span, dt, max_step, rtol, atol, first_step, max_steps, estimate_error
-        As in `simulate`, without SciPy's methods.
-    backend, fma, progress, form
         As in `simulate`.
+    backend, fma, progress, form
+        As in `simulate`, too.
     t_eval : array_like, optional
         Times from t0 to t_end to record, in this order, (T,) [s]; by default every step. Methods that choose their
         steps need it.
@@ -140,7 +140,7 @@ def simulate_many(
     [-0.077, -0.155, -0.2348]
     """
     # Check
-    folder = _check(method, chunk, tau, store)
+    folder = _check(chunk, tau, store)
     t0, t_end = time_span(t_end, t0, t_span)
     arguments = (dt, max_step, rtol, atol, t_eval, first_step, max_steps, backend, progress)
     options = RunOptions(t_end, method, *arguments, t0, estimate_error, fma)
@@ -239,10 +239,8 @@ def _ensemble(
     )
 
 
-def _check(method: str, chunk: int | None, tau: object, store: str | os.PathLike[str] | None) -> Path | None:
+def _check(chunk: int | None, tau: object, store: str | os.PathLike[str] | None) -> Path | None:
     """The folder of a store. Raises for what is wrong with these arguments alone."""
-    if isinstance(method, str) and method.startswith(SCIPY):
-        raise ValueError(f"simulate_many takes methods of dyn.METHODS, and none of SciPy, got {method!r:.60}")
     if chunk is not None:
         require_whole("chunk", chunk, 1)
     if isinstance(tau, SampledController):

@@ -15,7 +15,7 @@ from cgraph.extend import Array, memo, or_nearest, real_array, require_sequence
 
 from ...equations.state_equation import state_inputs
 from ...equations.states.initial_value import initial_values
-from ...integrators import METHODS, Method, Problem, derive, in_form
+from ...integrators import Method, Problem, derive, in_form
 from ...systems.model import Model
 from ..events.event import Event, event_program
 from ..moving import with_applied
@@ -209,7 +209,7 @@ def motion_of(
 def options_of(
     t_end: float, method: str | None, t0: float, options: Mapping[str, Any], *, rows: bool = False
 ) -> RunOptions:
-    """The options of a run, by a method whose motions have derivatives. Raises ValueError for another.
+    """The options of a run.
 
     rows: whether there is a row of forces for each step.  method: None for that of `simulate`, or equal steps.
     """
@@ -222,10 +222,7 @@ def options_of(
 
 @memo(OPTIONS_KEPT)
 def _checked_options(t_end: float, method: str, t0: float, *options: tuple[str, Any]) -> RunOptions:
-    run = RunOptions(t_end, method, t0=t0, **dict(options))
-    if run.scipy_solver is not None:
-        raise ValueError(f"motions by method {method!r} have no derivatives here; those by {', '.join(METHODS)} have")
-    return run
+    return RunOptions(t_end, method, t0=t0, **dict(options))
 
 
 def _rows(model: Model, tau: Any, *, many: bool) -> Array | None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from functools import partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -258,11 +257,6 @@ def integration_of(
     between: bool,
 ) -> Integration:
     """A run of a problem, before its first step. between: with all steps, and the dense output of chosen ones."""
-    if (name := options.scipy_solver) is not None:
-        from .scipy_solvers import ScipyIntegration, scipy_solver
-
-        segment = partial(ScipyIntegration, scipy_solver(problem, name, options.backend), between=between)
-        return segment(options) if events is None else _watched(segment, options, events)
     method = options.integrator
     program = step_program(problem, method, dense=method.adaptive and (between or options.between))
     run = NativeRun(compile_steps(program, options.backend, options.fma), options, parameters, control=hold)

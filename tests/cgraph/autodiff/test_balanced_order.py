@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import cgraph as cg
-from cgraph.autodiff.balanced import dissection
+from cgraph.autodiff import balanced_elimination
 from cgraph.autodiff.hessian_solve import solve_nodes
 from cgraph.autodiff.jacobian import hessian_nodes
 from cgraph.autodiff.symmetric_elimination import SingularError
@@ -21,7 +21,7 @@ SMALL = 0.2  # variables of a piece for each unknown that crosses: every variabl
 
 @pytest.fixture
 def small_pieces(monkeypatch):
-    monkeypatch.setattr(dissection, "LEAF", SMALL)
+    monkeypatch.setattr(balanced_elimination, "LEAF", SMALL)
 
 
 def running(x, rng, branches=0.0, still=0.0):
@@ -70,11 +70,12 @@ def test_functions_of_all_kinds_are_solved_in_pieces(name):
 
 
 @each_row(
-    ("leaf", "branches", "still"), [(SMALL, 0.0, 0.4), (SMALL, 0.4, 0.0), (dissection.LEAF, 0.4, 0.4), (SMALL, 0, 0)]
+    ("leaf", "branches", "still"),
+    [(SMALL, 0.0, 0.4), (SMALL, 0.4, 0.0), (balanced_elimination.LEAF, 0.4, 0.4), (SMALL, 0, 0)],
 )
 def test_chains_and_trees_are_solved_in_pieces(monkeypatch, leaf, branches, still):
     """Some of them with variables that have no inertia before others have left."""
-    monkeypatch.setattr(dissection, "LEAF", leaf)
+    monkeypatch.setattr(balanced_elimination, "LEAF", leaf)
     for seed in range(1 + (leaf == SMALL)):
         rng = np.random.default_rng(seed)
         n = int(rng.integers(8, 12))

@@ -73,7 +73,6 @@ def test_no_entry_is_lost_whatever_the_names(inputs, outputs):
     assert len(cg.gradient(first).outputs) == n
     assert len(cg.vjp(graph).outputs) == n
     assert len(cg.jvp(graph).outputs) == m
-    assert len(cg.double_double(graph, low=True).outputs) == 2 * m
     point = {name: float(k + 2) for k, name in enumerate(inputs)}
     whole = math.prod(point.values())
     expected = [2 * whole**2 / point[v] + i * (v == inputs[0]) for i in range(m) for v in inputs]

@@ -56,14 +56,6 @@ def test_web_assembly_imports_it_from_the_host():
     assert module(27.0) == [GRAPH.evaluate({"x": 27.0})["y"]]
 
 
-def test_double_double_passes_low_parts_on():
-    tiny = cg.variable("tiny")
-    graph = cg.double_double(cg.Graph([X, tiny], {"y": cg.asinh(X + tiny)}), low=True)
-    found = graph.evaluate({"x": 0.75, "tiny": 3e-20})
-    assert found["y"] == GRAPH.evaluate({"x": 0.75})["y"]
-    assert found["y_low"] == pytest.approx(3e-20 / 1.25, rel=1e-12)  # sqrt(1 + 0.75**2) = 1.25
-
-
 def test_simplification_folds_and_shares():
     twice = cg.Graph([X], {"y": cg.asinh(X) + cg.asinh(X), "c": cg.asinh(cg.constant(8.0))})
     simple = cg.simplify(twice)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import pickle
 import re
-from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -137,14 +136,6 @@ def test_webassembly_has_the_bits_of_evaluation():
     graph, points = all_kinds()
     module = pytest.importorskip("tests.wasm").instance(graph)
     assert same(np.array([module(*point) for point in points]), evaluated(graph, points))
-
-
-def test_double_double_has_the_digits_of_fractions():
-    xs, ys, x = [0.0, 1.0, 3.0], [0.1, 0.7, -0.4], 1.3
-    graph = cg.double_double(cg.Graph([X], {"y": cg.interp(X, xs, ys)}), low=True)
-    exact = Fraction(ys[1]) + Fraction((ys[2] - ys[1]) / 2.0) * (Fraction(x) - 1)  # of a slope that is in float64
-    found = sum([Fraction(value) for value in graph.evaluate({"x": x}).values()])
-    assert abs(found - exact) <= Fraction(1, 2**100)
 
 
 def test_bounds_hold():

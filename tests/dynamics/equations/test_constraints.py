@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,8 +11,6 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
-from tests.each_row import each_row
-from viz import cli
 
 
 def plane(q: Any, qd: Any, t: Any) -> Any:
@@ -43,110 +40,6 @@ def test_chaplygins_sleigh_has_its_known_accelerations() -> None:
     along = found["qdd0"] * math.cos(angle) + found["qdd1"] * math.sin(angle)
     assert along == pytest.approx(a * w * w, rel=1e-14)
     assert found["qdd2"] == pytest.approx(-m * a * v * w / (inertia + m * a * a), rel=1e-14)
-    assert dyn.integrable_rows(sleigh()) == {"blade": False}
-
-
-def test_integrability_is_not_judged_of_rows_that_depend_on_time() -> None:
-    moving = dyn.System(
-        lambda q, u, t: 0.5 * (u[0] ** 2 + u[1] ** 2), "x y", velocity_constraints=lambda q, u, t: {"belt": u[0] - t}
-    )
-    with pytest.raises(ValueError, match="'belt' does"):
-        dyn.integrable_rows(moving)
-
-
-def test_the_lint_tells_vakonomic_from_nonholonomic() -> None:
-    found = dyn.lint_constraints(sleigh())
-    assert found.ok
-    assert "'blade' is not integrable (nonholonomic)" in str(found)
-
-    def action(q: Any, qd: Any, t: Any) -> Any:
-        along, across = qd[0] - 0.5 * cg.cos(q[2]) * qd[3], qd[1] - 0.5 * cg.sin(q[2]) * qd[3]
-        return plane(q, qd, t) + 0.1 * qd[3] ** 2 + q[4] * along + 0.2 * q[5] * across - 0.5 * q[6] ** 2
-
-    mixed = dyn.lint_constraints(dyn.System(action, "x y heading roll mu nu other"))  # a coin
-    assert mixed.vakonomic == {"mu": True, "nu": True}
-    assert not mixed.ok
-    assert "coordinate 'mu' is a multiplier in L of a row that is not integrable" in str(mixed)
-    alone = dyn.System(lambda q, qd, t: plane(q, qd, t) + q[3] * (qd[0] - 0.5 * qd[2]), "x y angle nu")
-    assert dyn.lint_constraints(alone).vakonomic == {"nu": False}
-
-    def rows(q: Any, qd: Any, t: Any) -> Any:
-        return {"belt": qd[0] - t, "rail": qd[1] - q[2] * qd[2]}
-
-    timed = dyn.lint_constraints(dyn.System(plane, "x y a", velocity_constraints=rows))
-    assert timed.integrable == {"belt": None, "rail": True}
-    assert "'belt' depends on time, and is not judged" in str(timed)
-    assert str(dyn.lint_constraints(dyn.planar_arm([1.0], [1.0]))) == ""
-
-
-def test_the_command_line_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    (tmp_path / "own.py").write_text(f"from {__name__} import sleigh\n")
-    assert cli.main(["lint", f"{tmp_path / 'own.py'}:sleigh"]) == 0
-    assert "velocity constraint 'blade' is not integrable" in capsys.readouterr().out
-
-
-@each_row("scale", [1e-15, 1e-6, 1.0, 1e6, 1e15])
-def test_integrable_rows_are_told_from_others_in_any_units(scale: float) -> None:
-    """Rates of functions, also times a factor, or only together; a rolling coin is neither. Each row by itself."""
-
-    def rows(q: Any, qd: Any, t: Any) -> Any:
-        factor = cg.exp(q[2]) if scale == 1.0 else scale
-        return {"circle": factor * (q[0] * qd[0] + q[1] * qd[1]), "turn": qd[2] - qd[0] * 0.5}
-
-    assert dyn.integrable_rows(dyn.System(plane, "x y a", velocity_constraints=rows)) == {"circle": True, "turn": True}
-
-    def coin(q: Any, qd: Any, t: Any) -> Any:
-        return {"x": scale * (qd[0] - 0.5 * cg.cos(q[2]) * qd[3]), "y": qd[1] - 0.5 * cg.sin(q[2]) * qd[3]}
-
-    upright = dyn.System(lambda q, qd, t: 0.5 * sum(x * x for x in qd), "x y heading roll", velocity_constraints=coin)
-    assert dyn.integrable_rows(upright) == {"x": False, "y": False}
-
-    def only_together(q: Any, qd: Any, t: Any) -> Any:
-        return {"twist": scale * (qd[2] - q[1] * qd[0]), "rail": qd[0]}
-
-    assert dyn.integrable_rows(dyn.System(plane, "x y a", velocity_constraints=only_together)) == {
-        "twist": True,
-        "rail": True,
-    }
-    assert dyn.integrable_rows(dyn.System(plane, "x y a")) == {}
-
-
-@each_row("rate", [1e-6, 1.0, 1e6])
-def test_rows_that_overflow_are_judged_where_they_are_numbers(rate: float) -> None:
-    def rows(q: Any, qd: Any, t: Any) -> Any:
-        return {"growing": cg.exp(rate * q[0]) * qd[1] - qd[2]}
-
-    for held in ({}, {"constraints": lambda q, t: {"bent": rate * (q[0] - q[1] ** 2)}}):
-        system = dyn.System(plane, "x y a", velocity_constraints=rows, **held)
-        assert dyn.integrable_rows(system) == {**dict.fromkeys(system.constraints.names, True), "growing": bool(held)}
-
-    nowhere = dyn.System(
-        plane,
-        "x y a",
-        velocity_constraints=lambda q, qd, t: {"none": cg.exp(1e9 * q[0]) * cg.exp(-1e9 * q[0]) * qd[0] - qd[1]},
-    )
-    with pytest.raises(dyn.ConstraintError, match="no state was seen at which the rows of the constraints are finite"):
-        dyn.integrable_rows(nowhere)
-
-
-def test_brackets_of_quasi_velocities_count() -> None:
-    """Of a rotor, w_z = 0 alone is not integrable: turns about x and y together turn about z."""
-    ball = dyn.Body("ball", dyn.Joint("ball"), inertia=(1.0, 2.0, 2.5))
-    mechanism = dyn.Mechanism([ball]).system
-    quasi = mechanism.kinematics.quasi
-
-    def held(count: int) -> dyn.System:
-        rows = {"z": lambda u: u[2], "y": lambda u: u[1]}
-        chosen = list(rows.items())[:count]
-        return dyn.System(
-            lambda q, u, t: 0.5 * (u[0] ** 2 + 2.0 * u[1] ** 2 + 2.5 * u[2] ** 2),
-            mechanism.coordinates,
-            quasi_velocities=quasi,
-            velocity_constraints=lambda q, u, t: {name: row(u) for name, row in chosen},
-        )
-
-    assert dyn.integrable_rows(held(1)) == {"z": False}
-    assert dyn.integrable_rows(held(2)) == {"z": True, "y": True}
 
 
 @cache

@@ -38,7 +38,7 @@ def springs(forces: Any = None, parameters: Any = None, scale: float = 1.0) -> d
 SPRINGS = springs()
 
 
-@mark.parametrize("method", ["dop853", "taylor", "radau", "rk4", "verlet", "scipy:BDF"])
+@mark.parametrize("method", ["dop853", "taylor", "radau", "rk4", "verlet"])
 def test_a_controller_in_closed_form_is_a_force_of_the_system(method: str) -> None:
     """Bit for bit, with events and between the rows."""
     options = {"events": dyn.Event("passing", lambda q, qd, t: q[0] - 0.25), "dense_output": True, **step(method, 0.02)}
@@ -246,7 +246,6 @@ def test_ctrl_c_in_a_prepared_motion_is_raised_with_what_was_run() -> None:
 @mark.parametrize(
     ("options", "error", "message"),
     [
-        ({"method": "scipy:BDF"}, ValueError, "does not end its steps"),
         ({"t0": 2.0}, ValueError, "later than t0"),
         ({"model": dyn.OdeSystem(lambda x, t: [x[0]], ["x"]), "q": [1.0], "qd": None}, TypeError, "first order"),
     ],

@@ -79,10 +79,6 @@ def test_a_motion_that_stops_is_nan_and_the_others_go_on() -> None:
             "parameter 'force' of the controller needs a value",
         ),
         (
-            lambda: dyn.prepare(ARM, "scipy:Radau").ends([[0.1, 0.2]], [0, 0], 1.0),
-            "ends of many motions are by methods of dyn.METHODS, and none of SciPy, got 'scipy:Radau'",
-        ),
-        (
             lambda: dyn.prepare(ARM, tau=dyn.SampledController(lambda q, qd, t: [0.0, 0.0], 0.1)).ends(
                 [[0.1, 0.2]], [0, 0], 1.0
             ),

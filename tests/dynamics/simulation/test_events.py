@@ -15,7 +15,7 @@ from tests.dynamics.step_options import step
 from tests.slow import slow
 
 FIXED = [name for name, method in METHODS.items() if not method.adaptive]
-KINDS = ["dop853", "rk4", "scipy:DOP853"]  # with dense output of their own, by Hermite, of SciPy
+KINDS = ["dop853", "rk4"]  # with dense output of their own, by Hermite
 SHARP = 1e-12  # relative, of an instant found to the last bit
 CROSSING = {1: 2e-2, 2: 2e-5}  # s, by the order of the method: the error of a motion at dt = 1 ms
 CROSSING_FINE = 1e-8  # s, at order 4 and more, and for steps within 1e-11
@@ -174,7 +174,7 @@ def test_instants_do_not_depend_on_the_rows_the_engine_or_the_company_of_other_e
     other = dyn.Event("other", lambda x, t: cg.sin(40.0 * t))
     alone = circle([ask])
     assert len(alone.events["ask"].t) == 6
-    for method in ("dop853", "rk4", "scipy:RK45"):
+    for method in ("dop853", "rk4"):
         first = circle([ask], method=method).events["ask"].t
         assert first == approx(alone.events["ask"].t, abs=MOTION)
         choices: list[dict[str, Any]] = [

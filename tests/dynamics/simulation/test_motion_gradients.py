@@ -385,8 +385,6 @@ def test_what_is_not_there_is_said_in_a_sentence() -> None:
     def end(**given: Any) -> Any:
         return dyn.gradient(BEAD, loss, [0.5], [0.2], **({"t_end": 0.1, "dt": 0.05, "backend": "python"} | given))
 
-    with raises(ValueError, match="by method 'scipy:Radau' have no derivatives here; those by euler, rk4"):
-        end(method="scipy:Radau", dt=None)
     with raises(TypeError, match="SampledController calls Python"):
         end(tau=dyn.SampledController(lambda q, qd, t: q, 0.1))
     with raises(ValueError, match=r"wrt: the motion has no input 'mass' \(it has q, qd, tau, m, k\)"):

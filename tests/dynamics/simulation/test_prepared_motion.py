@@ -109,7 +109,6 @@ def test_motions_of_random_mechanisms(seed: int) -> None:
         {"tau": dyn.SampledController(lambda q, qd, t: -2.0 * qd, period=0.05)},
         {"tau": [0.1, 0.2], "form": "momentum"},
         {"method": "rk4", "dt": 0.01},
-        {"method": "scipy:DOP853"},
         {"max_steps": 5},
     ],
     ids=" ".join,
@@ -304,7 +303,7 @@ def test_an_end_that_is_not_reached_is_an_error_in_the_words_of_simulate(method:
 
 
 def test_single_steps_are_of_plain_motions() -> None:
-    refused: list[dict[str, Any]] = [{"max_steps": 3}, {"method": "scipy:RK45"}, {"form": "momentum"}]
+    refused: list[dict[str, Any]] = [{"max_steps": 3}, {"form": "momentum"}]
     for options in refused:
         with pytest.raises(ValueError, match="single steps are of motions without"):
             dyn.prepare(ARM, **options).start(*START)
@@ -320,7 +319,6 @@ SHORT = (1e-17, 1e-13)  # beside the span of a run, which is not known yet
 OWN: list[tuple[dict[str, Any], str]] = [
     ({"dense_output": 1}, "dense_output"),
     ({"varied": 3}, "varied must be a sequence of names"),
-    ({"varied": ["k"], "method": "scipy:BDF", "dt": None}, "needs one of dyn.METHODS"),
     ({"form": "speed"}, "form"),
     ({"varied": ["unknown"]}, "varied: the system has no parameter 'unknown'; it has "),
 ]
@@ -332,9 +330,3 @@ OWN: list[tuple[dict[str, Any], str]] = [
 def test_what_is_fixed_is_checked_at_once(given: dict[str, Any], message: str) -> None:
     with pytest.raises((TypeError, ValueError), match=message):
         dyn.prepare(oscillator(), **{"method": "rk4", "dt": 0.1} | given)
-
-
-def test_a_solver_of_scipy_that_is_not_installed_is_said_at_once(without: Any) -> None:
-    without("scipy.integrate")
-    with pytest.raises(ImportError, match=r"method 'scipy:Radau' needs SciPy: .*'\.\[scipy\]'"):
-        dyn.prepare(oscillator(), "scipy:Radau")

@@ -14,7 +14,7 @@ G = 9.81  # m/s^2
 FALL = math.sqrt(2.0 / G)  # s, from 1 m
 BALL = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 - G * q[0], ["height"])
 PARABOLA = 1e-9  # m and s: every method is exact on a parabola, to its tolerance
-METHOD_KINDS = ["dop853", "rk4", "verlet", "rodas", "scipy:DOP853", "scipy:LSODA"]
+METHOD_KINDS = ["dop853", "rk4", "verlet", "rodas"]
 
 
 def bounce(e: float, floor: float = 0.0, direction: int = -1) -> dyn.Event:
@@ -22,7 +22,7 @@ def bounce(e: float, floor: float = 0.0, direction: int = -1) -> dyn.Event:
 
 
 def fall(event: dyn.Event | list[dyn.Event], t_end: float, method: str = "dop853", **options: Any) -> dyn.Trajectory:
-    steps = {"dt": 0.05} if method in METHODS and not METHODS[method].adaptive else {"rtol": 1e-11, "atol": 1e-11}
+    steps = {"dt": 0.05} if not METHODS[method].adaptive else {"rtol": 1e-11, "atol": 1e-11}
     return dyn.simulate(BALL, [1.0], [0.0], t_end, method, events=event, **{**steps, **options})
 
 
@@ -46,7 +46,7 @@ def test_rows_at_t_eval_lie_on_the_bounces() -> None:
     times = np.linspace(0.0, 0.9, 10)
     since = times - FALL
     heights = np.where(since < 0.0, 1.0 - 0.5 * G * times**2, 0.5 * G * FALL * since - 0.5 * G * since**2)
-    for method in ("dop853", "rk4", "scipy:DOP853"):
+    for method in ("dop853", "rk4"):
         run = fall(bounce(0.5), 0.9, method, t_eval=times)
         assert run.t.tolist() == times.tolist()
         assert run.q[:, 0] == approx(heights, abs=1e-7)
@@ -54,7 +54,7 @@ def test_rows_at_t_eval_lie_on_the_bounces() -> None:
 
 
 @stops
-@mark.parametrize("method", ["dop853", "rk4", "rodas", "scipy:LSODA"])
+@mark.parametrize("method", ["dop853", "rk4", "rodas"])
 @mark.parametrize(("e", "floor"), [(0.0, 0.0), (0.3, 0.5)])
 def test_infinitely_many_bounces_end_with_a_sentence_above_the_floor(method: str, e: float, floor: float) -> None:
     run = fall(bounce(e, floor), 8.0, method)

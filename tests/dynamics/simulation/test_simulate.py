@@ -228,12 +228,12 @@ ARGUMENTS: list[tuple[dict[str, Any], str]] = [
     ({"t0": -1e15, "dt": 0.1}, r"dt = 0.1 s is below the resolution .* at t0 = -1e\+15 s"),
     ({"dt": 1e-13}, r"9999999999990 steps of 2 numbers take .* GiB are free: record fewer times"),
     ({"method": "rk5"}, "there is no method 'rk5'; there are euler, rk4, "),
+    ({"method": "scipy:BDF"}, "there is no method 'scipy:BDF'; there are euler, rk4, "),
     ({"method": None}, "method must be one of euler, .* got None"),
     (
         {"method": "dopri5"},
         "'dopri5' chooses its steps: max_step limits them; equal steps of dt = 0.1 s need method='rk4'",
     ),
-    ({"method": "scipy:BDF"}, "method 'scipy:BDF' chooses its steps: max_step limits them"),
     ({"max_step": 0.1}, r"'rk4' makes equal steps: .* dt, not by max_step \(got max_step = 0.1 s\)"),
     ({"first_step": 0.1}, r"'rk4' makes equal steps: .* dt, not by first_step \(got first_step = 0.1 s\)"),
     ({"method": "dopri5", "dt": None, "max_step": 0.0}, "max_step must be positive and finite, got 0.0 s"),
@@ -313,9 +313,9 @@ def test_a_parameter_that_the_system_has_not_is_named() -> None:
         dyn.OdeSystem(lambda x, t, p: [p["m"] * x[0]], ["x"], {"k": 1.0})
 
 
-@mark.parametrize("method", [*METHODS, "scipy:Radau"])
+@mark.parametrize("method", METHODS)
 def test_an_option_is_taken_or_refused_by_name(method: str) -> None:
-    equal = method in METHODS and not METHODS[method].adaptive
+    equal = not METHODS[method].adaptive
     for name, value in {"dt": 0.1, "max_step": 0.1, "first_step": 0.1, "estimate_error": True}.items():
         if equal == (name in ("dt", "estimate_error")):
             RunOptions(1.0, method, **{name: value})

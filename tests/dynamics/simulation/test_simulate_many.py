@@ -160,7 +160,6 @@ Q = np.zeros((4, 2))
         (Q[:0], Q, {}, "got: q has 0, qd has 4"),
         (Q[:0], Q[:0], {}, "there must be at least one trajectory, got 0"),
         (Q, Q, {"parameters": {"k": 1.0}}, r"the system has no parameter k \(it has none\)"),
-        (Q, Q, {"method": "scipy:BDF"}, "methods of dyn.METHODS, and none of SciPy, got 'scipy:BDF'"),
         (Q, Q, {"method": "dopri5"}, "'dopri5' chooses the steps of each trajectory: t_eval must say"),
         (Q, Q, {"dt": 0.0}, "dt must be positive and finite, got 0.0 s"),
         (Q, Q, {"rtol": -1.0}, "rtol and atol must be finite"),

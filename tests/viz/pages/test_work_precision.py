@@ -45,7 +45,7 @@ def content(**others: Any) -> dict[str, Any]:
         curve("dop853", True, "chosen steps", [point(r, 1e-4 * r**-0.1, 0.5 * r) for r in tolerances]),
         curve("MuJoCo RK4", False, "equal steps", [point(n, 1e-5 * n, 1e3 * n**-4) for n in steps], model_error=5e-15),
         curve(
-            "scipy:LSODA", False, "chosen steps", [point(r, 1e-2, 2 * r) for r in tolerances], order=None, fitted=None
+            "SciPy LSODA", False, "chosen steps", [point(r, 1e-2, 2 * r) for r in tolerances], order=None, fitted=None
         ),
     ]
     cold = {"about": "a start", "median": 0.2, "loading": 0.1, "turns": 5, "status": ""}
@@ -72,7 +72,7 @@ def content(**others: Any) -> dict[str, Any]:
         "left_out": ["contacts"],
         "targets": [
             {"error": 1e-6, "group": "ours", "name": "dop853", "knob": 1e-6, "seconds": 4e-4, "ratio": 1.0},
-            {"error": 1e-6, "group": "SciPy", "name": "scipy:LSODA", "knob": 1e-7, "seconds": 1e-2, "ratio": 25.0},
+            {"error": 1e-6, "group": "SciPy", "name": "SciPy LSODA", "knob": 1e-7, "seconds": 1e-2, "ratio": 25.0},
         ],
     } | others
 
@@ -103,7 +103,7 @@ def test_the_page_says_what_was_measured(page: str) -> None:
         "a machine",
         "Left out of the model: contacts.",
         "400 µs dop853",
-        "10 ms LSODA [25]",
+        "10 ms SciPy LSODA [25]",
         "5.0e-15",
         "3.99",
         "other: late.",
@@ -119,7 +119,7 @@ def test_a_method_has_one_color_on_every_page() -> None:
     assert len({(number % 5, number // 5) for number, _ in looks}) == len(METHODS)
     ours = {COLORS[number % 5] for number, _ in looks}
     others = [
-        _look({"name": name, "ours": False})[0] for name in ("scipy:RK45", "heyoka Taylor", "CVODES", "MuJoCo RK4")
+        _look({"name": name, "ours": False})[0] for name in ("SciPy RK45", "heyoka Taylor", "CVODES", "MuJoCo RK4")
     ]
     assert len(ours | set(others)) == len(ours) + len(others)
     assert _look({"name": "rk4, side by side", "ours": True}) != _look({"name": "dopri5", "ours": True})
