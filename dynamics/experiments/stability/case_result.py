@@ -79,7 +79,7 @@ _CLOSE = (
 _HEAVY = (
     "Elimination from the tip to the base: two joints take up all the inertia of a heavy link at the end, and what is "
     "left for the next joints, that of the light links, is the difference of two large numbers. Float64 keeps little "
-    "of it at 12 decades; double-double meets the bound."
+    "of it at 12 decades."
 )
 
 # (section, case, method); an empty method stands for every one.

@@ -9,7 +9,6 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-import cgraph as cg
 import dynamics as dyn
 from tests.dynamics.mechanisms import (
     TREES,
@@ -20,11 +19,8 @@ from tests.dynamics.mechanisms import (
     random_tree,
     turned_arm,
 )
-from tests.slow import slow
-
-pytest.importorskip("flint")
-
 from tests.dynamics.tree_in_digits import Slopes, digits, exactly, floats, slopes_in_digits
+from tests.slow import slow
 
 # Of the largest entry of a matrix of slopes of torques; and, of slopes X of accelerations, M X = dtau, of what a
 # relative change of M and of dtau may do to X: of the largest entry of |M^-1| (|M| |X| + |dtau|).
@@ -141,27 +137,3 @@ def test_slopes_of_a_hundred_bodies_are_exact(name: str) -> None:
     require_exact(again)
     if tree.system.kinematics.quasi is None:  # elimination differentiated loses nothing to the condition of M
         assert max(again.accelerations) < LONG_CHAIN
-
-
-def test_slopes_in_double_double_have_twice_the_digits() -> None:
-    """A ball on a slide needs no sines, and constants are not folded in float64 where some numbers are inputs."""
-    numbers = {"m": 2.0, "x": 0.5, "I": 0.625}
-    ball = {"mass": "m", "center": ("x", -0.25, 0.125), "inertia": (0.5, 0.75, "I")}
-    bodies = [
-        dyn.Body("a", dyn.Joint("prismatic", (0.0, 0.0, 1.0), damping=0.25), mass=1.5),
-        dyn.Body("b", dyn.Joint("ball", position=(0.5, 0.25, -1.0), armature=0.5), "a", **ball),
-    ]
-    named = dyn.Mechanism(bodies, (1.0, 2.0, -9.5), parameters=numbers)
-    tree = named.bind()
-    q, qd, qdd, tau = random_state(tree, 0)
-    exact = slopes_in_digits(tree, q, qd, qdd, tau)
-    graph, n = cg.double_double(dyn.state_space(named), low=True), len(qd)
-    at = numbers | {
-        f"{kind}{i}": x for kind, row in {"q": q, "qd": qd, "tau": tau}.items() for i, x in enumerate(row.tolist())
-    }
-    values = graph.evaluate({name: at[name] for name in graph.input_names})
-    names = [[f"{'A' if j < 2 * n else 'B'}_{n + i}_{j % (2 * n)}" for j in range(3 * n)] for i in range(n)]
-    halves = [np.array([[values[name + low] for name in row] for row in names]) for low in ("", "_low")]
-    with digits():
-        off = floats(exact.accelerations - exactly(halves[0]) - exactly(halves[1]))
-    assert np.abs(off).max() < 1e-28 * np.abs(halves[0]).max()
