@@ -25,7 +25,6 @@ OPTIONAL = {
     "mujoco": "mujoco",
     "llvmlite": "llvmlite",
     "scipy": "scipy",
-    "flint": "python-flint",
     "mpmath": "mpmath",
     "shtab": "shtab",
     "pinocchio": "pin",

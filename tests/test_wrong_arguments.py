@@ -221,7 +221,7 @@ CALLS = {
     "dyn.serial_arm": call(dyn.serial_arm, [LINK], (0.0, 0.0, -9.81), parameters=None),
     "dyn.tree": call(dyn.tree, [-1], None, axes=(0.0, 1.0, 0.0), gravity=(0.0, 0.0, -9.81), parameters=None),
     "dyn.reference": call(
-        dyn.reference, DECAY, [1.0], None, [0.0, 0.1], digits=15, method="taylor", tau=0.0, parameters=None, folder=None
+        dyn.reference, DECAY, [1.0], None, [0.0, 0.1], digits=15, tau=0.0, parameters=None, folder=None
     ),
     "dyn.simulate": call(
         dyn.simulate, ARM, [0.1], [0.0], 0.02, "rk4", t0=0.0, t_span=None, max_step=None, rtol=None, atol=None,

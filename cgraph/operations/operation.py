@@ -112,8 +112,8 @@ class Op(Row):
     operator : callable
         Of numbers and expressions of any kind, made by their operators. Default none.
     precise : callable
-        Of multiprecision numbers. Default `operator`, `piece`, the numbers' method of that name, else an error that
-        says what is missing.
+        Of mpmath's numbers. Default `operator`, `piece`, mpmath's function of that name, else an error that says
+        what is missing.
     piece : callable
         Of a piecewise operation: of the sign of the first argument, or of the difference of two, which argument (None:
         the number 1) times which factor is the value. Default: smooth.

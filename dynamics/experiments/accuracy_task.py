@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from decimal import Decimal
 from pathlib import Path
 from typing import Any
 
@@ -17,12 +18,12 @@ from cgraph.extend import Array, real_array
 from ..equations.energies import energy
 from ..equations.state_equation import state_inputs
 from ..multiprecision import Reference, reference
-from ..multiprecision.solution import scale
+from ..multiprecision.solution import from_text, scale
 from ..scenes import Scene
 from ..systems.model import Model, as_ode, as_system
 
 INTERVALS = 64  # between the times at which errors are taken
-DECADES = 12  # of the times, where they are spread by powers of ten
+KEPT_ENDS = Path(__file__).parent / "stability" / "solutions.json"  # of the stability cases, by name
 
 
 @dataclass(frozen=True)
@@ -30,17 +31,15 @@ class AccuracyTask(Scene):
     """A scene and its exact motion.  q, qd: of an OdeSystem the states, and nothing.
 
     size: a natural size of each state, which errors are relative to; empty for the largest values of the motion.
-    decades: times go up by powers of ten, and errors are relative to the state's value at that time.
-    exact: a closed form of the motion.  method: of `reference` otherwise; None where it does not get to t_end in a
-    minute or so.  digits: of the reference.
+    series: whether `reference` gets to t_end in a minute or so.  digits: of the reference.
+    ends: a JSON file of exact ends, some of motions that take longer.
     """
 
     size: tuple[float, ...] = ()
     stiff: bool = False  # an explicit method needs steps far below what the motion asks for
-    decades: bool = False
-    exact: Callable[[Sequence[float]], Reference] | None = None
-    method: str | None = "taylor"
+    series: bool = True
     digits: int = 30
+    ends: Path | None = None
 
     @property
     def start(self) -> tuple[float, ...]:
@@ -59,33 +58,27 @@ class AccuracyTask(Scene):
 
     @property
     def times(self) -> list[float]:
-        """When errors are taken [s]; the last is t_end."""
-        if self.decades:
-            return [*(self.t_end * 10.0 ** (k / 4) for k in range(-4 * DECADES, 0)), self.t_end]
+        """When errors are taken [s]; the last is t_end, and without a series the only one but 0."""
+        if not self.series:
+            return [0.0, self.t_end]
         return [self.t_end * k / INTERVALS for k in range(INTERVALS + 1)]
 
     def solution(
         self, times: Sequence[float] | None = None, folder: str | Path | None = None, digits: int | None = None
     ) -> Reference | None:
-        """The motion at `times` (default: t_end), from the closed form or else computed; None when there is neither.
+        """The motion at `times` (default: t_end): its end where it is kept, else computed; None where neither can be.
 
-        folder: as of `reference`. Raises ImportError without python-flint or mpmath, and what `reference` raises.
+        folder: as of `reference`. Raises ImportError without mpmath, and what `reference` raises.
         """
-        asked = self.digits if digits is None else digits
         at = [self.t_end] if times is None else real_array("times", times).ravel().tolist()
-        if self.exact is not None:
-            return self.exact(at)
-        if self.method is None:
+        if self.ends is not None and (kept := self.kept(self.ends, self.name)) is not None:
+            known = {0.0: [str(Decimal(x)) for x in self.start], self.t_end: kept["x"]}
+            if known.keys() >= set(at):
+                return from_text(at, [known[t] for t in at], kept["error"], kept["how"])
+        if not self.series:
             return None
-        return reference(
-            self.model,
-            self.q,
-            self.qd or None,
-            at,
-            digits=asked,
-            method=self.method,
-            folder=folder,
-        )
+        asked = self.digits if digits is None else digits
+        return reference(self.model, self.q, self.qd or None, at, digits=asked, folder=folder)
 
     @property
     def mechanical(self) -> bool:
@@ -109,8 +102,6 @@ class AccuracyTask(Scene):
 
     def scales(self, exact: Reference) -> Array:
         """Scale of the errors at all times, (T, m)."""
-        if self.decades:
-            return np.where(exact.x == 0.0, 1.0, np.abs(exact.x))
         return np.broadcast_to(self.size or scale(exact.x), exact.x.shape)
 
 
@@ -149,6 +140,7 @@ class StabilityCase(AccuracyTask):
     """
 
     digits: int = 20  # four more than float64 can tell
+    ends: Path | None = KEPT_ENDS
     criteria: tuple[Criterion, ...] = ()
     atol: float | tuple[float, ...] = ATOL
     growth: float | None = None

@@ -1,7 +1,7 @@
 """Multiprecision: reference trajectories to many digits with a stated error, to measure others against."""
 
-from .reference import REFERENCE_METHODS, reference
+from .reference import reference
 from .solution import Reference
 from .taylor_integrator import ReferenceFailedError
 
-__all__ = ["REFERENCE_METHODS", "Reference", "ReferenceFailedError", "reference"]
+__all__ = ["Reference", "ReferenceFailedError", "reference"]

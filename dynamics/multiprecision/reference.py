@@ -6,31 +6,23 @@ import hashlib
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
+from decimal import Decimal
 from pathlib import Path
 
 from numpy.typing import ArrayLike
 
 from cgraph import Graph, Node
-from cgraph.extend import atomic_write, require_choice, require_path
+from cgraph.extend import atomic_write, require_path
 
 from ..equations.state_equation import state_equation, state_inputs
 from ..equations.states.initial_value import other_inputs, start_state, times_to_record
 from ..systems.controller import with_closed_form
 from ..systems.model import Model, as_equations
-from .collocation import collocation
-from .flint_numbers import Number, text
+from .decimal_numbers import working
 from .solution import Reference, from_text
 from .taylor_integrator import ReferenceFailedError, taylor
 
-Solver = Callable[..., tuple[list[list[Number]], str]]
-REFERENCE_METHODS: dict[str, Solver] = {"taylor": taylor, "radau": collocation}
-FEWEST, STEP, MOST_DIGITS = (
-    8,
-    6,
-    400,
-)  # digits of the tolerance: the least at first, more in each run, and where it ends
-# Digits of the first run. Collocation has at the ends of steps about twice the digits that it has within.
-FIRST: dict[str, Callable[[int], int]] = {"taylor": lambda digits: digits + 2, "radau": lambda digits: digits // 2 + 4}
+FEWEST, STEP, MOST_DIGITS = 8, 6, 400  # digits of the tolerance: at least, more in each run, and at most
 SPARE = 6  # digits written beyond those asked for
 
 
@@ -41,16 +33,15 @@ def reference(
     t_eval: ArrayLike,
     *,
     digits: int = 30,
-    method: str = "taylor",
     tau: float | Sequence[float] | Callable[..., Sequence[Node | float]] = 0.0,
     parameters: Mapping[str, float] | None = None,
     folder: str | Path | None = None,
 ) -> Reference:
-    """The motion of a model from (q, qd) at t = 0, to so many digits.
+    """The motion of a model from (q, qd) at t = 0, to so many digits, by Taylor series.
 
     The error stated is the difference between the solution and another run with fewer digits, another order and other
     steps, so it is that of the worse one. Digits are added until it is at most 10^-digits. The problem solved is the
-    graph as it stands, with its constants and the start taken as exact.
+    graph as it stands, with its constants and the start taken as exact. Steps end where a piecewise operation switches.
 
     Parameters
     ----------
@@ -63,9 +54,6 @@ def reference(
         Increasing times from 0 on, (T,) [s].
     digits : int
         Decimal digits of the result, 1 to 200, relative to the largest value of the same state.
-    method : str
-        "taylor", Taylor series, whose steps end where a piecewise operation switches; "radau", implicit collocation,
-        for what is stiff and smooth.
     tau : float, sequence or callable
         Constant applied force [N m or N], for all velocities or for each, (n,); or a controller in closed form, see
         `with_controller`.
@@ -86,9 +74,9 @@ def reference(
     NotImplementedError
         For an operation whose row has no multiprecision value, or that jumps where its argument moves.
     ReferenceFailedError
-        At a singularity, or when 400 digits are not enough.
+        At a singularity, for a stiff motion of more than a million steps, or when 400 digits are not enough.
     ImportError
-        Without python-flint.
+        Without mpmath.
 
     Examples
     --------
@@ -97,7 +85,6 @@ def reference(
     >>> print(dyn.reference(decay, [1.0], None, [1.0], digits=30).decimal[0][0][:32])
     0.367879441171442321595523770161
     """
-    require_choice("method", method, REFERENCE_METHODS)
     if folder is not None:
         folder = require_path("folder", folder)
     if isinstance(digits, bool) or not (isinstance(digits, int) and 1 <= digits <= MOST_DIGITS // 2):
@@ -106,38 +93,38 @@ def reference(
     bound, inputs = other_inputs(model, constant, parameters), state_inputs(model)
     x, times = start_state(model, q, qd, bound).tolist(), times_to_record(t_eval).tolist()
     values = {name: bound[name] for name in (*inputs.parameters, *inputs.applied)}
-    graph, solver = state_equation(model), REFERENCE_METHODS[method]
+    graph = state_equation(model)
 
     def solve() -> Reference:
-        def run(wanted: int) -> tuple[list[list[Number]], str]:
-            return solver(graph, inputs.states, x, times, values, wanted)
+        def run(wanted: int) -> tuple[list[list[Decimal]], str]:
+            return taylor(graph, inputs.states, x, times, values, wanted)
 
-        return _converged(run, times, digits, FIRST[method](digits), inputs.states)
+        return _converged(run, times, digits, inputs.states)
 
     if folder is None:
         return solve()
-    name = key(graph, inputs.states, x, times, values, method, digits)
+    name = key(graph, inputs.states, x, times, values, digits)
     return _kept(Path(folder) / f"{name}.json", times, len(x), solve)
 
 
 def _converged(
-    run: Callable[[int], tuple[list[list[Number]], str]],
+    run: Callable[[int], tuple[list[list[Decimal]], str]],
     times: Sequence[float],
     digits: int,
-    first: int,
     states: Sequence[str],
 ) -> Reference:
-    wanted = max(first, FEWEST)
+    wanted = max(digits + 2, FEWEST)
     before, _ = run(wanted)
     step = STEP
     while (wanted := wanted + step) <= MOST_DIGITS:
         rows, how = run(wanted)
-        error, state = max(zip(_differences(before, rows), states, strict=True))
+        with working(FEWEST):
+            error, state = max(zip(_differences(before, rows), states, strict=True))
         if error <= 10.0**-digits:
             how = f"{how}; error: its difference from a run with 10^{step} times the tolerance"
             written = digits + SPARE
             error = max(error, 10.0 ** (1 - written))  # the text is rounded
-            return from_text(times, [[text(value, written) for value in row] for row in rows], error, how)
+            return from_text(times, [[f"{value:.{written}g}" for value in row] for row in rows], error, how)
         missing = digits + math.log10(error) if error < math.inf else digits
         before, step = rows, max(STEP, math.ceil(missing))
     raise ReferenceFailedError(
@@ -147,18 +134,18 @@ def _converged(
     )
 
 
-def _differences(a: list[list[Number]], b: list[list[Number]]) -> list[float]:
+def _differences(a: list[list[Decimal]], b: list[list[Decimal]]) -> list[float]:
     """Largest difference of each state, relative to its largest value in b."""
     result = []
     for first, second in zip(zip(*a, strict=True), zip(*b, strict=True), strict=True):
         largest = max([abs(value) for value in second])
         difference = max([abs(p - q) for p, q in zip(first, second, strict=True)])
         relative = float(difference / largest) if largest != 0 else float(difference)
-        result.append(relative if relative == relative else math.inf)
+        result.append(relative)
     return result
 
 
-FORMAT = 1  # part of the name: count it up when the method changes so that old solutions are not what would be computed
+FORMAT = 2  # part of the name: count it up when the method changes so that old solutions are not what would be computed
 
 
 def key(
@@ -167,7 +154,6 @@ def key(
     start: Sequence[float],
     times: Sequence[float],
     values: Mapping[str, float],
-    method: str,
     digits: int,
 ) -> str:
     """The name of a solution: a hash of the equations by structure, numbers by their bits."""
@@ -183,7 +169,7 @@ def key(
     ]
     rates = [number[node] for node in graph.outputs.values()]
     numbers = [[float(value).hex() for value in row] for row in (start, times, values.values())]
-    content = [FORMAT, nodes, rates, list(states), list(values), numbers, method, digits]
+    content = [FORMAT, nodes, rates, list(states), list(values), numbers, digits]
     return hashlib.sha256(json.dumps(content).encode()).hexdigest()
 
 

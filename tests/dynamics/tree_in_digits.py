@@ -1,41 +1,44 @@
 """Trees of bodies in 66 digits, in the world's axes, by the velocities of centers of mass: no graph, no derivative.
 
-Their slopes are central differences. Arrays hold numbers of python-flint, and are rounded at last.
+Their slopes are central differences. Arrays hold decimal numbers, and are rounded at last.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
+from decimal import Decimal
 from typing import Any, NamedTuple
 
 import numpy as np
-from flint import arb, arb_mat, ctx
 
+from cgraph.extend import OPS
 from dynamics import Mechanism
 from dynamics.multibody.bodies.joint_coordinates import places
+from dynamics.multiprecision.decimal_numbers import mpmath_context, value, working
 from tests.dynamics.mechanisms import Array
 
-DIGITS = 230  # bits
-STEP = arb(2.0**-56)  # of central differences, which are right to its square
+DIGITS = 66
+STEP = Decimal(2.0**-56)  # of central differences, which are right to its square
 
 
-@contextmanager
-def digits() -> Iterator[None]:
-    before, ctx.prec = ctx.prec, DIGITS
-    try:
-        yield
-    finally:
-        ctx.prec = before
+def digits() -> AbstractContextManager[Any]:
+    return working(DIGITS)
 
 
-exactly = np.vectorize(arb, otypes=[object])
-floats = np.vectorize(lambda x: float(x.mid()), otypes=[np.float64])
+sin, cos, atan = (value(OPS[name], mpmath_context(DIGITS)) for name in ("sin", "cos", "atan"))
+exactly = np.vectorize(lambda x: Decimal(float(x)), otypes=[object])
+floats = np.vectorize(float, otypes=[np.float64])
 
 
 def _solved(matrix: Any, right: Any) -> Any:
-    solved = arb_mat(matrix.tolist()).solve(arb_mat(right.reshape(len(matrix), -1).tolist()))
-    return np.array(solved.entries()).reshape(right.shape)
+    """By elimination, of a positive definite matrix."""
+    n = len(matrix)
+    rows = np.hstack([matrix, right.reshape(n, -1)])
+    for k in range(n):
+        rows[k] /= rows[k, k]
+        others = np.arange(n) != k
+        rows[others] -= np.outer(rows[others, k], rows[k])
+    return rows[:, n:].reshape(right.shape)
 
 
 def _unit(vector: Any) -> Any:
@@ -47,7 +50,7 @@ def _skew(a: Any) -> Any:
 
 
 def _rotation(axis: Any, angle: Any) -> Any:
-    return exactly(np.eye(3)) + angle.sin() * _skew(axis) + (1 - angle.cos()) * _skew(axis) @ _skew(axis)
+    return exactly(np.eye(3)) + sin(angle) * _skew(axis) + (1 - cos(angle)) * _skew(axis) @ _skew(axis)
 
 
 def _of_quaternion(quaternion: Any) -> Any:
@@ -61,7 +64,7 @@ def _joint(joint: Any, before: Any, q: Any) -> tuple[Any, Any, Any, Any]:
     if kind in ("revolute", "prismatic", "screw"):
         own = _unit(exactly(joint.axis))
         axis = before @ own
-        turns, slides = arb(int(kind != "prismatic")), arb(1 if kind == "prismatic" else float(joint.pitch))
+        turns, slides = Decimal(int(kind != "prismatic")), Decimal(1 if kind == "prismatic" else float(joint.pitch))
         return before @ _rotation(own, turns * q[0]), slides * q[0] * axis, [turns * axis], [slides * axis]
     axes = before @ _of_quaternion(q[-4:])
     if kind == "ball":
@@ -80,17 +83,17 @@ def _moved(tree: Mechanism, q: Any, u: Any, step: Any) -> Any:
         w, e = v[-3:], x[-4:]
         rate = [-(e[1:] @ w), *(e[0] * w + np.cross(e[1:], w))]
         along = v[:-3] if body.joint.kind != "free (body axes)" else _of_quaternion(e) @ v[:-3]
-        later[place.q] = x + step * np.array([*along, *[0.5 * each for each in rate]])
+        later[place.q] = x + step * np.array([*along, *[each / 2 for each in rate]])
     return later
 
 
 def _spring(joint: Any, x: Any) -> Any:
     """The torques, (k,), by which a spring pulls back."""
     if joint.kind != "ball":
-        return arb(float(joint.stiffness)) * (x - arb(float(joint.spring_reference)))
+        return Decimal(float(joint.stiffness)) * (x - Decimal(float(joint.spring_reference)))
     length = (x[1:] @ x[1:]).sqrt()
     assert x[0] > 0, "a rotation vector of more than half a turn"
-    return arb(float(joint.stiffness)) * 2 * (length / x[0]).atan() / length * x[1:]
+    return Decimal(float(joint.stiffness)) * 2 * atan(length / x[0]) / length * x[1:]
 
 
 def _terms(tree: Mechanism, q: Any, qd: Any) -> tuple[Any, Any, Any]:
@@ -113,7 +116,7 @@ def _terms(tree: Mechanism, q: Any, qd: Any) -> tuple[Any, Any, Any]:
         T = np.concatenate([T + np.cross(S, r), linear]) if len(S) else np.array(linear)
         S = np.concatenate([S, angular]) if len(S) else np.array(angular)
         states[body.name] = axes, after, alpha, a, which, S, T
-        c, m = axes @ exactly(body.center), arb(float(body.mass))
+        c, m = axes @ exactly(body.center), Decimal(float(body.mass))
         inertia = axes @ exactly(body.inertia) @ axes.T
         force = m * (a + np.cross(alpha, c) + np.cross(after, np.cross(after, c)))
         torque = inertia @ alpha + np.cross(after, inertia @ after)
@@ -121,8 +124,8 @@ def _terms(tree: Mechanism, q: Any, qd: Any) -> tuple[Any, Any, Any]:
         bias[which] += at_center @ force + S @ torque
         mass[np.ix_(which, which)] += m * (at_center @ at_center.T) + S @ inertia @ S.T
         rows = range(first, place.u.stop)
-        mass[rows, rows] += arb(float(joint.armature))
-        braking[place.u] = arb(float(joint.damping)) * u
+        mass[rows, rows] += Decimal(float(joint.armature))
+        braking[place.u] = Decimal(float(joint.damping)) * u
         if joint.type.sprung and joint.stiffness:
             bias[place.u] += _spring(joint, q[place.q])
     return mass, bias, braking

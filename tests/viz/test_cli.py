@@ -402,7 +402,7 @@ def test_a_place_that_cannot_be_written_is_told_before_the_work(here, capsys, ar
         ("graphviz", "viz", "lint spring_mass --svg a.svg"),
         ("resvg_py", "viz", "draw spring_mass --out a.png"),
         ("resvg_py", "viz", "paper"),
-        ("flint", "reference", "report --stability --json"),
+        ("mpmath", "reference", "report --stability --json"),
         ("mujoco", "mujoco", "draw robot.xml --out a.svg"),
     ],
 )

@@ -46,7 +46,7 @@ def _introduction(content: ReportData) -> list[Block]:
 
 
 def _sized(content: ReportData) -> str:
-    return {"own": "value at that instant", "given": "natural size"}.get(content["relative_to"], "largest value")
+    return {"given": "natural size"}.get(content["relative_to"], "largest value")
 
 
 def _busy(content: ReportData) -> str:

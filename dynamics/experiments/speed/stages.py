@@ -16,7 +16,7 @@ from ...equations.equations_of_motion import bias, forward_dynamics, mass_matrix
 from ...equations.linearization.linearize_many import linearize_many
 from ...multibody.builders.planar_arm import planar_arm
 from ...multibody.trees.mechanism import Mechanism
-from ...multiprecision.chain_equations import accelerations
+from ...multiprecision.graph_values import values_in_digits
 from ...systems.model import as_system
 from ..text_table import Table, digits
 from ..timing import Made, relative_difference, run_fresh, spent
@@ -86,7 +86,7 @@ def compile_time(links: int | None = None) -> Iterator[Table]:
 
 
 def long_chains(links: int = LINKS, sizes: Sequence[tuple[str, int]] = SIZES) -> Iterator[Table | str]:
-    """Cost of chains of so many links, each in a process of its own; then accuracy, which needs python-flint."""
+    """Cost of chains of so many links, each in a process of its own; then accuracy, which needs mpmath."""
     for kind in MODELS:
         *rows, size = _fresh("cost", kind, links)
         yield Table(f"{kind} chain of {links} links", ["stage", "clock", "processor", "peak"], rows)
@@ -149,7 +149,7 @@ def cost(kind: str, n: int) -> list[list[str] | str]:
 def accuracy(kind: str, n: int, spread: float) -> dict[str, float]:
     """Largest error relative to the largest entry, by way of solving, over states with angles within +-spread.
 
-    Beside Newton-Euler equations and a dense solve in multiprecision.
+    Beside the elimination in 100 digits.
     """
     model, rng = MODELS[kind](n), np.random.default_rng(n)
     graphs = {"elimination": forward_dynamics(model, "recursive")}
@@ -160,7 +160,7 @@ def accuracy(kind: str, n: int, spread: float) -> dict[str, float]:
     for _ in range(STATES):
         q, qd, tau = rng.uniform(-spread, spread, n), rng.normal(size=n), rng.normal(size=n)
         state = dict(zip(graphs["elimination"].input_names, [*q, *qd, *tau], strict=True))
-        exact = accelerations(model, q, qd, tau).high
+        exact = np.array(values_in_digits(graphs["elimination"], [*q, *qd, *tau], 100), dtype=np.float64)
         solved: dict[str, Array] = {name: values(graph, state) for name, graph in graphs.items()}
         if matrix is not None:
             m = values(matrix, state).reshape(n, n)

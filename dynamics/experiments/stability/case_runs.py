@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator
 from functools import partial
-from pathlib import Path
 
 import numpy as np
 
@@ -14,25 +13,12 @@ from cgraph.extend import Array
 from ...equations.state_equation import state_inputs
 from ...integrators import METHODS
 from ...multiprecision import Reference
-from ...multiprecision.solution import from_text
 from ...simulation.simulate import simulate
 from ...simulation.trajectory import Trajectory
 from ...systems.arguments import TIME
 from . import cases
 from .case_result import CaseResult, Measurement, reason
 from .cases import RTOL, Criterion, StabilityCase
-
-FILE = Path(__file__).with_name("solutions.json")
-
-
-def known_solution(case: StabilityCase) -> Reference | None:
-    """The case's motion at its t_end; None for a case without one.
-
-    Kept in a file, as some take a minute to compute, by name, start and t_end. A test computes them again.
-    """
-    kept = case.kept(FILE, case.name)
-    return case.solution() if kept is None else from_text([case.t_end], [kept["x"]], kept["error"], kept["how"])
-
 
 SECTION = "Cases"
 STIFF, SMOOTH = ("radau", "rodas"), ("dop853", "dopri5")
@@ -62,7 +48,7 @@ def results(names: Iterable[str] | None = None, methods: tuple[str, ...] | None 
 
 def result(case: StabilityCase, method: str) -> CaseResult:
     """One case by one method, with the relative tolerance that the bounds are for."""
-    solution, run = known_solution(case), trajectory(case, method)
+    solution, run = case.solution(), trajectory(case, method)
     values = errors(case, run, solution) if solution is not None and run.stats.success else {}
     quantities = {criterion.quantity for criterion in case.criteria}
     values |= changes(case, run, {name for name in quantities if not name.startswith("error")})

@@ -5,7 +5,7 @@ centre and inertia, damping, gravity), the error is
     max_i |y_i - exact_i| / (ulp max_i (|y_i| + sum_j |df_i/dx_j| |x_j|)),    ulp = 2^-52.
 The sum is what a relative change of each x_j makes of y_i: the componentwise condition, in the maximum norm. So 1 is
 what rounding the data once would do, whatever the algorithm. The derivatives are the graph's own (`cg.jvp`, of an arm
-whose parameters are inputs), the exact values come from Newton-Euler equations in multiprecision.
+whose parameters are inputs), and so are the exact values: the same graph in 200 digits.
 
 Besides, sine and cosine of the backends at random angles of every size, in ulps of the exact value.
 """
@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from decimal import Decimal
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -27,8 +28,8 @@ from ...equations.equations_of_motion import forward_dynamics
 from ...equations.formulations.formulations import inverse_dynamics
 from ...multibody.builders.planar_arm import planar_arm, planar_links
 from ...multibody.trees.mechanism import Mechanism
-from ...multiprecision.chain_equations import Pair, accelerations, torques
-from ...multiprecision.flint_numbers import working
+from ...multiprecision.decimal_numbers import mpmath_context, working
+from ...multiprecision.graph_values import values_in_digits
 from ...systems.system import System
 from .case_result import CaseResult, Measurement, reason
 
@@ -39,19 +40,11 @@ LINKS, QUICK = (3, 10, 50), (3, 10)
 STATES = 5  # of each arm
 LANES = 9  # of a batch: full vectors and what is left over
 SEED = 2025
+DIGITS = 200  # of exact values
 
 
-class Task(NamedTuple):
-    """Quantity to evaluate."""
-
-    derive: Callable[..., Graph]
-    exact: Callable[..., Pair]
-
-
-TASKS = {
-    "inverse dynamics": Task(inverse_dynamics, torques),
-    "forward dynamics": Task(forward_dynamics, accelerations),
-}
+Task = Callable[..., Graph]  # of a model
+TASKS: dict[str, Task] = {"inverse dynamics": inverse_dynamics, "forward dynamics": forward_dynamics}
 
 
 @dataclass(frozen=True)
@@ -89,7 +82,7 @@ def results(links: Sequence[int] = LINKS, backends: Sequence[str] | None = None)
     """A result for each task and family, measured at each number of links: the worst of states and backends.
 
     backends: of `cg.compile`; default: Python, and machine code where llvmlite is installed. Each is called at one
-    point and for a batch. Raises ImportError without python-flint.
+    point and for a batch. Raises ImportError without mpmath.
     """
     chosen = tuple(backends or available())
     for name, task in TASKS.items():
@@ -115,17 +108,18 @@ def measurement(family: Family, arms: Arms) -> Measurement:
     n = arms.n
     rng = np.random.default_rng([SEED, n])
     arm = arm_of(family, n, rng)
-    functions = arms.functions(arm)
+    functions = [cg.compile(arms.task(arm), backend) for backend in arms.backends]
     worst = 0.0
     for _ in range(STATES):
         q = rng.uniform(-family.angle, family.angle, n)
         qd, third = family.velocity * rng.normal(size=n), 5.0 * rng.normal(size=n)
-        exact, point = arms.task.exact(arm, q, qd, third), np.concatenate([q, qd, third])
-        size = np.max(np.abs(exact.high) + arms.condition(arm, point))
+        point = np.concatenate([q, qd, third])
+        exact = arms.exact(arm, point)
+        size = max(abs(float(y)) + moved for y, moved in zip(exact, arms.condition(arm, point).tolist(), strict=True))
         for function in functions:
             lanes = function.batch(np.repeat(point[:, None], LANES, axis=1))
             for values in (function(point), lanes[:, 0], lanes[:, -1]):
-                error = np.max(np.abs(exact.deviation(values))) / (ULP * size)
+                error = np.max(np.abs(deviation(values, exact))) / (ULP * size)
                 worst = float(np.maximum(worst, error))  # NaN stays NaN
     why = "of the condition: some operations one after another, each an ulp"
     return Measurement(f"{n} links", worst, BOUND, "ulp", why)
@@ -140,17 +134,22 @@ def arm_of(family: Family, n: int, rng: np.random.Generator) -> Mechanism:
     return planar_arm(masses.tolist(), lengths.tolist(), damping=0.1)
 
 
+def deviation(values: Array, exact: Sequence[Decimal]) -> Array:
+    """values - exact, to the last bits of the values."""
+    with working(DIGITS):
+        return np.array([float(Decimal(x) - y) for x, y in zip(values.tolist(), exact, strict=True)])
+
+
 class Arms:
-    """A task for arms of n links: what evaluates it, and its condition."""
+    """A task for arms of n links: its graph whose parameters are inputs, with exact values and their condition."""
 
     def __init__(self, task: Task, n: int, backends: Sequence[str] = ()) -> None:
         self.task, self.n, self.backends = task, n, backends
-        self._graph = task.derive(arm_with_parameters(n))
+        self._graph = task(arm_with_parameters(n))
 
-    def functions(self, arm: Mechanism) -> list[Compiled]:
-        """Functions of the task, one for each backend."""
-        graph = self.task.derive(arm)
-        return [cg.compile(graph, backend) for backend in self.backends]
+    def exact(self, arm: Mechanism, point: Array) -> list[Decimal]:
+        """The task's values at a point (3n,): angles, velocities, and the third."""
+        return values_in_digits(self._graph, self.with_parameters(arm, point).tolist(), DIGITS)
 
     def with_parameters(self, arm: Mechanism, point: Array) -> Array:
         """The inputs of the graph whose parameters are inputs: the point (3n,), and then those of the arm."""
@@ -162,10 +161,7 @@ class Arms:
         return cg.compile(cg.simplify(cg.jvp(self._graph)), "numpy")
 
     def condition(self, arm: Mechanism, point: Array) -> Array:
-        """sum_j |df_i/dx_j| |x_j| over all inputs and parameters, (n,), by the JVP of the graph.
-
-        point: (3n,), angles, velocities, and the third.
-        """
+        """sum_j |df_i/dx_j| |x_j| over all inputs and parameters, (n,), by the JVP of the graph."""
         x = self.with_parameters(arm, point)
         directions = np.concatenate([np.repeat(x[:, None], len(x), axis=1), np.diag(x)])
         with np.errstate(all="ignore"):
@@ -219,7 +215,6 @@ def by_centers(q: Sequence[Node], qd: Sequence[Node], links: Sequence[Any], grav
 SINES, SINE_CASE = "Sine and cosine", "sine and cosine"
 SINE_BOUND = 2.0  # ulp, what cgraph promises of its polynomials; a correctly rounded value is within half of one
 COUNT, QUICK_COUNT = 4000, 500  # angles of each range
-DIGITS = 360  # more than the largest angle has before its point
 RANGES: dict[str, tuple[float, float]] = {  # decimal exponents
     "1e-300 .. 1": (-300.0, 0.0),
     "1 .. 1e6": (0.0, 6.0),
@@ -261,14 +256,13 @@ def angles(low: float, high: float, count: int) -> Array:
     return np.where(rng.random(count) < 0.5, -sizes, sizes)
 
 
-def exact(points: Array) -> Pair:
-    """Sine and cosine, (2, N)."""
-    with working(DIGITS) as number:
-        at = [number(x) for x in points.tolist()]
-        sines, cosines = Pair.of([x.sin() for x in at]), Pair.of([x.cos() for x in at])
-    return Pair(np.array([sines.high, cosines.high]), np.array([sines.low, cosines.low]))
+def exact(points: Array) -> Any:
+    """Sine and cosine in numbers of mpmath, (2, N)."""
+    mp = mpmath_context(DIGITS)
+    return np.array([[function(x) for x in points.tolist()] for function in (mp.sin, mp.cos)], dtype=object)
 
 
-def ulps(values: Array, known: Pair) -> float:
+def ulps(values: Array, known: Any) -> float:
     """The largest error."""
-    return float(np.max(np.abs(known.deviation(values)) / np.spacing(np.abs(known.high))))
+    off = np.abs(values - known).astype(np.float64)
+    return float(np.max(off / np.spacing(np.abs(known.astype(np.float64)))))

@@ -10,7 +10,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
-from ...multiprecision.flint_numbers import flint
+from ...multiprecision.decimal_numbers import mpmath_context
 from ..text_table import GAPS, WIDTH, csv_text, number, table
 from ..timing import load, machine
 from . import case_runs, energy_drift, single_evaluations
@@ -35,15 +35,15 @@ QUICK = (  # cases of a quick run: one of each kind, none that takes a while to 
 
 ABOUT = {
     case_runs.SECTION: "Runs with a relative tolerance of 1e-9 and an absolute one of 1e-12 in SI units. An error is "
-    "that of the state at the end against a closed form or a solution in multiprecision, of each state relative to its "
+    "that of the state at the end against a solution in multiprecision, of each state relative to its "
     "natural size; an invariant's is its largest change during the run, relative to its natural scale.",
     energy_drift.SECTION: "Equal steps. The drift is the slope of the energy over the run, by least squares through "
     "the Hann-weighted means of 16 blocks, times the length of the run; the band is the largest less the smallest "
     "energy. Both relative to the energy at the start.",
     single_evaluations.SECTION: "The largest error of torques or accelerations, in units of 2^-52 of the largest "
     "component's size, where a size is |y_i| + sum_j |dy_i/dx_j| |x_j| over all inputs and parameters: the "
-    "componentwise condition. 1 is what rounding the data once would do. Exact values from Newton-Euler equations "
-    "with a dense solve in multiprecision; the worst of five random states, backends, single points and batches.",
+    "componentwise condition. 1 is what rounding the data once would do. Exact values from the same equations, "
+    "with all data as inputs, in 200 digits; the worst of five random states, backends, single points and batches.",
     single_evaluations.SINES: "The largest error over random angles, in units of the last place of the exact value.",
 }
 
@@ -52,7 +52,7 @@ def run(quick: bool = False, say: Callable[[str], None] = lambda line: None) -> 
     """All results. say: told of each row.
 
     quick: some of the cases, shorter runs, shorter arms: seconds in place of minutes.
-    Raises ImportError without python-flint.
+    Raises ImportError without mpmath.
     """
     rows = []
     for row in results(quick):
@@ -63,7 +63,7 @@ def run(quick: bool = False, say: Callable[[str], None] = lambda line: None) -> 
 
 def results(quick: bool = False) -> Iterator[CaseResult]:
     """All results, as they are measured."""
-    flint()  # minutes before it is used
+    mpmath_context(single_evaluations.DIGITS)  # minutes before it is used
     yield from case_runs.results(QUICK if quick else None)
     yield from energy_drift.results(energy_drift.QUICK if quick else energy_drift.STEPS)
     yield from single_evaluations.results(single_evaluations.QUICK if quick else single_evaluations.LINKS)

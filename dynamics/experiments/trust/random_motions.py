@@ -225,9 +225,7 @@ def _task(
 ) -> AccuracyTask:
     model = System(lagrangian, [f"x{i}" for i in range(len(q))], damping=damping)
     start = tuple(q.tolist()), tuple(qd.tolist())
-    return AccuracyTask(
-        name, "a random Lagrangian", model, *start, float(t_end), stiff=stiff, method="radau" if stiff else "taylor"
-    )
+    return AccuracyTask(name, "a random Lagrangian", model, *start, float(t_end), stiff=stiff, series=not stiff)
 
 
 EACH = 100  # of every family

@@ -40,7 +40,7 @@ def triple_fall() -> AccuracyTask:
     """Three rods let go almost level: chaotic."""
     # Exactly level, heyoka's first step is ten times too long at orders 12, 16 and 20, and a loss that tells nothing.
     model, q = planar_arm([1.0, 0.8, 0.7], [1.0, 0.8, 0.7]), (1.5, 0.2, -0.1)
-    return AccuracyTask("triple fall", "three rods let go almost level", model, q, (0.0,) * 3, 200.0, method=None)
+    return AccuracyTask("triple fall", "three rods let go almost level", model, q, (0.0,) * 3, 200.0, series=False)
 
 
 def henon_heiles() -> AccuracyTask:
@@ -71,7 +71,7 @@ def figure_eight() -> AccuracyTask:
 def seven_joints() -> AccuracyTask:
     """The bench's arm of seven hinges in space, damped, let go."""
     return AccuracyTask(
-        "arm 7", "seven hinges in space, damped", turned_arm(7), (0.1,) * 7, (0.0,) * 7, 200.0, method=None
+        "arm 7", "seven hinges in space, damped", turned_arm(7), (0.1,) * 7, (0.0,) * 7, 200.0, series=False
     )
 
 
@@ -82,14 +82,14 @@ def free_base() -> AccuracyTask:
     neutral = list(model.system.kinematics.neutral)
     q = (*neutral[:7], *[0.2] * 29)
     qd = (0.3, -0.2, 0.5, 0.1, 0.0, 0.2, *np.tile([0.4, -0.4], 15)[:29].tolist())
-    return AccuracyTask("free 35", "a free base with limbs, 35 degrees of freedom", model, q, qd, 200.0, method=None)
+    return AccuracyTask("free 35", "a free base with limbs, 35 degrees of freedom", model, q, qd, 200.0, series=False)
 
 
 def van_der_pol() -> AccuracyTask:
     """x'' = mu (1 - x^2) x' - x with mu = 100: slow arcs and jumps, one period in 163 s."""
     model = OdeSystem(lambda x, t, p: [x[1], p["mu"] * ((1.0 - x[0] * x[0]) * x[1]) - x[0]], ["x", "v"], {"mu": 100.0})
     about = "slow arcs and jumps"
-    return AccuracyTask("van der Pol 100", about, model, (2.0, 0.0), (), 200.0, stiff=True, method="radau")
+    return AccuracyTask("van der Pol 100", about, model, (2.0, 0.0), (), 200.0, stiff=True, series=False)
 
 
 def stiff_chain() -> AccuracyTask:
@@ -98,7 +98,7 @@ def stiff_chain() -> AccuracyTask:
     held = [replace(each, joint=replace(each.joint, stiffness=1e4, damping=2e1)) for each in arm.bodies[1:4]]
     model = Mechanism([arm.bodies[0], *held, *arm.bodies[4:]], arm.gravity)
     about = "four rods, three hinges with stiff springs and dampers"
-    return AccuracyTask("stiff chain", about, model, (1.0, 0, 0, 0), (0.0,) * 4, 200.0, stiff=True, method=None)
+    return AccuracyTask("stiff chain", about, model, (1.0, 0, 0, 0), (0.0,) * 4, 200.0, stiff=True, series=False)
 
 
 MOTIONS: dict[str, Callable[[], AccuracyTask]] = {

@@ -19,7 +19,7 @@ TASKS: dict[str, Callable[[], AccuracyTask]] = {
     **{f"kepler {e:g}": partial(kepler, e, 3.5, 1.0) for e in (0.3, 0.5, 0.7, 0.9)},
     "spring pendulum 1e8": partial(cases.load, "damped spring pendulum, k = 1e+08"),
     "van der pol 1e6": partial(cases.load, "Van der Pol, mu = 1e+06"),
-    "robertson": lambda: replace(cases.load("Robertson, to 1e11"), decades=True),
+    "robertson": partial(cases.load, "Robertson, to 1e11"),
 }
 
 

@@ -173,8 +173,9 @@ class Ours(Solver):
 
     def rows(self, knob: float) -> Array:
         """The states at the task's times, (T, m); NaN from where it stopped."""
-        times = self.task.times
-        return recorded(integration(NativeRun(self._dense, self._options(knob, times))), self.start, times)
+        options = self._options(knob, self.task.times)
+        compiled = self._dense if options.between else self._plain
+        return recorded(integration(NativeRun(compiled, options)), self.start, self.task.times)
 
 
 class Scipy(Solver):

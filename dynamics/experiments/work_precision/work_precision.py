@@ -87,7 +87,7 @@ class WorkPrecision:
     nodes: int  # of the rate's graph
     conservative: bool
     stiff: bool
-    relative_to: str  # errors: "largest", "given" sizes, or the "own" value of the state at that time
+    relative_to: str  # errors: "largest" values or "given" sizes
     times: tuple[float, ...]
     reference: str  # how the exact motion was computed
     reference_error: float
@@ -300,7 +300,7 @@ def work_precision(
         **{field: getattr(at.task, field) for field in fields},
         states=at.problem.size,
         nodes=len(at.problem.rate.nodes),
-        relative_to="own" if at.task.decades else "given" if at.task.size else "largest",
+        relative_to="given" if at.task.size else "largest",
         times=tuple(at.task.times),
         reference=at.metrics.exact.how,
         reference_error=at.metrics.exact.error,
@@ -322,8 +322,4 @@ def _solvers(
     }
     begins = tuple([PEERS[peer] for peer in peers])
     makers |= {name: make for name, make in offers(*at[:3], backend).items() if name.startswith(begins)}
-    solvers = made(makers, absent, ValueError, TypeError)
-    if at.task.decades:
-        equal = [name for name, solver in solvers.items() if solver.kind == EQUAL]
-        absent |= dict.fromkeys(equal, "equal steps cannot span this many powers of ten")
-    return [solver for name, solver in solvers.items() if name not in absent]
+    return list(made(makers, absent, ValueError, TypeError).values())

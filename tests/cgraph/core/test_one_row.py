@@ -56,7 +56,6 @@ def outcomes(*arguments: str) -> dict[str, list[str]]:
 def test_every_part_of_the_library_takes_the_operation_and_the_tests_of_the_table_accept_it() -> None:
     """Without a word about it in any of them."""
     pytest.importorskip("llvmlite")  # without which these files have nothing to run
-    pytest.importorskip("flint")
     file = "tests/cgraph/core/asinh_everywhere.py"
     found = outcomes(file, *TABLE, "-k", "asinh or every_operation or the_script_knows or slopes_are")
     assert found[file].count("PASSED") >= 12

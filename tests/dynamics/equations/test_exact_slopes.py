@@ -19,11 +19,8 @@ from tests.dynamics.mechanisms import (
     random_tree,
     turned_arm,
 )
-from tests.slow import slow
-
-pytest.importorskip("flint")
-
 from tests.dynamics.tree_in_digits import Slopes, digits, exactly, floats, slopes_in_digits
+from tests.slow import slow
 
 # Of the largest entry of a matrix of slopes of torques; and, of slopes X of accelerations, M X = dtau, of what a
 # relative change of M and of dtau may do to X: of the largest entry of |M^-1| (|M| |X| + |dtau|).

@@ -192,7 +192,6 @@ def test_pendulums_of_an_ensemble_end_where_those_of_mujoco_and_jax_do() -> None
 
 
 def test_elimination_is_accurate_on_long_chains_and_dense_solves_are_less_so() -> None:
-    pytest.importorskip("flint")
     errors = stages.accuracy("planar", 30, 0.1)
     assert errors["elimination"] < 1e-13  # some roundings a link
     assert all(errors[name] > 10.0 * errors["elimination"] for name in errors if name != "elimination")

@@ -8,19 +8,22 @@ from typing import Any
 import numpy as np
 from pytest import approx, mark, param, raises
 
+import dynamics as dyn
 from dynamics.equations.state_equation import state_equation, state_inputs
 from dynamics.experiments.accuracy_task import StabilityCase
 from dynamics.experiments.stability import cases
-from dynamics.experiments.stability.cases import chains, rotation, stiff
+from dynamics.experiments.stability.cases import chains, rotation
 from dynamics.multiprecision import Reference, reference
 from tests import high_precision
 from tests.dynamics.models import Array
-from tests.dynamics.planar_arm_equations import Link, accelerations_of
 from tests.dynamics.split_state import split_state
+from tests.dynamics.tree_in_digits import tree_in_digits
 from tests.each_row import each_row
+from tests.oracles import closed_forms
 from tests.slow import slow
 
 Rate = Callable[[Array, float], Any]  # of the state and t, written without the library
+Closed = Callable[[Sequence[float]], Reference]  # of the times
 
 STATES = 4
 ROUNDING = 1e-12  # of the largest term
@@ -54,14 +57,20 @@ def bodies(
     inertia: Sequence[float] | None = None,
     armature: float = 0.0,
 ) -> Rate:
-    """A planar chain by its closed formulas, in sixty digits. Rods unless centers and inertias are given."""
-    n, none = len(masses), np.zeros(len(masses))
+    """A planar chain in sixty digits. Rods unless centers and inertias are given."""
+    n = len(masses)
     c = [each / 2 for each in lengths] if center is None else center
     moment = [m * b * b / 12 for m, b in zip(masses, lengths, strict=True)] if inertia is None else inertia
-    links = [Link(*numbers) for numbers in zip(masses, lengths, c, moment, strict=True)]
+    links = []
+    for i in range(n):
+        place = (0.0, 0.0, -lengths[i - 1] if i else 0.0)
+        joint = dyn.Joint("revolute", (0.0, 1.0, 0.0), place, armature=armature)
+        parent, at = f"{i - 1}" if i else "world", (0.0, 0.0, -c[i])
+        links.append(dyn.Body(f"{i}", joint, parent, masses[i], at, (moment[i], moment[i], 0.0)))
+    chain, none = dyn.Mechanism(links, (0.0, 0.0, -gravity)), np.zeros(n)
 
     def rate(x: Array, t: float) -> list[float]:
-        return [*x[n:], *accelerations_of(links, gravity, x[:n], x[n:], none, none.tolist(), armature).high]
+        return [*x[n:], *tree_in_digits(chain, x[:n], x[n:], none, none)["accelerations"]]
 
     return rate
 
@@ -287,7 +296,7 @@ def test_what_is_watched_can_be_measured(name: str) -> None:
         assert criterion.scale > 0.0
         assert criterion.why
         if what == "error":
-            assert case.exact or case.method
+            assert case.solution() is not None
             assert all(int(each) < len(case.start) for each in states)
         else:
             assert criterion.quantity in invariants
@@ -295,31 +304,45 @@ def test_what_is_watched_can_be_measured(name: str) -> None:
     assert len(given.states) == len(case.start) == len(case.size or case.start)
 
 
-LIMITS = [name for name, case in cases.table().items() if case.exact is not None and case.method is None]
-CLOSED = [name for name, case in cases.table().items() if case.exact is not None and case.method is not None]
+def pendulum_from(angle: float) -> Closed:
+    return lambda times: closed_forms.pendulum(times, angle, 9.81)
+
+
+def orbit(name: str) -> Closed:
+    return lambda times: closed_forms.kepler(times, cases.load(name).start)
+
+
+CLOSED: dict[str, Closed] = {
+    **{
+        f"mass matrix of condition {4 / small:.0e}": lambda times: closed_forms.two_modes(times, (1.0, 0.5), (4.0, 1.0))
+        for small in (1e-4, 1e-8, 1e-12)
+    },
+    **{name: pendulum_from(cases.load(name).q[0]) for name in PENDULA if cases.load(name).q[0] not in (0.0, 0.5)},
+    "smallest velocity": lambda times: closed_forms.free_fall(times, 0.0, 5e-324, 0.0),
+    "smallest velocity, hanging": lambda times: closed_forms.oscillator(times, 0.0, 5e-324, 9.81),
+    "charge in a magnetic field": lambda times: closed_forms.cyclotron(times, (0.0, 0.0, 1.0, 0.5), 10.0),
+    "damping by a growing mass": lambda times: closed_forms.oscillator(times, 1.0, 0.0, 4.0, 0.5),
+    "exponential growth": lambda times: closed_forms.exponential(times, 1.0, 1.0),
+    "exponential decay": lambda times: closed_forms.exponential(times, 1.0, -1.0),
+    **{f"Kepler, e = {e:g}": orbit(f"Kepler, e = {e:g}") for e in (0.9, 0.99, 0.999)},
+    "free body about its middle axis, Euler's equations": lambda times: closed_forms.free_rigid_body(
+        times, rotation.INERTIA, rotation.OMEGA
+    ),
+    "Prothero-Robinson, rate 1e+06": closed_forms.cosine,
+}
 
 
 @each_row("name", CLOSED)
-def test_closed_form_is_the_motion_of_the_model(name: str) -> None:
-    """To a time by which the motion has moved; the rest is marked slow. Constants of the graph may be rounded."""
-    compare(cases.load(name), min(cases.load(name).t_end, 1.0))
-
-
-@mark.slow
-@mark.parametrize("name", CLOSED)
-def test_closed_form_is_the_motion_of_the_model_to_the_end(name: str) -> None:
-    compare(cases.load(name), cases.load(name).t_end)
-
-
-def compare(case: StabilityCase, t_end: float) -> None:
-    assert case.exact is not None
-    exact = case.exact([t_end])
-    model = case.model
-    found = reference(model, *split_state(model, case.start), [t_end], digits=16, method=case.method or "")
-    rounded = 1e-15 if "mass matrix" not in case.name else 1e-15 * float(case.name.rsplit(" ", 1)[1])
-    growth = case.growth or 1e9
+def test_solutions_are_closed_forms(name: str) -> None:
+    """At the end the one in the file, and near the start the series. Constants of the graph may be rounded."""
+    case = cases.load(name)
+    rounded = 1e-15 if "mass matrix" not in name else 1e-15 * float(name.rsplit(" ", 1)[1])
     size = np.array(case.sizes(case.solution()))
-    assert np.max(np.abs(found.deviation(exact.x)[0]) / size) <= rounded * max(growth, 100.0)
+    for t in (case.t_end, *([min(case.t_end, 1.0)] if case.series else [])):
+        found = case.solution([t], digits=16)
+        assert found is not None
+        off = np.max(np.abs(found.deviation(CLOSED[name]([t]).x)[0]) / size)
+        assert off <= rounded * max(case.growth or 1e9, 100.0)
 
 
 STEP = 2.0**-36  # of the start; a growth up to 10^6 is still a matter of first order
@@ -335,7 +358,7 @@ def growth(case: StabilityCase) -> float:
 
     def end(start: tuple[float, ...]) -> Reference:
         at = split_state(model, start)
-        return reference(model, *at, [case.t_end], digits=DIGITS, method=str(case.method))
+        return reference(model, *at, [case.t_end], digits=DIGITS)
 
     there = end(case.start)
     for i, value in enumerate(case.start):
@@ -349,7 +372,7 @@ def growth(case: StabilityCase) -> float:
     return worst
 
 
-MEASURED = [name for name, case in cases.table().items() if case.growth is not None and case.method is not None]
+MEASURED = [name for name, case in cases.table().items() if case.growth is not None and case.series]
 QUICK = {"next to the upright", "at the upright", "mass matrix of condition 4e+08", "damping by a growing mass"}
 TO_BE_LARGE = 1e-4  # below it errors die out, and how far says nothing about a method
 
@@ -362,17 +385,13 @@ def test_growth_is_what_reference_solutions_give(name: str) -> None:
 
 
 def test_the_stiffer_the_spring_the_nearer_the_rigid_rod() -> None:
-    """The distance from the limit falls as 1/k, within the bound of the cases that are watched by it."""
-    distances = []
-    for k in (1e2, 1e4):
+    """The distance from the limit falls as 1/k; the stiffest are watched by the limit itself."""
+    for k in (1e2, 1e4, 1e6, 1e8, 1e10, 1e12):
         case = cases.load(f"spring pendulum, k = {k:g}")
-        limit = stiff.rigid([2.0])
-        model = case.model
-        found = reference(model, *split_state(model, case.start), [2.0], digits=12)
-        distances.append(np.max(np.abs(found.x - limit.x)[0, [1, 3]]))
-        assert distances[-1] < 100.0 * 9.81 / k
-    assert distances[1] / distances[0] == approx(1e-2, rel=0.5)
-    assert all(name.startswith("spring pendulum") for name in LIMITS)
+        found, rod = case.solution(), closed_forms.pendulum([case.t_end], 1.0, 9.81)
+        assert found is not None
+        distance = np.max(np.abs(found.x[0, [1, 3]] - rod.x[0]))
+        assert distance < (100.0 * 9.81 / k if case.series else LAST_BITS)
 
 
 def test_a_name_that_is_none_is_refused() -> None:

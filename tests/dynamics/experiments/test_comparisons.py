@@ -20,7 +20,6 @@ ROUNDING = 1e-12  # of rates written by hand, beside those of the graph
 
 @pytest.fixture(scope="module")
 def spring(tmp_path_factory: pytest.TempPathFactory) -> Subject:
-    pytest.importorskip("flint")
     return subject(load("spring_mass", t_end=3.0), tmp_path_factory.mktemp("exact"))
 
 
@@ -69,7 +68,6 @@ def test_solve_ivp_gets_the_rate_it_is_given(spring: Subject) -> None:
 
 
 def test_rates_written_in_numpy_are_those_of_the_graph(tmp_path: Any) -> None:
-    pytest.importorskip("flint")
     at = subject(load("triple_pendulum", t_end=0.1), tmp_path)
     compiled, rate = cg.compile(at.problem.rate, "python"), numpy_rate()
     for x in np.random.default_rng(1).normal(size=(5, 6)):

@@ -58,7 +58,6 @@ TIMES = np.linspace(0.0, T_END, INTERVALS + 1)
 @pytest.fixture(scope="module")
 def report() -> WorkPrecision:
     """The oscillator by some of ours, quickly."""
-    pytest.importorskip("flint")
     pytest.importorskip("llvmlite")
     methods = ("euler", "rk4", "dop853", "verlet", "midpoint", "radau")
     return work_precision("spring_mass", methods=methods, peers=(), cold=(), turns=1, limit=0.05)
@@ -194,7 +193,6 @@ def exact_motion(found: AccuracyTask, digits: int) -> Reference:
 
 def task(name: str, **options: Any) -> tuple[AccuracyTask, ErrorMetrics, float]:
     """A task with its exact motion, to twenty digits."""
-    pytest.importorskip("flint")
     found = load(name, **options)
     metrics = ErrorMetrics(found, exact_motion(found, 20))
     return found, metrics, metrics.smallest
@@ -220,7 +218,6 @@ def test_mujoco_s_rk4_makes_the_error_that_ours_makes(arm: tuple[AccuracyTask, E
 def test_mujoco_s_order_of_the_joints_is_undone() -> None:
     """A tree whose coordinates MuJoCo keeps in another order, branch by branch."""
     pytest.importorskip("mujoco")
-    pytest.importorskip("flint")
     bodies = [
         dyn.Body(name, dyn.Joint("revolute", (0.0, 1.0, 0.0), (0.1, 0.0, -0.3)), parent, mass, (0.0, 0.0, -0.2))
         for name, parent, mass in (("a", "world", 1.0), ("b", "a", 0.5), ("c", "a", 0.7), ("d", "b", 0.3))
@@ -338,7 +335,6 @@ def test_a_solver_that_fails_keeps_its_good_points_and_a_reason() -> None:
 
 def test_what_cannot_be_made_is_absent_with_its_reason() -> None:
     pytest.importorskip("mujoco")
-    pytest.importorskip("flint")
     found = work_precision("spring_mass", methods=("rk4",), peers=("MuJoCo",), cold=(), turns=1, limit=1e-5)
     assert [each.name for each in found.curves] == ["rk4"]
     assert found.absent["MuJoCo RK4"] == "takes rigid bodies, not a Lagrangian"
@@ -350,15 +346,13 @@ def test_settings() -> None:
     assert (arm.conservative, planet.conservative, reaction.conservative) == (False, True, False)
     assert not reaction.mechanical
     assert len(arm.times) == INTERVALS + 1
-    assert (arm.times[-1], reaction.times[-1]) == (arm.t_end, 1e11)
-    assert reaction.times[0] == approx(0.1)
+    assert (arm.times[-1], reaction.times) == (arm.t_end, [0.0, 1e11])
     moved = load("triple_pendulum", t_end=1.5, start=[0.1, 0.2, 0.3, 0.0, 0.0, 0.0])
     assert (moved.t_end, moved.start) == (1.5, (0.1, 0.2, 0.3, 0.0, 0.0, 0.0))
     assert load("damped spring pendulum, k = 1e+08").name == load("spring pendulum 1e8").name
 
 
 def test_another_start_has_another_exact_motion() -> None:
-    pytest.importorskip("flint")
     found = load("spring_mass", start=[0.0, 2.0], t_end=1.0)
     exact = exact_motion(found, 15)
     assert exact.x[-1] == approx(np.array([2.0 * math.sin(1.0), 2.0 * math.cos(1.0)]), rel=1e-14)

@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from pytest import approx, importorskip, mark, raises
+from pytest import approx, mark, raises
 
 import cgraph as cg
 import dynamics as dyn
@@ -15,6 +15,7 @@ from dynamics.equations.mass_matrix.accelerations import accelerations
 from tests.dynamics.mechanisms import FAMILIES, random_inertia, random_rotation, turned_arm
 from tests.dynamics.models import error, run
 from tests.dynamics.multibody.test_reconfiguration import arm
+from tests.dynamics.tree_in_digits import tree_in_digits
 from tests.slow import slow
 from tests.tolerances import EQUATIONS, SHORT_SUM
 
@@ -108,9 +109,6 @@ def test_regrouped_inertia_moves_alike_in_no_more_nodes(family: str, equations: 
 @mark.parametrize("n", [10, *slow(40)])
 def test_by_default_pruning_costs_no_digit(n: int) -> None:
     """Nothing is switched off, so the graph is that of the model; regrouped, it has lost some."""
-    importorskip("flint")
-    from tests.dynamics.tree_in_digits import tree_in_digits
-
     rng = np.random.default_rng(n)
     model = dyn.planar_arm(rng.uniform(0.5, 1.5, n).tolist(), rng.uniform(0.5, 1.5, n).tolist())
     q, qd, tau = rng.uniform(-3.0, 3.0, n), rng.normal(size=n), 5.0 * rng.normal(size=n)

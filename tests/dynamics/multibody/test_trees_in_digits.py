@@ -26,6 +26,7 @@ from tests.dynamics.mechanisms import (
     turned_tree,
 )
 from tests.dynamics.multibody.test_units import random_tree as units_tree
+from tests.dynamics.tree_in_digits import tree_in_digits
 from tests.each_row import each_row
 from tests.slow import slow
 
@@ -47,9 +48,6 @@ def errors(tree: dyn.Mechanism, seed: int, *of_all: str) -> tuple[dict[str, floa
 
     of_all: some of the names of `OF_SIZES`, if not all of them.
     """
-    pytest.importorskip("flint")
-    from tests.dynamics.tree_in_digits import tree_in_digits
-
     q, qd, qdd, tau = random_state(tree, seed)
     exact, weight = tree_in_digits(tree, q, qd, qdd, tau), tree_in_digits(tree, q, 0.0 * qd, qdd, tau)["bias"]
     bias = np.abs(weight) + np.abs(exact["bias"] - weight) + np.abs(np.array(tree.system.damping) * qd)
@@ -180,9 +178,6 @@ KINDS: dict[str, Callable[[int], dyn.Mechanism]] = {
 
 def off(kind: str, n: int, spread: float, method: str = "recursive") -> float:
     """The largest error of an acceleration at joint angles within +-spread, relative to the largest of them."""
-    pytest.importorskip("flint")
-    from tests.dynamics.tree_in_digits import tree_in_digits
-
     model, rng = KINDS[kind](n), np.random.default_rng(n)
     at = {"q": rng.uniform(-spread, spread, n), "qd": rng.normal(size=n), "tau": rng.normal(size=n)}
     exact = tree_in_digits(model, at["q"], at["qd"], 0.0 * at["q"], at["tau"])["accelerations"]

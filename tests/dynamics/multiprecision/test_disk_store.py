@@ -10,10 +10,8 @@ from pytest import raises
 
 import cgraph as cg
 import dynamics as dyn
-from dynamics.multiprecision import REFERENCE_METHODS, Reference, ReferenceFailedError, reference
+from dynamics.multiprecision import Reference, ReferenceFailedError, reference
 from dynamics.systems.ode_system import OdeSystem
-
-pytest.importorskip("flint", reason="reference solutions need python-flint")
 
 PENDULUM = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 + 9.81 * cg.cos(q[0]), ["angle"])
 
@@ -24,7 +22,7 @@ def solve(folder: Path, start: float = 1.0, **options: Any) -> Reference:
 
 def test_a_kept_solution_is_found_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     first = solve(tmp_path / "made")
-    monkeypatch.setitem(REFERENCE_METHODS, "taylor", None)  # nothing may be computed now
+    monkeypatch.setattr("dynamics.multiprecision.taylor_integrator.Series", None)  # nothing may be computed now
     assert solve(tmp_path / "made") == first
     assert [path.suffix for path in (tmp_path / "made").iterdir()] == [".json"]
 
@@ -36,7 +34,6 @@ def test_what_the_solution_depends_on_has_its_own_entry(tmp_path: Path) -> None:
             lambda: solve(tmp_path),
             lambda: solve(tmp_path, start=math.nextafter(1.0, 2.0)),
             lambda: solve(tmp_path, tau=0.1),
-            lambda: solve(tmp_path, method="radau"),
             lambda: reference(PENDULUM, [1.0], [0.0], [0.5, 1.0], digits=13, folder=tmp_path),
             lambda: reference(PENDULUM, [1.0], [0.0], [0.5], digits=12, folder=tmp_path),
             lambda: reference(heavy, [1.0], [0.0], [0.5, 1.0], digits=12, folder=tmp_path),

@@ -8,7 +8,7 @@ from pytest import mark
 import dynamics as dyn
 from cgraph.extend import Array
 from dynamics.multibody.algebra.spatial import from_quaternion, rotation
-from dynamics.multiprecision.closed_forms import free_rigid_body
+from tests.oracles.closed_forms import free_rigid_body
 
 MOMENTS = [1.0, 2.0, 3.0]  # kg m^2, of the rotor
 ROUNDING = 2e-15  # of some hundred steps, compensated

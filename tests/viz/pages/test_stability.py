@@ -161,6 +161,5 @@ def test_the_command_writes_the_table_and_fails_for_an_unexplained_row(
 
 @pytest.mark.slow
 def test_a_quick_report_succeeds(tmp_path: Path) -> None:
-    pytest.importorskip("flint")
     assert cli.main(["report", "--stability", "--quick", "--out", str(tmp_path)]) == 0
     assert (tmp_path / "stability.html").stat().st_size > 100_000

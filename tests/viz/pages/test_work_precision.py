@@ -173,7 +173,6 @@ MEASURED = ["report", "spring_mass", "--quick", "--methods", "rk4,dop853", "--pe
 
 
 def test_the_command_writes_whole_files(tmp_path: Path, capsys: pytest.CaptureFixture[str], undrawn: None) -> None:
-    pytest.importorskip("flint")
     assert cli.main([*MEASURED, "--t-end", "2", "--start", "1,0.5", "--out", str(tmp_path / "r")]) == 0
     assert "spring_mass.html: 2 integrators" in capsys.readouterr().out
     names = {path.name for path in (tmp_path / "r").iterdir()}
@@ -185,8 +184,6 @@ def test_the_command_writes_whole_files(tmp_path: Path, capsys: pytest.CaptureFi
 
 
 def test_an_interrupted_report_leaves_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("flint")
-
     def interrupt(*_: Any) -> None:
         raise KeyboardInterrupt
 

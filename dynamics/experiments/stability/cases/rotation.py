@@ -7,7 +7,6 @@ from collections.abc import Sequence
 
 import cgraph as cg
 
-from ....multiprecision import closed_forms
 from ....systems.ode_system import OdeSystem
 from ....systems.system import System
 from ...accuracy_task import (
@@ -93,7 +92,6 @@ def euler_equations(growth: float) -> StabilityCase:
             energy=lambda w: 0.5 * (INERTIA[0] * w[0] ** 2 + INERTIA[1] * w[1] ** 2 + INERTIA[2] * w[2] ** 2),
             momentum=lambda w: (INERTIA[0] * w[0]) ** 2 + (INERTIA[1] * w[1]) ** 2 + (INERTIA[2] * w[2]) ** 2,
         ),
-        exact=lambda times: closed_forms.free_rigid_body(times, INERTIA, OMEGA),
     )
 
 
