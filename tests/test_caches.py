@@ -23,7 +23,7 @@ WEAK = {"cgraph.core.label", "dynamics.multibody.trees.structure"}  # have weak 
 TABLES = {
     "cgraph.core.row.ROWS",
     "cgraph.operations.operation.OPS",
-    "cgraph.operations.operation.BY_UFUNC",
+    "cgraph.core.row.BY_UFUNC",
     "cgraph.program.statement.STATEMENTS",
     "dynamics.equations.equation.EQUATIONS",
     "dynamics.experiments.trust.random_motions.FAMILIES",
