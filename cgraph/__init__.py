@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from .codegen.wasm.script import wasm_script as wasm_script
     from .codegen.wasm.to_wasm import to_wasm as to_wasm
     from .core.checks import GraphError as GraphError
+    from .core.counts import Counts as Counts
     from .core.graph import Edge as Edge, Graph as Graph
     from .core.node import Node as Node, constant as constant, variable as variable
     from .core.scope import tag as tag
@@ -73,9 +74,10 @@ if TYPE_CHECKING:
     from .simplification.double_double import double_double as double_double
     from .simplification.simplify import simplify as simplify, specialize as specialize
     from .util.caches import clear_caches as clear_caches
-    from .writing.counts import Counts as Counts
+    from .writing.html import html as html
     from .writing.latex import latex as latex
     from .writing.naming import variables as variables, with_name as with_name
+    from .writing.networkx_queries import from_networkx as from_networkx, to_networkx as to_networkx
     from .writing.source_lines import recording_lines as recording_lines
     from .writing.structure_hash import structure_hash as structure_hash
 

@@ -1,6 +1,6 @@
 """dynamics: equations of motion on computational graphs, from Lagrangians and bodies."""
 
-from cgraph.extend import doors
+from cgraph._shared import doors
 
 TYPE_CHECKING = False  # as a checker knows it; typing takes a while to load
 

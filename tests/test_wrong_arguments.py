@@ -468,7 +468,7 @@ RECORDS = """
 # `tests/cgraph/bridges`.
 LEFT_OUT = """cg.as_jax cg.to_casadi cg.to_jax cg.to_torch cg.recording_lines cg.clear_cache cg.clear_caches
     cg.Compiled.bind cg.Compiled.values cg.Graph.check
-    cg.Graph.counts cg.Graph.listing cg.Graph.only_output cg.Graph.to_networkx dyn.System.braking dyn.System.changed
+    cg.Graph.counts cg.Graph.listing cg.Graph.only_output dyn.System.braking dyn.System.changed
     dyn.System.mass_matrix dyn.System.require_known dyn.System.require_values dyn.JointForce.along
     dyn.JointForce.check dyn.JointLimit.along dyn.JointLimit.check dyn.JointFriction.along dyn.JointFriction.check
     dyn.Actuator.along dyn.Actuator.check extend.Builder extend.Runner extend.require_length extend.Runner.advancing

@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import NamedTuple
 
+from .check import check
 from .checks import GraphError, check_name
+from .counts import Counts, count
 from .evaluation import Value, evaluate
+from .html_text import render_html
+from .inputs import chosen_inputs, input_values
+from .listing import listing
 from .node import VARIABLE, Node, Scalar, as_node
 from .traversal import rebuild, topological
-
-if TYPE_CHECKING:
-    import networkx
-
-    from ..writing.counts import Counts
 
 
 class Edge(NamedTuple):
@@ -114,9 +114,7 @@ class Graph:
 
         Raises GraphError if the graph has no such input or one is named twice, TypeError for anything else.
         """
-        from ..util.inputs import chosen_inputs
-
-        return self.inputs if wrt is None else chosen_inputs(self, wrt)
+        return self.inputs if wrt is None else chosen_inputs(self.inputs, wrt)
 
     def only_output(self) -> Node:
         """The one output. Raises GraphError if there are several."""
@@ -157,8 +155,6 @@ class Graph:
         GraphError, TypeError
             If an input is missing or unknown, or shapes do not broadcast; and if a value is not real.
         """
-        from ..util.inputs import input_values
-
         return evaluate(self.nodes, self.outputs, input_values(self.input_names, values))
 
     def values(self, values: Mapping[str, Value]) -> dict[Node, Value]:
@@ -168,46 +164,15 @@ class Graph:
 
     def counts(self) -> Counts:
         """Nodes, edges, depth, width, and nodes by operation, tag and role."""
-        from ..writing.counts import count
-
         return count(self.nodes)
 
     def listing(self) -> str:
         """The graph as text, a node a line, the same in every run."""
-        from ..writing.listing import listing
-
         return listing(self.input_names, self.nodes, self.outputs)
-
-    def latex(self, *, names: Mapping[str, str] | None = None, lines: int | None = None) -> str:
-        """The equations as LaTeX, an aligned block; a node that several need, or that has a name, has a line.
-
-        names: {name in the graph: what a person calls it}.  lines: at most, by default 40; a last one counts the rest.
-        """
-        from ..writing.latex import graph_latex
-
-        return graph_latex(self.nodes, self.outputs, names, lines)
 
     def check(self) -> None:
         """Raise GraphError unless every node is well formed and the order is topological."""
-        from ..writing.check import check
-
-        check(self)
-
-    def to_networkx(self) -> networkx.MultiDiGraph:
-        """A networkx.MultiDiGraph from arguments to uses, nodes numbered as in `nodes`, unused inputs behind.
-
-        They have op; name, value, input (a place) if any; as JSON tags, roles, lines, outputs; edges a slot.
-        """
-        from ..writing.networkx_queries import to_networkx
-
-        return to_networkx(self.nodes, self.inputs, self.outputs)
-
-    @staticmethod
-    def from_networkx(network: networkx.DiGraph) -> Graph:
-        """The graph of what `to_networkx` gave, also through a file. Raises GraphError where something is missing."""
-        from ..writing.networkx_queries import from_networkx
-
-        return from_networkx(network)
+        check(self.nodes, self.outputs)
 
     def __repr__(self) -> str:
         ends, edges = map(_short, (self.input_names, tuple(self.outputs))), sum(len(node.args) for node in self.nodes)
@@ -215,14 +180,7 @@ class Graph:
 
     def _repr_html_(self) -> str | None:
         """The drawing that a notebook shows, when a drawing package is installed (extra `viz`)."""
-        from ..util.html_text import render_html
-
         return render_html("graph", self)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        from ..writing.records import reduced
-
-        return reduced(self)
 
 
 def _checked_inputs(inputs: Sequence[Node]) -> tuple[Node, ...]:

@@ -11,6 +11,7 @@ from typing import Any, NoReturn, SupportsFloat
 import numpy as np
 
 from .checks import check_name
+from .html_text import render_html
 from .label import INPUT, UNLABELLED, Interned, Label, SourceLine, label
 from .row import BY_UFUNC, ROWS, Row
 from .scope import current
@@ -110,8 +111,6 @@ class Node:
 
     def _repr_html_(self) -> str | None:
         """The formula that a notebook shows, when a drawing package is installed (extra `viz`)."""
-        from ..util.html_text import render_html
-
         return render_html("node", self)
 
     def __bool__(self) -> NoReturn:
@@ -207,7 +206,9 @@ class Leaf(Node):
 
     __slots__ = ("__weakref__", "value")
 
-    def __init__(self, op: Row, label: Label = UNLABELLED, *, value: float | None = None, name: str | None = None) -> None:
+    def __init__(
+        self, op: Row, label: Label = UNLABELLED, *, value: float | None = None, name: str | None = None
+    ) -> None:
         super().__init__(op, (), label, name=name)
         object.__setattr__(self, "value", value)
 

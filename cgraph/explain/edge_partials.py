@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from ..core.checks import GraphError
 from ..core.graph import Edge, Graph
 from ..core.node import Node
-from ..util.real_arrays import is_finite
+from ..core.real_arrays import is_finite
 from ..util.require import require_mapping
 from .names import Names
 

@@ -235,11 +235,10 @@ def enter(op: Op) -> None:
     OPS[op.name] = ROWS[op.name] = op
     if op.ufunc is not None:
         BY_UFUNC[op.ufunc] = op
-        name = getattr(op.ufunc, "__name__", "")
-        if getattr(np, name, None) is op.ufunc and not hasattr(Node, name):
-            setattr(Node, name, _method_of(op.ufunc))
+        if isinstance(op.ufunc, np.ufunc) and not hasattr(Node, op.ufunc.__name__):
+            setattr(Node, op.ufunc.__name__, _method_of(op.ufunc))
 
 
-def _method_of(ufunc: np.ufunc | str) -> Callable[..., Node]:
+def _method_of(ufunc: np.ufunc) -> Callable[..., Node]:
     """The method that NumPy asks of the elements of an array of objects, as in `np.sqrt(array)`."""
     return lambda *nodes: apply(BY_UFUNC[ufunc], *nodes)

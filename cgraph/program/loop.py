@@ -12,8 +12,8 @@ from ..core.checks import GraphError
 from ..core.evaluation import Array
 from ..core.graph import Graph
 from ..core.node import CONSTANT, Node, variable
+from ..core.real_arrays import real_array
 from ..core.traversal import rebuild, topological
-from ..util.real_arrays import real_array
 from ..util.require import require_graph, require_mapping, require_sequence
 from .program import Program
 from .runners.choose_runner import runner

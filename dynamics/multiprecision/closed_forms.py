@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from cgraph.extend import install
+from cgraph._shared import install
 
 from .solution import Reference, from_text
 

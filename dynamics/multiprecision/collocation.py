@@ -16,7 +16,7 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ..systems.arguments import TIME
 from .flint_numbers import Number, flint, log2_size, working

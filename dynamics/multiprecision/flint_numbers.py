@@ -9,7 +9,8 @@ from functools import partial
 from types import ModuleType
 from typing import TYPE_CHECKING, TypeAlias
 
-from cgraph.extend import Op, install
+from cgraph._shared import install
+from cgraph.extend import Op
 
 if TYPE_CHECKING:
     from flint import arb

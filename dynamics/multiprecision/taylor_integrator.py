@@ -14,7 +14,8 @@ from operator import mul
 import numpy as np
 
 from cgraph import Graph, Node
-from cgraph.extend import NoSeriesError, columns, jets, topological
+from cgraph._shared import columns
+from cgraph.extend import NoSeriesError, jets, topological
 
 from ..systems.arguments import TIME
 from .flint_numbers import Number, log2_size, sign, value, working

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import Array, WhyNan
+from cgraph._shared import Array, WhyNan
 
 from .row_values import row_values
 

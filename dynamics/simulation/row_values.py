@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Graph
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ..integrators import Problem
 from .estimates.state_sizes import OTHERS

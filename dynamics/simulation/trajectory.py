@@ -12,15 +12,15 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph import Graph, extend
-from cgraph.extend import Array, counted, or_nearest
+from cgraph import Graph, _shared
+from cgraph._shared import Array, counted, or_nearest
 
 from .row_values import row_values
 from .sampled_controller import HeldForces
 from .steps.dense_output import Solution
 
 if TYPE_CHECKING:
-    from cgraph.extend import WhyNan
+    from cgraph._shared import WhyNan
 
 _ROWS = 10_000  # of a text, written at once
 
@@ -386,7 +386,7 @@ class Trajectory:
 
     def _repr_html_(self) -> str | None:
         """The plot that a notebook shows, when a drawing package is installed (extra `viz`)."""
-        return extend.render_html("trajectory", self)
+        return _shared.render_html("trajectory", self)
 
     def __repr__(self) -> str:
         n, stats = self.q.shape[1], self.stats

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cgraph.extend import Array
+from cgraph._shared import Array
 from dynamics import Mechanism
 from dynamics.multibody.builders.planar_arm import planar_links
 from dynamics.multiprecision.chain_equations import Pair, bounded

@@ -2,7 +2,7 @@
 # ruff: noqa: F401
 # mypy: implicit-reexport
 
-from cgraph.extend import doors
+from cgraph._shared import doors
 
 TYPE_CHECKING = False
 

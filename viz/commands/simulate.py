@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import dynamics as dyn
-from cgraph import extend
+from cgraph import _shared
 
 from . import library
 from .arguments import MOMENTUM_FORM, answer, place, positive, started, takes_a_scene, takes_a_start, unless_json
@@ -43,7 +43,7 @@ def add(parser: Command) -> None:
 def run(options: argparse.Namespace) -> int:
     """Print how the run went; 1 where it ends before its time."""
     if options.csv is not None:
-        extend.check_writable(options.csv)
+        _shared.check_writable(options.csv)
     elif options.every is not None:
         raise ValueError("--every goes with --csv: it says how often the table has a row")
     if options.dt is not None and library.RunOptions(1.0, options.method).adaptive:
@@ -128,7 +128,7 @@ def _text(run: dyn.Trajectory, data: dict[str, Any]) -> str:
     at_end = ", ".join([f"{name} = {value:.6g}" for name, value in [*data["end"].items()][:SHOWN]])
     more = len(data["end"]) - SHOWN
     of = ", of coordinates and momenta" if data["form"] == "momentum" else ""
-    steps, evaluations = extend.counted(data["steps"], "step"), extend.counted(data["evaluations"], "evaluation")
+    steps, evaluations = _shared.counted(data["steps"], "step"), _shared.counted(data["evaluations"], "evaluation")
     work = f"{steps}{of}, {data['rejected']} rejected, {evaluations}"
     lines = [
         f"{data['message']}, {data['t_end']:g} s" if run.success else f"{data['message']}",
@@ -146,7 +146,7 @@ def _text(run: dyn.Trajectory, data: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def _every(step: float, end: float) -> extend.Array:
+def _every(step: float, end: float) -> _shared.Array:
     """Times so far apart up to the end, which is one of them. Raises ValueError for more than can be kept."""
     import numpy as np
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import cgraph as cg
 from cgraph import Graph, Node, variable
-from cgraph.extend import Side, counted, ink, is_letter, reading_form
+from cgraph._shared import Side, counted, ink, is_letter, reading_form
 from dynamics.equations.equations_of_motion import bias, damping_force, gravity_force, mass_matrix, momentum
 from dynamics.equations.formulations.formulations import inverse_dynamics
 from dynamics.equations.formulations.verdict import formulation_verdict

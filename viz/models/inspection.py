@@ -10,7 +10,8 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import PRIMAL, TANGENT, Array, counted, real_number, topological
+from cgraph._shared import Array, counted, real_number
+from cgraph.extend import PRIMAL, TANGENT, topological
 from dynamics.equations.equations_of_motion import forward_dynamics, momentum
 from dynamics.equations.formulations.formulations import inverse_dynamics
 from dynamics.equations.formulations.verdict import formulation_verdict

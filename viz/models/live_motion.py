@@ -12,7 +12,7 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import write_files
+from cgraph._shared import write_files
 from dynamics import scenes
 from dynamics.equations.energies import kinetic_energy, potential_energy
 from dynamics.equations.equations_of_motion import gravity_force, momentum

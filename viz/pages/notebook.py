@@ -8,7 +8,8 @@ from typing import Protocol
 import numpy as np
 
 from cgraph import Graph, Node
-from cgraph.extend import Array, counted, remarks_of, require_graph, topological
+from cgraph._shared import Array, counted, remarks_of, require_graph
+from cgraph.extend import topological
 
 from .. import theme
 from ..graph_drawing.dot import to_dot

@@ -20,9 +20,9 @@ from ...core.checks import GraphError
 from ...core.evaluation import Array
 from ...core.graph import Graph
 from ...core.node import Node, variable
+from ...core.real_arrays import real_array
 from ...util.extras import scipy_module
 from ...util.memory import require_memory, require_target
-from ...util.real_arrays import real_array
 from ...util.require import require_flag
 from ...util.threads import thread_count
 from ..program import Program

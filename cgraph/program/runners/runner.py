@@ -13,8 +13,8 @@ from numpy.typing import ArrayLike
 
 from ...core.checks import GraphError
 from ...core.evaluation import Array
+from ...core.real_arrays import real_array
 from ...util.memory import describe, require_memory, require_out
-from ...util.real_arrays import real_array
 from ...util.require import require_mapping, require_whole
 from ...util.threads import thread_count, write_batch
 from ..program import Program

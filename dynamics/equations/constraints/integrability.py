@@ -20,7 +20,8 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Array, Builder, building, cotangents, tangents, topological
+from cgraph._shared import Array
+from cgraph.extend import Builder, building, cotangents, tangents, topological
 
 from ...systems.constraints import ConstraintError, Constraints
 from ...systems.kinematics import ONE, ZERO
@@ -31,7 +32,7 @@ from ..substitute import substitute
 from .row_numbers import RowNumbers
 
 if TYPE_CHECKING:
-    from cgraph.extend import Json
+    from cgraph._shared import Json
 
 STATES = 3
 ROW_ROUNDING = 1e-9  # of the size of a row and its slopes

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ...equations.state_equation import state_inputs
 from ...integrators import METHODS

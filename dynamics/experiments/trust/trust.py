@@ -14,7 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 import cgraph as cg
-from cgraph.extend import Array, NoSeriesError
+from cgraph._shared import Array
+from cgraph.extend import NoSeriesError
 
 from ...integrators import METHODS
 from ...multiprecision import Reference, ReferenceFailedError

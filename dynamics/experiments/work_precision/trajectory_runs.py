@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ...equations.state_equation import state_inputs
 from ...integrators import METHODS, Problem, derive

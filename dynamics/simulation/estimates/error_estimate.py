@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ..run_options import RunOptions
 from ..steps.dense_output import StepBlock

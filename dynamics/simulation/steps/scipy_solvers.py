@@ -13,7 +13,7 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import Array, scipy_module
+from cgraph._shared import Array, scipy_module
 
 from ...integrators import Problem
 from ...integrators.step_control import RESOLUTION

@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from ..core.checks import GraphError
-from ..core.graph import Graph
-from ..core.node import CONSTANT, VARIABLE, Node
-from ..core.row import ROWS, Row
-from ..core.traversal import topological
+from collections.abc import Mapping, Sequence
+
+from .checks import GraphError
+from .node import CONSTANT, VARIABLE, Node
+from .row import ROWS, Row
+from .traversal import topological
 
 
-def check(graph: Graph) -> None:
+def check(nodes: Sequence[Node], outputs: Mapping[str, Node]) -> None:
     """Raise GraphError for a graph that no public function could have made."""
-    for node in graph.nodes:
+    for node in nodes:
         check_node(node)
-    if set(topological(graph.outputs.values())) != set(graph.nodes):
+    if set(topological(outputs.values())) != set(nodes):
         raise GraphError("the nodes are not those that the outputs reach")
     visited: set[Node] = set()
-    for node in graph.nodes:
+    for node in nodes:
         if not visited.issuperset(node.args):
             raise GraphError(f"{node!r} comes before one of its arguments")
         visited.add(node)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from html import escape
-from importlib.metadata import entry_points
 
 LEFT, RIGHT = "text-align:left", "text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap"
 
@@ -42,6 +41,8 @@ def render_html(kind: str, what: object) -> str | None:
 
     None where no package is installed that draws it, or where it cannot: the notebook shows text then.
     """
+    from importlib.metadata import entry_points  # takes as long to load as all of the core
+
     for renderer in entry_points(group="cgraph.renderers", name=kind):
         try:
             return str(renderer.load()(what))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from ..core.node import CONSTANT, VARIABLE, Node
+from .node import CONSTANT, VARIABLE, Node
 
 
 def listing(inputs: Sequence[str], nodes: Sequence[Node], outputs: Mapping[str, Node]) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.evaluation import Array
+from .evaluation import Array
 
 _KINDS = {"c": "complex numbers", "U": "text", "S": "text", "M": "dates", "m": "time spans"}
 
@@ -19,7 +19,7 @@ def real_array(what: str, value: object) -> Array:
     Raises TypeError for complex numbers (their imaginary part would be lost), text, dates and masked values, ValueError
     for rows of different lengths and a number too large for float64.
 
-    >>> from cgraph.extend import real_array
+    >>> from cgraph._shared import real_array
     >>> real_array("q", [1, 2])
     array([1., 2.])
     >>> real_array("q", [1, 2j])

@@ -6,8 +6,8 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from ..core.node import Node
-from ..util.html_text import html_table
+from .html_text import html_table
+from .node import Node
 
 
 @dataclass(frozen=True)

@@ -7,10 +7,9 @@ from numbers import Real
 
 import numpy as np
 
-from ..core.checks import GraphError
-from ..core.evaluation import Value
-from ..core.graph import Graph
-from ..core.node import Node, variable
+from .checks import GraphError
+from .evaluation import Value
+from .node import Node, variable
 from .real_arrays import real_array, real_number
 
 
@@ -44,22 +43,23 @@ def _as_value(name: str, value: object) -> Value:
     return array if array.ndim else float(array)
 
 
-def chosen_inputs(graph: Graph, wrt: str | Node | Sequence[str | Node]) -> tuple[Node, ...]:
-    """The inputs that `wrt` names. Raises as `Graph.select_inputs`."""
+def chosen_inputs(given: Sequence[Node], wrt: str | Node | Sequence[str | Node]) -> tuple[Node, ...]:
+    """Those of a graph's inputs that `wrt` names. Raises as `Graph.select_inputs`."""
     if not isinstance(wrt, (str, Node, Iterable)):
         raise TypeError(f"wrt must name inputs by strings or variables, got {type(wrt).__name__}: {wrt!r:.60}")
-    inputs, chosen = set(graph.inputs), dict[Node, None]()
+    inputs, chosen = set(given), dict[Node, None]()
+    names = ", ".join([str(node.name) for node in given]) or "none"
     for name in (wrt,) if isinstance(wrt, (str, Node)) else wrt:
         node = variable(name) if isinstance(name, str) else name
         if not isinstance(node, Node):
             raise TypeError(f"wrt must name inputs by strings or variables, got {node!r:.60}")
         if node not in inputs:
-            raise GraphError(f"the graph has no input {node.name or node!r} (it has {', '.join(graph.input_names)})")
+            raise GraphError(f"the graph has no input {node.name or node!r} (it has {names})")
         if node in chosen:
             raise GraphError(f"wrt names the input {node.name} twice")
         chosen[node] = None
     if not chosen:
-        raise GraphError(f"wrt must name at least one input (the graph has {', '.join(graph.input_names) or 'none'})")
+        raise GraphError(f"wrt must name at least one input (the graph has {names})")
     return tuple(chosen)
 
 
