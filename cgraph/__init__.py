@@ -20,8 +20,7 @@ if TYPE_CHECKING:
     from .codegen.wasm.script import wasm_script as wasm_script
     from .codegen.wasm.to_wasm import to_wasm as to_wasm
     from .core.checks import GraphError as GraphError
-    from .core.counts import Counts as Counts
-    from .core.graph import Edge as Edge, Graph as Graph
+    from .core.graph import Counts as Counts, Edge as Edge, Graph as Graph
     from .core.node import Node as Node, constant as constant, variable as variable
     from .core.scope import tag as tag
     from .explain.compare import compare as compare

@@ -12,15 +12,15 @@ if TYPE_CHECKING:
     from .bridges.translation import Operations as Operations, operations as operations, translated as translated
     from .codegen.wasm.functions import page_functions as page_functions
     from .core.checks import check_name as check_name
-    from .core.evaluation import Array as Array
-    from .core.html_text import html_lines as html_lines, html_table as html_table, render_html as render_html
-    from .core.label import UNLABELLED as UNLABELLED
-    from .core.real_arrays import (
+    from .core.evaluation import (
+        Array as Array,
         floats as floats,
         is_finite as is_finite,
         real_array as real_array,
         real_number as real_number,
     )
+    from .core.html_text import html_lines as html_lines, html_table as html_table, render_html as render_html
+    from .core.label import UNLABELLED as UNLABELLED
     from .core.scope import without_collection as without_collection
     from .explain.lint.lint import Lint as Lint
     from .explain.why_nan import WhyNan as WhyNan

@@ -115,8 +115,7 @@ if TYPE_CHECKING:
     from .simulation.trajectory import SimulationWarning as SimulationWarning, Trajectory as Trajectory
     from .systems.constraints import ConstraintError as ConstraintError
     from .systems.controller import with_controller as with_controller
-    from .systems.display_names import display_names as display_names
-    from .systems.model import as_system as as_system
+    from .systems.model import as_system as as_system, display_names as display_names
     from .systems.ode_system import OdeSystem as OdeSystem
     from .systems.quasi_velocities import QuasiVelocities as QuasiVelocities
     from .systems.system import System as System

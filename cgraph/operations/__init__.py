@@ -3,7 +3,6 @@
 Whoever imports this package has the table filled, and graphs that pickle.
 """
 
-from ..util import moved_methods as moved_methods
 from . import records as records, table
 
 abs, round = table.abs_, table.round_  # the rows of the table use Python's

@@ -11,6 +11,7 @@ from ..core.graph import Graph
 from ..core.label import label
 from ..core.node import CONSTANT, VARIABLE, Node, as_node, variable
 from ..core.traversal import as_made
+from ..util.doors import moved_methods
 from .operation import OPS
 
 Record = tuple[str, tuple[int, ...], Any, Any, tuple[Any, ...]]  # operation, arguments, value, name, label
@@ -50,3 +51,4 @@ def restored(inputs: tuple[str, ...], records: tuple[Record, ...], outputs: dict
 
 
 copyreg.pickle(Graph, reduced)
+moved_methods(Graph, "cgraph", ("from_networkx", "latex", "to_networkx"), alone=("from_networkx",))

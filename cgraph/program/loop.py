@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core.checks import GraphError
-from ..core.evaluation import Array
+from ..core.evaluation import Array, real_array
 from ..core.graph import Graph
 from ..core.node import CONSTANT, Node, variable
-from ..core.real_arrays import real_array
 from ..core.traversal import rebuild, topological
 from ..util.require import require_graph, require_mapping, require_sequence
 from .program import Program

@@ -1,8 +1,9 @@
-"""The names of a package that are loaded when they are first asked for (PEP 562)."""
+"""The names of a package that are loaded when they are first asked for (PEP 562), and methods that became functions."""
 
 from __future__ import annotations
 
 import sys
+import warnings
 from collections.abc import Callable, Collection
 from importlib import import_module
 
@@ -58,6 +59,25 @@ def doors(
         return value
 
     return load, lambda: sorted({*vars(sys.modules[package]), *names()})
+
+
+class MovedMethod:
+    """A method whose place a function of the package has taken, which it calls with a warning."""
+
+    def __init__(self, package: str, name: str, alone: bool) -> None:
+        self.package, self.name, self.alone = package, name, alone
+
+    def __get__(self, owner: object, kind: type) -> Callable[..., object]:
+        text = f"{kind.__name__}.{self.name} goes with the next version: call {self.package}.{self.name}"
+        warnings.warn(text, DeprecationWarning, stacklevel=2)
+        function: Callable[..., object] = getattr(sys.modules[self.package], self.name)
+        return function if owner is None or self.alone else lambda *args, **named: function(owner, *args, **named)
+
+
+def moved_methods(kind: type, package: str, names: Collection[str], alone: Collection[str] = ()) -> None:
+    """Keep methods of a class that are functions of a package now.  alone: those that took no object."""
+    for name in names:
+        setattr(kind, name, MovedMethod(package, name, name in alone))
 
 
 def _homes(file: str) -> Homes:

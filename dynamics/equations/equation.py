@@ -16,7 +16,7 @@ from typing import Protocol, TypeVar
 import cgraph as cg
 from cgraph import Graph, Node, _shared
 
-from ..systems.model import Model, as_system
+from ..systems.model import Model, as_system, display_names
 from ..systems.system import System
 
 LARGEST_REWRITTEN = 200  # nodes of a graph whose outputs are written anew
@@ -148,8 +148,6 @@ def called(graph: Graph, model: Model) -> Graph:
     """The graph, which a notebook draws with the names that a person calls its inputs and outputs by."""
 
     def remarks(_: Graph) -> _shared.Remarks:
-        from ..systems.display_names import display_names  # loaded when a notebook asks
-
         return _shared.Remarks(display_names(model))
 
     return _shared.remarked(graph, remarks)

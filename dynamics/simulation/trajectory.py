@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from cgraph import Graph, _shared
 from cgraph._shared import Array, counted, or_nearest
 
-from .row_values import row_values
+from .row_values import origin, row_values
 from .sampled_controller import HeldForces
 from .steps.dense_output import Solution
 
@@ -338,8 +338,6 @@ class Trajectory:
         It begins with %1 = sqrt(depth), which is nan, where depth = -0.00201144.
         On its way: %1 -> %2 -> %3 -> depth_dot.
         """
-        from .not_finite import origin  # which a run does not need
-
         graph = self.graphs["rate"]
         kinds = {"q": self.coordinates, "qd": self.velocities} if self.velocities else {}
         names = {f"{kind}{i}{end}": f"{kind}{end}.{name}" for kind, known in kinds.items()

@@ -114,13 +114,10 @@ def _beyond(scene: dyn.Scene, run: dyn.Trajectory) -> dict[str, Any]:
     """Sentences on the limits of joints that the run has left, and where it was looked at; nothing without limits."""
     if scene.mechanism is None or not any((limits := _limited(scene)).values()):
         return {}
-    from dynamics.multibody.bodies.joint_coordinates import display_units
-    from dynamics.simulation.limits_left import limits_left
-
-    units = display_units(scene.mechanism.moving)
+    units = library.display_units(scene.mechanism.moving)
     unit_of = {name: units[f"q{k}"] for k, name in enumerate(run.coordinates)}
     read = "rows" if run.dense is None else "steps"
-    return {"beyond_limits": limits_left(run, limits, unit_of), "limits_looked_at_in": read}
+    return {"beyond_limits": library.limits_left(run, limits, unit_of), "limits_looked_at_in": read}
 
 
 def _text(run: dyn.Trajectory, data: dict[str, Any]) -> str:

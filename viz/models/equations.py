@@ -15,7 +15,7 @@ from dynamics.equations.formulations.verdict import formulation_verdict
 from dynamics.equations.momentum.hamiltonian import hamilton_equations
 from dynamics.equations.state_equation import state_equation
 from dynamics.scenes import Scene
-from dynamics.systems.display_names import display_names
+from dynamics.systems.model import display_names
 from dynamics.systems.system import System
 
 from ..pages.mathml import ranks

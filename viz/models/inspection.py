@@ -24,7 +24,7 @@ from dynamics.multibody.trees.joint_positions import skeleton
 from dynamics.scenes import Scene
 from dynamics.simulation.simulate import simulate
 from dynamics.simulation.trajectory import Trajectory
-from dynamics.systems.display_names import display_names
+from dynamics.systems.model import display_names
 from dynamics.systems.system import System
 
 from .. import theme

@@ -27,8 +27,7 @@ from dynamics.scenes import Scene
 from dynamics.scenes.start import Start, moving_start, with_start
 from dynamics.simulation.simulate import simulate
 from dynamics.simulation.trajectory import SimulationWarning
-from dynamics.systems.display_names import display_names
-from dynamics.systems.model import Model
+from dynamics.systems.model import Model, display_names
 
 from ..live_page import Live, page_text, panel
 from ..pages.html import Page, Panel, html_target

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from ...core.evaluation import box_interval
 from ...core.graph import Graph
-from ...core.inputs import box_interval
 from ...core.node import CONSTANT, VARIABLE, Node
 from ...operations.bounds import REAL_LINE
 from ...operations.operation import Interval, Op, columns

@@ -16,9 +16,8 @@ from cgraph import Edge, Graph, Node, _shared, extend, simplify
 from cgraph._shared import Remarks, counted, remarked, require_mapping, shortened
 from cgraph.extend import Builder, Names, building, cotangents, folded
 
-from ...systems.display_names import display_names
 from ...systems.kinematics import ONE
-from ...systems.model import Model, as_system
+from ...systems.model import Model, as_system, display_names
 from ...systems.system import System
 from ..equation import documented
 from .blame import Derive, Split, blame, split

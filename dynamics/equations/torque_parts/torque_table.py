@@ -13,7 +13,7 @@ from cgraph import Graph, Node
 from cgraph._shared import Array, html_table, require_whole
 from cgraph.extend import Names, topological
 
-from ...systems.display_names import display_names
+from ...systems.model import display_names
 from ...systems.system import System
 from ..states.evaluate import evaluate
 
