@@ -140,9 +140,11 @@ CALLS = {
     "cg.constant": call(cg.constant, 1.0),
     "cg.double_double": call(cg.double_double, GRAPH, low=False),
     "cg.hessian_solve": call(cg.hessian_solve, SQUARES, ["x", "y"], [1.0, 2.0], check=False, order="recursive"),
-    "cg.Graph.latex": call(GRAPH.latex, names=None, lines=5),
+    "cg.from_networkx": call(cg.from_networkx, cg.to_networkx(GRAPH)),
+    "cg.html": call(cg.html, GRAPH),
     "cg.interp": call(cg.interp, X, [0.0, 1.0], [2.0, 3.0], kind="linear", outside="constant"),
     "cg.latex": call(cg.latex, X * Y, names=None, lines=5),
+    "cg.to_networkx": call(cg.to_networkx, GRAPH),
     "cg.lint": call(
         cg.lint, GRAPH, independent=(), depends=None, box=None, at=None, digits=4.0, function="f", names=None
     ),
@@ -610,6 +612,7 @@ GRAPH_FIRST = [
     (cg.to_c, ()),
     (cg.to_casadi, ()),
     (cg.to_jax, ()),
+    (cg.to_networkx, ()),
     (cg.to_wasm, ()),
     (cg.wasm_script, ()),
     (cg.vjp, ()),

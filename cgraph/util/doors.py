@@ -68,10 +68,13 @@ class MovedMethod:
         self.package, self.name, self.alone = package, name, alone
 
     def __get__(self, owner: object, kind: type) -> Callable[..., object]:
-        text = f"{kind.__name__}.{self.name} goes with the next version: call {self.package}.{self.name}"
-        warnings.warn(text, DeprecationWarning, stacklevel=2)
-        function: Callable[..., object] = getattr(sys.modules[self.package], self.name)
-        return function if owner is None or self.alone else lambda *args, **named: function(owner, *args, **named)
+        def call(*args: object, **named: object) -> object:
+            text = f"{kind.__name__}.{self.name} goes with the next version: call {self.package}.{self.name}"
+            warnings.warn(text, DeprecationWarning, stacklevel=2)
+            function = getattr(sys.modules[self.package], self.name)
+            return function(*args if owner is None or self.alone else (owner, *args), **named)
+
+        return call
 
 
 def moved_methods(kind: type, package: str, names: Collection[str], alone: Collection[str] = ()) -> None:

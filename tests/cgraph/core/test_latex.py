@@ -99,11 +99,11 @@ def test_a_node_alone_is_a_formula() -> None:
 
 def test_a_method_that_became_a_function_works_with_a_warning() -> None:
     graph = cg.Graph([A], {"y": A * A})
-    with pytest.warns(DeprecationWarning, match="call cg.latex"):
+    with pytest.warns(DeprecationWarning, match="call cgraph.latex"):
         assert graph.latex(lines=1) == cg.latex(graph, lines=1)
-    with pytest.warns(DeprecationWarning, match="call cg.to_networkx"):
+    with pytest.warns(DeprecationWarning, match="call cgraph.to_networkx"):
         network = graph.to_networkx()
-    with pytest.warns(DeprecationWarning, match="call cg.from_networkx"):
+    with pytest.warns(DeprecationWarning, match="call cgraph.from_networkx"):
         assert cg.Graph.from_networkx(network).listing() == graph.listing()
 
 
