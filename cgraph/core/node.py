@@ -65,15 +65,14 @@ class Node:
     def __init__(
         self, op: Row, args: tuple[Node, ...] = (), label: Label = UNLABELLED, *, name: str | None = None
     ) -> None:
-        global _block  # noqa: PLW0603 (its object is shared; the number is right in any thread)
         _set_op(self, op)
         _set_args(self, args)
         _set_label(self, label)
         _set_name(self, name)
         serial = next(_serials)
-        block = _block
+        block = _last[0]
         if block != serial >> 8:
-            _block = block = serial >> 8
+            _last[0] = block = serial >> 8
         _set_block(self, block)
         _set_place(self, serial & 255)
 
@@ -215,7 +214,7 @@ class Leaf(Node):
 
 # The setters of the fields, which Node.__setattr__ does not stop; in half the time of object.__setattr__.
 _set_args, _set_block, _set_label, _set_name, _set_op, _set_place = [vars(Node)[f].__set__ for f in Node.__slots__]
-_serials, _block = count(), 0
+_serials, _last = count(), [0]  # and the block of the last node, whose object those of the same block share
 Scalar = Node | float
 _constants: Interned[tuple[float, float], Node] = Interned()
 _variables: Interned[str, Node] = Interned()
