@@ -11,7 +11,7 @@ from typing import Any
 
 import cgraph as cg
 import dynamics as dyn
-from cgraph import _shared, extend
+from cgraph import _shared
 
 from . import library
 from .arguments import answer, box, place, scene_of, takes_a_scene
@@ -118,7 +118,7 @@ def _single(options: argparse.Namespace, scene: dyn.scenes.Scene, graph: cg.Grap
     if not options.float32:
         return {}
     values = {name: value for name, value in scene.parameters.items() if name in graph.input_names}
-    ranges = extend.Names(graph, dyn.display_names(scene)).inputs_of("--box", options.box or {})
+    ranges = library.Names(graph, dyn.display_names(scene)).inputs_of("--box", options.box or {})
     return {"dtype": "float32", "box": values | ranges}
 
 

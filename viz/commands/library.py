@@ -7,6 +7,7 @@ from cgraph._shared import doors
 TYPE_CHECKING = False
 
 if TYPE_CHECKING:
+    from cgraph.extend import Names, cotangents
     from dynamics.equations.constraints.integrability import ConstraintLint
     from dynamics.equations.formulations.formulation_sizes import INERTIAL_TERM, blamed
     from dynamics.equations.formulations.step_state import after_step, before_step
