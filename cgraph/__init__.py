@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from .codegen.wasm.script import wasm_script as wasm_script
     from .codegen.wasm.to_wasm import to_wasm as to_wasm
     from .core.checks import GraphError as GraphError
-    from .core.graph import Edge as Edge, Graph as Graph
+    from .core.graph import Counts as Counts, Edge as Edge, Graph as Graph
     from .core.node import Node as Node, constant as constant, variable as variable
     from .core.scope import tag as tag
     from .explain.compare import compare as compare
@@ -71,9 +71,10 @@ if TYPE_CHECKING:
     from .program.loop import loop as loop
     from .simplification.simplify import simplify as simplify, specialize as specialize
     from .util.caches import clear_caches as clear_caches
-    from .writing.counts import Counts as Counts
+    from .writing.html import html as html
     from .writing.latex import latex as latex
     from .writing.naming import variables as variables, with_name as with_name
+    from .writing.networkx_queries import from_networkx as from_networkx, to_networkx as to_networkx
     from .writing.source_lines import recording_lines as recording_lines
     from .writing.structure_hash import structure_hash as structure_hash
 

@@ -2,7 +2,7 @@
 
 `cgraph` itself is for people who write equations; this module is for code that makes nodes in bulk: how derived nodes
 are folded and shared, derivatives node by node, solves on the graph, graphs repeated natively. What `__all__` lists is
-kept stable. `dynamics` and `viz` import from `cgraph` and from here, and from nowhere deeper.
+kept stable.
 
 **Build**: `Builder` folds and shares; `with building(Builder()):` sends every formula inside through it. `folded`
 copies nodes through a builder, `topological` gives all nodes that some nodes reach, arguments first, `as_node` makes a
@@ -37,7 +37,7 @@ code or Python. `program_jvp` and `program_vjp` are its derivatives, `many` is w
     (True, True)
 """
 
-from .util.doors import doors as doors
+from .util.doors import doors
 
 TYPE_CHECKING = False  # as a checker knows it; typing takes a while to load
 
@@ -78,65 +78,6 @@ if TYPE_CHECKING:
     from .program.statements.memory import Pop as Pop, Push as Push, Take as Take
     from .simplification.reciprocals import with_reciprocals as with_reciprocals
     from .writing.formulas import Formulas as Formulas, Notation as Notation
-
-if TYPE_CHECKING:  # shared by the three packages alone: no promise is made for these names
-    from .autodiff.compressed_jacobian import CompressedJacobian as CompressedJacobian
-    from .autodiff.hessian_solve import Order as Order, solve_tangents as solve_tangents
-    from .autodiff.jets import Jets as Jets, convolution as convolution
-    from .autodiff.ldl_solve import ldl_elimination as ldl_elimination, ldl_solve as ldl_solve
-    from .bridges.translation import Operations as Operations, operations as operations, translated as translated
-    from .codegen.wasm.functions import page_functions as page_functions
-    from .core.checks import check_name as check_name
-    from .core.evaluation import Array as Array
-    from .core.label import UNLABELLED as UNLABELLED
-    from .core.scope import without_collection as without_collection
-    from .explain.lint.lint import Lint as Lint
-    from .explain.why_nan import WhyNan as WhyNan
-    from .operations.operation import columns as columns
-    from .program.derivatives.linearization import Linearization as Linearization, Linearized as Linearized
-    from .program.derivatives.tape import Tape as Tape, run_passes as run_passes
-    from .program.runners.batch_code import LaneCode as LaneCode
-    from .simplification.identities import shortened as shortened
-    from .simplification.ordered_terms import ink as ink
-    from .simplification.polynomial import (
-        Polynomial as Polynomial,
-        expand as expand,
-        format_polynomial as format_polynomial,
-    )
-    from .simplification.reading_form import reading_form as reading_form
-    from .simplification.rounding_growth import error_bounds as error_bounds, rounding_spread as rounding_spread
-    from .util.atomic_write import (
-        atomic_write as atomic_write,
-        check_writable as check_writable,
-        write_files as write_files,
-    )
-    from .util.caches import kept_by_first as kept_by_first, memo as memo
-    from .util.extras import install as install, required as required, scipy_module as scipy_module
-    from .util.html_text import html_lines as html_lines, html_table as html_table, render_html as render_html
-    from .util.json_type import Json as Json
-    from .util.real_arrays import (
-        floats as floats,
-        is_finite as is_finite,
-        real_array as real_array,
-        real_number as real_number,
-    )
-    from .util.require import (
-        require_choice as require_choice,
-        require_flag as require_flag,
-        require_graph as require_graph,
-        require_mapping as require_mapping,
-        require_path as require_path,
-        require_sequence as require_sequence,
-        require_texts as require_texts,
-        require_whole as require_whole,
-    )
-    from .util.threads import share as share, thread_count as thread_count
-    from .util.words import counted as counted, nearest as nearest, or_nearest as or_nearest
-    from .writing.formulas import Side as Side, fraction as fraction, statements as statements
-    from .writing.holds_nodes import HoldsNodes as HoldsNodes
-    from .writing.latex import LATEX as LATEX, latex_block as latex_block, number_text as number_text
-    from .writing.naming import Remarks as Remarks, remarked as remarked, remarks_of as remarks_of
-    from .writing.symbols import GREEK as GREEK, is_letter as is_letter, symbol as symbol
 
 
 if not TYPE_CHECKING:  # a checker shall see a misspelt name

@@ -1,6 +1,6 @@
 """dynamics: equations of motion on computational graphs, from Lagrangians and bodies."""
 
-from cgraph.extend import doors
+from cgraph._shared import doors
 
 TYPE_CHECKING = False  # as a checker knows it; typing takes a while to load
 
@@ -111,8 +111,7 @@ if TYPE_CHECKING:
     from .simulation.trajectory import SimulationWarning as SimulationWarning, Trajectory as Trajectory
     from .systems.constraints import ConstraintError as ConstraintError
     from .systems.controller import with_controller as with_controller
-    from .systems.display_names import display_names as display_names
-    from .systems.model import as_system as as_system
+    from .systems.model import as_system as as_system, display_names as display_names
     from .systems.ode_system import OdeSystem as OdeSystem
     from .systems.quasi_velocities import QuasiVelocities as QuasiVelocities
     from .systems.system import System as System

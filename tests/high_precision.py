@@ -8,7 +8,8 @@ import mpmath
 from mpmath import mp, mpf
 
 import cgraph as cg
-from cgraph.extend import OPS, columns
+from cgraph._shared import columns
+from cgraph.extend import OPS
 
 DIGITS = 50
 Number = float | mpf

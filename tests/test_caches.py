@@ -12,7 +12,7 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
-from cgraph.extend import kept_by_first, memo
+from cgraph._shared import kept_by_first, memo
 from cgraph.util.caches import kept_results
 from tests.sources import ROOT, sources
 
@@ -23,7 +23,7 @@ WEAK = {"cgraph.core.label", "dynamics.multibody.trees.structure"}  # have weak 
 TABLES = {
     "cgraph.core.row.ROWS",
     "cgraph.operations.operation.OPS",
-    "cgraph.operations.operation.BY_UFUNC",
+    "cgraph.core.row.BY_UFUNC",
     "cgraph.program.statement.STATEMENTS",
     "dynamics.equations.equation.EQUATIONS",
     "dynamics.experiments.trust.random_motions.FAMILIES",
@@ -118,7 +118,7 @@ def used() -> list[np.ndarray]:
     slope = dyn.gradient(arm, lambda q, qd, t: q[0] ** 2 + qd[1], q, qd, 0.1, dt=0.02)
     graph = dyn.forward_dynamics(arm)
     numbers = [*dyn.linearize_many(arm, [q, qd], [qd, q]), *dyn.arrays_at(arm, graph, q, qd).values()]
-    texts = [cg.to_wasm(graph), graph.latex().encode(), cg.to_c(graph).source.encode()]
+    texts = [cg.to_wasm(graph), cg.latex(graph).encode(), cg.to_c(graph).source.encode()]
     numbers += [np.frombuffer(text, dtype=np.uint8) for text in texts]
     return [*[run.q for run in runs], *[run.t for run in runs], many.q, *slope.gradients.values(), *numbers]
 

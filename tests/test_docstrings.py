@@ -15,7 +15,7 @@ import cgraph as cg
 import cgraph.extend
 import dynamics as dyn
 import viz
-from cgraph.extend import install
+from cgraph._shared import install
 from cgraph.operations.table import OPS
 from tests.sources import result_types, sources
 

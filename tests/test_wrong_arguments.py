@@ -139,9 +139,11 @@ CALLS = {
     "cg.compile": call(cg.compile, GRAPH, "python", fast=False, fma=True, cache=False),
     "cg.constant": call(cg.constant, 1.0),
     "cg.hessian_solve": call(cg.hessian_solve, SQUARES, ["x", "y"], [1.0, 2.0], check=False, order="recursive"),
-    "cg.Graph.latex": call(GRAPH.latex, names=None, lines=5),
+    "cg.from_networkx": call(cg.from_networkx, cg.to_networkx(GRAPH)),
+    "cg.html": call(cg.html, GRAPH),
     "cg.interp": call(cg.interp, X, [0.0, 1.0], [2.0, 3.0], kind="linear", outside="constant"),
     "cg.latex": call(cg.latex, X * Y, names=None, lines=5),
+    "cg.to_networkx": call(cg.to_networkx, GRAPH),
     "cg.lint": call(
         cg.lint, GRAPH, independent=(), depends=None, box=None, at=None, digits=4.0, function="f", names=None
     ),
@@ -467,7 +469,7 @@ RECORDS = """
 # `tests/cgraph/bridges`.
 LEFT_OUT = """cg.as_jax cg.to_casadi cg.to_jax cg.to_torch cg.recording_lines cg.clear_cache cg.clear_caches
     cg.Compiled.bind cg.Compiled.values cg.Graph.check
-    cg.Graph.counts cg.Graph.listing cg.Graph.only_output cg.Graph.to_networkx dyn.System.braking dyn.System.changed
+    cg.Graph.counts cg.Graph.listing cg.Graph.only_output dyn.System.braking dyn.System.changed
     dyn.System.mass_matrix dyn.System.require_known dyn.System.require_values dyn.JointForce.along
     dyn.JointForce.check dyn.JointLimit.along dyn.JointLimit.check dyn.JointFriction.along dyn.JointFriction.check
     dyn.Actuator.along dyn.Actuator.check extend.Builder extend.Runner extend.require_length extend.Runner.advancing
@@ -607,6 +609,7 @@ GRAPH_FIRST = [
     (cg.to_c, ()),
     (cg.to_casadi, ()),
     (cg.to_jax, ()),
+    (cg.to_networkx, ()),
     (cg.to_wasm, ()),
     (cg.wasm_script, ()),
     (cg.vjp, ()),

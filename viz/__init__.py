@@ -1,6 +1,6 @@
 """viz: pictures and pages of computational graphs."""
 
-from cgraph.extend import doors
+from cgraph._shared import doors
 
 TYPE_CHECKING = False  # as a checker knows it; typing takes longer to load than all that awaits Ctrl-C
 

@@ -9,7 +9,8 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from cgraph import Node
-from cgraph.extend import ADJOINT, GREEK, PRIMAL, TANGENT
+from cgraph._shared import GREEK
+from cgraph.extend import ADJOINT, PRIMAL, TANGENT
 
 # The palette of Okabe and Ito (2008), https://jfly.uni-koeln.de/color/
 BLACK, ORANGE, SKY_BLUE, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"

@@ -152,7 +152,7 @@ def solve_tangents(
     At w it is x itself; a product within a rotation may be left out. Arguments and errors are those of `solve_nodes`.
 
     >>> import cgraph as cg
-    >>> from cgraph.extend import solve_tangents
+    >>> from cgraph._shared import solve_tangents
     >>> v, tau = cg.variables("v tau")
     >>> twice = 2.0 * v
     >>> tangents = solve_tangents(0.125 * twice * twice, [v], [tau])

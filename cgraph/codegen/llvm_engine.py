@@ -10,6 +10,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from ..util.caches import memo
+from ..util.extras import install
 
 if TYPE_CHECKING:
     from llvmlite.binding import ExecutionEngine, TargetMachine
@@ -130,8 +131,6 @@ def host() -> Host:
     try:
         from llvmlite import __version__, binding
     except ImportError:
-        from ..util.extras import install
-
         raise ImportError(f"machine code needs llvmlite: {install('native')}") from None
     return _host(binding, __version__)
 

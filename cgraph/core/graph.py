@@ -4,18 +4,16 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import NamedTuple
 
 from .checks import GraphError, check_name
-from .evaluation import Value, evaluate
-from .node import VARIABLE, Node, Scalar, as_node
+from .evaluation import Value, evaluate, input_values
+from .html_text import html_table, render_html
+from .node import CONSTANT, VARIABLE, Node, Scalar, as_node, variable
+from .row import ROWS, Row
 from .traversal import rebuild, topological
-
-if TYPE_CHECKING:
-    import networkx
-
-    from ..writing.counts import Counts
 
 
 class Edge(NamedTuple):
@@ -46,6 +44,59 @@ class Edge(NamedTuple):
     def partial(self) -> Node:
         """d target / d source through this slot alone, as a node."""
         return as_node(self.target.op.partials(self.target, *self.target.args)[self.slot])
+
+
+@dataclass(frozen=True)
+class Counts:
+    """Sizes of a graph; leaves (inputs and constants) count as nodes. `str` of it is a table.
+
+    Attributes
+    ----------
+    nodes, edges : int
+        How many; an edge is one use of a node by another.
+    depth : int
+        Operations on the longest path.
+    width : int
+        The largest number of nodes at one distance from the leaves.
+    by_operation, by_tag, by_role : dict of str to int
+        Numbers of nodes, the largest first.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> x = cg.variable("x")
+    >>> counts = cg.Graph([x], {"y": x * cg.sin(x)}).counts()
+    >>> counts.nodes, counts.edges, counts.depth
+    (3, 3, 2)
+    """
+
+    nodes: int
+    edges: int
+    depth: int
+    width: int
+    by_operation: dict[str, int]
+    by_tag: dict[str, int]
+    by_role: dict[str, int]
+
+    def __str__(self) -> str:
+        def row(title: str, counts: dict[str, int]) -> str:
+            listed = ", ".join(f"{name} {n}" for name, n in counts.items())
+            return f"{title:13}{listed or '-'}"
+
+        return "\n".join(
+            (
+                f"nodes {self.nodes}, edges {self.edges}, depth {self.depth}, width {self.width}",
+                row("by operation", self.by_operation),
+                row("by tag", self.by_tag),
+                row("by role", self.by_role),
+            )
+        )
+
+    def _repr_html_(self) -> str:
+        sizes = [(name, str(getattr(self, name))) for name in ("nodes", "edges", "depth", "width")]
+        groups = {"operation": self.by_operation, "tag": self.by_tag, "role": self.by_role}
+        rows = [(f"{kind} {name}", str(n)) for kind, counts in groups.items() for name, n in counts.items()]
+        return html_table(("", "count"), sizes + rows)
 
 
 class Graph:
@@ -114,9 +165,7 @@ class Graph:
 
         Raises GraphError if the graph has no such input or one is named twice, TypeError for anything else.
         """
-        from ..util.inputs import chosen_inputs
-
-        return self.inputs if wrt is None else chosen_inputs(self, wrt)
+        return self.inputs if wrt is None else _chosen_inputs(self.inputs, wrt)
 
     def only_output(self) -> Node:
         """The one output. Raises GraphError if there are several."""
@@ -157,8 +206,6 @@ class Graph:
         GraphError, TypeError
             If an input is missing or unknown, or shapes do not broadcast; and if a value is not real.
         """
-        from ..util.inputs import input_values
-
         return evaluate(self.nodes, self.outputs, input_values(self.input_names, values))
 
     def values(self, values: Mapping[str, Value]) -> dict[Node, Value]:
@@ -168,46 +215,15 @@ class Graph:
 
     def counts(self) -> Counts:
         """Nodes, edges, depth, width, and nodes by operation, tag and role."""
-        from ..writing.counts import count
-
-        return count(self.nodes)
+        return _counted(self.nodes)
 
     def listing(self) -> str:
         """The graph as text, a node a line, the same in every run."""
-        from ..writing.listing import listing
-
-        return listing(self.input_names, self.nodes, self.outputs)
-
-    def latex(self, *, names: Mapping[str, str] | None = None, lines: int | None = None) -> str:
-        """The equations as LaTeX, an aligned block; a node that several need, or that has a name, has a line.
-
-        names: {name in the graph: what a person calls it}.  lines: at most, by default 40; a last one counts the rest.
-        """
-        from ..writing.latex import graph_latex
-
-        return graph_latex(self.nodes, self.outputs, names, lines)
+        return _listing(self.input_names, self.nodes, self.outputs)
 
     def check(self) -> None:
         """Raise GraphError unless every node is well formed and the order is topological."""
-        from ..writing.check import check
-
-        check(self)
-
-    def to_networkx(self) -> networkx.MultiDiGraph:
-        """A networkx.MultiDiGraph from arguments to uses, nodes numbered as in `nodes`, unused inputs behind.
-
-        They have op; name, value, input (a place) if any; as JSON tags, roles, lines, outputs; edges a slot.
-        """
-        from ..writing.networkx_queries import to_networkx
-
-        return to_networkx(self.nodes, self.inputs, self.outputs)
-
-    @staticmethod
-    def from_networkx(network: networkx.DiGraph) -> Graph:
-        """The graph of what `to_networkx` gave, also through a file. Raises GraphError where something is missing."""
-        from ..writing.networkx_queries import from_networkx
-
-        return from_networkx(network)
+        _check(self.nodes, self.outputs)
 
     def __repr__(self) -> str:
         ends, edges = map(_short, (self.input_names, tuple(self.outputs))), sum(len(node.args) for node in self.nodes)
@@ -215,14 +231,7 @@ class Graph:
 
     def _repr_html_(self) -> str | None:
         """The drawing that a notebook shows, when a drawing package is installed (extra `viz`)."""
-        from ..util.html_text import render_html
-
         return render_html("graph", self)
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        from ..writing.records import reduced
-
-        return reduced(self)
 
 
 def _checked_inputs(inputs: Sequence[Node]) -> tuple[Node, ...]:
@@ -249,6 +258,98 @@ def _checked_outputs(outputs: Mapping[str, Scalar]) -> dict[str, Node]:
         except TypeError as error:
             raise TypeError(f"output {name!r}: {error}") from None
     return nodes
+
+
+def _chosen_inputs(given: Sequence[Node], wrt: str | Node | Sequence[str | Node]) -> tuple[Node, ...]:
+    """Those of a graph's inputs that `wrt` names. Raises as `Graph.select_inputs`."""
+    if not isinstance(wrt, (str, Node, Iterable)):
+        raise TypeError(f"wrt must name inputs by strings or variables, got {type(wrt).__name__}: {wrt!r:.60}")
+    inputs, chosen = set(given), dict[Node, None]()
+    names = ", ".join([str(node.name) for node in given]) or "none"
+    for name in (wrt,) if isinstance(wrt, (str, Node)) else wrt:
+        node = variable(name) if isinstance(name, str) else name
+        if not isinstance(node, Node):
+            raise TypeError(f"wrt must name inputs by strings or variables, got {node!r:.60}")
+        if node not in inputs:
+            raise GraphError(f"the graph has no input {node.name or node!r} (it has {names})")
+        if node in chosen:
+            raise GraphError(f"wrt names the input {node.name} twice")
+        chosen[node] = None
+    if not chosen:
+        raise GraphError(f"wrt must name at least one input (the graph has {names})")
+    return tuple(chosen)
+
+
+def _counted(nodes: Iterable[Node]) -> Counts:
+    """Counts of nodes in topological order."""
+    level: dict[Node, int] = {}
+    operations: Counter[str] = Counter()
+    tags: Counter[str] = Counter()
+    roles: Counter[str] = Counter()
+    edges = 0
+    for node in nodes:
+        level[node] = 1 + max(level[arg] for arg in node.args) if node.args else 0
+        operations[node.op.name] += 1
+        edges += len(node.args)
+        tags.update(node.tags)
+        roles.update(node.roles)
+    width = max(Counter(level.values()).values(), default=0)
+    return Counts(len(level), edges, max(level.values(), default=0), width, *map(_sorted, (operations, tags, roles)))
+
+
+def _sorted(counter: Counter[str]) -> dict[str, int]:
+    return dict(sorted(counter.items(), key=lambda item: (-item[1], item[0])))
+
+
+def _listing(inputs: Sequence[str], nodes: Sequence[Node], outputs: Mapping[str, Node]) -> str:
+    """Text such as `%3 = mul %1 %2  # adjoint; kinetic, link 2`, operations numbered in topological order."""
+    lines = [f"inputs {' '.join(inputs)}"]
+    text: dict[Node, str] = {}
+    for node in nodes:
+        if node.op is CONSTANT:
+            text[node] = repr(node.value)
+        elif node.op is VARIABLE:
+            text[node] = str(node.name)
+        else:
+            text[node] = f"%{len(lines)}"
+            line = f"{text[node]} = {node.op.name} {' '.join([text[arg] for arg in node.args])}"
+            notes = [", ".join(sorted(labels)) for labels in (node.roles, node.tags) if labels]
+            name = f"  ({node.name})" if node.name else ""
+            lines.append(line + name + (f"  # {'; '.join(notes)}" if notes else ""))
+    lines.extend(f"output {name} = {text[node]}" for name, node in outputs.items())
+    return "\n".join(lines) + "\n"
+
+
+def _check(nodes: Sequence[Node], outputs: Mapping[str, Node]) -> None:
+    """Raise GraphError for a graph that no public function could have made."""
+    for node in nodes:
+        _check_node(node)
+    if set(topological(outputs.values())) != set(nodes):
+        raise GraphError("the nodes are not those that the outputs reach")
+    visited: set[Node] = set()
+    for node in nodes:
+        if not visited.issuperset(node.args):
+            raise GraphError(f"{node!r} comes before one of its arguments")
+        visited.add(node)
+
+
+def _check_node(node: Node) -> None:
+    """Raise GraphError unless the node is well formed."""
+    if not isinstance(node, Node) or not isinstance(node.op, Row):
+        raise GraphError(f"a {type(node).__name__} is not a node of an operation in the table")
+    if node.op is CONSTANT:
+        if type(node.value) is not float or node.value != node.value:
+            raise GraphError(f"constant {node.value!r} is not a number")
+    elif node.op is VARIABLE:
+        if not node.name:
+            raise GraphError("a variable has no name")
+    elif ROWS.get(node.op.name) is not node.op:
+        raise GraphError(f"operation {node.op.name!r} is not in the table")
+    if len(node.args) != node.op.arity:
+        raise GraphError(f"{node.op.name} takes {node.op.arity} argument(s), a node has {len(node.args)}")
+    for arg in node.args:
+        if not isinstance(arg, Node):
+            raise GraphError(f"an argument of {node!r} is not a node: {arg!r:.60}")
 
 
 def _short(names: Sequence[str]) -> str:

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import math
 import numbers
-from collections.abc import Callable
+from functools import partial
 from itertools import count
 from typing import Any, NoReturn, SupportsFloat
 
 import numpy as np
 
 from .checks import check_name
+from .html_text import render_html
 from .label import INPUT, UNLABELLED, Interned, Label, SourceLine, label
-from .row import ROWS, Row
+from .row import BY_UFUNC, ROWS, Row
 from .scope import current
 
 VARIABLE, CONSTANT = [Row(name, 0, float, float, lambda *_: ()) for name in ("variable", "constant")]
@@ -52,35 +53,39 @@ class Node:
     (<node mul>, (<node 2.0>, <node sin>))
     """
 
-    __slots__ = ("__weakref__", "args", "label", "name", "op", "serial", "value")
+    __slots__ = ("args", "block", "label", "name", "op", "place")
     op: Row
     args: tuple[Node, ...]
-    value: float | None
     name: str | None
     label: Label
-    serial: int  # larger than those of all nodes made before, of the arguments too
+    block: int  # of the nodes made one after another, 256 a block; they share this object
+    place: int  # in its block, below 256: Python keeps an object of each such number
+    value: float | None = None
 
     def __init__(
-        self,
-        op: Row,
-        args: tuple[Node, ...] = (),
-        label: Label = UNLABELLED,
-        *,
-        value: float | None = None,
-        name: str | None = None,
+        self, op: Row, args: tuple[Node, ...] = (), label: Label = UNLABELLED, *, name: str | None = None
     ) -> None:
         _set_op(self, op)
         _set_args(self, args)
         _set_label(self, label)
-        _set_value(self, value)
         _set_name(self, name)
-        _set_serial(self, next(_serials))
+        serial = next(_serials)
+        block = _last[0]
+        if block != serial >> 8:
+            _last[0] = block = serial >> 8
+        _set_block(self, block)
+        _set_place(self, serial & 255)
 
     def __setattr__(self, key: str, value: object) -> NoReturn:
         raise AttributeError(f"a Node is immutable: cannot set {key!r}")
 
     def __delattr__(self, key: str) -> NoReturn:
         raise AttributeError(f"a Node is immutable: cannot delete {key!r}")
+
+    @property
+    def serial(self) -> int:
+        """Larger than those of all nodes made before, of the arguments too."""
+        return self.block << 8 | self.place
 
     @property
     def tags(self) -> frozenset[str]:
@@ -105,8 +110,6 @@ class Node:
 
     def _repr_html_(self) -> str | None:
         """The formula that a notebook shows, when a drawing package is installed (extra `viz`)."""
-        from ..util.html_text import render_html
-
         return render_html("node", self)
 
     def __bool__(self) -> NoReturn:
@@ -128,9 +131,12 @@ class Node:
 
     def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **kwargs: Any) -> Any:
         """`np.sin(node)`, `np.float64(2) * node`, and element by element for arrays of nodes."""
-        from ..operations.arrays import of_ufunc
-
-        return of_ufunc(ufunc, method, inputs, kwargs)
+        if ufunc in _TURNED:
+            ufunc, inputs = _TURNED[ufunc], inputs[::-1]
+        op = BY_UFUNC.get(ufunc) or BY_UFUNC.get(ufunc.__name__)
+        if op is None or method != "__call__" or kwargs:
+            return NotImplemented
+        return elementwise(op, *inputs)
 
     # Operators look the row up by name, so that the table stays the one place that knows operations.
     def __add__(self, other: Scalar) -> Node:
@@ -193,16 +199,22 @@ class Node:
     def __round__(self) -> Node:
         return apply(ROWS["round"], self)
 
-    def __getattr__(self, name: str) -> Callable[..., Node]:
-        """The method that NumPy asks of the elements of an array of objects, as in `np.sqrt(array)`."""
-        from ..operations.arrays import method_of
 
-        return method_of(self, name)
+class Leaf(Node):
+    """A constant or a variable, of which there is one for each number or name: a weak table finds it."""
+
+    __slots__ = ("__weakref__", "value")
+
+    def __init__(
+        self, op: Row, label: Label = UNLABELLED, *, value: float | None = None, name: str | None = None
+    ) -> None:
+        super().__init__(op, (), label, name=name)
+        object.__setattr__(self, "value", value)
 
 
 # The setters of the fields, which Node.__setattr__ does not stop; in half the time of object.__setattr__.
-_set_args, _set_label, _set_name, _set_op, _set_serial, _set_value = [vars(Node)[f].__set__ for f in Node.__slots__[1:]]
-_serials = count()
+_set_args, _set_block, _set_label, _set_name, _set_op, _set_place = [vars(Node)[f].__set__ for f in Node.__slots__]
+_serials, _last = count(), [0]  # and the block of the last node, whose object those of the same block share
 Scalar = Node | float
 _constants: Interned[tuple[float, float], Node] = Interned()
 _variables: Interned[str, Node] = Interned()
@@ -247,7 +259,7 @@ def constant(value: SupportsFloat) -> Node:
         raise ValueError("a constant must not be NaN")
     key = (value, math.copysign(1.0, value))
     node = _constants.get(key)
-    return _constants.get_or_make(key, lambda: Node(CONSTANT, value=value)) if node is None else node
+    return _constants.get_or_make(key, lambda: Leaf(CONSTANT, value=value)) if node is None else node
 
 
 def variable(name: str) -> Node:
@@ -279,7 +291,7 @@ def variable(name: str) -> Node:
     node = _variables.get(name) if type(name) is str else None
     if node is None:
         name = check_name("a variable", name, spaces=False)
-        node = _variables.get_or_make(name, lambda: Node(VARIABLE, (), label(roles=frozenset({INPUT})), name=name))
+        node = _variables.get_or_make(name, lambda: Leaf(VARIABLE, label(roles=frozenset({INPUT})), name=name))
     return node
 
 
@@ -316,7 +328,15 @@ def _binary(name: str, a: Scalar, b: Scalar) -> Node:
     for operand in (a, b):
         if not isinstance(operand, (Node, numbers.Real, np.ndarray)):
             return NotImplemented  # type: ignore[no-any-return]  # Python then asks the other operand, or raises
-    from ..operations.arrays import elementwise
-
     node: Node = elementwise(ROWS[name], a, b)
     return node
+
+
+_TURNED = {np.greater: np.less, np.greater_equal: np.less_equal}  # a > b is b < a
+
+
+def elementwise(op: Row, *args: Any) -> Any:
+    """A node; or an array of nodes, when an argument is an array with dimensions."""
+    if any([isinstance(each, np.ndarray) and each.ndim for each in args]):
+        return np.frompyfunc(partial(apply, op), op.arity, 1)(*[np.asarray(each, dtype=object) for each in args])
+    return apply(op, *[each.item() if isinstance(each, np.ndarray) else each for each in args])

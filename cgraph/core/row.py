@@ -6,6 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 
 @dataclass(frozen=True, eq=False)
 class Row:
@@ -37,3 +39,4 @@ class Row:
 
 
 ROWS: dict[str, Row] = {}  # {name: row}, filled by `cgraph.operations`
+BY_UFUNC: dict[np.ufunc | str, Row] = {}  # {ufunc of NumPy, or the name of one: its row}, likewise

@@ -33,7 +33,7 @@ def topological(outputs: Iterable[Node]) -> list[Node]:
                     continue
                 if arg.args:
                     stack.append((node, rest))
-                    if arg.serial >= node.serial:
+                    if arg.block >= node.block and (arg.block > node.block or arg.place >= node.place):
                         raise GraphError(f"the graph has a cycle through {arg!r}")
                     node, rest = arg, iter(arg.args)
                     break

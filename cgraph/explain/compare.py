@@ -9,8 +9,8 @@ from typing import Literal, NamedTuple
 
 from ..core.checks import GraphError
 from ..core.graph import Graph
+from ..core.html_text import html_lines
 from ..core.node import VARIABLE, Node, variable
-from ..util.html_text import html_lines
 from ..util.json_type import Json
 from ..util.require import require_choice, require_graph, require_sequence, require_texts
 from ..util.words import counted

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from ..core.checks import GraphError
+from ..core.evaluation import is_finite
 from ..core.graph import Edge, Graph
 from ..core.node import Node
-from ..util.real_arrays import is_finite
 from ..util.require import require_mapping
 from .names import Names
 

@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 
 from ..core.checks import GraphError
 from ..core.graph import Edge, Graph
+from ..core.html_text import html_table, html_text
 from ..core.node import Node
 from ..operations.operation import columns
-from ..util.html_text import html_table, html_text
 from ..util.json_type import Json, json_number
 from ..util.require import require_graph
 from ..util.words import counted

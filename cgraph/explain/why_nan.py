@@ -7,12 +7,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from ..core.checks import GraphError
+from ..core.evaluation import real_number
 from ..core.graph import Edge, Graph
+from ..core.html_text import html_lines
 from ..core.node import Node, constant
 from ..core.reverse import cotangents
-from ..util.html_text import html_lines
 from ..util.json_type import Json, json_number
-from ..util.real_arrays import real_number
 from ..util.require import require_graph, require_mapping
 from .names import Name, Names, joined
 from .reachability import between

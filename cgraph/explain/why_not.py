@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 
 from ..core.checks import GraphError
 from ..core.graph import Graph
+from ..core.html_text import html_lines
 from ..core.node import Node
-from ..util.html_text import html_lines
 from ..util.json_type import Json
 from ..util.require import require_graph
 from ..util.words import counted

@@ -7,9 +7,9 @@ from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 from ..core.builder import Builder
+from ..core.evaluation import real_array
 from ..core.node import Node, Scalar, as_node
 from ..core.scope import building
-from ..util.real_arrays import real_array
 from ..util.require import require_choice, require_sequence
 from .table import abs_, less, not_equal, sign, where
 

@@ -10,8 +10,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core.node import CONSTANT, VARIABLE
-from ..core.row import ROWS, Row
+from ..core.node import CONSTANT, VARIABLE, Node, apply
+from ..core.row import BY_UFUNC, ROWS, Row
 from .values import ieee
 
 Interval = tuple[float, float]
@@ -215,7 +215,6 @@ class Op(Row):
 
 
 OPS: dict[str, Op] = {}  # the table; filled by table.py
-BY_UFUNC: dict[np.ufunc | str, Op] = {}  # {ufunc of NumPy, or the name of one: the operation that it makes of nodes}
 _LEAVES = {row.name: Op(row.name, 0, row.scalar, row.array, row.partials) for row in (VARIABLE, CONSTANT)}
 
 
@@ -232,3 +231,10 @@ def enter(op: Op) -> None:
     OPS[op.name] = ROWS[op.name] = op
     if op.ufunc is not None:
         BY_UFUNC[op.ufunc] = op
+        if isinstance(op.ufunc, np.ufunc) and not hasattr(Node, op.ufunc.__name__):
+            setattr(Node, op.ufunc.__name__, _method_of(op.ufunc))
+
+
+def _method_of(ufunc: np.ufunc) -> Callable[..., Node]:
+    """The method that NumPy asks of the elements of an array of objects, as in `np.sqrt(array)`."""
+    return lambda *nodes: apply(BY_UFUNC[ufunc], *nodes)

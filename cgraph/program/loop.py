@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..core.checks import GraphError
-from ..core.evaluation import Array
+from ..core.evaluation import Array, real_array
 from ..core.graph import Graph
 from ..core.node import CONSTANT, Node, variable
 from ..core.traversal import rebuild, topological
-from ..util.real_arrays import real_array
 from ..util.require import require_graph, require_mapping, require_sequence
 from .program import Program
 from .runners.choose_runner import runner

@@ -10,8 +10,8 @@ from types import MappingProxyType
 from ..core.graph import Graph
 from ..operations.table import where
 from ..writing.naming import variables
-from .program import Program
-from .statement import Statement, bodies_of, names_in, reads_and_writes, row_of
+from .program import Program, live_registers, outliving
+from .statement import Statement, reads_and_writes, row_of
 from .statements.call import Call, Map, copied
 from .statements.control import FixedPoint, If, While
 from .statements.memory import Push
@@ -42,7 +42,7 @@ def many(program: Program) -> Program:
 def many_keeping(program: Program, kept: Iterable[str]) -> Program:
     """`many`, but what is neither kept nor outlives a pass is put back only where something reads it."""
     after: dict[int, Set[str]] = {}
-    _live(program.body, {*kept, *outliving(program)}, after)
+    live_registers(program.body, {*kept, *outliving(program)}, after)
     return _masked(program, after)
 
 
@@ -56,31 +56,6 @@ def _masked(program: Program, after: Mapping[int, Set[str]]) -> Program:
     masked = Masked(lengths, own=own, after=after)
     masked.run(program.body)
     return replace(program, registers=lengths, body=tuple(masked.statements))
-
-
-def outliving(program: Program) -> list[str]:
-    """The registers that a pass reads, or that are read after it, before it is sure to have set them."""
-    read = {*program.record, *[name for name in (program.record_if, program.stop) if name is not None]}
-    first = _live(program.body, read, {})
-    return [name for name in program.registers if name in first]
-
-
-def _live(statements: Sequence[Statement], read: Set[str], after: dict[int, Set[str]]) -> Set[str]:
-    """The registers whose numbers before the statements matter, where those of `read` matter behind them.
-
-    after: receives, by the id of each statement with bodies, those that matter behind any of its bodies.
-    """
-    live = set(read)
-    for statement in reversed(statements):
-        row, bodies = row_of(statement), bodies_of(statement)
-        if bodies:  # which may run no time at all, or again
-            live |= {*names_in(statement, row.reads), *[name for body in bodies for name in _live(body, set(), {})]}
-            after[id(statement)] = frozenset(live)
-            for body in bodies:
-                _live(body, live, after)
-        else:
-            live = (live - {*names_in(statement, row.writes)}) | {*names_in(statement, row.reads)}
-    return live
 
 
 class Masked:

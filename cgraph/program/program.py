@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
 
 from ..core.checks import GraphError
 from ..core.graph import Graph
 from ..util.explain_failure import explain_failure
 from . import table  # noqa: F401 (which fills the table)
-from .statement import Statement, bodies_of, length_of, reads_and_writes, require_length, require_once, row_of
+from .statement import (
+    Statement,
+    bodies_of,
+    length_of,
+    names_in,
+    reads_and_writes,
+    require_length,
+    require_once,
+    row_of,
+)
 from .statements.call import Call
 
 
@@ -100,3 +109,31 @@ def whole_graph(program: Program, x: str) -> Graph | None:
     if isinstance(call, Call) and (call.inputs, call.outputs, call.products) == ((x,), tuple(program.record), None):
         return call.graph
     return None
+
+
+def outliving(program: Program) -> list[str]:
+    """The registers that a pass reads, or that are read after it, before it is sure to have set them."""
+    read = {*program.record, *[name for name in (program.record_if, program.stop) if name is not None]}
+    first = live_registers(program.body, read, {})
+    return [name for name in program.registers if name in first]
+
+
+def live_registers(statements: Sequence[Statement], read: Set[str], after: dict[int, Set[str]]) -> Set[str]:
+    """The registers whose numbers before the statements matter, where those of `read` matter behind them.
+
+    after: receives, by the id of each statement with bodies, those that matter behind any of its bodies.
+    """
+    live = set(read)
+    for statement in reversed(statements):
+        row, bodies = row_of(statement), bodies_of(statement)
+        if bodies:  # which may run no time at all, or again
+            live |= {
+                *names_in(statement, row.reads),
+                *[name for body in bodies for name in live_registers(body, set(), {})],
+            }
+            after[id(statement)] = frozenset(live)
+            for body in bodies:
+                live_registers(body, live, after)
+        else:
+            live = (live - {*names_in(statement, row.writes)}) | {*names_in(statement, row.reads)}
+    return live

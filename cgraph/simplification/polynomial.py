@@ -23,7 +23,7 @@ def expand(node: Node, atoms: Mapping[Node, str] | None = None) -> Polynomial:
     atoms: {inner node: name}, nodes that are written as one symbol. Raises GraphError for any other operation.
 
     >>> import cgraph as cg
-    >>> from cgraph.extend import expand
+    >>> from cgraph._shared import expand
     >>> a, b = cg.variables("a b")
     >>> expand((a - b) * (a + b))
     {(('a', 2),): 1.0, (('b', 2),): -1.0}
@@ -46,7 +46,7 @@ def format_polynomial(terms: Polynomial) -> str:
     """A polynomial, see `expand`, as text, terms in order of degree and name; "0" without terms.
 
     >>> import cgraph as cg
-    >>> from cgraph.extend import expand, format_polynomial
+    >>> from cgraph._shared import expand, format_polynomial
     >>> a, b = cg.variables("a b")
     >>> format_polynomial(expand((a - b) ** 2))
     '-2*a*b + a^2 + b^2'

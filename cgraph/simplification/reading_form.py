@@ -40,7 +40,7 @@ def reading_form(nodes: Sequence[Node], ranks: Mapping[str, int] | None = None, 
     of `ranks`.  largest: nodes of one that is written out, and of all four times as many.
 
     >>> import cgraph as cg
-    >>> from cgraph.extend import reading_form
+    >>> from cgraph._shared import reading_form
     >>> m, l, w = cg.variables("m l w")
     >>> (y,) = reading_form([w * (l * (w * m)) * l + (-2.0) * m], {"m": 0, "l": 0, "w": 3})
     >>> print(cg.latex(y))

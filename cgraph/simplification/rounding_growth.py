@@ -123,7 +123,7 @@ def rounding_spread(graph: Graph, values: Mapping[str, float], sizes: Mapping[st
     sizes: what inputs are drawn of, and outputs compared by, where they have units; 1 of those that are not named.
 
     >>> import cgraph as cg
-    >>> from cgraph.extend import rounding_spread
+    >>> from cgraph._shared import rounding_spread
     >>> x, y = cg.variables("x y")
     >>> product, difference = cg.Graph([x, y], {"f": x * y}), cg.Graph([x, y], {"f": (1e3 + x * y) - 1e3})
     >>> rounding_spread(product, {}).__round__(), rounding_spread(difference, {}) > 1e3

@@ -20,7 +20,7 @@ def atomic_write(path: str | Path, data: str | bytes, *, mode: int = 0o666) -> P
 
     >>> import tempfile
     >>> from pathlib import Path
-    >>> from cgraph.extend import atomic_write
+    >>> from cgraph._shared import atomic_write
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     atomic_write(Path(folder, "notes.txt"), "done").read_text()
     'done'
@@ -62,7 +62,7 @@ def check_writable(path: str | Path) -> None:
 
     Raises OSError as `atomic_write` would for the place alone.
 
-    >>> from cgraph.extend import check_writable
+    >>> from cgraph._shared import check_writable
     >>> check_writable("nowhere/at/all.svg")
     Traceback (most recent call last):
     FileNotFoundError: [Errno 2] cannot write .../nowhere/at/all.svg: the folder .../nowhere/at does not exist

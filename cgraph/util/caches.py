@@ -52,7 +52,7 @@ def memo(size: int) -> Callable[[Callable[Arguments, Result]], Memo[Arguments, R
     Its arguments must be hashable, and those that are compared by identity are kept alive. docs/design.md lists every
     function that has it.  size: how many results are kept at most, the last ones used.
 
-    >>> from cgraph.extend import memo
+    >>> from cgraph._shared import memo
     >>> @memo(16)
     ... def square(x):
     ...     print("made")
@@ -79,7 +79,7 @@ def kept_by_first(
     is not altered, has a `__dict__` and can be referred to weakly.
 
     >>> import cgraph as cg
-    >>> from cgraph.extend import kept_by_first
+    >>> from cgraph._shared import kept_by_first
     >>> @kept_by_first
     ... def pullback(graph):
     ...     return cg.vjp(graph)

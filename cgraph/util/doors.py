@@ -1,11 +1,11 @@
-"""The names of a package that are loaded when they are first asked for (PEP 562)."""
+"""The names of a package that are loaded when they are first asked for (PEP 562), and methods that became functions."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Collection, Iterator
+import warnings
+from collections.abc import Callable, Collection
 from importlib import import_module
-from itertools import chain
 
 Homes = dict[str, tuple[str, str | None]]  # {name: (module that has it, its name there; None for the module itself)}
 
@@ -22,7 +22,7 @@ def doors(
 
     The imports of the file under `if TYPE_CHECKING:`, which type checkers read, say where each name is written. A
     module is imported when one of its names is first asked for, and the name then stays in the package. `__all__` is
-    the list of names of the first such block; those of a second one are there, too, and no promise is made for them.
+    the list of these names.
 
     otherwise: what gives a name that no import brings, or raises AttributeError.  first: a module that is imported
     before any of those that have the names.  explained: functions of the core whose wrong arguments are told in a
@@ -32,22 +32,21 @@ def doors(
     >>> "jvp" in dir(cg)
     True
     """
-    blocks: list[Homes] = []
+    homes: Homes = {}
 
-    def homes() -> list[Homes]:
-        if not blocks:
-            blocks.extend(_homes(file))
-        return blocks
+    def names() -> Homes:
+        if not homes:
+            homes.update(_homes(file))
+        return homes
 
     def load(name: str) -> object:
         if name == "__all__":
-            return [each for each in sorted(homes()[0]) if not each.startswith("_")]
-        home = next((block[name] for block in homes() if name in block), None)
-        if home is None:
+            return [each for each in sorted(names()) if not each.startswith("_")]
+        if name not in names():
             if otherwise is not None and not name.startswith("_"):
                 return otherwise(name)
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        place, inner = home
+        place, inner = homes[name]
         if first:
             import_module(first)
         module = import_module(place, getattr(sys.modules[package], "__package__", package))
@@ -59,18 +58,40 @@ def doors(
         setattr(sys.modules[package], name, value)
         return value
 
-    return load, lambda: sorted({*vars(sys.modules[package]), *chain.from_iterable(homes())})
+    return load, lambda: sorted({*vars(sys.modules[package]), *names()})
 
 
-def _homes(file: str) -> Iterator[Homes]:
-    """Homes of the names that each block of a file imports for type checkers."""
+class MovedMethod:
+    """A method whose place a function of the package has taken, which it calls with a warning."""
+
+    def __init__(self, package: str, name: str, alone: bool) -> None:
+        self.package, self.name, self.alone = package, name, alone
+
+    def __get__(self, owner: object, kind: type) -> Callable[..., object]:
+        def call(*args: object, **named: object) -> object:
+            text = f"{kind.__name__}.{self.name} goes with the next version: call {self.package}.{self.name}"
+            warnings.warn(text, DeprecationWarning, stacklevel=2)
+            function = getattr(sys.modules[self.package], self.name)
+            return function(*args if owner is None or self.alone else (owner, *args), **named)
+
+        return call
+
+
+def moved_methods(kind: type, package: str, names: Collection[str], alone: Collection[str] = ()) -> None:
+    """Keep methods of a class that are functions of a package now.  alone: those that took no object."""
+    for name in names:
+        setattr(kind, name, MovedMethod(package, name, name in alone))
+
+
+def _homes(file: str) -> Homes:
+    """Homes of the names that a file imports for type checkers."""
     import ast
 
     with open(file, encoding="utf-8") as source:  # noqa: PTH123 (pathlib takes longer to load than this file)
         tree = ast.parse(source.read())
+    homes: Homes = {}
     for block in tree.body:
         if isinstance(block, ast.If) and isinstance(block.test, ast.Name) and block.test.id == "TYPE_CHECKING":
-            homes: Homes = {}
             for line in block.body:
                 assert isinstance(line, ast.ImportFrom)
                 above = "." * line.level
@@ -78,4 +99,4 @@ def _homes(file: str) -> Iterator[Homes]:
                     whole = line.module is None
                     home = (above + name.name, None) if whole else (f"{above}{line.module}", name.name)
                     homes[name.asname or name.name] = home
-            yield homes
+    return homes

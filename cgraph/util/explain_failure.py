@@ -9,7 +9,7 @@ from functools import wraps
 from types import UnionType
 from typing import Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
-from .real_arrays import is_finite
+from ..core.evaluation import is_finite
 
 T = TypeVar("T", bound=Callable[..., object])
 # What Python raises; a subclass, such as GraphError, is a sentence already.

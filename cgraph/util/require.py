@@ -51,7 +51,7 @@ def require_sequence(what: str, value: object, of: str, kind: type | tuple[type,
 
     of: what they are, in the plural.
 
-    >>> from cgraph.extend import require_sequence
+    >>> from cgraph._shared import require_sequence
     >>> require_sequence("outputs", 3, "names")
     Traceback (most recent call last):
     TypeError: outputs must be a sequence of names, got int: 3

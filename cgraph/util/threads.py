@@ -17,7 +17,7 @@ def thread_count(threads: int | None) -> int:
 
     Raises ValueError for anything else.
 
-    >>> from cgraph.extend import thread_count
+    >>> from cgraph._shared import thread_count
     >>> thread_count(3)
     3
     """
@@ -33,7 +33,7 @@ def share(work: Callable[[int], None], items: Iterable[int], threads: int) -> No
 
     After an exception, Ctrl-C among them, no thread begins another item; it is raised once all have stopped.
 
-    >>> from cgraph.extend import share
+    >>> from cgraph._shared import share
     >>> squares = [0] * 4
     >>> share(lambda i: squares.__setitem__(i, i * i), range(4), threads=2)
     >>> squares

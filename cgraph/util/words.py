@@ -32,7 +32,7 @@ def nearest(name: str, known: Iterable[str], most: int = 3) -> list[str]:
 def or_nearest(name: str, known: Sequence[str]) -> str:
     """End of an error that begins with "there is no ...": the nearest of the known names, or some of them.
 
-    >>> from cgraph.extend import or_nearest
+    >>> from cgraph._shared import or_nearest
     >>> or_nearest("kne", ["hip", "knee", "ankle"])
     "did you mean 'knee'?"
     >>> or_nearest("x", ["hip", "knee", "ankle"])

@@ -30,7 +30,7 @@ class HoldsNodes:
     --------
     >>> import pickle
     >>> import cgraph as cg
-    >>> from cgraph.extend import HoldsNodes
+    >>> from cgraph._shared import HoldsNodes
     >>> class Spring(HoldsNodes):
     ...     def __init__(self, force):
     ...         self.force = force

@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from xml.etree import ElementTree
 
+from ..core.graph import Graph
 from ..core.node import Node
 from ..core.traversal import topological
 from ..operations.operation import FUNCTION, LEAF, PRODUCT, SUM, Op
@@ -23,13 +24,13 @@ _KNOWN = ("log", "min", "max")  # functions of LaTeX that rows name
 _SPECIAL = {"\\": r"\backslash ", "^": r"\hat{}", "~": r"\sim "} | {sign: f"\\{sign}" for sign in "#$%&_{}"}
 
 
-def latex(node: Node, *, names: Mapping[str, str] | None = None, lines: int = LINES) -> str:
-    r"""The formula of a node as LaTeX.
+def latex(what: Node | Graph, *, names: Mapping[str, str] | None = None, lines: int = LINES) -> str:
+    r"""The formula of a node, or the equations of a graph, as LaTeX.
 
     Parameters
     ----------
-    node : Node
-        The node.
+    what : Node or Graph
+        The node or the graph.
     names : mapping of str to str, optional
         {name of a variable or node: what a person calls it}.
     lines : int
@@ -38,12 +39,13 @@ def latex(node: Node, *, names: Mapping[str, str] | None = None, lines: int = LI
     Returns
     -------
     str
-        The formula; an aligned block of equations where parts of it have names or are needed more than once.
+        The formula of a node; an aligned block of a graph, or if parts of the formula have names or are needed more
+        than once: a node that several lines need, or that has a name, has a line.
 
     Raises
     ------
     TypeError
-        For what is no node.
+        For what is neither a node nor a graph.
     ValueError
         For fewer than one line.
 
@@ -54,21 +56,12 @@ def latex(node: Node, *, names: Mapping[str, str] | None = None, lines: int = LI
     >>> print(cg.latex(0.5 * m * v**2))
     \frac{1}{2} \, m \, {v}^{2}
     """
-    if not isinstance(node, Node):
-        raise TypeError(
-            f"latex needs a node, got {type(node).__name__}: {node!r:.60}"
-            f"{'; of a graph, graph.latex()' if hasattr(node, 'latex') else ''}"
-        )
-    found = Formulas(topological([node]), {}, LATEX, names).lines([node], lines)
+    if isinstance(what, Graph):
+        return latex_block(Formulas(what.nodes, what.outputs, LATEX, names).lines(list(what.outputs.values()), lines))
+    if not isinstance(what, Node):
+        raise TypeError(f"latex needs a node or a graph, got {type(what).__name__}: {what!r:.60}")
+    found = Formulas(topological([what]), {}, LATEX, names).lines([what], lines)
     return found.equations[0][1] if len(found.equations) == 1 and not found.left_out else latex_block(found)
-
-
-def graph_latex(
-    nodes: Sequence[Node], outputs: Mapping[str, Node], names: Mapping[str, str] | None, lines: int | None
-) -> str:
-    """The equations of a graph's outputs as an aligned block."""
-    most = LINES if lines is None else lines
-    return latex_block(Formulas(nodes, outputs, LATEX, names).lines(list(outputs.values()), most))
 
 
 def latex_block(lines: Lines) -> str:

@@ -12,8 +12,9 @@ from ..core.checks import GraphError, check_name
 from ..core.graph import Edge, Graph
 from ..core.label import SourceLine
 from ..core.node import CONSTANT, VARIABLE, Node
+from ..operations.records import Record, restored
 from ..operations.table import OPS
-from .records import Record, restored
+from ..util.require import require_graph
 
 if TYPE_CHECKING:
     import networkx
@@ -21,18 +22,43 @@ if TYPE_CHECKING:
 LABELS = ("tags", "roles", "lines")
 
 
-def to_networkx(nodes: Sequence[Node], inputs: Sequence[Node], outputs: Mapping[str, Node]) -> networkx.MultiDiGraph:
-    """A MultiDiGraph from arguments to uses, of nodes in topological order and the inputs that nothing uses.
+def to_networkx(graph: Graph) -> networkx.MultiDiGraph:
+    """The graph as one of networkx, from arguments to uses.
 
-    Attributes are texts and numbers, as GraphML and GEXF have them; lists and mappings are JSON.
+    Nodes have the attribute op; name, value and input (its place) if any; tags, roles, lines and outputs as JSON. Edges
+    have a slot. So all attributes are texts and numbers, as files of GraphML and GEXF have them.
+
+    Parameters
+    ----------
+    graph : Graph
+        The graph.
+
+    Returns
+    -------
+    networkx.MultiDiGraph
+        Its nodes, numbered as in `graph.nodes`, and behind them the inputs that nothing uses.
+
+    Raises
+    ------
+    TypeError
+        For what is no graph.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> x = cg.variable("x")
+    >>> print(cg.to_networkx(cg.Graph([x], {"y": x * cg.sin(x)})))
+    MultiDiGraph with 3 nodes and 3 edges
     """
     import networkx
 
+    require_graph("to_networkx", graph)
+    nodes, inputs = graph.nodes, graph.inputs
     result = networkx.MultiDiGraph()
     number: dict[Node, int] = {}
     places = {node: place for place, node in enumerate(inputs)}
     named: dict[Node, dict[str, int]] = {}
-    for place, (name, node) in enumerate(outputs.items()):
+    for place, (name, node) in enumerate(graph.outputs.items()):
         named.setdefault(node, {})[name] = place
     for node in dict.fromkeys((*nodes, *inputs)):
         number[node] = len(number)
@@ -51,7 +77,32 @@ def to_networkx(nodes: Sequence[Node], inputs: Sequence[Node], outputs: Mapping[
 
 
 def from_networkx(network: networkx.DiGraph) -> Graph:
-    """The graph of which `to_networkx` gave this, or a file of it. Raises GraphError where something is missing."""
+    """The graph of what `to_networkx` gave, also through a file.
+
+    Parameters
+    ----------
+    network : networkx.DiGraph
+        Nodes and edges with the attributes that `to_networkx` gives them.
+
+    Returns
+    -------
+    Graph
+        The graph.
+
+    Raises
+    ------
+    GraphError
+        If an attribute is missing or cannot be read, an operation is not in the table, or there is a cycle.
+    TypeError
+        For what is no networkx.DiGraph.
+
+    Examples
+    --------
+    >>> import cgraph as cg
+    >>> x = cg.variable("x")
+    >>> cg.from_networkx(cg.to_networkx(cg.Graph([x], {"y": x * cg.sin(x)})))
+    <Graph (x) -> (y): 3 nodes, 3 edges>
+    """
     import networkx
 
     if not isinstance(network, networkx.DiGraph):

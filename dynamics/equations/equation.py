@@ -14,9 +14,9 @@ from types import FunctionType
 from typing import Protocol, TypeVar
 
 import cgraph as cg
-from cgraph import Graph, Node, extend
+from cgraph import Graph, Node, _shared
 
-from ..systems.model import Model, as_system
+from ..systems.model import Model, as_system, display_names
 from ..systems.system import System
 
 LARGEST_REWRITTEN = 200  # nodes of a graph whose outputs are written anew
@@ -147,12 +147,10 @@ class Equation:
 def called(graph: Graph, model: Model) -> Graph:
     """The graph, which a notebook draws with the names that a person calls its inputs and outputs by."""
 
-    def remarks(_: Graph) -> extend.Remarks:
-        from ..systems.display_names import display_names  # loaded when a notebook asks
+    def remarks(_: Graph) -> _shared.Remarks:
+        return _shared.Remarks(display_names(model))
 
-        return extend.Remarks(display_names(model))
-
-    return extend.remarked(graph, remarks)
+    return _shared.remarked(graph, remarks)
 
 
 def documented(
@@ -184,7 +182,7 @@ def documented(
     return function
 
 
-@extend.without_collection()
+@_shared.without_collection()
 def shortened(system: System, derive: Callable[[System], Graph], *, mirrored: bool = False) -> Graph:
     """derive(system), or of the system's energies written anew by identities, or its outputs so, if that is smaller.
 
@@ -197,7 +195,7 @@ def shortened(system: System, derive: Callable[[System], Graph], *, mirrored: bo
     for graph in graphs:
         if not mirrored and len(graph.nodes) <= LARGEST_REWRITTEN:
             below = None if graph is graphs[0] else len(best.nodes)
-            outputs = dict(zip(graph.outputs, extend.shortened(list(graph.outputs.values()), below), strict=True))
+            outputs = dict(zip(graph.outputs, _shared.shortened(list(graph.outputs.values()), below), strict=True))
             best = min(best, cg.simplify(Graph(graph.inputs, outputs)), key=_size)
     return best
 

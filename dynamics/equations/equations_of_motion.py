@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from cgraph import Graph, Node
-from cgraph.extend import Builder, cotangents, require_choice, require_flag
+from cgraph._shared import require_choice, require_flag
+from cgraph.extend import Builder, cotangents
 
 from ..systems.kinematics import ONE, ZERO
 from ..systems.model import Model, as_system

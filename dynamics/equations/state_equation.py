@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import kept_by_first, require_choice
+from cgraph._shared import kept_by_first, require_choice
 
 from ..systems.arguments import TIME
 from ..systems.kinematics import ZERO

@@ -23,7 +23,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from cgraph import Node
-from cgraph.extend import UNLABELLED, Builder, topological
+from cgraph._shared import UNLABELLED
+from cgraph.extend import Builder, topological
 
 
 def velocity_nodes(output: Node, q: Sequence[Node], qd: Sequence[Node], t: Node, build: Builder) -> list[Node]:

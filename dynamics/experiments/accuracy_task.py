@@ -13,7 +13,7 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Array, real_array
+from cgraph._shared import Array, real_array
 
 from ..equations.energies import energy
 from ..equations.state_equation import state_inputs

@@ -20,7 +20,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 Made = TypeVar("Made")
 CLOCKS = 200  # readings of the clocks, of which the quickest tells what they take

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from functools import partial
 from importlib import import_module
 
-from cgraph.extend import doors, memo
+from cgraph._shared import doors, memo
 
 from .dop853 import DOP853
 from .explicit import explicit_step

@@ -3,16 +3,8 @@
 from __future__ import annotations
 
 from cgraph import Graph
-from cgraph.extend import (
-    Call,
-    CompressedJacobian,
-    Factor,
-    Map,
-    Program,
-    Statement,
-    compressed_jacobian,
-    kept_by_first,
-)
+from cgraph._shared import CompressedJacobian, kept_by_first
+from cgraph.extend import Call, Factor, Map, Program, Statement, compressed_jacobian
 
 from .problem import Problem, state_jacobian
 

@@ -8,7 +8,8 @@ from functools import partial
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Call, Program, Statement, memo
+from cgraph._shared import memo
+from cgraph.extend import Call, Program, Statement
 
 from .problem import Problem
 from .step import Step, arriving, rate_calls, with_registers

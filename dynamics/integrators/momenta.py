@@ -7,15 +7,8 @@ from typing import NamedTuple
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import (
-    Builder,
-    SingularError,
-    building,
-    cotangents,
-    kept_by_first,
-    require_choice,
-    solve_nodes,
-)
+from cgraph._shared import kept_by_first, require_choice
+from cgraph.extend import Builder, SingularError, building, cotangents, solve_nodes
 
 from ..equations.equations_of_motion import momentum
 from ..equations.mass_matrix.singular_mass_matrix import SingularMassMatrixError

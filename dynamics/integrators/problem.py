@@ -9,7 +9,8 @@ from typing import Any
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import is_finite, kept_by_first, memo, topological
+from cgraph._shared import is_finite, kept_by_first, memo
+from cgraph.extend import topological
 
 from ..equations.constraints.constraint_rank import independent_rows
 from ..equations.constraints.projection import projection

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 from dataclasses import dataclass
 
-from cgraph.extend import kept_by_first
+from cgraph._shared import kept_by_first
 
 RowOfWeights = tuple[float, ...]
 

@@ -16,20 +16,8 @@ from collections.abc import Sequence
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import (
-    Call,
-    If,
-    Jets,
-    Map,
-    NoSeriesError,
-    Statement,
-    Sum,
-    convolution,
-    copied,
-    jets,
-    kept_by_first,
-    straight,
-)
+from cgraph._shared import Jets, convolution, kept_by_first
+from cgraph.extend import Call, If, Map, NoSeriesError, Statement, Sum, copied, jets, straight
 
 from ..systems.arguments import TIME
 from .elementwise import compensated, function, stage_time

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import Array, real_number, require_choice, require_mapping
+from cgraph._shared import Array, real_number, require_choice, require_mapping
 
 from ..multibody.algebra import spatial
 from ..multibody.forces.contact import CONTACT_QUANTITIES, Contact

@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping, Sequence
 
-from cgraph.extend import require_flag
+from cgraph._shared import require_flag
 
 from ..equations.constraints.constraint_rank import independent_rows
 from ..multibody.trees.mechanism import Mechanism, MechanismError, MechanismWarning

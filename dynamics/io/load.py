@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from cgraph.extend import require_flag
+from cgraph._shared import require_flag
 
 from ..multibody.bodies.joint_coordinates import neutral
 from ..multibody.trees.mechanism import Mechanism, MechanismError

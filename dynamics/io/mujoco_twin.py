@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cgraph.extend import Array, install
+from cgraph._shared import Array, install
 
 from ..multibody.builders.planar_arm import planar_links
 from ..multibody.trees.mechanism import Mechanism, MechanismError, require_mechanism

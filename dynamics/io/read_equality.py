@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ..multibody.algebra import spatial
 from ..multibody.bodies.body import WORLD, Body, MechanismError

@@ -13,7 +13,7 @@ from xml.parsers import expat
 
 import numpy as np
 
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ..multibody.algebra import spatial
 from ..multibody.joints import TYPES

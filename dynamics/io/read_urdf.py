@@ -10,7 +10,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
-from cgraph.extend import Array, require_flag
+from cgraph._shared import Array, require_flag
 
 from ..multibody.algebra import spatial
 from ..multibody.bodies.body import moment_rounding

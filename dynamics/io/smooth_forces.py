@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cgraph.extend import Array, real_array, real_number, require_flag
+from cgraph._shared import Array, real_array, real_number, require_flag
 
 from ..multibody.bodies.body import Body, MechanismError
 from ..multibody.bodies.limits import ANYTHING, Limits

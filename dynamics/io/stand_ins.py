@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ..multibody.algebra.spatial import SNAP
 from ..multibody.trees.mechanism import WORLD, Body, MechanismError

@@ -9,7 +9,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from cgraph.extend import Array, real_number
+from cgraph._shared import Array, real_number
 
 from ..multibody.algebra import spatial
 from ..multibody.bodies.limits import ANYTHING, NO_LIMITS, Pair

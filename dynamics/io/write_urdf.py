@@ -9,7 +9,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ..multibody.bodies.limits import NO_LIMITS
 from ..multibody.parameters import vanishes

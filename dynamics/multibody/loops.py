@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import Array, Builder, building, is_finite
+from cgraph._shared import Array, is_finite
+from cgraph.extend import Builder, building
 
 from ..equations.constraints.nearly_redundant_rows import without_nearly_redundant
 from ..systems.constraints import Constraints, LoopRow

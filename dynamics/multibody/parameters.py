@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Array, as_node, topological
+from cgraph._shared import Array
+from cgraph.extend import as_node, topological
 
 from ..equations.substitute import substitute
 

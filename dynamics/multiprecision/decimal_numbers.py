@@ -10,7 +10,8 @@ from decimal import MAX_EMAX, MIN_EMIN, Context, Decimal, localcontext
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
-from cgraph.extend import Op, install
+from cgraph._shared import install
+from cgraph.extend import Op
 
 if TYPE_CHECKING:
     from mpmath.ctx_mp import MPContext

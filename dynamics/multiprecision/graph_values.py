@@ -6,7 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from decimal import Decimal
 
 from cgraph import Graph, Node
-from cgraph.extend import columns, topological
+from cgraph._shared import columns
+from cgraph.extend import topological
 
 from .decimal_numbers import mpmath_context, number, value, working
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from numpy.typing import ArrayLike
 
 from cgraph import Graph, Node
-from cgraph.extend import atomic_write, require_path
+from cgraph._shared import atomic_write, require_path
 
 from ..equations.state_equation import state_equation, state_inputs
 from ..equations.states.initial_value import other_inputs, start_state, times_to_record

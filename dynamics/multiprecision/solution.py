@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import Array, real_array
+from cgraph._shared import Array, real_array
 
 
 @dataclass(frozen=True)

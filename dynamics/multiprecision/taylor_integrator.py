@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cgraph import Graph, Node
-from cgraph.extend import NoSeriesError, columns, jets
+from cgraph._shared import columns
+from cgraph.extend import NoSeriesError, jets
 
 from ..systems.arguments import TIME
 from .decimal_numbers import log10_size, mpmath_context, number, sign, value, working

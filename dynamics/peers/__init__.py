@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from importlib import import_module
 from importlib.util import find_spec
 
-from cgraph.extend import install
+from cgraph._shared import install
 
 from .peer import DERIVATIVES, MODES, MOTIONS, TASKS, Peer, PeerModel, TimedTask, UnavailableError
 

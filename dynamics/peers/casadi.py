@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from cgraph import Graph, GraphError, to_casadi
-from cgraph.extend import Array, kept_by_first
+from cgraph._shared import Array, kept_by_first
 
 from .peer import (
     BATCH,

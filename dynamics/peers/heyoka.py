@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cgraph.extend import ldl_elimination
+from cgraph._shared import ldl_elimination
 
 from .peer import Peer, PeerModel, TimedTask, required
 from .translate import lagrange, lagrangian, require_rates

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cgraph.extend import ldl_elimination
+from cgraph._shared import ldl_elimination
 
 from .peer import DERIVATIVES, MOTIONS, NUDGE, PASSES, Peer, PeerModel, TimedTask, required, rk4_step
 from .translate import lagrangian, quasi_velocities

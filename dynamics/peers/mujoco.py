@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ..io.mujoco_twin import MujocoTwin, joint_order, rollout
 from .peer import DT, PASSES, Peer, PeerModel, TimedTask, UnavailableError

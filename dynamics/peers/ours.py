@@ -10,7 +10,8 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Compiled, Graph, Node
-from cgraph.extend import Array, Call, Program, kept_by_first, runner
+from cgraph._shared import Array, kept_by_first
+from cgraph.extend import Call, Program, runner
 
 from ..equations.linearization.linearization_parts import LinearizationParts, linearization_parts
 from ..equations.linearization.linearize_many import WRITTEN_OUT, linearization_program, linearize_many

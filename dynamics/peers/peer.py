@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Array, required as extra_module, topological
+from cgraph._shared import Array, required as extra_module
+from cgraph.extend import topological
 
 from ..equations.state_equation import normalization
 from ..integrators.tableau import RK4

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ..multibody.bodies.body import WORLD
 from ..multibody.bodies.joint_coordinates import per_velocity, places

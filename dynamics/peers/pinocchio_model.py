@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ..multibody.bodies.body import WORLD, Body
 from ..multibody.bodies.joint_coordinates import places

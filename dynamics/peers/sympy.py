@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from .peer import BATCH, Peer, PeerModel, TimedTask, required
 from .translate import lagrange, lagrangian, require_rates

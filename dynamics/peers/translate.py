@@ -7,7 +7,8 @@ from typing import Any, TypeVar
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import Builder, Op, topological, translated as expressions
+from cgraph._shared import translated as expressions
+from cgraph.extend import Builder, Op, topological
 
 from .peer import PeerModel, UnavailableError
 

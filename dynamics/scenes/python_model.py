@@ -16,7 +16,7 @@ from pathlib import Path
 from types import CodeType, ModuleType
 from typing import TypeGuard, TypeVar
 
-from cgraph.extend import or_nearest
+from cgraph._shared import or_nearest
 
 from ..systems.model import Model
 

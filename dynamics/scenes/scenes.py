@@ -15,7 +15,7 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import nearest, or_nearest, real_array, real_number
+from cgraph._shared import nearest, or_nearest, real_array, real_number
 
 from ..io.load import load_at_start
 from ..multibody.bodies.limits import NO_LIMITS, Limits

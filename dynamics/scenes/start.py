@@ -9,7 +9,7 @@ from typing import TypeVar
 import numpy as np
 
 from cgraph import Graph
-from cgraph.extend import or_nearest, real_array, real_number
+from cgraph._shared import or_nearest, real_array, real_number
 
 from ..equations.state_equation import state_equation
 from ..equations.states.consistent_state import nearest_state

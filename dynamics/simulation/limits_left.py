@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import Polynomial
 
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from .trajectory import Trajectory
 

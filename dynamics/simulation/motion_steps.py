@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 
-from cgraph.extend import Array, real_number
+from cgraph._shared import Array, real_number
 
 from .outcome import MotionError
 from .steps.stepping import NativeIntegration

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Array, kept_by_first, or_nearest
+from cgraph._shared import Array, kept_by_first, or_nearest
 
 from ..equations.state_equation import state_inputs
 from ..equations.states.initial_value import other_inputs, start_state

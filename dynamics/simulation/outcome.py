@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cgraph.extend import Array, counted
+from cgraph._shared import Array, counted
 
 from .estimates.error_estimate import RunEstimate
 from .run_options import SMALL_MEMORY, TABLES, RunOptions, room

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import Array, HoldsNodes, floats
+from cgraph._shared import Array, HoldsNodes, floats
 
 from ..systems.model import Model
 from .events.event import Event

@@ -1,15 +1,16 @@
-"""Row values: what graphs of the state give at every row of a trajectory, and momenta that velocities do not reach."""
+"""Row values: what graphs of the state give at every row of a trajectory, and what gave one that is not finite."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph import Graph
-from cgraph.extend import Array
+import cgraph as cg
+from cgraph import Graph, _shared
+from cgraph._shared import Array
 
 from ..integrators import Problem
 from .estimates.state_sizes import OTHERS
@@ -91,3 +92,29 @@ def _other_velocities(problem: Problem, t: float, start: Array, x: Array, parame
     k = int(bad[0])
     other = f"of the {problem.components[nq + k]} it is {back[k]:.6g} in place of {qd[k]:.6g}"
     return [f"the momenta of the start belong to other velocities too: {other}; take form='velocity'"]
+
+
+def origin(
+    rate: Graph, times: Array, states: Array, held: ArrayLike, names: Mapping[str, str], beyond: float
+) -> _shared.WhyNan:
+    """Where the first rate comes from that is not finite, or the first derivative of one.
+
+    rate: over the states, t and forces.  times: (T,).  states: (T, m).  held: forces, (T, p) or ().
+    beyond: the step [s] of a run that stopped at the last row, which is taken along the rate; 0 of one that did not.
+    """
+    forces = np.broadcast_to(held, (len(times), len(rate.inputs) - states.shape[1] - 1))
+    tried = [(times, states, forces)]
+    if beyond and len(times):
+        direction = -1.0 if len(times) > 1 and times[-1] < times[0] else 1.0
+        slope = row_values(rate, times[-1:], states[-1:], forces[-1:])[0]
+        ahead = direction * beyond * np.array([0.5, 1.0])
+        tried.append((times[-1] + ahead, states[-1] + ahead[:, None] * slope, np.repeat(forces[-1:], 2, axis=0)))
+    for graph in (rate, cg.jacobian(rate, list(rate.inputs[: states.shape[1]]))):
+        for t, rows, force in tried:
+            bad = np.flatnonzero(~np.isfinite(row_values(graph, t, rows, force)).all(axis=1))
+            if len(bad):
+                k = int(bad[0])
+                return cg.why_nan(
+                    rate, dict(zip(rate.input_names, [*rows[k], t[k], *force[k]], strict=True)), names=names
+                )
+    return _shared.WhyNan(rate)

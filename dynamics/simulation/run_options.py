@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import Array, nearest, real_array, real_number, require_flag
+from cgraph._shared import Array, nearest, real_array, real_number, require_flag
 
 from ..equations.states.initial_value import times_to_record
 from ..integrators import METHODS, MOST_STAGES, Method

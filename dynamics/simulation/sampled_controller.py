@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import Array, HoldsNodes, real_array, real_number
+from cgraph._shared import Array, HoldsNodes, real_array, real_number
 
 from .steps.equal_steps import SAME_INSTANT
 

@@ -8,7 +8,7 @@ from contextlib import suppress
 
 from numpy.typing import ArrayLike
 
-from cgraph.extend import require_choice, require_flag, require_sequence
+from cgraph._shared import require_choice, require_flag, require_sequence
 
 from ..equations.state_equation import FORMS
 from ..equations.states.initial_value import other_inputs

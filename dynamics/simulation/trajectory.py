@@ -12,15 +12,15 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph import Graph, extend
-from cgraph.extend import Array, counted, or_nearest
+from cgraph import Graph, _shared
+from cgraph._shared import Array, counted, or_nearest
 
-from .row_values import row_values
+from .row_values import origin, row_values
 from .sampled_controller import HeldForces
 from .steps.dense_output import Solution
 
 if TYPE_CHECKING:
-    from cgraph.extend import WhyNan
+    from cgraph._shared import WhyNan
 
 _ROWS = 10_000  # of a text, written at once
 
@@ -338,8 +338,6 @@ class Trajectory:
         It begins with %1 = sqrt(depth), which is nan, where depth = -0.00201144.
         On its way: %1 -> %2 -> %3 -> depth_dot.
         """
-        from .not_finite import origin  # which a run does not need
-
         graph = self.graphs["rate"]
         kinds = {"q": self.coordinates, "qd": self.velocities} if self.velocities else {}
         names = {f"{kind}{i}{end}": f"{kind}{end}.{name}" for kind, known in kinds.items()
@@ -386,7 +384,7 @@ class Trajectory:
 
     def _repr_html_(self) -> str | None:
         """The plot that a notebook shows, when a drawing package is installed (extra `viz`)."""
-        return extend.render_html("trajectory", self)
+        return _shared.render_html("trajectory", self)
 
     def __repr__(self) -> str:
         n, stats = self.q.shape[1], self.stats

@@ -12,7 +12,8 @@ from typing import Any, NoReturn
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import check_name, is_finite, or_nearest, real_number, require_mapping, topological
+from cgraph._shared import check_name, is_finite, or_nearest, real_number, require_mapping
+from cgraph.extend import topological
 
 TIME = "t"
 _RESERVED = re.compile(r"(q|qd|qdd|tau|lambda)\d+(_old)?|t|dt")

@@ -9,7 +9,8 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from cgraph import Node
-from cgraph.extend import Builder, check_name, cotangents, tangents, topological
+from cgraph._shared import check_name
+from cgraph.extend import Builder, cotangents, tangents, topological
 
 from .arguments import Parameters, call_user_function, node_or_number, sequence
 from .kinematics import ONE, ZERO, Kinematics

@@ -8,7 +8,8 @@ from typing import Any, NamedTuple
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import memo, or_nearest, topological
+from cgraph._shared import memo, or_nearest
+from cgraph.extend import topological
 
 from .arguments import Parameters, parameter_items, parameter_value
 from .model import Equations, Model, as_equations

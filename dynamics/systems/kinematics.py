@@ -9,7 +9,8 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Builder, building, cotangents, folded, is_finite, tangents, topological
+from cgraph._shared import is_finite
+from cgraph.extend import Builder, building, cotangents, folded, tangents, topological
 
 from .arguments import names_of, node_or_number, require_known, sequence
 from .quasi_velocities import Function, QuasiVelocities

@@ -6,8 +6,9 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 
 import cgraph as cg
-from cgraph import Graph, Node, extend
-from cgraph.extend import HoldsNodes, topological
+from cgraph import Graph, Node, _shared
+from cgraph._shared import HoldsNodes
+from cgraph.extend import topological
 
 from .arguments import (
     TIME,
@@ -101,7 +102,7 @@ class OdeSystem(HoldsNodes):
 
     def _repr_html_(self) -> str | None:
         """The equations that a notebook shows as formulas, when a drawing package is installed (extra `viz`)."""
-        return extend.render_html("model", self)
+        return _shared.render_html("model", self)
 
     def __repr__(self) -> str:
         parameters = f", parameters {', '.join(self.parameters)}" if self.parameters else ""

@@ -11,8 +11,9 @@ from functools import cached_property
 from numpy.typing import ArrayLike
 
 import cgraph as cg
-from cgraph import Graph, Node, extend
-from cgraph.extend import Builder, HoldsNodes, building, require_sequence, topological
+from cgraph import Graph, Node, _shared, extend
+from cgraph._shared import HoldsNodes, require_sequence
+from cgraph.extend import Builder, building, topological
 
 from .arguments import (
     TIME,
@@ -230,7 +231,7 @@ class System(HoldsNodes):
         P, whose sums could lose digits that a product of differences keeps, only where it then depends on less.
         """
         kinetic, potential, forces = (
-            extend.shortened(part) for part in ([self.kinetic], [self.potential], self.forces)
+            _shared.shortened(part) for part in ([self.kinetic], [self.potential], self.forces)
         )
         if [*kinetic, *potential, *forces] == [self.kinetic, self.potential, *self.forces]:
             return None
@@ -275,7 +276,7 @@ class System(HoldsNodes):
 
     def _repr_html_(self) -> str | None:
         """The equations that a notebook shows as formulas, when a drawing package is installed (extra `viz`)."""
-        return extend.render_html("model", self)
+        return _shared.render_html("model", self)
 
     def __repr__(self) -> str:
         parameters = f", parameters {', '.join(self.parameters)}" if self.parameters else ""

@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import Array, Builder, cotangents, real_number, require_whole, tangents
+from cgraph._shared import Array, real_number, require_whole
+from cgraph.extend import Builder, cotangents, tangents
 
 from ..equations.constraints.constraint_rank import CLEAR
 from ..equations.coriolis import coriolis, require_quadratic

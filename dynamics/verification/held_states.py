@@ -9,7 +9,8 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import Array, Builder, cotangents, tangents
+from cgraph._shared import Array
+from cgraph.extend import Builder, cotangents, tangents
 
 from ..equations.constraints.constraint_rank import CLEAR
 from ..equations.constraints.nearly_redundant_rows import least_new

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ..equations.equations_of_motion import forward_dynamics
 from ..equations.formulations.formulations import inverse_dynamics

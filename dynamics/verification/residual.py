@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from cgraph.extend import Array, Json, html_lines, html_table
+from cgraph._shared import Array, Json, html_lines, html_table
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Array, Json, columns, page_functions
+from cgraph._shared import Array, Json, columns, page_functions
 
 from ..equations.state_equation import normalization, state_equation, state_inputs
 from ..equations.substitute import substitute

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 import dynamics as dyn
-from cgraph.extend import Array
+from cgraph._shared import Array
 from dynamics.equations.state_equation import state_inputs
 
 

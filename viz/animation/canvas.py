@@ -12,7 +12,7 @@ from tempfile import TemporaryDirectory
 from types import ModuleType
 from typing import TYPE_CHECKING
 
-from cgraph.extend import install, memo
+from cgraph._shared import install, memo
 
 from .. import theme
 

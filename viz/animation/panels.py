@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from .canvas import DARK, LIGHT, RATE, Canvas, Colors, Point
 from .surfaces import surfaces

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 EDGE_ON = 0.05  # of a plane's square: how little of it is seen where a line stands for the plane
 _RING = np.linspace(0.0, 2.0 * np.pi, 49)

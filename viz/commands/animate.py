@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Callable
 
 import dynamics as dyn
-from cgraph import extend
+from cgraph import _shared
 
 from . import library
 from .arguments import FORMULATIONS, answer, formulation, place, positive, say, started, takes_a_scene, takes_a_start
@@ -47,7 +47,7 @@ def run(options: argparse.Namespace) -> int:
         raise ValueError(f"--out must end in {', '.join(library.KINDS[:-1])} or {library.KINDS[-1]}, got {options.out}")
     if options.formulations and not options.driven:
         raise ValueError("--formulations goes with --driven")
-    extend.check_writable(options.out)
+    _shared.check_writable(options.out)
     library.check_can_animate(options.out.suffix)
     scene, _ = started(options, free=not options.driven)
     end = scene.t_end if options.t_end is None else options.t_end
@@ -55,7 +55,7 @@ def run(options: argparse.Namespace) -> int:
     say(f"{scene.name}: a motion of {end:g} s")
     motions: dict[str, dyn.Trajectory] = {}
     marked: list[str] = []
-    wanted: Callable[[extend.Array], extend.Array] | None = None
+    wanted: Callable[[_shared.Array], _shared.Array] | None = None
     if options.driven:
         for name in options.formulations or DRIVEN:
             words = f"torque {WORDS.get(name, name.replace('_', ' '))}"

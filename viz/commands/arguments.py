@@ -14,7 +14,7 @@ from typing import Any
 
 import cgraph as cg
 import dynamics as dyn
-from cgraph import extend
+from cgraph import _shared
 
 from . import library
 from .command import Command
@@ -117,7 +117,7 @@ def answer(
     try:
         for place in places:
             place.mkdir(parents=True, exist_ok=True)
-        extend.write_files(files or {})
+        _shared.write_files(files or {})
     except OSError:
         for place in sorted(missing, reverse=True):  # what is inside first
             with suppress(OSError):
@@ -234,7 +234,7 @@ def may_draw_and_print(command: argparse.ArgumentParser) -> None:
 def check_picture(options: argparse.Namespace) -> None:
     """Raise what writing the picture would, before the work."""
     if options.svg:
-        extend.check_writable(options.svg)
+        _shared.check_writable(options.svg)
         library.check_can_draw(png=False)
 
 

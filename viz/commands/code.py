@@ -11,7 +11,7 @@ from typing import Any
 
 import cgraph as cg
 import dynamics as dyn
-from cgraph import extend
+from cgraph import _shared
 
 from . import library
 from .arguments import answer, box, place, scene_of, takes_a_scene
@@ -84,7 +84,7 @@ def run(options: argparse.Namespace) -> None:
     if options.box is not None and not options.float32:
         raise ValueError("--box says where the bound of --float32 is stated")
     if out is not None:
-        extend.check_writable(out)
+        _shared.check_writable(out)
     scene = scene_of(options)
     what = options.what or ("forward_dynamics" if scene.ode is None else "state_equation")
     graph = EQUATIONS[what](scene)
@@ -108,7 +108,7 @@ def run(options: argparse.Namespace) -> None:
         return
     written = {out.with_suffix(end): content for end, content in files.items()}
     sizes = ", ".join(f"{path}: {len(content)} bytes" for path, content in written.items())
-    inputs, outputs = extend.counted(len(graph.inputs), "input"), extend.counted(len(graph.outputs), "output")
+    inputs, outputs = _shared.counted(len(graph.inputs), "input"), _shared.counted(len(graph.outputs), "output")
     places = f"; {inputs} from byte 0, {outputs} from byte {8 * len(graph.inputs)}"
     answer(f"{sizes}{places if options.language == 'wasm' else ''}", written)
 
@@ -118,13 +118,13 @@ def _single(options: argparse.Namespace, scene: dyn.scenes.Scene, graph: cg.Grap
     if not options.float32:
         return {}
     values = {name: value for name, value in scene.parameters.items() if name in graph.input_names}
-    ranges = extend.Names(graph, dyn.display_names(scene)).inputs_of("--box", options.box or {})
+    ranges = library.Names(graph, dyn.display_names(scene)).inputs_of("--box", options.box or {})
     return {"dtype": "float32", "box": values | ranges}
 
 
 def python_text(graph: cg.Graph) -> str:
     """The generated function, and before it the functions that it calls."""
-    ops = sorted({extend.columns(node.op) for node in graph.nodes if node.args}, key=lambda op: op.name)
+    ops = sorted({_shared.columns(node.op) for node in graph.nodes if node.args}, key=lambda op: op.name)
     called = [op for op in ops if re.match(rf"{op.name}\(", op.python)]
     known = [op.name for op in called if op.raising is getattr(math, op.name, None)]
     others = [op.name for op in called if op.name not in known and op.name not in ("abs", "float")]

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 
 import cgraph as cg
 import dynamics as dyn
-from cgraph import extend
+from cgraph import _shared
 
 from . import library
 from .arguments import (
@@ -71,7 +71,7 @@ def run(options: argparse.Namespace) -> int:
     sizes = {"left_nodes": len(left.nodes), "right_nodes": len(right.nodes), "in_both": both}
     only = comparison.only_left, comparison.only_right
     lines = [
-        f"{side}: {named[side]}, {extend.counted(len(graph.nodes), 'node')} = {both} in both + {len(rest)} only {side}"
+        f"{side}: {named[side]}, {_shared.counted(len(graph.nodes), 'node')} = {both} in both + {len(rest)} only {side}"
         for side, graph, rest in zip(named, (left, right), only, strict=True)
     ]
     data = {"scene": scene.name} | named | sizes | comparison.to_dict()
@@ -105,7 +105,7 @@ def _sizes(options: argparse.Namespace, scene: dyn.scenes.Scene) -> None:
     answer(unless_json(options, data, text))
 
 
-def _forms(scene: dyn.scenes.Scene, graphs: Mapping[str, cg.Graph]) -> tuple[dict[str, extend.Json], str]:
+def _forms(scene: dyn.scenes.Scene, graphs: Mapping[str, cg.Graph]) -> tuple[dict[str, _shared.Json], str]:
     """Sizes of both forms, and how far they agree at a state, as data and as text."""
     sizes, apart = size_data(graphs), library.form_agreement(scene, graphs, filled(graphs[library.LAGRANGE], scene, {}))
     agreement = (

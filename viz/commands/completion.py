@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 import dynamics as dyn
-from cgraph import extend
+from cgraph import _shared
 
 from .arguments import answer
 from .command import Command, parsers
@@ -24,7 +24,7 @@ def run(options: argparse.Namespace) -> None:
     try:
         import shtab
     except ImportError as error:
-        raise ImportError(f"a script of completion needs the package shtab: {extend.install('completion')}") from error
+        raise ImportError(f"a script of completion needs the package shtab: {_shared.install('completion')}") from error
     whole, commands = parsers()
     for command in commands.values():
         command.complete()

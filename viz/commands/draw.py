@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import cgraph as cg
 import dynamics as dyn
-from cgraph import extend
+from cgraph import _shared
 
 from . import library
 from .arguments import answer, collapsed, equations_of, place, scene_of, takes_a_scene, takes_equations, verdict_of
@@ -44,7 +44,7 @@ def run(options: argparse.Namespace) -> None:
         raise ValueError(f"--out must end in {', '.join(KINDS[:-1])} or {KINDS[-1]}, got {options.out}")
     if kind == ".txt" and options.collapse is not None:
         raise ValueError(f"--collapse goes with {', '.join(KINDS[:-1])}: a list has every node, got {options.out}")
-    extend.check_writable(options.out)
+    _shared.check_writable(options.out)
     if kind in PICTURES:
         library.check_can_draw(png=kind == ".png")
     scene = scene_of(options)
@@ -64,7 +64,7 @@ def run(options: argparse.Namespace) -> None:
     content = _listed(graph, scene) if kind == ".txt" else _drawn(*drawn)
     counts = graph.counts()
     answer(
-        f"{options.out}: {extend.counted(counts.nodes, 'node')}, {extend.counted(counts.edges, 'edge')}",
+        f"{options.out}: {_shared.counted(counts.nodes, 'node')}, {_shared.counted(counts.edges, 'edge')}",
         {options.out: content},
     )
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from cgraph import extend
+from cgraph import _shared
 
 from . import library
 from .arguments import (
@@ -47,7 +47,7 @@ def run(options: argparse.Namespace) -> int:
     scene, moved = started(options)
     content = library.inspection(scene, t_end=options.t_end, say=say)
     count = sum(len(each.graph.nodes) for each in content.versions.values())
-    say(f"{scene.name}: writing the page of {extend.counted(count, 'node')}")
+    say(f"{scene.name}: writing the page of {_shared.counted(count, 'node')}")
     text = library.inspection_page(scene, content, moved, view=library.first_view(options.forward, options.momentum))
     sizes = {
         name: {
@@ -60,7 +60,7 @@ def run(options: argparse.Namespace) -> int:
         for name, version in content.versions.items()
     }
     size = len(text.encode())
-    counts = ", ".join(f"{name} {extend.counted(version['nodes'], 'node')}" for name, version in sizes.items())
+    counts = ", ".join(f"{name} {_shared.counted(version['nodes'], 'node')}" for name, version in sizes.items())
     data = {"scene": scene.name, "bytes": size, "stopped": content.stopped, "versions": sizes}
     answer_page(options, unless_json(options, data, f"{options.out}: {counts}; {size / 1e6:.2f} MB"), text)
     return 1 if content.stopped else 0

@@ -6,7 +6,7 @@ import argparse
 from functools import partial
 from pathlib import Path
 
-from cgraph import extend
+from cgraph import _shared
 
 from . import library
 from .arguments import answer, may_open, say, scene_of, takes_a_scene
@@ -52,7 +52,7 @@ def run(parser: Command, options: argparse.Namespace) -> None:
     make = partial(library.lesson, scene, subject=options.subject, title=options.title, author=options.author)
     texts = {path: make(form=form) for form, path in targets.items()}
     lesson = library.LESSONS[options.subject]
-    about = f"{extend.counted(len(lesson.screens), 'question')} on {scene.name}, {lesson.minutes} minutes"
+    about = f"{_shared.counted(len(lesson.screens), 'question')} on {scene.name}, {lesson.minutes} minutes"
     words = {"page": about, "worksheet": "worksheet, to be printed", "key": "answers to it"}
     lines = [f"{path}: {words[form]}; {len(texts[path].encode()) / 1e3:.0f} kB" for form, path in targets.items()]
     answer("\n".join(lines), texts, show=next(iter(targets.values())) if options.open else None)

@@ -2,11 +2,12 @@
 # ruff: noqa: F401
 # mypy: implicit-reexport
 
-from cgraph.extend import doors
+from cgraph._shared import doors
 
 TYPE_CHECKING = False
 
 if TYPE_CHECKING:
+    from cgraph.extend import Names, cotangents
     from dynamics.equations.formulations.formulation_sizes import INERTIAL_TERM, blamed
     from dynamics.equations.formulations.step_state import after_step, before_step
     from dynamics.experiments.benches import BENCHES, SPEED, Bench
@@ -21,8 +22,10 @@ if TYPE_CHECKING:
     from dynamics.experiments.work_precision.work_precision import to_csv
     from dynamics.integrators import TABLEAUS
     from dynamics.io.load import compiled
+    from dynamics.multibody.bodies.joint_coordinates import display_units
     from dynamics.multibody.changes.pruning import PruneResult
     from dynamics.scenes.start import Start, moving_start, rest_text, with_start
+    from dynamics.simulation.limits_left import limits_left
     from dynamics.simulation.run_options import RunOptions
     from dynamics.verification.certificate import certify
     from dynamics.verification.same_bits import same_bits

@@ -6,7 +6,7 @@ import argparse
 
 import cgraph as cg
 import dynamics as dyn
-from cgraph import extend
+from cgraph import _shared
 
 from . import library
 from .arguments import (
@@ -101,7 +101,7 @@ def _after(scene: dyn.scenes.Scene, at: dict[str, float]) -> dict[str, float]:
     return library.after_step(scene.system, at) | others
 
 
-def lint_text(report: extend.Lint, verdict: dyn.Verdict | None) -> str:
+def lint_text(report: _shared.Lint, verdict: dyn.Verdict | None) -> str:
     """The report with the verdict before it, which tells better than tags what is gained on a path from qd to q."""
     if verdict is None:
         return str(report)

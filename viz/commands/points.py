@@ -6,7 +6,6 @@ from collections.abc import Mapping
 
 import cgraph as cg
 import dynamics as dyn
-from cgraph import extend
 
 from . import library
 
@@ -30,7 +29,7 @@ def filled(graph: cg.Graph, scene: dyn.scenes.Scene, given: dict[str, float]) ->
     import numpy as np
 
     called, of_library = dyn.display_names(scene), scene.name in dyn.scenes.names()
-    names = extend.Names(graph, called)
+    names = library.Names(graph, called)
 
     # What is not given: the start of a scene of the user's, its parameters, and numbers by lot
     starts = any([*scene.q, *scene.qd]) and not scene.ode  # all at 0 nobody has chosen, and it may be singular

@@ -12,7 +12,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import dynamics as dyn
-from cgraph import extend
+from cgraph import _shared
 
 from . import library
 from .arguments import (
@@ -280,6 +280,6 @@ def _bodies(scene: dyn.scenes.Scene, lock: dict[str, float]) -> dict[str, float]
     bodies = [body.name for body in moving]
     of = {body.coordinate: body.name for body in moving} | {name: name for name in bodies}
     if unknown := [name for name in lock if name not in of]:
-        known = extend.or_nearest(unknown[0], list(of)) if of else "it has no bodies"
+        known = _shared.or_nearest(unknown[0], list(of)) if of else "it has no bodies"
         raise ValueError(f"{scene.name} has no joint {unknown[0]!r:.80} to lock; {known}")
     return {of[name]: at for name, at in lock.items()}

@@ -6,7 +6,7 @@ import argparse
 from typing import Any
 
 import dynamics as dyn
-from cgraph import extend
+from cgraph import _shared
 
 from .arguments import answer, unless_json
 from .command import Command
@@ -35,8 +35,8 @@ def run(options: argparse.Namespace) -> None:
         )
     lines = [
         f"{row['name']:16} {row['about']}\n{'':16} coordinates: {row['coordinates']}, inverse dynamics "
-        f"{extend.counted(row['inverse_nodes'], 'node')}, "
-        f"forward dynamics {extend.counted(row['forward_nodes'], 'node')}"
+        f"{_shared.counted(row['inverse_nodes'], 'node')}, "
+        f"forward dynamics {_shared.counted(row['forward_nodes'], 'node')}"
         for row in rows
     ]
     answer(unless_json(options, rows, "\n".join(lines)))

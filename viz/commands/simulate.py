@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import dynamics as dyn
-from cgraph import extend
+from cgraph import _shared
 
 from . import library
 from .arguments import MOMENTUM_FORM, answer, place, positive, started, takes_a_scene, takes_a_start, unless_json
@@ -38,7 +38,7 @@ def add(parser: Command) -> None:
 def run(options: argparse.Namespace) -> int:
     """Print how the run went; 1 where it ends before its time."""
     if options.csv is not None:
-        extend.check_writable(options.csv)
+        _shared.check_writable(options.csv)
     elif options.every is not None:
         raise ValueError("--every goes with --csv: it says how often the table has a row")
     if options.dt is not None and library.RunOptions(1.0, options.method).adaptive:
@@ -109,13 +109,10 @@ def _beyond(scene: dyn.Scene, run: dyn.Trajectory) -> dict[str, Any]:
     """Sentences on the limits of joints that the run has left, and where it was looked at; nothing without limits."""
     if scene.mechanism is None or not any((limits := _limited(scene)).values()):
         return {}
-    from dynamics.multibody.bodies.joint_coordinates import display_units
-    from dynamics.simulation.limits_left import limits_left
-
-    units = display_units(scene.mechanism.moving)
+    units = library.display_units(scene.mechanism.moving)
     unit_of = {name: units[f"q{k}"] for k, name in enumerate(run.coordinates)}
     read = "rows" if run.dense is None else "steps"
-    return {"beyond_limits": limits_left(run, limits, unit_of), "limits_looked_at_in": read}
+    return {"beyond_limits": library.limits_left(run, limits, unit_of), "limits_looked_at_in": read}
 
 
 def _text(run: dyn.Trajectory, data: dict[str, Any]) -> str:
@@ -123,7 +120,7 @@ def _text(run: dyn.Trajectory, data: dict[str, Any]) -> str:
     at_end = ", ".join([f"{name} = {value:.6g}" for name, value in [*data["end"].items()][:SHOWN]])
     more = len(data["end"]) - SHOWN
     of = ", of coordinates and momenta" if data["form"] == "momentum" else ""
-    steps, evaluations = extend.counted(data["steps"], "step"), extend.counted(data["evaluations"], "evaluation")
+    steps, evaluations = _shared.counted(data["steps"], "step"), _shared.counted(data["evaluations"], "evaluation")
     work = f"{steps}{of}, {data['rejected']} rejected, {evaluations}"
     lines = [
         f"{data['message']}, {data['t_end']:g} s" if run.success else f"{data['message']}",
@@ -141,7 +138,7 @@ def _text(run: dyn.Trajectory, data: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
-def _every(step: float, end: float) -> extend.Array:
+def _every(step: float, end: float) -> _shared.Array:
     """Times so far apart up to the end, which is one of them. Raises ValueError for more than can be kept."""
     import numpy as np
 

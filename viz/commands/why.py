@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import cgraph as cg
 import dynamics as dyn
-from cgraph import extend
 
 from . import library
 from .arguments import (
@@ -66,7 +65,7 @@ def run(options: argparse.Namespace) -> int | None:
     scene = scene_of(options)
     verdict = verdict_of(options, scene)
     graph, _ = equations_of(options, scene, verdict)
-    names = extend.Names(graph, dyn.display_names(scene))
+    names = library.Names(graph, dyn.display_names(scene))
     at = filled(graph, scene, options.at)
     state = (
         f"At {point_text({names.shown(name): value for name, value in at.items()}, len(at) if options.at else SHOWN)}:"
@@ -90,7 +89,7 @@ class _Question(NamedTuple):
     """What is asked of an output, and where: its scene, the names of its graph, and a state with its words."""
 
     scene: dyn.scenes.Scene
-    names: extend.Names
+    names: library.Names
     verdict: dyn.Verdict | None
     table: CauseTable | None  # of torques
     output: str
@@ -146,7 +145,7 @@ def _dependence(options: argparse.Namespace, question: _Question) -> None:
     )
 
 
-def _nan(options: argparse.Namespace, scene: dyn.scenes.Scene, names: extend.Names, at: dict[str, float]) -> int:
+def _nan(options: argparse.Namespace, scene: dyn.scenes.Scene, names: library.Names, at: dict[str, float]) -> int:
     """Print where a number that is not finite comes from; status 1 where there is one."""
     output = options.output and names.meant(options.output)
     found = cg.why_nan(names.graph, at, output or None, options.input, names=dyn.display_names(scene))
@@ -155,7 +154,7 @@ def _nan(options: argparse.Namespace, scene: dyn.scenes.Scene, names: extend.Nam
     return 1 if found.what else 0
 
 
-def _not_connected(options: argparse.Namespace, scene: dyn.scenes.Scene, names: extend.Names, output: str) -> None:
+def _not_connected(options: argparse.Namespace, scene: dyn.scenes.Scene, names: library.Names, output: str) -> None:
     graph = names.graph
     stops = cg.why_not(graph, output, options.input, names=dyn.display_names(scene))
     alone = "" if options.forward else library.tree_alone(scene)
@@ -180,7 +179,7 @@ def _not_connected(options: argparse.Namespace, scene: dyn.scenes.Scene, names: 
     )
 
 
-def _constant(scene: dyn.scenes.Scene, names: extend.Names, options: argparse.Namespace, output: str) -> str:
+def _constant(scene: dyn.scenes.Scene, names: library.Names, options: argparse.Namespace, output: str) -> str:
     """Sentence on a constant momentum whose rate was asked for, or whose coordinate the rate was asked by; or ""."""
     source = names.meant(options.input)
     told = [
@@ -192,7 +191,7 @@ def _constant(scene: dyn.scenes.Scene, names: extend.Names, options: argparse.Na
     return "\n".join(told)
 
 
-def _by_reverse_sweep(names: extend.Names, output: str, source: str, at: dict[str, float]) -> float:
+def _by_reverse_sweep(names: library.Names, output: str, source: str, at: dict[str, float]) -> float:
     """d output / d source by the library's reverse mode, which knows no paths."""
-    (bar,) = extend.cotangents({names.output(output): cg.constant(1.0)}, [names.one(source)])
+    (bar,) = library.cotangents({names.output(output): cg.constant(1.0)}, [names.one(source)])
     return float(cg.Graph(names.graph.inputs, {"bar": bar}).evaluate(at)["bar"])

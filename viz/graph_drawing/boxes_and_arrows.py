@@ -7,7 +7,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from cgraph import Edge, Graph, Node
-from cgraph.extend import Names, columns, counted
+from cgraph._shared import columns, counted
+from cgraph.extend import Names
 
 from .. import theme
 from ..theme import Paint

@@ -7,8 +7,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Literal
 
 from cgraph import Edge, Graph, Node
-from cgraph.extend import (
-    Names,
+from cgraph._shared import (
     counted,
     require_choice,
     require_flag,
@@ -17,6 +16,7 @@ from cgraph.extend import (
     require_sequence,
     require_texts,
 )
+from cgraph.extend import Names
 
 from .. import theme
 from ..theme import Paint

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from cgraph.extend import install
+from cgraph._shared import install
 
 from .. import theme
 from ..theme import Paint

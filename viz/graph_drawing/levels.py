@@ -8,7 +8,7 @@ from html import escape
 from itertools import pairwise
 
 from cgraph import Graph, Node
-from cgraph.extend import columns, counted
+from cgraph._shared import columns, counted
 
 from .. import theme
 

@@ -13,7 +13,7 @@ from typing import NamedTuple, Protocol
 from xml.etree import ElementTree
 
 from cgraph import Graph, constant
-from cgraph.extend import install, memo, real_number, require_choice
+from cgraph._shared import install, memo, real_number, require_choice
 
 from .. import theme
 from .dot import to_dot

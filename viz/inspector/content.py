@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from cgraph import Edge, Graph, Node
-from cgraph.extend import Array, real_array
+from cgraph._shared import Array, real_array
 
 UNKNOWN = 0.5  # an input's value where none is given: a product with 0 would show nothing
 

@@ -7,7 +7,7 @@ from html import escape
 from string import Template
 
 from cgraph import Graph, Node, __version__
-from cgraph.extend import Array, Json, remarks_of, require_graph, require_mapping, require_sequence, require_texts
+from cgraph._shared import Array, Json, remarks_of, require_graph, require_mapping, require_sequence, require_texts
 
 from .. import theme
 from ..pages import html

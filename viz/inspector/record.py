@@ -27,7 +27,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 from cgraph import Graph, Node
-from cgraph.extend import ADJOINT, PRIMAL, TANGENT, Array, Json, columns
+from cgraph._shared import Array, Json, columns
+from cgraph.extend import ADJOINT, PRIMAL, TANGENT
 
 from .. import theme
 from ..graph_drawing.render import Positions, RenderError, positions

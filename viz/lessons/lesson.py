@@ -8,7 +8,7 @@ from html import escape
 from typing import NamedTuple
 
 from cgraph import Graph
-from cgraph.extend import require_choice, write_files
+from cgraph._shared import require_choice, write_files
 from dynamics.scenes.scenes import names
 from dynamics.systems.model import Model
 

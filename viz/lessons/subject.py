@@ -13,7 +13,7 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import Array
+from cgraph._shared import Array
 from dynamics import Verdict, display_names, formulation_verdict
 from dynamics.equations.states.consistent_state import nearest_state
 from dynamics.multibody.bodies.joint_coordinates import display_units

@@ -11,7 +11,7 @@ from typing import Any
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import Json, page_functions
+from cgraph._shared import Json, page_functions
 
 from .. import theme
 from ..pages import html

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 import cgraph as cg
 from cgraph import Graph, GraphError
-from cgraph.extend import Json, Names, cotangents, or_nearest, tangents
+from cgraph._shared import Json, or_nearest
+from cgraph.extend import Names, cotangents, tangents
 from dynamics import display_names, torque_by_cause
 from dynamics.equations.torque_parts.torque_table import TorqueTable
 from dynamics.multibody.bodies.joint_coordinates import display_units

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from cgraph import Graph, Node
-from cgraph.extend import check_writable, require_path, write_files
+from cgraph._shared import check_writable, require_path, write_files
 from dynamics import display_names, scenes
 from dynamics.equations.formulations.verdict import Verdict, formulation_verdict
 from dynamics.equations.state_equation import state_equation

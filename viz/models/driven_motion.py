@@ -9,7 +9,7 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import Array, real_array, real_number
+from cgraph._shared import Array, real_array, real_number
 from dynamics.equations.formulations.formulations import inverse_dynamics
 from dynamics.scenes import of_model
 from dynamics.simulation.simulate import simulate

@@ -8,14 +8,14 @@ from dataclasses import dataclass, field
 
 import cgraph as cg
 from cgraph import Graph, Node, variable
-from cgraph.extend import Side, counted, ink, is_letter, reading_form
+from cgraph._shared import Side, counted, ink, is_letter, reading_form
 from dynamics.equations.equations_of_motion import bias, damping_force, gravity_force, mass_matrix, momentum
 from dynamics.equations.formulations.formulations import inverse_dynamics
 from dynamics.equations.formulations.verdict import formulation_verdict
 from dynamics.equations.momentum.hamiltonian import hamilton_equations
 from dynamics.equations.state_equation import state_equation
 from dynamics.scenes import Scene
-from dynamics.systems.display_names import display_names
+from dynamics.systems.model import display_names
 from dynamics.systems.system import System
 
 from ..pages.mathml import ranks

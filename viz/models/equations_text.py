@@ -8,18 +8,8 @@ from functools import partial
 from html import escape
 
 from cgraph import Node
-from cgraph.extend import (
-    LATEX,
-    Notation,
-    Op,
-    Side,
-    columns,
-    fraction,
-    latex_block,
-    number_text,
-    statements,
-    topological,
-)
+from cgraph._shared import LATEX, Side, columns, fraction, latex_block, number_text, statements
+from cgraph.extend import Notation, Op, topological
 from dynamics.scenes.scenes import of_model
 from dynamics.systems.model import Model
 

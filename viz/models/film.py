@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import (
+from cgraph._shared import (
     Array,
     check_writable,
     real_array,

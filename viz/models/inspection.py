@@ -10,7 +10,8 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import PRIMAL, TANGENT, Array, counted, real_number, topological
+from cgraph._shared import Array, counted, real_number
+from cgraph.extend import PRIMAL, TANGENT, topological
 from dynamics.equations.equations_of_motion import forward_dynamics, momentum
 from dynamics.equations.formulations.formulations import inverse_dynamics
 from dynamics.equations.formulations.verdict import formulation_verdict
@@ -23,7 +24,7 @@ from dynamics.multibody.trees.joint_positions import skeleton
 from dynamics.scenes import Scene
 from dynamics.simulation.simulate import simulate
 from dynamics.simulation.trajectory import Trajectory
-from dynamics.systems.display_names import display_names
+from dynamics.systems.model import display_names
 from dynamics.systems.system import System
 
 from .. import theme

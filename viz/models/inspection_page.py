@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 
-from cgraph.extend import require_flag, write_files
+from cgraph._shared import require_flag, write_files
 from dynamics import display_names, scenes
 from dynamics.scenes.start import Start, moving_start, rest_text, with_start
 from dynamics.systems.model import Model, as_system

@@ -12,7 +12,7 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import write_files
+from cgraph._shared import write_files
 from dynamics import scenes
 from dynamics.equations.energies import kinetic_energy, potential_energy
 from dynamics.equations.equations_of_motion import gravity_force, momentum
@@ -27,8 +27,7 @@ from dynamics.scenes import Scene
 from dynamics.scenes.start import Start, moving_start, with_start
 from dynamics.simulation.simulate import simulate
 from dynamics.simulation.trajectory import SimulationWarning
-from dynamics.systems.display_names import display_names
-from dynamics.systems.model import Model
+from dynamics.systems.model import Model, display_names
 
 from ..live_page import Live, page_text, panel
 from ..pages.html import Page, Panel, html_target

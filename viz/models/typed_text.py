@@ -11,7 +11,8 @@ from unicodedata import normalize
 import numpy as np
 
 from cgraph import Node
-from cgraph.extend import OPS, columns, real_array, topological
+from cgraph._shared import columns, real_array
+from cgraph.extend import OPS, topological
 from dynamics.systems.model import Model, as_system
 from dynamics.systems.system import System
 

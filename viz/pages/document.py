@@ -13,7 +13,7 @@ from pathlib import Path
 from tempfile import TemporaryFile
 from typing import Any
 
-from cgraph.extend import Json
+from cgraph._shared import Json
 
 from .html import STYLE, compose
 

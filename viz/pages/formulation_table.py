@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from cgraph.extend import counted
+from cgraph._shared import counted
 
 from .. import theme
 from .document import Table

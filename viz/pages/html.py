@@ -14,7 +14,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
 
-from cgraph.extend import Json, check_writable, require_path
+from cgraph._shared import Json, check_writable, require_path
 
 from .. import theme
 from .mathml import STYLE as MATHML

@@ -9,7 +9,8 @@ from functools import partial
 from html import escape
 
 from cgraph import Graph, variable
-from cgraph.extend import GREEK, Notation, Op, Side, fraction, is_letter, reading_form, statements, symbol
+from cgraph._shared import GREEK, Side, fraction, is_letter, reading_form, statements, symbol
+from cgraph.extend import Notation, Op
 
 from .. import theme
 

@@ -8,11 +8,13 @@ from typing import Protocol
 import numpy as np
 
 from cgraph import Graph, Node
-from cgraph.extend import Array, counted, remarks_of, require_graph, topological
+from cgraph._shared import Array, counted, remarks_of, require_graph
+from cgraph.extend import topological
 
 from .. import theme
 from ..graph_drawing.dot import to_dot
 from ..graph_drawing.render import LARGE_GRAPH, render_svg, tags_to_collapse
+from ..plots.plot import GRID, empty_figure, style, to_adaptive_svg
 from .mathml import equations
 
 SECONDS = 20.0  # for Graphviz; a cell that takes longer shows text
@@ -70,8 +72,6 @@ def trajectory_html(run: Rows) -> str:
 
     Raises ImportError without matplotlib; the notebook shows the text form then.
     """
-    from ..plots.plot import GRID, empty_figure, style, to_adaptive_svg
-
     tables = [("state" if not run.qd.shape[1] else "coordinates", run.q, run.coordinates)]
     if run.qd.shape[1]:
         tables.append(("velocities", run.qd, run.velocities))

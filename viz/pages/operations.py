@@ -10,7 +10,8 @@ from xml.etree import ElementTree
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import OPS, Json, Op
+from cgraph._shared import Json
+from cgraph.extend import OPS, Op
 
 FormulaPart = str | int | list[Any]  # of a formula: a text, the number of an argument, [element, attributes, *parts]
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import cgraph as cg
 from cgraph import Counts, Graph
-from cgraph.extend import Array
+from cgraph._shared import Array
 from dynamics.equations.equations_of_motion import momentum
 from dynamics.equations.momentum.hamiltonian import hamilton_equations
 from dynamics.equations.state_equation import state_equation

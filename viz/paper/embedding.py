@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import cgraph as cg
-from cgraph.extend import Array
+from cgraph._shared import Array
 from dynamics import inverse_dynamics, planar_arm
 from dynamics.experiments.timing import exponent
 from dynamics.systems.model import Model, as_system

@@ -9,7 +9,8 @@ from html import escape
 from typing import NamedTuple
 
 from cgraph import Edge, Graph, Node
-from cgraph.extend import Names, columns
+from cgraph._shared import columns
+from cgraph.extend import Names
 
 from .. import theme
 from ..graph_drawing.dot import short_formulas

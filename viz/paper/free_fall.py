@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cgraph.extend import Array, Json
+from cgraph._shared import Array, Json
 from dynamics import Trajectory, inverse_dynamics, scenes, simulate
 from dynamics.io.mujoco_twin import MujocoTwin
 from dynamics.multibody.trees.mechanism import require_mechanism

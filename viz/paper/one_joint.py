@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from cgraph import Graph
-from cgraph.extend import Json, Polynomial, expand, format_polynomial
+from cgraph._shared import Json, Polynomial, expand, format_polynomial
 from dynamics import formulation_sizes, formulation_verdict, inverse_dynamics, momentum_rate, scenes
 from dynamics.equations.formulations.formulation_sizes import (
     INERTIAL_TERM,

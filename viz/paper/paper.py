@@ -10,7 +10,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import NamedTuple
 
-from cgraph.extend import Json
+from cgraph._shared import Json
 
 from ..graph_drawing.render import check_can_draw
 from ..pages import html

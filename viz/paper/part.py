@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import TYPE_CHECKING, NamedTuple
 
-from cgraph.extend import Json
+from cgraph._shared import Json
 from dynamics.experiments.text_table import csv_text
 
 from ..graph_drawing.legend import to_adaptive

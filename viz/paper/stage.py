@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from html import escape
 
 from cgraph import Graph
-from cgraph.extend import Json
+from cgraph._shared import Json
 
 from .. import theme
 from ..pages.document import Picture

@@ -11,7 +11,7 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Counts
-from cgraph.extend import Json
+from cgraph._shared import Json
 from dynamics import inverse_dynamics, scenes
 from dynamics.experiments.timing import spent
 from dynamics.peers.torch import eager_evaluations

@@ -6,7 +6,7 @@ import re
 from collections.abc import Mapping
 from html import escape
 
-from cgraph.extend import Polynomial
+from cgraph._shared import Polynomial
 
 LETTERS = {"q0": "θ", "qd0": "ω", "qdd0": "α", "q0_old": "θ_old"}  # those of the paper's captions, by names in a graph
 ORDER = ("I", "k", "α", "ω", "θ", "θ_old", "dt")  # of the factors of a term
@@ -49,7 +49,7 @@ def _word(word: str) -> str:
 def terms(polynomial: Polynomial, right: Polynomial, letters: Mapping[str, str] = LETTERS) -> str:
     """A sum of terms, those that `right` has not marked as wrong; "0" without any.
 
-    polynomial, right: as of `cgraph.extend.expand`.
+    polynomial, right: as of `cgraph._shared.expand`.
     """
     parts = list[str]()
     for monomial, coefficient in sorted(polynomial.items(), key=lambda item: (sum(p for _, p in item[0]), item[0])):

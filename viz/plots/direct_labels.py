@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from cgraph.extend import Array as Points
+from cgraph._shared import Array as Points
 
 from .. import theme
 from .plot import GRID, empty_figure, style

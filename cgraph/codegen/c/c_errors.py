@@ -8,11 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core.checks import GraphError
-from ...core.evaluation import Array, Value
+from ...core.evaluation import Array, Value, box_interval
 from ...core.graph import Graph
 from ...core.node import VARIABLE, Node
 from ...simplification.rounding_growth import output_bounds
-from ...util.inputs import box_interval
 from ...util.require import require_mapping
 from .c_numbers import CNumbers
 

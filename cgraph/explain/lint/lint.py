@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from ...core.graph import Edge, Graph
+from ...core.html_text import html_table, html_text
 from ...core.node import Node
-from ...util.html_text import html_table, html_text
 from ...util.json_type import Json
 from ...util.require import require_graph, require_mapping, require_sequence
 from ...util.words import counted

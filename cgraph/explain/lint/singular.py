@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from ...core.evaluation import box_interval
 from ...core.graph import Graph
 from ...core.node import CONSTANT, VARIABLE, Node
 from ...operations.bounds import REAL_LINE
 from ...operations.operation import Interval, Op, columns
-from ...util.inputs import box_interval
 from ...util.json_type import Json, json_number
 from ...util.require import require_mapping
 from ..names import Names

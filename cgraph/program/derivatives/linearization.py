@@ -47,7 +47,8 @@ class Linearization:
     constants: registers that passes read and never write.
 
     >>> import cgraph as cg
-    >>> from cgraph.extend import Call, Linearization, Program
+    >>> from cgraph._shared import Linearization
+    >>> from cgraph.extend import Call, Program
     >>> x, p = cg.variables("x p")
     >>> step = Call(cg.Graph([x, p], {"x": p * x}), ("x", "p"), ("x",))
     >>> passes = Linearization(Program({"x": 1, "p": 1}, [step], record=()), ["x"], ["p"])

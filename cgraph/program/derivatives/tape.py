@@ -29,7 +29,8 @@ class Tape:
     kept.
 
     >>> import numpy as np
-    >>> from cgraph.extend import Program, Tape, runner
+    >>> from cgraph._shared import Tape
+    >>> from cgraph.extend import Program, runner
     >>> forward = runner(Program({"x": 1}, [], record=["x"], feed=["x"]), "python")
     >>> tape = Tape(forward, lambda first, last: np.arange(first, last)[:, None] * 1.0, checkpoints=2)
     >>> tape.run(forward.memory({}), 0, 3, most=8)
@@ -68,7 +69,8 @@ def run_passes(ready: Runner, memory: Array, passes: int, every: int, feed: Arra
     """Passes of one memory, or of many side by side, as `Runner.run` and `Runner.run_many`.
 
     >>> import numpy as np
-    >>> from cgraph.extend import Program, run_passes, runner
+    >>> from cgraph._shared import run_passes
+    >>> from cgraph.extend import Program, runner
     >>> ready = runner(Program({"x": 1}, [], record=["x"]), "python")
     >>> run_passes(ready, ready.memory({"x": 2.0}), 1, 1, np.empty((1, 0))).rows.tolist()
     [[2.0]]

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...core.checks import GraphError
-from ...core.evaluation import Array
-from ...util.real_arrays import real_array
+from ...core.evaluation import Array, real_array
 from ...util.require import require_mapping, require_whole
 from ..program import Program
 from ..runners.choose_runner import runner

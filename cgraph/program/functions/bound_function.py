@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...core.checks import GraphError
-from ...core.evaluation import Array
-from ...util.real_arrays import real_array
+from ...core.evaluation import Array, real_array
 from ...util.words import listed
 
 Bind = Callable[[Array, Array], Callable[[], None]]  # x, y -> a function of nothing

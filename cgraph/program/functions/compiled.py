@@ -13,11 +13,10 @@ from numpy.typing import ArrayLike
 from ...codegen.bound_call import bound
 from ...codegen.c_entry import CEntry, c_entry
 from ...core.checks import GraphError
-from ...core.evaluation import Array
+from ...core.evaluation import Array, real_array
 from ...core.graph import Graph
-from ...util.html_text import html_table, html_text
+from ...core.html_text import html_table, html_text
 from ...util.memory import lies_in_rows, require_memory, require_out, require_target
-from ...util.real_arrays import real_array
 from ...util.threads import thread_count, write_batch
 from ..program import Program
 from ..runners.native_runner import NativeRunner

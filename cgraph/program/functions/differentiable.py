@@ -17,12 +17,11 @@ from ...autodiff.products import forward_products, reverse_products
 from ...autodiff.sparsity import Pattern, pattern, symmetric
 from ...codegen.bound_call import bound
 from ...core.checks import GraphError
-from ...core.evaluation import Array
+from ...core.evaluation import Array, real_array
 from ...core.graph import Graph
 from ...core.node import Node, variable
 from ...util.extras import scipy_module
 from ...util.memory import require_memory, require_target
-from ...util.real_arrays import real_array
 from ...util.require import require_flag
 from ...util.threads import thread_count
 from ..program import Program

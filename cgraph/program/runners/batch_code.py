@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
@@ -12,12 +12,14 @@ from typing import Any
 import numpy as np
 
 from ...codegen.arithmetic import Arithmetic, bits
-from ...codegen.batch_ir import Batch, Place, rows_ir
+from ...codegen.batch_ir import Batch, Place, batch_ir, rows_ir
 from ...codegen.function_writer import FunctionWriter
 from ...codegen.llvm_engine import Code
 from ...core.evaluation import Array
 from ...util.memory import aligned, lies_in_rows
-from ..program import Program
+from ..fuse import fused
+from ..many import many_keeping
+from ..program import Program, whole_graph
 from .llvm_ir import offsets, program_ir
 
 Counts = np.ndarray[Any, np.dtype[np.int64]]
@@ -76,6 +78,20 @@ class BatchCode:
         strides = points.strides[axis] // points.itemsize, result.strides[axis] // result.itemsize
         entry(points.ctypes.data, result.ctypes.data, count, *strides, memory.ctypes.data)  # type: ignore[misc]
         self._free.append(memory)
+
+
+def kept_beside(program: Program, kept: Sequence[str], alike: bool) -> Program:
+    """The program of memories side by side that puts back the registers `kept` where a memory rests."""
+    return fused(many_keeping(program, kept), alike=alike)
+
+
+def pass_ir(
+    program: Program, beside: Callable[[], Program], name: str, lanes: int, flags: str, registers: int
+) -> Batch:
+    """The text of one pass at many values of a register.  beside: gives the program of memories side by side."""
+    if (graph := whole_graph(program, name)) is not None:
+        return batch_ir(graph, lanes, flags, registers)
+    return program_rows_ir(beside(), name, lanes, flags, registers)
 
 
 def program_rows_ir(program: Program, name: str, lanes: int, flags: str, registers: int) -> Batch:

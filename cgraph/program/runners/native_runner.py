@@ -7,7 +7,7 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
-from types import MappingProxyType
+from types import MappingProxyType, ModuleType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -20,7 +20,7 @@ from ...core.evaluation import Array
 from ...core.scope import without_collection
 from ...util.memory import aligned
 from ..fuse import fused
-from ..program import Program, whole_graph
+from ..program import Program, outliving, whole_graph
 from ..statement import row_of
 from .llvm_ir import offsets, point_ir, program_functions, program_ir, require_texts
 from .runner import Record, Runner
@@ -157,22 +157,24 @@ class NativeRunner(Runner):
                     self._batches[name] = self._batch(name, start)
         return self._batches[name]
 
+    @cached_property
+    def _side(self) -> ModuleType:
+        """The module for memories side by side."""
+        from . import batch_code  # which a program of one memory does without
+
+        return batch_code
+
     def _batch(self, name: str, start: Mapping[str, Array]) -> tuple[int, BatchCode]:
         """The points in a block, and the machine code."""
-        from .batch_code import BatchCode
-
         lanes, text, alone = self._host.lanes, self._batch_module(name), whole_graph(self._fused, name) is not None
         code = self._compiled(text.source, lanes, looped=not alone)
         width = max(WORK // max(1, self._nodes) // lanes, 1) * lanes
         places = offsets(self._fused_many.registers, 1) if start else {}
         begin = {places[other]: numbers for other, numbers in start.items()}
-        return width, BatchCode(code, lanes, text.size, begin, columns=alone)
+        return width, self._side.BatchCode(code, lanes, text.size, begin, columns=alone)
 
     def lane_code(self, clock: str, results: Sequence[str] = (), *, alike: bool = True) -> LaneCode | None:
         """Machine code of memories in lanes; see `Runner`."""
-        from ..many import many_keeping, outliving
-        from .batch_code import LaneCode, lane_ir
-
         if self.program.feed or any(row_of(each).beside is None for each in self.program.statements()):
             return None
         lanes, lengths = self._host.lanes, self.program.registers
@@ -180,10 +182,11 @@ class NativeRunner(Runner):
         first = {*outliving(self._fused), *results}
         kept = [name for name in lengths if name in first]
         beside = replace(self._fused, registers={name: lengths[name] for name in dict.fromkeys([*kept, *lengths])})
-        masked, size = fused(many_keeping(beside, kept), alike=alike), sum([lengths[name] for name in kept])
+        masked, size = self._side.kept_beside(beside, kept, alike), sum([lengths[name] for name in kept])
         with without_collection():
-            text = lane_ir(masked, size, clock, arithmetic)
-        return LaneCode(self._compiled(text.source, lanes), masked, kept, lanes, text.size)
+            text = self._side.lane_ir(masked, size, clock, arithmetic)
+        code: LaneCode = self._side.LaneCode(self._compiled(text.source, lanes), masked, kept, lanes, text.size)
+        return code
 
     def _point_text(self, x: str, y: str) -> str:
         """The text in LLVM's language."""
@@ -194,14 +197,10 @@ class NativeRunner(Runner):
         return self._batch_module(name).source
 
     def _batch_module(self, name: str) -> Batch:
-        from ...codegen.batch_ir import batch_ir
-        from .batch_code import program_rows_ir
-
-        lanes, how, graph = self._host.lanes, (self._flags, self._host.registers), whole_graph(self._fused, name)
+        how = self._host.lanes, self._flags, self._host.registers
         with without_collection():
-            if graph is not None:
-                return batch_ir(graph, lanes, *how)
-            return program_rows_ir(self._fused_many, name, lanes, *how)
+            text: Batch = self._side.pass_ir(self._fused, lambda: self._fused_many, name, *how)
+        return text
 
     def _run_many(self, memories: Array, passes: int, every: int, feed: Array) -> Record:
         lanes, size = self._host.lanes, self.size

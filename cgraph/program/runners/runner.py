@@ -12,12 +12,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...core.checks import GraphError
-from ...core.evaluation import Array
+from ...core.evaluation import Array, real_array
 from ...util.memory import describe, require_memory, require_out
-from ...util.real_arrays import real_array
 from ...util.require import require_mapping, require_whole
 from ...util.threads import thread_count, write_batch
-from ..program import Program
+from ..program import Program, outliving
 from .llvm_ir import offsets
 
 if TYPE_CHECKING:
@@ -81,7 +80,7 @@ class Runner(ABC):
     def masked(self) -> Program:
         """The program of memories side by side, see `many`; made at its first use."""
         if self._masked is None:
-            from ..many import many
+            from ..many import many  # a program of one memory does without
 
             self._masked = many(self.program)
         return self._masked
@@ -211,8 +210,6 @@ class Runner(ABC):
         Raises GraphError for another shape; if the program cannot `run_many`, or has a feed; if a pass reads or records
         a register, other than this one, that it may not have set before.
         """
-        from ..many import outliving
-
         count, rows = thread_count(threads), np.ascontiguousarray(real_array(name, values))
         length = len(self.read(np.empty(self.size), name))
         if rows.ndim != 2 or rows.shape[1] != length:

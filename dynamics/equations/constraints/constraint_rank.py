@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cgraph.extend import Array, kept_by_first
+from cgraph._shared import Array, kept_by_first
 
 from ...systems.constraints import Constraints
 from .row_numbers import row_numbers

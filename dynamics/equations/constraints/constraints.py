@@ -17,7 +17,8 @@ from typing import NamedTuple
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import Builder, Order, building, cotangents, hessian_nodes, ldl_solve, solve_nodes, topological
+from cgraph._shared import Order, ldl_solve
+from cgraph.extend import Builder, building, cotangents, hessian_nodes, solve_nodes, topological
 
 from ...systems.kinematics import ONE, ZERO
 from ...systems.system import System

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ...systems.constraints import ConstraintError, Constraints
 from .constraint_rank import DEPENDENT, ConstraintWarning, independent_rows

@@ -15,7 +15,8 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph, Node, extend
-from cgraph.extend import Array, Builder, building, folded, kept_by_first
+from cgraph._shared import Array, kept_by_first
+from cgraph.extend import Builder, building, folded
 
 from ...systems.constraints import ConstraintError
 from ...systems.kinematics import ZERO

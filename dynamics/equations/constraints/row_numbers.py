@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import cgraph as cg
-from cgraph import Graph, extend
-from cgraph.extend import Array, Builder, cotangents, kept_by_first
+from cgraph import Graph, _shared, extend
+from cgraph._shared import Array, kept_by_first
+from cgraph.extend import Builder, cotangents
 
 from ...systems.constraints import ConstraintError, Constraints
 from ...systems.kinematics import ONE
@@ -154,7 +155,7 @@ class RowNumbers:
         if self.entries is None:
             return self._filled(())
         roundoff, outputs = np.finfo(float).eps / 2.0, self.entries.outputs.values()
-        both = extend.error_bounds(self.entries.nodes, point, roundoff, of_inputs=roundoff)
+        both = _shared.error_bounds(self.entries.nodes, point, roundoff, of_inputs=roundoff)
         matrix, rounding = (self._filled([float(each[node]) for node in outputs]) for each in both)
         with np.errstate(invalid="ignore"):
             return np.where(rounding <= UNCERTAIN * np.abs(matrix), matrix, 0.0)

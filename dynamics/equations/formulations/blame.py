@@ -9,7 +9,8 @@ from typing import NamedTuple
 
 import cgraph as cg
 from cgraph import Edge, Graph, Node
-from cgraph.extend import Builder, folded, require_graph
+from cgraph._shared import require_graph
+from cgraph.extend import Builder, folded
 
 from ...systems.arguments import new_variables
 from ...systems.kinematics import ONE, ZERO

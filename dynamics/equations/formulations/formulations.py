@@ -10,7 +10,7 @@ from functools import partial
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import Remarks, remarked, require_flag
+from cgraph._shared import Remarks, remarked, require_flag
 
 from ...systems.model import Model, as_system
 from ...systems.system import System

@@ -11,7 +11,8 @@ from typing import NamedTuple
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import TANGENT, Builder, building, cotangents, require_choice, tangents
+from cgraph._shared import require_choice
+from cgraph.extend import TANGENT, Builder, building, cotangents, tangents
 
 from ...systems.kinematics import ONE, ZERO
 from ...systems.model import Model, as_system

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import cgraph as cg
 from cgraph import Graph, extend
-from cgraph.extend import counted
+from cgraph._shared import counted
 
 
 class Off(NamedTuple):

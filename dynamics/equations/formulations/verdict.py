@@ -12,23 +12,12 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import TYPE_CHECKING, NamedTuple
 
-from cgraph import Edge, Graph, Node, extend, simplify
-from cgraph.extend import (
-    Builder,
-    Names,
-    Remarks,
-    building,
-    cotangents,
-    counted,
-    folded,
-    remarked,
-    require_mapping,
-    shortened,
-)
+from cgraph import Edge, Graph, Node, _shared, extend, simplify
+from cgraph._shared import Remarks, counted, remarked, require_mapping, shortened
+from cgraph.extend import Builder, Names, building, cotangents, folded
 
-from ...systems.display_names import display_names
 from ...systems.kinematics import ONE
-from ...systems.model import Model, as_system
+from ...systems.model import Model, as_system, display_names
 from ...systems.system import System
 from ..equation import documented
 from .blame import Derive, Split, blame, split
@@ -37,7 +26,7 @@ from .off import Off, off_at
 from .verdict_state import STATES, asked_state, chosen_state, numbers_of
 
 if TYPE_CHECKING:
-    from cgraph.extend import Json
+    from cgraph._shared import Json
 
 WRITTEN = 200  # nodes of c that identities are tried on
 SHOWN, NAMED, FORMULA = 6, 3, 60  # coordinates in the text and in its summary, and characters of a formula
@@ -239,7 +228,7 @@ rate, which cancels the -dL/dq of Lagrange's equation.
         return f"{spurious_text(len(self.graph.nodes), len(self.nodes), len(edges))}: {texts}."
 
     def _repr_html_(self) -> str:
-        return f"{extend.html_lines(str(self))}{extend.render_html('graph', self.graph) or ''}"
+        return f"{_shared.html_lines(str(self))}{_shared.render_html('graph', self.graph) or ''}"
 
     def to_dict(self) -> dict[str, Json]:
         """The verdict for JSON; nodes are numbered as in `graph.nodes`, an edge is [source, target, argument slot]."""

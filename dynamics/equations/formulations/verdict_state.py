@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 
 from cgraph import Graph, GraphError
-from cgraph.extend import or_nearest, real_number, require_mapping
+from cgraph._shared import or_nearest, real_number, require_mapping
 
 from ...systems.system import System
 

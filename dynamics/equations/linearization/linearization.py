@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Graph
-from cgraph.extend import Array, kept_by_first, require_choice
+from cgraph._shared import Array, kept_by_first, require_choice
 
 from ...systems.model import Model, as_system
 from ...systems.system import System

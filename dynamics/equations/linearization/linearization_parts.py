@@ -15,17 +15,8 @@ from numpy.typing import NDArray
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import (
-    Array,
-    Builder,
-    SingularError,
-    as_node,
-    building,
-    cotangents,
-    folded,
-    topological,
-    with_reciprocals,
-)
+from cgraph._shared import Array
+from cgraph.extend import Builder, SingularError, as_node, building, cotangents, folded, topological, with_reciprocals
 
 from ...systems.system import System
 from ..constraints.constraints import constraint_rows

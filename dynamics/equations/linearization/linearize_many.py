@@ -9,18 +9,8 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import (
-    Array,
-    Call,
-    Map,
-    Program,
-    Statement,
-    kept_by_first,
-    require_choice,
-    runner,
-    share,
-    thread_count,
-)
+from cgraph._shared import Array, kept_by_first, require_choice, share, thread_count
+from cgraph.extend import Call, Map, Program, Statement, runner
 
 from ...systems.kinematics import ONE, ZERO
 from ...systems.model import Model, as_system

@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import Array, Builder
+from cgraph._shared import Array
+from cgraph.extend import Builder
 
 from ...systems.constraints import ConstraintError
 from ...systems.model import Model, as_system

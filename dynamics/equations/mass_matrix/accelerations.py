@@ -9,7 +9,8 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Builder, Order, SingularError, building, rounding_spread, topological
+from cgraph._shared import Order, rounding_spread
+from cgraph.extend import Builder, SingularError, building, topological
 
 from ...systems.constraints import ConstraintError
 from ...systems.system import System

@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph, Node, extend
-from cgraph.extend import Array, SingularError, real_array, solve_nodes, topological
+from cgraph._shared import Array, real_array
+from cgraph.extend import SingularError, solve_nodes, topological
 
 from ...systems.model import Model, as_system
 from ...systems.system import System

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from cgraph import Node
-from cgraph.extend import Builder, as_node, building, columns, cotangents, folded, shortened, topological
+from cgraph._shared import columns, shortened
+from cgraph.extend import Builder, as_node, building, cotangents, folded, topological
 
 from ...systems.arguments import new_variables
 from ...systems.kinematics import ONE, ZERO

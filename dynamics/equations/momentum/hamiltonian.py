@@ -6,7 +6,8 @@ from typing import get_args
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Builder, Order, building, cotangents, require_choice, require_flag, require_whole
+from cgraph._shared import Order, require_choice, require_flag, require_whole
+from cgraph.extend import Builder, building, cotangents
 
 from ...systems.kinematics import ONE, ZERO
 from ...systems.model import Model, as_system

@@ -9,7 +9,8 @@ from typing import NamedTuple
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import Builder, Order, SingularError, building, cotangents, folded, solve_tangents, topological
+from cgraph._shared import Order, solve_tangents
+from cgraph.extend import Builder, SingularError, building, cotangents, folded, topological
 
 from ...systems.constraints import ConstraintError
 from ...systems.kinematics import ONE, ZERO

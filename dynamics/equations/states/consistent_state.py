@@ -8,7 +8,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ...systems.arguments import finite_time
 from ...systems.model import Model, as_system

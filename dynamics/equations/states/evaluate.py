@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Compiled, Graph
-from cgraph.extend import Array, kept_by_first, real_array
+from cgraph._shared import Array, kept_by_first, real_array
 
 from ...systems.arguments import TIME, finite_time
 from ...systems.model import Model, as_system

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import real_number
+from cgraph._shared import real_number
 
 from ...systems.arguments import finite_time
 from ...systems.model import Model, as_system

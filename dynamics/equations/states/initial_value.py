@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import Array, or_nearest, real_array
+from cgraph._shared import Array, or_nearest, real_array
 
 from ...systems.arguments import parameter_value, per_coordinate
 from ...systems.model import Model

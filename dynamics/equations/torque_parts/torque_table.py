@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Graph, Node
-from cgraph.extend import Array, Names, html_table, require_whole, topological
+from cgraph._shared import Array, html_table, require_whole
+from cgraph.extend import Names, topological
 
-from ...systems.display_names import display_names
+from ...systems.model import display_names
 from ...systems.system import System
 from ..states.evaluate import evaluate
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from cgraph.extend import Array, install
+from cgraph._shared import Array, install
 
 from ...multibody.trees.mechanism import as_mechanism
 from ...peers import PEERS, PeerModel

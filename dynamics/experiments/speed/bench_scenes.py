@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ... import scenes
 from ...multibody.algebra.spatial import rotation

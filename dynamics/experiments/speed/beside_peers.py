@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 import cgraph as cg
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ... import scenes
 from ...equations.equations_of_motion import bias, forward_dynamics, mass_matrix

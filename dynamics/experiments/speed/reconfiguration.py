@@ -16,7 +16,7 @@ from functools import partial
 import numpy as np
 
 import cgraph as cg
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ...equations.formulations.formulations import inverse_dynamics
 from ...io.mujoco_twin import mujoco

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 import cgraph as cg
-from cgraph.extend import Array, ldl_elimination
+from cgraph._shared import Array, ldl_elimination
 
 from ...equations.equations_of_motion import bias, forward_dynamics, mass_matrix
 from ...equations.linearization.linearize_many import linearize_many

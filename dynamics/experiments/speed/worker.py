@@ -18,7 +18,7 @@ from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
 from typing import Any
 
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ...multibody.trees.mechanism import MechanismWarning
 from ...peers import PEERS, PeerModel, UnavailableError

@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ...equations.state_equation import state_inputs
 from ...integrators import METHODS

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ...multibody.builders.planar_arm import planar_arm
 from ...scenes import Scene

@@ -22,7 +22,7 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Compiled, Graph, Node
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ...equations.equations_of_motion import forward_dynamics
 from ...equations.formulations.formulations import inverse_dynamics

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from cgraph import Node
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ...integrators import METHODS
 from ...simulation.ensembles.simulate_many import simulate_many

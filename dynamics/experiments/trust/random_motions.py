@@ -9,7 +9,7 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ...systems.ode_system import OdeSystem
 from ...systems.system import System

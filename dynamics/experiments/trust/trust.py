@@ -14,7 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 import cgraph as cg
-from cgraph.extend import Array, NoSeriesError, scipy_module
+from cgraph._shared import Array, scipy_module
+from cgraph.extend import NoSeriesError
 
 from ...integrators import METHODS
 from ...multiprecision import Reference, ReferenceFailedError

@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 
 import cgraph as cg
-from cgraph.extend import Array, scipy_module
+from cgraph._shared import Array, scipy_module
 
 from ...equations.energies import energy as energy_graph
 from ...integrators import METHODS, Problem

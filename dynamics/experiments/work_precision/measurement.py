@@ -11,7 +11,7 @@ from typing import Any, Generic, NamedTuple, Protocol, TypeVar
 import numpy as np
 
 from cgraph import Graph
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ...equations.energies import energy
 from ...multiprecision import Reference

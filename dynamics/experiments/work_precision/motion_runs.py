@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ...integrators import METHODS
 from ...peers.heyoka import heyoka

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 import cgraph as cg
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ...multibody.builders.planar_arm import planar_arm
 from ...multibody.trees.mechanism import Mechanism

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ...integrators import METHODS, Problem
 from ...multiprecision import Reference

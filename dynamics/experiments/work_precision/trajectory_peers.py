@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from cgraph import GraphError, to_jax
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ...integrators import Problem
 from ...io.mujoco_twin import rollout

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import cgraph as cg
-from cgraph.extend import Array, scipy_module
+from cgraph._shared import Array, scipy_module
 
 from ...equations.state_equation import state_inputs
 from ...integrators import METHODS, Problem, derive

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ...integrators import METHODS, Problem
 from ...peers.peer import made

@@ -13,7 +13,8 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import Array, as_node
+from cgraph._shared import Array
+from cgraph.extend import as_node
 
 Triple = tuple[Node, Node, Node]
 Matrix = Sequence[Sequence[float | Node]]  # (3, 3)

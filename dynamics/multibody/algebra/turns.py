@@ -10,7 +10,8 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import Array, as_node
+from cgraph._shared import Array
+from cgraph.extend import as_node
 
 from . import spatial
 from .spatial import ZERO, Matrix, Triple, combined, plus, scaled

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Node
-from cgraph.extend import Array, check_name, is_finite
+from cgraph._shared import Array, check_name, is_finite
 
 from ..algebra import spatial
 from ..joints import COMPOSITIONS, TYPES, JointType

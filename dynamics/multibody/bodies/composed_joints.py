@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import Array, is_finite, require_mapping
+from cgraph._shared import Array, is_finite, require_mapping
 
 from ..algebra import spatial
 from ..joints import COMPOSITIONS

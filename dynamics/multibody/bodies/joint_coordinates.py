@@ -11,7 +11,7 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ...systems.quasi_velocities import QuasiVelocities
 from ..joints import JointType

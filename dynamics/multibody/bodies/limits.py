@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, fields
 
-from cgraph.extend import real_array
+from cgraph._shared import real_array
 
 Pair = tuple[float, float]
 ANYTHING: Pair = (-math.inf, math.inf)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from .body import BODY_QUANTITIES, JOINT_QUANTITIES, moment_rounding
 

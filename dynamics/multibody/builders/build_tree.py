@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ..bodies.body import WORLD, Body, Joint, MechanismError, shape_of, vector
 from ..parameters import Quantities

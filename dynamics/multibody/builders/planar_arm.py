@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cgraph import Node
-from cgraph.extend import real_number
+from cgraph._shared import real_number
 
 from ...systems.arguments import coefficients, parameter_items, parameter_value, sequence
 from ..bodies.body import WORLD, Body, Joint

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import Array, real_array
+from cgraph._shared import Array, real_array
 
 from ...equations.equations_of_motion import forward_dynamics, momentum
 from ...equations.states.evaluate import arrays_at

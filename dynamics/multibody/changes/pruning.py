@@ -8,7 +8,7 @@ from functools import cached_property, partial
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import (
+from cgraph._shared import (
     check_name,
     counted,
     real_number,

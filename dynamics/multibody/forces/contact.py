@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import as_node, is_finite
+from cgraph._shared import is_finite
+from cgraph.extend import as_node
 
 from ..algebra import spatial
 from ..algebra.spatial import Triple, cross, dot, plus, scaled

@@ -11,7 +11,8 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import Builder, building, check_name, cotangents, real_array, real_number
+from cgraph._shared import check_name, real_array, real_number
+from cgraph.extend import Builder, building, cotangents
 
 from ...systems.kinematics import gathered
 from ..algebra.spatial import ZERO

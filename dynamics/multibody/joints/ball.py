@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from cgraph import Node
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ..algebra import spatial
 from ..algebra.spatial import STILL

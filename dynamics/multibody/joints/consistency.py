@@ -6,7 +6,8 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Array, Builder, building, memo, tangents
+from cgraph._shared import Array, memo
+from cgraph.extend import Builder, building, tangents
 
 from ...systems.kinematics import Kinematics
 from ...systems.quasi_velocities import QuasiVelocities

@@ -10,7 +10,8 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import Array, Builder, building, tangents, topological
+from cgraph._shared import Array
+from cgraph.extend import Builder, building, tangents, topological
 
 from ..algebra import spatial
 from ..algebra.spatial import STILL, ZERO, Triple, cross, plus

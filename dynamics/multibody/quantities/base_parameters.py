@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ...equations.states.initial_value import normalized
 from ...systems.model import Model

@@ -14,7 +14,8 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import Builder, building, cotangents, require_choice
+from cgraph._shared import require_choice
+from cgraph.extend import Builder, building, cotangents
 
 from ...equations.bias_terms import along_motion
 from ...equations.equation import Equation, Output, entries

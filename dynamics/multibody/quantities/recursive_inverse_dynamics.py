@@ -16,7 +16,8 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Compiled, Graph, Node
-from cgraph.extend import Array, Builder, building, cotangents, memo, real_array
+from cgraph._shared import Array, memo, real_array
+from cgraph.extend import Builder, building, cotangents
 
 from ...systems.kinematics import gathered
 from ..algebra.spatial import STILL, ZERO, Triple

@@ -8,7 +8,8 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Array, Builder, building
+from cgraph._shared import Array
+from cgraph.extend import Builder, building
 
 from ...equations.formulations.formulations import inverse_dynamics
 from ...systems.model import Model

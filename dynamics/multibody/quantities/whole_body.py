@@ -12,7 +12,8 @@ from typing import NamedTuple
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import Builder, building, cotangents, folded, require_choice
+from cgraph._shared import require_choice
+from cgraph.extend import Builder, building, cotangents, folded
 
 from ...equations.equation import Equation, Output, entries
 from ...equations.substitute import substitute

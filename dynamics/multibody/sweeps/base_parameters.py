@@ -14,7 +14,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cgraph.extend import Array, Builder, building
+from cgraph._shared import Array
+from cgraph.extend import Builder, building
 
 from ..joints import JointType
 from .links import Link, Numbers

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ..algebra import spatial
 from ..joints import JointType

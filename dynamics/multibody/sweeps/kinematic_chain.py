@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ..algebra import spatial
 from ..algebra.spatial import STILL, Triple, plus

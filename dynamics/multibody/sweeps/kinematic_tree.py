@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import Array, Builder, building, is_finite
+from cgraph._shared import Array, is_finite
+from cgraph.extend import Builder, building
 
 from ..algebra import spatial
 from ..bodies.body import WORLD, Body, Joint, MechanismError, vector

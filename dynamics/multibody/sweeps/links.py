@@ -10,7 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from cgraph import Node
-from cgraph.extend import Array, Builder, building
+from cgraph._shared import Array
+from cgraph.extend import Builder, building
 
 from ..algebra import spatial
 from ..algebra.spatial import Matrix, Triple

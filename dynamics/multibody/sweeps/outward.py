@@ -17,7 +17,8 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import Array, Builder, as_node, building
+from cgraph._shared import Array
+from cgraph.extend import Builder, as_node, building
 
 from ...systems.body_terms import BiasForce
 from ..algebra import spatial

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Array, real_array
+from cgraph._shared import Array, real_array
 
 from ..algebra import spatial
 from ..bodies.body import Body, unit_axis

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 import cgraph as cg
-from cgraph import Graph, Node, extend
-from cgraph.extend import Array, Builder, building, or_nearest, real_array, require_flag, require_mapping
+from cgraph import Graph, Node, _shared
+from cgraph._shared import Array, or_nearest, real_array, require_flag, require_mapping
+from cgraph.extend import Builder, building
 
 from ...systems.arguments import parameter_value
 from ...systems.body_terms import BodyTerms
@@ -142,7 +143,7 @@ class Mechanism(Structure):
 
     def _repr_html_(self) -> str | None:
         """The equations that a notebook shows as formulas, when a drawing package is installed (extra `viz`)."""
-        return extend.render_html("model", self)
+        return _shared.render_html("model", self)
 
     def __repr__(self) -> str:
         return f"<Mechanism of {'; '.join(_summary(self))}>"

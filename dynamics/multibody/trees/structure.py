@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import HoldsNodes, kept_by_first
+from cgraph._shared import HoldsNodes, kept_by_first
 
 from ..algebra import spatial
 from ..bodies.body import BODY_QUANTITIES, JOINT_QUANTITIES, WORLD, Body, MechanismError, checked, quantities

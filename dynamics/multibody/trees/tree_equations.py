@@ -10,7 +10,8 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import Array, Builder, building, hessian_nodes
+from cgraph._shared import Array
+from cgraph.extend import Builder, building, hessian_nodes
 
 from ...systems.body_terms import BiasForce, MotionState, TorqueDerivatives
 from ..algebra import spatial

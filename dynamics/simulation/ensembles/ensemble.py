@@ -8,10 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ..outcome import REACHED
 from ..trajectory import Crossings, Stats
+from .tables import to_pandas, to_xarray
 
 if TYPE_CHECKING:
     import pandas
@@ -201,8 +202,6 @@ class Ensemble:
         >>> table["q.x"].loc[1, 1.0].round(3), table["k"].loc[1, 1.0]
         (np.float64(-0.416), np.float64(4.0))
         """
-        from .tables import to_pandas
-
         return to_pandas(self)
 
     def to_xarray(self) -> xarray.Dataset:
@@ -227,6 +226,4 @@ class Ensemble:
         >>> fan.to_xarray().q.sel(coordinate="joint 1", t=1.0).values.round(4)
         array([-0.077, -0.155])
         """
-        from .tables import to_xarray
-
         return to_xarray(self)

@@ -13,7 +13,8 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import Array, Call, FixedPoint, LaneCode, While, kept_by_first, runner
+from cgraph._shared import Array, LaneCode, kept_by_first
+from cgraph.extend import Call, FixedPoint, While, runner
 
 from ...integrators.step_control import DONE
 from ..estimates.state_sizes import Flags

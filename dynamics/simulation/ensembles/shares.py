@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ..progress_bar import Progress
 from ..run_options import RunOptions

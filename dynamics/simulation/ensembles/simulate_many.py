@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Node
-from cgraph.extend import Array, require_path, require_whole
+from cgraph._shared import Array, require_path, require_whole
 
 from ...equations.states.initial_value import InitialValues, initial_values
 from ...integrators import Problem, derive, in_form

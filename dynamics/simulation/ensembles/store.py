@@ -19,7 +19,7 @@ from zlib import crc32
 import numpy as np
 
 import cgraph as cg
-from cgraph.extend import Array, Json, atomic_write
+from cgraph._shared import Array, Json, atomic_write
 
 from ...integrators import Problem
 from .ensemble import RunTable

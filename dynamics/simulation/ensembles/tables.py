@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cgraph.extend import Array, install
+from cgraph._shared import Array, install
 
 if TYPE_CHECKING:
     import pandas

@@ -14,7 +14,8 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import Array, Call, If, Runner, kept_by_first, runner
+from cgraph._shared import Array, kept_by_first
+from cgraph.extend import Call, If, Runner, runner
 
 from ..estimates.error_estimate import ErrorEstimates, Estimator
 from ..estimates.runs_beside import Course, States

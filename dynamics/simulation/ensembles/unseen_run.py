@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ..outcome import REACHED
 from ..steps.integration import AdaptiveIntegration

@@ -13,7 +13,7 @@ from queue import Empty, SimpleQueue
 
 import numpy as np
 
-from cgraph.extend import Array, thread_count
+from cgraph._shared import Array, thread_count
 
 from ..steps.stepping import StoppedError
 from .task import Chunk, Part, Task

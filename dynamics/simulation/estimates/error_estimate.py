@@ -12,11 +12,11 @@ import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ..run_options import RunOptions
 from ..steps.dense_output import StepBlock
@@ -26,6 +26,9 @@ from ..steps.stepping import FixedStepIntegration, Integration
 from .runs_beside import LATE, SHARE, Course, Difference, Law, States, courses, even, together
 from .state_sizes import off_by
 from .unresolved import missed, turning, unresolved
+
+if TYPE_CHECKING:
+    from ..events.event_log import WatchedIntegration
 
 LEAST_RATIO = 2.0  # times a difference that of steps twice as long is, at least, where the error has a law
 LAWLESS = 0.1  # of the size of a component: a difference above it follows no power of the step
@@ -302,10 +305,8 @@ class RunEstimate:
         assert isinstance(segment, FixedStepIntegration)
         other: Integration = segment.beside(course.stretches, p[0].tolist())
         if segment.control is None and run is not segment:  # with events
-            from ..events.event_log import WatchedIntegration
-
-            assert isinstance(run, WatchedIntegration)
-            other = run.beside(course.steps) if run.resetting else other
+            watched = cast("WatchedIntegration", run)
+            other = watched.beside(course.steps) if watched.resetting else other
         for block in other.blocks(x[0]):
             yield States(block.t, block.x[None], other.resets)
             at, t = course.stretches[0].begin, float(block.t[-1])

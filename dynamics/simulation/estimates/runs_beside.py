@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ..steps.dense_output import Indices
 from ..steps.equal_steps import SAME_INSTANT, EqualSteps, doubled, halved, joined

@@ -11,7 +11,8 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Array, Call, Map, Statement
+from cgraph._shared import Array
+from cgraph.extend import Call, Map, Statement
 
 Flags = np.ndarray[Any, np.dtype[np.bool_]]
 

@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from cgraph import Graph, Node, floor, less, variable, where
-from cgraph.extend import Array, Builder, building, kept_by_first
+from cgraph._shared import Array, kept_by_first
+from cgraph.extend import Builder, building
 
 from ...systems.arguments import TIME
 from ..row_values import values_of

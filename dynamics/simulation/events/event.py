@@ -10,7 +10,8 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Array, Builder, HoldsNodes, building, check_name, columns, topological
+from cgraph._shared import Array, HoldsNodes, check_name, columns
+from cgraph.extend import Builder, building, topological
 
 from ...equations.substitute import substitute
 from ...integrators import Problem, quantity, quantity_inputs, state_arguments

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ..estimates.state_sizes import Flags
 from ..steps.dense_output import Indices, StepBlock

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ...integrators.step_control import RESOLUTION
 from ..estimates.state_sizes import Flags

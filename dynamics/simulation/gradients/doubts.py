@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ..estimates.error_estimate import LAWLESS
 from ..estimates.state_sizes import off_by

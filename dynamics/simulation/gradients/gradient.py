@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Array, Builder, kept_by_first, memo, topological
+from cgraph._shared import Array, kept_by_first, memo
+from cgraph.extend import Builder, topological
 
 from ...integrators import Problem, quantity
 from ...systems.arguments import Parameters, call_user_function

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Node
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ...systems.model import Model
 from ..outcome import MotionError

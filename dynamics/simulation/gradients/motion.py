@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph import Node
-from cgraph.extend import Array, memo, or_nearest, real_array, require_sequence
+from cgraph._shared import Array, memo, or_nearest, real_array, require_sequence
 
 from ...equations.state_equation import state_inputs
 from ...equations.states.initial_value import initial_values

@@ -16,18 +16,8 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import (
-    Array,
-    Builder,
-    SingularError,
-    building,
-    cotangents,
-    folded,
-    kept_by_first,
-    solve_nodes,
-    tangents,
-    topological,
-)
+from cgraph._shared import Array, kept_by_first
+from cgraph.extend import Builder, SingularError, building, cotangents, folded, solve_nodes, tangents, topological
 
 from ...equations.bias_terms import bias_terms
 from ...equations.constraints.constraints import constraint_rows

@@ -9,7 +9,8 @@ from typing import Any
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import STATEMENTS, Call, Linearization, Linearized, Map, Program, Runner, Statement, memo, runner
+from cgraph._shared import Linearization, Linearized, memo
+from cgraph.extend import STATEMENTS, Call, Map, Program, Runner, Statement, runner
 
 from ...integrators import Method, Step
 from ...integrators.method import equal_registers

@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from cgraph.extend import Array, Runner, Tape, run_passes
+from cgraph._shared import Array, Tape, run_passes
+from cgraph.extend import Runner
 
 from ..outcome import MotionError
 from ..steps.dense_output import Indices

@@ -15,7 +15,7 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import Array, kept_by_first
+from cgraph._shared import Array, kept_by_first
 
 from ..events.event import Event, WatchedEvent, event_program
 from ..outcome import MotionError

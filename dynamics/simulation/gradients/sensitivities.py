@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ...systems.model import Model
 from ..events.event import Event, as_events

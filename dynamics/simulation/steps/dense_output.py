@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import Array, kept_by_first, real_array
+from cgraph._shared import Array, kept_by_first, real_array
 
 from ..row_values import converted, values_of
 

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cgraph.extend import Array
+from cgraph._shared import Array
 
 from ..row_values import values_of
 from .step_program import StepProgram

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import Array, Runner
+from cgraph._shared import Array
+from cgraph.extend import Runner
 
 from ...integrators import Problem
 from ...integrators.step_control import DONE, RUNNING, SMALLEST_ATOL, TOO_SMALL

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from cgraph import Graph
-from cgraph.extend import Call, Factor, If, Program, Runner, Statement, kept_by_first, memo, runner
+from cgraph._shared import kept_by_first, memo
+from cgraph.extend import Call, Factor, If, Program, Runner, Statement, runner
 
 from ...integrators import Method, Problem
 from ...integrators.jacobian_statements import prices

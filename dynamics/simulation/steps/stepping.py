@@ -13,7 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from cgraph.extend import Array, Runner
+from cgraph._shared import Array
+from cgraph.extend import Runner
 
 from ...integrators.step_control import RUNNING
 from ..run_options import RunOptions

@@ -143,7 +143,7 @@ def test_the_partial_of_an_edge_is_that_of_its_slot_alone():
 
 def test_to_networkx_has_nodes_and_edges_with_their_attributes():
     graph = pendulum()
-    found = graph.to_networkx()
+    found = cg.to_networkx(graph)
     assert (found.number_of_nodes(), found.number_of_edges()) == (11, 11)
     number = {node: i for i, node in enumerate(graph.nodes)}
     assert sorted(found.edges(keys=True)) == sorted((number[e.source], number[e.target], e.slot) for e in graph.edges)
@@ -160,7 +160,7 @@ def test_to_networkx_has_nodes_and_edges_with_their_attributes():
 
 
 def test_unused_inputs_are_nodes_in_networkx():
-    found = cg.Graph([x, y], {"f": cg.sin(x), "g": x}).to_networkx()
+    found = cg.to_networkx(cg.Graph([x, y], {"f": cg.sin(x), "g": x}))
     assert [found.nodes[i].get("name") for i in found] == ["x", None, "y"]
     assert [found.nodes[i].get("input") for i in found] == [0, None, 1]
     assert found.nodes[0]["outputs"] == '{"g": 1}'
@@ -172,7 +172,7 @@ def test_unused_inputs_are_nodes_in_networkx():
 def test_degrees_in_networkx_add_up_to_the_edges(case):
     import networkx
 
-    found = case.graph.to_networkx()
+    found = cg.to_networkx(case.graph)
     counts = case.graph.counts()
     assert sum(degree for _, degree in found.in_degree()) == counts.edges
     assert sum(degree for _, degree in found.out_degree()) == counts.edges

@@ -8,7 +8,7 @@ import pytest
 
 import cgraph as cg
 from cgraph import GraphError
-from cgraph.core.node import CONSTANT, VARIABLE, Node
+from cgraph.core.node import CONSTANT, VARIABLE, Leaf, Node
 from cgraph.operations.operation import OPS
 from tests.each_row import each_row
 
@@ -183,14 +183,19 @@ def forged_graph(**fields: object) -> cg.Graph:
         ({"op": replace(OPS["mul"])}, "'mul' is not in the table"),  # a copy is not the row
         ({"op": "mul"}, "not a node of an operation"),
         ({"args": (x, 2.0)}, "is not a node"),
-        ({"op": CONSTANT, "args": (), "value": math.nan}, "not a number"),
-        ({"op": CONSTANT, "args": (), "value": 1}, "not a number"),
+        ({"op": CONSTANT, "args": ()}, "not a number"),
         ({"op": VARIABLE, "args": (), "name": None}, "no name"),
     ],
 )
 def test_check_finds_a_forged_node(fields, message):
     with pytest.raises(GraphError, match=message):
         forged_graph(**fields).check()
+
+
+@each_row("value", [math.nan, 1])
+def test_check_finds_a_constant_that_is_no_number(value):
+    with pytest.raises(GraphError, match="not a number"):
+        cg.Graph([x], {"f": x + Leaf(CONSTANT, value=value)}).check()
 
 
 def test_check_finds_other_nodes_than_those_of_the_outputs_and_a_wrong_order():

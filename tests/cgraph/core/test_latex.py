@@ -59,10 +59,10 @@ def test_the_equations_are_the_graph(steps, lines) -> None:
         nodes.append(made[name] if name in made else cg.sin(a))
     graph = cg.Graph([A, B], {"y": nodes[-1], "z": nodes[-2]})
     point = {"a": 0.3, "b": -0.7}
-    found = value(graph.latex(lines=10**6), **point)
+    found = value(cg.latex(graph, lines=10**6), **point)
     for name, expected in graph.evaluate(point).items():
         assert found[name] == pytest.approx(expected, rel=1e-9, abs=1e-12)
-    whole, cut = rows(graph.latex(lines=10**6)), rows(graph.latex(lines=lines))
+    whole, cut = rows(cg.latex(graph, lines=10**6)), rows(cg.latex(graph, lines=lines))
     if "left~out" in cut[-1]:
         (left, total) = map(int, re.findall(r"out:~(\d+)~of~(\d+)~lines", cut[-1])[0])
         assert total == len(whole)
@@ -86,19 +86,29 @@ def test_names_become_letters_with_dots_and_indices() -> None:
 
 def test_names_of_people_are_shown() -> None:
     graph = cg.Graph([A], {"y": A * A})
-    assert rows(graph.latex(names={"a": "q.knee"})) == [r"y &= q_{\mathrm{knee}} \, q_{\mathrm{knee}}"]
+    assert rows(cg.latex(graph, names={"a": "q.knee"})) == [r"y &= q_{\mathrm{knee}} \, q_{\mathrm{knee}}"]
 
 
 def test_a_node_alone_is_a_formula() -> None:
     assert cg.latex(A / (B - 1.0)) == r"\frac{a}{b - 1}"
     shared = cg.sin(A * B)
     assert rows(cg.latex(shared + shared)) == [r"v_{2} &= \sin\left(a \, b\right)", r"& v_{2} + v_{2}"]
-    with pytest.raises(TypeError, match=r"graph\.latex\(\)"):
-        cg.latex(cg.Graph([A], {"y": A}))
+    with pytest.raises(TypeError, match="latex needs a node or a graph, got float"):
+        cg.latex(1.0)
+
+
+def test_a_method_that_became_a_function_works_with_a_warning() -> None:
+    graph = cg.Graph([A], {"y": A * A})
+    with pytest.warns(DeprecationWarning, match="call cgraph.latex"):
+        assert graph.latex(lines=1) == cg.latex(graph, lines=1)
+    with pytest.warns(DeprecationWarning, match="call cgraph.to_networkx"):
+        network = graph.to_networkx()
+    with pytest.warns(DeprecationWarning, match="call cgraph.from_networkx"):
+        assert cg.Graph.from_networkx(network).listing() == graph.listing()
 
 
 def test_a_long_graph_is_written_in_time_that_grows_linearly() -> None:
     node = A
     for _ in range(5000):
         node = cg.sin(node) * node
-    assert len(rows(cg.Graph([A], {"y": node}).latex())) == 41
+    assert len(rows(cg.latex(cg.Graph([A], {"y": node})))) == 41

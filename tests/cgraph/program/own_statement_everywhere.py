@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 import cgraph as cg
-from cgraph.extend import STATEMENTS, Array, Call, If, Program, While, program_jvp, program_vjp, runner
+from cgraph._shared import Array
+from cgraph.extend import STATEMENTS, Call, If, Program, While, program_jvp, program_vjp, runner
 from tests.cgraph.engines import RUNNERS
 from tests.tolerances import SHORT_SUM
 

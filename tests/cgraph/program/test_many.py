@@ -6,21 +6,8 @@ import numpy as np
 import pytest
 
 import cgraph as cg
-from cgraph.extend import (
-    Array,
-    Call,
-    Factor,
-    If,
-    Pop,
-    Program,
-    Push,
-    Solve,
-    While,
-    many,
-    program_jvp,
-    program_vjp,
-    runner,
-)
+from cgraph._shared import Array
+from cgraph.extend import Call, Factor, If, Pop, Program, Push, Solve, While, many, program_jvp, program_vjp, runner
 from cgraph.program.many import many_keeping, outliving
 from tests.cgraph.program.test_program_derivatives import LENGTHS, PASSES, START, RandomProgram, seeds
 

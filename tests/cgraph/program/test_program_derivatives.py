@@ -10,13 +10,12 @@ import pytest
 
 import cgraph as cg
 from cgraph import GraphError
+from cgraph._shared import Array, Linearization
 from cgraph.extend import (
-    Array,
     Call,
     Factor,
     FixedPoint,
     If,
-    Linearization,
     Map,
     Pop,
     Program,

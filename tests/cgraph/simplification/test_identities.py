@@ -9,7 +9,8 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Node
-from cgraph.extend import shortened, topological
+from cgraph._shared import shortened
+from cgraph.extend import topological
 from tests.each_row import each_row
 
 X, Y, A = cg.variables("x y a")

@@ -10,7 +10,7 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
-from cgraph.extend import Array
+from cgraph._shared import Array
 from dynamics.equations.states.consistent_state import nearest_state
 from dynamics.equations.states.evaluate import evaluate
 from tests.dynamics.linkages import four_bar, scaled_four_bar

@@ -10,7 +10,8 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
-from cgraph.extend import Array, Builder
+from cgraph._shared import Array
+from cgraph.extend import Builder
 from dynamics import as_system
 from dynamics.equations.linearization.momentum_parts import momentum_parts
 from dynamics.equations.momentum.hamiltonian import velocities

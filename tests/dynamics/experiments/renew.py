@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 import dynamics as dyn
-from cgraph.extend import Array
+from cgraph._shared import Array
 from dynamics.experiments.accuracy_task import KEPT_ENDS, AccuracyTask
 from dynamics.experiments.stability import cases
 from dynamics.experiments.trust import trust as answers

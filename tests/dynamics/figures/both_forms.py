@@ -15,7 +15,7 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph.extend import Array
+from cgraph._shared import Array
 from dynamics.equations.linearization.linearization import state_space
 from dynamics.equations.momentum.hamiltonian import hamilton_equations, velocities
 from dynamics.equations.state_equation import state_equation

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cgraph.extend import Array
+from cgraph._shared import Array
 from viz import theme
 from viz.plots.plot import GRID, empty_figure, style
 

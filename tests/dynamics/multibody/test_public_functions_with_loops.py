@@ -12,7 +12,7 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
-from cgraph.extend import Array
+from cgraph._shared import Array
 from dynamics.equations.states.consistent_state import nearest_state
 from dynamics.simulation.gradients.sensitivities import Sensitivities
 

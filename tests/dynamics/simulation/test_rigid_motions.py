@@ -6,7 +6,7 @@ from numpy.typing import ArrayLike
 from pytest import mark
 
 import dynamics as dyn
-from cgraph.extend import Array
+from cgraph._shared import Array
 from dynamics.multibody.algebra.spatial import from_quaternion, rotation
 from tests.oracles.closed_forms import free_rigid_body
 

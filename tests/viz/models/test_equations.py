@@ -10,7 +10,7 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
-from cgraph.extend import LATEX, statements
+from cgraph._shared import LATEX, statements
 from dynamics.equations.equations_of_motion import momentum
 from dynamics.equations.formulations.formulations import inverse_dynamics
 from dynamics.equations.momentum.hamiltonian import hamilton_equations

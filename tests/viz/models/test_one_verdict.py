@@ -9,7 +9,7 @@ import pytest
 from pytest import approx
 
 import dynamics as dyn
-from cgraph.extend import remarks_of
+from cgraph._shared import remarks_of
 from tests.dynamics.equations.test_verdict import NAMED
 from tests.dynamics.textbook import TEXTBOOK
 from tests.slow import slow

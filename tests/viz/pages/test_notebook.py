@@ -14,7 +14,7 @@ import pytest
 
 import cgraph as cg
 import dynamics as dyn
-from cgraph.extend import remarks_of
+from cgraph._shared import remarks_of
 from tests.sources import ROOT
 from viz import theme
 from viz.graph_drawing.render import LARGE_GRAPH
@@ -152,7 +152,7 @@ def test_a_model_is_shown_by_its_lagrangian_and_torque():
 
 
 def test_a_model_asks_for_what_draws_it(monkeypatch):
-    monkeypatch.setattr("cgraph.extend.render_html", lambda kind, what: f"{kind}: {what!r}")
+    monkeypatch.setattr("cgraph._shared.render_html", lambda kind, what: f"{kind}: {what!r}")
     body = dyn.Body("rotor", dyn.Joint("revolute"), inertia=(0.1, 0.1, 0.2))
     for model in (
         dyn.OdeSystem(lambda x, t: [-x[0]], ["x"]),

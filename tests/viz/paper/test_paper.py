@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import dynamics as dyn
-from cgraph.extend import write_files
+from cgraph._shared import write_files
 from tests.tolerances import SOLVED
 from tests.viz.page_elements import Elements
 from viz import theme

@@ -6,7 +6,7 @@ from html import escape
 
 import numpy as np
 
-from cgraph.extend import Array
+from cgraph._shared import Array
 from dynamics import formulation_sizes, formulation_verdict, inverse_dynamics
 from dynamics.equations.formulations.formulation_sizes import INERTIAL_TERM, blamed
 

@@ -7,7 +7,7 @@ from html import escape
 import numpy as np
 
 from cgraph import Node
-from cgraph.extend import Array
+from cgraph._shared import Array
 from dynamics import System, forward_dynamics, gravity_force
 
 from ...pages.document import Table

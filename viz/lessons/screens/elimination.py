@@ -6,7 +6,7 @@ from html import escape
 
 import numpy as np
 
-from cgraph.extend import Array, counted
+from cgraph._shared import Array, counted
 from dynamics import forward_dynamics, mass_matrix
 
 from ...pages.document import Table

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from cgraph.extend import Array
+from cgraph._shared import Array
 from dynamics import SimulationWarning, energy, simulate, state_equation
 
 from ... import theme

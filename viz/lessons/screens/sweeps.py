@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph.extend import Names, columns, cotangents, counted, tangents
+from cgraph._shared import columns, counted
+from cgraph.extend import Names, cotangents, tangents
 from dynamics import inverse_dynamics, momentum
 
 from ...graph_drawing.dot import to_dot

@@ -6,7 +6,7 @@ from html import escape
 
 import numpy as np
 
-from cgraph.extend import Array
+from cgraph._shared import Array
 from dynamics import inverse_dynamics
 
 from ...pages.document import Table

@@ -7,7 +7,7 @@ from html import escape
 import numpy as np
 
 from cgraph import Graph
-from cgraph.extend import Array
+from cgraph._shared import Array
 from dynamics import inverse_dynamics, momentum, momentum_rate
 
 from ...pages.document import Table

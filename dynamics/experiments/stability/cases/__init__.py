@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cgraph.extend import memo
+from cgraph._shared import memo
 
 from ...accuracy_task import RTOL, Criterion, StabilityCase
 from . import chains, extremes, fields, orbits, rotation, stiff

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copyreg
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
@@ -10,13 +11,14 @@ from ..core.graph import Graph
 from ..core.label import label
 from ..core.node import CONSTANT, VARIABLE, Node, as_node, variable
 from ..core.traversal import as_made
-from ..operations.table import OPS
+from ..util.doors import moved_methods
+from .operation import OPS
 
 Record = tuple[str, tuple[int, ...], Any, Any, tuple[Any, ...]]  # operation, arguments, value, name, label
 
 
 def reduced(graph: Graph) -> tuple[Callable[..., Graph], tuple[object, ...]]:
-    """Result of `Graph.__reduce__`: the function that makes the graph again, and its arguments."""
+    """How a graph pickles: the function that makes it again, and its arguments."""
     nodes = as_made(graph.nodes)  # made again in this order
     number = {node: i for i, node in enumerate(nodes)}
     outputs = {name: number[node] for name, node in graph.outputs.items()}
@@ -46,3 +48,7 @@ def restored(inputs: tuple[str, ...], records: tuple[Record, ...], outputs: dict
             node = Node(OPS[op], tuple([from_record[i] for i in args]), kept, name=name)
         from_record.append(node)
     return Graph([variable(name) for name in inputs], {name: from_record[i] for name, i in outputs.items()})
+
+
+copyreg.pickle(Graph, reduced)
+moved_methods(Graph, "cgraph", ("from_networkx", "latex", "to_networkx"), alone=("from_networkx",))

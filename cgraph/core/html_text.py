@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from html import escape
-from importlib.metadata import entry_points
 
 LEFT, RIGHT = "text-align:left", "text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap"
 
@@ -18,10 +16,12 @@ def html_table(header: Sequence[str], rows: Sequence[Sequence[str]], *, title: s
 
     def line(cells: Sequence[str], kind: str) -> str:
         styles = [LEFT if i < texts else RIGHT for i in range(len(cells))]
-        inside = [f'<{kind} style="{style}">{escape(cell)}</{kind}>' for style, cell in zip(styles, cells, strict=True)]
+        inside = [
+            f'<{kind} style="{style}">{_escape(cell)}</{kind}>' for style, cell in zip(styles, cells, strict=True)
+        ]
         return f"<tr>{''.join(inside)}</tr>"
 
-    above = f'<caption style="{LEFT}">{escape(title)}</caption>' if title else ""
+    above = f'<caption style="{LEFT}">{_escape(title)}</caption>' if title else ""
     head = f"<thead>{line(header, 'th')}</thead>" if any(header) else ""
     body = "".join([line(row, "td") for row in rows])
     return f'<div style="overflow-x:auto"><table>{above}{head}<tbody>{body}</tbody></table></div>'
@@ -29,12 +29,12 @@ def html_table(header: Sequence[str], rows: Sequence[Sequence[str]], *, title: s
 
 def html_lines(text: str) -> str:
     """Text in its lines, in letters of equal width, as HTML."""
-    return f"<pre>{escape(text)}</pre>"
+    return f"<pre>{_escape(text)}</pre>"
 
 
 def html_text(text: str) -> str:
     """A paragraph of text as HTML."""
-    return f"<p>{escape(text)}</p>"
+    return f"<p>{_escape(text)}</p>"
 
 
 def render_html(kind: str, what: object) -> str | None:
@@ -42,9 +42,17 @@ def render_html(kind: str, what: object) -> str | None:
 
     None where no package is installed that draws it, or where it cannot: the notebook shows text then.
     """
+    from importlib.metadata import entry_points  # takes as long to load as all of the core
+
     for renderer in entry_points(group="cgraph.renderers", name=kind):
         try:
             return str(renderer.load()(what))
         except (ImportError, RuntimeError):
             return None
     return None
+
+
+def _escape(text: str) -> str:
+    from html import escape  # loaded with the first result that a notebook shows
+
+    return escape(text)

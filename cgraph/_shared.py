@@ -1,0 +1,68 @@
+"""What the three packages share beside `cgraph` and `cgraph.extend`: no promise is made for these names."""
+
+from .util.doors import doors as doors
+
+TYPE_CHECKING = False  # as a checker knows it; typing takes a while to load
+
+if TYPE_CHECKING:
+    from .autodiff.compressed_jacobian import CompressedJacobian as CompressedJacobian
+    from .autodiff.hessian_solve import Order as Order, solve_tangents as solve_tangents
+    from .autodiff.jets import Jets as Jets, convolution as convolution
+    from .autodiff.ldl_solve import ldl_elimination as ldl_elimination, ldl_solve as ldl_solve
+    from .bridges.translation import Operations as Operations, operations as operations, translated as translated
+    from .codegen.wasm.functions import page_functions as page_functions
+    from .core.checks import check_name as check_name
+    from .core.evaluation import (
+        Array as Array,
+        floats as floats,
+        is_finite as is_finite,
+        real_array as real_array,
+        real_number as real_number,
+    )
+    from .core.html_text import html_lines as html_lines, html_table as html_table, render_html as render_html
+    from .core.label import UNLABELLED as UNLABELLED
+    from .core.scope import without_collection as without_collection
+    from .explain.lint.lint import Lint as Lint
+    from .explain.why_nan import WhyNan as WhyNan
+    from .operations.operation import columns as columns
+    from .program.derivatives.linearization import Linearization as Linearization, Linearized as Linearized
+    from .program.derivatives.tape import Tape as Tape, run_passes as run_passes
+    from .program.runners.batch_code import LaneCode as LaneCode
+    from .simplification.identities import shortened as shortened
+    from .simplification.ordered_terms import ink as ink
+    from .simplification.polynomial import (
+        Polynomial as Polynomial,
+        expand as expand,
+        format_polynomial as format_polynomial,
+    )
+    from .simplification.reading_form import reading_form as reading_form
+    from .simplification.rounding_growth import error_bounds as error_bounds, rounding_spread as rounding_spread
+    from .util.atomic_write import (
+        atomic_write as atomic_write,
+        check_writable as check_writable,
+        write_files as write_files,
+    )
+    from .util.caches import kept_by_first as kept_by_first, memo as memo
+    from .util.extras import install as install, required as required, scipy_module as scipy_module
+    from .util.json_type import Json as Json
+    from .util.require import (
+        require_choice as require_choice,
+        require_flag as require_flag,
+        require_graph as require_graph,
+        require_mapping as require_mapping,
+        require_path as require_path,
+        require_sequence as require_sequence,
+        require_texts as require_texts,
+        require_whole as require_whole,
+    )
+    from .util.threads import share as share, thread_count as thread_count
+    from .util.words import counted as counted, nearest as nearest, or_nearest as or_nearest
+    from .writing.formulas import Side as Side, fraction as fraction, statements as statements
+    from .writing.holds_nodes import HoldsNodes as HoldsNodes
+    from .writing.latex import LATEX as LATEX, latex_block as latex_block, number_text as number_text
+    from .writing.naming import Remarks as Remarks, remarked as remarked, remarks_of as remarks_of
+    from .writing.symbols import GREEK as GREEK, is_letter as is_letter, symbol as symbol
+
+
+if not TYPE_CHECKING:  # a checker shall see a misspelt name
+    __getattr__, __dir__ = doors(__name__, __file__, first="cgraph.operations")
