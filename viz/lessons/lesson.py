@@ -170,10 +170,9 @@ def scripts() -> str:
 
 
 def modules(screens: Sequence[Screen]) -> str:
-    """The constant MODULES of a script, {name: module} for the play of each screen."""
-    plays = [(screen.play or {}).get("modules", {}) for screen in screens]
-    texts = ["".join([f"{name}: {text},\n" for name, text in play.items()]) for play in plays]
-    return f"const MODULES = [\n{''.join([f'{{{text}}},\n' for text in texts])}];\n"
+    """The constant MODULES of a script: of the play of each screen."""
+    texts = [str((screen.play or {}).get("modules", "{}")) for screen in screens]
+    return f"const MODULES = [{', '.join(texts)}];\n"
 
 
 def _end(subject: Subject, chosen: str) -> str:

@@ -163,14 +163,15 @@ class Subject:
     def play(self, kind: str, graphs: Mapping[str, Graph], **other: object) -> dict[str, object] | None:
         """What the page's script draws by these graphs at its state; None where they are too large for it.
 
-        Under "modules" are their texts for the script, that of a graph called "rate" with steps.
+        Under "modules" is a text for the script, {name: module}, of a graph called "rate" with steps.
         """
         if sum([len(graph.nodes) for graph in graphs.values()]) > LARGEST_GRAPH:
             return None
-        modules = {
-            name: expression(cg.to_js(graph, TABLEAUS if name == "rate" else None)) for name, graph in graphs.items()
-        }
-        return {"kind": kind, "modules": modules} | other
+        modules = [
+            f"{name}: {expression(cg.to_js(graph, TABLEAUS if name == 'rate' else None))}"
+            for name, graph in graphs.items()
+        ]
+        return {"kind": kind, "modules": f"{{ {', '.join(modules)} }}"} | other
 
     def shown(self, name: str) -> str:
         """Display name of an input, output or node."""
