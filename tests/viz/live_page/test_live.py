@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,10 +15,13 @@ import cgraph as cg
 import dynamics as dyn
 import viz
 from cgraph.core.node import apply
-from cgraph.extend import Op
+from cgraph.extend import OPS, Op
 from dynamics.integrators import TABLEAUS
 from dynamics.scenes.scenes import of_model
 from tests.each_row import each_row
+from tests.registered import registered
+from viz.lessons.screens.energy_and_step import energy_and_step
+from viz.lessons.subject import subject_of
 from viz.live_page import Live, page_text
 from viz.live_page.live_panel import SCRIPTS, functions
 from viz.models.live_motion import live_of
@@ -322,22 +326,23 @@ def test_a_center_that_attracts_has_a_page():
     assert "const LIVE = {" in viz.live(planet, start=[0.0, 0.0, 0.0, 0.0])
 
 
-def own(javascript):
-    """A spring whose potential is an operation of one's own."""
-    op = Op(
-        "bowl", 1, lambda x: x * x, lambda x: x * x, lambda y, x: (2.0 * x,), samples=((0.6,),), javascript=javascript
-    )
-    return dyn.System(lambda q, qd, t: qd[0] ** 2 - apply(op, q[0]), ["x"])
-
-
 def test_an_operation_of_ones_own_works_in_pages_and_one_without_javascript_is_told():
-    script = Script(live_of(of_model(own("(x) => { return x * x; }"))))
-    values = [0.3, 0.5, 0.0]
-    script.engine.eval(f"{values}.forEach((value, i) => run.set(i, value))")
-    potential = next(k for k, each in enumerate(script("data.meters")) if each["called"] == "potential")
-    assert script(f"run.now().values[{potential}]") == pytest.approx(0.09)
-    script.engine.close()
-    assert "of_bowl = (x) => { return x * x; }" in viz.lesson(own("(x) => { return x * x; }"))
-    for page in (viz.live, viz.lesson):
-        with pytest.raises(ValueError, match=r"'bowl' has no text in JavaScript, .* the column `javascript`"):
-            page(own(""))
+    """A spring whose potential is such an operation."""
+    values = lambda x: x * x, lambda x: x * x, lambda y, x: (2.0 * x,)
+    bowl = Op("bowl", 1, *values, samples=((0.6,),), javascript="(x) => { return x * x; }")
+
+    def spring(op):
+        return dyn.System(lambda q, qd, t: qd[0] ** 2 - apply(op, q[0]), ["x"])
+
+    with registered(OPS, bowl=bowl):
+        script = Script(live_of(of_model(spring(bowl))))
+        script.engine.eval("run.set(0, 0.3)")
+        potential = [each["called"] for each in script("data.meters")].index("potential")
+        assert script(f"run.now().values[{potential}]") == pytest.approx(0.09)
+        script.engine.close()
+        assert bowl.javascript in energy_and_step(subject_of(spring(bowl))).play["modules"]
+    bare = replace(bowl, javascript="")
+    with registered(OPS, bowl=bare):
+        for made in (viz.live, lambda system: energy_and_step(subject_of(system))):
+            with pytest.raises(ValueError, match=r"'bowl' has no text in JavaScript, .* the column `javascript`"):
+                made(spring(bare))
