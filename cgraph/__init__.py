@@ -16,8 +16,7 @@ if TYPE_CHECKING:
     from .bridges.torch import to_torch as to_torch
     from .codegen.c.c_source import to_c as to_c
     from .codegen.disk_cache import clear_cache as clear_cache
-    from .codegen.wasm.script import wasm_script as wasm_script
-    from .codegen.wasm.to_wasm import to_wasm as to_wasm
+    from .codegen.javascript import to_js as to_js
     from .core.checks import GraphError as GraphError
     from .core.graph import Counts as Counts, Edge as Edge, Graph as Graph
     from .core.node import Node as Node, constant as constant, variable as variable

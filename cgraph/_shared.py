@@ -10,7 +10,6 @@ if TYPE_CHECKING:
     from .autodiff.jets import Jets as Jets, convolution as convolution
     from .autodiff.ldl_solve import ldl_elimination as ldl_elimination, ldl_solve as ldl_solve
     from .bridges.translation import Operations as Operations, operations as operations, translated as translated
-    from .codegen.wasm.functions import page_functions as page_functions
     from .core.checks import check_name as check_name
     from .core.evaluation import (
         Array as Array,

@@ -118,7 +118,7 @@ def used() -> list[np.ndarray]:
     slope = dyn.gradient(arm, lambda q, qd, t: q[0] ** 2 + qd[1], q, qd, 0.1, dt=0.02)
     graph = dyn.forward_dynamics(arm)
     numbers = [*dyn.linearize_many(arm, [q, qd], [qd, q]), *dyn.arrays_at(arm, graph, q, qd).values()]
-    texts = [cg.to_wasm(graph), cg.latex(graph).encode(), cg.to_c(graph).source.encode()]
+    texts = [cg.to_js(graph).encode(), cg.latex(graph).encode(), cg.to_c(graph).source.encode()]
     numbers += [np.frombuffer(text, dtype=np.uint8) for text in texts]
     return [*[run.q for run in runs], *[run.t for run in runs], many.q, *slope.gradients.values(), *numbers]
 

@@ -93,9 +93,7 @@ class Op(Row):
         Units of rounding, 2**-53, of its own result. Default two, as for a function of the C library.
     python, numpy : str
         Text over floats and over arrays, with {} or {0}, {1} for arguments. Default name(..), with `scalar` and `array`
-        behind the name; of a ufunc np.ufunc(..). WebAssembly is made of the one in Python: of numbers, {0}, + - * / and
-        **, comparisons, `and`, `or`, `a if c else b`, which computes both, and calls. A function that is called and a
-        module has not is imported from `math`: in a page that is Math, and of the operation's name `javascript`.
+        behind the name; of a ufunc np.ufunc(..).
     library : str
         Its function in the C library. Default of that name.
     llvm : tuple of str
@@ -107,8 +105,8 @@ class Op(Row):
         C expression with {0}, {1} for arguments, and a C function that it calls, with {name} for the name of the one
         being written. Default the call of the library's function, and none.
     javascript : str
-        A function. Default Math.name. Where a browser has none the inspector and lessons show no number, and what needs
-        WebAssembly with that function, `viz.live` and `cg.wasm_script`, raises ValueError.
+        A function. Default Math.name. Where a browser has none the inspector shows no number, and `cg.to_js`, by which
+        live pages and lessons compute, raises ValueError.
     operator : callable
         Of numbers and expressions of any kind, made by their operators. Default none.
     precise : callable

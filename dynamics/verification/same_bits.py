@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import base64
 import ctypes
-import json
 import os
 import pickle
 import re
@@ -24,7 +22,7 @@ import numpy as np
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph._shared import Array, Json, columns, page_functions
+from cgraph._shared import Array, Json
 
 from ..equations.state_equation import normalization, state_equation, state_inputs
 from ..equations.substitute import substitute
@@ -41,30 +39,27 @@ COMPILERS = ("cc", "gcc", "clang")
 FLAGS = ("-std=c99", "-O2", "-shared", "-fPIC")
 NEAR = 1e-6  # relative: far above rounding, and below a wrong formula
 PATIENCE = 300.0  # s that another program may take
-LIBRARY, OWN = "C library", "WebAssembly"  # whose sine, exponential, ..
-NODE = {"baseline compiler": "--liftoff-only", "optimizing compiler": "--no-liftoff"}
 
 
 @dataclass(frozen=True)
 class Way:
-    """A way to compute the motion: whose functions it has, the digest, and whether that is the first way's with these.
+    """A way to compute the motion: the digest, and whether that is the first way's.
 
     Parameters
     ----------
-    name, functions, digest : str
-        The way, "C library", "WebAssembly" or "live page", and 32 hexadecimal digits.
+    name, digest : str
+        The way, and 32 hexadecimal digits.
     same : bool
-        Whether the digest is that of the first way with the same functions.
+        Whether the digest is that of the first way.
 
     Examples
     --------
     >>> from dynamics.verification.same_bits import Way
-    >>> Way("loop", "C library", "00", True).same
+    >>> Way("loop", "00", True).same
     True
     """
 
     name: str
-    functions: str
     digest: str
     same: bool
 
@@ -93,7 +88,7 @@ class SameBits:
 
     @property
     def passed(self) -> bool:
-        """Whether all that have the same functions have the same digest."""
+        """Whether all have the same digest."""
         return all([way.same for way in self.ways])
 
     def __str__(self) -> str:
@@ -103,11 +98,6 @@ class SameBits:
             f"{STEPS} steps of 2^-10 s by rk4 of the state equation; the digest is of the state after every {EVERY}, "
             "SHA-256 of its numbers, half of it."
         )
-        if {way.functions for way in self.ways} >= {LIBRARY, OWN}:
-            lines.append(
-                "Of WebAssembly, sine and the like are its own, the same on every machine; those of the C library "
-                "differ from them now and then in the last bit."
-            )
         return "\n".join([*lines, *[f"left out: {each}" for each in self.left_out]])
 
     def to_dict(self) -> dict[str, Json]:
@@ -115,15 +105,13 @@ class SameBits:
         return {"passed": self.passed, **asdict(self)}
 
 
-def same_bits(scene: Scene, page: Scene | None = None, source: str = "") -> SameBits:
+def same_bits(scene: Scene, source: str = "") -> SameBits:
     """Compute one motion of a scene in every way that there is here, and compare the bits.
 
-    page: the scene that the live page shows of it, where that has more parameters, and so another digest.
     source: the model's name, FILE.py:NAME, where it is a model of Python, whose operations another process registers.
 
     Fused products are off, as by `fma=False`: which products a compiler fuses is its choice. Raises ValueError for a
-    motion that does not stay finite, for a row whose `javascript` is another function than its `scalar`, and as
-    `state_equation` does.
+    motion that does not stay finite, and as `state_equation` does.
 
     Examples
     --------
@@ -133,25 +121,14 @@ def same_bits(scene: Scene, page: Scene | None = None, source: str = "") -> Same
     True
     """
     motion = _Motion(scene, source)
-    found: list[tuple[str, str, str]] = []
+    found: list[tuple[str, str]] = []
     left_out: list[str] = []
     for name, run in motion.ways():
         try:
-            found.append((name, LIBRARY, run()))
+            found.append((name, run()))
         except NotRunError as error:
             left_out.append(f"{name}: {error}")
-    modules = [("WebAssembly", OWN if motion.calls_library else LIBRARY, (motion.rate, motion.start))]
-    if page is not None:
-        modules.append(("live page (masses and gravity are inputs)", "live page", _rate_and_start(page)))
-    for what, functions, module in modules:
-        for name, option in NODE.items():
-            try:
-                found.append((f"{what}, {name}", functions, _in_node(*module, option)))
-            except NotRunError as error:
-                left_out.append(f"{what}, {name}: {error}")
-    first: dict[str, str] = {}
-    ways = [Way(*row, same=first.setdefault(row[1], row[2]) == row[2]) for row in found]
-    return SameBits(tuple(ways), tuple(left_out))
+    return SameBits(tuple([Way(*row, same=row[1] == found[0][1]) for row in found]), tuple(left_out))
 
 
 class NotRunError(Exception):
@@ -166,7 +143,6 @@ class _Motion:
         self.rate, self.start = _rate_and_start(scene)
         self.states = len(self.rate.outputs)
         self.step, self.carry = _step(self.rate)
-        self.calls_library = any([columns(node.op).calls_library for node in self.rate.nodes if node.args])
         self.loop = cg.loop(self.step, self.carry, fma=False)
         self.native = cg.compile(self.step, fma=False).backend != "python"
         rows = rows_of(self.step, self.carry, self.start, self.states, "python")
@@ -270,54 +246,6 @@ def _rate_and_start(scene: Scene) -> tuple[Graph, list[float]]:
     return rate, [float(values.get(name, 0.0)) for name in rate.input_names]  # torques and the time are 0
 
 
-def _in_node(rate: Graph, start: list[float], option: str) -> str:
-    """The digest by WebAssembly in Node.js."""
-    node = shutil.which("node")
-    if node is None:
-        raise NotRunError("node is not installed")
-    _check_javascript(rate, node)
-    with _left_out(ValueError):  # a function that no page has
-        script = _SCRIPT.replace("MATH", page_functions(rate))
-        module = base64.b64encode(cg.to_wasm(rate, {"rk4": RK4}, time=TIME)).decode()
-    shape = {"states": len(rate.outputs), "h": STEP, "rows": STEPS // EVERY, "n": EVERY}
-    asked = json.dumps({"module": module, "x": start} | shape).encode()
-    return _digest(np.frombuffer(bytes.fromhex(_run([node, option, "-e", script], asked)), dtype="<f8"))
-
-
-def _check_javascript(rate: Graph, node: str) -> None:
-    """Raise ValueError where the column `javascript` is not the function of `scalar` at a sample."""
-    rows = dict.fromkeys([columns(each.op) for each in rate.nodes if each.args and columns(each.op).own_javascript])
-    if not rows:
-        return
-    asked = json.dumps([[op.javascript, op.samples] for op in rows]).encode()
-    found = map(float, _run([node, "-e", _VALUES_SCRIPT], asked).split())
-    for op in rows:
-        values = [op.scalar(*sample) for sample in op.samples]
-        allowed = NEAR * max(map(abs, values))
-        for sample, value, other in zip(op.samples, values, found, strict=False):
-            if not abs(value - other) <= allowed:
-                at = ", ".join([f"{name}={x:g}" for name, x in zip(op.parameters, sample, strict=True)])
-                raise ValueError(f"operation {op.name!r}: at {at} scalar is {value:.6g} and javascript {other:.6g}")
-
-
-_VALUES_SCRIPT = """\
-const asked = JSON.parse(require("fs").readFileSync(0, "utf8"));
-const values = ([text, samples]) => samples.map((sample) => String(eval(`(${text})`)(...sample)));
-console.log(asked.flatMap(values).join(" "));
-"""
-_SCRIPT = """\
-const asked = JSON.parse(require("fs").readFileSync(0, "utf8"));
-const module = new WebAssembly.Module(Buffer.from(asked.module, "base64"));
-const exports = new WebAssembly.Instance(module, { math: MATH }).exports;
-const x = new Float64Array(exports.memory.buffer, 0, asked.x.length);
-x.set(asked.x);
-for (let row = 0; row < asked.rows; row++) {
-  exports.rk4(0, asked.h, asked.n);
-  process.stdout.write(Buffer.from(x.slice(0, asked.states).buffer).toString("hex"));
-}
-"""
-
-
 def rows_of(step: Graph, carry: dict[str, str], start: list[float], states: int, backend: str) -> Array:
     """The states at every EVERY-th step."""
     return cg.loop(step, carry, backend, fma=False)(start, STEPS, EVERY)[:, :states]
@@ -365,14 +293,14 @@ def _run(
 
 
 def _reason(text: str) -> str:
-    """The line that has the error: of Python and Node.js the last such as `TypeError: ..`, of a compiler the first."""
+    """The line that has the error: of Python the last such as `TypeError: ..`, of a compiler the first."""
     raised = re.findall(r"^[\w.]*Error: .*", text, re.MULTILINE)
     compiled = re.findall(r"^.*\berror: .*", text, re.MULTILINE)
     return next(iter([*raised[-1:], *compiled, *text.strip().splitlines()[-1:]]), "it said nothing")
 
 
 def _step(rate: Graph) -> tuple[Graph, dict[str, str]]:
-    """A step of rk4, operation by operation that of `to_c` and `to_wasm`, and what goes on into the next.
+    """A step of rk4, operation by operation that of `to_c`, and what goes on into the next.
 
     The time is count * h, as there.
     """

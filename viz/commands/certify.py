@@ -28,7 +28,7 @@ def add(parser: Command) -> None:
     parser.add_argument(
         "--bits",
         action="store_true",
-        help="instead: the bits of one motion by calls, loops, batches, threads, another process, C and WebAssembly",
+        help="instead: the bits of one motion by calls, loops, batches, threads, another process and C",
     )
     parser.add_argument("--json", action="store_true", help="print as JSON")
     parser.set_defaults(run=run)
@@ -55,9 +55,7 @@ def _bits(scene: dyn.scenes.Scene, options: argparse.Namespace) -> int:
     moving = library.moving_start(scene)
     if moving is not scene:
         say(f"{scene.name}: {library.rest_text(scene, moving)}")
-    page = library.adjustable(moving)
-    shown = None if page.model is moving.mechanism or page is moving else page
-    found = library.same_bits(moving, shown, options.scene)
+    found = library.same_bits(moving, options.scene)
     answer(unless_json(options, {"scene": scene.name} | found.to_dict(), found))
     if found.passed:
         return 0

@@ -1,4 +1,4 @@
-"""`cgraph code`: the equations of a scene as C, in double or in float, as WebAssembly or as Python."""
+"""`cgraph code`: the equations of a scene as C, in double or in float, as JavaScript or as Python."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ EQUATIONS: dict[str, Callable[[dyn.scenes.Scene], cg.Graph]] = {
     "mass_matrix": lambda scene: dyn.mass_matrix(scene),
     "energy": lambda scene: dyn.energy(scene),
 }  # each is loaded when it is called
-SUFFIXES = {"c": ".c", "wasm": ".wasm", "python": ".py"}
+SUFFIXES = {"c": ".c", "js": ".mjs", "python": ".py"}
 
 
 def add(parser: Command) -> None:
@@ -40,11 +40,11 @@ def add(parser: Command) -> None:
         help="C99, with its header; of the state equation with steps of {tableaus}",
     )
     language.add_argument(
-        "--wasm",
+        "--js",
         dest="language",
         action="store_const",
-        const="wasm",
-        help="a WebAssembly module, and the .mjs that loads it; of the state equation with steps of {tableaus}",
+        const="js",
+        help="a module of JavaScript; of the state equation with steps of {tableaus}",
     )
     language.add_argument(
         "--python", dest="language", action="store_const", const="python", help="a Python function of a list"
@@ -55,7 +55,7 @@ def add(parser: Command) -> None:
         help="default: forward_dynamics; of a first-order system state_equation",
     )
     parser.add_argument(
-        "--out", type=place, help="file to write, in place of standard output: .c (and .h), .wasm (and .mjs) or .py"
+        "--out", type=place, help="file to write, in place of standard output: .c (and .h), .mjs or .py"
     )
     parser.add_argument(
         "--float32",
@@ -75,8 +75,6 @@ def run(options: argparse.Namespace) -> None:
     """Write or print the code."""
     out: Path | None = options.out
     suffix = SUFFIXES[options.language]
-    if out is None and options.language == "wasm":
-        raise ValueError("--wasm needs --out: a module is no text")
     if out is not None and out.suffix != suffix:
         raise ValueError(f"--out must end in {suffix} for --{options.language}, got {out}")
     if options.float32 and options.language != "c":
@@ -90,9 +88,8 @@ def run(options: argparse.Namespace) -> None:
     graph = EQUATIONS[what](scene)
     name = re.sub("[^A-Za-z0-9_]", "_", scene.name) if out is None else out.stem
     methods = library.TABLEAUS if what == "state_equation" else None
-    if options.language == "wasm":
-        script = cg.wasm_script(graph, methods)
-        files: dict[str, str | bytes] = {suffix: cg.to_wasm(graph, methods), ".mjs": script}
+    if options.language == "js":
+        files = {suffix: cg.to_js(graph, methods)}
     elif options.language == "python":
         files = {suffix: python_text(graph)}
     else:
@@ -104,13 +101,11 @@ def run(options: argparse.Namespace) -> None:
         whole = text.source.replace(f'#include "{name}.h"\n', text.header)  # one text for standard output
         files = {suffix: whole} if out is None else {suffix: text.source, ".h": text.header}
     if out is None:
-        answer(str(files[suffix]).rstrip("\n"))
+        answer(files[suffix].rstrip("\n"))
         return
     written = {out.with_suffix(end): content for end, content in files.items()}
     sizes = ", ".join(f"{path}: {len(content)} bytes" for path, content in written.items())
-    inputs, outputs = _shared.counted(len(graph.inputs), "input"), _shared.counted(len(graph.outputs), "output")
-    places = f"; {inputs} from byte 0, {outputs} from byte {8 * len(graph.inputs)}"
-    answer(f"{sizes}{places if options.language == 'wasm' else ''}", written)
+    answer(sizes, written)
 
 
 def _single(options: argparse.Namespace, scene: dyn.scenes.Scene, graph: cg.Graph) -> dict[str, Any]:

@@ -64,7 +64,7 @@ COMMANDS = {
     "scenes": "the scenes, with the size of their graphs",
     "equations": "the Lagrangian, momenta and torques of a scene as formulas; status 1 for a wrong formulation",
     "draw": "draw the graph of a scene's equations (SVG, PNG or DOT) or list it (TXT)",
-    "code": "write a scene's equations as C, WebAssembly or Python",
+    "code": "write a scene's equations as C, JavaScript or Python",
     "certify": "equations that a scene's graphs must fulfil, and agreement with peers; status 1 if any fails",
     "inspect": "one page on which a scene's equations unfold, move and answer; status 1 for a motion cut short",
     "live": "one page that computes a scene's motion, with sliders and meters",

@@ -161,7 +161,6 @@ def compose(title: str, data: Mapping[str, Json] | None, tables: Sequence[Table]
         f"{_colors()}{asset(__package__, 'page.css')}{''.join([panel.style for panel in panels])}",
         f'"use strict";\n{scripts()}\n{added}\nconst inspector = start({first});{begin}',
         {"data": data} | {name: each for panel in panels for name, each in panel.data.items()},
-        " ".join([panel.allowed for panel in panels if panel.allowed]),
     )
 
 

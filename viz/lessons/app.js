@@ -58,7 +58,7 @@ function guess(question, choice) {
 /** What there is to play with, made when its screen is first seen. */
 function play(k) {
   const board = ASKING[k]?.querySelector(".board"), what = LESSON.plays[k];
-  if (what && board && !board.hasChildNodes()) startPlay(board, { values: LESSON.values, ...what });
+  if (what?.kind && board && !board.hasChildNodes()) startPlay(board, { values: LESSON.values, ...what, ...MODULES[k] });
 }
 /** What a term means, below the paragraph that it stands in; pressed again, it goes. */
 function explain(link) {

@@ -15,7 +15,6 @@ from dynamics.systems.model import Model
 from ..graph_drawing.render import check_can_draw
 from ..pages import html
 from ..pages.html import Page, asset, html_target
-from ..pages.operations import values
 from .glossary import glossary
 from .introduction import MINUTES, introduction
 from .screen import Screen
@@ -142,7 +141,7 @@ def page(
     """The page of some screens, between the introduction and the end."""
     data = {
         "answers": [screen.answer for screen in screens],
-        "plays": [screen.play for screen in screens],
+        "plays": [{key: each for key, each in (screen.play or {}).items() if key != "modules"} for screen in screens],
         "values": subject.values,  # of inputs, where a play has no others
     }
     body = "\n".join([screen.to_html(k) for k, screen in enumerate(screens, start=1)])
@@ -160,16 +159,20 @@ def page(
         title,
         f'<header><h1>{escape(title)}</h1>{by}</header>\n<nav aria-label="Screens"></nav>\n<main>\n{text}\n{glossary(text)}\n</main>',
         asset(__package__, "lesson.css"),
-        f'"use strict";\n{scripts()}\n{asset(__package__, "app.js")}',
+        f'"use strict";\n{modules(screens)}{scripts()}\n{asset(__package__, "app.js")}',
         {"data": data},
     )
 
 
 def scripts() -> str:
     """Scripts of the plays, and of what they need."""
-    return "\n".join(
-        [values(), asset(html.__package__, "elements.js", "tables.js", "graph.js"), asset(__package__, "plays.js")]
-    )
+    return "\n".join([asset(html.__package__, "elements.js", "tables.js"), asset(__package__, "plays.js")])
+
+
+def modules(screens: Sequence[Screen]) -> str:
+    """The constant MODULES of a script: of the play of each screen."""
+    texts = [str((screen.play or {}).get("modules", "{}")) for screen in screens]
+    return f"const MODULES = [{', '.join(texts)}];\n"
 
 
 def _end(subject: Subject, chosen: str) -> str:

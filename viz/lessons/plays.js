@@ -1,43 +1,27 @@
 // What there is to play with on the screens: sliders, and what the graphs make of them.
 
-/** The function from {input: value} to {output: value} of a graph. */
-function named(graph) {
-  const run = evaluator(graph);
-  return (at) => {
-    const found = run(graph.inputs.map(([name]) => at[name]));
-    return Object.fromEntries(graph.outputs.map(([name, node]) => [name, found[node]]));
-  };
-}
-
-/** Names of the numbered outputs of a kind, as tau0, tau1, .. */
-const numbered = (kind, n, end = "") => Array.from({ length: n }, (_, i) => kind + i + end);
+/** The function from {input: value} to {output: value} of a graph's module. */
+const named = ({ inputs, outputs, evaluate }) => (at) => {
+  const found = evaluate(inputs.map((name) => at[name]));
+  return Object.fromEntries(outputs.map((name, k) => [name, found[k]]));
+};
 
 /** Pivots of a symmetric matrix, the last first: the matrix before every pivot, and after the last. */
 function stages(matrix) {
-  const left = matrix.map((row) => row.slice());
-  const all = [left.map((row) => row.slice())];
-  for (let k = left.length - 1; k > 0; k--) {
-    for (let i = 0; i < k; i++)
-      for (let j = 0; j < k; j++) left[i][j] -= (matrixAt(left, i, k) * matrixAt(left, k, j)) / left[k][k];
-    all.push(left.map((row) => row.slice()));
+  const all = [matrix];
+  for (let k = matrix.length - 1; k > 0; k--) {
+    const left = all.at(-1);
+    all.push(left.map((row, i) => row.map((x, j) => (Math.max(i, j) < k ? x - (left[i][k] * left[k][j]) / left[k][k] : x))));
   }
   return all;
 }
-const matrixAt = (matrix, i, j) => matrix[Math.max(i, j)][Math.min(i, j)];
 
-/** A motion by Euler's method or rk4: states at every step, until one is not finite. */
-function motion(rate, start, names, dt, steps, method) {
-  const at = { ...start }, rows = [];
-  const slope = (state) => {
-    names.forEach((name, i) => { at[name] = state[i]; });
-    const found = rate(at);
-    return names.map((name) => found[name + "_dot"]);
-  };
-  const euler = (state, k = slope(state)) => state.map((x, i) => x + dt * k[i]);
-  let state = names.map((name) => start[name]);
-  for (let k = 0; k <= steps && state.every(Number.isFinite); k++) {
-    rows.push(state);
-    state = method === "euler" ? euler(state) : rk4(slope, state, 0, dt);
+/** A motion by a method: inputs of the rate at every step, until its state is not finite. */
+function motion({ inputs, outputs, steps }, start, dt, count, method) {
+  const x = Float64Array.from(inputs, (name) => start[name]), rows = [];
+  for (let k = 0; k <= count && x.subarray(0, outputs.length).every(Number.isFinite); k++) {
+    rows.push([...x]);
+    steps[method](x, dt, 1);
   }
   return rows;
 }
@@ -58,9 +42,8 @@ function sliders(board, play, at, draw) {
     slider(board, each.shown, each.low, each.high, 0.01, each.value, (x) => { at[each.name] = x; draw(); });
 }
 function button(board, text, press) {
-  const made = tag("button", { type: "button" }, text);
+  const made = board.appendChild(tag("button", { type: "button" }, text));
   made.addEventListener("click", press);
-  board.append(made);
   return made;
 }
 /** A table whose cells can be written anew: {write(rows), cells}. */
@@ -68,12 +51,7 @@ function grid(board, header) {
   const made = table(header, []);
   board.append(scrolled(made));
   return (rows, classes = () => "") => made.tBodies[0].replaceChildren(
-    ...rows.map((row, i) => tag("tr", {}, ...row.map((text, j) => {
-      const cell = tag("td", {}, text);
-      const kind = classes(i, j);
-      if (kind) cell.className = kind;
-      return cell;
-    }))),
+    ...rows.map((row, i) => tag("tr", {}, ...row.map((text, j) => tag("td", { class: classes(i, j) }, text)))),
   );
 }
 /** The width of what holds a picture, so that its letters are as large as they say. */
@@ -117,7 +95,7 @@ const PLAYS = {
   },
   step(board, play, at, redraw) {
     const right = named(play.right), wrong = named(play.wrong), terms = play.terms && named(play.terms);
-    const names = numbered("tau", play.joints.length), old = Object.keys(at).filter((name) => name.endsWith("_old"));
+    const names = play.right.outputs.slice(0, play.joints.length), old = Object.keys(at).filter((name) => name.endsWith("_old"));
     const rate = {}; // of what is old, by a second, where velocities are no rates of coordinates
     for (const name of old) rate[name] = (play.values[name.slice(0, -4)] - play.values[name]) / play.values.dt;
     if (play.sliders.length)
@@ -164,7 +142,7 @@ const PLAYS = {
   },
   parts(board, play, at, redraw) {
     const torque = named(play.graph);
-    const names = numbered("tau", play.joints.length);
+    const names = play.graph.outputs.slice(0, play.joints.length);
     const zero = (kind) => Object.fromEntries(Object.keys(at).filter((name) => new RegExp(`^${kind}\\d+$`).test(name)).map((name) => [name, 0]));
     sliders(board, play, at, redraw);
     const write = grid(board, [play.joint, ...play.parts, "τ"]);
@@ -186,8 +164,7 @@ const PLAYS = {
     button(buttons, "Again", () => { step = 0; redraw(); });
     const write = grid(board, ["row", ...play.joints]);
     return () => {
-      const found = mass(at), name = (i, j) => found[`M_${i}_${j}`];
-      const matrix = play.joints.map((_, i) => play.joints.map((_, j) => name(i, j)));
+      const found = mass(at), matrix = play.joints.map((_, i) => play.joints.map((_, j) => found[`M_${i}_${j}`]));
       const shown = stages(matrix)[step], pivot = n - 1 - step;
       write(shown.map((row, i) => [play.joints[i], ...row.map((x, j) => (Math.max(i, j) > pivot && i !== j ? "" : digits(x)))]),
         (i, j) => (j === 0 ? "" : i === j - 1 && i === pivot ? "lit" : Math.max(i, j - 1) > pivot ? "gone" : ""));
@@ -207,13 +184,9 @@ const PLAYS = {
     };
   },
   energy(board, play, start, redraw) {
-    const rate = named(play.rate), total = named(play.energy);
-    const names = [...numbered("q", play.nq), ...numbered("qd", play.n)];
-    const energies = (method, steps) => motion(rate, start, names, play.t_end / steps, steps, method).map((state) => {
-      const at = { ...start };
-      names.forEach((name, i) => { at[name] = state[i]; });
-      return total(at).E;
-    });
+    const { rate, energy } = play, total = named(energy);
+    const energies = (method, steps) => motion(rate, start, play.t_end / steps, steps, method)
+      .map((row) => total({ ...start, ...Object.fromEntries(rate.inputs.map((name, i) => [name, row[i]])) }).E);
     const fine = play.fine, exact = energies("rk4", fine);
     let steps = 100;
     slider(board, "steps", 1, 3, 0.05, 2, (x) => { steps = Math.round(10 ** x); redraw(); }, (x) => String(Math.round(10 ** x)));

@@ -16,6 +16,7 @@ from cgraph import Graph
 from cgraph._shared import Array
 from dynamics import Verdict, display_names, formulation_verdict
 from dynamics.equations.states.consistent_state import nearest_state
+from dynamics.integrators import TABLEAUS
 from dynamics.multibody.bodies.joint_coordinates import display_units
 from dynamics.scenes.scenes import Scene, of_model, two_link
 from dynamics.scenes.start import moving_start
@@ -24,7 +25,7 @@ from dynamics.systems.system import System
 
 from .. import theme
 from ..graph_drawing.render import render_svg
-from ..pages.operations import graph_data
+from ..pages.operations import expression
 
 if TYPE_CHECKING:
     from graphviz import Digraph
@@ -160,10 +161,17 @@ class Subject:
         return self._drawn[source]
 
     def play(self, kind: str, graphs: Mapping[str, Graph], **other: object) -> dict[str, object] | None:
-        """Data by which the page's script draws these graphs at its state; None where they are too large for it."""
+        """What the page's script draws by these graphs at its state; None where they are too large for it.
+
+        Under "modules" is a text for the script, {name: module}, of a graph called "rate" with steps.
+        """
         if sum([len(graph.nodes) for graph in graphs.values()]) > LARGEST_GRAPH:
             return None
-        return {"kind": kind} | {name: graph_data(graph) for name, graph in graphs.items()} | other
+        modules = [
+            f"{name}: {expression(cg.to_js(graph, TABLEAUS if name == 'rate' else None))}"
+            for name, graph in graphs.items()
+        ]
+        return {"kind": kind, "modules": f"{{ {', '.join(modules)} }}"} | other
 
     def shown(self, name: str) -> str:
         """Display name of an input, output or node."""

@@ -1,4 +1,4 @@
-"""The live motion: a panel that computes a system's motion in the page, by WebAssembly."""
+"""The live motion: a panel that computes a system's motion in the page."""
 
 from .live_panel import Live, page_text, panel
 

@@ -7,10 +7,10 @@ const TRACE = 120; // places of the tip
 /** A number with four digits. */
 const liveNumber = (value) => (Number.isFinite(value) ? numeral(value, 4) : "—");
 
-async function startLive() {
+function startLive() {
   const data = JSON.parse(byId("live-data").textContent);
   const $ = (id) => byId(`live-${id}`);
-  const machine = liveMachine(data, await liveModules(data));
+  const machine = liveMachine(data, LIVE);
   const motion = liveRun(machine, data);
   const { state } = motion;
   let playing = false, last = 0;
@@ -56,9 +56,6 @@ async function startLive() {
     keep();
     copyLink((copied) => { $("said").textContent = copied ? "Copied." : "The link is in the address bar."; });
   };
-
-  $("bits").toggleAttribute("hidden", !globalThis.crypto?.subtle || !data.methods.includes("rk4") || data.inputs.some(({ group }) => group === "momenta"));
-  $("digest").onclick = async () => { $("digits").textContent = `${await machine.digest()}: 1000 steps of 2^-10 s by rk4 from the start of the page. The command cgraph certify --bits prints it, too.`; };
 
   // The link
 
@@ -144,10 +141,10 @@ async function startLive() {
     [group, tag("tr", {}, tag("th", { scope: "row" }, called), cells[k], tag("td", {}, unit))]
   )), (rows, group) => [...(data.notes[group] ? [tag("p", { class: "live-quiet" }, data.notes[group])] : []), tag("table", {}, tag("tbody", {}, ...rows))]);
   for (const id of ["strip", "energies", "drift-row"]) $(id).toggleAttribute("hidden", data.energy < 0);
-  const unitOf = (i) => data.inputs[i].unit;
   function error(id, { index, most, share }) {
     $(`${id}-bar`).value = share > 0 ? Math.min(1, Math.max(0, (Math.log10(share) + 12) / 12)) : share === 0 ? 0 : 1;
-    $(id).textContent = most === most ? `${liveNumber(most)} ${unitOf(index)} in ${data.inputs[index].called}` : "no number any more";
+    const { called, unit } = data.inputs[index];
+    $(id).textContent = most === most ? `${liveNumber(most)} ${unit} in ${called}` : "no number any more";
     $(id).dataset.large = String(!(share < 0.01));
   }
   function show() {

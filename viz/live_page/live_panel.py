@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -11,11 +10,12 @@ from typing import Any
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph._shared import Json, page_functions
+from cgraph._shared import Json
 
 from .. import theme
 from ..pages import html
 from ..pages.html import Page, Panel, asset
+from ..pages.operations import expression
 
 TIME = "t"  # the input that is the time, if there is one
 GROUPS = (
@@ -66,8 +66,6 @@ class Live:
     def to_dict(self) -> dict[str, Json]:
         """Data for the script of the page."""
         return {
-            "rate": base64.b64encode(cg.to_wasm(self.rate, self.methods, time=TIME)).decode(),
-            "shown": base64.b64encode(cg.to_wasm(self.shown)).decode(),
             "shownCount": len(self.shown.outputs),
             "states": len(self.rate.outputs),
             "time": self.rate.input_names.index(TIME) if TIME in self.rate.input_names else -1,
@@ -99,7 +97,6 @@ class Live:
 
 
 SCRIPTS = ("machine.js", "run.js", "course.js", "live.js")
-EVALUATION = "'wasm-unsafe-eval'"  # in the policy: WebAssembly may be compiled, text may not
 
 
 def panel(live: Live, begin: str = "startLive();") -> Panel:
@@ -111,17 +108,20 @@ def panel(live: Live, begin: str = "startLive();") -> Panel:
     colors = {"kinetic": theme.BLUE, "potential": theme.ORANGE, "right": theme.GREEN, "wrong": theme.SPURIOUS}
     variables = ":root{" + "".join(f"--live-{name}:{color};" for name, color in colors.items()) + "}\n"
     dark = f"@media (prefers-color-scheme: dark){{:root{{--live-kinetic:{theme.SKY_BLUE};}}}}\n"
-    functions = page_functions(live.rate, live.shown)
-    run = f"const LIVE_MATH = {functions};\n{asset(__package__, *SCRIPTS)}\n{begin}"
+    run = f"{functions(live)}{asset(__package__, *SCRIPTS)}\n{begin}"
     script = f"{{\n{run}\n}}"  # in a block it shares no name with a page's
     style = f"{variables}{dark}{asset(__package__, 'live.css')}"
-    return Panel(
-        asset(__package__, "live.html"), style, run=script, allowed=EVALUATION, data={"live-data": live.to_dict()}
-    )
+    return Panel(asset(__package__, "live.html"), style, run=script, data={"live-data": live.to_dict()})
+
+
+def functions(live: Live) -> str:
+    """The constant LIVE of a script: `rate` and `shown`, as modules of `cg.to_js`."""
+    rate, shown = cg.to_js(live.rate, live.methods, time=TIME), cg.to_js(live.shown)
+    return f"const LIVE = {{\nrate: {expression(rate)},\nshown: {expression(shown)},\n}};\n"
 
 
 def page_text(live: Live, title: str, about: str = "") -> Page:
-    """One page on which a motion is computed as it is watched, by a WebAssembly module in it.
+    """One page on which a motion is computed as it is watched.
 
     title: its heading.  about: what to see, a sentence or two.
     """
@@ -131,6 +131,4 @@ def page_text(live: Live, title: str, about: str = "") -> Page:
     touching = len(live.shown.outputs) > len(live.meters) + 2 * len(live.parents)
     shared = asset(html.__package__, "elements.js", "address.js", *["surfaces.js"] * touching)
     script = f'"use strict";\n{shared}\n{shown.run}'
-    return html.compose(
-        title, body, f"{asset(__package__, 'alone.css')}{shown.style}", script, shown.data, shown.allowed
-    )
+    return html.compose(title, body, f"{asset(__package__, 'alone.css')}{shown.style}", script, shown.data)

@@ -6,7 +6,6 @@ const AHEAD = 0.25; // s that the error ahead looks at
 
 /** A run of a machine. */
 function liveRun(machine, data) {
-  const index = new Map(data.inputs.map(({ name }, i) => [name, i]));
   let sizes = new Map();
   const state = { dt: data.dt, method: "rk4", time: 0, owed: 0, slow: false };
 
@@ -21,11 +20,10 @@ function liveRun(machine, data) {
     machine.forget();
     sizes = machine.sizesAhead(state.method, state.dt);
   }
-  /** An input gets a value: of a state the reference starts anew, of a parameter both have it. */
+  /** An input gets a value, and the reference starts anew. */
   function set(i, value) {
     if (!Number.isFinite(value)) return false;
     machine.run[i] = value;
-    machine.fine[i] = value;
     together();
     return true;
   }
@@ -72,7 +70,7 @@ function liveRun(machine, data) {
     if (Number.isFinite(found.dt) && found.dt > 0) state.dt = found.dt;
     if (data.methods.includes(found.method)) state.method = found.method;
     if (Number.isFinite(found.time)) state.time = found.time;
-    for (const [name, i] of index) if (Number.isFinite(found.values?.[name])) machine.run[i] = found.values[name];
+    data.inputs.forEach(({ name }, i) => { if (Number.isFinite(found.values?.[name])) machine.run[i] = found.values[name]; });
     state.owed = 0;
     together();
     return true;

@@ -90,8 +90,7 @@ class Panel(NamedTuple):
     """A part that another module adds: markup beside the picture or at the end, style, scripts before and after start.
 
     first: JavaScript for the record that the page shows first, where its own data are none.  run: JavaScript that
-    begins the panel; `inspector` is what app.js lends to other scripts.  data: as `compose` takes them.  allowed:
-    what the policy lets scripts do.
+    begins the panel; `inspector` is what app.js lends to other scripts.  data: as `compose` takes them.
     """
 
     body: str = ""
@@ -100,22 +99,17 @@ class Panel(NamedTuple):
     first: str = ""
     run: str = ""
     end: str = ""
-    allowed: str = ""
     data: Mapping[str, Json] = MappingProxyType({})
 
 
-def compose(
-    title: str, body: str, style: str, script: str = "", data: Mapping[str, object] | None = None, allowed: str = ""
-) -> Page:
+def compose(title: str, body: str, style: str, script: str = "", data: Mapping[str, object] | None = None) -> Page:
     """Page of one file, which fetches nothing and whose policy lets its own script and style alone run.
 
-    body: HTML.  data: {id of an element: what scripts read there as JSON}.  allowed: what else scripts may do. A page
-    without a script may have styles at its elements.
+    body: HTML.  data: {id of an element: what scripts read there as JSON}. A page without a script may have styles
+    at its elements.
     """
     style += MATHML if 'class="aligned"' in body else ""
-    run = (
-        f"script-src {_digest(script)} {allowed}; style-src {_digest(style)}" if script else "style-src 'unsafe-inline'"
-    )
+    run = f"script-src {_digest(script)}; style-src {_digest(style)}" if script else "style-src 'unsafe-inline'"
     policy = f"default-src 'none'; {run}; img-src data:; base-uri 'none'; form-action 'none'"
     # "<" in the data could end the element that holds it
     texts = {

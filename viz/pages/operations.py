@@ -16,17 +16,18 @@ from cgraph.extend import OPS, Op
 FormulaPart = str | int | list[Any]  # of a formula: a text, the number of an argument, [element, attributes, *parts]
 
 
-def values() -> str:
-    """The constant VALUE {operation: function}."""
-    functions = ",\n".join([f"  {op.name}: {op.javascript}" for op in OPS.values()])
-    return f"const VALUE = {{\n{functions},\n}};\n"
+def expression(module: str) -> str:
+    """A module of `cg.to_js` as an expression, for a script that is no module: {inputs, outputs, evaluate, steps}."""
+    text = re.sub("^export ", "", module, flags=re.MULTILINE)
+    return f"(() => {{\n{text}return {{ inputs, outputs, evaluate, steps }};\n}})()"
 
 
 def operations() -> str:
-    """The constants VALUE, ROWS {operation: its row} and FORMULA: operation -> [tree, least binding, binding].
+    """The constants VALUE {operation: function}, ROWS {operation: its row} and FORMULA.
 
-    An operation without a formula is written as a function.
+    FORMULA: operation -> [tree, least binding, binding].  An operation without a formula is written as a function.
     """
+    functions = ",\n".join([f"  {op.name}: {op.javascript}" for op in OPS.values()])
     rows = {
         op.name: {
             "symbol": op.symbol,
@@ -42,7 +43,7 @@ def operations() -> str:
     table = json.dumps(rows, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
     formulas = [[op.name, [_tree(op), op.mathml.least, op.mathml.binding]] for op in OPS.values() if op.mathml]
     tree = json.dumps(formulas, separators=(",", ":"), ensure_ascii=False)
-    return f"{values()}const ROWS = {table};\nconst FORMULA = new Map({tree});\n"
+    return f"const VALUE = {{\n{functions},\n}};\nconst ROWS = {table};\nconst FORMULA = new Map({tree});\n"
 
 
 def slopes(op: Op) -> dict[str, Json]:

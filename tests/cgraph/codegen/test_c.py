@@ -14,7 +14,7 @@ from hypothesis import Phase, given, settings, strategies as st
 
 import cgraph as cg
 import dynamics as dyn
-from cgraph.codegen.c import c_statements as body
+from cgraph.codegen import statements as body
 from cgraph.core.node import apply
 from cgraph.operations.operation import OPS
 from cgraph.util.atomic_write import atomic_write

@@ -19,6 +19,7 @@ from dynamics.integrators import TABLEAUS
 from tests.cgraph.codegen.test_c import CC, CXX, STRICT, WARNINGS, build, needs_cc, run
 from tests.cgraph.engines import evaluated, points_of
 from tests.each_row import each_row
+from tests.javascript import stepped_by_js
 from tests.registered import registered
 from tests.ulps import same
 
@@ -132,17 +133,15 @@ def sum_of(weights, slopes):
 
 
 @needs_cc
-def test_steps_of_c_and_of_web_assembly_have_the_same_bits(tmp_path):
+def test_steps_of_c_and_of_javascript_have_the_same_bits(tmp_path):
     """Without functions of a library."""
-    from tests.wasm import instance
-
     graph = cg.Graph([X, Y, T], {"x_dot": Y, "y_dot": -X * 1.7 - 0.3 * Y * X * X + 0.25 * T})
     methods = {name: TABLEAUS[name] for name in ("rk4", "dopri5")}
-    library = build(tmp_path, [cg.to_c(graph, "linear", methods)])
+    library, text = build(tmp_path, [cg.to_c(graph, "linear", methods)]), cg.to_js(graph, methods)
     for name in methods:
         start = [0.7, -0.2, 0.0]
         found = stepped(library, f"linear_{name}", start, 0.01, 1000, np.float64)
-        assert same(found, instance(graph, methods).step(name, start, 0.01, 1000))
+        assert same(found, stepped_by_js(text, name, start, 0.01, 1000))
 
 
 MAIN = """

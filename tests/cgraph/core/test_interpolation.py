@@ -15,6 +15,7 @@ from cgraph.explain.lint.singular import intervals
 from tests.cgraph.codegen.test_c import agrees, needs_cc
 from tests.cgraph.engines import ENGINES, evaluated
 from tests.each_row import each_row
+from tests.javascript import evaluated_by_js
 from tests.slow import slow
 from tests.ulps import same
 
@@ -132,10 +133,9 @@ def test_c_has_the_bits_of_evaluation(tmp_path):
     agrees(tmp_path, {"table": graph}, {"table": points})
 
 
-def test_webassembly_has_the_bits_of_evaluation():
+def test_javascript_has_the_bits_of_evaluation():
     graph, points = all_kinds()
-    module = pytest.importorskip("tests.wasm").instance(graph)
-    assert same(np.array([module(*point) for point in points]), evaluated(graph, points))
+    assert same(evaluated_by_js(cg.to_js(graph), points), evaluated(graph, points))
 
 
 def test_bounds_hold():

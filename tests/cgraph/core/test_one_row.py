@@ -26,7 +26,7 @@ TABLE = (
     "tests/cgraph/codegen/test_strict.py",
     "tests/cgraph/codegen/test_llvm.py",
     "tests/cgraph/codegen/test_c.py",
-    "tests/cgraph/codegen/test_wasm.py",
+    "tests/cgraph/codegen/test_javascript.py",
     "tests/cgraph/explain/lint/test_lint.py",
     "tests/viz/graph_drawing/test_dot.py",
     "tests/viz/inspector/test_script.py",

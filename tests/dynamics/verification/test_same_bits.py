@@ -45,7 +45,6 @@ def test_every_way_has_the_same_bits(name):
     names = {way.name for way in found.ways}
     assert {"loop in Python", "another process"} <= names
     assert ("C" in names) == any(map(shutil.which, module.COMPILERS))
-    assert ("WebAssembly, baseline compiler" in names) == (shutil.which("node") is not None)
     assert ("simulate in Python" in names) == ("simulate in machine code" in names) == (name != "free")
     json.dumps(found.to_dict())
 
@@ -62,7 +61,6 @@ def test_another_order_of_sums_is_seen_and_what_is_missing_is_said(monkeypatch):
     found = same_bits(scene)
     assert found.passed
     assert "C: none of cc, gcc, clang is installed" in found.left_out
-    assert "WebAssembly, baseline compiler: node is not installed" in found.left_out
     assert "left out: C: none of" in str(found)
 
 
@@ -103,22 +101,15 @@ def test_an_operation_of_a_models_file_is_run_where_it_can_be_and_what_it_lacks_
     assert status == 0
     assert re.search(r"another process +\n", told)
     assert "left out: another process" not in told
-    node = (
-        "cube_of_bits, which no page has: its row needs the column `javascript`" if shutil.which("node") else "node is"
-    )
-    assert f"left out: WebAssembly, baseline compiler: {node}" in told.replace("operation 'cube_of_bits' calls ", "")
     if any(map(shutil.which, module.COMPILERS)):
         assert "left out: C: operation 'cube_of_bits' has no text in C" in told
 
 
-@pytest.mark.skipif(not any(map(shutil.which, module.COMPILERS)) or not shutil.which("node"), reason="no compiler")
-def test_what_a_compiler_or_node_says_of_an_operation_is_told(command):
-    status, told = command("c='cube_of(', javascript='(x) => x *'")
+@pytest.mark.skipif(not any(map(shutil.which, module.COMPILERS)), reason="no compiler")
+def test_what_a_compiler_says_of_an_operation_is_told(command):
+    status, told = command("c='cube_of('")
     assert status == 0
     assert re.search(r"left out: C: \w+ failed: motion.c:\d+:\d+: error: .*expected", told)
-    assert "left out: WebAssembly, baseline compiler: node failed: SyntaxError: " in told
-    status, told = command("c='no_function_of_bits({0})', javascript='(x) => x * x * x'")
+    status, told = command("c='no_function_of_bits({0})'")
     assert "left out: C: " in told
     assert "no_function_of_bits" in told
-    assert "WebAssembly, optimizing compiler\n" in told
-    assert command("javascript='(x) => x * x'")[0] == 2

@@ -14,8 +14,8 @@ import dynamics as dyn
 from cgraph.core.node import apply
 from cgraph.operations.operation import OPS
 from tests.each_row import each_row
+from tests.javascript import evaluated_by_js
 from tests.tolerances import SUMS
-from tests.wasm import Instance
 from viz import cli
 from viz.commands.code import EQUATIONS, python_text
 
@@ -46,16 +46,18 @@ def test_operations_that_python_lacks_are_taken_from_the_table():
     assert names["function"](at) == tuple(graph.evaluate(dict(zip("abc", at, strict=True))).values())
 
 
-def test_wasm_has_steps_with_the_state_equation(tmp_path, capsys):
-    out = tmp_path / "arm.wasm"
-    assert cli.main(["code", "triple_pendulum", "--wasm", "--what", "state_equation", "--out", str(out)]) == 0
-    assert "9 inputs from byte 0, 6 outputs from byte 72" in capsys.readouterr().out
-    graph = dyn.state_equation(SCENE)
-    made = Instance(out.read_bytes(), graph)
-    assert made(*point(graph)) == pytest.approx(
+def test_javascript_has_steps_with_the_state_equation(tmp_path, capsys):
+    out = tmp_path / "arm.mjs"
+    line = ["code", "triple_pendulum", "--js", "--what", "state_equation"]
+    assert cli.main([*line, "--out", str(out)]) == 0
+    assert f"{out}: " in capsys.readouterr().out
+    assert cli.main(line) == 0
+    text, graph = out.read_text(encoding="utf-8"), dyn.state_equation(SCENE)
+    assert capsys.readouterr().out == text
+    assert evaluated_by_js(text, [point(graph)])[0] == pytest.approx(
         list(graph.evaluate(dict(zip(graph.input_names, point(graph), strict=True))).values()), rel=SUMS
     )
-    assert {"euler", "rk4", "dopri5"} <= set(made.exports)
+    assert all(f'"{method}"(x, h, n)' in text for method in ("euler", "rk4", "dopri5"))
 
 
 def test_of_a_first_order_system_it_is_the_state_equation(tmp_path, capsys):
@@ -82,8 +84,7 @@ def test_c_is_one_text_or_two_files(tmp_path, capsys):
 @each_row(
     ("arguments", "said"),
     [
-        ("--wasm", "--wasm needs --out"),
-        ("--wasm --out a.c", "--out must end in .wasm for --wasm, got a.c"),
+        ("--js --out a.c", "--out must end in .mjs for --js, got a.c"),
         ("--c --out 2.c", "must be a letter"),
         ("--c --out sin.c", "sin.c names the function: the name of a C function must not be a word of C"),
     ],

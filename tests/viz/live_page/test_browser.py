@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import itertools
-import json
-import shutil
 
 import pytest
 
@@ -83,22 +81,6 @@ def test_too_long_a_dt_shows_its_error_and_the_two_arms_part(show):
     assert page.locator(".live-stick").nth(3).get_attribute("d") != page.locator(".live-reference").nth(
         3
     ).get_attribute("d")
-
-
-@pytest.mark.skipif(shutil.which("node") is None, reason="the command computes it by Node.js")
-def test_the_digest_of_a_motion_is_that_of_the_command(show, written, capsys):
-    found = {}
-    for scene, name in (("triple_pendulum", "live"), (f"{written}/spring.py:spring", "spring")):
-        page = show(name)
-        page.locator('input[aria-label^="q"]').first.fill("0.4")  # from where it starts, whatever it is set to
-        page.click("#live-digest")
-        until(page, lambda page=page: page.locator("#live-digits").inner_text())
-        found[scene] = page.locator("#live-digits").inner_text().partition(":")[0]
-    for scene, digest in found.items():
-        assert cli.main(["certify", scene, "--bits", "--json"]) == 0
-        ways = json.loads(capsys.readouterr().out)["ways"]
-        of_page = [way["digest"] for way in ways if way["name"].startswith("live page")]  # masses are inputs there
-        assert {digest} == {*(of_page or [way["digest"] for way in ways if "WebAssembly" in way["name"]])}
 
 
 def test_a_system_without_places_shows_its_course_before_anything_runs(show):

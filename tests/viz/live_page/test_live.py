@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import base64
 import json
 import math
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,10 +14,16 @@ from py_mini_racer import MiniRacer
 import cgraph as cg
 import dynamics as dyn
 import viz
+from cgraph.core.node import apply
+from cgraph.extend import OPS, Op
 from dynamics.integrators import TABLEAUS
+from dynamics.scenes.scenes import of_model
 from tests.each_row import each_row
+from tests.registered import registered
+from viz.lessons.screens.energy_and_step import energy_and_step
+from viz.lessons.subject import subject_of
 from viz.live_page import Live, page_text
-from viz.live_page.live_panel import SCRIPTS
+from viz.live_page.live_panel import SCRIPTS, functions
 from viz.models.live_motion import live_of
 from viz.pages.html import asset
 
@@ -33,16 +39,12 @@ def live():
 class Script:
     """The panel's script in V8, without a page: a machine and a run on data."""
 
-    def __init__(self, data: dict) -> None:
+    def __init__(self, live: Live) -> None:
         self.engine = MiniRacer()
         self.engine.eval(
-            f'"use strict";\n{asset("viz.live_page", *SCRIPTS)}\nvar data = {json.dumps(data)}, machine, run;'
+            f'"use strict";\n{functions(live)}{asset("viz.live_page", *SCRIPTS)}\n'
+            f"var data = {json.dumps(live.to_dict())}, machine = liveMachine(data, LIVE), run = liveRun(machine, data);"
         )
-        codes = [list(base64.b64decode(data[name])) for name in ("rate", "shown")]  # V8 alone has no atob
-        modules = [f"new WebAssembly.Module(Uint8Array.of({str(code)[1:-1]}))" for code in codes]
-        instances = ", ".join([f"new WebAssembly.Instance({module}, {{ math: Math }})" for module in modules])
-        self.engine.eval(f"machine = liveMachine(data, [{instances}])")
-        self.engine.eval("run = liveRun(machine, data)")
 
     def __call__(self, program: str) -> object:
         """The value of an expression, through JSON."""
@@ -51,7 +53,7 @@ class Script:
 
 @pytest.fixture(scope="module")
 def engine(live):
-    started = Script(live.to_dict())
+    started = Script(live)
     yield started
     started.engine.close()
 
@@ -134,7 +136,7 @@ def test_an_error_is_large_or_small_in_any_unit_and_a_link_keeps_parameters_of_a
             ["x"],
             {"time": 2.0, "method": 3.0},
         )
-        script = Script(live_of(dyn.Scene("spring", "bounces", spring, (size,), (0.0,), 1.0)).to_dict())
+        script = Script(live_of(dyn.Scene("spring", "bounces", spring, (size,), (0.0,), 1.0)))
         script.engine.eval("run.state.dt = 0.3; run.steps(4)")
         shares.append(script("[run.now().since.share, run.now().ahead.share]"))
         script.engine.eval(
@@ -320,5 +322,27 @@ def test_a_start_that_is_no_number_is_told():
 def test_a_center_that_attracts_has_a_page():
     """Its state at 0 has no rates, and no weight that sliders could be as long as."""
     planet = dyn.System(lambda q, qd, t: qd[0] ** 2 + qd[1] ** 2 + 1.0 / cg.hypot(q[0], q[1]), "x y")
-    assert "wasm-unsafe-eval" in viz.live(planet)
-    assert "wasm-unsafe-eval" in viz.live(planet, start=[0.0, 0.0, 0.0, 0.0])
+    assert "const LIVE = {" in viz.live(planet)
+    assert "const LIVE = {" in viz.live(planet, start=[0.0, 0.0, 0.0, 0.0])
+
+
+def test_an_operation_of_ones_own_works_in_pages_and_one_without_javascript_is_told():
+    """A spring whose potential is such an operation."""
+    values = lambda x: x * x, lambda x: x * x, lambda y, x: (2.0 * x,)
+    bowl = Op("bowl", 1, *values, samples=((0.6,),), javascript="(x) => { return x * x; }")
+
+    def spring(op):
+        return dyn.System(lambda q, qd, t: qd[0] ** 2 - apply(op, q[0]), ["x"])
+
+    with registered(OPS, bowl=bowl):
+        script = Script(live_of(of_model(spring(bowl))))
+        script.engine.eval("run.set(0, 0.3)")
+        potential = [each["called"] for each in script("data.meters")].index("potential")
+        assert script(f"run.now().values[{potential}]") == pytest.approx(0.09)
+        script.engine.close()
+        assert bowl.javascript in energy_and_step(subject_of(spring(bowl))).play["modules"]
+    bare = replace(bowl, javascript="")
+    with registered(OPS, bowl=bare):
+        for made in (viz.live, lambda system: energy_and_step(subject_of(system))):
+            with pytest.raises(ValueError, match=r"'bowl' has no text in JavaScript, .* the column `javascript`"):
+                made(spring(bare))

@@ -21,9 +21,9 @@ SVG, MATHML = "http://www.w3.org/2000/svg", "http://www.w3.org/1998/Math/MathML"
 ARM = dyn.planar_arm([1.0, 0.8], [1.0, 0.8])
 X = cg.variable("x")
 PAGES = {  # kind: its page, bytes at most, and the one thing that its policy allows besides
-    "inspect": (lambda: viz.inspect(ARM, t_end=0.2), 400_000, "'wasm-unsafe-eval'"),
+    "inspect": (lambda: viz.inspect(ARM, t_end=0.2), 400_000, ""),
     "page": (lambda: viz.page(cg.Graph([X], {"y": cg.sin(X)}), tables=[Table("t", ["a"], [["b"]])]), 200_000, ""),
-    "live": (lambda: viz.live(ARM), 60_000, "'wasm-unsafe-eval'"),
+    "live": (lambda: viz.live(ARM), 60_000, ""),
     "typed": (viz.typed_page, 500_000, ""),
     "lesson": (lambda: viz.lesson(ARM), 200_000, ""),
     "paper": (lambda: page_of([equations(), figures_1_to_3()], {}), 200_000, ""),

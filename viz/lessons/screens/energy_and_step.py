@@ -13,7 +13,6 @@ from dynamics import SimulationWarning, energy, simulate, state_equation
 
 from ... import theme
 from ...pages.document import Table
-from ...pages.operations import graph_data
 from ..glossary import term
 from ..screen import Screen
 from ..subject import Subject, number
@@ -38,10 +37,7 @@ def energy_and_step(subject: Subject) -> Screen:
     rows = [[f"{t_end / (factor * steps):.3g}", number(error)] for factor, error in measured.errors.items()]
     play = subject.play(
         "energy",
-        {"rate": rate},
-        energy=graph_data(total),
-        nq=subject.system.nq,
-        n=subject.system.n,
+        {"rate": rate, "energy": total},
         t_end=min(subject.scene.t_end, 3.0),
         fine=2000 if len(rate.nodes) < 1000 else 500,
         colors=[theme.ORANGE, theme.BLUE],

@@ -1,1 +1,0 @@
-"""WebAssembly: a graph as a module that computes it, and steps its motion."""
