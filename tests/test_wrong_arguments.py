@@ -319,7 +319,7 @@ CALLS = {
     "dyn.cases.load": call(dyn.cases.load, "exponential decay"),
     "viz.lesson": call(viz.lesson, ARM, None, subject="torque", form="page", title="t", author="a"),
     "viz.animate": call(
-        viz.animate, ARM, dyn.simulate(ARM, [0.1], [0.0], 0.04), None, kind=None, wanted=lambda t: t[:, np.newaxis],
+        viz.animate, ARM, dyn.simulate(ARM, [0.1], [0.0], 0.04), None, wanted=lambda t: t[:, np.newaxis],
         marked=(), speed=1.0, dark=False, title=""
     ),
     "viz.driven": call(viz.driven, ARM, "chain_rule", 0.1),
