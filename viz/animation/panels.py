@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -222,7 +222,7 @@ def film(panel: FilmPanel, t: Array, dark: bool = False, title: str = "") -> byt
         return to_gif(figure, frame, (len(t) - 1) // FRAME_ROWS + 1, RATE)
 
 
-def _line(axis: Axes, **looks: object) -> Line2D:
+def _line(axis: Axes, **looks: Any) -> Line2D:
     """An empty line."""
     line: Line2D = axis.plot([], [], solid_capstyle="round", **looks)[0]
     return line
