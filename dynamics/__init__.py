@@ -56,7 +56,6 @@ if TYPE_CHECKING:
     from .integrators import METHODS as METHODS
     from .io.load import load_mjcf as load_mjcf, load_urdf as load_urdf
     from .io.write_mjcf import to_mjcf as to_mjcf
-    from .io.write_urdf import to_urdf as to_urdf
     from .multibody.bodies.limits import Limits as Limits
     from .multibody.builders.build_tree import serial_arm as serial_arm, tree as tree
     from .multibody.builders.planar_arm import planar_arm as planar_arm

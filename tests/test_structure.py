@@ -23,7 +23,6 @@ OPTIONAL = {
     "wasmtime": "wasmtime",
     "resvg_py": "resvg-py",
     "matplotlib": "matplotlib",
-    "PIL": "pillow",
     "mujoco": "mujoco",
     "llvmlite": "llvmlite",
     "scipy": "scipy",

@@ -103,6 +103,9 @@ HALVE = cg.Graph([X], {"next": 0.5 * X})
 LOOP = cg.loop(HALVE, {"x": "next"}, "python")
 DECAY = dyn.OdeSystem(lambda x, t: [-x[0]], ["x"])
 MOTION = dyn.prepare(ARM, "rk4", dt=0.01, backend="python", estimate_error=False)
+ROBOT = """<robot name="r"><link name="world"/><link name="b"><inertial><mass value="1"/>
+<inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="j" type="continuous"><parent link="world"/><child link="b"/></joint></robot>"""
 RUN = dyn.simulate(ARM, [0.1], [0.0], 0.02, "rk4", dt=0.01, backend="python", dense_output=True)
 TABLE, SYSTEM, SUBTREE = dyn.torque_by_link(ARM), dyn.System(lagrangian, ["a"]), TWO.subtree(TWO.bodies[1].name)
 EXACT = Reference((0.0, 1.0), (("0.0", "1.0"), ("0.0", "1.0")), 1e-30, "by hand")
@@ -128,7 +131,7 @@ RUNS = {"dt": 0.01, "max_steps": 100, "backend": "python", "fma": False, "estima
 MODEL_ALONE = """as_system bias center_of_mass center_of_mass_jacobian conserved_momenta coriolis damping_force
     base_parameters display_names energy gravity_force inertial_parameters inverse_dynamics_derivatives
     inverse_mass_matrix kinetic_energy mass_matrix momentum potential_energy regressor
-    to_urdf torque_by_joint_motion torque_by_link RecursiveInverseDynamics"""
+    torque_by_joint_motion torque_by_link RecursiveInverseDynamics"""
 
 CALLS = {
     **{f"cg.{op.name}": call(function(op), *[X] * op.arity) for op in OPS.values()},
@@ -215,7 +218,7 @@ CALLS = {
         contacts="compliant"
     ),
     "dyn.load_urdf": call(
-        dyn.load_urdf, dyn.to_urdf(ARM), ignore=True, limits=(1e3, 0.1), friction=0.1, floating=False,
+        dyn.load_urdf, ROBOT, ignore=True, limits=(1e3, 0.1), friction=0.1, floating=False,
         contacts="compliant"
     ),
     "dyn.planar_arm": call(dyn.planar_arm, [1.0], [1.0], 0.0, "rod", 9.81, parameters=None),
@@ -316,7 +319,7 @@ CALLS = {
     "dyn.cases.load": call(dyn.cases.load, "exponential decay"),
     "viz.lesson": call(viz.lesson, ARM, None, subject="torque", form="page", title="t", author="a"),
     "viz.animate": call(
-        viz.animate, ARM, dyn.simulate(ARM, [0.1], [0.0], 0.04), None, kind=None, wanted=lambda t: t[:, np.newaxis],
+        viz.animate, ARM, dyn.simulate(ARM, [0.1], [0.0], 0.04), None, wanted=lambda t: t[:, np.newaxis],
         marked=(), speed=1.0, dark=False, title=""
     ),
     "viz.driven": call(viz.driven, ARM, "chain_rule", 0.1),

@@ -1,77 +1,69 @@
-"""The command line `cgraph`: the signals first, then the imports, which take a while, then one command."""
+"""The command line `cgraph`: one command, its exit status, and a line for an error."""
 
 from __future__ import annotations
 
 import io
 import os
-import select
 import signal
 import sys
 import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
-from .commands.signals import ENDING, ignore_late, settled, stoppable, stopped, watch_loading
+from .commands.command import parse
 
-SUCCESS, FINDING, ERROR = 0, 1, 2  # exit statuses, as docs/commands.md has them
+SUCCESS, FINDING, ERROR, INTERRUPTED, UNREAD = 0, 1, 2, 130, 141  # exit statuses, as docs/commands.md has them
 ERRORS = (ValueError, TypeError, OSError, ImportError, RuntimeError, MemoryError, ArithmeticError)
 
 
 def start() -> int:
-    """The process's command: `main` with the signals of the first second, and warnings in a line.
+    """The process's command: `main`, which Ctrl-C ends, and warnings in a line.
 
     A letter that standard output cannot encode is written as its number, as Python does on standard error.
     """
-    watch_loading()
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # it is ignored in a background job
+        signal.signal(signal.SIGINT, _interrupt)
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")
     try:
         status = main()
-        if stopped() and status == 128 + stopped():  # all is cleaned up, but threads may still be in machine code,
-            os._exit(status)  # which the end of Python does not wait for, and may not survive
-        return status
     except Exception:  # noqa: BLE001 (a mistake of ours must not look like a finding, which status 1 is)
         sys.excepthook(*sys.exc_info())
         return ERROR
-    finally:
-        ignore_late()
+    if status == INTERRUPTED:  # threads may still be in machine code, which the end of Python may not survive
+        os._exit(status)
+    return status
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; returns the exit status.
 
-    0 fine, 1 a finding, 2 an error (one line on standard error), 128 and the number of a signal that ended it:
-    130 Ctrl-C, 143 SIGTERM, 141 where nobody reads standard output any more.
-    Raises SystemExit with status 2, after the usage, for wrong arguments.
+    0 fine, 1 a finding, 2 an error (one line on standard error), 130 interrupted by Ctrl-C, 141 where nobody reads
+    standard output any more. Raises SystemExit with status 2, after the usage, for wrong arguments.
     """
-    with stoppable():
-        try:
-            return _command(arguments)
-        except BaseException as error:
-            if stopped() or isinstance(error, KeyboardInterrupt):  # whatever became of the exception on its way
-                number = stopped() or signal.SIGINT
-                _say(ENDING[signal.Signals(number)])
-                return 128 + number
-            if isinstance(error, BrokenPipeError) and _nobody_reads():  # the reader, such as `head`, has had enough
-                _discard_output()
-                return 128 + getattr(signal, "SIGPIPE", 13)
-            if isinstance(error, ERRORS):
-                _discard_output()
-                _say(f"error: {' '.join(_sentence(error).split())}")
-                return ERROR
+    try:
+        options = parse(arguments)
+        with _shown_warnings():
+            status: int | None = options.run(options)
+        if sys.stdout is not None:
+            sys.stdout.flush()
+        return status or SUCCESS
+    except (KeyboardInterrupt, SystemExit) as error:
+        if isinstance(error, SystemExit) and error.code != INTERRUPTED:
             raise
+        _say("interrupted")
+        return INTERRUPTED
+    except ERRORS as error:
+        _discard_output()
+        if isinstance(error, BrokenPipeError):  # the reader, such as `head`, has had enough
+            return UNREAD
+        _say(f"error: {' '.join(_sentence(error).split())}")
+        return ERROR
 
 
-def _command(arguments: Sequence[str] | None) -> int:
-    from .commands.command import parse  # here, where a signal is awaited: with all else it takes a second
-
-    options = parse(arguments)
-    with _shown_warnings():
-        status: int | None = options.run(options)
-    settled()
-    if sys.stdout is not None:
-        sys.stdout.flush()
-    return status or SUCCESS
+def _interrupt(*_: object) -> None:
+    """End the command by Ctrl-C: a KeyboardInterrupt ends a simulation alone, which keeps the rows that it has."""
+    raise SystemExit(INTERRUPTED)
 
 
 @contextmanager
@@ -92,15 +84,6 @@ def _shown_warnings() -> Iterator[None]:
 def _say(line: str) -> None:
     if sys.stderr is not None:
         print(f"cgraph: {line}", file=sys.stderr, flush=True)
-
-
-def _nobody_reads() -> bool:
-    """Whether the pipe that broke is standard output."""
-    if not hasattr(select, "poll"):
-        return True
-    output = select.poll()
-    output.register(sys.stdout, 0)
-    return any(event & (select.POLLERR | select.POLLHUP) for _, event in output.poll(0))
 
 
 def _discard_output() -> None:

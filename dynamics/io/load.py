@@ -15,7 +15,7 @@ from ..multibody.bodies.joint_coordinates import neutral
 from ..multibody.trees.mechanism import Mechanism, MechanismError
 from .contacts import Material, standing
 from .left_out import warned
-from .mujoco_twin import mujoco
+from .mujoco_module import mujoco
 from .read_mjcf import compiled_mjcf, read_mjcf
 from .read_urdf import add_floating_base, origin_of, read_urdf
 from .smooth_forces import smooth
@@ -144,9 +144,11 @@ def load_urdf(
     Examples
     --------
     >>> import dynamics as dyn
-    >>> rotor = dyn.Body("rotor", dyn.Joint("revolute"), mass=1.0, inertia=(0.1, 0.1, 0.1))
-    >>> dyn.load_urdf(dyn.to_urdf(dyn.Mechanism([rotor]))).coordinates
-    ('rotor',)
+    >>> inertia = '<mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
+    >>> rotor = f'<link name="base"/><link name="rotor"><inertial>{inertia}</inertial></link>'
+    >>> joint = '<joint name="j" type="continuous"><parent link="base"/><child link="rotor"/></joint>'
+    >>> dyn.load_urdf(f'<robot name="r">{rotor}{joint}</robot>').coordinates
+    ('j',)
     """
     taken = smooth(limits, friction, False, contacts)
     return warned(read_urdf(urdf_root(source), called(source), ignore, floating, taken), called(source))

@@ -12,7 +12,7 @@ from cgraph._shared import Array
 from ..multibody.algebra import spatial
 from .contacts import Ball, capsule_ends
 from .left_out import listed, present
-from .mujoco_twin import mujoco
+from .mujoco_module import mujoco
 from .smooth_forces import disabled
 
 if TYPE_CHECKING:

@@ -2,42 +2,21 @@
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import replace
-from types import ModuleType
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cgraph._shared import Array, install
+from cgraph._shared import Array
 
 from ..multibody.builders.planar_arm import planar_links
 from ..multibody.trees.mechanism import Mechanism, MechanismError, require_mechanism
 from ..systems.model import Model
-from .write_mjcf import to_mjcf
+from .mujoco_module import mujoco
+from .write_mjcf import mujoco_spec
 
 if TYPE_CHECKING:
     from mujoco import MjModel
-
-
-def mujoco() -> ModuleType:
-    """The mujoco module. Raises ImportError naming the extra when it is not installed."""
-    try:
-        import mujoco as module
-    except ImportError as error:
-        raise ImportError(f"MuJoCo is not installed: {install('mujoco')}") from error
-    if module.get_mju_user_warning() is None:  # by itself it adds a warning to a file in the current folder
-        module.set_mju_user_warning(_warn)
-    found: ModuleType = module  # it has no types
-    return found
-
-
-def _warn(text: str) -> None:
-    """MuJoCo's warning as Python's."""
-    with suppress(BaseException):  # an exception that leaves a callback aborts the process
-        warnings.warn(f"MuJoCo: {' '.join(text.split())}", stacklevel=2)
 
 
 def joint_order(mj: MjModel, mechanism: Mechanism) -> tuple[list[int], list[int]]:
@@ -46,24 +25,6 @@ def joint_order(mj: MjModel, mechanism: Mechanism) -> tuple[list[int], list[int]
     q = [int(joint.qposadr[0]) + k for joint, kind in joints for k in range(len(kind.coordinates))]
     u = [int(joint.dofadr[0]) + k for joint, kind in joints for k in range(len(kind.velocities))]
     return q, u
-
-
-def rollout(mj: MjModel, starts: Array, states: Array) -> Callable[[], None]:
-    """A run of MuJoCo's own native loop of steps, one thread, from every start.
-
-    starts: (N, 1 + 2n), the time, positions and velocities in MuJoCo's order.  states: (N, steps, 1 + 2n), which each
-    run overwrites with what is after every step. The model, such as its time step, is read when it runs.
-    """
-    module = mujoco()
-    from mujoco.rollout import rollout as native
-
-    models, data = [mj] * len(starts), [module.MjData(mj)]  # one datum: one thread
-    steps, sensors = states.shape[1], np.empty((*states.shape[:2], 0))
-
-    def run() -> None:
-        native(models, data, starts, nstep=steps, state=states, sensordata=sensors, skip_checks=True)
-
-    return run
 
 
 def _tree(mechanism: Mechanism) -> Mechanism:
@@ -83,7 +44,7 @@ class MujocoTwin:
     def __init__(self, of: Model, timestep: float = 1e-3) -> None:
         self.mujoco = mujoco()
         self.mechanism = require_mechanism(of, "MuJoCo").bind()
-        self.model = self.mujoco.MjModel.from_xml_string(to_mjcf(_tree(self.mechanism), timestep))
+        self.model = mujoco_spec(_tree(self.mechanism), timestep).compile()
         self.data = self.mujoco.MjData(self.model)
 
     def require_tree(self, what: str) -> None:

@@ -15,7 +15,7 @@ from ..multibody.algebra import spatial
 from ..multibody.bodies.body import WORLD, Body, MechanismError
 from ..multibody.loops import Loop
 from .left_out import listed, present
-from .mujoco_twin import mujoco
+from .mujoco_module import mujoco
 from .smooth_forces import disabled
 
 if TYPE_CHECKING:

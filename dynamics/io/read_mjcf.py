@@ -21,7 +21,7 @@ from ..multibody.trees.mechanism import WORLD, Body, Joint, Mechanism, Mechanism
 from .contacts import untaken, with_contacts
 from .left_out import listed, present, refused_or_left_out
 from .mjcf_contacts import has_balls, mjcf_balls
-from .mujoco_twin import mujoco
+from .mujoco_module import mujoco
 from .read_equality import left_of_equalities, other_equalities, read_loops
 from .smooth_forces import (
     NONE,

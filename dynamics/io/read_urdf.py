@@ -24,7 +24,7 @@ from .left_out import follows_itself, listed, present, refused_or_left_out
 from .smooth_forces import NONE, Smooth
 
 GRAVITY = (0.0, 0.0, -9.81)  # m/s^2, where the file says nothing
-FAR_LIMIT = 1e9  # in any unit: a limit that `to_urdf` writes because URDF asks for one; it stands for none
+FAR_LIMIT = 1e9  # in any unit: a limit that is there because URDF asks for one; it stands for none
 BALLS = ("sphere", "capsule")  # shapes whose contacts are taken
 _OTHERS = {"revolute": "revolute", "planar": "planar"}  # beside the words of joint types: a hinge with limits, three
 _ENTRIES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")

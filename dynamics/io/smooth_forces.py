@@ -15,7 +15,7 @@ from ..multibody.bodies.body import Body, MechanismError
 from ..multibody.bodies.limits import ANYTHING, Limits
 from ..multibody.forces.joint_force import Actuator, JointForce, JointFriction, JointLimit, Range
 from .contacts import Material, asked
-from .mujoco_twin import mujoco
+from .mujoco_module import mujoco
 
 if TYPE_CHECKING:
     from mujoco import MjModel

@@ -1,11 +1,11 @@
-"""MJCF written: the text of a mechanism for MuJoCo."""
+"""MJCF written: a mechanism as a specification of MuJoCo's, and the text that MuJoCo writes of it."""
 
 from __future__ import annotations
 
 import math
 import warnings
 from collections.abc import Sequence
-from xml.sax.saxutils import quoteattr
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,24 +13,31 @@ from cgraph._shared import Array, real_number
 
 from ..multibody.algebra import spatial
 from ..multibody.bodies.limits import ANYTHING, NO_LIMITS, Pair
+from ..multibody.loops import Loop
 from ..multibody.quantities.body_quantity import of_bodies
-from ..multibody.trees.mechanism import WORLD, Body, MechanismError, MechanismWarning, require_mechanism
+from ..multibody.trees.mechanism import WORLD, Body, Mechanism, MechanismError, MechanismWarning, require_mechanism
 from ..systems.model import Model
 from .left_out import listed, present
+from .mujoco_module import mujoco, text_of
 from .stand_ins import INERTIA_ROUNDING, with_stand_ins
-from .write_loops import equality_lines, numbers, site_lines
+
+if TYPE_CHECKING:
+    from mujoco import MjSpec
+
+_DEGREE = 4  # of MJCF's polycoef
+_OF_SITES = {"point": "CONNECT", "weld": "WELD"}
 
 
 @of_bodies
 def to_mjcf(model: Model, timestep: float = 1e-3) -> str:
     """The bodies of a model as MJCF text: masses and inertias explicit, RK4, contacts and limits off.
 
-    `load_mjcf` reads the same bodies from it, those that one carries before the next. Names, positions, centers, masses
-    and coefficients are the same to the last bit; axes, orientations and inertias to a few roundings, which quaternions
-    and principal axes cost. Joints have the names of the coordinates; one that is locked is a weld. MuJoCo takes no
-    zero for the mass and moments of a body that moves: 1e-15 stands for it there, and is zero again when it is read.
-    Of parameters the values are written. Of loops, points and welds are equality constraints of sites, and couplings
-    those of joints: MuJoCo has them soft.
+    MuJoCo writes it. `load_mjcf` reads the same bodies from it, those that one carries before the next. Names,
+    positions, centers, masses and coefficients are the same to the last bit; axes, orientations and inertias to a few
+    roundings, which quaternions and principal axes cost. Joints have the names of the coordinates; one that is locked
+    is a weld. MuJoCo takes no zero for the mass and moments of a body that moves: 1e-15 stands for it there, and is
+    zero again when it is read. Of parameters the values are written. Of loops, points and welds are equality
+    constraints of sites, and couplings those of joints: MuJoCo has them soft.
 
     Limits of position are the joints' `range`, those of effort their `actuatorfrcrange`. As in the model, they are
     numbers and hold no motion, by `<flag limit="disable">`; without it MuJoCo holds them. MJCF has no limits
@@ -53,6 +60,8 @@ def to_mjcf(model: Model, timestep: float = 1e-3) -> str:
         less than 1e-15 kg or kg m^2, zeros where 1e-15 is more than 1e-9 of what moves with them, and free joints other
         than on the world, in its axes and at its origin; for loops of other kinds, couplings of more than degree 4 and
         those of locked joints; and for forces on bodies: in MuJoCo they are state, `xfrc_applied`, and not the model's.
+    ImportError
+        Without MuJoCo.
 
     Examples
     --------
@@ -61,7 +70,13 @@ def to_mjcf(model: Model, timestep: float = 1e-3) -> str:
     >>> text.count("<joint")
     2
     """
-    mechanism = require_mechanism(model, "MJCF").bind()
+    spec = mujoco_spec(require_mechanism(model, "MJCF").bind(), timestep)
+    spec.compile()
+    return text_of(spec)
+
+
+def mujoco_spec(mechanism: Mechanism, timestep: float) -> MjSpec:
+    """MuJoCo's specification of a mechanism without parameters. Raises what `to_mjcf` does."""
     if not 0.0 < real_number("timestep", timestep) < math.inf:
         raise ValueError(f"timestep must be positive and finite, got {timestep!r} s")
     if mechanism.forces:
@@ -69,57 +84,61 @@ def to_mjcf(model: Model, timestep: float = 1e-3) -> str:
     bodies = mechanism.parts
     _tell_left_out(bodies)
     moments = {body.name: _principal(body) for body in bodies}
-    inertial = {
-        name: (mass, _diagonal(values, moments[name][1]))
-        for name, (mass, values) in with_stand_ins(bodies, moments).items()
-    }
-    children: dict[str, list[Body]] = {}
+    inertial = with_stand_ins(bodies, moments)
+    module = mujoco()
+    spec = module.MjSpec()
+    spec.modelname, spec.compiler.degree = "mechanism", False
+    spec.compiler.inertiafromgeom = module.mjtInertiaFromGeom.mjINERTIAFROMGEOM_FALSE
+    spec.option.timestep, spec.option.gravity = timestep, np.asarray(mechanism.gravity, np.float64)
+    spec.option.integrator = module.mjtIntegrator.mjINT_RK4
+    spec.option.disableflags = module.mjtDisableBit.mjDSBL_CONTACT | module.mjtDisableBit.mjDSBL_LIMIT
+    made = {WORLD: spec.worldbody}
     for body in bodies:
-        children.setdefault(body.parent, []).append(body)
-    lines = [
-        '<mujoco model="mechanism">',
-        '  <compiler angle="radian" inertiafromgeom="false"/>',
-        f'  <option timestep="{timestep!r}" integrator="RK4" gravity="{numbers(mechanism.gravity)}">',
-        '    <flag contact="disable" limit="disable"/>',
-        "  </option>",
-        "  <worldbody>",
-    ]
-    sites = site_lines(mechanism.loops)
-    lines += [f"    {line}" for line in sites.get(WORLD, ())]
-    indent = 2
-    stack: list[Body | None] = [*reversed(children.get(WORLD, []))]  # None closes a body
-    while stack:
-        opened = stack.pop()
-        if opened is None:
-            indent -= 1
-            lines.append("  " * indent + "</body>")
-            continue
-        inside = [f"  {line}" for line in sites.get(opened.name, ())]
-        lines += ["  " * indent + line for line in [*_body_lines(opened, *inertial[opened.name]), *inside]]
-        indent += 1
-        stack += [None, *reversed(children.get(opened.name, []))]
-    return "\n".join([*lines, "  </worldbody>", *equality_lines(mechanism), "</mujoco>"]) + "\n"
+        mass, values = inertial[body.name]
+        made[body.name] = made[body.parent].add_body(
+            name=body.name,
+            **_place(body.joint.position, body.joint.orientation),
+            mass=mass,
+            ipos=np.asarray(body.center, np.float64),
+            iquat=spatial.to_quaternion(moments[body.name][1]),
+            inertia=values,
+            explicitinertial=True,
+        )
+        if body.joint.type.moves:
+            made[body.name].add_joint(**_joint(body))
+    for loop in mechanism.loops:
+        _add_equality(spec, made, mechanism, loop)
+    return spec
 
 
-def _body_lines(body: Body, mass: float, moments: str) -> list[str]:
-    joint = body.joint
-    x, y, _ = np.asarray(joint.orientation).T
-    place = f'pos="{numbers(joint.position)}" xyaxes="{numbers(np.concatenate([x, y]))}"'
-    lines = [f"<body name={quoteattr(body.name)} {place}>"]
-    if joint.type.moves:
-        _require_joint(body)
-        spring = f'damping="{joint.damping!r}" armature="{joint.armature!r}"'
-        if joint.type.has_axis:
-            spring = f'springref="{joint.spring_reference!r}" axis="{numbers(joint.axis)}" {spring}'
-        if joint.type.sprung:
-            spring = f'stiffness="{joint.stiffness!r}" {spring}'
-        limits = joint.limits or NO_LIMITS
-        for attribute, ends in (("range", limits.position), ("actuatorfrcrange", limits.effort)):
-            if _ranged(ends):
-                spring += f' {attribute}="{numbers(ends)}"'
-        lines.append(f'  <joint name={quoteattr(body.coordinate)} type="{joint.type.mjcf}" {spring}/>')
-    lines.append(f'  <inertial pos="{numbers(body.center)}" mass="{mass!r}" {moments}/>')
-    return lines
+def _place(position: Any, orientation: Any) -> dict[str, Array]:
+    return {
+        "pos": np.asarray(position, np.float64),
+        "quat": spatial.to_quaternion(np.asarray(orientation, np.float64)),
+    }
+
+
+def _joint(body: Body) -> dict[str, Any]:
+    """Fields of MuJoCo's joint. Raises MechanismError for one that MJCF has not, or with other coordinates."""
+    joint, where = body.joint, f"the joint of body {body.name!r}"
+    if not joint.type.mjcf:
+        raise MechanismError(f"MJCF has no joint of the kind {joint.kind!r}, as is {where}")
+    if joint.type.mjcf == "free":
+        if body.parent != WORLD:
+            raise MechanismError(f"in MJCF a free body hangs on the world, and body {body.name!r} on {body.parent!r}")
+        if np.any(np.asarray(joint.position)) or np.any(np.asarray(joint.orientation) != np.eye(3)):
+            raise MechanismError(f"in MJCF a free joint has the axes and the origin of the world, and {where} has not")
+    kind = getattr(mujoco().mjtJoint, f"mjJNT_{joint.type.mjcf.upper()}")
+    fields = {"name": body.coordinate, "type": kind, "damping": joint.damping, "armature": joint.armature}
+    if joint.type.has_axis:
+        fields |= {"axis": np.asarray(joint.axis, np.float64), "springref": joint.spring_reference}
+    if joint.type.sprung:
+        fields["stiffness"] = joint.stiffness
+    limits = joint.limits or NO_LIMITS
+    for field, ends in (("range", limits.position), ("actfrcrange", limits.effort)):
+        if _ranged(ends):
+            fields[field] = ends
+    return fields
 
 
 def _ranged(ends: Pair) -> bool:
@@ -137,19 +156,7 @@ def _tell_left_out(bodies: Sequence[Body]) -> None:
         f"limits whose ends are one number ({listed(narrow)})": narrow,
     }
     if left_out := present(what):
-        warnings.warn(f"MJCF has no {' and no '.join(left_out)}: left out", MechanismWarning, stacklevel=3)
-
-
-def _require_joint(body: Body) -> None:
-    """Raises MechanismError for a joint that MJCF does not have, or has with other coordinates."""
-    joint, where = body.joint, f"the joint of body {body.name!r}"
-    if not joint.type.mjcf:
-        raise MechanismError(f"MJCF has no joint of the kind {joint.kind!r}, as is {where}")
-    if joint.type.mjcf == "free":
-        if body.parent != WORLD:
-            raise MechanismError(f"in MJCF a free body hangs on the world, and body {body.name!r} on {body.parent!r}")
-        if np.any(np.asarray(joint.position)) or np.any(np.asarray(joint.orientation) != np.eye(3)):
-            raise MechanismError(f"in MJCF a free joint has the axes and the origin of the world, and {where} has not")
+        warnings.warn(f"MJCF has no {' and no '.join(left_out)}: left out", MechanismWarning, stacklevel=4)
 
 
 def _principal(body: Body) -> tuple[Array, Array]:
@@ -174,5 +181,40 @@ def _principal(body: Body) -> tuple[Array, Array]:
     return moments, axes
 
 
-def _diagonal(moments: Array, axes: Array) -> str:
-    return f'diaginertia="{numbers(moments)}" quat="{numbers(spatial.to_quaternion(axes))}"'
+def _add_equality(spec: MjSpec, made: dict[str, Any], mechanism: Mechanism, loop: Loop) -> None:
+    """Add the equality constraint of a loop, and its sites. Raises MechanismError for a loop that MJCF has not."""
+    module = mujoco()
+    if loop.kind == "coupling":
+        names = _coupled(mechanism, loop)
+        kind, held, data = "JOINT", module.mjtObj.mjOBJ_JOINT, _polynomial(loop)
+    elif loop.kind in _OF_SITES:
+        kind, held, data = _OF_SITES[loop.kind], module.mjtObj.mjOBJ_SITE, [0.0] * 10 + [1.0]  # torquescale of a weld
+        names = [f"{loop.label} at", f"{loop.label} to"]
+        turn = loop.orientation if loop.kind == "weld" else np.eye(3)
+        made[loop.body].add_site(name=names[0], **_place(loop.at, np.eye(3)))
+        made[loop.to].add_site(name=names[1], **_place(loop.to_at, turn))
+    else:
+        raise MechanismError(f"MJCF has no loop of the kind {loop.kind!r}, as is {loop.label!r}")
+    equality = spec.add_equality(name=loop.label, type=getattr(module.mjtEq, f"mjEQ_{kind}"), objtype=held)
+    equality.name1, equality.name2 = [*names, ""][:2]
+    equality.data[: len(data)] = data
+
+
+def _coupled(mechanism: Mechanism, loop: Loop) -> list[str]:
+    """Names of the joints of a coupling."""
+    parts = {body.name: body for body in mechanism.parts}
+    bodies = [parts[name] for name in (loop.body, loop.to) if name != WORLD]
+    for body in bodies:
+        if not body.joint.type.moves:
+            raise MechanismError(
+                f"MJCF has a locked joint as a weld, and loop {loop.label!r} couples that of {body.name!r}"
+            )
+    return [body.coordinate for body in bodies]
+
+
+def _polynomial(loop: Loop) -> list[float]:
+    """The coefficients of a coupling, of all degrees that MJCF has."""
+    coefficients = [float(each) for each in loop.coefficients]
+    if any(coefficients[_DEGREE + 1 :]):
+        raise MechanismError(f"MJCF has couplings of degree {_DEGREE} at most, and loop {loop.label!r} is of more")
+    return [*coefficients, *[0.0] * _DEGREE][: _DEGREE + 1]

@@ -6,7 +6,8 @@ import numpy as np
 
 from cgraph._shared import Array
 
-from ..io.mujoco_twin import MujocoTwin, joint_order, rollout
+from ..io.mujoco_module import rollout
+from ..io.mujoco_twin import MujocoTwin, joint_order
 from .peer import DT, PASSES, Peer, PeerModel, TimedTask, UnavailableError
 
 

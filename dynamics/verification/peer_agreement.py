@@ -17,7 +17,8 @@ from ..equations.equations_of_motion import forward_dynamics
 from ..equations.formulations.formulations import inverse_dynamics
 from ..equations.states.evaluate import evaluate
 from ..io.load import compiled
-from ..io.mujoco_twin import joint_order, mujoco
+from ..io.mujoco_module import mujoco
+from ..io.mujoco_twin import joint_order
 from ..multibody.bodies.body import Body, MechanismError
 from ..multibody.trees.mechanism import Mechanism, as_mechanism
 from ..peers.mujoco import MujocoPeer

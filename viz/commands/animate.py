@@ -20,8 +20,7 @@ def add(parser: Command) -> None:
     """The command's arguments."""
     takes_a_scene(parser)
     takes_a_start(parser)
-    parser.names["kinds"] = lambda: library.KINDS
-    parser.add_argument("--out", type=place, required=True, help="file to write: {kinds}, MP4 by ffmpeg")
+    parser.add_argument("--out", type=place, required=True, help="file to write, a .gif")
     parser.add_argument(
         "--driven", action="store_true", help="two side by side: the same motion is wanted, driven by two torques"
     )
@@ -43,12 +42,11 @@ def add(parser: Command) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Write the film; 1 where a motion ends before its time."""
-    if options.out.suffix not in library.KINDS:
-        raise ValueError(f"--out must end in {', '.join(library.KINDS[:-1])} or {library.KINDS[-1]}, got {options.out}")
+    library.require_film(options.out)
     if options.formulations and not options.driven:
         raise ValueError("--formulations goes with --driven")
     _shared.check_writable(options.out)
-    library.check_can_animate(options.out.suffix)
+    library.check_can_plot()
     scene, _ = started(options, free=not options.driven)
     end = scene.t_end if options.t_end is None else options.t_end
     library.frames(end, options.speed)  # before the work
@@ -67,7 +65,7 @@ def run(options: argparse.Namespace) -> int:
     say(f"{scene.name}: drawing {library.frames(max(each.t[-1] for each in motions.values()), options.speed)} frames")
     title = f"{scene.name}: the gray motion is wanted" if options.driven else ""
     film = library.animate(
-        scene, motions, kind=options.out.suffix, wanted=wanted, marked=marked, speed=options.speed, dark=options.dark,
+        scene, motions, wanted=wanted, marked=marked, speed=options.speed, dark=options.dark,
         title=title,
     )  # fmt: skip
     answer(f"{options.out}: {len(film) / 1e3:.0f} kB", {options.out: film})

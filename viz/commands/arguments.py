@@ -18,7 +18,6 @@ from cgraph import _shared
 
 from . import library
 from .command import Command
-from .signals import settled
 
 FORMULATIONS = (
     "by_definition",
@@ -107,11 +106,10 @@ def answer_page(options: argparse.Namespace, text: str, page: str) -> None:
 def answer(
     text: str, files: Mapping[Path, str | bytes] | None = None, *, folder: Path | None = None, show: Path | None = None
 ) -> None:
-    """The end of a command: its files, all or none, and what it prints. No signal comes in between.
+    """The end of a command: its files, all or none, and what it prints.
 
     folder: made for the files where it is missing.  show: the page to open in the browser.
     """
-    settled()
     places = {} if folder is None else {folder: None} | {path.parent: None for path in files or {}}
     missing = [each for place in places for each in (place, *place.parents) if not each.exists()]
     try:

@@ -69,7 +69,7 @@ COMMANDS = {
     "inspect": "one page on which a scene's equations unfold, move and answer; status 1 for a motion cut short",
     "live": "one page that computes a scene's motion, with sliders and meters",
     "simulate": "the motion of a scene: how the run went, its energy, and as CSV; status 1 if it is cut short",
-    "animate": "a film of a scene in motion (GIF, APNG or MP4); status 1 for a motion cut short",
+    "animate": "a film of a scene in motion (GIF); status 1 for a motion cut short",
     "type": "a page that a Lagrangian is typed into: derived, checked, drawn, moving",
     "lint": "check that a scene's equations are those of the chain rule; status 1 and the blame if they are not",
     "why": "what makes a torque, by cause and body; why it depends on an input; where a NaN comes from",

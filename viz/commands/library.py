@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from dynamics.verification.same_bits import same_bits
 
     from .. import theme
-    from ..animation.canvas import KINDS, check_can_animate
     from ..graph_drawing.dot import to_dot
     from ..graph_drawing.render import check_can_draw, render_png, render_svg, tags_to_collapse
     from ..lessons.lesson import LESSONS, lesson
@@ -40,7 +39,7 @@ if TYPE_CHECKING:
     from ..models.driven_motion import driven
     from ..models.equations import model_equations
     from ..models.equations_text import equations_latex, equations_text
-    from ..models.film import animate, frames
+    from ..models.film import animate, frames, require_film
     from ..models.inspection import FRAMES, inspection
     from ..models.inspection_page import first_view, inspection_page
     from ..models.live_motion import live

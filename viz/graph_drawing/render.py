@@ -22,6 +22,8 @@ ENGINES = ("dot", "neato", "fdp", "sfdp", "circo", "twopi", "osage", "patchwork"
 LONGEST_WAIT = 1e6  # s, that a drawing may be waited for
 LARGE_GRAPH = 500  # nodes; beyond, a layered drawing takes long and shows little
 
+_GRAPH = re.compile(r"graph[^{]*\{", re.IGNORECASE)
+
 # The WebAssembly Graphviz runs in a process of its own: it has no time limit, it aborts the process when threads use
 # it, and one failed drawing spoils the next. Its machine code is kept in wasmtime's cache, in the user's cache folder:
 # making it takes a second, loading it some milliseconds. Where that folder cannot be written, it is made every time.
@@ -91,6 +93,8 @@ def render_svg(dot_source: str | Drawing, *, engine: str = "dot", timeout: float
     source = dot_source if isinstance(dot_source, str) else getattr(dot_source, "source", None)
     if not isinstance(source, str):
         raise TypeError(f"render_svg needs DOT text or what to_dot returns, got {type(dot_source).__name__}")
+    if not _GRAPH.search(source):
+        raise RenderError(f"dot_source is no graph in DOT, such as 'digraph {{ a -> b }}', got {source!r:.60}")
     try:
         command = _command(engine)
         done = subprocess.run(command, input=source.encode(), capture_output=True, timeout=timeout, check=False)
@@ -102,7 +106,7 @@ def render_svg(dot_source: str | Drawing, *, engine: str = "dot", timeout: float
     start = svg.find("<svg")
     if done.returncode or start < 0:
         said = done.stderr.decode(errors="replace").strip() or f"exit status {done.returncode}, and no message"
-        raise RenderError(f"Graphviz cannot draw this: {said:.1000}")
+        raise RenderError(f"Graphviz cannot draw this dot_source: {said:.1000}")
     return svg[start:].replace(f'font-family="{theme.FONT}"', f'font-family="{theme.FONT_FAMILIES}"')
 
 

@@ -7,6 +7,7 @@ import math
 import os
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,7 +17,6 @@ from cgraph._shared import (
     check_writable,
     real_array,
     real_number,
-    require_choice,
     require_flag,
     require_path,
     require_sequence,
@@ -27,22 +27,18 @@ from dynamics.multibody.trees.joint_positions import skeleton
 from dynamics.multibody.trees.mechanism import as_mechanism
 from dynamics.systems.model import Model
 
-from ..animation.canvas import KINDS, RATE, check_can_animate, encode
-from ..animation.panels import FRAME_ROWS, Curves, FilmPanel, Motion, Sticks, film
+from ..animation.panels import FRAME_ROWS, RATE, Curves, FilmPanel, Motion, Sticks, film
+from ..plots.plot import check_can_plot
 
 MOST_FRAMES, MOST_MOTIONS = 1000, 4
 FILM = 10.0  # s, a length that is offered
 
 
 class Animation(bytes):
-    """The bytes of an animation; a notebook plays it.  kind: how its file ends, such as ".gif"."""
-
-    kind: str = ".gif"
+    """The bytes of a GIF; a notebook plays it."""
 
     def _repr_html_(self) -> str:
-        media = {".gif": "image/gif", ".mp4": "video/mp4"}.get(self.kind, "image/apng")
-        source = f'src="data:{media};base64,{base64.b64encode(self).decode()}" style="max-width:100%"'
-        return f"<video {source} controls autoplay loop muted></video>" if self.kind == ".mp4" else f"<img {source}>"
+        return f'<img src="data:image/gif;base64,{base64.b64encode(self).decode()}" style="max-width:100%">'
 
 
 def animate(
@@ -50,7 +46,6 @@ def animate(
     motions: Trajectory | Sequence[Trajectory] | Mapping[str, Trajectory],
     path: str | os.PathLike[str] | None = None,
     *,
-    kind: str | None = None,
     wanted: Callable[[Array], ArrayLike] | None = None,
     marked: Collection[str] = (),
     speed: float = 1.0,
@@ -68,9 +63,7 @@ def animate(
     motions : Trajectory, sequence of Trajectory, or mapping of str to Trajectory
         What `simulate` gave; a mapping has the words above each, up to four. One that ends early stays as it is.
     path : str or path, optional
-        The file to write: .gif, .png or .apng for an animated PNG, or .mp4, which needs the program ffmpeg.
-    kind : str, optional
-        How a film without a path is written: ".gif" by default.
+        The file to write, a .gif.
     wanted : callable, optional
         The motion that was wanted, drawn faint behind each: a function of times (T,) that gives coordinates (T, nq).
     marked : collection of str
@@ -93,9 +86,7 @@ def animate(
         For motions of another model, more than four or none, a path that ends otherwise, and for a film of fewer than 2
         frames or more than 1000, which are 40 s.
     ImportError
-        Without Pillow.
-    RuntimeError
-        For .mp4 without ffmpeg.
+        Without matplotlib.
     OSError
         For a path that cannot be written.
 
@@ -106,16 +97,14 @@ def animate(
     >>> arm = dyn.planar_arm([1.0, 0.5], [1.0, 0.8])
     >>> fall = dyn.simulate(arm, [1.5, 0.0], [0.0, 0.0], t_end=0.2)
     >>> film = viz.animate(arm, fall)
-    >>> film.kind, film[:6]
-    ('.gif', b'GIF89a')
+    >>> film[:6]
+    b'GIF89a'
     """
     target = None if path is None else require_path("the film's file", path)
-    if kind is None:
-        kind = KINDS[0] if target is None else target.suffix
-    require_choice("kind", kind, KINDS)
     if target is not None:
+        require_film(target)
         check_writable(target)
-    check_can_animate(kind)
+    check_can_plot()
     if not isinstance(title, str):
         raise TypeError(f"title must be text, got {type(title).__name__}: {title!r:.60}")
     model = scenes.of_model(model)
@@ -125,12 +114,16 @@ def animate(
         raise ValueError(f"marked: there is no motion {unknown[0]!r:.80} (there are {', '.join(known)})")
     times = _times(known.values(), speed)
     panel = _panel(model, known, times, wanted, set(wrong))
-    count = (len(times) - 1) // FRAME_ROWS + 1
-    made = Animation(encode(film(panel, times, require_flag("dark", dark), title), count, kind))
-    made.kind = kind
+    made = Animation(film(panel, times, require_flag("dark", dark), title))
     if target is not None:
         write_files({target: made})
     return made
+
+
+def require_film(target: Path) -> None:
+    """Raises ValueError for a file that is no GIF by its name."""
+    if target.suffix != ".gif":
+        raise ValueError(f"a film's file must end in .gif, got {str(target)!r:.80}")
 
 
 def _motions(model: Model, motions: object) -> dict[str, Trajectory]:

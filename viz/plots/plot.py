@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -73,6 +75,16 @@ def to_adaptive_svg(figure: Figure, *, background: bool = False) -> str:
     light, night = (f" background: {color};" if background else "" for color in (theme.WHITE, theme.DARK_PAGE))
     dark = f"@media (prefers-color-scheme: dark) {{ svg {{ color: {theme.DARK_TEXT};{night} }} }}"
     return f"{head}<style>svg {{ color: {theme.TEXT}; fill: currentColor;{light} }} {dark}</style>\n <defs>{rest}"
+
+
+def to_gif(figure: Figure, draw: Callable[[int], None], count: int, rate: int) -> bytes:
+    """A film of `count` frames, `rate` a second, that starts again at its end.  draw: makes the figure frame k."""
+    from matplotlib.animation import FuncAnimation, PillowWriter
+
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "a.gif"
+        FuncAnimation(figure, draw, count, cache_frame_data=False).save(path, PillowWriter(rate), dpi=100)
+        return path.read_bytes()
 
 
 def snapshots(times: Array, positions: Array, instants: Sequence[float], dots: Array | None = None) -> Figure:

@@ -15,7 +15,7 @@ from ... import scenes
 from ...equations.equations_of_motion import bias, forward_dynamics, mass_matrix
 from ...equations.formulations.formulations import inverse_dynamics
 from ...equations.states.consistent_state import nearest_state
-from ...io.mujoco_twin import mujoco, rollout
+from ...io.mujoco_module import mujoco, rollout
 from ...io.write_mjcf import to_mjcf
 from ...multibody.builders.planar_arm import planar_arm
 from ...multibody.loops import Loop

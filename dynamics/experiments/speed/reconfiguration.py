@@ -19,7 +19,7 @@ import cgraph as cg
 from cgraph._shared import Array
 
 from ...equations.formulations.formulations import inverse_dynamics
-from ...io.mujoco_twin import mujoco
+from ...io.mujoco_module import mujoco
 from ...io.write_mjcf import to_mjcf
 from ...multibody.algebra.spatial import rotation
 from ...multibody.bodies.body import Body, Joint

@@ -14,7 +14,7 @@ from cgraph import GraphError, to_jax
 from cgraph._shared import Array
 
 from ...integrators import Problem
-from ...io.mujoco_twin import rollout
+from ...io.mujoco_module import rollout
 from ...peers import PeerModel, UnavailableError
 from ...peers.casadi import casadi, our_function
 from ...peers.heyoka import expressions, heyoka

@@ -252,7 +252,7 @@ def test_rods_are_told_from_capsules_by_their_inertia() -> None:
 
 
 TWO_LINKS = dyn.planar_arm([1.0, 1.0], [1.0, 1.0])
-OF_ONE = to_mjcf(dyn.planar_arm([1.0], [1.0]))
+OF_ONE = '<mujoco><worldbody><body><joint/><geom size="1"/></body></worldbody></mujoco>'
 
 
 @each_row(
@@ -275,15 +275,28 @@ def test_what_cannot_be_certified_is_an_error(model: dyn.Model, given: dict[str,
         certify(model, **given)
 
 
+def urdf(parents: list[int]) -> str:
+    """Links on hinges, each on another, -1 for the world."""
+    link = (
+        '<link name="b{0}"><inertial><origin xyz="0 0.1 -0.5"/><mass value="1"/>'
+        '<inertia ixx="0.2" ixy="0" ixz="0" iyy="0.2" iyz="0" izz="0.1"/></inertial></link>'
+        '<joint name="j{0}" type="continuous"><parent link="{1}"/><child link="b{0}"/><origin xyz="0.1 0 -1"/>'
+        '<axis xyz="0 1 0.2"/></joint>'
+    )
+    links = [link.format(k, f"b{parent}" if parent >= 0 else "world") for k, parent in enumerate(parents)]
+    return f'<robot name="r"><link name="world"/>{"".join(links)}</robot>'
+
+
 def test_a_urdf_file_is_a_twin(tmp_path) -> None:
     """Its shapes are not read, so a mesh that is not there is no reason."""
     pytest.importorskip("mujoco")
-    shape = '<visual><geometry><mesh filename="nowhere.stl"/></geometry></visual>'
-    joint = dyn.Joint("revolute", (0.0, 1.0, 0.0), (0.0, 0.0, -1.0))
-    arm = dyn.serial_arm([{"joint": joint, "mass": 1.0, "center": (0.0, 0.0, -0.5), "inertia": (0.2, 0.2, 0.1)}] * 2)
     file = tmp_path / "arm.urdf"
-    file.write_text(dyn.to_urdf(arm).replace("<inertial>", f"{shape}<inertial>"))
-    found = certify(arm, FEW, twin=file)
+    file.write_text(
+        urdf([-1, 0]).replace(
+            "<inertial>", '<visual><geometry><mesh filename="nowhere.stl"/></geometry></visual><inertial>'
+        )
+    )
+    found = certify(dyn.load_urdf(urdf([-1, 0])), FEW, twin=file)
     assert failed(found) == {}
     assert "inverse dynamics = MuJoCo's" in [each.equation for each in found.residuals]
 
@@ -291,19 +304,17 @@ def test_a_urdf_file_is_a_twin(tmp_path) -> None:
 def test_a_twin_may_have_its_joints_in_another_order() -> None:
     """MuJoCo goes down each branch before the next, whatever the order of a URDF is."""
     pytest.importorskip("mujoco")
-    joint = dyn.Joint("revolute", (0.0, 1.0, 0.2), (0.1, 0.0, -1.0))
-    link = {"joint": joint, "mass": 1.0, "center": (0.0, 0.1, -0.5), "inertia": (0.2, 0.2, 0.1)}
-    mechanism = dyn.tree([-1, 0, 0, 1, 2, 1], [link] * 6)
-    assert failed(certify(mechanism, FEW, twin=dyn.to_urdf(mechanism))) == {}
+    text = urdf([-1, 0, 0, 1, 2, 1])
+    mechanism = dyn.load_urdf(text)
+    assert mechanism.coordinates == tuple([f"j{k}" for k in range(6)])
+    assert failed(certify(mechanism, FEW, twin=text)) == {}
 
 
 def test_the_command_translates_what_mujoco_cannot_read(tmp_path, capsys: pytest.CaptureFixture[str]) -> None:
     """Such as a link without mass between two joints."""
     pytest.importorskip("mujoco")
-    hinge = dyn.Joint("revolute", (0.0, 1.0, 0.0))
-    tip = dyn.Body("tip", dyn.Joint("revolute", (1.0, 0.0, 0.0)), "bare", 1.0, (0.2, 0.0, 0.5), (0.2, 0.3, 0.4))
     model = tmp_path / "model.urdf"
-    model.write_text(dyn.to_urdf(dyn.Mechanism([dyn.Body("bare", hinge), tip])))
+    model.write_text(re.sub("<inertial>.*?</inertial>", "", urdf([-1, 0]), count=1))
     assert cli.main(["certify", str(model), "--states", "3"]) == 0
     printed = capsys.readouterr()
     assert "inverse dynamics = MuJoCo's" in printed.out

@@ -91,7 +91,7 @@ def test_engines_draw_every_node(engine: str) -> None:
 
 def test_bad_dot_is_an_error_and_the_next_drawing_is_good(no_binary: None) -> None:
     good = render_svg("digraph { a -> b }")
-    with pytest.raises(RenderError, match=r"Graphviz cannot draw this: .*[Pp]arse"):
+    with pytest.raises(RenderError, match=r"Graphviz cannot draw this dot_source: .*[Pp]arse"):
         render_svg("digraph { a -> ")
     assert render_svg("digraph { a -> b }") == good
 

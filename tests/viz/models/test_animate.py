@@ -1,10 +1,8 @@
-"""Animations: frames in real time, every format, what is wrong in its color, and one sentence for what cannot be."""
+"""Animations: frames in real time, what is wrong in its color, and one sentence for what cannot be."""
 
 from __future__ import annotations
 
 import io
-import shutil
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -14,9 +12,10 @@ import dynamics as dyn
 import viz
 from dynamics import scenes
 from tests.each_row import each_row
-from viz.animation.canvas import DARK, LIGHT
+from viz.animation.panels import DARK, LIGHT
 from viz.models.film import _at, frames
 
+pytest.importorskip("matplotlib")
 Image = pytest.importorskip("PIL.Image")
 ARM = dyn.planar_arm([1.0, 0.5], [1.0, 0.8])
 FALL = dyn.simulate(ARM, [1.0, 0.2], [0.0, 0.0], t_end=0.08)
@@ -41,9 +40,9 @@ def has(frame, color: str) -> bool:
     return bool((np.abs(frame - wanted).sum(axis=2) < 24).any())
 
 
-@each_row(("kind", "model", "motion"), [(".gif", ARM, FALL), (".png", SYSTEM, SWING), (".apng", ARM, FALL)])
-def test_a_film_takes_the_time_of_the_motion(model, motion, kind, tmp_path):
-    path = tmp_path / f"film{kind}"
+@each_row(("model", "motion"), [(ARM, FALL), (SYSTEM, SWING)])
+def test_a_film_takes_the_time_of_the_motion(model, motion, tmp_path):
+    path = tmp_path / "film.gif"
     film = viz.animate(model, motion, path)
     assert path.read_bytes() == film
     found, seconds = opened(film)
@@ -71,8 +70,8 @@ def test_speed_and_a_motion_that_ends_early():
     found, seconds = opened(viz.animate(ARM, [FALL, short], speed=0.5))
     assert sum(seconds) == pytest.approx(0.2)
     left, right = zip(*[np.array_split(frame[:350], 2, axis=1) for frame in found], strict=True)
-    assert (left[-1] != left[-2]).any()
-    assert (right[-1] == right[-2]).all()
+    assert np.abs(left[-1] - left[-2]).max() > 100
+    assert np.abs(right[-1] - right[-2]).max() < 40  # each frame has colors of its own
 
 
 def test_between_rows_a_motion_is_cubic():
@@ -121,7 +120,7 @@ def test_a_notebook_plays_it():
         ((ARM, [FALL] * 5), {}, "1 to 4 motions side by side, got 5"),
         ((ARM, FALL), {"speed": 1e-9}, "at speed 1e-09 are 2e[+]09; speed 0.008 makes it 10 s long"),
         ((ARM, FALL), {"speed": 1e9}, "a film has 2 to 1000 frames"),
-        ((ARM, FALL, "film.avi"), {}, "kind must be one of .gif, .png, .apng, .mp4, got '.avi'"),
+        ((ARM, FALL, "film.avi"), {}, "a film's file must end in .gif, got 'film.avi'"),
         ((ARM, FALL), {"marked": ["a"]}, "there is no motion 'a'"),
         ((ARM, FALL), {"wanted": lambda t: t}, r"coordinates \(T, nq\) = \(9, 2\), got shape \(9,\)"),
     ],
@@ -131,24 +130,8 @@ def test_what_cannot_be_shown_is_told(arguments, named, message):
         viz.animate(*arguments, **named)
 
 
-def test_a_missing_program_or_package_is_told(without, monkeypatch, tmp_path):
-    monkeypatch.setenv("PATH", str(tmp_path))
-    with pytest.raises(RuntimeError, match=r"MP4 needs the program ffmpeg on the PATH; .gif and .apng need no program"):
-        viz.animate(ARM, FALL, tmp_path / "a.mp4")
-    without("PIL")
-    with pytest.raises(ImportError, match=r"animations need Pillow: .*viz"):
-        viz.animate(ARM, FALL)
+def test_a_missing_package_is_told(without, tmp_path):
+    without("matplotlib.figure")
+    with pytest.raises(ImportError, match=r"plots need matplotlib: .*viz"):
+        viz.animate(ARM, FALL, tmp_path / "a.gif")
     assert not [*tmp_path.iterdir()]
-
-
-def test_mp4_gets_every_frame_and_ffmpeg_is_heard(monkeypatch, tmp_path):
-    """By a program in ffmpeg's place, which counts the bytes that it gets, and then refuses them."""
-    program = tmp_path / "ffmpeg"
-    count = "open(sys.argv[-1], 'w').write(str(len(sys.stdin.buffer.read())))"
-    program.write_text(f"#!{sys.executable}\nimport sys\n{count}\n")
-    program.chmod(0o755)
-    monkeypatch.setattr(shutil, "which", lambda name: str(program))
-    assert bytes(viz.animate(ARM, FALL, tmp_path / "a.mp4")) == str(3 * 368 * 396 * 3).encode()
-    program.write_text(f"#!{sys.executable}\nimport sys\nsys.exit('no such codec')\n")
-    with pytest.raises(RuntimeError, match="ffmpeg cannot write this film: no such codec"):
-        viz.animate(ARM, FALL, tmp_path / "a.mp4")

@@ -1,0 +1,71 @@
+"""MuJoCo's module, with its warnings as Python's, and what it does by functions outside of it."""
+
+from __future__ import annotations
+
+import ctypes
+import warnings
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from cgraph._shared import Array, install
+
+if TYPE_CHECKING:
+    from mujoco import MjModel, MjSpec
+
+DIGITS = 17  # of a number in a text, so that it is read as the same float
+
+
+def mujoco() -> ModuleType:
+    """The mujoco module. Raises ImportError naming the extra when it is not installed."""
+    try:
+        import mujoco as module
+    except ImportError as error:
+        raise ImportError(f"MuJoCo is not installed: {install('mujoco')}") from error
+    if module.get_mju_user_warning() is None:  # by itself it adds a warning to a file in the current folder
+        module.set_mju_user_warning(_warn)
+    found: ModuleType = module  # it has no types
+    return found
+
+
+def _warn(text: str) -> None:
+    """MuJoCo's warning as Python's."""
+    with suppress(BaseException):  # an exception that leaves a callback aborts the process
+        warnings.warn(f"MuJoCo: {' '.join(text.split())}", stacklevel=2)
+
+
+def text_of(spec: MjSpec) -> str:
+    """The MJCF text that MuJoCo writes of a compiled spec, with all digits.
+
+    By itself it writes 6 digits. Its own tests write more by a function of the library that Python's module leaves out.
+    """
+    library = ctypes.CDLL(str(next(Path(mujoco().__file__ or "").parent.glob("*mujoco.*"))))
+    before = library._mjPRIVATE__get_xml_precision()
+    library._mjPRIVATE__set_xml_precision(DIGITS)
+    try:
+        text: str = spec.to_xml()
+    finally:
+        library._mjPRIVATE__set_xml_precision(before)
+    return text
+
+
+def rollout(mj: MjModel, starts: Array, states: Array) -> Callable[[], None]:
+    """A run of MuJoCo's own native loop of steps, one thread, from every start.
+
+    starts: (N, 1 + 2n), the time, positions and velocities in MuJoCo's order.  states: (N, steps, 1 + 2n), which each
+    run overwrites with what is after every step. The model, such as its time step, is read when it runs.
+    """
+    module = mujoco()
+    from mujoco.rollout import rollout as native
+
+    models, data = [mj] * len(starts), [module.MjData(mj)]  # one datum: one thread
+    steps, sensors = states.shape[1], np.empty((*states.shape[:2], 0))
+
+    def run() -> None:
+        native(models, data, starts, nstep=steps, state=states, sensordata=sensors, skip_checks=True)
+
+    return run
