@@ -15,7 +15,7 @@ import dynamics as dyn
 from cgraph import Graph
 from dynamics import Body, Joint, Mechanism, MechanismError
 from dynamics.multibody.algebra.spatial import from_quaternion
-from tests.dynamics.mechanisms import FAMILIES, random_body, random_tree
+from tests.dynamics.mechanisms import FAMILIES, random_tree
 from tests.dynamics.models import Array, run as values
 from tests.dynamics.parametrized import parametrized
 from tests.each_row import each_row
@@ -123,17 +123,6 @@ def test_numbers_alone_keep_their_graphs() -> None:
     for back in (whole.bind(), whole.bind({"m": 1.0}).bind({"l": 1.0}), constants):
         assert same(dyn.inverse_dynamics(back), dyn.inverse_dynamics(arm))
         assert back.parameters == {}
-
-
-def test_slopes_of_torque_by_mass_and_inertia_are_columns_of_the_regressor() -> None:
-    rng = np.random.default_rng(3)
-    body = random_body("b", "revolute", "a", rng, mass="m", center=(0.0, 0.0, 0.0), inertia=("x", "y", "z"))
-    values_ = {"m": 1.3, "x": 0.2, "y": 0.3, "z": 0.25}
-    mechanism = Mechanism([random_body("a", "revolute", "world", rng), body], parameters=values_)
-    at = state(mechanism)
-    slopes = values(cg.jacobian(dyn.inverse_dynamics(mechanism), list(values_)), at).reshape(2, 4)
-    columns = values(dyn.regressor(mechanism), at).reshape(2, 2, 10)[:, 1, [0, 4, 6, 9]]
-    assert slopes == approx(columns, rel=1e-12)
 
 
 def test_the_regressor_keeps_its_names_apart() -> None:

@@ -286,14 +286,6 @@ def test_what_is_locked_and_bound_computes_the_rest_as_before() -> None:
     assert found == {name: approx(full[name], rel=EQUATIONS) for name in ("tau2", "tau0")}
 
 
-def test_parameters_become_numbers() -> None:
-    scene = dyn.scenes.load("spring_mass")
-    pruned = dyn.prune(scene, dyn.forward_dynamics, values=scene.system.parameters)
-    assert pruned.graph.input_names == ("q0", "qd0", "tau0")
-    assert pruned.graph.evaluate({"q0": 0.3, "qd0": 0.0, "tau0": 1.0}) == {"qdd0": approx(0.7)}
-    assert (nodes(pruned.full), nodes(pruned.graph)) == (7, 3)
-
-
 def test_damping_and_forces_of_any_lagrangian_can_be_left_out() -> None:
     system = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 - 2.0 * q[0] ** 2, ["x"],
                         forces=lambda q, qd, t: [cg.sin(t)], damping=0.3)  # fmt: skip
