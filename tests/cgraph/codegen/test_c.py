@@ -242,15 +242,6 @@ def stepped():
 
 
 @needs_cc
-def test_a_program_simulates_with_the_header_alone(tmp_path):
-    source, _ = cg.to_c(pendulum(), "pendulum").write(tmp_path)
-    atomic_write(tmp_path / "main.c", USE)
-    files = [str(tmp_path / "main.c"), str(source), "-o", str(tmp_path / "main"), "-lm"]
-    run([CC, *STRICT, "-O2", "-ffp-contract=off", *files])
-    assert tuple(map(float, run([str(tmp_path / "main")]).split())) == stepped()
-
-
-@needs_cc
 @pytest.mark.skipif(CXX is None, reason="no C++ compiler")
 @pytest.mark.parametrize("standard", ["c++98", "c++20"])
 def test_the_header_is_one_of_cpp_too(standard, tmp_path):
@@ -276,13 +267,3 @@ def test_a_name_that_is_no_identifier_or_taken_is_an_error():
             cg.to_c(pendulum(), name)
     with pytest.raises(TypeError, match="must be a string, got int: 3"):
         cg.to_c(pendulum(), 3)
-
-
-def test_both_files_are_written(tmp_path):
-    made = cg.to_c(pendulum(), "pendulum")
-    source, header = made.write(str(tmp_path))
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["pendulum.c", "pendulum.h"]
-    assert source.read_text(encoding="utf-8") == made.source
-    assert header.read_text(encoding="utf-8") == made.header
-    with pytest.raises(OSError, match=r"the folder .* does not exist"):
-        made.write(tmp_path / "missing")

@@ -64,13 +64,6 @@ def test_values_and_slopes_are_those_of_scipy(seeds):
                 assert error <= ROUNDING * np.abs(ys).max() / np.diff(xs).min() ** order, (seed, kind, order)
 
 
-def test_a_linear_table_is_that_of_numpy_outside_too():
-    xs, ys = table(1)
-    points = np.linspace(xs[0] - 1.0, xs[-1] + 1.0, 501)
-    found = cg.compile(cg.Graph([X], {"y": cg.interp(X, xs, ys)}), "numpy").batch([points])[0]
-    assert np.abs(found - np.interp(points, xs, ys)).max() <= ROUNDING * np.abs(ys).max()
-
-
 @each_row("n", [2, 3, 4, 7, 8, 9, 31, 32, 33, 100])
 def test_a_table_of_any_size_is_searched_by_bisection(n):
     xs = np.arange(n) + 0.0
