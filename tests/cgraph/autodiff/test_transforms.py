@@ -8,6 +8,7 @@ from hypothesis import given, strategies as st
 import cgraph as cg
 from cgraph import GraphError
 from tests.each_row import each_row
+from tests.tolerances import LAST_BITS
 
 x, y, z = cg.variables("x y z")
 GRAPH = cg.Graph([x, y], {"f": cg.sin(x) * y, "g": y * y})
@@ -114,6 +115,18 @@ def test_wrt_is_a_name_a_variable_or_a_sequence_of_them(wrt):
 def test_wrt_of_the_wrong_type_is_a_type_error(wrong):
     with pytest.raises(TypeError):
         cg.gradient(ONE, wrong)
+
+
+def test_the_jacobian_is_the_same_in_both_modes():
+    """A wide graph goes in reverse, a tall one forward; they meet in their common entries."""
+    w = cg.sin(x) * y + cg.exp(y) * z
+    wide = cg.jacobian(cg.Graph([x, y, z], {"w": w}))
+    tall = cg.jacobian(cg.Graph([x, y, z], {"w": w, "a": x, "b": y, "c": z}))
+    values = {"x": 0.3, "y": -0.7, "z": 1.1}
+    found = tall.evaluate(values)
+    assert wide.evaluate(values) == pytest.approx({name: found[name] for name in wide.outputs}, rel=LAST_BITS)
+    assert wide.counts().by_role.keys() & {"adjoint", "tangent"} == {"adjoint"}
+    assert tall.counts().by_role.keys() & {"adjoint", "tangent"} == {"tangent"}
 
 
 def test_the_hessian_is_one_node_for_both_entries():

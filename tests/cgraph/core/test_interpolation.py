@@ -90,17 +90,6 @@ def test_outside_it_goes_on_as_it_is_told(kind, outside):
     assert [graph.evaluate({"x": x})["y"] for x in xs] == ys
 
 
-@each_row("seed", range(8))
-def test_a_monotone_table_never_leaves_the_values_beside(seed):
-    xs, ys = table(seed)
-    points = np.sort(np.random.default_rng(seed).uniform(xs[0], xs[-1], 300))
-    found = cg.compile(cg.Graph([X], {"y": cg.interp(X, xs, ys, "monotone")}), "numpy").batch([points])[0]
-    place = np.searchsorted(xs, points, side="right") - 1
-    slack = ROUNDING * np.abs(ys).max()
-    assert (found >= np.minimum(ys[place], ys[place + 1]) - slack).all()
-    assert (found <= np.maximum(ys[place], ys[place + 1]) + slack).all()
-
-
 def all_kinds(seed=0, **more):
     """One graph of a table in every kind, with its derivatives."""
     xs, ys = table(seed, least=4)

@@ -19,7 +19,6 @@ from tests.dynamics.mechanisms import FAMILIES, random_tree
 from tests.dynamics.models import Array, run as values
 from tests.dynamics.parametrized import parametrized
 from tests.each_row import each_row
-from viz.models.inspection import inspection
 
 ROUNDING = 1e-12  # of the largest of its kind, in some hundred sums
 GRAPHS: dict[str, Callable[[Any], Graph]] = {
@@ -186,7 +185,6 @@ def test_a_force_at_a_place_of_parameters_does_its_work() -> None:
         assert near(values(graph(arm.bind({"length": 0.8})), at), values(graph(arm), at))
 
 
-START = ([0.3, -0.2], [0.0, 0.5], 0.3)
 PLAIN: dict[str, Any] = {"method": "rk4", "dt": 0.05, "backend": "python"}
 
 
@@ -204,21 +202,6 @@ def test_dry_friction_may_be_one() -> None:
         replace(rough, parameters={"c": -1.0})
     with raises(MechanismError, match=r"uses the parameter 'cc': put its name .* or have `components` of a JointForce"):
         replace(rough, parameters={"c": 4.0, "cc": 1.0})
-
-
-def test_simulate_binds_them() -> None:
-    heavy = pendulums(load=0.7, length=1.1)
-    chosen = dyn.simulate(pendulums(), *START, **PLAIN, parameters={"load": 0.7, "length": 1.1}).q[-1]
-    for model in (heavy, heavy.bind()):
-        assert chosen == approx(dyn.simulate(model, *START, **PLAIN).q[-1], rel=ROUNDING)
-
-
-def test_simulate_many_varies_them() -> None:
-    arm, loads = pendulums(), [0.0, 0.3, 0.9]
-    many = dyn.simulate_many(arm, *START, **PLAIN, parameters={"load": loads}, t_eval=[0.3])
-    for k, load in enumerate(loads):
-        alone = dyn.simulate(pendulums(load=load), *START, **PLAIN)
-        assert many.q[k, -1] == approx(alone.q[-1], rel=ROUNDING)
 
 
 def test_pruning_takes_their_parameters_away() -> None:
@@ -268,17 +251,6 @@ def test_what_takes_numbers_takes_the_values() -> None:
     assert caught.qd == approx(numbers.qd)
     assert caught.energy == approx(numbers.energy)
     assert dyn.release(arm, q, qd, "load").body.velocity == approx(dyn.release(arm.bind(), q, qd, "load").body.velocity)
-
-
-def test_a_page_shows_them() -> None:
-    arm = pendulums()
-    found, numbers = (
-        inspection(dyn.scenes.Scene("arm", "", model, (0.1, 0.2), (0.0, 0.0), 0.1)) for model in (arm, arm.bind())
-    )
-    assert found.motion.points == approx(numbers.motion.points)
-    assert found.shares is not None
-    assert "lower" in found.shares.header
-    assert "load" in found.at
 
 
 def test_they_are_read_by_their_names() -> None:
@@ -342,15 +314,6 @@ def test_values_are_checked_wherever_they_are_bound() -> None:
     ):
         with raises(ValueError, match=message):
             bind()
-
-
-def test_chains_and_trees_take_them() -> None:
-    rod = {"joint": Joint("revolute", (0.0, 1.0, 0.0)), "mass": "m", "center": (0.0, 0.0, -0.5)}
-    chain = dyn.serial_arm([rod, rod], (0.0, 0.0, "g"), parameters={"m": 2.0, "g": -9.81})
-    assert dict(chain.parameters) == {"m": 2.0, "g": -9.81}
-    assert same(
-        dyn.bias(chain), dyn.bias(dyn.tree([-1, 0], [rod, rod], gravity=chain.gravity, parameters=chain.parameters))
-    )
 
 
 def test_a_planar_arm_takes_them() -> None:

@@ -165,15 +165,6 @@ def test_without_gravity_the_base_s_angle_is_gone() -> None:
     assert_alike(graph, dyn.prune(PAPER, effects=[]).graph)
 
 
-def test_a_base_about_the_vertical_has_no_gravity() -> None:
-    graph = dyn.gravity_force(turned_arm(3))
-    assert graph.outputs["gravity0"].value == 0.0
-    assert graph.outputs["gravity1"].value is None
-    assert "q0" not in {node.name for node in dyn.inverse_dynamics(turned_arm(3)).nodes}
-    (row,) = [each for each in dyn.prune(turned_arm(3)).absent if each.what.startswith("gravity")]
-    assert (row.what, row.nodes > 0) == ("gravity at link 1", True)
-
-
 @mark.parametrize(
     ("model", "found", "hand", "ready"),
     [(PAPER, 16, 19, 16), (arm(3), 88, 88, 86), (turned_arm(4), 51, 52, 51)],

@@ -17,9 +17,8 @@ pytest.importorskip("matplotlib")
 
 
 from dynamics import METHODS
-from tests.each_row import each_row
 from viz import theme
-from viz.pages.work_precision_page import _look, _power, _time, work_precision
+from viz.pages.work_precision_page import _look, work_precision
 from viz.plots.direct_labels import COLORS, labeled
 
 
@@ -144,16 +143,6 @@ def test_missing_numbers_are_dashes(undrawn: None) -> None:
     rows = next(s for s in work_precision(report).sections if s.anchor == "points").blocks[1]
     assert isinstance(rows, Table)
     assert rows.rows == [["64", "-", "-", "40", "1 ms", "1.5 ms", "1.0e0", "-", "-"]]
-
-
-@each_row(("value", "text"), [(None, "-"), (0.0, "0"), (1.26e-12, "1.3e-12"), (3e-5, "3.0e-5"), (2e11, "2.0e+11")])
-def test_numbers_have_two_digits(value: float | None, text: str) -> None:
-    assert _power(value) == text
-
-
-@each_row(("value", "text"), [(None, "-"), (2.5, "2.5 s"), (0.0123, "12.3 ms"), (4.5e-7, "0.45 µs")])
-def test_times_have_units(value: float | None, text: str) -> None:
-    assert _time(value) == text
 
 
 MEASURED = ["report", "spring_mass", "--quick", "--methods", "rk4,dop853", "--peers", ""]

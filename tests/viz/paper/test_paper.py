@@ -14,7 +14,6 @@ import pytest
 
 import dynamics as dyn
 from cgraph.extend import write_files
-from tests.tolerances import SOLVED
 from tests.viz.page_elements import Elements
 from viz import theme
 from viz.graph_drawing.render import RenderError
@@ -157,11 +156,6 @@ def test_the_figures_show_the_letters_of_the_papers_captions(paper):
     assert not {"k", "dt"} & shown["fig3"]
 
 
-def test_the_falls_agree_with_mujoco(paper):
-    _, data, _ = paper
-    assert data["fall"]["largest_difference"] < SOLVED  # rad in 3 s: rounding, grown by the motion
-
-
 def test_the_moving_fall_is_the_paper_s_and_by_definition_the_arm_weighs_nothing(paper):
     folder, _, _ = paper
     text = (folder / "index.html").read_text()
@@ -184,12 +178,6 @@ def test_the_law_has_slope_one(paper):
         assert row["slope"] is None or row["slope"] == pytest.approx(1.0, abs=0.02), name
     assert data["law"]["kinetic_only n=1"]["limit"] == 0.0
     assert data["law"]["kinetic_only n=3"]["limit"] > 0.01
-
-
-def test_edges_grow_linearly_by_the_contracted_chain_rule_and_quadratically_by_the_literal_one(paper):
-    _, data, _ = paper
-    assert data["scaling"]["chain_rule"]["edges_exponent"] <= 1.11
-    assert 1.9 <= data["scaling"]["chain_rule_literal"]["edges_exponent"] <= 2.1
 
 
 def test_the_readme_shows_figure_1_as_it_is_drawn(paper):
