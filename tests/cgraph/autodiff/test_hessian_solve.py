@@ -17,8 +17,10 @@ from cgraph import GraphError
 from cgraph.autodiff.hessian_solve import solve_nodes, solve_tangents
 from cgraph.autodiff.jacobian import hessian_nodes
 from cgraph.autodiff.ldl_solve import ldl_elimination, ldl_solve
+from cgraph.autodiff.rotation_pairs import rotations
 from cgraph.autodiff.symmetric_elimination import SingularError
 from cgraph.core.forward import tangents
+from cgraph.core.traversal import topological
 from tests.cgraph.engines import ENGINES
 from tests.each_row import each_row
 from tests.tolerances import LONG_SUM
@@ -237,6 +239,28 @@ def test_rotations_are_turned_back_as_one() -> None:
         angles, point, right = rng.uniform(-3.0, 3.0, 2), rng.uniform(-0.3, 0.3, 5), rng.normal(size=5)
         found, at = function(np.concatenate([angles, point, right])), [mpmath.mpf(each) for each in angles]
         assert_solved(partial(lambda at, *v: turning(mpmath, *at, v), at), found, point, right)
+
+
+def test_which_pairs_of_sums_are_rotations() -> None:
+    def found(make: Callable[..., tuple[cg.Node, ...]], kept: bool = False) -> int:
+        a, b, *x = cg.variables("a b x y z")
+        nodes = make(cg.cos(a), cg.sin(a), cg.sin(b), *x)
+        order = [node for node in topological(nodes) if node.op.name in ("add", "sub", "mul")]
+        return len(rotations(order, {*x, *order}, [order[0]] if kept else []))
+
+    assert found(lambda c, s, o, x, y, z: (c * x + s * y, c * y - s * x)) == 1
+    assert found(lambda c, s, o, x, y, z: (s * x - y * c, y * s + x * c)) == 1
+    assert found(lambda c, s, o, x, y, z: (c * x + s * y, c * y - s * x), kept=True) == 0
+    assert found(lambda c, s, o, x, y, z: (c * x + s * y, c * y + s * x)) == 0
+    assert found(lambda c, s, o, x, y, z: (c * x + s * y, c * z - s * x)) == 0
+    assert found(lambda c, s, o, x, y, z: (c * x + o * y, c * y - o * x)) == 0
+    assert found(lambda c, s, o, x, y, z: (c * x + s * x, c * x - s * x)) == 0
+
+    def used_again(c: cg.Node, s: cg.Node, o: cg.Node, x: cg.Node, y: cg.Node, z: cg.Node) -> tuple[cg.Node, ...]:
+        product = c * x
+        return product + s * y, c * y - s * x, product * z
+
+    assert found(used_again) == 0
 
 
 def test_turning_a_pair_back_costs_what_its_blocks_need() -> None:

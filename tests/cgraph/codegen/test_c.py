@@ -267,3 +267,13 @@ def test_a_name_that_is_no_identifier_or_taken_is_an_error():
             cg.to_c(pendulum(), name)
     with pytest.raises(TypeError, match="must be a string, got int: 3"):
         cg.to_c(pendulum(), 3)
+
+
+def test_both_files_are_written(tmp_path):
+    made = cg.to_c(pendulum(), "pendulum")
+    source, header = made.write(str(tmp_path))
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["pendulum.c", "pendulum.h"]
+    assert source.read_text(encoding="utf-8") == made.source
+    assert header.read_text(encoding="utf-8") == made.header
+    with pytest.raises(OSError, match=r"the folder .* does not exist"):
+        made.write(tmp_path / "missing")

@@ -132,6 +132,16 @@ def test_of_cuts_of_one_size_the_one_nearest_to_the_dependent_is_blamed():
     assert finding.data["paths"] == ["x -> sin(x) -> cos(sin(x)) -> exp(cos(sin(x)))"]
 
 
+def test_two_uses_are_two_edges():
+    a = cg.with_name(cg.sin(x) * cg.sin(x) + y, "a")
+    assert len(lint(cg.Graph([x, y], {"f": a}), independent=("a", "x")).edges) == 1  # one behind the product
+    a = cg.with_name(x * x, "a")
+    assert len(lint(cg.Graph([x], {"f": a}), independent=("a", "x")).edges) == 2
+    once = cg.sin(x)
+    (finding,) = lint(cg.Graph([x], {"f": once * once}), independent=("f", "x")).findings
+    assert [each["text"] for each in finding.data["cut"]] == ["x -> sin(x)"]
+
+
 def test_groups_may_be_given_in_many_ways():
     graph = cg.Graph([x, y, z], {"f": cg.with_name(x * y, "two words") + z})
     for pairs in (("x y", "z"), [("x, y", "z")], [(["x", "y"], "z")], [((x, "y"), z)], [("x", "z"), ("y", "z")]):
