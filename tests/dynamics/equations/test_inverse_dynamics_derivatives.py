@@ -169,3 +169,23 @@ def test_straight_chains_are_linearized_to_the_last_digits() -> None:
     exact = [float(value) for value in high_precision.evaluate(graph, at, DIGITS).values()]
     found = np.array(list(graph.evaluate(at).values()))
     assert np.abs(found - exact).max() < ROUNDING * np.abs(exact).max()
+
+
+@pytest.mark.parametrize("kind", ["hinges", "a free base", "with parameters"])
+def test_compiled_they_are_the_arrays_of_many_states(kind: str) -> None:
+    mechanism = (TREES | KINDS)[kind]()
+    system, rng = mechanism.system, np.random.default_rng(0)
+    graph, compiled = (
+        dyn.inverse_dynamics_derivatives(mechanism),
+        cg.compile(dyn.inverse_dynamics_derivatives(mechanism)),
+    )
+    q = np.array(system.kinematics.neutral) + rng.uniform(-0.3, 0.3, (11, system.nq))
+    qd, qdd = rng.normal(size=(11, system.n)), rng.normal(size=system.n)
+    many = dyn.arrays_at(mechanism, compiled, q, qd, qdd)
+    one = dyn.arrays_at(mechanism, compiled, q[3], qd[3], qdd)
+    expected = dyn.arrays_at(mechanism, graph, q, qd, qdd)
+    assert list(many) == list(one) == list(expected)
+    for name, array in expected.items():
+        assert many[name].shape == array.shape
+        for found, wanted in ((many[name], array), (one[name], array[3])):
+            assert np.abs(found - wanted).max() <= ROUNDING * np.abs(wanted).max()

@@ -124,3 +124,16 @@ def test_a_number_that_is_small_beside_others_of_its_vector_counts(small: float)
     assert dyn.mass_matrix(thin).evaluate(REST) == {"M_0_0": small}
     short = pendulum((1.0, 0.0, 0.0), (0.0, -(small**2), 0.0), (0.0, 0.0, small**2))
     assert dyn.gravity_force(short).evaluate(REST) == {"gravity0": small**2}
+
+
+@mark.parametrize("tilt", [1e-5, 1e-7, 1e-9, 1e-11, 1e-13])
+def test_hinges_that_are_nearly_parallel_are_not_taken_as_parallel(tilt: float) -> None:
+    """Two axes through one point: M_01 = z_0 . J z_1."""
+    inertia = np.array([[0.3, 0.0, 0.05], [0.0, 0.2, 0.06], [0.05, 0.06, 1e-5]]) + np.diag([0.0, 0.0, 0.2])
+    turn = rotation(np.array([1.0, 0.0, 0.0]), tilt)
+    bodies = [dyn.Body("first", dyn.Joint("revolute"), inertia=(1.0, 1.0, 1.0)),
+              dyn.Body("second", dyn.Joint("revolute", orientation=turn), "first", inertia=inertia)]  # fmt: skip
+    angle = 0.4
+    matrix = dyn.mass_matrix(dyn.Mechanism(bodies)).evaluate({"q0": 0.1, "qd0": 0.0, "q1": angle, "qd1": 0.0})
+    first_axis = math.sin(tilt) * math.sin(angle), math.sin(tilt) * math.cos(angle), math.cos(tilt)
+    assert matrix["M_0_1"] == approx(np.dot(first_axis, inertia[2]), rel=LAST_BITS)

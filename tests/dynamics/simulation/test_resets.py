@@ -64,6 +64,21 @@ def test_infinitely_many_bounces_end_with_a_sentence_above_the_floor(method: str
     assert run.q.min() > floor - PARABOLA
 
 
+def test_touches_crossings_of_both_directions_and_several_resets_at_once() -> None:
+    run = fall(bounce(1.0, direction=0), 3.0)
+    assert run.events["bounce"].t == approx(FALL * np.array([1.0, 3.0, 5.0]), abs=1e-7)
+    kick = dyn.Event("kick", lambda q, qd, t: q[0] - 0.5, 0, reset=lambda q, qd, t: (q, [qd[0] - 1.0]))
+    v = -math.sqrt(G)
+    assert fall(kick, 0.4).events["kick"].qd[:, 0] == approx([v], abs=1e-7)  # goes on through, and counts once
+    corner = [
+        bounce(1.0),
+        dyn.Event("also", lambda q, qd, t: 2.0 * q[0], -1, reset=lambda q, qd, t: (q, [0.5 * qd[0]])),
+    ]
+    run = fall(corner, 0.6)
+    assert [len(crossings.t) for crossings in run.events.values()] == [1, 0]  # the first one has turned it back
+    assert run.qd[np.flatnonzero(np.diff(run.t) == 0.0) + 1, 0] == approx([G * FALL], abs=1e-7)
+
+
 @stops
 def test_a_first_order_system_parameters_time_and_limits() -> None:
     heater = dyn.OdeSystem(lambda x, t, p: [x[1] * p["power"] - 1.0, 0.0 * x[0]], ["T", "on"], {"power": 3.0})
