@@ -14,7 +14,8 @@ import cgraph as cg
 import dynamics as dyn
 from dynamics import simulate_many
 from dynamics.simulation.ensembles import lanes, task
-from dynamics.simulation.ensembles.lanes import FEW_TRAJECTORIES
+from dynamics.simulation.ensembles.lanes import FEW_TRAJECTORIES, fits_lanes
+from dynamics.simulation.steps.step_program import StepProgram
 from tests.dynamics.ensembles import same
 from tests.dynamics.models import oscillator, random_arm
 from tests.early_end import stops
@@ -205,6 +206,30 @@ def test_as_many_steps_as_alone() -> None:
             one = dyn.simulate(model, q[k], qd[k], 1.0, t_eval=[0.01, 1.0], max_steps=steps)
         assert (fan.stats.message[k], fan.stats.steps[k]) == (one.stats.message, one.stats.steps)
     assert not fan.stats.success.all()
+
+
+def test_what_cannot_go_in_lanes_goes_one_by_one() -> None:
+    from dynamics import METHODS
+    from dynamics.integrators import derive
+    from dynamics.simulation.run_options import RunOptions
+    from dynamics.simulation.steps.step_program import step_program
+
+    problem = derive(spring(), {"k": 5.0, "tau0": 0.0, "tau1": 0.0})
+
+    def program(method: str) -> StepProgram:
+        return step_program(problem, METHODS[method], dense=False)
+
+    fine = RunOptions(1.0)
+    assert fits_lanes(program("dop853"), fine, FEW_TRAJECTORIES)
+    assert not fits_lanes(program("dop853"), fine, FEW_TRAJECTORIES - 1)
+    assert not fits_lanes(program("radau"), RunOptions(1.0, "radau"), FEW_TRAJECTORIES)
+    assert not fits_lanes(program("rk4"), RunOptions(1.0, "rk4"), FEW_TRAJECTORIES)
+    assert not fits_lanes(program("dop853"), RunOptions(1.0, rtol=1e-16), FEW_TRAJECTORIES)
+    q, qd = starts(spring(), 7)
+    one_by_one = simulate_many(spring(), q, qd, 0.3, "radau", t_eval=[0.3])
+    each_is_alone(spring(), one_by_one, q, qd, 0.3, "radau", t_eval=[0.3])
+    in_python = simulate_many(spring(), q, qd, 0.05, t_eval=[0.05], backend="python")
+    each_is_alone(spring(), in_python, q, qd, 0.05, "dop853", t_eval=[0.05], backend="python")
 
 
 def test_lanes_are_made_once_trajectories_alone_took_as_long() -> None:

@@ -18,7 +18,6 @@ from tests.viz.page_elements import Elements
 from viz import theme
 from viz.graph_drawing.render import RenderError
 from viz.paper import paper as module
-from viz.paper.embedding import EmbeddingError, _panels
 from viz.paper.free_fall import torque_at_rest
 from viz.paper.one_joint import STATE, WORDS, caption, moving_figure, view
 from viz.paper.scaling import SCALED, NodeScaling, edge_law
@@ -215,16 +214,6 @@ def test_figure_7_counts_both_forms_and_says_what_became_of_the_conjecture(paper
 def test_one_interruption_moves_no_time():
     interrupted = timing(np.append(np.full(99, 2e-6), 1.0))
     assert (interrupted.median, interrupted.lower, interrupted.upper) == pytest.approx((2.0, 2.0, 2.0))
-
-
-def test_the_law_is_drawn_beside_a_line_of_slope_one():
-    steps = np.array([1e-2, 1e-4])
-    law = EmbeddingError("by_definition", 2, steps, np.array([3.0, 3.0]), 5.0 * steps, np.ones(2), 1.0)
-    errors, distances = _panels([law])
-    guide = next(line for line in distances.lines if line.name == "slope 1")
-    assert guide.color is None
-    assert np.allclose(np.diff(np.log(guide.y)), np.diff(np.log(guide.x)))
-    assert errors.lines[0].color == distances.lines[0].color == theme.FORMULATIONS["by_definition"]
 
 
 def test_the_page_is_self_contained_but_for_the_pages_beside_it(paper):
