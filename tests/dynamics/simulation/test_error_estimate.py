@@ -105,6 +105,17 @@ def test_what_is_warned_of_is_what_was_asked_for() -> None:
     assert many.stats.status.tolist() == [0, 0]
 
 
+@mark.parametrize("exponent", [-200, -40, 0, 40, 200])
+def test_an_error_has_no_units(exponent: int) -> None:
+    """In other units of length, powers of two, all is the same to the last bit, and rounding is no error."""
+    unit = 2.0**exponent
+    noise = dyn.OdeSystem(lambda x, t: [x[1], -x[0], ((x[0] + 0.3 * x[1]) - x[0]) - 0.3 * x[1]], ["x", "v", "noise"])
+    run = dyn.simulate(noise, [unit, 0.0, 0.0], None, 2.0, "rk4", dt=0.01)
+    assert 0.0 < np.abs(run.q[:, 2]).max() < 1e-14 * unit
+    assert run.stats.error == dyn.simulate(noise, [1.0, 0.0, 0.0], None, 2.0, "rk4", dt=0.01).stats.error
+    assert run.stats.error < 1e-4
+
+
 def test_a_second_run_that_fails_says_that_nothing_is_known() -> None:
     """Steps that are just short enough to get through, and a pulse that only one of two runs sees."""
     blow = dyn.OdeSystem(lambda x, t: [x[0] * x[0] * (1.0 - t)], ["x"])

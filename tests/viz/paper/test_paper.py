@@ -21,7 +21,6 @@ from viz.paper import paper as module
 from viz.paper.free_fall import torque_at_rest
 from viz.paper.one_joint import STATE, WORDS, caption, moving_figure, view
 from viz.paper.scaling import SCALED, NodeScaling, edge_law
-from viz.paper.timing import timing
 from viz.typed import typed_page
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -209,11 +208,6 @@ def test_figure_7_counts_both_forms_and_says_what_became_of_the_conjecture(paper
     for name in ("fig7b", "fig7c"):
         shown = Path(__file__).parents[3] / f"docs/images/{name}.svg"
         assert shown.read_text() == (folder / f"{name}.svg").read_text()
-
-
-def test_one_interruption_moves_no_time():
-    interrupted = timing(np.append(np.full(99, 2e-6), 1.0))
-    assert (interrupted.median, interrupted.lower, interrupted.upper) == pytest.approx((2.0, 2.0, 2.0))
 
 
 def test_the_page_is_self_contained_but_for_the_pages_beside_it(paper):
