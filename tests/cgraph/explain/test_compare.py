@@ -72,6 +72,13 @@ def test_the_summary():
     )
 
 
+def test_copies_are_paired_once_each():
+    left = cg.Graph([x], {"f": cg.sin(x) * cg.sin(x), "g": cg.sin(x)})
+    right = cg.Graph([x], {"f": cg.sin(x) * cg.sin(x)})
+    found = compare(left, right)
+    assert (len(found.common), len(found.only_left), len(found.only_right)) == (4, 1, 0)
+
+
 def test_the_chain_rule_and_by_definition_differ_by_the_embedding():
     arm = dyn.planar_arm([1.0] * 3, [1.0] * 3)
     verdicts = [dyn.formulation_verdict(arm, name) for name in ("chain_rule", "by_definition")]

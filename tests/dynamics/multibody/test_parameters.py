@@ -148,9 +148,6 @@ def test_slopes_of_accelerations_by_any_number_are_differences(quantity: str) ->
     assert values(slopes, at) == approx(difference, rel=1e-9)
 
 
-LENGTH = {cg.variable("length")}
-
-
 def pendulums(**more: float) -> Mechanism:
     """Two links and a load welded to the second, of one parameter each."""
     length, center = cg.variable("length"), cg.variable("center")
@@ -251,14 +248,6 @@ def test_what_takes_numbers_takes_the_values() -> None:
     assert caught.qd == approx(numbers.qd)
     assert caught.energy == approx(numbers.energy)
     assert dyn.release(arm, q, qd, "load").body.velocity == approx(dyn.release(arm.bind(), q, qd, "load").body.velocity)
-
-
-def test_they_are_read_by_their_names() -> None:
-    graph = dyn.forward_dynamics(pendulums())
-    assert "length" in str(cg.why(graph, "qdd1", "length"))
-    assert "FUNCTION_IN_length" in cg.to_c(graph).header
-    assert any("lower" in node.tags for node in graph.nodes if node.op.name == "mul" and set(node.args) & LENGTH)
-    assert "load" in repr(pendulums())
 
 
 ROD: dict[str, Any] = {"joint": Joint("revolute"), "inertia": (1.0, 1.0, 1.0)}
