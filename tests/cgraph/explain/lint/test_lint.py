@@ -246,6 +246,13 @@ def test_a_value_lies_within_its_bounds(name, data):
         assert mpmath.mpf(low) <= exact <= mpmath.mpf(high)
 
 
+def test_a_zero_of_either_sign_bounds_a_domain():
+    for zero in (0.0, -0.0):
+        low, high = value_of(OPS["pow"], [(zero, 2e-9), (-1.0, 5.0)])
+        assert 0.0 <= low <= 1e-40
+        assert high == math.inf
+
+
 @settings(max_examples=examples(150))
 @given(cases(), st.data())
 def test_every_value_of_a_graph_in_a_box_lies_within_its_bounds_and_no_slope_is_infinite_without_a_finding(case, data):
