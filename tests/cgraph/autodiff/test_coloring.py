@@ -109,23 +109,6 @@ def test_the_colors_are_few(name):
         assert 1 + max(star_coloring(pattern(matrix))) <= star
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_the_colors_are_no_more_than_casadi_has(seed):
-    casadi = pytest.importorskip("casadi")
-    matrix = random_matrix(seed, 120, 90, 0.03, 0, 0)
-    symmetric = random_matrix(seed, 120, 120, 0.02, seed, 0)
-    symmetric |= symmetric.T | np.eye(120, dtype=bool)
-    for each in (matrix, symmetric):
-        rows, columns = (part.tolist() for part in np.nonzero(each))
-        theirs = casadi.Sparsity.triplet(*each.shape, rows, columns)
-        one_way = min(theirs.uni_coloring(theirs.T).size2(), theirs.T.uni_coloring(theirs).size2())
-        coloring = jacobian_coloring(pattern(each), LANES)
-        assert coloring.vectors(LANES) <= -(-one_way // LANES)
-        if each is symmetric:
-            stars = min(theirs.star_coloring(order).size2() for order in (0, 1))
-            assert 1 + max(star_coloring(pattern(each))) <= stars
-
-
 def test_nothing_needs_no_directions():
     for shape in ((0, 0), (3, 0), (0, 3), (3, 4)):
         assert jacobian_coloring(pattern(np.zeros(shape, dtype=bool)), LANES).counts == (0, 0)

@@ -14,7 +14,6 @@ import pytest
 
 import cgraph as cg
 from cgraph import GraphError
-from cgraph.autodiff.elimination_order import elimination_steps
 from cgraph.autodiff.hessian_solve import solve_nodes, solve_tangents
 from cgraph.autodiff.jacobian import hessian_nodes
 from cgraph.autodiff.ldl_solve import ldl_elimination, ldl_solve
@@ -278,39 +277,6 @@ def test_turning_a_pair_back_costs_what_its_blocks_need() -> None:
     assert size() == 126
 
 
-def test_steps_are_those_of_the_order_from_its_end_with_rotations_by_one_angle_at_once() -> None:
-    a, b, *x = cg.variables("a b x0 x1 x2 x3")
-    c, s, o, r = cg.cos(a), cg.sin(a), cg.cos(b), cg.sin(b)
-
-    def turned(c: cg.Node, s: cg.Node, x: cg.Node, y: cg.Node) -> tuple[cg.Node, cg.Node]:
-        return c * x + s * y, c * y - s * x
-
-    p, q = turned(c, s, x[0], x[1])
-    u, v = turned(c, s, x[2], cg.exp(x[3]))
-    y, z = turned(o, r, p, u)
-    again = turned(c, s, y, v)  # by the same angle, but of what the first are turned to
-    energy = q * again[0] + z * again[1]
-    order = [node for node in topological([energy]) if node.args and {*node.args} & {*x, *topological([energy])}]
-    order = [*x, *(node for node in order if node not in (c, s, o, r))]
-    found = {each.first: each for each in rotations(order, set(order), [])}
-    inside = {node for each in found.values() for node in (*each.products, each.second)}
-    firsts = {each.second: each.first for each in found.values()}
-    arguments = {
-        node: {firsts.get(arg, arg) for arg in ((found[node].x, found[node].y) if node in found else node.args)}
-        for node in order
-        if node not in inside
-    }
-    plan = elimination_steps(arguments, found)
-    assert sorted(len(step) for step in plan if isinstance(step, list)) == [1, 1, 2]
-    done: set[cg.Node] = set()
-    for step in plan:
-        taken = [each.first for each in step] if isinstance(step, list) else [step]
-        assert all(user in done for user, args in arguments.items() if {*taken} & {*args})
-        done.update(taken)
-    assert done == arguments.keys()
-    assert elimination_steps(dict.fromkeys(x, ()), {}) == x[::-1]
-
-
 def test_elimination_is_exact_over_fractions() -> None:
     matrix = [[4, 1, 2], [1, 5, 3], [2, 3, 6]]
     expected = [Fraction(1, 3), Fraction(-2, 7), Fraction(5)]
@@ -361,29 +327,3 @@ def test_the_sign_of_a_pivot_is_told_by_its_place():
     *_, info = solve_nodes(u * u + x * v * v + s * (u + v), [u, v, s], [one] * 3, multipliers=[s], check=True)
     graph = cg.Graph([x], {"info": info})
     assert [graph.evaluate({"x": value})["info"] for value in (2.0, -2.0)] == [0.0, 2.0]
-
-
-def test_a_multiplier_leaves_where_its_row_ends():
-    """Nodes grow with the length of a chain of many rows, not with its square."""
-    counts = []
-    for n in (12, 24, 36, 48):
-        total, u, s, _ = saddle_with_parameters(n)
-        counts.append(len(cg.Graph(cg.variables([f"k{i}" for i in range(n)]), numbered(total, u, s)).nodes))
-    growth = np.diff(counts)
-    assert growth.max() - growth.min() <= 0.02 * growth.max()
-
-
-def saddle_with_parameters(n):
-    u, s = cg.variables([f"u{i}" for i in range(n)]), cg.variables([f"s{i}" for i in range(n // 4)])
-    k, total, at = cg.variables([f"k{i}" for i in range(n)]), 0.0, 0.0
-    for stiffness, node in zip(k, u, strict=True):
-        at = stiffness * at + node
-        total = total + stiffness * at * at
-    for i, node in enumerate(s):
-        total = total + node * sum((k[j] * u[j] for j in range(4 * i + 1, 4 * i + 4)), u[4 * i])
-    return total, u, s, k
-
-
-def numbered(total, u, s):
-    one = cg.constant(1.0)
-    return {f"{i}": x for i, x in enumerate(solve_nodes(total, [*u, *s], [one] * len([*u, *s]), multipliers=s))}

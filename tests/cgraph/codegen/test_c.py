@@ -242,15 +242,6 @@ def stepped():
 
 
 @needs_cc
-def test_a_program_simulates_with_the_header_alone(tmp_path):
-    source, _ = cg.to_c(pendulum(), "pendulum").write(tmp_path)
-    atomic_write(tmp_path / "main.c", USE)
-    files = [str(tmp_path / "main.c"), str(source), "-o", str(tmp_path / "main"), "-lm"]
-    run([CC, *STRICT, "-O2", "-ffp-contract=off", *files])
-    assert tuple(map(float, run([str(tmp_path / "main")]).split())) == stepped()
-
-
-@needs_cc
 @pytest.mark.skipif(CXX is None, reason="no C++ compiler")
 @pytest.mark.parametrize("standard", ["c++98", "c++20"])
 def test_the_header_is_one_of_cpp_too(standard, tmp_path):

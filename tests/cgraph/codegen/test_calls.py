@@ -223,16 +223,6 @@ def test_a_bound_function_reads_and_writes_its_arrays(function):
     assert np.array_equal(trajectory[:, 3:], function.batch(trajectory[:, :3].T).T)
 
 
-def test_a_bound_function_keeps_what_it_needs(backend):
-    y = np.empty(3)
-    run = cg.compile(GRAPH, backend).bind(POINT.copy(), y)
-    gc.collect()
-    fill = [np.full(3, np.nan) for _ in range(100)]  # takes the place of memory set free
-    run()
-    assert len(fill) == 100
-    assert np.array_equal(y, cg.compile(GRAPH, backend)(POINT))
-
-
 def test_bound_functions_of_many_threads_do_not_meet(function):
     points = np.random.default_rng(0).uniform(1.0, 2.0, (8, 3))
     expected = [function(point) for point in points]

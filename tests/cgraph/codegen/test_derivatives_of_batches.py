@@ -10,11 +10,9 @@ from hypothesis import given, settings, strategies as st
 import cgraph as cg
 from cgraph import GraphError
 from cgraph.program.functions import colored_matrix, differentiable, direction_products
-from dynamics.peers.translate import translated
 from tests.cgraph.codegen.test_derivatives import LANES, WRITTEN, compiled, example, x, y
 from tests.cgraph.engines import RUNNERS
 from tests.strategies import cases, examples
-from tests.tolerances import SHORT_SUM
 from tests.ulps import same
 
 
@@ -90,11 +88,6 @@ def test_sparse_and_dense_matrices_of_many_points(backend, n, sparse):
         check(compiled(rows(n, sparse), backend, cost, fma=False), points)
 
 
-def test_large_matrices_of_many_points_are_filled_in(backend, monkeypatch):
-    monkeypatch.setattr(colored_matrix, "LARGE_MATRIX", 1)
-    check(compiled(rows(5, sparse=True), backend, LANES, fma=False), np.random.default_rng(0).normal(size=(9, 5)))
-
-
 def test_functions_without_inputs_slopes_or_points(backend):
     for graph in (cg.Graph([], {"f": 1.0, "g": 2.0}), cg.Graph([x, y], {"f": cg.floor(x), "g": 2.0}), example()):
         for count in (0, 1, 3):
@@ -145,31 +138,3 @@ def test_wrong_shapes_of_many_points_are_said(backend):
         function.hessian(points, np.ones((4, 8)))
     with pytest.raises(ValueError, match="threads"):
         function.jacobian(points, threads=0)
-
-
-def test_a_derivative_of_points_in_columns_is_that_of_their_rows():
-    function, columns = compiled(example(), fma=False), np.random.default_rng(0).uniform(0.1, 1.0, (4, 13))
-    values, slopes = function.batch(columns), function.jacobian(columns.T)
-    assert values.shape == (8, 13)
-    assert same(slopes[12], function.jacobian(columns[:, 12]))
-
-
-def test_derivatives_at_many_points_are_those_of_jax():
-    """Of vmap over jacfwd, jvp, vjp and hessian of the same graph."""
-    jax = pytest.importorskip("jax", reason="the bench extra has it")
-    jax.config.update("jax_enable_x64", True)
-    function, rng = compiled(example()), np.random.default_rng(0)
-    points, along, weights = rng.uniform(0.1, 1.0, (40, 4)), rng.normal(size=(40, 4)), rng.normal(size=(40, 8))
-
-    def f(point):
-        values = translated(function.graph.nodes, dict(zip(function.graph.inputs, point, strict=True)), jax.numpy)
-        return jax.numpy.stack([jax.numpy.asarray(values[node]) for node in function.graph.outputs.values()])
-
-    for ours, theirs, *given_to in (
-        (function.jacobian, jax.jacfwd(f)),
-        (function.jvp, lambda p, d: jax.jvp(f, (p,), (d,))[1], along),
-        (function.vjp, lambda p, w: jax.vjp(f, p)[1](w)[0], weights),
-        (function.hessian, lambda p, w: jax.hessian(lambda x: f(x) @ w)(p), weights),
-    ):
-        expected = jax.vmap(theirs)(points, *given_to)
-        np.testing.assert_allclose(ours(points, *given_to), expected, rtol=SHORT_SUM, atol=SHORT_SUM)

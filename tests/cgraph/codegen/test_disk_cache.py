@@ -1,7 +1,6 @@
 """Machine code on disk: it is found again, only where it belongs, and never in the way."""
 
 import errno
-import multiprocessing
 import os
 import pickle
 import stat
@@ -9,7 +8,6 @@ import subprocess
 import sys
 import warnings
 from concurrent.futures import ThreadPoolExecutor
-from operator import attrgetter, methodcaller
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -314,18 +312,6 @@ def test_a_pickle_keeps_the_choice(backend, folder):
     restored = pickle.loads(pickle.dumps(function))
     assert restored.options == function.options == options
     assert bits(restored) == bits(function)
-
-
-def test_another_process_reads_what_this_one_compiled(folder):
-    function = cg.compile(graph(), "llvm", cache=folder, fma=False)
-    (path,) = entries(folder)
-    written = path.stat().st_mtime_ns, path.stat().st_ino
-    with multiprocessing.get_context("spawn").Pool(1) as pool:
-        assert pool.map(methodcaller("values", POINT), [function]) == [function.values(POINT)]
-        assert pool.map(attrgetter("options"), [function]) == [function.options]
-        (batch,) = pool.map(methodcaller("batch", POINTS, threads=2), [function])
-    assert np.array_equal(batch, function.batch(POINTS))
-    assert (path.stat().st_mtime_ns, path.stat().st_ino) == written
 
 
 def test_a_relative_path_means_the_folder_it_meant(here, monkeypatch):

@@ -5,7 +5,6 @@ import math
 import pickle
 import re
 import sys
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -57,15 +56,6 @@ def test_a_random_graph_in_a_batch_agrees_in_every_lane_with_every_other(case):
     function = cg.compile(graph, "llvm")
     columns = function.batch(np.repeat([[values[name]] for name in graph.input_names], 11, axis=1))
     assert all(same(columns[:, k], columns[:, 0]) for k in range(11))
-
-
-def test_a_batch_of_any_size():
-    function = cg.compile(chain(), "llvm")
-    for count in (0, 1, 2, 7, 8, 9, 31, 100):
-        points = np.random.default_rng(count).uniform(-2, 2, (3, count))
-        found = function.batch(points)
-        assert (found.shape, found.dtype) == ((5, count), np.float64)
-        assert all(ulps_apart(found[:, k], function(points[:, k])) <= BATCH_ULPS for k in range(count)), count
 
 
 @pytest.mark.parametrize("lanes", [lanes for lanes in (2, 4, 8) if lanes <= llvm_engine.host().lanes])
@@ -203,21 +193,6 @@ def test_fast_arithmetic_keeps_infinities_and_nan():
     for point, expected in zip(points, evaluated(graph, points), strict=True):
         assert np.array_equal(function(point), expected, equal_nan=True)
         assert np.array_equal(function.batch(np.array([point] * 9).T)[:, 8], expected, equal_nan=True)
-
-
-def test_threads_may_call_one_function_at_once():
-    function = cg.compile(chain(), "llvm")
-    points = np.random.default_rng(4).uniform(-1, 1, (400, 3))
-    expected, batch = [function(x) for x in points], cg.compile(chain(), "llvm").batch(points.T)
-
-    def task(seed):
-        order = np.random.default_rng(seed).permutation(400)
-        single = all(same(function(points[k]), expected[k]) for k in order)
-        listed = all(same(function.values(points[k].tolist()), expected[k]) for k in order)
-        return single and listed and same(function.batch(points.T), batch)
-
-    with ThreadPoolExecutor(8) as pool:
-        assert all(pool.map(task, range(16)))
 
 
 def test_a_pickle_is_rebuilt_with_its_options():

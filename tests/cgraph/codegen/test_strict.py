@@ -9,9 +9,8 @@ from hypothesis import given, settings, strategies as st
 
 import cgraph as cg
 from cgraph.core.node import apply
-from cgraph.extend import Call, Program, runner
 from cgraph.operations.operation import OPS
-from tests.cgraph.engines import RUNNERS, evaluated
+from tests.cgraph.engines import evaluated
 from tests.strategies import cases
 from tests.ulps import same
 
@@ -67,14 +66,3 @@ def test_angles_and_exponents_of_many_sizes_have_the_same_bits(backend):
     points = np.random.default_rng(0).uniform(0.01, 30.0, (1, 500))
     assert wrong(graph, backend, points) == []
     assert not same(cg.compile(graph, backend).batch(points), evaluated(graph, points.T).T) or backend == "python"
-
-
-@pytest.mark.parametrize("backend", RUNNERS)
-def test_a_program_over_many_memories_has_the_bits_of_one(backend):
-    a, b = cg.variables("a b")
-    step = cg.Graph([a, b], {"a": cg.sin(a * 3.0) + cg.exp(-b), "b": cg.log(a * a + 1.0) + cg.cos(b)})
-    run = runner(Program({"s": 2}, [Call(step, ("s",), ("s",))], record=["s"]), backend, fma=False)
-    starts = np.random.default_rng(1).uniform(-2.0, 2.0, (2, 11))
-    together = run.run_many(np.stack([run.memory({"s": s}) for s in starts.T], axis=1), passes=6).rows
-    for k, start in enumerate(starts.T):
-        assert same(together[:, :, k], run.run(run.memory({"s": start}), passes=6).rows)

@@ -7,20 +7,17 @@ import pickle
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
 
 import cgraph as cg
 from cgraph.codegen import llvm_engine as llvm
 from cgraph.codegen.batch_ir import batch_ir
-from cgraph.codegen.llvm_ir import TOGETHER, libm_functions
-from cgraph.codegen.schedule import Joined, Merged, joined_calls, products_of, schedule
+from cgraph.codegen.llvm_ir import libm_functions
+from cgraph.codegen.schedule import Joined, Merged, joined_calls, schedule
 from cgraph.core.node import apply
 from cgraph.core.traversal import topological
 from cgraph.operations.operation import OPS
 from tests.cgraph.engines import SPECIAL, evaluated, graph_of
 from tests.each_row import each_row
-from tests.strategies import cases, examples
-from tests.tolerances import SHORT_SUM
 from tests.ulps import exact, same, ulps_apart
 
 pytestmark = pytest.mark.optimized
@@ -237,39 +234,6 @@ def test_one_at_a_time_only_sine_and_cosine_of_one_angle_are_joined():
     assert all(len(call.arguments) == 1 for call in calls.values())
 
 
-def assert_complete_and_in_order(graph, together):
-    merged = Merged(joined_calls(graph, together), products_of(graph))
-    order = schedule(graph, merged)
-    place = {step: k for k, step in enumerate(order)}
-    assert len(place) == len(order)
-    operations = {node for node in graph.nodes if node.args}
-    inside = set(merged.products.values())
-    assert {step for step in order if not isinstance(step, Joined)} == operations - inside
-    assert {step for step in order if isinstance(step, Joined)} == set(merged.calls.values())
-    for step, reads in order.items():
-        assert all(place[each] < place[step] for each in reads if isinstance(each, Joined) or each.args)
-    for node, product in merged.products.items():
-        assert set(order[node]) == {*product.args, *[arg for arg in node.args if arg is not product]}
-
-
-@given(case=cases(max_operations=30))
-@settings(max_examples=examples(80), deadline=None)
-def test_a_schedule_has_every_node_once_and_after_what_it_needs(case):
-    for together in (1, TOGETHER):
-        assert_complete_and_in_order(case.graph, together)
-
-
-def test_a_call_waits_for_the_calls_that_its_arguments_need():
-    x, y, z = cg.variables("x y z")
-    first, then = cg.sin(cg.sin(x)), cg.cos(cg.log(y) + cg.log(z))  # joined; the logarithms are met after `first`
-    graph = cg.Graph([x, y, z], {"a": first, "b": then})
-    calls = joined_calls(graph, TOGETHER)
-    assert calls[first] is calls[then]
-    assert_complete_and_in_order(graph, TOGETHER)
-    expected = graph.evaluate({"x": 0.3, "y": 1.2, "z": 0.7})
-    assert cg.compile(graph, "llvm")([0.3, 1.2, 0.7]) == pytest.approx(list(expected.values()), rel=SHORT_SUM)
-
-
 def two_chains(steps=40):
     """Two long products made side by side, in a graph that names one after the other, with a sum of 0 to fold."""
     a, b = nodes = cg.variables("a b")
@@ -285,11 +249,3 @@ def test_operations_are_computed_in_the_order_in_which_they_were_made(graph):
     roots = [node for node in order if node.op.name == "sqrt"]
     below = [set(topological([node])) for node in graph.outputs.values()]
     assert [root in below[k % 2] for k, root in enumerate(roots)] == [True] * 80
-
-
-def test_a_schedule_of_a_deep_graph_needs_no_recursion_and_no_square_of_its_size():
-    x = node = cg.variable("x")
-    for _ in range(20_000):
-        node = cg.sin(node) * cg.cos(node)
-    graph = cg.Graph([x], {"y": node})
-    assert len(schedule(graph, Merged(joined_calls(graph, TOGETHER), {}))) == len(graph.nodes) - 1 + 20_000

@@ -90,18 +90,6 @@ def test_counts_are_exact():
     assert counts.by_role == {"primal": 6, "input": 2}
 
 
-def test_counts_of_a_chain_a_fan_and_a_leaf():
-    chain = x
-    for _ in range(10):
-        chain = cg.sin(chain)
-    counts = cg.Graph([x], {"f": chain}).counts()
-    assert (counts.nodes, counts.edges, counts.depth, counts.width) == (11, 10, 10, 1)
-    fan = cg.Graph([x], {str(i): x * x for i in range(10)}).counts()
-    assert (fan.nodes, fan.edges, fan.depth, fan.width) == (11, 20, 1, 10)
-    leaf = cg.Graph([x, y], {"f": x}).counts()  # an unused input is no node of the graph
-    assert (leaf.nodes, leaf.edges, leaf.depth, leaf.width) == (1, 0, 0, 1)
-
-
 def test_operations_are_counted_from_the_largest_and_then_by_name():
     counts = cg.Graph([x], {"f": cg.sin(x) + cg.cos(x) + cg.sin(x * 2)}).counts()
     assert list(counts.by_operation.items()) == [

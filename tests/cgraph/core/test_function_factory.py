@@ -4,7 +4,6 @@ import doctest
 import inspect
 import math
 import pickle
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -27,21 +26,6 @@ def test_every_operation_takes_its_arguments_by_name_and_shows_an_example_that_r
         assert [function.__doc__.count(part) for part in parts] == [1] * 4
         node = function(**dict(zip(reversed(op.parameters), reversed(inputs), strict=True)))
         assert (node.op, node.args) == (op, tuple(inputs))
-
-
-@pytest.mark.parametrize(
-    ("signature", "function"),
-    [
-        ("(x)", cg.sin),
-        ("(y, x)", cg.atan2),
-        ("(x, y)", cg.hypot),
-        ("(base, exponent)", cg.pow),
-        ("(a, b)", cg.minimum),
-        ("(condition, if_true, if_false)", cg.where),
-    ],
-)
-def test_signatures(signature: str, function: Callable[..., cg.Node]) -> None:
-    assert str(inspect.signature(function)) == signature
 
 
 def test_a_wrong_number_of_arguments_is_told() -> None:

@@ -10,7 +10,6 @@ from mpmath import mp, mpf
 import cgraph as cg
 from tests import high_precision
 from tests.each_row import each_row
-from tests.tolerances import LONG_SUM
 
 TOLERANCE = 1e-14  # a few roundings
 INF = math.inf
@@ -166,48 +165,6 @@ def test_integer_powers_of_negative_numbers_have_derivatives(exponent):
         for order, name in enumerate(("first", "second"), 1):
             expected = float(high_precision.partial(lambda x: x ** int(exponent), [base], [order]))
             assert found[name] == pytest.approx([expected] * len(found[name]), rel=TOLERANCE)
-
-
-EXTREMES = (1e-200, -1e-200, 1e200, -1e200, 1e-310, 1.0)
-
-
-@each_row("a", EXTREMES)
-def test_partials_of_atan2_and_hypot_neither_overflow_nor_underflow_early(a):
-    x, y = cg.variables("x y")
-    jacobian = cg.jacobian(cg.Graph([x, y], {"angle": cg.atan2(x, y), "length": cg.hypot(x, y)}))
-    for b in EXTREMES:
-        assert_partials_of_angle_and_length(jacobian.evaluate({"x": a, "y": b}), a, b)
-
-
-def assert_partials_of_angle_and_length(found: dict[str, float], a: float, b: float) -> None:
-    with mp.workdps(50):
-        s = mpf(a) ** 2 + mpf(b) ** 2
-        expected = {
-            "dangle/dx": mpf(b) / s,
-            "dangle/dy": -mpf(a) / s,
-            "dlength/dx": mpf(a) / mpmath.sqrt(s),
-            "dlength/dy": mpf(b) / mpmath.sqrt(s),
-        }
-    length = float(mpmath.sqrt(s))
-    denormal = 4 * 5e-324 / length  # what rounding the length to a denormal costs, relative
-    for name, value in expected.items():
-        assert found[name] == pytest.approx(float(value), rel=TOLERANCE + denormal, abs=5e-324), name
-
-
-@each_row("size", [1e-150, 1e-100, 1.0, 1e100, 1e150])
-def test_second_partials_of_atan2_and_hypot_keep_their_accuracy_at_any_size(size):
-    x, y = cg.variables("x y")
-    a, b = 3 * size, -4 * size
-    for function, exact in ((cg.atan2, mpmath.atan2), (cg.hypot, mpmath.hypot)):
-        found = cg.hessian(cg.Graph([x, y], {"f": function(x, y)})).evaluate({"x": a, "y": b})
-        with mp.workdps(50):  # homogeneous functions: the second derivatives scale
-            degree = 0 if function is cg.atan2 else 1
-            scaled = {
-                n: mpmath.diff(exact, (3, -4), orders) * mpf(size) ** (degree - 2)
-                for n, orders in {"d2f/dxdx": (2, 0), "d2f/dxdy": (1, 1), "d2f/dydy": (0, 2)}.items()
-            }
-        for name, value in scaled.items():
-            assert found[name] == pytest.approx(float(value), rel=LONG_SUM, abs=5e-324), (function.__name__, name)
 
 
 @each_row("point", [(0.0, 0.0, 0.0), (0.0, 2.0, 3.0), (0.0, 0.0, 3.0), (2.0, 0.0, 3.0)])

@@ -4,7 +4,6 @@ import itertools
 import math
 import random
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -240,33 +239,3 @@ PROPERTIES = (
 def test_a_row_of_the_table_has_every_property(op):
     for holds in PROPERTIES:
         holds(op)
-
-
-# Test the tests: a wrong rule is seen, whichever part of it is wrong.
-WRONG = {
-    "sign": replace(OPS["sin"], partials=lambda y, a: (-cg.cos(a),)),
-    "slightly off": replace(OPS["exp"], partials=lambda y, a: (y * (1.0 + 1e-11),)),
-    "swapped": replace(OPS["div"], partials=lambda y, a, b: (-(y / b), 1.0 / b)),
-    "a partial left out": replace(OPS["mul"], partials=lambda y, a, b: (b, 0.0)),
-    "right at the sample, but flat": replace(OPS["sin"], partials=lambda y, a: (math.cos(0.3),)),
-    "reads the value where it should read the argument": replace(OPS["cos"], partials=lambda y, a: (-cg.sin(y),)),
-}
-
-
-@pytest.mark.parametrize("op", [pytest.param(op, id=name) for name, op in WRONG.items()])
-def test_a_wrong_rule_is_seen(op):
-    right = OPS[op.name]
-    assert wrong_derivatives(right, right.samples[0]) == []
-    assert wrong_derivatives(op, op.samples[0]) != []
-
-
-def test_a_rule_that_is_wrong_in_the_second_order_alone_is_seen_there_alone():
-    found = " ".join(wrong_derivatives(WRONG["right at the sample, but flat"], (0.3,)))
-    assert "hessian" in found
-    assert "gradient gives" not in found.replace("jacobian of gradient gives", "")
-
-
-def test_a_wrong_value_is_seen():
-    wrong = replace(OPS["sin"], scalar=lambda a: math.sin(a) * (1.0 + 1e-15))
-    (found,) = at(graph_of(wrong), 0.3)
-    assert apart(found, float(high_precision.OPERATIONS["sin"](mpf(0.3))), ulps=2)

@@ -74,12 +74,6 @@ def test_a_bound_run_needs_memory_that_fits(backend: str) -> None:
         fed.bind(fed.memory({}), np.empty((1, 1)))
 
 
-def test_a_carry_that_trades_places(backend: str) -> None:
-    a, b = cg.variables("a b")
-    swap = cg.loop(cg.Graph([a, b], {"first": b, "second": a}), {"a": "first", "b": "second"}, backend)
-    assert swap([1.0, 2.0], 3).tolist() == [[2.0, 1.0], [1.0, 2.0], [2.0, 1.0]]
-
-
 def test_what_does_not_change_is_computed_before_the_first_pass(backend: str) -> None:
     x, k, taken, last = cg.variables("x k invariant0 last")
     graph = cg.Graph([last, k, x, taken], {"next": x * cg.exp(-k) + cg.sin(k) * taken + last, "same": cg.sqrt(k)})

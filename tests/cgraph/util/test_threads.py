@@ -50,15 +50,6 @@ def test_the_values_do_not_depend_on_the_number_of_threads(function):
             np.testing.assert_array_almost_equal_nulp(alone[:, column], function(X[:, column]), BATCH_ULPS)
 
 
-def test_the_block_is_no_matter_to_the_values(function, monkeypatch):
-    X = points(1000)
-    found = function.batch(X, threads=2)
-    monkeypatch.undo()
-    if function.backend == "llvm":  # NumPy's own loops may treat the last few of an array apart
-        assert found.tobytes() == cg.compile(graph(), "llvm").batch(X).tobytes()
-    np.testing.assert_array_almost_equal_nulp(found, cg.compile(graph(), "numpy").batch(X), BATCH_ULPS)
-
-
 LAYOUTS = {
     "Fortran": np.asfortranarray,
     "every second column": lambda X: np.repeat(X, 2, axis=1)[:, ::2],

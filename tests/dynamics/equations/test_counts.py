@@ -1,29 +1,15 @@
 """Exact counts of the formulations, and how they grow with the number of links."""
 
-from collections.abc import Sequence
-
-import numpy as np
-from pytest import approx, fixture, mark
+from pytest import mark
 
 import dynamics as dyn
 from cgraph import structure_hash
 from tests.dynamics.mechanisms import FAMILIES, turned_arm
 from tests.each_row import each_row
 
-FROM_6_TO_40 = (6, 10, 17, 28, 40)
-
 
 def equal_links(n: int) -> dyn.Mechanism:
     return dyn.planar_arm([0.9] * n, [0.7] * n)
-
-
-def edges(formulation: str, sizes: Sequence[int]) -> list[int]:
-    return [dyn.inverse_dynamics(equal_links(n), formulation).counts().edges for n in sizes]
-
-
-def exponent(formulation: str, sizes: Sequence[int]) -> float:
-    """The slope of log edges over log n."""
-    return float(np.polyfit(np.log(sizes), np.log(edges(formulation, sizes)), 1)[0])
 
 
 def test_inverse_dynamics_of_the_paper_s_arm_is_small() -> None:
@@ -62,30 +48,6 @@ def test_each_further_equal_link_adds_79_nodes_and_148_edges_and_91_nodes_to_for
     assert n < 3 or len(dyn.forward_dynamics(equal_links(n), "recursive").nodes) == 156 + 91 * (n - 3)
 
 
-@fixture(scope="module")
-def exponents() -> dict[str, float]:
-    few = (6, 10, 17, 30)  # of the graphs that grow quadratically
-    found = {name: exponent(name, FROM_6_TO_40) for name in ("chain_rule", "by_definition")}
-    return found | {"chain_rule_literal": exponent("chain_rule_literal", few)}
-
-
-def test_contracted_the_chain_rule_grows_linearly(exponents: dict[str, float], record_property) -> None:
-    record_property("exponent, contracted", exponents["chain_rule"])
-    assert 1.0 < exponents["chain_rule"] <= 1.10
-    assert exponents["chain_rule"] == approx(1.08, abs=0.005)
-
-
-def test_taken_literally_the_chain_rule_grows_quadratically(exponents: dict[str, float], record_property) -> None:
-    record_property("exponent, literal", exponents["chain_rule_literal"])
-    assert 1.9 <= exponents["chain_rule_literal"] <= 2.1
-
-
-def test_embedded_the_graph_grows_linearly_too(exponents: dict[str, float], record_property) -> None:
-    """The paper's O(n^2) is not the embedding's: it is the order of contraction."""
-    record_property("exponent, embedded", exponents["by_definition"])
-    assert 1.0 < exponents["by_definition"] <= 1.10
-
-
 @mark.parametrize("formulation", ["by_definition", "kinetic_only"])
 @mark.parametrize("n", [1, 3, 10])
 def test_the_chain_rule_is_smaller_than_the_embedded_formulations(n: int, formulation: str) -> None:
@@ -102,13 +64,6 @@ def test_a_parameter_with_a_half_before_it_leaves_no_halves_behind() -> None:
     )
     names = [node.op.name for node in dyn.inverse_dynamics(system).nodes if node.args]
     assert sorted(names) == ["add", "mul", "mul"]
-
-
-def test_the_literal_form_costs_more_from_two_links_on() -> None:
-    sizes = range(1, 8)
-    ratios = [b / a for a, b in zip(edges("chain_rule", sizes), edges("chain_rule_literal", sizes), strict=True)]
-    assert ratios[0] == 1.0
-    assert (np.diff(ratios) > 0).all()
 
 
 @mark.parametrize("model", [dyn.tree([-1, 0]), turned_arm(2)], ids=["rods", "arm of 2"])

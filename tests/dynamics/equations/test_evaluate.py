@@ -41,8 +41,3 @@ def test_wrong_numbers_are_named_with_their_coordinate(state: dict[str, object],
     system = slider()
     with pytest.raises(ValueError, match=words):
         evaluate(system, dyn.inverse_dynamics(system), state)
-
-
-def test_a_person_reads_the_coordinate_s_name() -> None:
-    names = dyn.display_names(slider())
-    assert [names[each] for each in ("q1", "qd0", "qdd1", "tau0")] == ["q.elbow", "qd.rail", "qdd.elbow", "tau.rail"]

@@ -5,19 +5,11 @@ from pytest import approx, mark, warns
 import cgraph as cg
 import dynamics as dyn
 from dynamics.equations.formulations.lagrange_terms import INERTIAL
-from tests.dynamics.models import MODELS, before, error, random_arm, run, states
-from tests.formulations import SEEN, SMALL, WRONG
+from tests.dynamics.models import MODELS, before, run, states
+from tests.formulations import WRONG
 
 ROUNDING = 1e-12  # two orders of summation of the same terms, which may cancel tenfold
 EMBEDDED = ("by_definition", "kinetic_only", "kinetic_only_exact")
-
-
-@mark.parametrize("name", MODELS)
-def test_literal_and_contracted_chain_rule_are_one_function(name: str) -> None:
-    model = MODELS[name]()
-    state = states(model, 50)
-    contracted, literal = (run(dyn.inverse_dynamics(model, f), state) for f in ("chain_rule", "chain_rule_literal"))
-    assert error(literal, contracted) < ROUNDING
 
 
 @mark.parametrize("formulation", dyn.FORMULATIONS)
@@ -71,23 +63,6 @@ def test_torque_is_momentum_rate_minus_dl_dq_plus_damping_minus_forces(formulati
     rest = run(dyn.inverse_dynamics(system, formulation), state) - run(dyn.momentum_rate(system, formulation), state)
     right = run(dyn.inverse_dynamics(system, "chain_rule"), state) - run(dyn.momentum_rate(system), state)
     assert rest == approx(right, rel=ROUNDING, abs=ROUNDING)
-
-
-@mark.parametrize("n", [2, 3])
-@mark.parametrize("formulation", WRONG)
-def test_spurious_nodes_change_the_torque_of_an_arm(n: int, formulation: str) -> None:
-    arm = random_arm(n)
-    graph = dyn.inverse_dynamics(arm, formulation)
-    assert dyn.spurious_nodes(graph)
-    state = before(states(arm, 20), dt=SMALL)
-    assert error(run(graph, state), run(dyn.inverse_dynamics(arm, "chain_rule"), state)) > SEEN
-
-
-@mark.parametrize("n", [1, 2, 3])
-def test_the_nodes_of_the_torque_say_which_link_they_come_from(n: int) -> None:
-    tags = dyn.inverse_dynamics(random_arm(n)).counts().by_tag
-    assert {name for name in tags if name.startswith("link")} == {f"link {i + 1}" for i in range(n)}
-    assert tags["damping"] == 2 * n  # damping * qd, added
 
 
 @mark.parametrize("former", ["euler_embedded"])

@@ -45,8 +45,3 @@ def test_derivatives_say_whose_they_are() -> None:
     for name, bodies in (("M_1_1", {"link 3"}), ("dtau_dqd_1_1", {"link 3"}), ("dtau_dq_2_0", {"link 3"})):
         tags = set().union(*[node.tags for node in cg.Graph(graph.inputs, {name: graph.outputs[name]}).nodes])
         assert bodies | {"kinetic"} <= tags
-
-
-def test_without_gravity_nothing_comes_of_the_potential() -> None:
-    weightless = dyn.inverse_dynamics(dyn.planar_arm([1.0, 0.8], [1.0, 0.8], gravity=0.0))
-    assert [node for node in weightless.nodes if "potential" in node.tags] == []

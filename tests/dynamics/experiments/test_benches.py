@@ -24,7 +24,7 @@ from dynamics.experiments.speed.counts import VARIANTS
 from dynamics.experiments.text_table import WIDTH, csv_text, table
 from dynamics.experiments.timing import Timed, in_turns, machine, run_fresh, spent
 from dynamics.peers import PEERS, PeerModel
-from tests.dynamics.figures import balanced_order, both_forms, parallel_c
+from tests.bench import balanced_order, both_forms, parallel_c
 from tests.each_row import each_row
 from tests.slow import slow
 from viz import cli

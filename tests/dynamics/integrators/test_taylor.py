@@ -15,9 +15,7 @@ import cgraph as cg
 import dynamics as dyn
 from cgraph.core.node import apply
 from cgraph.extend import OPS
-from dynamics import METHODS
 from dynamics.integrators import taylor
-from tests.each_row import each_row
 from tests.slow import slow
 
 ROUNDINGS = 2e-14  # of a few dozen steps
@@ -102,16 +100,6 @@ def test_the_first_step_misses_no_more_than_others(length: float, tolerance: flo
     assert abs(motion.qd - exact.qd[-1]).max() < 0.03 * tolerance
 
 
-def test_orders_follow_the_tolerance() -> None:
-    method = METHODS["taylor"]
-    assert [method.at(rtol).order for rtol in (0.5, 1e-6, 1e-9, 1e-12, 1e-15, 1e-30, 0.0, 10.0)] == [
-        *(4, 10, 14, 17),
-        *(21, 22, 22, 22),
-    ]
-    assert method.at(1e-9) is method.at(2e-9)  # so that a problem keeps one program for both
-    assert METHODS["dop853"].at(1e-9) is METHODS["dop853"]
-
-
 def test_what_the_series_at_the_start_does_not_show_is_seen_at_the_end_of_the_step() -> None:
     """A pulse far from the start, where all its coefficients are rounding: the defect cuts the step."""
     pytest.importorskip("llvmlite")
@@ -134,30 +122,6 @@ def test_a_chain_of_whole_powers_starts_at_0(power: float) -> None:
     assert run.success
     assert run.stats.steps < 40
     np.testing.assert_allclose(run.q[-1], other.q[-1], rtol=1e-8)
-
-
-FORCES = {  # that begin at 0, and twice their integral over time
-    "t^1": (lambda t: t, lambda t: t**3 / 6),
-    "t^4": (lambda t: t**4, lambda t: t**6 / 30),
-    "1 - cos 2t": (lambda t: 1.0 - cg.cos(2.0 * t), lambda t: t * t / 2 - (1.0 - math.cos(2.0 * t)) / 4),
-    "t exp(-t)": (lambda t: t * cg.exp(-t), lambda t: t + t * math.exp(-t) + 2.0 * math.exp(-t) - 2.0),
-}
-
-
-@each_row(("force", "unit", "tolerance"), itertools.product(FORCES, [1e-9, 1.0, 1e9], [{}, {"atol": 1e-30}]))
-def test_a_force_that_begins_at_0_moves_what_rests(force: str, unit: float, tolerance: dict[str, float]) -> None:
-    """Of rest all sizes are 0, and so are first changes: the largest term of the series is what there is."""
-    push, twice = FORCES[force]
-    block = dyn.System(
-        lambda q, qd, t: 0.5 * qd[0] ** 2 + 0.5 * qd[1] ** 2,
-        ["x", "still"],
-        forces=lambda q, qd, t: [unit * push(t), 0.0],
-    )
-    run = dyn.simulate(block, [0.0, 0.0], [0.0, 0.0], 3.0, "taylor", rtol=1e-10, **tolerance)
-    assert run.success, run.stats.message
-    assert run.q[-1, 0] == approx(unit * twice(3.0), rel=1e-8)
-    assert run.q[-1, 1] == 0.0
-    assert run.stats.steps < 60
 
 
 @mark.parametrize("name", [name for name, row in OPS.items() if row.piece is not None])

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from pytest import approx, mark, param, raises
+from pytest import approx, mark, raises
 
 import dynamics as dyn
-from dynamics import System, certify
+from dynamics import System
 from tests.dynamics import mechanisms
 from tests.dynamics.mechanisms import for_peers
 from tests.dynamics.models import Array, run as values
@@ -29,13 +29,6 @@ def state(system: System, seed: int, **more: int) -> dict[str, float]:
 
 def near(a: Array, b: Array) -> bool:
     return bool(np.abs(a - b).max() <= ROUNDING * np.abs(b).max())
-
-
-@mark.parametrize("base", ["free", "ball", "free (body axes)", "revolute"])
-@mark.parametrize("seed", [0, param(1, marks=mark.slow)])
-def test_its_certificate_holds(base: str, seed: int) -> None:
-    certificate = certify(random_tree(seed, base, most=2), states=2, seed=seed)
-    assert certificate.passed, str(certificate)
 
 
 @mark.parametrize("angle", [0.0, 1e-300, 1e-150, 1e-8, 0.3, 2.0, 3.0, math.pi - 1e-9, math.pi + 1e-9, 6.0])

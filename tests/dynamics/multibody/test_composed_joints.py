@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import math
-import pickle
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from pytest import importorskip, mark, raises
 
-import cgraph as cg
 import dynamics as dyn
 from dynamics.multibody.algebra.spatial import rotation, unit
 from tests.dynamics.mechanisms import random_body
@@ -174,12 +172,6 @@ def test_a_parameter_of_one_coordinate_is_bound() -> None:
     state = {f"{name}{i}": 0.1 for name in ("q", "qd", "tau") for i in range(3)}
     of_parameters = dyn.forward_dynamics(table).evaluate(state | {"d": 0.5, "m": 2.0})
     assert dyn.forward_dynamics(table.bind()).evaluate(state) == of_parameters
-
-
-def test_a_mechanism_that_was_used_pickles() -> None:
-    arm = dyn.Mechanism([dyn.Body("b", dyn.Joint("planar"), mass=1.0, inertia=(1.0, 1.0, 1.0))])
-    graph = dyn.forward_dynamics(arm)
-    assert cg.structure_hash(dyn.forward_dynamics(pickle.loads(pickle.dumps(arm)))) == cg.structure_hash(graph)
 
 
 WRONG = {

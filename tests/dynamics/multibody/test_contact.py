@@ -78,14 +78,6 @@ def test_a_body_is_thrown_back_as_hunt_and_crossley_say(d: float, unit: float) -
     assert d * (1.0 + e) == approx(math.log((1.0 + d) / (1.0 - d * e)), rel=STEPS)
 
 
-def test_without_dissipation_nothing_is_lost_and_what_is_stored_is_the_work_of_the_force() -> None:
-    model = falling(stiffness=1e5)
-    run = dyn.simulate(model, [0.01], [-1.0], 0.1, rtol=1e-10, atol=1e-13)
-    stored = evaluated(model, model.forces[0], run.q, run.qd)["energy"]
-    assert stored.max() > 0.9 * run.energy[0]
-    assert run.energy + stored == approx(run.energy[0], rel=STEPS)
-
-
 def test_a_ball_that_slips_rolls_at_five_sevenths_of_its_speed() -> None:
     """It slips for 2 v / (7 friction g), and, but for the creep, not after."""
     mu, slow, speed = 0.2, 1e-4, 1.0
@@ -201,32 +193,6 @@ def test_in_a_turned_frame_a_contact_is_the_same() -> None:
     assert np.abs(first - second).max() < EQUATIONS * np.abs(first).max()
 
 
-@each_row("mass, length, time", [(2.0**7, 2.0**-10, 2.0**5), (2.0**-9, 2.0**6, 2.0**-4)])
-def test_in_other_units_a_contact_is_the_same(mass: float, length: float, time: float) -> None:
-    """Of mass, length and time, the stiffness in N/m^(3/2)."""
-    moment = 0.4 * MASS * RADIUS**2 * mass * length**2
-    body = dyn.Body("ball", dyn.Joint("free"), mass=mass * MASS, inertia=(moment, moment, moment))
-    other = dyn.Contact(
-        "ball",
-        radius=length * RADIUS,
-        stiffness=MATERIAL["stiffness"] * mass * length / time**2 / length**1.5,
-        dissipation=MATERIAL["dissipation"] * time / length,
-        friction=MATERIAL["friction"],
-        velocity=MATERIAL["velocity"] * length / time,
-    )
-    q, qd = [0.0, 0.0, 0.09, 1.0, 0.0, 0.0, 0.0], [1.0, 0.5, -0.4, 1.0, 2.0, 3.0]
-    ours, theirs = on_ground(), dyn.Mechanism([body], (0.0, 0.0, -GRAVITY * length / time**2), [other])
-    turned = [1.0 / time] * 3
-    first = dyn.arrays_at(ours, dyn.forward_dynamics(ours), q=q, qd=qd)["qdd"]
-    state = {
-        "q": [length * x for x in q[:3]] + q[3:],
-        "qd": [*[length / time * v for v in qd[:3]], *[v / time for v in qd[3:]]],
-    }
-    second = dyn.arrays_at(theirs, dyn.forward_dynamics(theirs), **state)["qdd"]
-    scales = np.array([length / time**2] * 3 + [each / time for each in turned])
-    assert (second / scales).tolist() == approx(first.tolist(), rel=SHORT_SUM)
-
-
 # --- derivatives
 
 
@@ -266,18 +232,6 @@ def test_a_gradient_through_a_landing_is_that_of_differences() -> None:
 
 
 # --- as part of a mechanism
-
-
-def test_calls_batches_and_plain_python_agree() -> None:
-    for tree in trees()[:2]:
-        forward = dyn.forward_dynamics(tree)
-        states = [random_state(tree, seed) for seed in range(5)]
-        rows = np.array([np.concatenate([q, qd, tau]) for q, qd, _, tau in states])
-        native, plain = (cg.compile(forward, backend=backend) for backend in ("auto", "python"))
-        found = native.batch(rows.T).T
-        assert np.array([native(row) for row in rows]).tolist() == found.tolist()
-        for row, values in zip(rows, found, strict=True):
-            assert np.abs(plain(row) - values).max() < EQUATIONS * np.abs(values).max()
 
 
 def test_parameters_of_a_contact_are_inputs_and_are_bound() -> None:

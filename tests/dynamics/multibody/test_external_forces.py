@@ -8,16 +8,15 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from pytest import approx, mark, raises
+from pytest import mark, raises
 
 import cgraph as cg
 import dynamics as dyn
 from dynamics import Body, Force, Joint, Mechanism, MechanismError
 from dynamics.multibody.algebra.spatial import from_quaternion
 from tests.dynamics.mechanisms import FAMILIES, PLAIN, turned_arm
-from tests.dynamics.models import Array, at, error, inputs, run, states
+from tests.dynamics.models import Array, at, error, run, states
 from tests.slow import slow
-from tests.tolerances import EQUATIONS, SHORT_SUM, SOLVED
 
 ROUNDING = 1e-12  # of the largest entry: two orders of summing the same few terms
 DIFFERENCES = 1e-8  # of the largest entry: central differences of positions of size 1 with a step of 1e-5
@@ -98,44 +97,7 @@ def test_accelerations_take_the_force_that_torques_do() -> None:
         assert error(run(dyn.inverse_dynamics(mechanism), given | {"qdd": qdd}), given["tau"]) < AGREEMENT
 
 
-def test_a_pendulum_pushed_at_its_tip_by_hand() -> None:
-    """About y, the tip at l (-sin q, 0, -cos q): the lever of a force along x is -l cos q, along z l sin q."""
-    rod = Body("rod", Joint("revolute", (0.0, 1.0, 0.0)), mass=1.0, center=(0.0, 0.0, -0.5))
-    tip = (0.0, 0.0, -0.8)
-    pendulum = Mechanism([rod], forces=[Force("rod", ("fx", 9.0, 2.0), tip)], parameters={"fx": 3.0})
-    graph = dyn.inverse_dynamics(pendulum)
-    assert graph.input_names == ("q0", "qd0", "qdd0", "fx")
-    q = 0.4
-    free = 0.25 * 1.5 + 9.81 * 0.5 * np.sin(q)
-    expected = free - 0.8 * (-3.0 * np.cos(q) + 2.0 * np.sin(q))
-    assert graph.evaluate({"q0": q, "qd0": 0.3, "qdd0": 1.5, "fx": 3.0})["tau0"] == approx(expected, rel=SHORT_SUM)
-    place = pendulum.position("rod", tip).evaluate({"q0": q})
-    assert list(place.values()) == approx([-0.8 * np.sin(q), 0.0, -0.8 * np.cos(q)], rel=SHORT_SUM)
-
-
 # --- graphs
-
-
-def test_parameters_are_inputs_that_simulate_binds() -> None:
-    arm = turned_arm(2)
-    pushable = replace(arm, forces=[Force("link 2", ("fx", 0.0, "fz"), HAND)], parameters={"fx": 2.0})
-    fixed = replace(arm, forces=[Force("link 2", (2.0, 0.0, 0.0), HAND)])
-    assert pushable.system.parameters == {"fx": 2.0, "fz": 0.0}
-    start = ([0.1, 0.2], [0.3, 0.4], 0.3)
-    default, chosen = (dyn.simulate(pushable, *start, parameters=p).q[-1] for p in ({}, {"fx": 0.0}))
-    assert default == approx(dyn.simulate(fixed, *start).q[-1], rel=EQUATIONS)
-    assert chosen == approx(dyn.simulate(arm, *start).q[-1], rel=EQUATIONS)
-    assert default != approx(chosen, rel=1e-3)
-
-
-def test_a_force_may_depend_on_time() -> None:
-    rotor = Mechanism(
-        [Body("rotor", Joint("revolute"), inertia=(1.0, 1.0, 1.0))],
-        forces=[Force("rotor", torque=(0.0, 0.0, 2.0 * cg.variable("t")))],
-    )
-    run = dyn.simulate(rotor, [0.0], [0.0], 3.0, "rk4", dt=0.1)
-    assert run.qd[-1] == approx([9.0])
-    assert run.q[-1] == approx([9.0])
 
 
 def test_forces_are_tagged_with_their_body() -> None:
@@ -146,18 +108,6 @@ def test_forces_are_tagged_with_their_body() -> None:
     assert all("link 3" in node.tags for node in tagged)
     assert any("adjoint" in node.roles for node in tagged)
     assert not any("force" in node.tags for node in dyn.inverse_dynamics(arm).nodes)
-
-
-def test_only_the_joints_between_a_body_and_the_world_feel_its_force() -> None:
-    mechanism = FAMILIES["branched"](9)
-    carried = {body.name: body.parent for body in mechanism.bodies}
-    path, at_ = set(), "b7"
-    while at_ != "world":
-        path.add(at_)
-        at_ = carried[at_]
-    felt = generalized(pushed(mechanism, "b7"), at(states(mechanism, 1), 0))
-    assert {name for name, each in zip(mechanism.system.coordinates, felt, strict=True) if each} == path
-    assert len(path) < 9
 
 
 def test_no_force_costs_nothing_and_one_costs_little() -> None:
@@ -175,17 +125,6 @@ def test_a_force_on_what_is_welded_to_the_world_does_nothing() -> None:
     still = replace(free, forces=[Force("base", (1.0, 2.0, 3.0), torque=(4.0, 5.0, 6.0))])
     assert len(dyn.forward_dynamics(still).nodes) == len(dyn.forward_dynamics(free).nodes)
     assert free.position("base", (0.0, 2.0, 0.0)).evaluate({"q0": 0.3}) == {"x": 1.0, "y": 2.0, "z": 0.0}
-
-
-@mark.parametrize("formulation", ["chain_rule_literal", "by_definition", "kinetic_only_exact"])
-def test_every_formulation_takes_the_force_off(formulation: str) -> None:
-    arm = turned_arm(3)
-    given = at(states(arm, 1), 0)
-    expected = generalized(pushed(arm, "link 3"), given)
-    old = {"q_old": given["q"], "qd_old": given["qd"], "dt": 0.0, **given}
-    free, ours = (dyn.inverse_dynamics(each, formulation) for each in (arm, pushed(arm, "link 3")))
-    difference = np.array(list(free.evaluate(inputs(free, old)).values())) - run(ours, old)
-    assert difference == approx(expected, rel=SOLVED)
 
 
 def test_bodies_and_forces_may_come_from_iterators() -> None:

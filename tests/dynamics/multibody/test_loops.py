@@ -251,16 +251,6 @@ def test_a_coordinate_follows_another_as_a_polynomial() -> None:
     assert run.q[-1, 0] == pytest.approx(state["q1"], rel=1e-14)
 
 
-def test_a_hinge_in_a_plane_holds_what_a_point_does() -> None:
-    """Three of its rows say nothing about a planar linkage, and cost nothing."""
-    graphs = [dyn.forward_dynamics(four_bar(kind)) for kind in ("point", "hinge")]
-    at = {f"{kind}{i}": 0.3 * i + 0.2 for kind in ("q", "qd", "tau") for i in range(3)}
-    values_ = [graph.evaluate(at) for graph in graphs]
-    assert {name: values_[1][name] for name in values_[0]} == values_[0]
-    assert [values_[1][f"lambda{k}"] for k in (1, 3, 4)] == [0.0, 0.0, 0.0]
-    assert len(graphs[0].nodes) == len(graphs[1].nodes)
-
-
 @pytest.mark.parametrize("kind", ["point", "hinge"])
 def test_a_planar_loop_in_any_plane_moves_alike(kind: str) -> None:
     """Of rows across the plane only rounding is left, or sums of others: they are told by their digits."""

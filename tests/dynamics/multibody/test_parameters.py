@@ -15,11 +15,10 @@ import dynamics as dyn
 from cgraph import Graph
 from dynamics import Body, Joint, Mechanism, MechanismError
 from dynamics.multibody.algebra.spatial import from_quaternion
-from tests.dynamics.mechanisms import FAMILIES, random_body, random_tree
+from tests.dynamics.mechanisms import FAMILIES, random_tree
 from tests.dynamics.models import Array, run as values
 from tests.dynamics.parametrized import parametrized
 from tests.each_row import each_row
-from viz.models.inspection import inspection
 
 ROUNDING = 1e-12  # of the largest of its kind, in some hundred sums
 GRAPHS: dict[str, Callable[[Any], Graph]] = {
@@ -125,17 +124,6 @@ def test_numbers_alone_keep_their_graphs() -> None:
         assert back.parameters == {}
 
 
-def test_slopes_of_torque_by_mass_and_inertia_are_columns_of_the_regressor() -> None:
-    rng = np.random.default_rng(3)
-    body = random_body("b", "revolute", "a", rng, mass="m", center=(0.0, 0.0, 0.0), inertia=("x", "y", "z"))
-    values_ = {"m": 1.3, "x": 0.2, "y": 0.3, "z": 0.25}
-    mechanism = Mechanism([random_body("a", "revolute", "world", rng), body], parameters=values_)
-    at = state(mechanism)
-    slopes = values(cg.jacobian(dyn.inverse_dynamics(mechanism), list(values_)), at).reshape(2, 4)
-    columns = values(dyn.regressor(mechanism), at).reshape(2, 2, 10)[:, 1, [0, 4, 6, 9]]
-    assert slopes == approx(columns, rel=1e-12)
-
-
 def test_the_regressor_keeps_its_names_apart() -> None:
     """A parameter may be called as the regressor calls its own."""
     rod = Body("rod", Joint("revolute", (0.0, 1.0, 0.0), ("m_0", 0, 0)), mass=1.0, center=("mx_0", 0.0, 0.0))
@@ -158,9 +146,6 @@ def test_slopes_of_accelerations_by_any_number_are_differences(quantity: str) ->
         for sign in (1, -1)
     )
     assert values(slopes, at) == approx(difference, rel=1e-9)
-
-
-LENGTH = {cg.variable("length")}
 
 
 def pendulums(**more: float) -> Mechanism:
@@ -197,7 +182,6 @@ def test_a_force_at_a_place_of_parameters_does_its_work() -> None:
         assert near(values(graph(arm.bind({"length": 0.8})), at), values(graph(arm), at))
 
 
-START = ([0.3, -0.2], [0.0, 0.5], 0.3)
 PLAIN: dict[str, Any] = {"method": "rk4", "dt": 0.05, "backend": "python"}
 
 
@@ -215,21 +199,6 @@ def test_dry_friction_may_be_one() -> None:
         replace(rough, parameters={"c": -1.0})
     with raises(MechanismError, match=r"uses the parameter 'cc': put its name .* or have `components` of a JointForce"):
         replace(rough, parameters={"c": 4.0, "cc": 1.0})
-
-
-def test_simulate_binds_them() -> None:
-    heavy = pendulums(load=0.7, length=1.1)
-    chosen = dyn.simulate(pendulums(), *START, **PLAIN, parameters={"load": 0.7, "length": 1.1}).q[-1]
-    for model in (heavy, heavy.bind()):
-        assert chosen == approx(dyn.simulate(model, *START, **PLAIN).q[-1], rel=ROUNDING)
-
-
-def test_simulate_many_varies_them() -> None:
-    arm, loads = pendulums(), [0.0, 0.3, 0.9]
-    many = dyn.simulate_many(arm, *START, **PLAIN, parameters={"load": loads}, t_eval=[0.3])
-    for k, load in enumerate(loads):
-        alone = dyn.simulate(pendulums(load=load), *START, **PLAIN)
-        assert many.q[k, -1] == approx(alone.q[-1], rel=ROUNDING)
 
 
 def test_pruning_takes_their_parameters_away() -> None:
@@ -279,25 +248,6 @@ def test_what_takes_numbers_takes_the_values() -> None:
     assert caught.qd == approx(numbers.qd)
     assert caught.energy == approx(numbers.energy)
     assert dyn.release(arm, q, qd, "load").body.velocity == approx(dyn.release(arm.bind(), q, qd, "load").body.velocity)
-
-
-def test_a_page_shows_them() -> None:
-    arm = pendulums()
-    found, numbers = (
-        inspection(dyn.scenes.Scene("arm", "", model, (0.1, 0.2), (0.0, 0.0), 0.1)) for model in (arm, arm.bind())
-    )
-    assert found.motion.points == approx(numbers.motion.points)
-    assert found.shares is not None
-    assert "lower" in found.shares.header
-    assert "load" in found.at
-
-
-def test_they_are_read_by_their_names() -> None:
-    graph = dyn.forward_dynamics(pendulums())
-    assert "length" in str(cg.why(graph, "qdd1", "length"))
-    assert "FUNCTION_IN_length" in cg.to_c(graph).header
-    assert any("lower" in node.tags for node in graph.nodes if node.op.name == "mul" and set(node.args) & LENGTH)
-    assert "load" in repr(pendulums())
 
 
 ROD: dict[str, Any] = {"joint": Joint("revolute"), "inertia": (1.0, 1.0, 1.0)}
@@ -353,15 +303,6 @@ def test_values_are_checked_wherever_they_are_bound() -> None:
     ):
         with raises(ValueError, match=message):
             bind()
-
-
-def test_chains_and_trees_take_them() -> None:
-    rod = {"joint": Joint("revolute", (0.0, 1.0, 0.0)), "mass": "m", "center": (0.0, 0.0, -0.5)}
-    chain = dyn.serial_arm([rod, rod], (0.0, 0.0, "g"), parameters={"m": 2.0, "g": -9.81})
-    assert dict(chain.parameters) == {"m": 2.0, "g": -9.81}
-    assert same(
-        dyn.bias(chain), dyn.bias(dyn.tree([-1, 0], [rod, rod], gravity=chain.gravity, parameters=chain.parameters))
-    )
 
 
 def test_a_planar_arm_takes_them() -> None:

@@ -65,37 +65,6 @@ def test_joint_positions_hang_down_at_zero_and_swing_to_the_right() -> None:
     assert folded == approx(np.array([[0, 0], [2, 0], [2, 1]]), abs=LAST_BITS)
 
 
-def test_an_arm_at_rest_hanging_down_needs_no_torque_and_is_lowest_there() -> None:
-    arm = random_arm(4)
-    rest = {"q": np.zeros(4), "qd": np.zeros(4), "qdd": np.zeros(4)}
-    assert run(dyn.inverse_dynamics(arm), rest) == approx(np.zeros(4), abs=0.0)
-    many = {**states(arm, 100), "qd": np.zeros((100, 4))}
-    assert run(dyn.energy(arm), many).min() > run(dyn.energy(arm), rest)[0]
-
-
-def test_gravity_pulls_a_raised_arm_down() -> None:
-    """Held straight out to the right, the holding torque is the weight times the distance of the centre of mass."""
-    arm = dyn.planar_arm([2.0, 3.0], [1.0, 0.5])
-    held = {"q": np.array([math.pi / 2, 0.0]), "qd": np.zeros(2)}
-    expected = 9.81 * np.array([2.0 * 0.5 + 3.0 * 1.25, 3.0 * 0.25])
-    assert run(dyn.gravity_force(arm), held) == approx(expected, rel=ROUNDING)
-
-
-@mark.parametrize(("model", "center", "inertia"), [("rod", 0.6, 2.0 * 1.2**2 / 12), ("point", 1.2, 0.0)])
-def test_a_link_is_what_its_model_says(model: str, center: float, inertia: float) -> None:
-    (link,) = planar_links(dyn.planar_arm([2.0], [1.2], mass_model=model))
-    assert (link.mass, link.length, link.center) == (2.0, 1.2, center)
-    assert link.inertia == approx(inertia, rel=LAST_BITS)
-
-
-def test_a_graph_has_inputs_in_the_order_of_the_links() -> None:
-    arm = random_arm(11)
-    names = [f"{x}{i}" for x in ("q", "qd", "qdd") for i in range(11)]
-    assert list(dyn.inverse_dynamics(arm).input_names) == names
-    assert list(dyn.inverse_dynamics(arm).outputs) == [f"tau{i}" for i in range(11)]
-    assert list(dyn.mass_matrix(random_arm(2)).outputs) == ["M_0_0", "M_0_1", "M_1_0", "M_1_1"]
-
-
 def test_the_triple_pendulum_is_the_paper_s() -> None:
     scene = dyn.scenes.load("triple_pendulum")
     assert [(link.mass, link.length) for link in planar_links(scene.model)] == [(1.0, 1.0), (0.8, 0.8), (0.7, 0.7)]

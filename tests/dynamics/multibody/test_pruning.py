@@ -163,15 +163,6 @@ def test_without_gravity_the_base_s_angle_is_gone() -> None:
     assert_alike(graph, dyn.prune(PAPER, effects=[]).graph)
 
 
-def test_a_base_about_the_vertical_has_no_gravity() -> None:
-    graph = dyn.gravity_force(turned_arm(3))
-    assert graph.outputs["gravity0"].value == 0.0
-    assert graph.outputs["gravity1"].value is None
-    assert "q0" not in {node.name for node in dyn.inverse_dynamics(turned_arm(3)).nodes}
-    (row,) = [each for each in dyn.prune(turned_arm(3)).absent if each.what.startswith("gravity")]
-    assert (row.what, row.nodes > 0) == ("gravity at link 1", True)
-
-
 @mark.parametrize(
     ("model", "found", "hand", "ready"),
     [(PAPER, 16, 19, 16), (arm(3), 88, 88, 86), (turned_arm(4), 51, 52, 51)],
@@ -282,14 +273,6 @@ def test_what_is_locked_and_bound_computes_the_rest_as_before() -> None:
     full = dyn.inverse_dynamics(model).evaluate(given | {"q3": 0.2, "qd3": 0.0, "qdd3": 0.0})
     found = pruned.graph.evaluate({name: given[name] for name in pruned.graph.input_names})
     assert found == {name: approx(full[name], rel=EQUATIONS) for name in ("tau2", "tau0")}
-
-
-def test_parameters_become_numbers() -> None:
-    scene = dyn.scenes.load("spring_mass")
-    pruned = dyn.prune(scene, dyn.forward_dynamics, values=scene.system.parameters)
-    assert pruned.graph.input_names == ("q0", "qd0", "tau0")
-    assert pruned.graph.evaluate({"q0": 0.3, "qd0": 0.0, "tau0": 1.0}) == {"qdd0": approx(0.7)}
-    assert (nodes(pruned.full), nodes(pruned.graph)) == (7, 3)
 
 
 def test_damping_and_forces_of_any_lagrangian_can_be_left_out() -> None:

@@ -37,17 +37,6 @@ def test_times_the_parameters_it_is_the_torque_of_the_bodies(family: str) -> Non
     assert found == approx(tau, abs=ROUNDING * abs(tau).max())
 
 
-def test_of_a_pendulum_it_is_the_textbook_s() -> None:
-    """About -y, hanging down: tau = Iyy qdd + g (mx cos q - mz sin q), and nothing else counts."""
-    arm = dyn.planar_arm([3.0], [2.0])
-    q, qdd = 0.4, 1.7
-    found = value(arm, {"q": np.array([q]), "qd": np.array([5.0]), "qdd": np.array([qdd])})[0, 0, 0]
-    expected = {"mx": 9.81 * np.cos(q), "mz": -9.81 * np.sin(q), "Iyy": qdd}
-    names = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
-    assert found == approx(np.array([expected.get(name, 0.0) for name in names]))
-    assert inertial_parameters(arm)[0] == approx(np.array([3, 0, 0, -3, 4, 0, 4, 0, 0, 0]))
-
-
 def test_it_is_small_and_free_of_the_parameters() -> None:
     graph = regressor(turned_arm(7))
     assert graph.input_names == tuple(f"{kind}{i}" for kind in ("q", "qd", "qdd") for i in range(7))

@@ -20,9 +20,7 @@ from dynamics.multibody.joints.consistency import contradiction
 from dynamics.multibody.joints.joint_type import AxialJoint
 from tests.dynamics.mechanisms import random_body
 from tests.dynamics.models import Array
-from tests.dynamics.units import Units, in_units
 from tests.registered import registered
-from tests.slow import slow
 
 ZERO, ONE = cg.constant(0.0), cg.constant(1.0)
 X, Y, Z = range(3)
@@ -224,22 +222,6 @@ def with_joint(kind: str) -> dyn.Mechanism:
     rng = np.random.default_rng(11)
     joint = dyn.Joint(kind, position=rng.normal(size=3), orientation=spatial.from_quaternion(rng.normal(size=4)))
     return dyn.Mechanism([random_body("b", kind, "world", rng, joint=joint)])
-
-
-@mark.parametrize("length", [2.0**-20, *slow(2.0**20)])
-@mark.parametrize("kind", ["angles", "polar"])
-def test_nothing_depends_on_the_unit_of_length(kind: str, length: float) -> None:
-    """To the last bit, of a power of two."""
-    first = with_joint(kind)
-    rng, size = np.random.default_rng(0), np.array([length if u == "m" else 1.0 for u in TYPES[kind].units])
-    q, qd, qdd = rng.uniform(0.3, 1.0, 3), rng.normal(size=3), rng.normal(size=3)
-    here, there = (
-        dyn.arrays_at(model, dyn.inverse_dynamics_derivatives(model), q=q * unit, qd=qd * unit, qdd=qdd * unit)
-        for model, unit in ((first, np.ones(3)), (in_units(first, Units(length=length)), size))
-    )
-    for name, array in here.items():
-        factor = length**2 / (size if array.ndim == 1 else np.outer(size, size))
-        assert np.array_equal(there[name], factor * array)
 
 
 @patch("dynamics.multibody.bodies.body.contradiction", lambda joint: "")

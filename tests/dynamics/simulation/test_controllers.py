@@ -11,7 +11,7 @@ import cgraph as cg
 import dynamics as dyn
 from dynamics import METHODS
 from dynamics.integrators import derive
-from tests.dynamics.models import Array, random_arm
+from tests.dynamics.models import Array
 from tests.dynamics.step_options import EVERY_METHOD, step
 
 RUN_ERROR = 1e-8  # of runs at rtol 1e-9 and less, or of fourth order at 2 ms
@@ -161,15 +161,6 @@ def test_steps_end_where_periods_do_and_all_move(method: str, period: float) -> 
     assert np.diff(every.t).min() > 1e-9  # of periods of 70 ms, none is cut to a rounding
     assert chosen.success
     assert chosen.t.tolist() == times
-
-
-def test_the_work_of_held_forces_is_the_change_of_energy() -> None:
-    arm = random_arm(3, damped=False)
-    controller = dyn.SampledController(lambda q, qd, t: -2.0 * qd + math.sin(5.0 * t), 0.02)
-    run = dyn.simulate(arm, [0.5, -0.3, 0.8], [0.0] * 3, t_end=1.0, rtol=1e-11, tau=controller)
-    work = (run.tau[:-1] * np.diff(run.q, axis=0)).sum()
-    assert abs(work) > 0.1
-    assert run.energy[-1] - run.energy[0] == approx(work, abs=RUN_ERROR)
 
 
 @mark.parametrize("method", ["dop853", "radau", "rk4"])

@@ -54,24 +54,6 @@ def test_the_estimate_is_the_error(grid: int, method: str) -> None:
     assert many.stats.error_at_end == approx(run.stats.error_at_end, rel=0.01, abs=ROUNDING)
 
 
-@mark.parametrize("method", ["rk4", "midpoint"])
-@mark.parametrize("t_eval", [[0.0], [0.05], [0.0, 0.05], [0.05, 0.15, 0.4], [0.35, 0.4]])
-def test_times_that_second_steps_step_over_have_an_estimate(method: str, t_eval: list[float]) -> None:
-    """Whatever is recorded, and whether an event ends the run: 0 is never said where nothing was compared."""
-    options: dict[str, Any] = {"dt": 0.05, "t_eval": t_eval, "rtol": LOOSE, "backend": "python"}
-    late = dyn.Event("late", lambda q, qd, t: t - 2.31, terminal=True)
-    for events in ((), late):
-        run = dyn.simulate(spring(), [1.0], [0.0], 2.5, method, events=events, **options)
-        every = dyn.simulate(spring(), [1.0], [0.0], 2.5, method, events=events, **options | {"t_eval": None})
-        assert run.stats.error_at_end == approx(every.stats.error_at_end, rel=0.2)
-        assert 1.2 * every.stats.error >= run.stats.error >= run.stats.error_at_end > 0.0
-    many = dyn.simulate_many(spring(), [[1.0]], [0.0], 2.5, method, **options)
-    one = dyn.simulate(spring(), [1.0], [0.0], 2.5, method, **options)
-    assert many.stats.error_at_end[0] == approx(one.stats.error_at_end, rel=1e-3)
-    early = dyn.Event("early", lambda q, qd, t: t - 0.07, terminal=True)
-    assert dyn.simulate(spring(), [1.0], [0.0], 2.5, method, events=early, **options).stats.error is None
-
-
 @mark.parametrize("method", EQUAL)
 def test_an_estimate_changes_no_row(method: str) -> None:
     for t_eval in (None, [0.1, 0.3]):
@@ -203,19 +185,6 @@ def in_silence(*arguments: Any, **options: Any) -> dyn.Trajectory:
         return dyn.simulate(*arguments, **options)
 
 
-def test_a_parameter_may_have_any_name() -> None:
-    """Also that of a number by which the two sides of a kink are told apart."""
-    names = ["branch0", "branch_", "phase0"]
-    bent = dyn.System(
-        lambda q, qd, t, p: (
-            0.5 * qd[0] ** 2 - p["branch0"] * cg.abs(q[0]) + p["branch_"] * q[0] * cg.sin(p["phase0"] * t)
-        ),
-        ["x"],
-        parameters=dict.fromkeys(names, 1.0),
-    )
-    assert in_silence(bent, [1.0], [0.0], 5.0, "midpoint", dt=0.01).stats.error > 1e-6
-
-
 @mark.parametrize("method", ["midpoint", *slow("rk4", "verlet", "gauss4")])
 def test_a_kink_that_steps_do_not_miss_is_no_error(method: str) -> None:
     """One that is never passed, at which a coordinate is at rest, or where steps end, also all of those beside."""
@@ -248,18 +217,6 @@ def test_a_run_beside_with_other_resets_says_that_nothing_is_known() -> None:
     with warns(dyn.SimulationWarning, match="the error is unknown: beside it a run .* takes another course, at t = "):
         run = dyn.simulate(spring(), [1.0], [0.0], 7.0, "euler", dt=0.02, events=wall)
     assert (len(run.events["wall"].t), run.stats.error) == (0, math.inf)
-
-
-@mark.parametrize("place", [0.0, math.pi])
-def test_errors_of_a_controlled_motion_add_up_period_by_period(place: float) -> None:
-    """Also about a rest that is none without the controller, from which the same forces would drive it away."""
-    hold = dyn.SampledController(lambda q, qd, t: 60.0 * (place + 0.2 * math.sin(t) - q) - 12.0 * qd, 0.01)
-    arm, start = dyn.planar_arm([1.0], [1.0]), ([place - 0.5], [0.0])
-    run = dyn.simulate(arm, *start, 10.0, "rk4", dt=5e-3, tau=hold)
-    exact = dyn.simulate(arm, *start, 10.0, "dop853", rtol=1e-13, tau=hold, t_eval=run.t)
-    true = max(np.max(np.abs(a - b)) / np.max(np.abs(b)) for a, b in ((run.q, exact.q), (run.qd, exact.qd)))
-    assert 0.5 * true <= run.stats.error <= 100.0 * true
-    assert not run.stats.warnings
 
 
 @mark.parametrize("method", ["rk4", *slow("euler", "verlet", "gauss6")])
@@ -313,14 +270,3 @@ def test_jacobians_and_factorizations_are_counted(method: str, jacobians: int, f
     else:
         assert (run.njev, run.nlu) == (jacobians * run.stats.steps, factors * trials)
     assert (run.nfev, run.status, run.success) == (run.stats.nfev, 0, True)
-
-
-def test_the_error_where_a_reset_of_the_run_beside_is_at_the_end_of_a_step() -> None:
-    ball = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 - 9.81 * q[0], ["height"])
-    bounce = dyn.Event("bounce", lambda q, qd, t: q[0], direction=-1, reset=lambda q, qd, t: (q, [-0.5 * qd[0]]))
-    with warns(dyn.SimulationWarning, match=r"^the state is off by an estimated 0\.13 of the size of"):
-        run = dyn.simulate(ball, [1.0], [0.0], 0.7, "symplectic_euler", dt=0.05, events=bounce)
-    falls, left = np.sqrt(2.0 / 9.81), 0.7 - np.sqrt(2.0 / 9.81)
-    exact = 0.5 * 9.81 * falls * left - 0.5 * 9.81 * left**2
-    assert run.stats.error_at_end is not None
-    assert 0.5 < run.stats.error_at_end / abs(run.q[-1, 0] - exact) < 2.0

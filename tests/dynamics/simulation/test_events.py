@@ -152,23 +152,6 @@ def test_random_oscillations_cross_zero_where_they_do(method: str) -> None:
         assert found[f"{k}"].t == approx(zeros[keep], abs=SHARP if k % 2 == 0 else MOTION), k
 
 
-def test_units_of_a_quantity_and_of_the_time_change_nothing() -> None:
-    """The same instants for a quantity in other units; and in time units, the same number of units."""
-    powers = [10.0**k for k in (-300, -12, -3, 0, 3, 12, 290)]
-    events = [dyn.Event(f"{a} {k}", lambda x, t, *, a=a, k=k: a * (x[0] - 0.5) ** k) for a in powers for k in (1, 2)]
-    found = circle(events).events
-    for k in (1, 2):
-        for a in powers:
-            assert found[f"{a} {k}"].t == approx(found[f"1.0 {k}"].t, rel=SHARP), a
-    assert len(found["1.0 1"].t) == len(found["1.0 2"].t) == 3
-    for unit in (1e-12, 1e12):
-        slow = dyn.OdeSystem(lambda x, t, *, unit=unit: [x[1] / unit, -x[0] / unit], ["x", "v"])
-        events = [dyn.Event(f"{k}", lambda x, t, *, k=k: (x[0] - 0.5) ** k) for k in (1, 2)]
-        run = dyn.simulate(slow, [1.0, 0.0], None, 10.0 * unit, "dop853", events=events, **TIGHT)
-        for k in (1, 2):
-            assert run.events[f"{k}"].t / unit == approx(found[f"1.0 {k}"].t, abs=MOTION)
-
-
 def test_instants_do_not_depend_on_the_rows_the_engine_or_the_company_of_other_events() -> None:
     ask = dyn.Event("ask", lambda x, t: (x[0] - 0.5) * (x[1] - 0.25) ** 2)
     other = dyn.Event("other", lambda x, t: cg.sin(40.0 * t))

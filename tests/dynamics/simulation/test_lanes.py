@@ -142,18 +142,6 @@ def test_options_are_those_of_a_run_alone(options: dict[str, Any]) -> None:
         assert np.array_equal(fan.p[3], np.asarray(one.p))
 
 
-@mark.parametrize("method", LANES)
-def test_workers_and_chunks_change_no_bit(method: str) -> None:
-    model = spring()
-    q, qd = starts(model, 3)
-    q[5], qd[7] = 1e3, 50.0  # steps that are much shorter than those of others
-    whole, *others = [
-        simulate_many(model, q, qd, 0.5, method, t_eval=TIMES[:4], **shares)
-        for shares in ({}, {"workers": 3}, {"chunk": 1}, {"chunk": 9, "workers": 2}, {"workers": map, "chunk": 20})
-    ]
-    assert all(same(whole, other) for other in others)
-
-
 def test_lanes_that_are_interrupted_go_on_with_the_same_bits() -> None:
     model = random_arm(2)
     q, qd = starts(model, 4)

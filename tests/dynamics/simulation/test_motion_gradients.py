@@ -251,15 +251,6 @@ def test_events_that_reset_the_state_or_end_the_motion(method: str, events: Any)
         assert float(np.squeeze(result[name])) == approx(difference, rel=DIFFERENCES)
 
 
-def test_a_stopping_time_is_differentiated() -> None:
-    """A fall from rest takes sqrt(2 q / g)."""
-    ground = dyn.Event("ground", lambda q, qd, t: q[0], terminal=True)
-    free = System(lambda q, qd, t: 0.5 * qd[0] ** 2 - 9.81 * q[0], ["height"])
-    result = dyn.gradient(free, lambda q, qd, t: t, [2.0], [0.0], 1.0, dt=0.1, events=ground, backend="python")
-    assert result.value == approx(math.sqrt(4.0 / 9.81), rel=SHORT_SUM)
-    assert result["q"] == approx([1.0 / math.sqrt(4.0 * 9.81)], rel=SHORT_SUM)
-
-
 @mark.parametrize(
     ("method", "backend"), [("rk4", "python"), ("rk4", "llvm"), ("gauss4", "llvm"), *slow(("gauss4", "python"))]
 )

@@ -15,7 +15,6 @@ from pytest import mark
 
 import dynamics as dyn
 from dynamics import METHODS
-from tests.dynamics.mechanisms import random_state, random_tree
 from tests.dynamics.models import oscillator
 from tests.dynamics.simulation.test_simulate import ARGUMENTS
 from tests.each_row import each_row
@@ -88,16 +87,6 @@ def test_instants_cut_its_steps(method: str) -> None:
         going.propagate_until(0.1)
 
 
-@mark.parametrize("seed", range(4))
-def test_motions_of_random_mechanisms(seed: int) -> None:
-    tree = random_tree(seed, 4)
-    q, qd, *_ = random_state(tree, seed)
-    motion = dyn.prepare(tree, rtol=1e-8)
-    run = dyn.simulate(tree, q, qd, SPAN, rtol=1e-8)
-    same(motion(q, qd, SPAN), run)
-    np.testing.assert_array_equal(motion.end(q, qd, SPAN).q, run.q[-1])
-
-
 @mark.parametrize(
     "options",
     [
@@ -152,16 +141,6 @@ def test_ends_alone_are_those_of_all_steps(method: str, options: dict[str, Any])
     assert (ends.t.tolist(), ends.q.tolist()) == (whole.t[[0, -1]].tolist(), whole.q[[0, -1]].tolist())
     counts = ("steps", "rejected", "nfev", "njev", "nlu", "dt", "message", "warnings")
     assert [getattr(ends.stats, name) for name in counts] == [getattr(whole.stats, name) for name in counts]
-
-
-@mark.parametrize(("rates", "said"), [(lambda x, t: [x[0] * x[0]], "stopped"), (lambda x, t: [-1e4 * x[0]], "stiff")])
-def test_ends_alone_tell_of_poles_and_stiffness(rates: Any, said: str) -> None:
-    model = dyn.OdeSystem(rates, ["x"])
-    with pytest.warns(dyn.SimulationWarning, match=said):
-        ends = dyn.simulate(model, [1.0], None, 2.0, "dopri5", t_eval=[2.0])
-    with pytest.warns(dyn.SimulationWarning, match=said):
-        whole = dyn.simulate(model, [1.0], None, 2.0, "dopri5")
-    assert (ends.t[-1], ends.q[-1, 0], ends.stats.steps) == (whole.t[-1], whole.q[-1, 0], whole.stats.steps)
 
 
 def test_a_linkage_goes_on_step_by_step() -> None:

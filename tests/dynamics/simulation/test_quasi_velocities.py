@@ -83,17 +83,6 @@ def test_of_a_quaternion_only_the_direction_counts(size: float) -> None:
     np.testing.assert_allclose(run.q, same.q, rtol=8 * UNIT)
 
 
-@mark.parametrize("method", ["rk4", "dop853"])
-def test_many_runs_are_the_single_ones(method: str) -> None:
-    options = {"dt": 0.05, "estimate_error": False} if method == "rk4" else {}
-    q = np.random.default_rng(0).normal(size=(9, 4))
-    many = dyn.simulate_many(top(), q, [0.3, 0.2, 1.0], 0.5, method, t_eval=[0.2, 0.5], tau=np.eye(9, 3), **options)
-    one = dyn.simulate(top(), q[1], [0.3, 0.2, 1.0], 0.5, method, t_eval=[0.2, 0.5], tau=[0.0, 1.0, 0.0], **options)
-    assert (many.q.shape, many.qd.shape) == ((9, 2, 4), (9, 2, 3))
-    np.testing.assert_allclose(np.hstack([many.q[1], many.qd[1]]), np.hstack([one.q, one.qd]), rtol=0, atol=1e-13)
-    assert np.abs(lengths(many.q) - 1.0).max() <= UNIT
-
-
 @mark.parametrize("method", ["dop853", "rk4"])
 def test_events_read_and_leave_unit_quaternions(method: str) -> None:
     """A quantity of a quaternion's entry, a reset that gives another length, and the run between."""
@@ -130,26 +119,6 @@ def test_the_entries_of_a_quaternion_share_a_tolerance_which_a_place_does_not() 
         run = dyn.simulate(stone, [0.0, 0.0, unit, *TURN], [0.1 * unit, 0.0, 0.0, *spin], 1.0)
         ends.append([*run.q[-1, :3] / unit, *run.q[-1, 3:], run.stats.steps])
     np.testing.assert_allclose(ends[1], ends[0], rtol=1e-7)
-
-
-def pendulum() -> dyn.System:
-    """A system of one's own on a ball joint, whose L depends on |q| off the constraint; parameter k."""
-    joint = dyn.Joint("ball").type
-
-    def lagrangian(e, w, t, p):
-        height = 1.0 - 2.0 * (e[1] ** 2 + e[2] ** 2)
-        return 0.5 * (w[0] ** 2 + 2.0 * w[1] ** 2 + 3.0 * w[2] ** 2) - p["k"] * height
-
-    moving = dyn.QuasiVelocities("wx wy wz", joint.rate, joint.structure, joint.neutral, joint.normalized, joint.groups)
-    return dyn.System(lagrangian, "w x y z", {"k": 5.0}, quasi_velocities=moving)
-
-
-@mark.parametrize("method", ["dopri5", "gauss6"])
-def test_a_system_of_ones_own_is_held_on_its_constraint(method: str) -> None:
-    options = {} if method == "dopri5" else {"dt": 0.02}
-    run = dyn.simulate(pendulum(), TURN, [0.1, 0.2, 0.3], 20.0, method, **options)
-    assert np.abs(lengths(run.q) - 1.0).max() <= UNIT
-    assert np.ptp(run.energy) < 1e-6
 
 
 @mark.parametrize(

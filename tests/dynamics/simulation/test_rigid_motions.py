@@ -54,20 +54,6 @@ def tree(kind: str = "free", gravity: ArrayLike = (0.0, 0.0, 0.0)) -> dyn.Mechan
     return dyn.Mechanism([trunk(rng, dyn.Joint(kind)), *branches(rng)], gravity=gravity)
 
 
-def start() -> tuple[Array, Array]:
-    """A state of the tree, with unit quaternions."""
-    rng = np.random.default_rng(4)
-    q, u = rng.normal(size=12), rng.normal(size=10)
-    q[3:7] /= np.linalg.norm(q[3:7])
-    q[7:11] /= np.linalg.norm(q[7:11])
-    return q, u
-
-
-def states(run: dyn.Trajectory) -> Array:
-    """q and qd of all rows, quaternions with the sign of those of the base and the leg at hand."""
-    return np.hstack([run.q, run.qd])
-
-
 @mark.optimized  # the bound is that of fused products
 @mark.parametrize("omega", [[0.1, 1.0, 0.2], [2.0, 1.0, 0.2], [-0.3, -1.0, -2.0]])
 def test_a_free_rotor_turns_as_jacobis_functions_say(omega: list[float]) -> None:
@@ -131,15 +117,3 @@ def test_dzhanibekovs_rotor_keeps_energy_and_momentum_without_drift(steps: int) 
     assert np.ptp(run.energy) < ROUNDING * run.energy[0]
     assert np.ptp(length) < ROUNDING * length[0]
     assert np.abs(momentum - momentum[0]).max() < KEPT * length[0]
-
-
-@mark.parametrize(("method", "options"), [("dop853", {"rtol": 1e-14}), ("gauss6", {"dt": 5e-3})])
-def test_a_free_tree_keeps_its_momentum_in_space(method: str, options: dict[str, float]) -> None:
-    model, (q, u) = tree(), start()
-    run = dyn.simulate(model, q, u, 2.0, method, t_eval=np.linspace(0.0, 2.0, 11), **options)
-    graph = dyn.momentum(model)
-    values = graph.evaluate(dict(zip(graph.input_names, states(run).T, strict=True)))
-    p = np.stack(list(values.values()), axis=1)  # of the base: linear in the world's axes, angular in the body's
-    angular = np.einsum("tij,tj->ti", rotations(run.q[:, 3:7]), p[:, 3:6]) + np.cross(run.q[:, :3], p[:, :3])
-    for kept in (p[:, :3], angular):
-        assert np.abs(kept - kept[0]).max() < KEPT * np.abs(kept[0]).max()

@@ -12,7 +12,7 @@ from pytest import approx, mark, raises
 
 import dynamics as dyn
 from dynamics import METHODS, System, as_system, simulate_many
-from dynamics.simulation.steps.equal_steps import EqualSteps, even_steps
+from dynamics.simulation.steps.equal_steps import even_steps
 from tests.dynamics.ensembles import arms, same
 from tests.dynamics.models import oscillator, random_arm
 from tests.dynamics.step_options import LIKE_OTHERS, step
@@ -75,27 +75,6 @@ def test_every_method_gives_what_simulate_gives(model: Any, method: str) -> None
         iterated = not METHODS[method].adaptive and method not in ("euler", "rk4")
         assert result.stats.nfev[k] == approx(one.stats.nfev, rel=TURNS if iterated else 0.0)
         assert result.stats.dt[k] == approx(one.stats.dt, rel=SPACING)
-
-
-def test_a_system_of_first_order_and_time() -> None:
-    """x' = -a x + cos t, and a start for all."""
-    import cgraph as cg
-
-    model = dyn.OdeSystem(lambda x, t, p: [-p["a"] * x[0] + cg.cos(t)], ["x"], {"a": 1.0})
-    a = np.array([0.5, 1.0, 3.0])
-    result = simulate_many(model, [1.0], None, 2.0, "rk4", parameters={"a": a})
-    t = result.t
-    particular = (a[:, None] * np.cos(t) + np.sin(t)) / (1.0 + a[:, None] ** 2)
-    expected = particular + (1.0 - a / (1.0 + a**2))[:, None] * np.exp(-a[:, None] * t)
-    assert result.q[:, :, 0] == approx(expected, abs=RK4_ERROR)
-    assert (result.q.shape, result.qd.shape) == ((3, 2001, 1), (3, 2001, 0))
-
-
-@mark.parametrize("times", [[0.0], [1e-9], [0.3], [0.2, 0.9], np.linspace(0.0, 1.0, 11), np.geomspace(1e-3, 1.0, 7)])
-def test_t_eval_chooses_the_rows(times: Any) -> None:
-    result = simulate_many(oscillator(), [[1.0], [2.0]], [0.0], 1.0, "rk4", t_eval=times)
-    assert result.t.tolist() == list(times)
-    assert result.q[1, :, 0] == approx(2.0 * np.cos(math.sqrt(1.5) * result.t), abs=RK4_ERROR)
 
 
 def test_many_steps_come_in_many_blocks() -> None:
@@ -200,14 +179,6 @@ def test_a_result_that_would_not_fit_is_refused() -> None:
         MemoryError, match=r"100000 trajectories of 100000001 rows of 4 numbers take 2.98e\+05 GiB, and .* free"
     ):
         simulate_many(random_arm(2), np.zeros((100_000, 2)), [0.0, 0.0], 1e5, "rk4")
-
-
-def test_only_the_last_block_of_a_row_ends_at_an_instant() -> None:
-    grid = EqualSteps(0.0, 0.1, 14, 1.4, rows=2)
-    assert [*grid.blocks(3, 5)] == [(3, 3, False), (3, 3, False), (1, 1, True)] * 2
-    assert [*grid.blocks(7, 5)] == [(7, 7, True)] * 2
-    assert [*grid.blocks(20, 5)] == [(14, 7, True)]
-    assert [*EqualSteps(0.0, 0.1, 5, 0.5, rows=5).blocks(20, 2)] == [(2, 1, True), (2, 1, True), (1, 1, True)]
 
 
 @given(

@@ -142,42 +142,6 @@ def test_an_unknown_formulation_is_named_with_those_that_there_are(make, known, 
         make(System(mass, ["x"]), name)
 
 
-@mark.parametrize("make", [dyn.inverse_dynamics, dyn.mass_matrix, dyn.bias, dyn.energy, dyn.forward_dynamics])
-def test_what_is_no_model_is_refused(make) -> None:
-    with raises(TypeError, match="expected a System, a mechanism or a scene, got str: 'triple_pendulum'"):
-        make("triple_pendulum")
-
-
-def test_an_unknown_scene_is_named_with_those_that_there_are() -> None:
-    with raises(ValueError, match=f"there is no scene 'swing'; the scenes are {', '.join(dyn.scenes.names())}"):
-        dyn.scenes.load("swing")
-
-
-def test_a_chain_needs_a_link() -> None:
-    with raises(ValueError, match="a chain needs at least one link, got 0"):
-        dyn.scenes.load("chain", n=0)
-
-
-@mark.parametrize(
-    ("lagrangian", "name"),
-    [
-        (lambda q, qd, t: 0.5 * qd[0] ** 2 - q[1] ** 2, "slack"),  # no velocity of its own at all
-        (
-            lambda q, qd, t: 0.5 * (qd[0] + qd[1]) ** 2,
-            "stiff",
-        ),  # two coordinates, one motion: found at the second pivot
-        (lambda q, qd, t: qd[0] * q[1] - q[0] ** 2 + 0.5 * qd[1] ** 2, "stiff"),  # linear in velocity is no inertia
-    ],
-)
-def test_a_coordinate_without_inertia_is_named(lagrangian, name: str) -> None:
-    system = System(lagrangian, ["stiff", "slack"])
-    for make in (dyn.forward_dynamics, lambda s: dyn.simulate(s, [0.0, 0.0], [0.0, 0.0], 1.0)):
-        with raises(dyn.SingularMassMatrixError, match=f"mass matrix is singular: coordinate '{name}' has no inertia"):
-            make(system)
-    assert issubclass(dyn.SingularMassMatrixError, ValueError)
-    dyn.inverse_dynamics(system).check()  # which needs no inverse
-
-
 def test_without_mujoco_the_error_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "mujoco", None)
     arm = dyn.planar_arm([1.0], [1.0])

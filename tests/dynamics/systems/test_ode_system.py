@@ -1,15 +1,13 @@
 """First-order systems and the state equation: what they give, and what they say about wrong input."""
 
 import numpy as np
-from pytest import approx, mark, raises
+from pytest import mark, raises
 
 import cgraph as cg
 import dynamics as dyn
 from dynamics import OdeSystem, state_equation
 from dynamics.equations.state_equation import state_inputs
 from tests.dynamics.models import MODELS, at, inputs, states
-
-ROUNDING = 1e-15  # relative: the same three operations in another order
 
 
 def lotka_volterra() -> OdeSystem:
@@ -68,14 +66,6 @@ def test_a_tank_runs_empty_and_stays_so(method: str) -> None:
     assert abs(run.q[-1, 0]) < 1e-8
 
 
-def test_a_second_order_system_is_the_same_either_way() -> None:
-    pendulum = dyn.System(lambda q, qd, t: 0.5 * qd[0] ** 2 + 9.81 * cg.cos(q[0]), ["angle"], damping=0.3)
-    spelled = OdeSystem(lambda x, t: [x[1], -9.81 * cg.sin(x[0]) - 0.3 * x[1]], "q0 qd0")
-    point = {"q0": 0.7, "qd0": -1.2}
-    one = state_equation(pendulum).evaluate({**point, "tau0": 0.0})
-    assert list(spelled.graph.evaluate(point).values()) == approx(list(one.values()), rel=ROUNDING)
-
-
 @mark.parametrize(
     ("rate", "names", "parameters", "error", "words"),
     [
@@ -97,8 +87,3 @@ def test_a_second_order_system_is_the_same_either_way() -> None:
 def test_wrong_input_is_named(rate: object, names: object, parameters: dict, error: type, words: str) -> None:
     with raises(error, match=words):
         OdeSystem(rate, names, parameters)  # type: ignore[arg-type]
-
-
-def test_what_is_no_model_has_no_state_equation() -> None:
-    with raises(TypeError, match="expected a System"):
-        state_equation(3)

@@ -18,11 +18,6 @@ def test_a_mechanism() -> None:
     )
 
 
-def test_a_planar_arm() -> None:
-    said = "<Mechanism of 3 bodies, 2 coordinate(s) joint 1, joint 2; gravity 0, 0, -9.81>"
-    assert repr(dyn.planar_arm([1.0, 0.5], [1.0, 1.0])) == said
-
-
 def test_a_trajectory() -> None:
     arm = dyn.planar_arm([1.0], [1.0])
     event = dyn.Event("bottom", lambda q, qd, t: q[0])

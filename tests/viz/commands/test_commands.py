@@ -243,14 +243,6 @@ def test_why_nan_finds_the_operation_and_its_status_is_a_finding(own, said):
     assert "which is -inf, where " in text
 
 
-def test_why_on_forward_dynamics(figures):
-    found = figures("why", "chain", "qdd9", "tau0", "--forward", "--k", "1")
-    graph = dyn.forward_dynamics(dyn.scenes.load("chain"))
-    exact = by_complex_step(graph, "qdd9", "tau0", found["at"])
-    assert abs(found["derivative"] - exact) <= ROUNDING * found["weight"]
-    assert found["difference"] <= ROUNDING * found["weight"]
-
-
 def test_two_that_are_not_connected_are_told_why_not(said, figures):
     assert said("why", "spring_mass", "tau0", "qd0").startswith("tau.theta does not depend on qd.theta.\n")
     found = figures("why", "spring_mass", "tau0", "qd0")
@@ -444,17 +436,6 @@ def test_the_answer_is_drawn(tmp_path, said):
     assert svg.startswith("<svg")
     assert "only by_definition" in svg
     assert "only chain_rule" in svg
-
-
-def test_a_point_keeps_parameters_and_is_always_the_same():
-    scene = dyn.scenes.load("spring_mass")
-    graph = dyn.inverse_dynamics(scene, "by_definition")
-    at = filled(graph, scene, {"qdd0": 2.0})
-    assert at == filled(graph, scene, {"qdd0": 2.0})
-    assert set(at) == set(graph.input_names)
-    assert (at["I"], at["k"], at["dt"], at["qdd0"]) == (1.0, 1.0, 1e-3, 2.0)
-    assert -1.0 <= at["q0_old"] <= 1.0
-    assert np.isfinite(list(graph.evaluate(at).values())).all()
 
 
 def test_a_point_of_a_file_is_its_start_and_takes_bare_names(tmp_path: Path) -> None:

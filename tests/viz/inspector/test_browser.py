@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 
 import pytest
@@ -416,21 +415,3 @@ def test_print_keeps_the_picture_legend_results_and_version(show):
         assert not page.locator(gone).is_visible(), gone
     assert page.inner_text("#version").startswith("cgraph ")
     assert page.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(255, 255, 255)"
-
-
-def test_names_and_counts_are_those_of_the_library(show):
-    page = show()
-    page.click("summary:text-is('Counts')")
-    rows = page.locator("#counts tbody tr").all_inner_texts()
-    for name, row in zip((EMBEDDED, "kinetic_only", "chain_rule"), rows, strict=False):
-        graph = graph_of(name)
-        edges = len(dyn.formulation_verdict(dyn.scenes.load("triple_pendulum"), name).edges)
-        counts = [len(graph.nodes), len(graph.edges), len(dyn.spurious_nodes(graph)), edges]
-        assert [int(number) for number in re.findall(r"\d+", row)] == counts
-    called = dyn.display_names(dyn.scenes.load("triple_pendulum"))
-    heads = page.locator("#results tbody th").all_inner_texts()
-    assert heads == [f"{called[f'tau{i}']} [N m]" for i in range(3)]
-    data = json.loads(page.evaluate("document.getElementById('data').textContent"))
-    assert {called[name] for name in data["inputs"] if name in called} <= set(
-        page.eval_on_selector_all("#inputs input", "(all) => all.map((each) => each.ariaLabel)")
-    )

@@ -137,19 +137,6 @@ def test_contacts_are_seen_where_they_touch():
     assert places == pytest.approx(np.concatenate([seen.points, seen.surfaces], axis=1))
 
 
-def test_a_mechanism_hangs_together():
-    joint = dyn.Joint("revolute", axis=(0, -1, 0), position=(0.0, 0.0, -0.5))
-    bodies = [
-        dyn.Body("a", joint, mass=1.0, center=(0, 0, -0.25)),
-        dyn.Body("b", joint, "a", mass=1.0, center=(0, 0, -0.25)),
-    ]
-    points, parents, *_ = skeleton(dyn.Mechanism(bodies), [[0.3, 0.2]])
-    assert parents == (-1, 0, 1)
-    a = np.array([np.sin(0.3), -np.cos(0.3)]) * 0.5
-    tip = np.array([np.sin(0.5), -np.cos(0.5)]) * 0.25
-    assert points[0] == pytest.approx(np.array([[0.0, -0.5], [0.0, -0.5] + a, [0.0, -0.5] + a + tip]))
-
-
 @each_row(("axis", "turns"), [((0, 1, 0), (-1,)), ((0, -1, 0), (1,)), ((1, 0, 0), (1,)), ((0, 0, 1), (1,))])
 def test_a_joint_turns_the_picture_one_way_or_the_other(axis, turns):
     """About y, x goes to the right and z up, so that a positive turn is clockwise; the others as they are seen."""

@@ -1,16 +1,14 @@
 """The page of the stability table: verdicts, figures and reasons, on one page and as files."""
 
 import json
-import re
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from tests.each_row import each_row
 from viz import cli
 from viz.pages import stability_page
-from viz.pages.document import Document, document_files, to_html
+from viz.pages.document import Document, to_html
 
 pytest.importorskip("matplotlib")
 
@@ -87,20 +85,6 @@ def test_success_does_not_stand_in_the_box_of_a_warning(document: Document, undr
     assert '<p class="warning">1 of 4 rows' in to_html(document)
 
 
-@each_row(
-    ("value", "bound", "share"),
-    [
-        (2.0, 4.0, 0.5),
-        ("nan", 1.0, stability_page.TO),
-        ("inf", 1.0, stability_page.TO),
-        (0.0, 0.0, stability_page.FROM),
-        (1.0, 0.0, 1e13),
-    ],
-)
-def test_a_share_is_drawn_within_the_picture(value: float | str, bound: float, share: float) -> None:
-    assert stability_page._share({"value": value, "bound": bound}) == share
-
-
 def test_what_is_beyond_its_bound_is_drawn_in_the_color_of_what_is_wrong() -> None:
     axis = stability_page.shares(ROWS).axes[0]
     met, missed = (line for line in axis.lines if line.get_marker() in ("o", "X"))
@@ -108,21 +92,6 @@ def test_what_is_beyond_its_bound_is_drawn_in_the_color_of_what_is_wrong() -> No
     assert list(missed.get_xdata()) == [7.0, 8.0, stability_page.TO]
     assert missed.get_color() == stability_page.theme.SPURIOUS
     assert [label.get_text() for label in axis.get_yticklabels()] == [each["case"] for each in ROWS]
-
-
-def test_files_are_written_and_the_page_needs_no_other(tmp_path: Path, document: Document) -> None:
-    files = document_files(tmp_path, "stability", document, CONTENT, "section,case\n")
-    assert {each.name for each in files} == {
-        "stability.html",
-        "stability.md",
-        "stability.csv",
-        "stability.json",
-        "stability-cases.svg",
-    }
-    text = files[tmp_path / "stability.html"]
-    assert not re.search(r'(src|href)="(?!data:|#)', text)
-    assert json.loads(files[tmp_path / "stability.json"]) == CONTENT
-    assert "![Figures over their bounds" in files[tmp_path / "stability.md"]
 
 
 def test_a_report_of_nothing_is_refused(capsys: pytest.CaptureFixture[str]) -> None:

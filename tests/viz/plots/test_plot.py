@@ -26,6 +26,14 @@ def test_the_ink_of_a_picture_follows_the_page() -> None:
         assert ink.lower() not in drawn.lower()
 
 
+def test_a_background_adapts_with_the_ink() -> None:
+    figure = bars(["a", "b"], [0.1, 20.0], "time [s]")
+    alone, backed = to_adaptive_svg(figure), to_adaptive_svg(figure, background=True)
+    for color in (theme.WHITE, theme.DARK_PAGE):
+        assert f"background: {color};" in backed
+    assert "background" not in alone
+
+
 def test_a_bar_has_its_range() -> None:
     groups = {"ours": {"a": (2.0, 1.0, 5.0), "b": (3.0, 2.5, 3.5)}, "others'": {"a": (20.0, 20.0, 20.0)}}
     axis, other = plot.bars(groups, {"a": "red", "b": "blue"}, "ratio").axes

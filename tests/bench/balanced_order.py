@@ -1,6 +1,6 @@
 """What the balanced order of elimination costs and gains: nodes, depth, digits, and time by lanes and by threads.
 
-python -m tests.dynamics.figures.balanced_order
+python -m tests.bench.balanced_order
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from cgraph.extend import Builder, folded, solve_nodes, topological
 from dynamics.experiments.speed.bench_scenes import chain, turned_arm
 from dynamics.experiments.text_table import digits, table
 from dynamics.multibody.trees.mechanism import Mechanism
-from tests.dynamics.figures.parallel_c import times
+from tests.bench.parallel_c import times
 
 MODELS: dict[str, Callable[[], Mechanism]] = {
     "planar 20": lambda: chain(0.2, 0.2, 20),
