@@ -1,13 +1,12 @@
-"""Solvers: ways to integrate a task, timed from its start to t_end; ours, and SciPy on our compiled rate."""
+"""Solvers: ways to integrate a task, timed from its start to t_end; ours are the methods of `simulate`."""
 
 from __future__ import annotations
 
-import copy
 import math
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -18,9 +17,8 @@ from cgraph.extend import Array
 from ...equations.state_equation import state_inputs
 from ...integrators import METHODS, Problem, derive
 from ...simulation.outcome import Recorder
-from ...simulation.run_options import SCIPY, RunOptions
+from ...simulation.run_options import RunOptions
 from ...simulation.steps.integration import integration
-from ...simulation.steps.scipy_solvers import ScipyIntegration, scipy_solver
 from ...simulation.steps.step_program import CompiledSteps, compile_steps, step_program
 from ...simulation.steps.stepping import Integration, NativeRun
 from ..accuracy_task import AccuracyTask
@@ -53,8 +51,8 @@ class Run(Timed):
         return self.read(self.run())
 
 
-class EndSolver(ABC):
-    """A way to compute the end of one task.
+class Solver(ABC):
+    """A way to integrate one task.
 
     kind: `EQUAL`, where the knob is the number of steps, or `CHOSEN`, where it is the relative tolerance.
     order: of its error, as declared; None where that is no fixed number.
@@ -62,18 +60,11 @@ class EndSolver(ABC):
 
     order: int | None = None
     kind = CHOSEN
-    ours = False
     tolerances: Sequence[float] = tuple([10.0**-k for k in range(3, 16)])
 
-    def __init__(self, name: str, about: str, task: AccuracyTask, smallest: float) -> None:
-        self.name, self.about, self.task, self.smallest = name, about, task, smallest
+    def __init__(self, name: str, task: AccuracyTask, smallest: float) -> None:
+        self.name, self.task, self.smallest = name, task, smallest
         self.start = np.array(task.start)
-
-    def until(self, t_end: float) -> EndSolver:
-        """Run to another end, with what is compiled already."""
-        other = copy.copy(self)
-        other.task = replace(self.task, t_end=t_end)
-        return other
 
     @abstractmethod
     def ready(self, knob: float) -> Run:
@@ -82,18 +73,6 @@ class EndSolver(ABC):
     def absolute(self, knob: float) -> float:
         """The absolute tolerance that goes with a relative one: as small a part of the smallest state."""
         return knob * self.smallest
-
-
-class Solver(EndSolver):
-    """A way to integrate one task, which tells the states on the way, too."""
-
-    @abstractmethod
-    def rows(self, knob: float) -> Array:
-        """The states at the task's times, (T, m); NaN from where it stopped."""
-
-    def rates(self, x: Array) -> Array | None:
-        """Rates of the states, (T, m), at states (T, m); None where they are computed by our graph."""
-        return None
 
 
 def problem_of(task: AccuracyTask) -> Problem:
@@ -133,22 +112,20 @@ def recorded(run: Integration, start: Array, times: Sequence[float]) -> Array:
 class Ours(Solver):
     """One of our methods in its native loop; the program is made once."""
 
-    ours = True
-
-    def __init__(self, name: str, task: AccuracyTask, smallest: float, problem: Problem, backend: str = "auto") -> None:
-        super().__init__(name, "ours", task, smallest)
-        self.problem, self.backend, self.method = problem, backend, METHODS[name]
+    def __init__(self, name: str, task: AccuracyTask, smallest: float, problem: Problem) -> None:
+        super().__init__(name, task, smallest)
+        self.problem, self.method = problem, METHODS[name]
         self.order = self.method.order
         self.kind = CHOSEN if self.method.adaptive else EQUAL
 
     @cached_property
     def _plain(self) -> CompiledSteps:
-        return compile_steps(step_program(self.problem, self.method, dense=False), self.backend, True)
+        return compile_steps(step_program(self.problem, self.method, dense=False), "auto", True)
 
     @cached_property
     def _dense(self) -> CompiledSteps:
         program = step_program(self.problem, self.method, dense=self.method.adaptive)
-        return compile_steps(program, self.backend, True)
+        return compile_steps(program, "auto", True)
 
     def _options(self, knob: float, times: Sequence[float], max_steps: float = math.inf) -> RunOptions:
         t_end = self.task.t_end
@@ -174,29 +151,3 @@ class Ours(Solver):
         """The states at the task's times, (T, m); NaN from where it stopped."""
         times = self.task.times
         return recorded(integration(NativeRun(self._dense, self._options(knob, times))), self.start, times)
-
-
-class Scipy(Solver):
-    """One of SciPy's solvers on our compiled rate and Jacobian. Raises ImportError without SciPy."""
-
-    tolerances = tuple([10.0**-k for k in range(3, 14)])  # it takes none smaller than 2e-14
-
-    def __init__(
-        self, solver: str, task: AccuracyTask, smallest: float, problem: Problem, backend: str = "auto"
-    ) -> None:
-        super().__init__(SCIPY + solver, "SciPy's solver on our compiled rate", task, smallest)
-        self._solver = scipy_solver(problem, solver, backend)
-        self.order = {"DOP853": 8, "Radau": 5, "RK45": 5}.get(solver)
-
-    def _options(self, knob: float, times: Sequence[float] | None) -> RunOptions:
-        return RunOptions(self.task.t_end, self.name, rtol=knob, atol=self.absolute(knob), t_eval=times)
-
-    def ready(self, knob: float) -> Run:
-        """The run to t_end, which records its steps alone."""
-        solver, options = self._solver, self._options(knob, None)
-        return Run(lambda: finished(ScipyIntegration(solver, options), self.start)._replace(rejected=None))
-
-    def rows(self, knob: float) -> Array:
-        """The states at the task's times, (T, m); NaN from where it stopped."""
-        times = self.task.times
-        return recorded(ScipyIntegration(self._solver, self._options(knob, times)), self.start, times)

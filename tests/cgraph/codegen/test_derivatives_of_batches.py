@@ -10,7 +10,7 @@ from hypothesis import given, settings, strategies as st
 import cgraph as cg
 from cgraph import GraphError
 from cgraph.program.functions import colored_matrix, differentiable, direction_products
-from dynamics.peers.translate import translated
+from tests.bench.peers.translate import translated
 from tests.cgraph.codegen.test_derivatives import LANES, WRITTEN, compiled, example, x, y
 from tests.cgraph.engines import RUNNERS
 from tests.strategies import cases, examples

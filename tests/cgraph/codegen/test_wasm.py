@@ -13,7 +13,6 @@ import dynamics as dyn
 from cgraph.codegen.wasm.functions import library, page_functions, text_of
 from cgraph.core.node import apply
 from cgraph.operations.operation import OPS, Op
-from dynamics.experiments.speed.bench_scenes import turned_arm
 from dynamics.integrators import TABLEAUS
 from tests.cgraph.engines import SPECIAL, graph_of
 from tests.each_row import each_row
@@ -21,6 +20,7 @@ from tests.strategies import cases, examples
 from tests.tolerances import SUMS
 from tests.ulps import same, ulps_apart
 from tests.wasm import instance
+from viz.paper.mechanisms import turned_arm
 
 X, Y = cg.variables("x y")
 STATE = cg.Graph([X, Y], {"x_dot": Y, "y_dot": -X})

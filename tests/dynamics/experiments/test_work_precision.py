@@ -17,10 +17,8 @@ from pytest import approx, raises
 import dynamics as dyn
 from dynamics.experiments.accuracy_task import INTERVALS, AccuracyTask
 from dynamics.experiments.work_precision import measurement
-from dynamics.experiments.work_precision.cold_start import cold_starts
 from dynamics.experiments.work_precision.measurement import FLOOR_ERROR, Entry, ErrorMetrics
 from dynamics.experiments.work_precision.named_tasks import load, names
-from dynamics.experiments.work_precision.trajectory_peers import EPSILON, Mujoco, heyoka_derivatives, offers
 from dynamics.experiments.work_precision.trajectory_runs import (
     CHOSEN,
     EQUAL,
@@ -42,6 +40,8 @@ from dynamics.experiments.work_precision.work_precision import (
 )
 from dynamics.integrators import METHODS
 from dynamics.multiprecision import Reference
+from tests.bench.motions.cold_start import cold_starts
+from tests.bench.motions.trajectory_peers import EPSILON, Mujoco, heyoka_derivatives, offers
 from tests.each_row import each_row
 
 T_END = 10.0  # s, of the scene spring_mass: q = cos t

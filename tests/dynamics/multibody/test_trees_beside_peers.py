@@ -9,8 +9,8 @@ import numpy as np
 from pytest import mark, param
 
 import dynamics as dyn
-from dynamics.peers import PEERS
-from dynamics.peers.peer import PeerModel
+from tests.bench.peers import PEERS
+from tests.bench.peers.peer import PeerModel
 from tests.dynamics.mechanisms import EVERY_KIND, for_peers, random_state, random_tree
 from tests.dynamics.models import run
 

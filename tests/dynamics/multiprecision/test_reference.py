@@ -17,11 +17,11 @@ import dynamics as dyn
 from dynamics.equations.state_equation import state_equation, state_inputs
 from dynamics.experiments.stability import cases
 from dynamics.experiments.work_precision.named_tasks import load
-from dynamics.experiments.work_precision.trajectory_peers import heyoka_equations
 from dynamics.experiments.work_precision.trajectory_runs import problem_of
 from dynamics.multiprecision import REFERENCE_METHODS, Reference, ReferenceFailedError, closed_forms, reference
 from dynamics.multiprecision.flint_numbers import working
 from dynamics.systems.ode_system import OdeSystem
+from tests.bench.motions.trajectory_peers import heyoka_equations
 from tests.dynamics.split_state import split_state
 from tests.each_row import each_row
 from tests.slow import slow
