@@ -19,13 +19,13 @@ from .speed import bench as speed
 
 LISTS = {"tasks": speed.TASKS, "modes": speed.MODES, "peers": speed.PEERS}
 NUMBERS = {"links": "links of the models", "repeats": "turns", "count": "trajectories, or states"}
-OPTIONS = (*READING, *LISTS, "quick", "budget", "json", "repeats", "times", "errors", "count", "links")
+OPTIONS = (*READING, *LISTS, "quick", "budget", "repeats", "times", "errors", "count", "links")
 
 
 def parser() -> argparse.ArgumentParser:
     """The arguments."""
     figures = [
-        f"  {name:16} {bench.about}" + f"; takes {dashed(bench.takes)}" * (name != SPEED)
+        f"  {name:16} {bench.about}" + f"; takes {dashed(bench.takes)}" * (name != SPEED and bool(bench.takes))
         for name, bench in BENCHES.items()
     ]
     result = argparse.ArgumentParser(
@@ -81,12 +81,12 @@ def run(options: argparse.Namespace) -> None:
     bench, given = BENCHES[name], {each: getattr(options, each) for each in OPTIONS}
     for option, value in given.items():
         if option not in bench.takes and value not in (None, False):
-            raise ValueError(f"--{option} does not go with {name}, which takes {dashed(bench.takes)}")
+            raise ValueError(f"--{option} does not go with {name}, which takes {dashed(bench.takes) or 'none'}")
         if option in NUMBERS and value == 0:
             raise ValueError(f"--{option} must be at least 1, got 0")
     if scenes and not bench.rows:
         raise ValueError(f"{name} has models of its own and takes no scene, got {scenes[0]!r}")
-    chosen = {each: value for each, value in given.items() if value and each not in (*READING, "quick", "json")}
+    chosen = {each: value for each, value in given.items() if value and each not in (*READING, "quick")}
     if scenes:
         chosen["scenes"] = scenes
     if bench.rows:

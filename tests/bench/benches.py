@@ -21,7 +21,7 @@ class Bench(NamedTuple):
 
     about: str
     home: str
-    takes: tuple[str, ...]
+    takes: tuple[str, ...] = ()
     rows: bool = False
 
     @property
@@ -37,75 +37,52 @@ class Bench(NamedTuple):
 
 
 READING = ("ignore", "floating", "limits", "friction", "actuators", "contacts")
+OF_SPEED = (*READING, "tasks", "modes", "peers", "quick", "budget", "repeats")
+OF_MOTIONS = ("times", "errors", "peers", "quick", "repeats", "count")
+SIDE, STAGES, COMPARED = "bench.speed.beside_peers", "bench.speed.stages", "bench.motions.comparisons"
+# fmt: off   (a table is read by columns)
 BENCHES = {
-    SPEED: Bench(
-        "run times of tasks beside other software (default)",
-        "bench.speed.bench.bench",
-        (*READING, "tasks", "modes", "peers", "quick", "budget", "json", "repeats"),
-        True,
-    ),
-    MOTIONS: Bench(
-        "what ends of motions cost at equal true error",
-        "bench.motions.motions.motions",
-        ("times", "errors", "peers", "quick", "json", "repeats", "count"),
-        True,
-    ),
+    SPEED: Bench("run times of tasks beside other software (default)", "bench.speed.bench.bench", OF_SPEED, rows=True),
+    MOTIONS: Bench("what ends of motions cost at equal true error", "bench.motions.motions.motions", OF_MOTIONS, True),
     "counts": Bench(
-        "nodes of forward dynamics, and what leaving out one idea adds",
-        "bench.speed.counts.node_counts",
-        ("links", "json"),
+        "nodes of forward dynamics, and what leaving out one idea adds", "bench.speed.counts.node_counts", ("links",)
     ),
     "operations": Bench(
         "products and sums of robots' equations beside published ones",
         "bench.speed.counts.operation_counts",
-        ("links", "json"),
+        ("links",),
     ),
-    "build": Bench(
-        "time to build the graph of forward dynamics", "bench.speed.stages.build_time", ("links", "repeats", "json")
-    ),
-    "compile": Bench(
-        "time to compile chains, and derivatives of them", "bench.speed.stages.compile_time", ("links", "json")
-    ),
-    "agreement": Bench(
-        "largest differences from MuJoCo and Pinocchio",
-        "bench.speed.beside_peers.agreement",
-        ("links", "count", "json"),
-    ),
+    "build": Bench("time to build the graph of forward dynamics", f"{STAGES}.build_time", ("links", "repeats")),
+    "compile": Bench("time to compile chains, and derivatives of them", f"{STAGES}.compile_time", ("links",)),
+    "long-chains": Bench("cost of a thousand links, and accuracy of long chains", f"{STAGES}.long_chains", ("links",)),
+    "agreement": Bench("largest differences from MuJoCo and Pinocchio", f"{SIDE}.agreement", ("links", "count")),
     "ensembles": Bench(
-        "many pendulums beside MuJoCo's rollout and JAX's vmap",
-        "bench.speed.beside_peers.ensembles",
-        ("count", "repeats", "json"),
+        "many pendulums beside MuJoCo's rollout and JAX's vmap", f"{SIDE}.ensembles", ("count", "repeats")
+    ),
+    "closed-chains": Bench(
+        "chains pinned at the tip beside Pinocchio and MuJoCo", f"{SIDE}.closed_chains", ("repeats",)
     ),
     "reconfiguration": Bench(
-        "first torque after a change of structure",
-        "bench.speed.reconfiguration.reconfiguration",
-        ("links", "repeats", "json"),
+        "first torque after a change of structure", "bench.speed.reconfiguration.reconfiguration", ("links", "repeats")
     ),
     "trust": Bench(
         "random motions with exact answers: runs right, said to be wrong, silent",
         "trust.cascades.with_cascades",
-        ("count", "json"),
+        ("count",),
     ),
     "tightest": Bench(
         "random Lagrangians as exactly as float64 has them, beside heyoka",
         "bench.motions.tightest.tightest",
-        ("count", "json"),
+        ("count",),
     ),
-    "closed-chains": Bench(
-        "chains pinned at the tip beside Pinocchio and MuJoCo",
-        "bench.speed.beside_peers.closed_chains",
-        ("repeats", "json"),
+    "orders": Bench("fitted orders of the methods of equal steps", f"{COMPARED}.orders"),
+    "taylor": Bench(
+        "the three-link arm to 10 s at 1e-12 beside heyoka and CVODES, and cold starts", f"{COMPARED}.taylor"
     ),
-    "long-chains": Bench(
-        "cost of a thousand links, and accuracy of long chains", "bench.speed.stages.long_chains", ("links", "json")
+    "stiff": Bench(
+        "steps and times on a stiff spring, Van der Pol's oscillator and Robertson's reaction", f"{COMPARED}.stiff"
     ),
-} | {
-    name: Bench(about, f"bench.motions.comparisons.{name}", ("json",))
-    for name, about in {
-        "orders": "fitted orders of the methods of equal steps",
-        "taylor": "the three-link arm to 10 s at 1e-12 beside heyoka and CVODES, and cold starts",
-        "stiff": "steps and times on a stiff spring, Van der Pol's oscillator and Robertson's reaction",
-        "loops": "the native loop beside SciPy's solve_ivp on three rates",
-        "energy": "drift of the energy over a million steps from a dozen starts",
-    }.items()
+    "loops": Bench("the native loop beside SciPy's solve_ivp on three rates", f"{COMPARED}.loops"),
+    "energy": Bench("drift of the energy over a million steps from a dozen starts", f"{COMPARED}.energy"),
 }
+# fmt: on

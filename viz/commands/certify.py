@@ -18,10 +18,8 @@ if TYPE_CHECKING:
 def add(parser: Command) -> None:
     """The command's arguments."""
     takes_a_scene(parser)
-    parser.add_argument("--states", type=counting, default=20, metavar="N", help="random states (default: %(default)s)")
-    parser.add_argument(
-        "--seed", type=whole, default=0, metavar="S", help="of the random states (default: %(default)s)"
-    )
+    parser.add_argument("--states", type=counting, default=20, metavar="N", help="random states (default: 20)")
+    parser.add_argument("--seed", type=whole, default=0, metavar="S", help="of the random states (default: 0)")
     parser.add_argument("--json", action="store_true", help="print as JSON")
     parser.set_defaults(run=run)
 

@@ -107,9 +107,11 @@ class Scipy(EndSolver):
 
             return self.solve(rate, (0.0, self.task.t_end), self.start, **options)
 
-        return Run(
-            run, read=lambda run: Outcome(run.y[:, -1], len(run.t) - 1, None, run.nfev, run.message * (not run.success))
-        )
+        def read(found: Any) -> Outcome:
+            status = "" if found.success else found.message
+            return Outcome(found.y[:, -1], len(found.t) - 1, None, found.nfev, status)
+
+        return Run(run, read=read)
 
 
 class Mujoco(EndSolver):
