@@ -55,7 +55,9 @@ BENCHES = {
     "build": Bench("time to build the graph of forward dynamics", f"{STAGES}.build_time", ("links", "repeats")),
     "compile": Bench("time to compile chains, and derivatives of them", f"{STAGES}.compile_time", ("links",)),
     "long-chains": Bench("cost of a thousand links, and accuracy of long chains", f"{STAGES}.long_chains", ("links",)),
-    "agreement": Bench("largest differences from MuJoCo and Pinocchio", f"{SIDE}.agreement", ("links", "count")),
+    "agreement": Bench(
+        "largest differences from MuJoCo and Pinocchio", "agreement.agreement.agreement", ("links", "count")
+    ),
     "ensembles": Bench(
         "many pendulums beside MuJoCo's rollout and JAX's vmap", f"{SIDE}.ensembles", ("count", "repeats")
     ),
@@ -72,7 +74,7 @@ BENCHES = {
     ),
     "tightest": Bench(
         "random Lagrangians as exactly as float64 has them, beside heyoka",
-        "bench.motions.tightest.tightest",
+        "trust.tightest.tightest",
         ("count",),
     ),
     "orders": Bench("fitted orders of the methods of equal steps", f"{COMPARED}.orders"),

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
-from pytest import approx, raises
+from pytest import approx
 
 from dynamics.experiments.work_precision.groups import OURS
 from dynamics.experiments.work_precision.measurement import Entry, Tried
@@ -15,7 +14,7 @@ from dynamics.experiments.work_precision.trajectory_runs import Outcome, Run, pr
 from dynamics.multiprecision import Reference
 from tests.bench.motions.motion_runs import HeyokaBatch, Many, Motion
 from tests.bench.motions.motion_scenes import MOTIONS, TIMES, exact_end, sizes
-from tests.bench.motions.motions import ERRORS, Cell, Missed, Row, cost, motions, tables
+from tests.bench.motions.motions import Row, cost, motions
 from tests.bench.motions.trajectory_peers import Heyoka
 from tests.each_row import each_row
 
@@ -41,30 +40,6 @@ def test_a_motion_and_its_ensemble_have_rows_of_every_error(rows: list[Row]) -> 
     assert [set(row.missed) for row in rows] == [{"MuJoCo"}] * 2 + [set()] * 2
 
 
-def test_the_tables_show_them(rows: list[Row]) -> None:
-    text = tables(rows, "a machine")
-    assert text.count(NAME) == len(rows)
-    assert "A motion, to t = 0.01 s [ms]" in text
-    assert "A motion of N side by side, heyoka's in batch mode, to t = 0.01 s [ms]" in text
-    assert "\n< " not in text
-
-
-def lost() -> Row:
-    """A row that heyoka wins."""
-    ours, theirs = Cell("dop853", 2e-3, 2e-3, 1e-9, 10, 121), Cell("heyoka Taylor", 1e-3, 1e-3, 1e-9, 4, None)
-    return Row(NAME, 1.0, 1e-9, 1, {OURS: ours, "heyoka": theirs}, {"SciPy": Missed("too slow", 3e-8)})
-
-
-def test_a_row_that_heyoka_wins_is_marked_with_its_counts() -> None:
-    row = lost()
-    left = replace(row, error=1e-12, cells={OURS: row.cells[OURS]}, missed={"heyoka": Missed("gone")})
-    lines = tables([row, left]).splitlines()
-    assert row.ratio == 0.5
-    assert "(3e-08)" in lines[-4]
-    assert lines[-4].split()[4:9] == ["2.00", "<", "2.00", "dop853", "1.00"]
-    assert lines[-2:] == ["a: gone", f"< {NAME}, 1e-09: dop853 10 steps, 121 evaluations; heyoka Taylor 4 steps"]
-
-
 def test_a_wrong_exact_end_is_noticed() -> None:
     pytest.importorskip("scipy")
     end = exact_end(NAME, T_END)
@@ -72,7 +47,6 @@ def test_a_wrong_exact_end_is_noticed() -> None:
     wrong = replace(end, decimal=(tuple([f"{float(value) + 1e-7:.17g}" for value in end.decimal[0]]),))
     row, *_ = motions([NAME], [T_END], [1e-6], ["SciPy"], repeats=1, count=0, exact={(NAME, T_END): wrong})
     assert "the exact end is doubted" in row.doubt
-    assert f"! {NAME}: {row.doubt}" in tables([row]).splitlines()
 
 
 def test_a_cost_is_interpolated_between_the_runs_about_an_error() -> None:
@@ -102,8 +76,6 @@ def test_exact_ends_are_those_of_the_motions(name: str) -> None:
     assert isinstance(end, Reference)
     outcome = Motion("radau" if task.stiff else "dop853", task, 1.0).ready(1e-12)()
     assert np.max(np.abs(end.deviation(outcome.x[None])) / sizes(name)) < 1e-9
-    assert all(isinstance(exact_end(name, t), Reference | str) for t in TIMES)
-    assert len(ERRORS) == 3
 
 
 def test_heyoka_batches_end_where_ours_do() -> None:
@@ -114,17 +86,3 @@ def test_heyoka_batches_end_where_ours_do() -> None:
     ours = Many("dop853", task, starts).ready(1e-13)()
     assert theirs.x == approx(ours.x, rel=1e-11, abs=1e-11)
     assert theirs.steps
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        ({"scenes": ["nothing"]}, "there is no motion 'nothing'; there are double pendulum"),
-        ({"peers": ["Drake"]}, "there is no peer 'Drake'"),
-        ({"times": [-1.0]}, "times must be positive"),
-        ({"errors": []}, "errors must be positive"),
-    ],
-)
-def test_mistakes(arguments: dict[str, Any], said: str) -> None:
-    with raises(ValueError, match=said):
-        motions(**arguments)

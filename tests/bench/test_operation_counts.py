@@ -6,19 +6,12 @@ from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
-import dynamics as dyn
 from tests.bench.speed.counts import (
     QUANTITIES,
     ROBOTS,
     models,
     operation_counts,
     operations,
-    published_forward,
-    published_inverse,
-    published_mass_matrix,
-    robot,
 )
 from tests.each_row import each_row
 from tests.slow import slow
@@ -65,23 +58,7 @@ def test_the_page_has_every_row() -> None:
         assert all(int(now) <= said for now, said in zip(numbers, ROWS[what, "planar 3"], strict=True))
 
 
-def test_published_formulas_give_the_numbers_that_are_printed() -> None:
-    assert [published_inverse(n) for n in (6, 7, 30)] == [836, 1010, 5012]
-    assert [published_mass_matrix(n) for n in (6, 7, 18)] == [855, 1122, 6171]
-    assert [published_forward(n) for n in (6, 7, 12, 18)] == [1842, 2356, 4641, 7215]
-
-
 def test_every_row_of_inverse_dynamics_is_below_the_published_one() -> None:
     for name in (*ROBOTS, "general 6", "general 7", "general 30"):
         total, (*_, theirs, by_chain_rule) = ROWS["inverse dynamics", name][0], ROWS["inverse dynamics", name]
         assert total < theirs < by_chain_rule
-
-
-def test_a_robot_stands_as_its_rows_say() -> None:
-    """At q = 0, links one on another: the sum of rotations and offsets, of the Stanford arm by hand."""
-    arm = robot(ROBOTS["Stanford arm"])
-    assert [body.joint.kind for body in arm.bodies] == ["revolute"] * 2 + ["prismatic"] + ["revolute"] * 3
-    at = dict.fromkeys(arm.position("link 3").input_names, 0.0) | {"q2": 0.5}
-    place = list(arm.position("link 3").evaluate(at).values())
-    assert np.allclose(place, [0.0, 0.1524, 0.5], rtol=0.0, atol=1e-15)
-    assert len(dyn.inverse_dynamics(arm).outputs) == 6

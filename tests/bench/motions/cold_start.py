@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import math
 import statistics
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
 from functools import partial
 from importlib import import_module
 from importlib.util import find_spec
-from typing import Any
+from typing import NamedTuple
 
 from dynamics.experiments.accuracy_task import AccuracyTask
 from dynamics.experiments.timing import spent
@@ -26,39 +24,24 @@ from tests.bench.motions.trajectory_peers import (
 from tests.bench.peers import PeerModel, UnavailableError
 from tests.bench.peers.casadi import CasadiPeer, casadi
 from tests.bench.peers.heyoka import heyoka, leave_cache
+from tests.bench.tables import Table
 from tests.bench.timing import run_fresh
 
 RTOL = 1e-9  # of all but heyoka, whose default is the resolution of float64
 LONG_START = 5.0  # s; what takes longer is started once
 
 
-@dataclass(frozen=True)
-class ColdStart:
-    """seconds: the shortest of the turns; median of them.  loading: of the packages [s], beforehand.
+class Start(NamedTuple):
+    """A way to start.  packages: loaded beforehand.  primed: the first start fills a cache, and does not count."""
 
-    status: empty, or why there is no figure.
-    """
-
-    name: str
-    about: str
-    seconds: float
-    median: float
-    loading: float
-    turns: int
-    status: str = ""
-
-
-@dataclass(frozen=True)
-class _Start:
-    about: str
     packages: tuple[str, ...]
     run: Callable[[AccuracyTask], object]
-    primed: bool = False  # the first start is there to fill a cache, and does not count
+    primed: bool = False
 
 
 def _ours(task: AccuracyTask) -> None:
-    method = "radau" if task.stiff else "dop853"
     start = task.q, task.qd or None
+    method = "radau" if task.stiff else "dop853"
     run = simulate(task.model, *start, task.t_end, method, rtol=RTOL, atol=RTOL, progress=False)
     if not run.stats.success:
         raise RuntimeError(run.stats.message)
@@ -100,74 +83,49 @@ def _casadi(task: AccuracyTask) -> None:
 
 
 STARTS = {
-    "ours": _Start("our graph, LLVM, and a run of dop853 (radau where it is stiff)", ("llvmlite.binding",), _ours),
-    "scipy": _Start(
-        "our graph, LLVM, and SciPy's DOP853 (Radau where it is stiff) on it",
-        ("llvmlite.binding", "scipy.integrate"),
-        _scipy,
-    ),
-    "CasADi": _Start("CasADi's own derivatives in its virtual machine, and a run of CVODES", ("casadi",), _casadi),
-    "heyoka compact": _Start(
-        "heyoka's own derivatives, its Taylor integrator in compact mode at its default tolerance, and a run",
-        ("heyoka",),
-        partial(_heyoka, compact=True),
-    ),
-    "heyoka": _Start("the same, with its code written out", ("heyoka",), _heyoka),
-    "heyoka cached": _Start(
-        "the same, when an earlier process has left the machine code in heyoka's cache on disk",
-        ("heyoka",),
-        partial(_heyoka, cached=True),
-        primed=True,
-    ),
+    "ours": Start(("llvmlite.binding",), _ours),
+    "scipy": Start(("llvmlite.binding", "scipy.integrate"), _scipy),
+    "CasADi": Start(("casadi",), _casadi),
+    "heyoka compact": Start(("heyoka",), partial(_heyoka, compact=True)),
+    "heyoka": Start(("heyoka",), _heyoka),
+    "heyoka cached": Start(("heyoka",), partial(_heyoka, cached=True), primed=True),
 }
 
 
-def cold_starts(
-    name: str,
-    options: dict[str, Any],
-    wanted: Sequence[str] = tuple(STARTS),
-    *,
-    turns: int = 5,
-    budget: float = 60.0,
-    say: Callable[[str], None] = lambda line: None,
-) -> list[ColdStart]:
-    """Cold starts of a task, in turns.  name, options: as of `named_tasks.load`.
+def cold_starts(name: str, t_end: float, turns: int = 5, budget: float = 120.0) -> Table:
+    """Cold starts of a task, in turns, as a table.  name: of `named_tasks.load`.
 
     budget: seconds after which one is given up.  What needs a package that is not installed is left out.
     """
-    asked = [each for each in wanted if all(find_spec(package.partition(".")[0]) for package in STARTS[each].packages)]
-    times: dict[str, list[float]] = {each: [] for each in asked}
-    loading, status = dict.fromkeys(asked, 0.0), dict.fromkeys(asked, "")
+    asked = {
+        who: start
+        for who, start in STARTS.items()
+        if all(find_spec(package.partition(".")[0]) for package in start.packages)
+    }
+    times: dict[str, list[float]] = {who: [] for who in asked}
+    status = dict.fromkeys(asked, "")
     for turn in range(turns):
-        for each in asked:
-            if status[each] or (turn and min(times[each]) > LONG_START):
+        for who, start in asked.items():
+            if status[who] or (turn and min(times[who]) > LONG_START):
                 continue
-            if not turn:
-                say(f"{name}: cold start, {each}")
             try:
-                for _ in range(1 + (STARTS[each].primed and not turn)):
-                    answer = run_fresh(__name__, "child", each, name, options, timeout=budget)
-                times[each].append(answer["seconds"])
-                loading[each] = answer["loading"]
+                for _ in range(1 + (start.primed and not turn)):
+                    seconds = run_fresh(__name__, "child", who, name, t_end, timeout=budget)
+                times[who].append(seconds)
             except RuntimeError as error:
-                status[each] = str(error)
-    return [
-        ColdStart(
-            name,
-            STARTS[name].about,
-            min(seconds, default=math.nan),
-            statistics.median(seconds or [math.nan]),
-            loading[name],
-            len(seconds),
-            status[name],
-        )
-        for name, seconds in times.items()
-    ]
+                status[who] = str(error)
+    rows = []
+    for who, taken in times.items():
+        figures = (min(taken), statistics.median(taken), min(taken) / min(times["ours"])) if taken else ()
+        rows.append([who, *([f"{figure:.3f}" for figure in figures] or ["-"] * 3), status[who]])
+    title = "cold start: model to end of first run, nothing compiled; heyoka at its default tolerance [s]"
+    return Table(title, ["", "shortest", "median", "times ours", "status"], rows, left=(0, 4))
 
 
-def child(which: str, name: str, options: dict[str, Any]) -> dict[str, float]:
-    """The process's side: how long the start took, and its packages to load."""
+def child(which: str, name: str, t_end: float) -> float:
+    """The process's side: how long the start took, its packages loaded before."""
     start = STARTS[which]
-    loading = spent(lambda: [import_module(package) for package in start.packages]).seconds
-    task = load(name, **options)
-    return {"seconds": spent(lambda: start.run(task)).seconds, "loading": loading}
+    for package in start.packages:
+        import_module(package)
+    task = load(name, t_end=t_end)
+    return spent(lambda: start.run(task)).seconds

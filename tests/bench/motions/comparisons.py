@@ -117,11 +117,7 @@ def taylor() -> Iterator[str]:
     for kind in ("BDF", "Adams"):
         race.add(f"CVODES {kind}", partial(Cvodes, kind), tolerances(1e-11, 1e-15, 1))
     yield race.text()
-    starts = cold_starts("triple_pendulum", {"t_end": 10.0}, turns=5, budget=120.0)
-    ours = next(each.seconds for each in starts if each.name == "ours")
-    rows = [[s.name, f"{s.seconds:.3f}", f"{s.median:.3f}", f"{s.seconds / ours:.2f}", s.status] for s in starts]
-    title = "cold start: model to end of first run, nothing compiled; heyoka at its default tolerance [s]"
-    yield str(Table(title, ["", "shortest", "median", "times ours", "status"], rows, left=(0, 4)))
+    yield str(cold_starts("triple_pendulum", 10.0))
 
 
 def stiff() -> Iterator[str]:

@@ -49,7 +49,6 @@ class Motion(EndSolver):
         self.order = METHODS[method].order
 
     def ready(self, knob: float) -> Run:
-        """The run with that tolerance."""
         run, end = run_to_end(self.task, self.name, knob)
 
         def read(found: Any) -> Outcome:
@@ -69,7 +68,6 @@ class Many(EndSolver):
         self.starts = starts
 
     def ready(self, knob: float) -> Run:
-        """The run with that tolerance; the ends, (N, m)."""
         q, qd = np.split(self.starts, [len(self.task.q)], axis=1)
         velocities = qd if self.task.qd else None
         options: dict[str, Any] = {"rtol": knob, "t_eval": [self.task.t_end], "progress": False}
@@ -98,7 +96,6 @@ class HeyokaBatch(EndSolver):
         self.compact, self.starts = single.compact, starts
 
     def ready(self, knob: float) -> Run:
-        """The run with that tolerance; the ends, (N, m)."""
         lanes = self.lanes
         starts = np.pad(self.starts, ((0, -len(self.starts) % lanes), (0, 0)), "edge")
         blocks = [np.ascontiguousarray(starts[k : k + lanes].T) for k in range(0, len(starts), lanes)]
@@ -126,5 +123,4 @@ class ManyEnds:
     size: Array  # (m,)
 
     def at_end(self, x: Array) -> float:
-        """The error of ends (N, m)."""
         return float(np.median(np.max(np.abs(x - self.ends) / self.size, axis=1)))

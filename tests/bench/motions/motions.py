@@ -33,7 +33,7 @@ DUEL = (OURS, HEYOKA)  # whose ratio is told
 GROUPS = (OURS, HEYOKA, *[name for name in PEERS if name != HEYOKA])  # in the order of the columns
 ERRORS = (1e-6, 1e-9, 1e-12)
 STIFF = ("rodas", "radau")  # methods that only stiff equations are given to
-ASKED = {False: ("DOP853", "Adams", "Dopri8", "RK4"), True: ("LSODA", "Radau", "BDF", "Kvaerno5")}  # of peers, by stiff
+ASKED = {False: ("DOP853", "Adams", "RK4"), True: ("LSODA", "Radau", "BDF")}  # of peers, by stiff
 PATIENCE = 3.0  # times as long for the others, most of which need more time for the same error
 TURNS, LIMIT = 9, 3.0  # turns of each run; s of a run, after which no finer tolerance is tried
 COUNT = 4096  # motions of an ensemble, fewer where one motion is long

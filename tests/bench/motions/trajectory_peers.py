@@ -1,4 +1,4 @@
-"""Solvers of other software: SciPy, MuJoCo's integrators, heyoka's Taylor series, CVODES through CasADi, diffrax."""
+"""Solvers of other software: SciPy, MuJoCo's integrators, heyoka's Taylor series, CVODES through CasADi."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import cgraph as cg
-from cgraph import GraphError, to_jax
 from cgraph.extend import Array
 from dynamics.experiments.accuracy_task import AccuracyTask
 from dynamics.experiments.work_precision.trajectory_runs import EQUAL, LONGEST_RUN, Outcome, Run, Solver
@@ -23,9 +22,7 @@ from dynamics.systems.arguments import TIME
 from tests.bench.peers import PeerModel, UnavailableError
 from tests.bench.peers.casadi import casadi, our_function
 from tests.bench.peers.heyoka import expressions, heyoka
-from tests.bench.peers.jax import double_precision
 from tests.bench.peers.mujoco import MujocoPeer
-from tests.bench.peers.peer import required
 from tests.bench.peers.translate import translated
 
 if TYPE_CHECKING:
@@ -34,9 +31,7 @@ if TYPE_CHECKING:
 
 EPSILON = 2.0**-52
 COMPACT = 300  # nodes of the rate; beyond, heyoka's code written out takes minutes to compile
-MOST_STEPS = 100_000  # steps of heyoka, of CVODES and of diffrax
-JITTED = 1000  # nodes of the rate for XLA
-DIFFRAX = ("Dopri8", "Kvaerno5")  # the second for stiff equations
+MOST_STEPS = 100_000  # steps of heyoka and of CVODES
 MUJOCO = {"Euler": 1, "RK4": 4, "implicit": 1, "implicitfast": 1}  # with the orders of their errors
 CVODES: dict[str, dict[str, Any]] = {
     "BDF": {},
@@ -46,7 +41,7 @@ CVODES: dict[str, dict[str, Any]] = {
 
 # How the names of peers' solvers begin.
 OURS, HEYOKA, SCIPY = "ours", "heyoka", "scipy:"
-PEERS = {"MuJoCo": "MuJoCo", "SciPy": SCIPY, HEYOKA: HEYOKA, "CasADi": "CVODES", "diffrax": "diffrax"}
+PEERS = {"MuJoCo": "MuJoCo", "SciPy": SCIPY, HEYOKA: HEYOKA, "CasADi": "CVODES"}
 ORDERS = {"Radau": 5, "BDF": None, "LSODA": None, "DOP853": 8, "RK45": 5}  # of SciPy's solvers
 IMPLICIT = ("Radau", "BDF", "LSODA")
 
@@ -94,7 +89,6 @@ class Scipy(EndSolver):
             self.options["jac"] = lambda t, x: compiled.jacobian([*x, t])[:, : problem.size]
 
     def ready(self, knob: float) -> Run:
-        """The run with that knob, everything before it done: what is timed."""
         options = self.options | {"rtol": knob, "atol": self.absolute(knob)}
 
         def run() -> Any:
@@ -130,7 +124,6 @@ class Mujoco(EndSolver):
         self.begin = self.peer.starts(self.start[None])
 
     def ready(self, knob: float) -> Run:
-        """The run with that knob, everything before it done: what is timed."""
         states, run = self._states(int(knob))
         return Run(run, read=lambda _: Outcome(states[0, -1, self.peer.taken], int(knob)))
 
@@ -175,7 +168,6 @@ class Heyoka(EndSolver):
         integrator.state[:] = self.start
 
     def ready(self, knob: float) -> Run:
-        """The run with that knob, everything before it done: what is timed."""
         integrator = self.integrator(knob)
         propagate, limit = integrator.propagate_until, self.heyoka.taylor_outcome.time_limit
 
@@ -208,7 +200,6 @@ class Cvodes(EndSolver):
         return self.casadi.integrator("run", "cvodes", self.equations, 0.0, list(times), options | self.options)
 
     def ready(self, knob: float) -> Run:
-        """The run with that knob, everything before it done: what is timed."""
         function = self._function(knob, [self.task.t_end])
 
         def read(found: dict[str, DM]) -> Outcome:
@@ -216,58 +207,6 @@ class Cvodes(EndSolver):
             return Outcome(np.array(found["xf"]).ravel(), stats["nsteps"], stats["netfails"], stats["nfevals"])
 
         return Run(partial(function, x0=self.start.tolist()), read=read)
-
-
-class Diffrax(EndSolver):
-    """One of diffrax's solvers on our equations, node for node, jitted in double precision."""
-
-    tolerances = tuple([10.0**-k for k in range(3, 15)])
-
-    def __init__(self, solver: str, task: AccuracyTask, smallest: float, problem: Problem) -> None:
-        super().__init__(f"diffrax {solver}", task, smallest)
-        if len(problem.rate.nodes) > JITTED:
-            raise UnavailableError(f"XLA takes minutes for more than {JITTED} nodes")
-        diffrax, jax = required("diffrax", "diffrax"), double_precision()
-        method, numpy = getattr(diffrax, solver)(), jax.numpy
-        try:
-            rate = to_jax(problem.rate)
-        except GraphError as error:
-            raise UnavailableError(str(error)) from None
-        term = diffrax.ODETerm(lambda t, x, _: rate(numpy.append(x, t)))
-
-        def end(x: object, t_end: float, rtol: float, atol: float) -> tuple[object, ...]:
-            found = diffrax.diffeqsolve(
-                term,
-                method,
-                0.0,
-                t_end,
-                None,
-                x,
-                saveat=diffrax.SaveAt(t1=True),
-                stepsize_controller=diffrax.PIDController(rtol=rtol, atol=atol),
-                max_steps=MOST_STEPS,
-                throw=False,
-            )
-            return found.ys[-1], found.stats["num_accepted_steps"], found.result == diffrax.RESULTS.successful
-
-        self._end, self._x = jax.jit(end), numpy.asarray(self.start)
-
-    def ready(self, knob: float) -> Run:
-        """The run with that knob, everything before it done: what is timed."""
-        arguments = self._x, self.task.t_end, knob, self.absolute(knob)
-
-        def run() -> tuple[object, ...]:
-            found: tuple[Any, ...] = self._end(*arguments)
-            found[0].block_until_ready()
-            return found
-
-        run()  # compiles
-
-        def read(found: tuple[Any, ...]) -> Outcome:
-            state, steps, good = found
-            return Outcome(np.asarray(state), int(steps), None, None, "" if good else f"stopped after {steps} steps")
-
-        return Run(run, read=read)
 
 
 def heyoka_equations(
@@ -316,6 +255,4 @@ def offers(task: AccuracyTask, smallest: float, problem: Problem) -> dict[str, C
     makers["heyoka Taylor"] = partial(Heyoka, task, smallest, problem)
     for kind in CVODES:
         makers[f"CVODES {kind}"] = partial(Cvodes, kind, task, smallest, problem)
-    for solver in DIFFRAX:
-        makers[f"diffrax {solver}"] = partial(Diffrax, solver, task, smallest, problem)
     return makers

@@ -130,7 +130,6 @@ class CasadiPeer(Peer):
         return self.casadi.Function("moved", [x], [moved])
 
     def prepare(self, task: str, mode: str) -> TimedTask:
-        """CasADi's function of the task, in its virtual machine or through gcc."""
         if self.native and self.compiler is None:
             raise UnavailableError("there is no C compiler")
         function, x = self.function(task), self.case.inputs(task, mode)

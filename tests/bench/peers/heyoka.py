@@ -29,7 +29,6 @@ class HeyokaPeer(Peer):
         self.functions: dict[str, Callable[..., object]] = {}
 
     def prepare(self, task: str, mode: str) -> TimedTask:
-        """heyoka's compiled function of the task."""
         if task not in self.functions:
             outputs, inputs = expressions(self.case, task)
             self.functions[task] = self.heyoka.cfunc(outputs, inputs, compact_mode=self.case.n > COMPACT)

@@ -107,7 +107,6 @@ class JaxPeer(Peer):
         return slopes
 
     def prepare(self, task: str, mode: str) -> TimedTask:
-        """JAX's jitted function of the task."""
         jit, lax = self.jax.jit, self.jax.lax
         function, x = self._function(task), self.case.inputs(task, mode)
         if mode == "batch":

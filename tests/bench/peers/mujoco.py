@@ -38,7 +38,6 @@ class MujocoPeer(Peer):
         return np.hstack([np.zeros((len(x), 1)), x[:, self.q_at], x[:, self.case.nq + self.at]])
 
     def prepare(self, task: str, mode: str) -> TimedTask:
-        """MuJoCo's call for the task, at one state, in a loop or over states."""
         if task != "inverse" and self.twin.mechanism.loops:
             raise UnavailableError("has soft loops, which move otherwise")
         if mode != "call":

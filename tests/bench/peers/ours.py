@@ -41,7 +41,6 @@ class Ours(Peer):
         return cg.compile(self.graph(task))
 
     def prepare(self, task: str, mode: str) -> TimedTask:
-        """The compiled graph of the task."""
         if task in MOTIONS:
             return self._motion() if task == "motion" else self._gradient(task)
         if task == "derivatives" and mode == "batch":
@@ -127,7 +126,6 @@ class OurNumpy(Peer):
     """Our graph as generated NumPy over arrays: what there is without llvmlite. For batches."""
 
     def prepare(self, task: str, mode: str) -> TimedTask:
-        """The compiled graph of the task."""
         function, points = cg.compile(task_graph(self.case, task), backend="numpy"), self.case.points(task)
         return TimedTask(lambda: function.batch(points), np.asarray, len(function.graph.nodes))
 

@@ -40,7 +40,6 @@ class PinocchioPeer(Peer):
         }
 
     def prepare(self, task: str, mode: str) -> TimedTask:
-        """Pinocchio's rnea or aba, at one state or over states."""
         if self.loops and DERIVATIVES.get(task, task) != "inverse":
             raise UnavailableError("has no loops in aba; the bench's closed-chains have its constraintDynamics")
         if task == "rk4":

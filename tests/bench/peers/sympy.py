@@ -25,7 +25,6 @@ class SympyPeer(Peer):
         self.functions: dict[str, Lambdified] = {}
 
     def prepare(self, task: str, mode: str) -> TimedTask:
-        """SymPy's lambdified function of the task."""
         if task not in self.functions:
             self.functions[task] = self._lambdified(task)
         function, many = self.functions[task], mode == "batch"

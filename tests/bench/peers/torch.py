@@ -19,7 +19,6 @@ class TorchPeer(Peer):
         self.evaluate = eager_evaluations(case.system, ["chain_rule"])["chain_rule"]
 
     def prepare(self, task: str, mode: str) -> TimedTask:
-        """PyTorch's eager evaluation of the task."""
         if self.case.system.parameters or any(force.value != 0.0 for force in self.case.system.forces):
             raise UnavailableError("is measured on systems without parameters and applied forces")
         x = self.case.point(task)

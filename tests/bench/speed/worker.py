@@ -10,11 +10,10 @@ import os
 import signal
 import time
 import warnings
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib import import_module
-from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
 from typing import Any
 
@@ -52,12 +51,11 @@ class Worker:
         context = multiprocessing.get_context("spawn")
         self._pipe, theirs = context.Pipe()
         self._process = context.Process(target=_serve, args=(theirs, load, peer), daemon=True)
-        with single_core(), _interrupts_held():
+        with single_core():
             self._process.start()
         theirs.close()
 
     def prepare(self, task: str, mode: str, budget: float) -> Prepared | Refused:
-        """Make and check the timed task; the process ends if it takes longer than `budget` s."""
         if (told := self._tell(task, mode)) is not None:
             return told
         if not self._pipe.poll(budget):
@@ -137,17 +135,3 @@ def _serve(pipe: Connection, load: Load, name: str) -> None:
                 pipe.send(Refused(str(error)))
             except Exception as error:  # noqa: BLE001 (whatever a peer's own code raises is a line in the report)
                 pipe.send(Refused(f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"))
-
-
-@contextmanager
-def _interrupts_held() -> Iterator[None]:
-    """Processes started within do not hear Ctrl-C: who started them does, once this is over, and ends them."""
-    if not hasattr(signal, "pthread_sigmask"):
-        yield
-        return
-    resource_tracker.ensure_running()  # which would let signals through again if it were started within
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, [signal.SIGINT])
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
