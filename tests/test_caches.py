@@ -26,7 +26,6 @@ TABLES = {
     "cgraph.operations.operation.BY_UFUNC",
     "cgraph.program.statement.STATEMENTS",
     "dynamics.equations.equation.EQUATIONS",
-    "tests.trust.random_motions.FAMILIES",
     f"{HOME}._memos",
 }
 CONTAINERS = {"dict", "list", "set", "OrderedDict", "defaultdict", "deque", "Counter"}

@@ -8,8 +8,9 @@ import pytest
 
 import dynamics as dyn
 from dynamics.io.mujoco_twin import MujocoTwin
+from dynamics.verification.residual import UnavailableError
 from tests.agreement.agreement import QUANTITIES, differences, random_arm
-from tests.bench.peers import PEERS, PeerModel, UnavailableError
+from tests.bench.peers import PEERS, PeerModel
 from tests.bench.peers.peer import BATCH, DERIVATIVES, DT, MODES, MOTIONS, NUDGE, PASSES, TASKS
 from tests.bench.speed.scenes import free_tree, load
 from tests.each_row import each_row
@@ -19,31 +20,6 @@ ROUNDING = 1e-10  # of a loop: the motion is that much larger than the last bit 
 DIFFERENCES = 1e-8
 SCALAR = 1e-12  # relative: one coordinate, a few operations
 POINTS = 1e-11  # of point masses, whose inertia MuJoCo's format does not take as exactly zero
-
-
-def tree() -> dyn.Mechanism:
-    """A branched mechanism with springs, armature and a slide, in an order that MuJoCo does not keep."""
-    parents = ("world", "a", "a", "b", "b")
-    bodies = [
-        dyn.Body(
-            name,
-            dyn.Joint(
-                "prismatic" if name == "d" else "revolute",
-                axis=(0.0, 1.0, 0.5),
-                position=(0.1, 0.2, -0.3),
-                damping=0.2,
-                stiffness=1.5,
-                spring_reference=0.3,
-                armature=0.05,
-            ),
-            parent,
-            mass=1.2,
-            center=(0.05, 0.02, -0.1),
-            inertia=(0.02, 0.03, 0.025),
-        )
-        for name, parent in zip("abcde", parents, strict=True)
-    ]
-    return dyn.Mechanism(bodies)
 
 
 class Reference:
@@ -167,28 +143,6 @@ def test_a_gradient_is_the_slope_of_mujoco_s_motion(name, task, mode, pushed):
     x = case.point(task)
     for direction, expected in slopes:
         assert found[: len(x)] @ direction == pytest.approx(expected, rel=DIFFERENCES)
-
-
-@cache
-def branched():
-    return PeerModel("tree", tree())
-
-
-@each_row(
-    ("name", "task"),
-    [
-        (name, task)
-        for name in ("ours", "casadi", "pinocchio", "mujoco")
-        for task in TASKS
-        if (task, "call") in PEERS[name].offers and task not in MOTIONS
-    ],
-    by="name",
-)
-def test_a_peer_knows_springs_armature_slides_and_the_order_of_joints(name, task):
-    case = branched()
-    _, found = prepared(name, case, task, "call")
-    x = case.point(task)
-    assert difference(found, Reference(case).value(task, x), x if task == "rk4" else 0.0) < rounding(task)
 
 
 @pytest.fixture(scope="module")

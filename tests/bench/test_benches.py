@@ -14,8 +14,7 @@ import dynamics as dyn
 from dynamics.experiments.timing import machine
 from tests.bench import __main__ as command
 from tests.bench.benches import BENCHES, MOTIONS, SPEED, Bench
-from tests.bench.peers import PEERS
-from tests.bench.speed import beside_peers, stages
+from tests.bench.speed import stages
 from tests.bench.speed.counts import VARIANTS
 from tests.bench.timing import run_fresh
 from tests.each_row import each_row
@@ -116,16 +115,6 @@ def test_a_variant_computes_the_same_with_other_nodes(name: str) -> None:
     base, other = dyn.forward_dynamics(model, "recursive"), variant.graph(model)
     assert accelerations(other) == pytest.approx(accelerations(base), rel=ROUNDING)
     assert (len(other.nodes) > len(base.nodes)) is (name not in ("every idea", "dense"))  # dense is smaller at seven
-
-
-def test_pendulums_of_an_ensemble_end_where_those_of_mujoco_and_jax_do() -> None:
-    q, qd = np.random.default_rng(0).uniform(-1.0, 1.0, (2, 3, 3))
-    first, *_ = beside_peers.SIDE_BY_SIDE.values()
-    expected = first(q, qd)()
-    for name in ("MuJoCo", "JAX"):
-        if PEERS[name.lower()].installed:
-            found = beside_peers.SIDE_BY_SIDE[name](q, qd)()
-            assert found == pytest.approx(expected, rel=1e-9, abs=1e-9)  # 1000 steps
 
 
 def test_elimination_is_accurate_on_long_chains_and_dense_solves_are_less_so() -> None:

@@ -29,16 +29,13 @@ os.write({ready}, b"!")
 sys.exit(start())
 """
 VERDICTS = ("meets", "unexplained", "ok  ", "FAIL", "Holds", "nodes")
-QUICK = ("inspect chain --out a.html", "report --stability --quick", "bench --quick", "paper --quick")
+QUICK = ("inspect chain --out a.html", "report --stability --quick", "paper --quick")
 LONG = {  # command: s of it in which the signal comes
     "inspect chain --out a.html": 5.0,
     "report spring_mass --quick": 15.0,
     "report --stability --quick": 12.0,
     "report chain --pruning": 3.0,
-    "report --compare orders": 15.0,
     "paper --quick": 15.0,
-    "bench --quick": 15.0,
-    "bench ensembles": 8.0,
     "lesson --out a.html": 5.0,
     "draw chain --out a.svg": 3.0,
     "certify chain": 4.0,

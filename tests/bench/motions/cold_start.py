@@ -14,6 +14,7 @@ from dynamics.experiments.timing import spent
 from dynamics.experiments.work_precision.named_tasks import load
 from dynamics.experiments.work_precision.trajectory_runs import problem_of
 from dynamics.simulation.simulate import simulate
+from dynamics.verification.residual import UnavailableError
 from tests.bench.motions.trajectory_peers import (
     MOST_STEPS,
     Scipy,
@@ -21,7 +22,7 @@ from tests.bench.motions.trajectory_peers import (
     heyoka_derivatives,
     heyoka_equations,
 )
-from tests.bench.peers import PeerModel, UnavailableError
+from tests.bench.peers import PeerModel
 from tests.bench.peers.casadi import CasadiPeer, casadi
 from tests.bench.peers.heyoka import heyoka, leave_cache
 from tests.bench.tables import Table

@@ -325,7 +325,6 @@ def _table(rows: Sequence[Row], many: bool) -> list[str]:
 
 
 def _texts(row: Row, name: str, notes: Footnotes) -> list[str | tuple[str, str]]:
-    """Texts of a group's columns."""
     cell, missed, ours = row.cells.get(name), row.missed.get(name), row.cells.get(OURS)
     more = (name in DUEL) + (name == OURS)
     if cell is None:
@@ -340,17 +339,12 @@ def _texts(row: Row, name: str, notes: Footnotes) -> list[str | tuple[str, str]]
 
 
 def _lost(row: Row) -> bool:
-    """heyoka is faster, or gets to an error that ours do not get to."""
     return HEYOKA in row.cells and not (row.ratio or 0.0) >= 1.0
 
 
 def _loss(row: Row) -> str:
-    """Counts of a lost row."""
     counts = []
     for cell in [row.cells[name] for name in DUEL if name in row.cells]:
         told = {"steps": cell.steps, "evaluations": cell.evaluations}
         counts.append(f"{cell.solver} {', '.join([f'{count} {what}' for what, count in told.items() if count])}")
     return f"< {row.scene}, {row.error:.0e}: {'; '.join(counts)}"
-
-
-__all__ = ["ERRORS", "MOTIONS", "PEERS", "TIMES", "Cell", "Row", "motions", "tables"]

@@ -19,7 +19,8 @@ from dynamics.experiments.work_precision.trajectory_runs import EQUAL, LONGEST_R
 from dynamics.integrators import Problem
 from dynamics.io.mujoco_twin import rollout
 from dynamics.systems.arguments import TIME
-from tests.bench.peers import PeerModel, UnavailableError
+from dynamics.verification.residual import UnavailableError
+from tests.bench.peers import PeerModel
 from tests.bench.peers.casadi import casadi, our_function
 from tests.bench.peers.heyoka import expressions, heyoka
 from tests.bench.peers.mujoco import MujocoPeer
@@ -128,7 +129,6 @@ class Mujoco(EndSolver):
         return Run(run, read=lambda _: Outcome(states[0, -1, self.peer.taken], int(knob)))
 
     def _states(self, steps: int) -> tuple[Array, Callable[[], object]]:
-        """Memory of the states of a run, (1, steps, ..), and the run."""
         states = np.empty((1, steps, self.begin.shape[1]))
         native = rollout(self.model, self.begin, states)
 

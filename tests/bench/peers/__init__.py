@@ -7,8 +7,7 @@ from dataclasses import dataclass, field
 from importlib import import_module
 from importlib.util import find_spec
 
-from cgraph.extend import install
-from tests.bench.peers.peer import DERIVATIVES, MODES, MOTIONS, TASKS, Peer, PeerModel, TimedTask, UnavailableError
+from tests.bench.peers.peer import DERIVATIVES, MODES, MOTIONS, TASKS, Peer, PeerModel
 
 CALLS = {(task, mode) for task in ("inverse", "forward") for mode in ("call", "batch")}
 RK4 = {("rk4", mode) for mode in MODES}
@@ -23,7 +22,6 @@ class Kind:
 
     about: what it is, in one line.  package: what has to be installed, by the name it is imported by.
     offers: the (task, mode) that it has a function for.  home: its class, as module.name.  options: of the class.
-    without: a package that it does without, and what it is then.
     """
 
     about: str
@@ -31,12 +29,6 @@ class Kind:
     offers: Set[tuple[str, str]]
     home: str
     options: Mapping[str, bool] = field(default_factory=dict)
-    without: tuple[str, str] | None = None
-
-    @property
-    def told(self) -> str:
-        """What it is with the packages that are installed, in one line."""
-        return self.without[1] if self.without and find_spec(self.without[0]) is None else self.about
 
     @property
     def installed(self) -> bool:
@@ -61,7 +53,6 @@ PEERS = {
         "cgraph",
         ALL | {("inertial-gradient", "call")},
         "ours.Ours",
-        without=("llvmlite", f"our graph as generated Python; machine code needs llvmlite: {install('native')}"),
     ),
     "ours-numpy": Kind(
         "our graph as generated NumPy, for where there is no llvmlite",
@@ -101,5 +92,3 @@ PEERS = {
     "sympy": Kind("SymPy through lambdify with cse, and numpy.linalg.solve", "sympy", CALLS, "sympy.SympyPeer"),
     "torch": Kind("PyTorch eager, torch.autograd", "torch", {("inverse", "call")}, "torch.TorchPeer"),
 }
-
-__all__ = ["PEERS", "Kind", "Peer", "PeerModel", "TimedTask", "UnavailableError"]

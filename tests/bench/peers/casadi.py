@@ -56,7 +56,6 @@ class CasadiPeer(Peer):
         return self._lagrange(task) if self._own_graph else self._ours(task)
 
     def _lagrange(self, task: str) -> Function:
-        """The task from the Lagrangian, x -> y."""
         ca, n = self.casadi, self.case.n
         if task == "rk4":
             return self._step(self.function("rate"))
@@ -94,14 +93,12 @@ class CasadiPeer(Peer):
         return ca.Function("slopes", [x], [ca.cse(ca.densify(ca.vec(rows.T)))])
 
     def _ours(self, task: str) -> Function:
-        """Our graph of the task, node for node."""
         if task == "rk4":
             return self._step(self.function("rate"))
         graph = rate_graph(self.case) if task == "rate" else task_graph(self.case, task)
         return our_function(graph, task.replace("-", "_"))
 
     def _step(self, rate: Function) -> Function:
-        """One RK4 step that calls the rate of the state four times."""
         ca = self.casadi
         state = ca.MX.sym("x", self.case.width("rk4"))
         after = rk4_step(rate, state)
@@ -121,7 +118,6 @@ class CasadiPeer(Peer):
         return ca.Function(task, [x], [end if task == "motion" else ca.gradient(ca.sumsqr(end[:n]), x)])
 
     def _pass(self, task: str) -> Function:
-        """One pass of a loop: the carry to the carry."""
         function = self.function(task)
         if task == "rk4":
             return function

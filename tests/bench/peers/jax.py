@@ -40,7 +40,6 @@ class JaxPeer(Peer):
         return lagrangian(self.case, q, qd, self.np, NAMES)[0]
 
     def _known(self, q: JaxArray, qd: JaxArray) -> JaxArray:
-        """dL/dq, applied forces and damping."""
         forces = self.np.stack([self.np.asarray(f) for f in lagrangian(self.case, q, qd, self.np, NAMES)[1]])
         damping = self.np.array(self.case.system.damping) * qd
         slope, momenta = self.jax.grad(self._energy, 0)(q, qd), self.jax.grad(self._energy, 1)(q, qd)
@@ -49,7 +48,6 @@ class JaxPeer(Peer):
         return pulled + forces - damping - self.np.stack([self.np.asarray(f) for f in taken])
 
     def _rate(self, q: JaxArray, qd: JaxArray) -> JaxArray:
-        """The rates of the coordinates."""
         rates = quasi_velocities(self.case, q, qd, qd, self.np, NAMES)[0]
         return self.np.stack([self.np.asarray(rate) for rate in rates])
 
@@ -80,7 +78,6 @@ class JaxPeer(Peer):
         return rk4_step(self.rate, x)
 
     def _motion(self, x: JaxArray) -> JaxArray:
-        """Steps of RK4 by `scan`, a row of torques a step."""
         join, n = self.np.concatenate, self.case.n
 
         def step(state: JaxArray, tau: JaxArray) -> tuple[JaxArray, None]:

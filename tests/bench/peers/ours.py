@@ -96,7 +96,6 @@ class Ours(Peer):
         )
 
     def _gradient(self, task: str) -> TimedTask:
-        """`dyn.gradient`."""
         case, n = self.case, self.case.n
         model: Model = case.model
         numbers: dict[str, float] = {}
@@ -117,7 +116,6 @@ def _square(q: Sequence[Node], qd: Sequence[Node], t: Node) -> Node:
 
 
 def _slopes(a: Array, b: Array) -> Array:
-    """(n n 3, N) of A and B at N states: rows of accelerations."""
     n = b.shape[2]
     return np.concatenate([a, b], axis=2)[:, n:].reshape(len(a), -1).T
 

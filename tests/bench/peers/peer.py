@@ -87,7 +87,6 @@ class PeerModel:
         return self.points(task) if mode == "batch" else self.point(task)
 
     def _normalized(self, x: Array) -> Array:
-        """Inputs with quaternions of length 1."""
         graph = normalization(self.model)
         if graph is not None:
             x[: self.nq + self.n] = cg.compile(graph, backend="numpy").batch(x[: self.nq + self.n])

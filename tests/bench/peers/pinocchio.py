@@ -113,7 +113,6 @@ class PinocchioPeer(Peer):
         return derivatives
 
     def _their_slopes(self, task: str, arguments: tuple[Array, Array, Array]) -> Array:
-        """Derivatives that the last call has left, in our order."""
         forward, n, data = task == "derivatives", self.case.n, self.data
         if forward:
             found = data.ddq_dq, data.ddq_dv, _symmetric(data.Minv)
@@ -126,7 +125,6 @@ class PinocchioPeer(Peer):
         return np.hstack([by_q + passive * stiffness, by_u + passive * damping, by_last]).ravel()
 
     def _step(self) -> TimedTask:
-        """RK4 in Python over aba."""
         if self.case.nq != self.case.n:
             raise UnavailableError("has no rates of quaternions")
         n, twin, data, aba, bodies = self.case.n, self.twin, self.data, self.pinocchio.aba, self.bodies
@@ -145,7 +143,6 @@ class PinocchioPeer(Peer):
 
 
 def _symmetric(upper: Array) -> Array:
-    """The matrix whose upper triangle is there."""
     rows = np.triu(upper)
     return rows + np.triu(rows, 1).T
 
@@ -178,5 +175,4 @@ def our_slopes(
 
 
 def _cross(vector: Array) -> Array:
-    """[v]x."""
     return np.cross(np.eye(3), vector)

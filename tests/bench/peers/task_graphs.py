@@ -33,7 +33,6 @@ def slope_graph(case: PeerModel) -> Graph:
 
 
 def _inverse_derivatives(model: Model) -> Graph:
-    """(q0.., qd0.., qdd0..) -> dtau/d(q, qd, qdd), row by row."""
     graph = inverse_dynamics_derivatives(model)
     n = sum(name.startswith("tau") for name in graph.outputs)
     names = [f"{block}_{i}_{j}" for i in range(n) for block in ("dtau_dq", "dtau_dqd", "M") for j in range(n)]

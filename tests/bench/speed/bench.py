@@ -114,7 +114,6 @@ def bench(
 
 
 def _missing(case: PeerModel, task: str) -> str:
-    """Reason why there is no such task of the model, or nothing."""
     if task in MOTIONS and case.nq != case.n:
         return "not of quaternions"
     return "not without bodies" if task == "inertial-gradient" and as_mechanism(case.model) is None else ""
@@ -193,8 +192,6 @@ class WorkerPool:
             worker.end()
 
 
-__all__ = ["MODES", "PEERS", "SCENES", "TASKS", "Cell", "Row", "bench", "tables"]
-
 HOW = f"{install('bench')}; PyTorch by itself"  # to install what is missing
 
 
@@ -207,7 +204,7 @@ def tables(rows: Sequence[Row], where: str = "") -> str:
         "Medians of alternating turns on one core. In brackets: times ours, above 1 where ours is faster.",
         f"* the fastest of its row.  ! it differs from ours by more than {AGREES:g}.  - a: not measured, see below.",
         "",
-        *[f"{peer:<11} {PEERS[peer].told}" for peer in shown],
+        *[f"{peer:<11} {PEERS[peer].about}" for peer in shown],
         *(textwrap.wrap(f"not installed: {', '.join(missing)} ({HOW})", WIDTH) if missing else []),
     ]
     for task, about in TASKS.items():
@@ -225,7 +222,6 @@ def tables(rows: Sequence[Row], where: str = "") -> str:
 
 
 def _times(row: Row) -> dict[str, tuple[str, str]]:
-    """Time, and ratio with marks, of each peer."""
     ours = row.cells.get(OURS)
     best = min([cell.micros for cell in row.cells.values()], default=0.0)
     result = {}
@@ -287,7 +283,6 @@ def _table(rows: Sequence[Row], read: Callable[[Row], dict[str, tuple[str, str]]
 
 
 def _spread(rows: Sequence[Row]) -> list[str]:
-    """Spread of the turns of the peers."""
     spreads = {
         (peer, row.scene): 100.0 * (cell.high - cell.low) / cell.micros
         for row in rows

@@ -46,16 +46,9 @@ SCENES: dict[str, Callable[[], Scene]] = {
 
 
 def load(name: str, **reading: Any) -> Scene:
-    """The scene of that name, of `SCENES` or else of `dynamics.scenes` or a file.
-
-    reading: options of `dynamics.scenes.of_file`. Raises ValueError for a name that is neither, and as
-    `dynamics.scenes.load` does.
-    """
+    """The scene of that name, of `SCENES`, of `dynamics.scenes` or a file; reading: options of `scenes.of_file`."""
     if name in SCENES:
         return SCENES[name]()
     if name not in scenes.names() and not Path(name).suffix and ":" not in name:
-        raise ValueError(
-            f"there is no scene {name!r}; the bench has {', '.join(SCENES)}, the scenes {', '.join(scenes.names())}, "
-            "files end in .xml or .urdf, and models in Python are file.py:name"
-        )
+        raise ValueError(f"there is no scene {name!r}; the bench has {', '.join(SCENES)}, and takes scenes and files")
     return scenes.load(name, **({} if name in scenes.names() else reading))

@@ -39,7 +39,6 @@ class Stages(dict[str, tuple[float, float, float]]):
     """Seconds by the clock and of the processor, and the peak of memory [MB], 0 on Windows, of each stage by name."""
 
     def __call__(self, name: str, function: Callable[[], Made]) -> Made:
-        """Run the next stage, its cost noted under that name."""
         taken = spent(function)
         self[name] = taken.seconds, taken.processor, _peak()
         return taken.made

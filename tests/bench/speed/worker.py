@@ -20,7 +20,8 @@ from typing import Any
 from cgraph.extend import Array
 from dynamics.multibody.trees.mechanism import MechanismWarning
 from dynamics.scenes import Scene
-from tests.bench.peers import PEERS, PeerModel, UnavailableError
+from dynamics.verification.residual import UnavailableError
+from tests.bench.peers import PEERS, PeerModel
 from tests.bench.peers.peer import EVALUATIONS
 from tests.bench.timing import repetitions, single_core, timed
 
