@@ -16,9 +16,9 @@ import dynamics as dyn
 from cgraph.extend import Array
 from dynamics.experiments.accuracy_task import AccuracyTask
 from dynamics.experiments.stability import case_runs, cases
-from dynamics.experiments.work_precision import motion_scenes
 from dynamics.experiments.work_precision.trajectory_runs import problem_of
 from dynamics.multiprecision import Reference
+from tests.bench.motions import motion_scenes
 from tests.bench.motions.trajectory_peers import heyoka_equations
 from tests.bench.peers.heyoka import heyoka
 from tests.trust import trust as answers
@@ -56,7 +56,7 @@ def renew_answers(numbers: Iterable[int]) -> None:
 
 
 def renew_ends(names: Iterable[str]) -> None:
-    """Compute the ends of the motions of `cgraph bench motions` and keep them in the file."""
+    """Compute the ends of the motions of the bench and keep them in the file."""
     for name in names:
         task = motion_scenes.MOTIONS[name]()
         method = "radau" if task.stiff else "taylor"
