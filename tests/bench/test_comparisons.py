@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import cgraph as cg
-from dynamics.experiments.work_precision import comparisons
 from dynamics.experiments.work_precision.named_tasks import load
 from dynamics.experiments.work_precision.work_precision import Subject, subject
+from tests.bench.motions import comparisons
 from tests.bench.motions.comparisons import Comparison, numpy_rate
 
 ERROR = 1e-6

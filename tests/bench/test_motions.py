@@ -8,14 +8,13 @@ import numpy as np
 import pytest
 from pytest import approx
 
-from dynamics.experiments.work_precision.groups import OURS
 from dynamics.experiments.work_precision.measurement import Entry, Tried
 from dynamics.experiments.work_precision.trajectory_runs import Outcome, Run, problem_of
 from dynamics.multiprecision import Reference
 from tests.bench.motions.motion_runs import HeyokaBatch, Many, Motion
 from tests.bench.motions.motion_scenes import MOTIONS, TIMES, exact_end, sizes
 from tests.bench.motions.motions import Row, cost, motions
-from tests.bench.motions.trajectory_peers import Heyoka
+from tests.bench.motions.trajectory_peers import OURS, Heyoka
 from tests.each_row import each_row
 
 NAME, T_END = "Henon and Heiles", TIMES[0]

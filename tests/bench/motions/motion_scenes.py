@@ -22,9 +22,7 @@ from dynamics.systems.ode_system import OdeSystem
 from dynamics.systems.system import System
 from tests.bench.speed.scenes import free_tree, turned_arm
 
-FILE = Path(__file__).with_name(
-    "motion_ends.json"
-)  # exact ends at `TIMES`, made by tests/dynamics/experiments/renew.py
+FILE = Path(__file__).with_name("motion_ends.json")  # exact ends at `TIMES`, made by renew.py
 TIMES = (0.01, 10.0, 200.0)  # s
 DIGITS = 20  # of the ends
 

@@ -20,10 +20,10 @@ from dynamics.multibody.builders.planar_arm import planar_arm
 from dynamics.multibody.loops import Loop
 from dynamics.multibody.trees.mechanism import Mechanism
 from dynamics.simulation.ensembles.simulate_many import simulate_many
+from dynamics.verification.pinocchio_bodies import constraint_dynamics
 from tests.bench.peers.jax import JaxPeer
 from tests.bench.peers.mujoco import MujocoPeer
 from tests.bench.peers.peer import AnyState, PeerModel, TimedTask, made, rk4_step
-from tests.bench.peers.pinocchio import constraint_dynamics
 from tests.bench.tables import Table
 from tests.bench.timing import relative_difference, repetitions, single_core, timed
 
