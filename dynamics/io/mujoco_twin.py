@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from types import ModuleType
@@ -46,24 +45,6 @@ def joint_order(mj: MjModel, mechanism: Mechanism) -> tuple[list[int], list[int]
     q = [int(joint.qposadr[0]) + k for joint, kind in joints for k in range(len(kind.coordinates))]
     u = [int(joint.dofadr[0]) + k for joint, kind in joints for k in range(len(kind.velocities))]
     return q, u
-
-
-def rollout(mj: MjModel, starts: Array, states: Array) -> Callable[[], None]:
-    """A run of MuJoCo's own native loop of steps, one thread, from every start.
-
-    starts: (N, 1 + 2n), the time, positions and velocities in MuJoCo's order.  states: (N, steps, 1 + 2n), which each
-    run overwrites with what is after every step. The model, such as its time step, is read when it runs.
-    """
-    module = mujoco()
-    from mujoco.rollout import rollout as native
-
-    models, data = [mj] * len(starts), [module.MjData(mj)]  # one datum: one thread
-    steps, sensors = states.shape[1], np.empty((*states.shape[:2], 0))
-
-    def run() -> None:
-        native(models, data, starts, nstep=steps, state=states, sensordata=sensors, skip_checks=True)
-
-    return run
 
 
 def _tree(mechanism: Mechanism) -> Mechanism:

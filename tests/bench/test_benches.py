@@ -7,19 +7,15 @@ import sys
 from collections.abc import Iterator
 from typing import Any
 
-import numpy as np
 import pytest
 
-import dynamics as dyn
 from dynamics.experiments.timing import machine
 from tests.bench import __main__ as command
 from tests.bench.benches import BENCHES, MOTIONS, SPEED, Bench
 from tests.bench.speed import stages
-from tests.bench.speed.counts import VARIANTS
 from tests.bench.timing import run_fresh
 from tests.each_row import each_row
 from tests.slow import slow
-from viz.paper.mechanisms import turned_arm
 
 ROUNDING = 1e-11  # relative, of accelerations of seven bodies by another order of operations
 HENON = {"scenes": ["Henon and Heiles"], "times": [0.01], "errors": [1e-6], "peers": ["heyoka"], "count": 1}
@@ -97,24 +93,6 @@ def speed_row() -> Any:
 def test_a_wrong_choice_gets_one_line(arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert command.main(arguments) == 2
     assert said in capsys.readouterr().err
-
-
-def accelerations(graph: Any) -> Any:
-    x = np.random.default_rng(3).normal(size=len(graph.inputs))
-    return np.array(list(graph.evaluate(dict(zip(graph.input_names, x.tolist(), strict=True))).values()))
-
-
-def planar() -> dyn.Mechanism:
-    return dyn.planar_arm([0.9] * 3, [0.7] * 3, damping=0.1)
-
-
-@each_row("name", VARIANTS)
-def test_a_variant_computes_the_same_with_other_nodes(name: str) -> None:
-    variant = VARIANTS[name]
-    model = planar() if variant.planar else turned_arm(7)
-    base, other = dyn.forward_dynamics(model, "recursive"), variant.graph(model)
-    assert accelerations(other) == pytest.approx(accelerations(base), rel=ROUNDING)
-    assert (len(other.nodes) > len(base.nodes)) is (name not in ("every idea", "dense"))  # dense is smaller at seven
 
 
 def test_elimination_is_accurate_on_long_chains_and_dense_solves_are_less_so() -> None:

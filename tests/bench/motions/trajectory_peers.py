@@ -17,13 +17,12 @@ from cgraph.extend import Array
 from dynamics.experiments.accuracy_task import AccuracyTask
 from dynamics.experiments.work_precision.trajectory_runs import EQUAL, LONGEST_RUN, Outcome, Run, Solver
 from dynamics.integrators import Problem
-from dynamics.io.mujoco_twin import rollout
 from dynamics.systems.arguments import TIME
 from dynamics.verification.residual import UnavailableError
 from tests.bench.peers import PeerModel
 from tests.bench.peers.casadi import casadi, our_function
 from tests.bench.peers.heyoka import expressions, heyoka
-from tests.bench.peers.mujoco import MujocoPeer
+from tests.bench.peers.mujoco import MujocoPeer, rollout
 from tests.bench.peers.translate import translated
 
 if TYPE_CHECKING:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import numpy as np
 
 from cgraph.extend import Array
-from dynamics.io.mujoco_twin import MujocoTwin, joint_order, rollout
+from dynamics.io.mujoco_twin import MujocoTwin, joint_order, mujoco
 from tests.bench.peers.peer import DT, PASSES, Peer, PeerModel, TimedTask, UnavailableError
 
 
@@ -71,3 +74,21 @@ class MujocoPeer(Peer):
             return last.copy() if mode == "batch" else last[:, 0].copy()
 
         return TimedTask(rollout(self.twin.model, starts, states), result)
+
+
+def rollout(mj: Any, starts: Array, states: Array) -> Callable[[], None]:
+    """A run of MuJoCo's own native loop of steps, one thread, from every start.
+
+    starts: (N, 1 + 2n), the time, positions and velocities in MuJoCo's order.  states: (N, steps, 1 + 2n), which each
+    run overwrites with what is after every step. The model, such as its time step, is read when it runs.
+    """
+    module = mujoco()
+    from mujoco.rollout import rollout as native
+
+    models, data = [mj] * len(starts), [module.MjData(mj)]  # one datum: one thread
+    steps, sensors = states.shape[1], np.empty((*states.shape[:2], 0))
+
+    def run() -> None:
+        native(models, data, starts, nstep=steps, state=states, sensordata=sensors, skip_checks=True)
+
+    return run

@@ -14,7 +14,7 @@ from dynamics import scenes
 from dynamics.equations.equations_of_motion import forward_dynamics
 from dynamics.equations.states.consistent_state import nearest_state
 from dynamics.experiments.timing import Timed, in_turns, load
-from dynamics.io.mujoco_twin import mujoco, rollout
+from dynamics.io.mujoco_twin import mujoco
 from dynamics.io.write_mjcf import to_mjcf
 from dynamics.multibody.builders.planar_arm import planar_arm
 from dynamics.multibody.loops import Loop
@@ -22,7 +22,7 @@ from dynamics.multibody.trees.mechanism import Mechanism
 from dynamics.simulation.ensembles.simulate_many import simulate_many
 from dynamics.verification.pinocchio_bodies import constraint_dynamics
 from tests.bench.peers.jax import JaxPeer
-from tests.bench.peers.mujoco import MujocoPeer
+from tests.bench.peers.mujoco import MujocoPeer, rollout
 from tests.bench.peers.peer import AnyState, PeerModel, TimedTask, made, rk4_step
 from tests.bench.tables import Table
 from tests.bench.timing import relative_difference, repetitions, single_core, timed

@@ -5,17 +5,25 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import numpy as np
+import pytest
+
+import dynamics as dyn
 from tests.bench.speed.counts import (
     QUANTITIES,
     ROBOTS,
+    VARIANTS,
     models,
     operation_counts,
     operations,
 )
 from tests.each_row import each_row
 from tests.slow import slow
+from viz.paper.mechanisms import turned_arm
 
+ROUNDING = 1e-11  # relative, of accelerations of seven bodies by another order of operations
 PAGE = Path(__file__).parents[3] / "docs/operations.md"
 MODELS = models()
 SMALL = 7  # links of what is counted in every run
@@ -62,3 +70,21 @@ def test_every_row_of_inverse_dynamics_is_below_the_published_one() -> None:
     for name in (*ROBOTS, "general 6", "general 7", "general 30"):
         total, (*_, theirs, by_chain_rule) = ROWS["inverse dynamics", name][0], ROWS["inverse dynamics", name]
         assert total < theirs < by_chain_rule
+
+
+def accelerations(graph: Any) -> Any:
+    x = np.random.default_rng(3).normal(size=len(graph.inputs))
+    return np.array(list(graph.evaluate(dict(zip(graph.input_names, x.tolist(), strict=True))).values()))
+
+
+def planar() -> dyn.Mechanism:
+    return dyn.planar_arm([0.9] * 3, [0.7] * 3, damping=0.1)
+
+
+@each_row("name", VARIANTS)
+def test_a_variant_computes_the_same_with_other_nodes(name: str) -> None:
+    variant = VARIANTS[name]
+    model = planar() if variant.planar else turned_arm(7)
+    base, other = dyn.forward_dynamics(model, "recursive"), variant.graph(model)
+    assert accelerations(other) == pytest.approx(accelerations(base), rel=ROUNDING)
+    assert (len(other.nodes) > len(base.nodes)) is (name not in ("every idea", "dense"))  # dense is smaller at seven
