@@ -58,7 +58,7 @@ async function startLive() {
   };
 
   $("bits").toggleAttribute("hidden", !globalThis.crypto?.subtle || !data.methods.includes("rk4") || data.inputs.some(({ group }) => group === "momenta"));
-  $("digest").onclick = async () => { $("digits").textContent = `${await machine.digest()}: 1000 steps of 2^-10 s by rk4 from the start of the page. The command cgraph certify --bits prints it, too.`; };
+  $("digest").onclick = async () => { $("digits").textContent = `${await machine.digest()}: 1000 steps of 2^-10 s by rk4 from the start of the page.`; };
 
   // The link
 

@@ -100,7 +100,7 @@ function liveMachine(data, instances) {
     return rows;
   }
 
-  /** A digest of the states after every hundredth of 1000 steps of 2^-10 s by rk4 from the start: as `cgraph certify --bits` prints it. */
+  /** A digest of the states after every hundredth of 1000 steps of 2^-10 s by rk4 from the start. */
   async function digest() {
     data.inputs.forEach(({ value }, i) => { ahead[i] = value; });
     const states = [];
