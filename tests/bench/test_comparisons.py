@@ -47,7 +47,7 @@ def test_rates_written_in_numpy_are_those_of_the_graph(tmp_path: Any) -> None:
 
 
 def test_the_energy_of_symplectic_methods_stays_in_a_band_and_that_of_rk4_falls() -> None:
-    (text,) = comparisons.energy("", steps=4000, starts=4)
+    (text,) = comparisons.energy(steps=4000, starts=4)
     rows = {line.split()[0]: line.split()[1:] for line in text.splitlines()[4:]}
     assert float(rows["gauss6"][0]) < float(rows["gauss4"][0]) < float(rows["midpoint"][0]) < 1e-2
     assert float(rows["rk4"][1]) < 0.0
