@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     from ..models.film import animate, frames
     from ..models.inspection import FRAMES, inspection
     from ..models.inspection_page import first_view, inspection_page
-    from ..models.live_motion import adjustable, live
+    from ..models.live_motion import live
     from ..models.node_classes import form_classes, formulation_classes
     from ..models.remarks import constant_momentum, tree_alone
     from ..models.typed_text import typed_text
