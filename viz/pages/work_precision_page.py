@@ -55,10 +55,10 @@ def _busy(content: ReportData) -> str:
 
 
 def _fastest(content: ReportData) -> Section:
-    rows = [[_power(each["error"]), f"{_time(each['seconds'])} {each['name']}"] for each in content["targets"]]
+    rows = [[_power(each["error"]), _time(each["seconds"]), each["name"]] for each in content["targets"]]
     if not rows:
         return Section("fastest", "Fastest for an error", [Paragraph("No method came near the exact motion.")])
-    table = Table("The fastest run with an error at the end of at most", ["error", ""], rows)
+    table = Table("The fastest run with an error at the end of at most", ["error", "run time", "method"], rows)
     note = Paragraph("Only the settings in the table of all points were tried.")
     return Section("fastest", "Fastest for an error", [table, note])
 
