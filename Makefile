@@ -4,7 +4,8 @@ VENV ?= .venv
 OUT ?= paper
 WORKERS ?= 2
 WORST ?= 15
-FIGURES ?= speed counts operations build agreement ensembles reconfiguration closed-chains long-chains orders taylor stiff loops energy
+FIGURES ?= speed motions counts operations build compile long-chains agreement ensembles closed-chains reconfiguration trust \
+	tightest orders taylor stiff loops energy
 
 BIN = $(VENV)/bin
 LOCKED = .venv-locked/bin
