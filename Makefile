@@ -4,6 +4,8 @@ VENV ?= .venv
 OUT ?= paper
 WORKERS ?= 2
 WORST ?= 15
+FIGURES ?= speed motions counts operations build compile long-chains agreement ensembles closed-chains reconfiguration trust \
+	tightest orders taylor stiff loops energy
 
 BIN = $(VENV)/bin
 LOCKED = .venv-locked/bin
@@ -51,12 +53,9 @@ docs: $(INSTALLED)docs,viz,mujoco  ## the documentation, into docs/_build/html
 pictures: $(INSTALLED)test  ## all pictures of the pages, from their examples and commands; ARGS=docs/gallery.md for one page
 	$(BIN)/python -m tests.page_pictures $(ARGS)
 
-bench: $(INSTALLED)bench  ## the comparisons with other software
-	$(BIN)/cgraph bench
-	@for figure in counts build agreement ensembles reconfiguration long-chains; do \
-		echo "== $$figure"; $(BIN)/cgraph bench "$$figure" || exit 1; done
-	$(BIN)/cgraph report --compare orders,taylor,stiff,loops,energy --out build
-	$(BIN)/python -m pytest tests/dynamics/multibody/test_pinocchio.py -q
+bench: $(INSTALLED)bench  ## the comparisons with other software, hours; ARGS="counts --links 10" for one of them
+	@$(if $(ARGS),$(BIN)/python -m tests.bench $(ARGS),for figure in $(FIGURES); do \
+		echo "== $$figure"; $(BIN)/python -m tests.bench $$figure || exit 1; done)
 
 clean:  ## remove the environments, paper and all else that the targets above make where nothing else is said
 	rm -rf .venv .venv-locked paper docs/_build build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .coverage

@@ -26,7 +26,6 @@ TABLES = {
     "cgraph.core.row.BY_UFUNC",
     "cgraph.program.statement.STATEMENTS",
     "dynamics.equations.equation.EQUATIONS",
-    "dynamics.experiments.trust.random_motions.FAMILIES",
     f"{HOME}._memos",
 }
 CONTAINERS = {"dict", "list", "set", "OrderedDict", "defaultdict", "deque", "Counter"}

@@ -35,7 +35,6 @@ METHODS = (
     *("rk4", "dopri5", "dop853", "taylor", "radau", "rodas", "euler", "verlet", "midpoint", "gauss4", "gauss6"),
     *("symplectic_euler", "yoshida4", "yoshida6", "yoshida8", "mclachlan4", "mclachlan6", "kahan_li6", "kahan_li8"),
 )
-MAKERS = {"heyoka": "#A6761D", "CVODES": "#7A8B00", "MuJoCo": "#B5507A"}  # of others, none of ours
 SERIES = (BLUE, ORANGE, GREEN, PURPLE, SKY_BLUE, BLACK, YELLOW)  # curves of a plot, and tags
 
 FONT = "DejaVu Sans"  # its letter widths are known to the Graphviz that comes without fonts, and matplotlib carries it

@@ -1,13 +1,10 @@
-"""Figures as text: tables for a terminal, CSV, and numbers with so many digits."""
+"""Figures as text: tables for a terminal, CSV, and numbers of two digits."""
 
 from __future__ import annotations
 
 import csv
 import io
-import math
-import string
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple
 
 WIDTH = 120  # characters of a terminal
 GAPS = ("  ", " ")  # between columns: the second where the first is too wide
@@ -36,22 +33,6 @@ def table(header: Sequence[str], rows: Sequence[Sequence[Cell]], left: Iterable[
     return [gap.join(parts).rstrip() for block in blocks for parts in zip(first, *block, strict=True)]
 
 
-class Table(NamedTuple):
-    """A table under its title, as text or as plain data.  left: the columns of texts."""
-
-    title: str
-    header: Sequence[str]
-    rows: Sequence[Sequence[str]]
-    left: Iterable[int] = (0,)
-
-    def __str__(self) -> str:
-        return "\n".join([*filter(None, [self.title]), *table(self.header, self.rows, self.left)])
-
-    def to_dict(self) -> dict[str, object]:
-        """Dictionary for JSON."""
-        return {"title": self.title, "header": list(self.header), "rows": [list(row) for row in self.rows]}
-
-
 def _column(head: str, cells: Sequence[tuple[str, str]], flush_left: bool) -> list[str]:
     """Cells of one width under a head that stands over the numbers."""
     after = max([len(right) for _, right in cells], default=0)
@@ -70,31 +51,9 @@ def csv_text(columns: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     return text.getvalue()
 
 
-def digits(value: float, count: int) -> str:
-    """The number with `count` significant digits, without an exponent."""
-    if not (math.isfinite(value) and value > 0.0):
-        return str(value)
-    return f"{value:.{max(0, count - 1 - math.floor(math.log10(value)))}f}"
-
-
 def number(value: float) -> str:
     """The number with two significant digits, with an exponent where it is small or large."""
     return f"{value:.1e}" if value and not 0.01 <= abs(value) < 1000.0 else f"{value:.2g}"
-
-
-class Footnotes:
-    """Letters for the reasons why cells are empty, and the lines below a table that say them."""
-
-    def __init__(self) -> None:
-        self._letters: dict[str, str] = {}
-
-    def mark(self, reason: str) -> str:
-        """Letter of a reason."""
-        return self._letters.setdefault(reason, string.ascii_lowercase[min(len(self._letters), 25)])
-
-    def lines(self) -> list[str]:
-        """A line for each reason."""
-        return [f"{letter}: {reason}" for reason, letter in self._letters.items()]
 
 
 def check_names(*choices: tuple[str, Iterable[str], Iterable[str]]) -> None:

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import ctypes
 import warnings
-from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from types import ModuleType
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from cgraph._shared import Array, install
+from cgraph._shared import install
 
 if TYPE_CHECKING:
-    from mujoco import MjModel, MjSpec
+    from mujoco import MjSpec
 
 DIGITS = 17  # of a number in a text, so that it is read as the same float
 
@@ -51,21 +48,3 @@ def text_of(spec: MjSpec) -> str:
     finally:
         library._mjPRIVATE__set_xml_precision(before)
     return text
-
-
-def rollout(mj: MjModel, starts: Array, states: Array) -> Callable[[], None]:
-    """A run of MuJoCo's own native loop of steps, one thread, from every start.
-
-    starts: (N, 1 + 2n), the time, positions and velocities in MuJoCo's order.  states: (N, steps, 1 + 2n), which each
-    run overwrites with what is after every step. The model, such as its time step, is read when it runs.
-    """
-    module = mujoco()
-    from mujoco.rollout import rollout as native
-
-    models, data = [mj] * len(starts), [module.MjData(mj)]  # one datum: one thread
-    steps, sensors = states.shape[1], np.empty((*states.shape[:2], 0))
-
-    def run() -> None:
-        native(models, data, starts, nstep=steps, state=states, sensordata=sensors, skip_checks=True)
-
-    return run

@@ -31,7 +31,7 @@ from ..systems.model import Model, as_system
 from ..systems.system import System
 from . import peer_agreement as agreement
 from .held_states import Held, new_rows, random_states
-from .residual import DIFFERENCES, POSITIVE, Certificate, Residual, rounded, worst
+from .residual import DIFFERENCES, POSITIVE, Certificate, Residual, UnavailableError, rounded, worst
 
 if TYPE_CHECKING:
     from ..io.load import Source
@@ -102,7 +102,7 @@ def certify(
     for name, peer in agreement.peers(model, theirs):
         try:
             residuals.append(agreement.residual(name, peer(), model, at))
-        except agreement.NotComparableError as error:
+        except UnavailableError as error:
             left_out.append(str(error) if str(error).startswith(name) else f"{name}: {error}")
     if len(system.constraints):
         held, said = agreement.with_loops(model, at)

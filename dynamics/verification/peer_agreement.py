@@ -18,14 +18,12 @@ from ..equations.formulations.formulations import inverse_dynamics
 from ..equations.states.evaluate import evaluate
 from ..io.load import compiled
 from ..io.mujoco_module import mujoco
-from ..io.mujoco_twin import joint_order
+from ..io.mujoco_twin import MujocoTwin, joint_order
 from ..multibody.bodies.body import Body, MechanismError
 from ..multibody.trees.mechanism import Mechanism, as_mechanism
-from ..peers.mujoco import MujocoPeer
-from ..peers.peer import Peer, PeerModel, UnavailableError
-from ..peers.pinocchio import PinocchioPeer, constrained_accelerations
 from ..systems.model import Model
-from .residual import PEERS, PROXIMAL, Residual
+from .pinocchio_bodies import PinocchioBodies, constrained_accelerations
+from .residual import PEERS, PROXIMAL, Residual, UnavailableError
 
 if TYPE_CHECKING:
     from mujoco import MjModel
@@ -35,10 +33,6 @@ if TYPE_CHECKING:
 ASKED = 4  # states at which a disagreement is explained
 TAKEN = 2  # terms at most that are taken out together
 TINY_MASS = 2.0**-40  # of the heaviest body: a mass that weighs nothing beside what is left
-
-
-class NotComparableError(Exception):
-    """Raised when a peer has nothing to say of a model."""
 
 
 class Sizes(NamedTuple):
@@ -127,43 +121,28 @@ def without(mechanism: Mechanism, terms: Sequence[str], sizes: Sizes) -> Mechani
     return mechanism
 
 
-class Asked(Protocol):
-    """A peer that has the model."""
+class Bodies(Protocol):
+    """Bodies in a peer."""
 
     def inverse(self, at: Mapping[str, Array]) -> Array:
         """tau, (N, n), of q, qd, qdd, (N, n) each."""
         ...
+
+
+class Asked(Bodies, Protocol):
+    """A peer that has the model."""
 
     def without(self, terms: Sequence[str], sizes: Sizes) -> Asked:
         """The peer with these of the `TERMS` taken out."""
         ...
 
 
-class _At(PeerModel):
-    """A case that is asked at a state of ours."""
-
-    state: Array
-
-    def point(self, task: str) -> Array:
-        return self.state
-
-
 class Translation:
-    """A peer on the model as `to_mjcf` writes it."""
+    """A peer on our mechanism, which `make` gives it."""
 
-    def __init__(self, make: Callable[[PeerModel], Peer], mechanism: Mechanism) -> None:
+    def __init__(self, make: Callable[[Mechanism], Bodies], mechanism: Mechanism) -> None:
         self.make, self.mechanism = make, mechanism
-        self.case = _At("the model", mechanism)
-        self.peer = make(self.case)
-
-    def inverse(self, at: Mapping[str, Array]) -> Array:
-        """tau, (N, n), of q, qd, qdd, (N, n) each."""
-        rows = []
-        for state in np.concatenate([at["q"], at["qd"], at["qdd"]], axis=1):
-            self.case.state = state
-            asked = self.peer.prepare("inverse", "call")
-            rows.append(asked.result(asked.run()))
-        return np.array(rows)
+        self.inverse = make(mechanism).inverse
 
     def without(self, terms: Sequence[str], sizes: Sizes) -> Translation:
         """The model with these of the `TERMS` taken out."""
@@ -195,13 +174,19 @@ class Original:
         return Original(mj, self.q_order, self.order)
 
 
+def twin_of(mechanism: Mechanism) -> Original:
+    """MuJoCo on the model as `to_mjcf` writes it."""
+    twin = MujocoTwin(mechanism)
+    return Original(twin.model, *joint_order(twin.model, mechanism))
+
+
 def peers(model: Model, twin: Original | None = None) -> Iterator[tuple[str, Callable[[], Asked]]]:
-    """Name of each peer, and what makes it for a model: raises NotComparableError with the reason.
+    """Name of each peer, and what makes it for a model: raises UnavailableError with the reason.
 
     twin: MuJoCo's, in place of the translation.
     """
-    yield "MuJoCo", lambda: twin or _translated(MujocoPeer, model)
-    yield "Pinocchio", lambda: _translated(PinocchioPeer, model)
+    yield "MuJoCo", lambda: twin or _translated(twin_of, model)
+    yield "Pinocchio", lambda: _translated(PinocchioBodies, model)
 
 
 def residual(name: str, peer: Asked, model: Model, at: Mapping[str, Array]) -> Residual:
@@ -238,12 +223,11 @@ def with_loops(model: Model, at: Mapping[str, Array]) -> tuple[list[Residual], l
     said = ["MuJoCo: its equality constraints are soft, so that it is compared without the loops"]
     try:
         bodies = _without_forces(model)
-        theirs = constrained_accelerations(bodies, at["q"], at["qd"], at["tau"])
-    except NotComparableError as error:
-        return [], [f"MuJoCo and Pinocchio with constraints: {error}"]
-    except ImportError as error:
-        return [], [*said, f"Pinocchio's constraintDynamics: {error}"]
     except UnavailableError as error:
+        return [], [f"MuJoCo and Pinocchio with constraints: {error}"]
+    try:
+        theirs = constrained_accelerations(bodies, at["q"], at["qd"], at["tau"])
+    except (ImportError, UnavailableError) as error:
         return [], [*said, f"Pinocchio's constraintDynamics: {error}"]
     ours = evaluate(bodies, forward_dynamics(bodies), at)[:, : theirs.shape[1]]
     size = np.maximum(np.abs(ours).max(axis=1), np.finfo(float).tiny)
@@ -260,20 +244,20 @@ def bare(model: Model) -> Mechanism:
 def _without_forces(model: Model) -> Mechanism:
     """The mechanism of a model, without forces on its bodies, which the peers do not have, and parameters as numbers.
 
-    Raises NotComparableError for another model.
+    Raises UnavailableError for another model.
     """
     bodies = as_mechanism(model)
     if bodies is None:
-        raise NotComparableError("takes rigid bodies, not a Lagrangian")
+        raise UnavailableError("takes rigid bodies, not a Lagrangian")
     bodies = bodies.bind()
     return replace(bodies, forces=(), parameters={}) if bodies.forces else bodies
 
 
-def _translated(make: Callable[[PeerModel], Peer], model: Model) -> Translation:
+def _translated(make: Callable[[Mechanism], Bodies], model: Model) -> Translation:
     try:
         return Translation(make, bare(model))
     except (ImportError, UnavailableError, MechanismError) as error:
-        raise NotComparableError(str(error)) from None
+        raise UnavailableError(str(error)) from None
 
 
 def original(twin: Source, model: Model) -> Original:
@@ -285,7 +269,7 @@ def original(twin: Source, model: Model) -> Original:
     module, theirs = mujoco(), copy.copy(compiled(twin))
     try:
         bodies = bare(model)
-    except NotComparableError as error:
+    except UnavailableError as error:
         raise ValueError(f"a twin is compared with rigid bodies: MuJoCo {error}") from None
     loops = getattr(as_mechanism(model), "loops", ())
     nq, n = len(bodies.coordinates), len(bodies.velocities)

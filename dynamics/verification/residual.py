@@ -25,6 +25,10 @@ PEERS = Bound("peers", 1e-10, "the rounding of two programs, and inertias that p
 PROXIMAL = Bound("proximal", 1e-7, "a solver that iterates on regularized constraints until 1e-14 of them is left")
 
 
+class UnavailableError(Exception):
+    """Raised when a peer cannot do a task for a model."""
+
+
 @dataclass(frozen=True)
 class Residual:
     """An equation, and by how much the worst state misses it, relative to the terms of the equation."""

@@ -9,13 +9,15 @@ import sys
 from collections.abc import Callable, Iterator
 from heapq import heappop, heappush
 
+from tests.dynamics.figures.parallel_c import times
+
 import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import Builder, folded, solve_nodes, topological
-from dynamics.experiments.speed.bench_scenes import chain, turned_arm
-from dynamics.experiments.text_table import digits, table
+from dynamics.experiments.text_table import table
 from dynamics.multibody.trees.mechanism import Mechanism
-from tests.bench.parallel_c import times
+from tests.bench.tables import digits
+from viz.paper.mechanisms import chain, turned_arm
 
 MODELS: dict[str, Callable[[], Mechanism]] = {
     "planar 20": lambda: chain(0.2, 0.2, 20),

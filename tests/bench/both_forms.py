@@ -19,10 +19,11 @@ from cgraph._shared import Array
 from dynamics.equations.linearization.linearization import state_space
 from dynamics.equations.momentum.hamiltonian import hamilton_equations, velocities
 from dynamics.equations.state_equation import state_equation
-from dynamics.experiments.speed.bench_scenes import SCENES, chain
-from dynamics.experiments.text_table import digits, table
+from dynamics.experiments.text_table import table
 from dynamics.experiments.timing import Timed, in_turns
 from dynamics.systems.model import Model, as_system
+from tests.bench.speed.scenes import SCENES, chain
+from tests.bench.tables import digits
 
 ROUNDS = 15  # of all forms in turn; the fastest counts
 SECONDS = 0.02  # of a round

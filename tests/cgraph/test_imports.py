@@ -15,7 +15,7 @@ import viz
 from tests.sources import PACKAGES, ROOT
 
 PLAIN = {*sys.stdlib_module_names, "numpy"}
-LABORATORY = tuple([f"dynamics.{room}" for room in ("experiments", "peers", "verification", "multiprecision")])
+LABORATORY = tuple([f"dynamics.{room}" for room in ("experiments", "verification", "multiprecision")])
 MOST = {"viz": 10, "equations": 107, "simulation": 200}  # {step: modules of ours that are loaded up to there, at most}
 
 

@@ -142,8 +142,6 @@ def test_a_model_file_stands_where_a_scene_s_name_does(tmp_path, capsys):
         ("simulate chain --method yoshida", "there is no method 'yoshida'; did you mean 'yoshida"),
         ("lint triple_pendulm", "there is no scene 'triple_pendulm'; did you mean 'triple_pendulum'?"),
         ("draw spring_mass --collapse nolink --out x.txt", "--collapse goes with .svg, .png, .dot"),
-        ("bench counts --links 1", "the smallest model that is counted has 3 links, got links = 1"),
-        ("bench operations --links 1", "the smallest model that is counted has 3 links, got links = 1"),
         ("report", "a report of run times needs a scene, as in: cgraph report spring_mass"),
         ("lesson --out lesson.txt", "--out must end in .html"),
         ("report nothing", "there is no scene 'nothing'"),
@@ -153,14 +151,9 @@ def test_a_model_file_stands_where_a_scene_s_name_does(tmp_path, capsys):
         ("report spring_mass --without gravity", "--without goes with --pruning"),
         ("report spring_mass --lock a=1", "--lock goes with --pruning"),
         ("report spring_mass --pruning --quick", "--quick goes with a report of run times or --stability"),
-        (["report", "spring_mass", "--pruning", "--peers", ""], "--peers goes with a report of run times"),
-        ("report --stability --budget 3", "--budget goes with a report of run times"),
         ("report --stability --ignore", "--ignore goes with a report of run times or --pruning"),
         ("report --stability --pruning", "one at a time"),
         ("report --pruning", "--pruning needs a scene"),
-        ("report --compare speed", "comparisons are orders, taylor, stiff, loops, energy, got 'speed'"),
-        ("report --compare orders --json", "--json goes with a report of run times"),
-        ("report chain --compare orders", "--compare takes no scene, got 'chain'"),
         ("report chain --pruning --lock a=1 --lock a=2", "--lock takes each body once"),
     ],
 )
@@ -192,7 +185,7 @@ def test_the_exit_status_of_a_process_is_the_command_s():
 USAGE = """paint|draw|draw chain --out x.dot --formulation f|lint|why
 why spring_mass tau0 q0 --k 0|why spring_mass tau0 q0 --k -1
 why spring_mass tau0 q0 --at q0|why spring_mass tau0 q0 --at q0=nan|why spring_mass tau0 q0 --at q0=1,q0=2
-lint spring_mass --box q0=0:1,q0=0:2|certify spring_mass --seed -1|bench --budget -1|lesson
+lint spring_mass --box q0=0:1,q0=0:2|certify spring_mass --seed -1|report spring_mass --t-end -1|lesson
 inspect spring_mass --out x.html --t-end 0|why spring_mass tau0 q0 --svg answer.png
 why spring_mass tau0 q0 --forward --formulation kinetic_only|lint spring_mass --box q0=1|lint spring_mass --box q0=2:1
 compare spring_mass --formulations chain_rule|compare spring_mass --formulations chain_rule none
@@ -205,7 +198,6 @@ draw chain --out a.dot --forward --formulation kinetic_only"""
     [
         *[(line, "") for line in re.split(r"[|\n]", USAGE)],
         ("draw chain chain --out a.dot", "unrecognized arguments: "),
-        ("bench --quickly", "unrecognized arguments: "),
         ("--foo", "there is no option '--foo': `cgraph` alone lists the commands"),
         ("version", "there is no command 'version': did you mean '--version'?"),
         (
@@ -222,7 +214,6 @@ draw chain --out a.dot --forward --formulation kinetic_only"""
             "report spring_mass --pruning --lock tip",
             "argument --lock: expected a body and a coordinate, BODY=AT, got 'tip'",
         ),
-        ("report spring_mass --budget -1", "argument --budget: expected a positive number, got '-1'"),
         ("report spring_mass --t-end inf", "argument --t-end: expected a finite number, got 'inf'"),
     ],
 )
@@ -323,11 +314,6 @@ def test_every_command_and_option_is_in_the_completion(capsys, shell):
 
 
 def test_words_of_a_list_may_stand_between_options():
-    assert parse(["bench", "speed", "--quick", "spring_mass", "--repeats", "3", "chain"]).what == [
-        "speed",
-        "spring_mass",
-        "chain",
-    ]
     assert parse(["report", "--quick", "chain", "--json", "spring_mass"]).scenes == ["chain", "spring_mass"]
 
 
@@ -416,19 +402,15 @@ def test_a_missing_package_is_an_error_that_names_its_extra(here, without, capsy
     assert [path.name for path in here.iterdir()] == ["robot.xml"]
 
 
-def test_peers_that_a_figure_does_without_are_named_with_their_extra(without, capsys):
+def test_peers_that_are_not_installed_are_named_with_their_extra(without):
     without("mujoco")
     without("pinocchio")
-    assert cli.main(["bench", "agreement", "--links", "1", "--count", "1"]) == 0
-    printed = capsys.readouterr().out
-    assert "MuJoCo is not installed: in a checkout of cgraph, pip install -e '.[mujoco]'" in printed
-    assert "Pinocchio is not installed: in a checkout of cgraph, pip install -e '.[bench]'" in printed
     assert cli.main(["certify", "spring_mass", "--states", "1"]) == 0
     arm = dyn.certify(dyn.planar_arm([1.0], [1.0]), states=1)
-    assert [line.partition(": in a checkout")[0] for line in arm.left_out] == [
-        "MuJoCo is not installed",
-        "Pinocchio is not installed",
-    ]
+    extras = {"MuJoCo": "mujoco", "Pinocchio": "pinocchio"}
+    assert arm.left_out == tuple(
+        [f"{name} is not installed: in a checkout of cgraph, pip install -e '.[{of}]'" for name, of in extras.items()]
+    )
 
 
 LATE = """import dynamics as dyn

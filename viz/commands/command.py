@@ -59,8 +59,7 @@ class Command(argparse.ArgumentParser):
 # What each does, in the order of the help. To add a command, write its file and name it here.
 COMMANDS = {
     "paper": "the paper's six figures and its table, measured, and three of our own, in one folder",
-    "bench": "our speed beside what is installed: CasADi, Pinocchio, MuJoCo, heyoka, JAX, SymPy, PyTorch",
-    "report": "error beside run time of every integrator, ours and others', as pages",
+    "report": "error beside run time of every integrator, as pages",
     "scenes": "the scenes, with the size of their graphs",
     "equations": "the Lagrangian, momenta and torques of a scene as formulas; status 1 for a wrong formulation",
     "draw": "draw the graph of a scene's equations (SVG, PNG or DOT) or list it (TXT)",

@@ -10,15 +10,9 @@ if TYPE_CHECKING:
     from cgraph.extend import Names, cotangents
     from dynamics.equations.formulations.formulation_sizes import INERTIAL_TERM, blamed
     from dynamics.equations.formulations.step_state import after_step, before_step
-    from dynamics.experiments.benches import BENCHES, SPEED, Bench
-    from dynamics.experiments.speed import bench as speed
     from dynamics.experiments.stability import stability
     from dynamics.experiments.text_table import table
-    from dynamics.experiments.timing import machine
-    from dynamics.experiments.work_precision import comparisons, named_tasks, work_precision
-    from dynamics.experiments.work_precision.cold_start import STARTS
-    from dynamics.experiments.work_precision.groups import COMPARISONS, PEERS
-    from dynamics.experiments.work_precision.motion_scenes import MOTIONS
+    from dynamics.experiments.work_precision import named_tasks, work_precision
     from dynamics.experiments.work_precision.work_precision import to_csv
     from dynamics.integrators import TABLEAUS
     from dynamics.io.load import compiled
@@ -28,7 +22,6 @@ if TYPE_CHECKING:
     from dynamics.simulation.limits_left import limits_left
     from dynamics.simulation.run_options import RunOptions
     from dynamics.verification.certificate import certify
-    from dynamics.verification.same_bits import same_bits
 
     from .. import theme
     from ..graph_drawing.dot import to_dot

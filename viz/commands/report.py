@@ -1,4 +1,4 @@
-"""`cgraph report`: error beside run time of integrators, as pages; or one of three other reports."""
+"""`cgraph report`: error beside run time of integrators, as pages; or one of two other reports."""
 
 from __future__ import annotations
 
@@ -31,21 +31,18 @@ from .arguments import (
 )
 from .command import Command
 
-CURVES, STABILITY, PRUNING, COMPARE = "a report of run times", "--stability", "--pruning", "--compare"
+CURVES, STABILITY, PRUNING = "a report of run times", "--stability", "--pruning"
 
 GO_WITH = {  # options that not every kind of report has
     **dict.fromkeys(READING, (CURVES, PRUNING)),
     "t_end": (CURVES,),
     "start": (CURVES,),
     "methods": (CURVES,),
-    "peers": (CURVES,),
-    "budget": (CURVES,),
     "quick": (CURVES, STABILITY),
     "json": (CURVES, STABILITY, PRUNING),
     "without": (PRUNING,),
     "lock": (PRUNING,),
 }
-BUDGET = 60.0  # s
 FOLDER = Path("report")
 
 
@@ -54,8 +51,6 @@ def add(parser: Command) -> None:
     parser.names |= {
         "scenes": lambda: [*dyn.scenes.names(), *library.named_tasks.names()],
         "methods": lambda: dyn.METHODS,
-        "peers": lambda: library.PEERS,
-        "comparisons": lambda: library.COMPARISONS,
         "effects": lambda: dyn.EFFECTS,
     }
     parser.add_argument(
@@ -74,17 +69,7 @@ def add(parser: Command) -> None:
         "--start", type=start, metavar="A=1,B=2", help="instead of the scene's own: by names, or all numbers"
     )
     parser.add_argument("--methods", type=listed, metavar="A,B", help="only these of {methods}")
-    parser.add_argument("--peers", type=listed, metavar="A,B", help="only these of {peers}; '' for none")
-    parser.add_argument("--quick", action="store_true", help="fewer turns, shorter runs, and no cold starts")
-    parser.add_argument(
-        "--budget", type=positive, metavar="S", help=f"seconds that a cold start may take (default: {BUDGET:g})"
-    )
-    parser.add_argument(
-        "--compare",
-        type=listed,
-        metavar="A,B",
-        help="instead: print comparisons at equal error, of {comparisons}; minutes, and no scene",
-    )
+    parser.add_argument("--quick", action="store_true", help="fewer turns and shorter runs")
     parser.add_argument("--json", action="store_true", help="print as JSON")
     parser.add_argument("--pruning", action="store_true", help="instead: what the scene's graphs hold and leave out")
     parser.add_argument("--without", type=listed, metavar="A,B", help="with --pruning: leave out {effects}")
@@ -98,14 +83,14 @@ def run(options: argparse.Namespace) -> int | None:
     """Write the pages that the arguments ask for; 1 where one of them has a finding."""
     if options.out is None and not options.json:
         options.out = FOLDER
-    others = {STABILITY: options.stability, PRUNING: options.pruning, COMPARE: options.compare is not None}
+    others = {STABILITY: options.stability, PRUNING: options.pruning}
     kinds = [kind for kind, asked in others.items() if asked] or [CURVES]
     if len(kinds) > 1:
         raise ValueError(f"{' and '.join(kinds)} are {len(kinds)} reports: one at a time")
     kind = kinds[0]
     if not options.scenes and kind in (CURVES, PRUNING):
-        raise ValueError(f"{kind} needs a scene, as in: cgraph report spring_mass; --stability and --compare need none")
-    if options.scenes and kind in (STABILITY, COMPARE):
+        raise ValueError(f"{kind} needs a scene, as in: cgraph report spring_mass; --stability needs none")
+    if options.scenes and kind == STABILITY:
         raise ValueError(f"{kind} takes no scene, got {options.scenes[0]!r:.80}")
     for name, with_these in GO_WITH.items():
         if kind not in with_these and getattr(options, name) not in (None, False):
@@ -114,7 +99,6 @@ def run(options: argparse.Namespace) -> int | None:
         CURVES: _curves,
         STABILITY: _stability,
         PRUNING: _pruning,
-        COMPARE: _comparisons,
     }
     if options.out is not None:
         library.check_folder(options.out)
@@ -144,34 +128,21 @@ def _exact_motions(out: Path | None) -> Iterator[tuple[Path, Callable[[], dict[P
         yield folder, new
 
 
-def _comparisons(options: argparse.Namespace) -> None:
-    """Print comparisons as they are measured; exact motions are kept where reports keep theirs."""
-    if unknown := [name for name in options.compare if name not in library.COMPARISONS]:
-        raise ValueError(f"comparisons are {', '.join(library.COMPARISONS)}, got {unknown[0]!r}")
-    print(library.machine())
-    with _exact_motions(options.out) as (folder, new):
-        for name in options.compare or library.COMPARISONS:
-            for text in getattr(library.comparisons, name)(str(folder)):
-                print(f"\n{text}", flush=True)
-        answer("", new(), folder=options.out)
-
-
 def _curves(options: argparse.Namespace) -> None:
     """A page of run time beside error for each scene."""
     named = {library.named_tasks.load(name, reading=reading(options)).name for name in options.scenes}
     if len(named) < len(options.scenes):
         raise ValueError(f"each scene needs a name of its own for its files, got {', '.join(options.scenes)}")
     chosen = {"t_end": options.t_end, "start": options.start, "reading": reading(options)}
-    peers = tuple(library.PEERS) if options.peers is None else options.peers
     if options.out is not None:
         library.check_can_plot()
     with _exact_motions(options.out) as (folder, new):
-        found, lines, files = _measured(options, chosen, peers, folder)
+        found, lines, files = _measured(options, chosen, folder)
         answer(unless_json(options, found, "\n".join(lines)), files | new(), folder=options.out)
 
 
 def _measured(
-    options: argparse.Namespace, chosen: dict[str, Any], peers: tuple[str, ...], exact: Path
+    options: argparse.Namespace, chosen: dict[str, Any], exact: Path
 ) -> tuple[list[dict[str, Any]], list[str], dict[Path, str | bytes]]:
     """Data, lines to print and files of a report."""
     found, lines, files = [], [], dict[Path, str | bytes]()
@@ -179,11 +150,8 @@ def _measured(
         report = library.work_precision.work_precision(
             name,
             methods=options.methods or tuple(dyn.METHODS),
-            peers=peers,
             turns=3 if options.quick else 9,
             limit=0.03 if options.quick else library.work_precision.LIMIT,
-            cold=() if options.quick else tuple(library.STARTS),
-            budget=BUDGET if options.budget is None else options.budget,
             folder=exact,
             options=chosen,
             say=say,

@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from cgraph import Counts, Graph
-from dynamics import hamilton_equations, scenes, state_equation
-from dynamics.experiments.speed.bench_scenes import SCENES, chain
+from dynamics import Mechanism, hamilton_equations, scenes, state_equation
 
 from .. import theme
 from ..graph_drawing.legend import kinds_in, legend_svg, to_adaptive
 from ..graph_drawing.levels import LevelPanel, Scale, levels_svg, silhouettes_svg
 from ..pages.document import Block, Paragraph, Picture, Table
 from .both_forms import HAMILTON, LAGRANGE, VELOCITIES_ALONE, both_forms, form_sizes
+from .mechanisms import binary_tree, chain, turned_arm
 from .part import Part, drawn
 
 TITLES = {LAGRANGE: "Lagrange: accelerations of (θ, ω)", HAMILTON: "Hamilton: rates of (θ, p)"}
 SPRING, ARM = "a rotor on a spring", "the three-link arm"
-LARGER = {"a planar chain of 20": "planar 20", "an arm of 7 in space": "arm 7", "a tree of 15": "tree 15"}
+LARGER: dict[str, Callable[[], Mechanism]] = {
+    "a planar chain of 20": lambda: chain(0.2, 0.2, 20),
+    "an arm of 7 in space": lambda: turned_arm(7),
+    "a tree of 15": lambda: binary_tree(15),
+}
 LARGE_SCALE = Scale(
     row=68.0,
     gap=62.0,
@@ -31,15 +35,14 @@ METHODS = ("recursive", "balanced")
 SIZES = ("nodes", "edges", "depth", "width")
 
 
-def figure7(larger: Mapping[str, str] = LARGER) -> Part:
+def figure7(larger: Mapping[str, Callable[[], Mechanism]] = LARGER) -> Part:
     """Figure 7: a rotor on a spring and the three-link arm in both forms, a row for each operation of depth.
 
-    And the silhouettes of a long chain in both orders of elimination.  larger: {what it is called: one of the bench's `SCENES`}
-    whose sizes are counted as well.
+    And the silhouettes of a long chain in both orders of elimination.  larger: mechanisms whose sizes are counted as well.
     """
     shown = {SPRING: both_forms(scenes.load("spring_mass")), ARM: both_forms(scenes.load("triple_pendulum"))}
     sizes = {name: form_sizes(forms) for name, forms in shown.items()}
-    sizes |= {name: form_sizes(both_forms(SCENES[model]())) for name, model in larger.items()}
+    sizes |= {name: form_sizes(both_forms(make())) for name, make in larger.items()}
     spring = levels_svg([LevelPanel(TITLES[name], graph) for name, graph in shown[SPRING].items()], LARGE_SCALE)
     level = sizes[ARM][VELOCITIES_ALONE].depth
     marks: dict[str, Mapping[str, int]] = {HAMILTON: {"ω is solved": level}}

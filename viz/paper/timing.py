@@ -14,11 +14,11 @@ from cgraph import Counts
 from cgraph._shared import Json
 from dynamics import inverse_dynamics, scenes
 from dynamics.experiments.timing import spent
-from dynamics.peers.torch import eager_evaluations
 
 from ..pages.document import Block, Paragraph, Table
 from ..pages.formulation_table import COLORS, TITLES
 from ..plots import plot
+from .eager import eager_evaluations
 from .part import Part, plotted
 
 if TYPE_CHECKING:

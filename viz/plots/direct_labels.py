@@ -182,24 +182,3 @@ def _dense(path: Points) -> Points:
         count = max(1, int(np.hypot(*(b - a)) / 4.0))
         parts.append(a + (b - a) * np.linspace(0.0, 1.0, count, endpoint=False)[:, None])
     return np.vstack(parts)
-
-
-def bars(names: Sequence[str], values: Sequence[float], x: str) -> Figure:
-    """Points on a logarithmic axis, a row each, with their values beside them."""
-    with style():
-        figure = empty_figure(10.0, 0.9 + 0.34 * len(names))
-        axis = figure.subplots()
-        rows = range(len(names))
-        axis.set_xscale("log")
-        axis.hlines(rows, min(values) / 2.0, values, color=theme.BLUE, linewidth=1.4)
-        axis.plot(values, rows, "o", color=theme.BLUE, markersize=6)
-        for row, value in zip(rows, values, strict=True):
-            axis.annotate(
-                f"{value:.3g}", (value, row), xytext=(8, 0), textcoords="offset points", va="center", fontsize=9
-            )
-        axis.set_yticks(rows, names)
-        axis.set_xlim(min(values) / 2.0, max(values) * 2.0)
-        axis.set_ylim(len(names) - 0.5, -0.5)
-        axis.set_xlabel(x)
-        axis.grid(axis="x", **GRID)
-    return figure

@@ -18,11 +18,9 @@ from ...multiprecision import Reference
 from ...systems.model import as_system
 from ..accuracy_task import INTERVALS, AccuracyTask
 from ..timing import Spent, in_turns, spent
-from .trajectory_runs import CHOSEN, EndSolver, Outcome, Run
+from .trajectory_runs import CHOSEN, Outcome, Run, Solver
 
-PATIENCE = 3.0  # times as long for the others, most of which need more time for the same error
-AnySolver = TypeVar("AnySolver", bound=EndSolver)
-
+AnySolver = TypeVar("AnySolver", bound=Solver)
 
 CHUNK = 5e-3  # s, of runs that are timed in one turn
 FLOOR_ERROR = 5e-12  # an error that is rounding
@@ -131,7 +129,7 @@ class Attempt(NamedTuple):
     raised: bool = False
 
 
-def attempt(solver: EndSolver, metrics: EndMetrics, knob: float) -> Attempt:
+def attempt(solver: Solver, metrics: EndMetrics, knob: float) -> Attempt:
     """The first run with that knob."""
     begin = time.process_time()
     try:
@@ -140,7 +138,7 @@ def attempt(solver: EndSolver, metrics: EndMetrics, knob: float) -> Attempt:
         begin = time.process_time()
         once = spent(run.run)
         outcome = run.read(once.made)
-    except Exception as error:  # noqa: BLE001 (whatever a peer's own code raises is a line in the report)
+    except Exception as error:  # noqa: BLE001 (whatever a run raises is a line in the report)
         kind = "" if isinstance(error, ValueError) else f"{type(error).__name__}: "
         return Attempt(None, kind + " ".join(str(error).split())[:200], time.process_time() - begin, raised=True)
     off = math.inf if outcome.status else metrics.at_end(outcome.x)

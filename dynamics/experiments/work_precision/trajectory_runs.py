@@ -1,20 +1,18 @@
-"""Solvers: ways to integrate a task, timed from its start to t_end; ours, and SciPy on our compiled rate."""
+"""Solvers: ways to integrate a task, timed from its start to t_end; ours are the methods of `simulate`."""
 
 from __future__ import annotations
 
-import copy
 import math
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
-import cgraph as cg
-from cgraph._shared import Array, scipy_module
+from cgraph._shared import Array
 
 from ...equations.state_equation import state_inputs
 from ...integrators import METHODS, Problem, derive
@@ -54,8 +52,8 @@ class Run(Timed):
         return self.read(self.run())
 
 
-class EndSolver(ABC):
-    """A way to compute the end of one task.
+class Solver(ABC):
+    """A way to integrate one task.
 
     kind: `EQUAL`, where the knob is the number of steps, or `CHOSEN`, where it is the relative tolerance.
     order: of its error, as declared; None where that is no fixed number.
@@ -63,18 +61,11 @@ class EndSolver(ABC):
 
     order: int | None = None
     kind = CHOSEN
-    ours = False
     tolerances: Sequence[float] = tuple([10.0**-k for k in range(3, 16)])
 
-    def __init__(self, name: str, about: str, task: AccuracyTask, smallest: float) -> None:
-        self.name, self.about, self.task, self.smallest = name, about, task, smallest
+    def __init__(self, name: str, task: AccuracyTask, smallest: float) -> None:
+        self.name, self.task, self.smallest = name, task, smallest
         self.start = np.array(task.start)
-
-    def until(self, t_end: float) -> EndSolver:
-        """Run to another end, with what is compiled already."""
-        other = copy.copy(self)
-        other.task = replace(self.task, t_end=t_end)
-        return other
 
     @abstractmethod
     def ready(self, knob: float) -> Run:
@@ -83,18 +74,6 @@ class EndSolver(ABC):
     def absolute(self, knob: float) -> float:
         """The absolute tolerance that goes with a relative one: as small a part of the smallest state."""
         return knob * self.smallest
-
-
-class Solver(EndSolver):
-    """A way to integrate one task, which tells the states on the way, too."""
-
-    @abstractmethod
-    def rows(self, knob: float) -> Array:
-        """The states at the task's times, (T, m); NaN from where it stopped."""
-
-    def rates(self, x: Array) -> Array | None:
-        """Rates of the states, (T, m), at states (T, m); None where they are computed by our graph."""
-        return None
 
 
 def problem_of(task: AccuracyTask) -> Problem:
@@ -134,22 +113,20 @@ def recorded(run: Integration, start: Array, times: Sequence[float]) -> Array:
 class Ours(Solver):
     """One of our methods in its native loop; the program is made once."""
 
-    ours = True
-
-    def __init__(self, name: str, task: AccuracyTask, smallest: float, problem: Problem, backend: str = "auto") -> None:
-        super().__init__(name, "ours", task, smallest)
-        self.problem, self.backend, self.method = problem, backend, METHODS[name]
+    def __init__(self, name: str, task: AccuracyTask, smallest: float, problem: Problem) -> None:
+        super().__init__(name, task, smallest)
+        self.problem, self.method = problem, METHODS[name]
         self.order = self.method.order
         self.kind = CHOSEN if self.method.adaptive else EQUAL
 
     @cached_property
     def _plain(self) -> CompiledSteps:
-        return compile_steps(step_program(self.problem, self.method, dense=False), self.backend, True)
+        return compile_steps(step_program(self.problem, self.method, dense=False), "auto", True)
 
     @cached_property
     def _dense(self) -> CompiledSteps:
         program = step_program(self.problem, self.method, dense=self.method.adaptive)
-        return compile_steps(program, self.backend, True)
+        return compile_steps(program, "auto", True)
 
     def _options(self, knob: float, times: Sequence[float], max_steps: float = math.inf) -> RunOptions:
         t_end = self.task.t_end
@@ -176,38 +153,3 @@ class Ours(Solver):
         options = self._options(knob, self.task.times)
         compiled = self._dense if options.between else self._plain
         return recorded(integration(NativeRun(compiled, options)), self.start, self.task.times)
-
-
-class Scipy(Solver):
-    """One of SciPy's solvers on our compiled rate and Jacobian. Raises ImportError without SciPy."""
-
-    tolerances = tuple([10.0**-k for k in range(3, 14)])  # it takes none smaller than 2e-14
-
-    def __init__(
-        self, solver: str, task: AccuracyTask, smallest: float, problem: Problem, backend: str = "auto"
-    ) -> None:
-        super().__init__(f"scipy:{solver}", "SciPy's solver on our compiled rate", task, smallest)
-        self._solve, rate = scipy_module("integrate", self.name).solve_ivp, cg.compile(problem.rate, backend)
-        self._rate, self._how = lambda t, x: rate([*x, t]), dict[str, Any](method=solver)
-        if solver in ("Radau", "BDF", "LSODA"):
-            self._how["jac"] = lambda t, x: rate.jacobian([*x, t])[:, : problem.size]
-        self.order = {"DOP853": 8, "Radau": 5, "RK45": 5}.get(solver)
-
-    def _run(self, knob: float, times: Sequence[float] | None) -> Any:
-        limits = {"rtol": knob, "atol": self.absolute(knob), "t_eval": times}
-        return self._solve(self._rate, (0.0, self.task.t_end), self.start, **self._how, **limits)
-
-    def ready(self, knob: float) -> Run:
-        """The run to t_end, which records its steps alone."""
-
-        def outcome(run: Any) -> Outcome:
-            return Outcome(run.y[:, -1], len(run.t) - 1, None, run.nfev, "" if run.success else run.message)
-
-        return Run(lambda: outcome(self._run(knob, None)))
-
-    def rows(self, knob: float) -> Array:
-        """The states at the task's times, (T, m); NaN from where it stopped."""
-        states = self._run(knob, self.task.times).y.T
-        result = np.full((len(self.task.times), len(self.start)), math.nan)
-        result[: len(states)] = states
-        return result

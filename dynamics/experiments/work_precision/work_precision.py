@@ -1,4 +1,4 @@
-"""Work and precision: a report of run time beside error of every integrator on one task, ours and others'."""
+"""Work and precision: a report of run time beside error of every integrator on one task."""
 
 from __future__ import annotations
 
@@ -6,28 +6,20 @@ import math
 import statistics
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
-from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from cgraph._shared import Array
-
 from ...integrators import METHODS, Problem
-from ...peers.peer import made
 from ..accuracy_task import AccuracyTask
 from ..text_table import check_names, csv_text
 from ..timing import exponent, load as load_of_machine, machine, spent
-from .cold_start import STARTS, ColdStart, cold_starts
-from .groups import OURS, PEERS, group
-from .measurement import FLOOR_ERROR, PATIENCE, Entry, ErrorMetrics, Tried, sweep, time_in_turns
+from .measurement import FLOOR_ERROR, Entry, ErrorMetrics, Tried, sweep, time_in_turns
 from .named_tasks import load
-from .trajectory_peers import offers
-from .trajectory_runs import EQUAL, Ours, Solver, problem_of
+from .trajectory_runs import EQUAL, Ours, problem_of
 
 LIMIT = 0.3  # s; no finer knob is tried after a run of this length
-
 
 TARGETS = (1e-3, 1e-6, 1e-9, 1e-12)
 WORST = 1e-1  # the largest error from which an order is fitted: above is none yet, below `FLOOR_ERROR` is rounding
@@ -36,7 +28,7 @@ FITTED = 3  # points of equal steps, the finest between those bounds: the coarse
 
 @dataclass(frozen=True)
 class Point:
-    """One knob of one solver.  None: not told by the solver.
+    """One knob of one solver.
 
     knob: the number of equal steps, or the relative tolerance.  step: t_end over the accepted steps [s].
     seconds, median: the shortest and the median of the timed runs.
@@ -60,18 +52,13 @@ class Point:
 class Curve:
     """One solver.  kind: "equal steps" or "chosen steps".  order: declared.  fitted: see `fitted_order`.
 
-    model_error: largest difference of its rates from ours along the motion, relative to the largest rate of the same
-    state; None where the rates are ours.
     stopped: why there is no finer point.
     """
 
     name: str
-    about: str
-    ours: bool
     kind: str
     order: int | None
     fitted: float | None
-    model_error: float | None
     stopped: str
     points: tuple[Point, ...]
 
@@ -95,7 +82,6 @@ class WorkPrecision:
     machine: str
     load: tuple[float | None, float | None]
     curves: tuple[Curve, ...]
-    cold: tuple[ColdStart, ...]
     absent: dict[str, str] = field(default_factory=dict)
     left_out: tuple[str, ...] = ()
 
@@ -107,41 +93,28 @@ class WorkPrecision:
 
 @dataclass(frozen=True)
 class Target:
-    """The fastest of ours, and of a peer, with at most this error at t_end.  ratio: to the fastest of ours."""
+    """The fastest run with at most this error at t_end."""
 
     error: float
-    group: str
     name: str
     knob: float
     seconds: float
-    ratio: float | None
 
 
 def targets(curves: Sequence[Curve], errors: Sequence[float] = TARGETS) -> list[Target]:
-    """Targets for each error, ours first."""
+    """Targets for each error that is met."""
     fastest_runs = []
     for error in errors:
-        ours = None
-        for who in (OURS, *PEERS):
-            fastest = _fastest([each for each in curves if group(each.name) == who], error)
-            if fastest is None:
-                continue
-            curve, point = fastest
-            if who == OURS:
-                ours = point.seconds
-            ratio = None if ours is None else point.seconds / ours
-            fastest_runs.append(Target(error, who, curve.name, point.knob, point.seconds, ratio))
+        met = [(curve.name, point) for curve in curves for point in curve.points if point.error <= error]
+        if met:
+            name, point = min(met, key=lambda each: each[1].seconds)
+            fastest_runs.append(Target(error, name, point.knob, point.seconds))
     return fastest_runs
-
-
-def _fastest(curves: Sequence[Curve], error: float) -> tuple[Curve, Point] | None:
-    met = [(curve, point) for curve in curves for point in curve.points if point.error <= error]
-    return min(met, key=lambda each: each[1].seconds, default=None)
 
 
 COLUMNS = (
     *("solver", "kind", "declared_order", "fitted_order", "knob", "step", "seconds", "median_seconds", "steps"),
-    *("rejected", "evaluations", "error_at_end", "largest_error", "energy_drift", "model_error"),
+    *("rejected", "evaluations", "error_at_end", "largest_error", "energy_drift"),
 )
 
 
@@ -151,7 +124,7 @@ def to_csv(report: WorkPrecision) -> str:
     for curve in report.curves:
         for p in curve.points:
             first = (curve.name, curve.kind, curve.order, curve.fitted, p.knob, p.step, p.seconds, p.median)
-            rest = (p.steps, p.rejected, p.evaluations, p.error, p.largest, p.drift, curve.model_error)
+            rest = (p.steps, p.rejected, p.evaluations, p.error, p.largest, p.drift)
             rows.append([*first, *rest])
     return csv_text(COLUMNS, rows)
 
@@ -164,29 +137,20 @@ def _plain(value: Any) -> Any:
     return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
-def curve(entry: Entry[Solver], metrics: ErrorMetrics, problem: Problem) -> Curve:
+def curve(entry: Entry[Ours], metrics: ErrorMetrics) -> Curve:
     """Curve of the report."""
     solver = entry.solver
     points = tuple([_point(solver, each, metrics) for each in entry.tried])
-    theirs = solver.rates(metrics.exact.x)
-    difference = None
-    if theirs is not None:
-        names, x = problem.rate.input_names, metrics.exact.x
-        inputs: dict[str, float | Array] = dict.fromkeys(names, 0.0) | dict(zip(names, x.T, strict=False))
-        ours = np.array(np.broadcast_arrays(*problem.rate.evaluate(inputs).values(), x[:, 0])[:-1]).T
-        largest = np.max(np.abs(ours), axis=0)
-        difference = float(np.max(np.abs(theirs - ours) / np.where(largest > 0.0, largest, 1.0)))
     fitted = None if solver.order is None else _fitted(solver.kind, points)
-    about = solver.name, solver.about, solver.ours, solver.kind, solver.order
-    return Curve(*about, fitted, difference, entry.stopped, points)
+    return Curve(solver.name, solver.kind, solver.order, fitted, entry.stopped, points)
 
 
-def _point(solver: Solver, tried: Tried, metrics: ErrorMetrics) -> Point:
+def _point(solver: Ours, tried: Tried, metrics: ErrorMetrics) -> Point:
     outcome = tried.outcome
     with np.errstate(all="ignore"):
         try:
             rows = solver.rows(tried.knob)
-        except Exception:  # noqa: BLE001 (a peer may fail at these instants where it did not at the end alone)
+        except Exception:  # noqa: BLE001 (a run may fail at these instants where it did not at the end alone)
             rows = np.full(metrics.exact.x.shape, math.nan)
         largest = float(np.max(metrics.errors(rows)))
         drift = metrics.drift(rows) if math.isfinite(largest) else None
@@ -253,48 +217,40 @@ def work_precision(
     name: str,
     *,
     methods: Sequence[str] = tuple(METHODS),
-    peers: Sequence[str] = tuple(PEERS),
     digits: int | None = None,
     turns: int = 9,
     limit: float = LIMIT,
-    cold: Sequence[str] = tuple(STARTS),
-    cold_turns: int = 5,
-    budget: float = 60.0,
     folder: str | Path | None = None,
-    backend: str = "auto",
     options: dict[str, Any] | None = None,
     say: Callable[[str], None] = lambda line: None,
 ) -> WorkPrecision:
     """The report of a task.
 
-    name, options: as of `named_tasks.load`.  methods: ours.  peers: of `PEERS`; what is not installed is absent.
-    digits: of the exact motion (default: the task's).  turns: all solvers run in turns, this often.  limit: seconds
-    of a run after which no finer knob is tried, thrice as long for the others.  cold: of `cold_start.STARTS`, with
-    `cold_turns` turns and `budget` seconds each.  folder: where exact motions are kept.  backend: see `simulate`.
-    say: takes progress lines.
+    name, options: as of `named_tasks.load`.  methods: of `METHODS`.  digits: of the exact motion (default: the task's).
+    turns: all methods run in turns, this often.  limit: seconds of a run after which no finer knob is tried.
+    folder: where exact motions are kept.  say: takes progress lines.
 
     Raises ValueError for a name that is not known, ImportError without what makes the exact motion, and what
     `reference` raises.
     """
-    check_names(("method", methods, METHODS), ("peer", peers, PEERS), ("cold start", cold, STARTS))
+    check_names(("method", methods, METHODS))
     if turns < 1 or not limit > 0.0:
         raise ValueError(f"turns must be at least 1 and limit positive, got {turns!r} and {limit!r} s")
     task, before = load(name, **(options or {})), load_of_machine()
     say(f"{name}: exact motion")
     readied = spent(lambda: subject(task, folder, digits))
     at, absent = readied.made, dict[str, str]()
-    entries: list[Entry[Solver]] = []
-    for solver in _solvers(at, methods, peers, backend, absent):
+    entries: list[Entry[Ours]] = []
+    for solver in [Ours(method, *at[:3]) for method in METHODS if method in methods]:
         say(f"{name}: {solver.name}")
-        entry = sweep(solver, at.metrics, limit if solver.ours else PATIENCE * limit)
+        entry = sweep(solver, at.metrics, limit)
         if entry.tried:
             entries.append(entry)
         else:
             absent[solver.name] = entry.stopped
     say(f"{name}: {turns} turns")
     time_in_turns([tried for entry in entries for tried in entry.tried], turns)
-    curves = tuple([curve(entry, at.metrics, at.problem) for entry in entries])
-    started = cold_starts(name, options or {}, cold, turns=cold_turns, budget=budget, say=say) if cold else []
+    curves = tuple([curve(entry, at.metrics) for entry in entries])
     fields = ("name", "about", "t_end", "conservative", "stiff", "left_out")
     return WorkPrecision(
         **{field: getattr(at.task, field) for field in fields},
@@ -308,18 +264,5 @@ def work_precision(
         machine=machine(),
         load=(before, load_of_machine()),
         curves=curves,
-        cold=tuple(started),
         absent=absent,
     )
-
-
-def _solvers(
-    at: Subject, methods: Sequence[str], peers: Sequence[str], backend: str, absent: dict[str, str]
-) -> list[Solver]:
-    """Solvers that can be made; reasons why others cannot go to `absent`."""
-    makers: dict[str, Callable[[], Solver]] = {
-        method: partial(Ours, method, *at[:3], backend) for method in METHODS if method in methods
-    }
-    begins = tuple([PEERS[peer] for peer in peers])
-    makers |= {name: make for name, make in offers(*at[:3], backend).items() if name.startswith(begins)}
-    return list(made(makers, absent, ValueError, TypeError).values())

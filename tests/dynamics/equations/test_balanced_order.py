@@ -13,12 +13,12 @@ import dynamics as dyn
 from cgraph.autodiff import balanced_elimination
 from cgraph.extend import solve_nodes
 from dynamics import as_system
-from dynamics.experiments.speed.bench_scenes import chain
 from dynamics.systems.model import as_ode
 from tests import high_precision
 from tests.each_row import each_row
 from tests.slow import slow
 from tests.tolerances import SOLVED
+from viz.paper.mechanisms import chain
 
 from .test_hamiltonian import CASES, EQUAL, near, point, random_tree, values
 

@@ -66,8 +66,8 @@ def ours(tree: dyn.Mechanism, state: tuple[Array, ...]) -> Slopes:
 
 
 def pinocchios(tree: dyn.Mechanism, state: tuple[Array, ...]) -> Slopes:
-    from dynamics.peers import PeerModel
-    from dynamics.peers.pinocchio import PinocchioPeer
+    from tests.bench.peers import PeerModel
+    from tests.bench.peers.pinocchio import PinocchioPeer
 
     peer, (q, qd, qdd, tau) = PinocchioPeer(PeerModel("tree", tree)), state
     return Slopes(

@@ -8,8 +8,8 @@ import pytest
 import cgraph as cg
 import dynamics as dyn
 from cgraph import Node
-from dynamics.experiments.trust.random_motions import random_task
 from tests.dynamics.models import Array, run
+from tests.trust.random_motions import random_task
 
 AGREEMENT = 1e-13  # of the largest torque
 REWRITTEN = 9  # a task of which the larger graph is the smaller one once its outputs are written anew

@@ -9,7 +9,7 @@ import cgraph as cg
 import dynamics as dyn
 from cgraph.extend import hessian_nodes, topological
 from dynamics.equations.mass_matrix.accelerations import accelerations
-from dynamics.peers.translate import translated
+from tests.bench.peers.translate import translated
 from tests.dynamics.textbook import TEXTBOOK, points
 
 POINTS = 6

@@ -17,13 +17,13 @@ import dynamics as dyn
 from cgraph._shared import Array
 from dynamics.experiments.accuracy_task import KEPT_ENDS, AccuracyTask
 from dynamics.experiments.stability import cases
-from dynamics.experiments.trust import trust as answers
-from dynamics.experiments.trust.random_motions import random_motion
-from dynamics.experiments.work_precision import motion_scenes
-from dynamics.experiments.work_precision.trajectory_peers import heyoka_equations
 from dynamics.experiments.work_precision.trajectory_runs import problem_of
 from dynamics.multiprecision import Reference
-from dynamics.peers.heyoka import heyoka
+from tests.bench.motions import motion_scenes
+from tests.bench.motions.trajectory_peers import heyoka_equations
+from tests.bench.peers.heyoka import heyoka
+from tests.trust import trust as answers
+from tests.trust.random_motions import random_motion
 
 CHAOS, LOST = 1e-13, 1e-2  # errors of an end, in sizes: one that is not known, and one of which nothing is known
 
@@ -59,7 +59,7 @@ def renew_answers(numbers: Iterable[int]) -> None:
 
 
 def renew_ends(names: Iterable[str]) -> None:
-    """Compute the ends of the motions of `cgraph bench motions` and keep them in the file."""
+    """Compute the ends of the motions of the bench and keep them in the file."""
     for name in names:
         task = motion_scenes.MOTIONS[name]()
         method = "radau" if task.stiff else "taylor"

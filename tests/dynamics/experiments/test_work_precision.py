@@ -1,4 +1,4 @@
-"""Error and run time: errors are those of closed forms, orders are those declared, others get what ours gets."""
+"""Error and run time: errors are those of closed forms, orders are those declared."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ import io
 import json
 import math
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,10 +16,8 @@ from pytest import approx, raises
 import dynamics as dyn
 from dynamics.experiments.accuracy_task import INTERVALS, AccuracyTask
 from dynamics.experiments.work_precision import measurement
-from dynamics.experiments.work_precision.cold_start import cold_starts
-from dynamics.experiments.work_precision.measurement import FLOOR_ERROR, Entry, ErrorMetrics
+from dynamics.experiments.work_precision.measurement import FLOOR_ERROR, ErrorMetrics
 from dynamics.experiments.work_precision.named_tasks import load, names
-from dynamics.experiments.work_precision.trajectory_peers import EPSILON, Mujoco, heyoka_derivatives, offers
 from dynamics.experiments.work_precision.trajectory_runs import (
     CHOSEN,
     EQUAL,
@@ -48,10 +45,6 @@ T_END = 10.0  # s, of the scene spring_mass: q = cos t
 ROUNDING = 1e-9  # a thousand times that of a power of R(i h) in float64
 LEADING = 1e-3  # relative, of an error at least 1e-9: what rounding adds to it
 REPEATED = 1e-4  # relative, of an error: the same steps in another program
-SAME_METHOD = 1e-5  # relative, of an error: MuJoCo's RK4 and ours differ by rounding alone
-SAME_RATES = 1e-12  # relative: rounding of the same equations of three links
-THOUSANDFOLD = 1e3  # an error at the end, in tolerances of a step
-LAST_BITS = 1e-13  # of a series of 25 terms at the resolution of float64
 TIMES = np.linspace(0.0, T_END, INTERVALS + 1)
 
 
@@ -60,7 +53,7 @@ def report() -> WorkPrecision:
     """The oscillator by some of ours, quickly."""
     pytest.importorskip("llvmlite")
     methods = ("euler", "rk4", "dop853", "verlet", "midpoint", "radau")
-    return work_precision("spring_mass", methods=methods, peers=(), cold=(), turns=1, limit=0.05)
+    return work_precision("spring_mass", methods=methods, turns=1, limit=0.05)
 
 
 def curve(report: WorkPrecision, name: str) -> Curve:
@@ -158,19 +151,11 @@ def point(error: float, seconds: float, knob: float = 1e-6) -> Point:
 
 def test_targets_are_the_fastest_runs_that_are_good_enough() -> None:
     curves = [
-        Curve("rk4", "", True, EQUAL, 4, None, None, "", (point(1e-2, 1.0), point(1e-7, 4.0))),
-        Curve("dop853", "", True, CHOSEN, 8, None, None, "", (point(1e-7, 2.0), point(1e-13, 8.0))),
-        Curve("MuJoCo RK4", "", False, EQUAL, 4, None, None, "", (point(1e-8, 6.0),)),
+        Curve("rk4", EQUAL, 4, None, "", (point(1e-2, 1.0), point(1e-7, 4.0))),
+        Curve("dop853", CHOSEN, 8, None, "", (point(1e-7, 2.0), point(1e-13, 8.0))),
     ]
-    found = [(each.error, each.group, each.name, each.seconds, each.ratio) for each in targets(curves)]
-    assert found == [
-        (1e-3, "ours", "dop853", 2.0, 1.0),
-        (1e-3, "MuJoCo", "MuJoCo RK4", 6.0, 3.0),
-        (1e-6, "ours", "dop853", 2.0, 1.0),
-        (1e-6, "MuJoCo", "MuJoCo RK4", 6.0, 3.0),
-        (1e-9, "ours", "dop853", 8.0, 1.0),
-        (1e-12, "ours", "dop853", 8.0, 1.0),
-    ]
+    found = [(each.error, each.name, each.seconds) for each in targets(curves)]
+    assert found == [(1e-3, "dop853", 2.0), (1e-6, "dop853", 2.0), (1e-9, "dop853", 8.0), (1e-12, "dop853", 8.0)]
 
 
 def test_csv_and_json_hold_the_points(report: WorkPrecision) -> None:
@@ -181,7 +166,7 @@ def test_csv_and_json_hold_the_points(report: WorkPrecision) -> None:
     content = json.loads(json.dumps(report.to_dict(), allow_nan=False))
     assert content["reference_error"] <= 1e-30
     assert content["curves"][0]["points"][0]["error"] == first.error
-    assert content["targets"][0]["group"] == "ours"
+    assert content["targets"][0]["error"] == 1e-3
 
 
 def exact_motion(found: AccuracyTask, digits: int) -> Reference:
@@ -196,108 +181,6 @@ def task(name: str, **options: Any) -> tuple[AccuracyTask, ErrorMetrics, float]:
     found = load(name, **options)
     metrics = ErrorMetrics(found, exact_motion(found, 20))
     return found, metrics, metrics.smallest
-
-
-@pytest.fixture(scope="module")
-def arm() -> tuple[AccuracyTask, ErrorMetrics, float]:
-    return task("triple_pendulum", t_end=1.0)
-
-
-def test_mujoco_s_rk4_makes_the_error_that_ours_makes(arm: tuple[AccuracyTask, ErrorMetrics, float]) -> None:
-    pytest.importorskip("mujoco")
-    found, metrics, smallest = arm
-    theirs, ours = Mujoco("RK4", found, smallest), Ours("rk4", found, smallest, problem_of(found))
-    for steps in (64, 256):
-        error = metrics.at_end(ours.ready(steps)().x)
-        assert metrics.at_end(theirs.ready(steps)().x) == approx(error, rel=SAME_METHOD)
-        assert float(metrics.errors(theirs.rows(steps)).max()) == approx(
-            float(metrics.errors(ours.rows(steps)).max()), rel=SAME_METHOD
-        )
-
-
-def test_mujoco_s_order_of_the_joints_is_undone() -> None:
-    """A tree whose coordinates MuJoCo keeps in another order, branch by branch."""
-    pytest.importorskip("mujoco")
-    bodies = [
-        dyn.Body(name, dyn.Joint("revolute", (0.0, 1.0, 0.0), (0.1, 0.0, -0.3)), parent, mass, (0.0, 0.0, -0.2))
-        for name, parent, mass in (("a", "world", 1.0), ("b", "a", 0.5), ("c", "a", 0.7), ("d", "b", 0.3))
-    ]
-    found = AccuracyTask("tree", "", dyn.Mechanism(bodies), (0.1, 0.4, -0.3, 0.8), (0.5, -0.2, 0.7, 0.3), 0.5)
-    metrics, theirs = ErrorMetrics(found, exact_motion(found, 15)), Mujoco("RK4", found, 1.0)
-    assert list(theirs.peer.order) != [0, 1, 2, 3]
-    assert metrics.at_end(theirs.ready(512)().x) < 1e-8
-    assert float(metrics.errors(theirs.rows(512)).max()) < 1e-8
-    difference = curve_of(Entry(theirs), metrics, problem_of(found)).model_error
-    assert difference is not None
-    assert difference < 1e-10  # rounding, of a mass matrix of thin rods
-
-
-@pytest.mark.parametrize("kind", ["Euler", "implicit", "implicitfast"])
-def test_mujoco_s_first_order_integrators_come_nearer_with_the_step(
-    arm: tuple[AccuracyTask, ErrorMetrics, float], kind: str
-) -> None:
-    pytest.importorskip("mujoco")
-    found, metrics, smallest = arm
-    theirs = Mujoco(kind, found, smallest)
-    coarse, fine = (metrics.at_end(theirs.ready(steps)().x) for steps in (4096, 8192))
-    assert coarse / fine == approx(2.0, rel=0.02)
-
-
-@pytest.mark.parametrize("damping", [0.1, 0.2])
-def test_the_error_of_a_model_is_told_apart(arm: tuple[AccuracyTask, ErrorMetrics, float], damping: float) -> None:
-    """MuJoCo's rates are ours to rounding; with another damping they differ by what that damping does."""
-    pytest.importorskip("mujoco")
-    found, metrics, smallest = arm
-    theirs = Mujoco("RK4", found, smallest)
-    theirs.model.dof_damping[:] = damping
-    entry = Entry(theirs)
-    difference = curve_of(entry, metrics, problem_of(found)).model_error
-    assert difference is not None
-    assert difference < SAME_RATES if damping == 0.1 else 1e-3 < difference < 10.0
-
-
-SOLVERS = [  # name, package, task and its length, knob, and the error that comes of it
-    ("scipy:DOP853", "scipy", "spring_mass", T_END, 1e-7, 1e-7 * THOUSANDFOLD),
-    ("scipy:LSODA", "scipy", "spring_mass", T_END, 1e-7, 1e-7 * THOUSANDFOLD),
-    ("scipy:Radau", "scipy", "spring_mass", T_END, 1e-7, 1e-7 * THOUSANDFOLD),
-    ("CVODES BDF", "casadi", "triple_pendulum", 1.0, 1e-9, 1e-9 * THOUSANDFOLD),
-    ("CVODES Adams", "casadi", "triple_pendulum", 1.0, 1e-9, 1e-9 * THOUSANDFOLD),
-    ("heyoka Taylor", "heyoka", "spring_mass", T_END, EPSILON, LAST_BITS),
-    ("heyoka Taylor", "heyoka", "spring_mass", T_END, 1e-4, 1e-2),
-    ("diffrax Dopri8", "diffrax", "spring_mass", T_END, 1e-9, 1e-9 * THOUSANDFOLD),
-    ("diffrax Kvaerno5", "diffrax", "spring_mass", T_END, 1e-9, 1e-9 * THOUSANDFOLD),
-]
-
-
-@pytest.mark.parametrize(("name", "package", "scene", "t_end", "knob", "error"), SOLVERS)
-def test_a_solver_of_others_gets_our_equations(
-    name: str, package: str, scene: str, t_end: float, knob: float, error: float
-) -> None:
-    pytest.importorskip(package)
-    found, metrics, smallest = task(scene, t_end=t_end)
-    theirs = offers(found, smallest, problem_of(found), "auto")[name]()
-    outcome = theirs.ready(knob)()
-    assert metrics.at_end(outcome.x) < error
-    assert float(metrics.errors(theirs.rows(knob)).max()) < error
-    difference = curve_of(Entry(theirs), metrics, problem_of(found)).model_error
-    assert difference is None if package in ("scipy", "diffrax") else difference is not None and difference < SAME_RATES
-    assert (outcome.rejected is None) is (package != "casadi")  # the others do not tell
-
-
-def test_heyokas_derivatives_leave_its_cache_as_it_is() -> None:
-    """Or a cold start that is to find compiled code would find none."""
-    hy = pytest.importorskip("heyoka")
-    state = hy.llvm_state
-    if not hasattr(state, "get_diskcache_enabled"):
-        pytest.skip("this heyoka has no cache on disk")
-    before = state.get_diskcache_enabled()
-    try:
-        for enabled in (True, False):
-            state.set_diskcache_enabled(enabled)
-            assert len(heyoka_derivatives(hy, load("spring_mass"))) == 2
-            assert state.get_diskcache_enabled() is enabled
-    finally:
-        state.set_diskcache_enabled(before)
 
 
 class Broken(Solver):
@@ -323,21 +206,14 @@ class Broken(Solver):
 
 def test_a_solver_that_fails_keeps_its_good_points_and_a_reason() -> None:
     found, metrics, smallest = task("spring_mass")
-    entry = measurement.sweep(Broken("broken", "", found, smallest), metrics, 1.0)
+    entry = measurement.sweep(Broken("broken", found, smallest), metrics, 1.0)
     assert [each.knob for each in entry.tried] == [1e-2, 1e-3]
     assert entry.stopped == "is not finite"
     assert entry.tried[0].error == approx(1e-2, rel=1e-2)
     measurement.time_in_turns(entry.tried, 1)
-    for each in curve_of(entry, metrics, problem_of(found)).points:
+    for each in curve_of(entry, metrics).points:
         assert each.largest == math.inf
         assert each.drift is None
-
-
-def test_what_cannot_be_made_is_absent_with_its_reason() -> None:
-    pytest.importorskip("mujoco")
-    found = work_precision("spring_mass", methods=("rk4",), peers=("MuJoCo",), cold=(), turns=1, limit=1e-5)
-    assert [each.name for each in found.curves] == ["rk4"]
-    assert found.absent["MuJoCo RK4"] == "takes rigid bodies, not a Lagrangian"
 
 
 def test_settings() -> None:
@@ -369,24 +245,9 @@ def test_another_start_has_another_exact_motion() -> None:
         ),
         ({"name": "kepler 0.3", "options": {"start": [1.0] * 4}}, "has a start of its own"),
         ({"name": "spring_mass", "methods": ["rk5"]}, "there is no method 'rk5'"),
-        ({"name": "spring_mass", "peers": ["Drake"]}, "there is no peer 'Drake'"),
-        ({"name": "spring_mass", "cold": ["Drake"]}, "there is no cold start 'Drake'"),
         ({"name": "spring_mass", "turns": 0}, "turns must be at least 1"),
     ],
 )
 def test_mistakes(arguments: dict[str, Any], said: str) -> None:
     with raises(ValueError, match=said):
         work_precision(**arguments)
-
-
-@pytest.mark.slow
-def test_cold_starts_run_in_processes_of_their_own(tmp_path: Path) -> None:
-    pytest.importorskip("llvmlite")
-    (found,) = cold_starts("spring_mass", {}, ["ours"], turns=2, budget=1e3)
-    assert (found.turns, found.status) == (2, "")
-    assert 0.0 < found.seconds <= found.median
-    (late,) = cold_starts("spring_mass", {}, ["ours"], turns=2, budget=0.01)
-    assert (late.turns, late.status) == (0, "not ready within 0.01 s")
-    assert math.isnan(late.seconds)
-    (wrong,) = cold_starts("nothing", {}, ["ours"], turns=1, budget=1e3)
-    assert "there is no scene 'nothing'" in wrong.status

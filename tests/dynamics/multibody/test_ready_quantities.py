@@ -74,8 +74,8 @@ def test_a_frame_s_quantities_are_rates_of_one_another(base: str, axes: str) -> 
 @mark.parametrize("seed", SEEDS)
 def test_mujoco_finds_the_same(seed: int) -> None:
     mujoco = importorskip("mujoco")
-    from dynamics.peers.mujoco import MujocoPeer
-    from dynamics.peers.peer import PeerModel
+    from tests.bench.peers.mujoco import MujocoPeer
+    from tests.bench.peers.peer import PeerModel
 
     mechanism = random_tree(300 + seed)
     at, n = state(mechanism, seed), mechanism.system.n

@@ -15,10 +15,10 @@ from pytest import approx, mark, raises
 import cgraph as cg
 import dynamics as dyn
 from dynamics.experiments.work_precision.named_tasks import load
-from dynamics.experiments.work_precision.trajectory_peers import heyoka_equations
 from dynamics.experiments.work_precision.trajectory_runs import problem_of
 from dynamics.multiprecision import Reference, ReferenceFailedError, reference
 from dynamics.systems.ode_system import OdeSystem
+from tests.bench.motions.trajectory_peers import heyoka_equations
 from tests.dynamics.split_state import split_state
 from tests.each_row import each_row
 from tests.oracles import closed_forms

@@ -10,9 +10,9 @@ from pytest import approx, mark
 import cgraph as cg
 import dynamics as dyn
 from dynamics import METHODS
-from dynamics.experiments.trust.cascades import CASCADES, KINDS, judge_balls, random_balls
-from dynamics.experiments.trust.trust import RIGHT, SILENT
 from tests.slow import slow
+from tests.trust.cascades import CASCADES, KINDS, judge_balls, random_balls
+from tests.trust.trust import RIGHT, SILENT
 
 G = 9.81  # m/s^2
 QUICK = ["dop853", "rk4", *slow("dopri5", "rodas", "radau", "taylor", "euler", "verlet", "gauss6")]

@@ -14,11 +14,11 @@ import cgraph as cg
 import dynamics as dyn
 from dynamics import METHODS, System
 from dynamics.equations.states.consistent_state import nearest_state
-from dynamics.experiments.speed import bench_scenes
 from dynamics.integrators import derive
 from dynamics.simulation.gradients import motion_run
 from dynamics.simulation.gradients.gradient import MotionGradient
 from dynamics.simulation.gradients.motion_equations import motion_equations, rate_pullback, sharing
+from tests.bench.speed.scenes import load
 from tests.dynamics.mechanisms import random_mechanism
 from tests.dynamics.models import driven_pendulum, magnetic, random_arm, relativistic
 from tests.dynamics.parametrized import parametrized
@@ -315,7 +315,7 @@ def test_what_parameters_alone_decide_is_in_no_step(make: Any) -> None:
 @mark.parametrize(("name", "count"), [("planar 3", 162), ("planar 7", 514), ("arm 7", 1565)])
 def test_a_rate_is_pulled_back_by_what_it_has_solved(name: str, count: int) -> None:
     """Operations, M solved as the rate solves it: of the arm in space by its factors, of the planar ones by bodies."""
-    problem = derive(bench_scenes.load(name).model, {})
+    problem = derive(load(name).model, {})
     n = problem.size - problem.nq
     equations = motion_equations(problem, n)
     shared = sharing(equations)

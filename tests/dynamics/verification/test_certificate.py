@@ -85,7 +85,7 @@ def doubled(nodes: dict[str, cg.Node]) -> dict[str, cg.Node]:
 
 
 def test_loops_are_those_of_pinocchio() -> None:
-    pytest.importorskip("pinocchio", reason="the bench extra has it")
+    pytest.importorskip("pinocchio")
     for model in (four_bar(), peaucellier()):
         found = certify(model, 3)
         assert failed(found) == {}
@@ -322,7 +322,7 @@ def test_the_command_translates_what_mujoco_cannot_read(tmp_path, capsys: pytest
 
 
 def test_pinocchio_agrees_when_it_is_there() -> None:
-    pytest.importorskip("pinocchio", reason="the bench extra has it")
+    pytest.importorskip("pinocchio")
     for model in (FAMILIES["branched"](5), dyn.planar_arm([1.0, 0.8], [1.0, 0.7], damping=0.1, gravity=3.0)):
         found = certify(model, FEW)
         assert failed(found) == {}
@@ -331,7 +331,7 @@ def test_pinocchio_agrees_when_it_is_there() -> None:
 
 def test_a_body_that_pinocchio_does_not_take_is_named() -> None:
     """Moments below rounding, as programs write those of a point mass that they have moved about."""
-    pytest.importorskip("pinocchio", reason="the bench extra has it")
+    pytest.importorskip("pinocchio")
     hinge = dyn.Joint("revolute", (0.0, 1.0, 0.0))
     certificate = certify(dyn.Mechanism([dyn.Body("a", hinge, "world", 0.5, (0, 0, 0.03), (-5e-20, -5e-20, 0.0))]), FEW)
     assert failed(certificate) == {}

@@ -11,12 +11,11 @@ pytest.importorskip("matplotlib")
 
 from viz import theme
 from viz.plots import plot
-from viz.plots.direct_labels import bars
 from viz.plots.plot import snapshots, to_adaptive_svg
 
 
 def test_the_ink_of_a_picture_follows_the_page() -> None:
-    svg = to_adaptive_svg(bars(["a", "b"], [0.1, 20.0], "time [s]"))
+    svg = to_adaptive_svg(plot.bars({"ours": {"a": (2.0, 1.0, 5.0)}}, {"a": "red"}, "time [s]"))
     root = ElementTree.fromstring(svg)
     (style,) = [each for each in root.iter("{http://www.w3.org/2000/svg}style") if "prefers" in (each.text or "")]
     assert theme.DARK_TEXT in str(style.text)
@@ -24,14 +23,6 @@ def test_the_ink_of_a_picture_follows_the_page() -> None:
     drawn = svg.replace(str(style.text), "")
     for ink in (theme.TEXT, theme.LINE, "#000000", "#FFFFFF"):
         assert ink.lower() not in drawn.lower()
-
-
-def test_a_background_adapts_with_the_ink() -> None:
-    figure = bars(["a", "b"], [0.1, 20.0], "time [s]")
-    alone, backed = to_adaptive_svg(figure), to_adaptive_svg(figure, background=True)
-    for color in (theme.WHITE, theme.DARK_PAGE):
-        assert f"background: {color};" in backed
-    assert "background" not in alone
 
 
 def test_a_bar_has_its_range() -> None:

@@ -1,0 +1,96 @@
+"""Translation: nodes as expressions of other software, operation by operation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, TypeVar
+
+import cgraph as cg
+from cgraph import Node
+from cgraph._shared import translated as expressions
+from cgraph.extend import Builder, Op, topological
+from tests.bench.peers.peer import PeerModel, UnavailableError
+
+Expression = TypeVar("Expression")
+Constant = Callable[[float], Any]  # of an expression
+
+
+def translated(
+    order: Sequence[Node],
+    env: Mapping[Node, Expression],
+    functions: object,
+    names: Mapping[str, str] | None = None,
+    number: Constant = float,
+) -> dict[Node, Expression]:
+    """Every node of a topological order as an expression, from those of the variables in `env`.
+
+    functions: the module that has sin, cos, ..., by the names of our operations or those in `names`.
+    number: makes a constant.  Raises UnavailableError for an operation that the module does not have.
+    """
+
+    def function_of(op: Op) -> Callable[..., Any]:
+        found = op.operator or getattr(functions, (names or {}).get(op.name, op.name), None)
+        if found is None:
+            raise UnavailableError(f"has no operation {op.name!r}")
+        return found
+
+    return expressions(order, env, function_of, number)
+
+
+def lagrangian(
+    case: PeerModel,
+    q: Sequence[Expression],
+    qd: Sequence[Expression],
+    functions: object,
+    names: Mapping[str, str] | None = None,
+    number: Constant = float,
+) -> tuple[Expression, list[Expression]]:
+    """L and the applied forces at q and qd, without damping, in the other software's expressions."""
+    system = case.system
+    env = dict(zip([*system.q, *system.qd], [*q, *qd], strict=True))
+    env |= {node: number(system.parameters[str(node.name)]) for node in system.extra_inputs}
+    values = translated(case.order, env, functions, names, number)
+    return values[system.lagrangian], [values[force] for force in system.forces]
+
+
+def lagrange(
+    case: PeerModel,
+    qd: Sequence[Any],
+    slopes: Sequence[Any],
+    hessian: Mapping[tuple[int, int], Any],
+    forces: Sequence[Any],
+    total: Callable[[list[Any]], Any],
+) -> tuple[list[list[Any]], list[Any]]:
+    """M and the rest of Lagrange's equation, tau = M qdd + rest, of a peer's own derivatives of L.
+
+    slopes: dL/d(q, qd).  hessian: [i, k] is the derivative of dL/dqd_i by the k-th of (q, qd).
+    """
+    n, damping = case.n, case.system.damping
+    known = [slopes[i] + forces[i] - damping[i] * qd[i] for i in range(n)]
+    moved = [total([hessian[i, k] * qd[k] for k in range(n)]) for i in range(n)]
+    mass = [[hessian[i, n + k] for k in range(n)] for i in range(n)]
+    return mass, [one - other for one, other in zip(moved, known, strict=True)]
+
+
+def quasi_velocities(
+    case: PeerModel,
+    q: Sequence[Expression],
+    qd: Sequence[Expression],
+    momenta: Sequence[Expression],
+    functions: object,
+    names: Mapping[str, str] | None = None,
+    number: Constant = float,
+) -> tuple[list[Expression], list[Expression]]:
+    """The rates of the coordinates, G(q) qd, and what brackets of velocities take of the force, ad(qd; p)."""
+    kinematics = case.system.kinematics
+    p = cg.variables([f"p{i}" for i in range(case.n)])
+    taken = kinematics.structure(p, Builder())
+    env = dict(zip([*case.system.q, *case.system.qd, *p], [*q, *qd, *momenta], strict=True))
+    values = translated(topological([*kinematics.q_dot, *taken]), env, functions, names, number)
+    return [values[rate] for rate in kinematics.q_dot], [values[term] for term in taken]
+
+
+def require_rates(case: PeerModel) -> None:
+    """Raises UnavailableError for a model with quasi-velocities: for peers whose derivation knows none."""
+    if case.system.kinematics.quasi is not None:
+        raise UnavailableError("is measured on velocities that are rates of coordinates")
