@@ -1,6 +1,6 @@
 """What the balanced order of elimination costs and gains: nodes, depth, digits, and time by lanes and by threads.
 
-python -m tests.bench.balanced_order
+python -m tests.dynamics.figures.balanced_order
 """
 
 from __future__ import annotations
@@ -9,14 +9,13 @@ import sys
 from collections.abc import Callable, Iterator
 from heapq import heappop, heappush
 
-from tests.dynamics.figures.parallel_c import times
-
 import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import Builder, folded, solve_nodes, topological
 from dynamics.experiments.text_table import table
 from dynamics.multibody.trees.mechanism import Mechanism
 from tests.bench.tables import digits
+from tests.dynamics.figures.parallel_c import times
 from viz.paper.mechanisms import chain, turned_arm
 
 MODELS: dict[str, Callable[[], Mechanism]] = {

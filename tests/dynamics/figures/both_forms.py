@@ -1,7 +1,7 @@
 """Both forms of the equations of motion in one run, those of velocities and those of momenta, and their linearizations.
 
-python -m tests.bench.both_forms                  nodes, edges, depth, width, and times of an evaluation
-python -m tests.bench.both_forms linearizations   nodes and times of A and B
+python -m tests.dynamics.figures.both_forms                  nodes, edges, depth, width, and times of an evaluation
+python -m tests.dynamics.figures.both_forms linearizations   nodes and times of A and B
 """
 
 from __future__ import annotations
