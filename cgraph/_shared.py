@@ -8,8 +8,8 @@ if TYPE_CHECKING:
     from .autodiff.compressed_jacobian import CompressedJacobian as CompressedJacobian
     from .autodiff.hessian_solve import Order as Order, solve_tangents as solve_tangents
     from .autodiff.jets import Jets as Jets, convolution as convolution
-    from .autodiff.ldl_solve import ldl_elimination as ldl_elimination, ldl_solve as ldl_solve
-    from .bridges.translation import Operations as Operations, operations as operations, translated as translated
+    from .autodiff.ldl_solve import ldl_solve as ldl_solve
+    from .bridges.translation import Operations as Operations, operations as operations
     from .core.checks import check_name as check_name
     from .core.evaluation import (
         Array as Array,
@@ -42,7 +42,7 @@ if TYPE_CHECKING:
         write_files as write_files,
     )
     from .util.caches import kept_by_first as kept_by_first, memo as memo
-    from .util.extras import install as install, required as required, scipy_module as scipy_module
+    from .util.extras import install as install, required as required
     from .util.json_type import Json as Json
     from .util.require import (
         require_choice as require_choice,

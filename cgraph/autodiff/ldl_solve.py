@@ -67,7 +67,7 @@ def ldl_elimination(lower: Sequence[Sequence[Any]], rhs: Sequence[object]) -> tu
     lower: the lower triangle of the symmetric A by rows: row i has at least i + 1 entries. Arrays, symbols and other
     types with arithmetic count as numbers.
 
-    >>> from cgraph._shared import ldl_elimination
+    >>> from cgraph.autodiff.ldl_solve import ldl_elimination
     >>> ldl_elimination([[4.0], [2.0, 2.0]], [10.0, 6.0])
     ([2.0, 1.0], [2.0, 2.0])
     """

@@ -112,11 +112,6 @@ class Subject:
         """The velocity that questions are about: the first with the largest slope."""
         return int(np.abs(self.slopes).argmax())
 
-    @property
-    def scene_names(self) -> dict[str, str]:
-        """Display names of the inputs and outputs, in plain letters."""
-        return display_names(self.scene)
-
     @cached_property
     def rates(self) -> dict[str, float]:
         """Rates of coordinates, velocities and the time at the state."""

@@ -52,14 +52,6 @@ def style() -> AbstractContextManager[None]:
     return rc_context(STYLE)
 
 
-def to_svg(figure: Figure) -> str:
-    """The figure as SVG text, the same bytes in every run."""
-    buffer = io.BytesIO()
-    with style():
-        figure.savefig(buffer, format="svg", metadata={"Date": None})
-    return buffer.getvalue().decode()
-
-
 def to_adaptive_svg(figure: Figure, *, background: bool = False) -> str:
     """The figure as SVG text with ink for light and dark pages, as the reader's system asks, and no background.
 

@@ -16,7 +16,6 @@ from ..names import Names
 from .finding import Finding
 
 ROUNDOFF = 2.0**-53  # relative error of one rounding
-FLOAT_DIGITS = -math.log10(ROUNDOFF)  # 15.95 decimal digits of a float64
 
 
 @dataclass(frozen=True)

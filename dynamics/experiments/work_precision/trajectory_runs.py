@@ -27,7 +27,6 @@ from ..timing import Timed
 EQUAL, CHOSEN = "equal steps", "chosen steps"
 TRIAL = 4096  # steps that tell how long many more take
 LONGEST_RUN = 3.0  # s; a run that takes longer is given up
-SCIPY_SOLVERS = ("Radau", "BDF", "LSODA", "DOP853", "RK45")
 
 
 class Outcome(NamedTuple):

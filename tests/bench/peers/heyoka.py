@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from cgraph._shared import ldl_elimination
+from cgraph.autodiff.ldl_solve import ldl_elimination
 from tests.bench.peers.peer import Peer, PeerModel, TimedTask, required
 from tests.bench.peers.translate import lagrange, lagrangian, require_rates
 

@@ -7,7 +7,7 @@ from typing import Any, TypeVar
 
 import cgraph as cg
 from cgraph import Node
-from cgraph._shared import translated as expressions
+from cgraph.bridges.translation import translated as expressions
 from cgraph.extend import Builder, Op, topological
 from tests.bench.peers.peer import PeerModel, UnavailableError
 

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 import cgraph as cg
-from cgraph._shared import Array, ldl_elimination
+from cgraph._shared import Array
+from cgraph.autodiff.ldl_solve import ldl_elimination
 from dynamics.equations.equations_of_motion import bias, forward_dynamics, mass_matrix
 from dynamics.equations.linearization.linearize_many import linearize_many
 from dynamics.experiments.timing import Made, spent
