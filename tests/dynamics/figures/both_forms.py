@@ -2,6 +2,7 @@
 
 python -m tests.dynamics.figures.both_forms                  nodes, edges, depth, width, and times of an evaluation
 python -m tests.dynamics.figures.both_forms linearizations   nodes and times of A and B
+python -m tests.dynamics.figures.both_forms orders           M^-1 tau by both orders of elimination: also steps by units
 """
 
 from __future__ import annotations
@@ -9,13 +10,15 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable, Iterator
 from functools import partial
+from heapq import heappop, heappush
 from typing import NamedTuple
 
 import numpy as np
 
 import cgraph as cg
-from cgraph import Graph
+from cgraph import Graph, Node
 from cgraph._shared import Array
+from cgraph.extend import solve_nodes, topological
 from dynamics.equations.linearization.linearization import state_space
 from dynamics.equations.momentum.hamiltonian import hamilton_equations, velocities
 from dynamics.equations.state_equation import state_equation
@@ -41,13 +44,22 @@ MODELS: dict[str, Callable[[], Model]] = {name: SCENES[name] for name in LARGER}
 
 
 class Figure(NamedTuple):
-    """A table: models x forms x numbers.  compiled: the largest graph that is timed."""
+    """A table: models x forms x numbers.
+
+    compiled: the largest graph that is timed.  units: that make an operation at a time each, steps on so many are told.
+    """
 
     models: tuple[str, ...]
     forms: dict[str, Callable[[Model], Graph]]
     sizes: tuple[str, ...]
     ways: dict[str, Callable[[Graph], Way]]
     compiled: int = sys.maxsize
+    units: tuple[int, ...] = ()
+
+    @property
+    def head(self) -> tuple[str, ...]:
+        """Names of the columns of counts."""
+        return (*self.sizes, *[f"{n} units" for n in self.units])
 
 
 def called(graph: Graph) -> Way:
@@ -82,6 +94,42 @@ def _jacobian(model: Model) -> Graph:
     return cg.jacobian(equations, equations.inputs[: system.nq + system.n])
 
 
+def _solved(order: str, model: Model) -> Graph:
+    """M^-1 tau."""
+    system = as_system(model)
+    x = solve_nodes(system.lagrangian, system.qd, system.tau, order="balanced" if order == "balanced" else "recursive")
+    return cg.simplify(system.graph({f"x{i}": node for i, node in enumerate(x)}, system.q, system.tau))
+
+
+def schedule(graph: Graph, units: int) -> int:
+    """Steps to evaluate a graph on so many units, each an operation a step, the longest way to an output first."""
+    order = [node for node in topological(graph.outputs.values()) if node.args]
+    height = dict.fromkeys(order, 0)
+    for node in reversed(order):
+        for arg in node.args:
+            if arg.args:
+                height[arg] = max(height[arg], height[node] + 1)
+    missing = {node: len({arg for arg in node.args if arg.args}) for node in order}
+    users: dict[Node, list[Node]] = {node: [] for node in order}
+    for node in order:
+        for arg in {arg for arg in node.args if arg.args}:
+            users[arg].append(node)
+    place = {node: k for k, node in enumerate(order)}
+    ready: list[tuple[int, int]] = []
+    for node in order:
+        if not missing[node]:
+            heappush(ready, (-height[node], place[node]))
+    steps = 0
+    while ready:
+        steps += 1
+        for _, k in [heappop(ready) for _ in range(min(units, len(ready)))]:
+            for user in users[order[k]]:
+                missing[user] -= 1
+                if not missing[user]:
+                    heappush(ready, (-height[user], place[user]))
+    return steps
+
+
 FIGURES = {
     "forms": Figure(
         ("planar 3", "planar 20", "planar 50", "planar 200", "arm 7", "arm 30", "tree 15", "free 35"),
@@ -96,6 +144,13 @@ FIGURES = {
         {"call us": called},
         COMPILED,
     ),
+    "orders": Figure(
+        ("planar 20", "planar 50", "planar 200", "arm 30"),
+        {order: partial(_solved, order) for order in ("recursive", "balanced")},
+        ("nodes", "depth", "width"),
+        {"call us": called, "batch us": batched},
+        units=(1, 4, 16, 64),
+    ),
 }
 
 
@@ -103,13 +158,16 @@ def figure(name: str, models: tuple[str, ...] = (), rounds: int = ROUNDS) -> Ite
     """A row for each form of each model, and one of what the form is of the first."""
     this = FIGURES[name]
     lines = [line for model in models or this.models for line in rows(this, model, rounds)]
-    yield from table(("", *this.sizes, *this.ways), lines)
+    yield from table(("", *this.head, *this.ways), lines)
 
 
 def rows(this: Figure, name: str, rounds: int = ROUNDS) -> list[tuple[str, ...]]:
     """Those of one model; no times where a graph is larger than what is compiled."""
     graphs = {form: derive(MODELS[name]()) for form, derive in this.forms.items()}
-    sizes = [[getattr(graph.counts(), size) for size in this.sizes] for graph in graphs.values()]
+    sizes = [
+        [*[getattr(graph.counts(), size) for size in this.sizes], *[schedule(graph, units) for units in this.units]]
+        for graph in graphs.values()
+    ]
     numbers: list[list[float]] = [[*each] for each in sizes]
     if max(len(graph.nodes) for graph in graphs.values()) <= this.compiled:
         for way in this.ways.values():
@@ -117,7 +175,7 @@ def rows(this: Figure, name: str, rounds: int = ROUNDS) -> list[tuple[str, ...]]
                 numbers, least_seconds([way(each) for each in graphs.values()], rounds), strict=True
             ):
                 row.append(1e6 * seconds)
-    missing = ["-"] * (len(this.sizes) + len(this.ways) - len(numbers[0]))
+    missing = ["-"] * (len(this.head) + len(this.ways) - len(numbers[0]))
     lines = []
     for form, size, row in zip(graphs, sizes, numbers, strict=True):
         lines.append((f"{name}, {form}", *map(str, size), *[digits(each, 3) for each in row[len(size) :]], *missing))

@@ -9,8 +9,6 @@ import dynamics as dyn
 from dynamics import to_mjcf
 from dynamics.io.mujoco_module import mujoco
 from dynamics.io.mujoco_twin import MujocoTwin
-from dynamics.io.stand_ins import STAND_IN
-from dynamics.multibody.builders.planar_arm import planar_links
 from tests.dynamics.models import Array, random_arm
 
 SAME_STEPS = 1e-10  # rad, rad/s: rounding of two codes grown by the motion over a second of RK4 steps
@@ -32,27 +30,9 @@ def test_the_triple_pendulum_moves_as_in_mujoco(model: str) -> None:
     assert np.ptp(q, axis=0).min() > 0.5  # rad: every joint has moved
 
 
-def test_the_model_is_the_arm_number_by_number() -> None:
-    arm = random_arm(3)
-    model = MujocoTwin(arm, timestep=2e-3).model
-    assert model.body_mass[1:].tolist() == [link.mass for link in planar_links(arm)]
-    assert model.body_ipos[1:, 2].tolist() == [-link.center for link in planar_links(arm)]
-    assert model.body_inertia[1:, 1].tolist() == [link.inertia for link in planar_links(arm)]
-    assert model.body_pos[1:, 2].tolist() == [0.0, -planar_links(arm)[0].length, -planar_links(arm)[1].length]
-    assert model.dof_damping.tolist() == list(arm.system.damping)
-    assert (model.opt.timestep, model.opt.gravity.tolist()) == (2e-3, [0.0, 0.0, -9.81])
-
-
 def test_the_mjcf_text_is_the_same_every_time() -> None:
     assert to_mjcf(random_arm(2)) == to_mjcf(random_arm(2))
     assert to_mjcf(random_arm(2)).count("<inertial") == 3  # the tip, which is welded on, too
-
-
-def test_small_masses_are_written_as_they_are_and_only_zeros_are_replaced() -> None:
-    small = dyn.Body("small", dyn.Joint("revolute", (0, 1, 0)), mass=3e-15, center=(1, 0, 0), inertia=(2e-15, 2e-15, 0))
-    model = mujoco().MjModel.from_xml_string(to_mjcf(dyn.Mechanism([small])))
-    assert model.body_mass.tolist() == [0.0, 3e-15]
-    assert model.body_inertia[1].tolist() == [2e-15, 2e-15, STAND_IN]
 
 
 def test_a_warning_while_mujoco_runs_is_python_s_and_leaves_no_file(tmp_path, monkeypatch):

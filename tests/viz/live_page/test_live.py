@@ -95,16 +95,6 @@ def test_meters_and_points_are_those_of_the_library(script, live):
     assert script("run.now().values[data.energy]") == pytest.approx(energy, abs=ROUNDING * 30)
 
 
-def test_a_slider_moves_energy_and_torque_at_once(script):
-    """In the same call: no frame goes by."""
-    before = script("[...run.now().values]")
-    names = [each["called"] for each in script("data.meters")]
-    script.engine.eval("run.set(data.inputs.findIndex(({ name }) => name === 'g'), 3.0); run.set(0, 0.4)")
-    after = script("[...run.now().values]")
-    moved = {name for name, a, b in zip(names, before, after, strict=False) if a != b}
-    assert {"potential", "energy", "holding.joint 1", "dp/dt.joint 1"} <= moved
-
-
 def test_too_long_a_step_shows_its_error_at_once(script):
     """Nothing has moved yet; the error ahead grows with the order of the method, and is small at the page's dt."""
     errors = []
