@@ -4,8 +4,8 @@ VENV ?= .venv
 OUT ?= paper
 WORKERS ?= 2
 WORST ?= 15
-FIGURES ?= speed motions counts operations compile long-chains agreement ensembles closed-chains reconfiguration trust \
-	tightest taylor stiff loops
+FIGURES ?= speed motions counts operations build compile long-chains agreement ensembles closed-chains reconfiguration trust \
+	tightest orders taylor stiff loops energy
 
 BIN = $(VENV)/bin
 LOCKED = .venv-locked/bin

@@ -52,6 +52,7 @@ BENCHES = {
         "bench.speed.counts.operation_counts",
         ("links",),
     ),
+    "build": Bench("time to build the graph of forward dynamics", f"{STAGES}.build_time", ("links", "repeats")),
     "compile": Bench("time to compile chains, and derivatives of them", f"{STAGES}.compile_time", ("links",)),
     "long-chains": Bench("cost of a thousand links, and accuracy of long chains", f"{STAGES}.long_chains", ("links",)),
     "agreement": Bench(
@@ -76,6 +77,7 @@ BENCHES = {
         "trust.tightest.tightest",
         ("count",),
     ),
+    "orders": Bench("fitted orders of the methods of equal steps", f"{COMPARED}.orders"),
     "taylor": Bench(
         "the three-link arm to 10 s at 1e-12 beside heyoka and CVODES, and cold starts", f"{COMPARED}.taylor"
     ),
@@ -83,5 +85,6 @@ BENCHES = {
         "steps and times on a stiff spring, Van der Pol's oscillator and Robertson's reaction", f"{COMPARED}.stiff"
     ),
     "loops": Bench("the native loop beside SciPy's solve_ivp on three rates", f"{COMPARED}.loops"),
+    "energy": Bench("drift of the energy over a million steps from a dozen starts", f"{COMPARED}.energy"),
 }
 # fmt: on

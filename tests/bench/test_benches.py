@@ -26,6 +26,7 @@ SMALLEST: dict[str, tuple[dict[str, Any], tuple[str, ...]]] = {
     MOTIONS: ({**HENON, "repeats": 1}, ("heyoka",)),
     "counts": ({"links": 3}, ()),
     "operations": ({"links": 3}, ()),
+    "build": ({"links": 3, "repeats": 1}, ()),
     "compile": ({"links": 2}, ()),
     "agreement": ({"links": 1, "count": 1}, ("mujoco", "pinocchio")),
     "ensembles": ({"count": 10, "repeats": 1}, ("mujoco", "jax")),
@@ -84,7 +85,7 @@ def speed_row() -> Any:
         (["counts", "planar 3"], "counts has models of its own and takes no scene, got 'planar 3'"),
         (["counts", "--tasks", "forward"], "--tasks does not go with counts, which takes --links"),
         (["speed", "--links", "3"], "--links does not go with speed"),
-        (["counts", "--links", "0"], "--links must be at least 1, got 0"),
+        (["build", "--links", "0"], "--links must be at least 1, got 0"),
         (["counts", "--links", "1"], "the smallest model that is counted has 3 links, got links = 1"),
         (["planar 4"], "there is no scene 'planar 4'"),
     ],
@@ -95,6 +96,7 @@ def test_a_wrong_choice_gets_one_line(arguments: list[str], said: str, capsys: p
 
 
 def test_elimination_is_accurate_on_long_chains_and_dense_solves_are_less_so() -> None:
+    pytest.importorskip("flint")
     errors = stages.accuracy("planar", 15, 0.1)
     assert errors["elimination"] < 1e-13  # some roundings a link
     assert all(errors[name] > 10.0 * errors["elimination"] for name in errors if name != "elimination")

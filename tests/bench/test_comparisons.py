@@ -10,6 +10,7 @@ import pytest
 import cgraph as cg
 from dynamics.experiments.work_precision.named_tasks import load
 from dynamics.experiments.work_precision.work_precision import Subject, subject
+from tests.bench.motions import comparisons
 from tests.bench.motions.comparisons import Comparison, numpy_rate
 
 ERROR = 1e-6
@@ -41,3 +42,10 @@ def test_rates_written_in_numpy_are_those_of_the_graph(tmp_path: Any) -> None:
     for x in np.random.default_rng(1).normal(size=(5, 6)):
         expected = np.array(compiled.values([*x.tolist(), 0.0]))
         assert rate(0.0, x) == pytest.approx(expected, rel=ROUNDING, abs=ROUNDING * np.abs(expected).max())
+
+
+def test_the_energy_of_symplectic_methods_stays_in_a_band_and_that_of_rk4_falls() -> None:
+    (text,) = comparisons.energy(steps=4000, starts=4)
+    rows = {line.split()[0]: line.split()[1:] for line in text.splitlines()[4:]}
+    assert float(rows["gauss6"][0]) < float(rows["gauss4"][0]) < float(rows["midpoint"][0]) < 1e-2
+    assert float(rows["rk4"][1]) < 0.0

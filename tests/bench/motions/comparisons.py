@@ -1,4 +1,4 @@
-"""Comparisons of integrators at equal error: Taylor series, stiff systems, and native loops.
+"""Comparisons of integrators at equal error: orders, energy, Taylor series, stiff systems, and native loops.
 
 Times are the shortest of runs that take turns in one process; cold starts run in processes of their own.
 """
@@ -15,20 +15,27 @@ import numpy as np
 
 import cgraph as cg
 from cgraph._shared import Array
+from dynamics.equations.energies import energy as energy_graph
+from dynamics.experiments.stability.energy_drift import SYMPLECTIC, drift
+from dynamics.experiments.text_table import table
 from dynamics.experiments.work_precision.measurement import Tried, attempt, time_in_turns
 from dynamics.experiments.work_precision.named_tasks import load
 from dynamics.experiments.work_precision.trajectory_runs import Ours, Solver
-from dynamics.experiments.work_precision.work_precision import Subject, subject
+from dynamics.experiments.work_precision.work_precision import Subject, subject, work_precision
 from dynamics.integrators import METHODS
+from dynamics.multibody.builders.planar_arm import planar_arm
+from dynamics.simulation.simulate import simulate
 from tests.bench.motions.cold_start import cold_starts
 from tests.bench.motions.trajectory_peers import EPSILON, Cvodes, Heyoka, Scipy
 from tests.bench.peers.peer import made
 from tests.bench.tables import Table
 
+FIXED = tuple([name for name, method in METHODS.items() if not method.adaptive])
 MASSES = LENGTHS = np.array([1.0, 0.8, 0.7])  # kg, m: the rods of the scene triple_pendulum
 DAMPING, GRAVITY = 0.1, 9.81  # N m s, m/s^2: of the same
 TURNS = 15
 FOLDER = Path("build/exact")  # where exact motions are kept
+STEPS, STEP, STARTS = 10**6, 0.01, 12  # of `energy`: steps, their length [s], and starts
 
 
 @dataclass
@@ -81,6 +88,19 @@ def tolerances(first: float, last: float, per_decade: int = 4) -> list[float]:
     count = round(per_decade * np.log10(first / last))
     powers: list[float] = np.geomspace(first, last, count + 1).tolist()
     return powers
+
+
+def orders() -> Iterator[str]:
+    """Fitted orders of the methods of equal steps."""
+    for name in ("triple_pendulum", "spring pendulum, k = 100"):
+        report = work_precision(name, methods=FIXED, turns=1, limit=1.5, folder=FOLDER)
+        rows = []
+        for curve in report.curves:
+            fitted, apart = "-", "-"
+            if curve.fitted is not None and curve.order is not None:
+                fitted, apart = f"{curve.fitted:.4f}", f"{curve.fitted - curve.order:+.4f}"
+            rows.append([curve.name, str(curve.order), fitted, apart])
+        yield str(Table(f"fitted orders, {name}", ["", "declared", "fitted", "difference"], rows))
 
 
 def taylor() -> Iterator[str]:
@@ -170,3 +190,35 @@ def loops() -> Iterator[str]:
         for name, rate in rates.items():
             race.add(name, partial(Scipy, "DOP853", rate=rate), tolerances(1e-4, 1e-13, 2), 1)
         yield race.text()
+
+
+def energy(steps: int = STEPS, starts: int = STARTS) -> Iterator[str]:
+    """Drift of the energy of the three-link arm without damping over a million steps, from a dozen starts.
+
+    The drift of one run is that of its roundings too, whose random walk looks like a line; it has another sign from
+    another start, and what a method adds has not. So the mean over starts is compared with its standard error.
+    """
+    arm = planar_arm(MASSES.tolist(), LENGTHS.tolist())
+    at_rest = dict.fromkeys([f"{letter}{i}" for letter in ("q", "qd") for i in range(len(MASSES))], 0.0)
+    hanging = float(energy_graph(arm).evaluate(at_rest)["E"])
+    q = np.array([0.4, 0.2, 0.1]) * np.random.default_rng(1).uniform(0.5, 1.5, (starts, 3))
+    rows = []
+    for method in (*SYMPLECTIC, "rk4"):
+        equal = partial(simulate, arm, method=method, dt=STEP, estimate_error=False, progress=False)
+        runs = [equal(q=start, qd=[0.0] * 3, t_end=STEP * steps) for start in q]
+        drifts = [drift(run.energy, float(run.energy[0] - hanging)) for run in runs]
+        slopes = np.array([each.drift for each in drifts])
+        mean, deviation = slopes.mean(), slopes.std(ddof=1) / np.sqrt(starts)
+        stopped = " ".join({run.stats.message for run in runs if not run.stats.success})
+        cells = [f"{max(each.band for each in drifts):.2e}", f"{mean:+.2e}", f"{deviation:.1e}"]
+        seconds = min(run.stats.seconds for run in runs)
+        rows.append([method, *cells, f"{abs(mean) / deviation:.1f}", f"{seconds:.1f}", stopped])
+    header = ["", "band", "drift", "standard error", "their ratio", "s a run", ""]
+    yield "\n".join(
+        [
+            f"three-link arm without damping from rest, {steps} steps of {STEP:g} s from each of {starts} starts",
+            "Of the kinetic energy: widest band; mean drift over the starts, by least squares, and its standard error",
+            f"(the random walk of one rounding a step ends near {2.0**-53 * steps**0.5:.1e})",
+            *table(header, rows, left=(0, 6)),
+        ]
+    )

@@ -14,6 +14,7 @@ from tests.each_row import each_row
 DTS = np.geomspace(1e-4, 1e-6, 5)  # s: the second-order term is then below 1e-3 of the first
 SLOPE = 0.02  # of a line through logarithms, whose curvature over DTS is the second-order term
 ROUNDING = 1e-13
+FIRST_ORDER = 1e-2  # relative, of an error at dt <= 1e-4 s: its term of second order
 SIZES = (1, 2, 3, 6)
 
 
@@ -43,16 +44,42 @@ def slope(errors: Array) -> float:
     return float(np.polyfit(np.log(DTS), np.log(errors), 1)[0])
 
 
-@mark.parametrize("formulation", ["by_definition", "kinetic_only"])
-def test_a_flawed_torque_tends_to_tau_and_a_gradient_that_is_not_small(formulation: str, case: Case) -> None:
-    """Of one joint, whose kinetic energy does not depend on q, the kinetic only is right."""
-    gradient = {"by_definition": case.dl_dq, "kinetic_only": case.dk_dq}[formulation]
-    if formulation == "kinetic_only" and len(gradient) == 1:
-        return
-    errors = case.errors(formulation, case.tau + gradient)
+def test_by_definition_the_torque_tends_to_tau_and_dl_dq(case: Case) -> None:
+    errors = case.errors("by_definition", case.tau + case.dl_dq)
     assert slope(errors) == approx(1.0, abs=SLOPE)
-    assert errors[-1] < 1e-3 * np.linalg.norm(gradient)
-    assert np.linalg.norm(gradient) > 0.01  # N m
+    assert errors[-1] < 1e-4 * np.linalg.norm(case.dl_dq)
+
+
+def test_by_definition_the_error_does_not_vanish_with_dt(case: Case) -> None:
+    errors = case.errors("by_definition", case.tau)
+    assert errors == approx(np.linalg.norm(case.dl_dq), rel=FIRST_ORDER)
+    assert np.linalg.norm(case.dl_dq) > 0.1  # N m: so the line above says something
+
+
+@mark.parametrize("case", SIZES[1:], indirect=True, ids=lambda n: f"{n} links")
+def test_kinetic_only_tends_to_tau_and_dk_dq(case: Case) -> None:
+    errors = case.errors("kinetic_only", case.tau + case.dk_dq)
+    assert slope(errors) == approx(1.0, abs=SLOPE)
+    assert errors[-1] < 1e-3 * np.linalg.norm(case.dk_dq)
+
+
+@mark.parametrize("case", SIZES[1:], indirect=True, ids=lambda n: f"{n} links")
+def test_kinetic_only_is_wrong_for_a_real_arm_at_any_dt(case: Case) -> None:
+    assert case.errors("kinetic_only", case.tau).min() > 0.01  # N m
+
+
+@mark.parametrize("dt", [1e-6, 1e-3, 0.1, 1.0])
+@each_row("formulation", ["kinetic_only", "kinetic_only_exact"])
+def test_kinetic_only_is_exact_for_one_joint_at_any_dt(formulation: str, dt: float) -> None:
+    case = Case(1)
+    tau = run(dyn.inverse_dynamics(case.arm, formulation), before(case.state, dt))
+    assert tau == approx(case.tau, rel=0.0, abs=ROUNDING * case.largest)
+
+
+def test_the_chain_rule_is_exact(case: Case) -> None:
+    for formulation in ("chain_rule", "chain_rule_literal"):
+        tau = run(dyn.inverse_dynamics(case.arm, formulation), case.state)
+        assert tau == approx(case.tau, rel=0.0, abs=ROUNDING * case.largest)
 
 
 @mark.parametrize("dt", [1e-6, 1e-3, 0.1, 1.0])
