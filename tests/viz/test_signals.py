@@ -11,11 +11,16 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 PROGRAM = """
-import os, signal, sys, threading
+import os, signal, sys, threading, time
 from viz import cli
+def interrupt():
+    while signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        time.sleep(0.01)  # until the command awaits it
+    time.sleep({seconds})
+    os.kill(os.getpid(), signal.SIGINT)
 signal.signal(signal.SIGINT, signal.default_int_handler)
 sys.argv = ["cgraph", *{arguments}]
-threading.Timer({seconds}, os.kill, [os.getpid(), signal.SIGINT]).start()
+threading.Thread(target=interrupt, daemon=True).start()
 sys.exit(cli.start())
 """
 
