@@ -212,6 +212,7 @@ class Leaf(Node):
         object.__setattr__(self, "value", value)
 
 
+Leaf.__name__ = Node.__name__  # messages name what a user knows
 # The setters of the fields, which Node.__setattr__ does not stop; in half the time of object.__setattr__.
 _set_args, _set_block, _set_label, _set_name, _set_op, _set_place = [vars(Node)[f].__set__ for f in Node.__slots__]
 _serials, _last = count(), [0]  # and the block of the last node, whose object those of the same block share

@@ -96,9 +96,7 @@ def require_graph(what: str, graph: object) -> None:
     """Raise TypeError, saying that the function `what` needs a graph, for anything else."""
     if isinstance(graph, Graph):
         return
-    hint = ""
+    hint = "; write cg.Graph(inputs, {name: node})" if isinstance(graph, Node) else ""
     if hasattr(type(graph), "coordinates"):  # a model has graphs; see `dynamics.Model`
         hint = "; forward_dynamics(model) of the package dynamics is one"
-    elif isinstance(graph, Node):
-        hint = "; write cg.Graph(inputs, {name: node})"
     raise TypeError(f"{what} needs a cg.Graph, got {type(graph).__name__}: {graph!r:.60}{hint}")
