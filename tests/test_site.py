@@ -86,7 +86,7 @@ def test_nothing_is_wider_than_its_column(new_page: Any, pages: list[Path], widt
 WORDS = {
     "floating base": "Mechanisms and joints",
     "animation": "Gallery",
-    "LaTeX": "cgraph.Graph.latex",
+    "LaTeX": "cgraph.latex",
     "export C": "Code from graphs",
 }
 

@@ -170,6 +170,7 @@ class Curves(FilmPanel):
         """Axes with their numbers, and the curves up to a row."""
         axis.set(xlim=(self.t[0], self.t[-1]), ylim=(self.low, self.high))
         axis.locator_params(nbins=4)
+        axis.xaxis.set_major_formatter("{x:g} s")
         axis.tick_params(colors=colors.text, labelsize=SMALL, length=0.0)
         axis.grid(axis="y", color=colors.faint, linewidth=0.4)
         axis.spines[:].set_visible(False)
