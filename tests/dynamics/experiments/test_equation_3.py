@@ -77,6 +77,12 @@ def test_nothing_is_spurious_in_a_right_formulation_of_one_joint(formulation: st
     assert dyn.spurious_nodes(dyn.momentum_rate(SPRING_MASS, formulation)) == frozenset()
 
 
+def test_spurious_is_seen_before_simplification_too() -> None:
+    graph = dyn.momentum_rate(SPRING_MASS, "by_definition", simplify=False)
+    kept = [node for node in graph.nodes if node not in dyn.spurious_nodes(graph)]
+    assert sorted(node.name or node.op.name for node in kept) == ["I", "mul", "qdd0", "sub"]
+
+
 def test_the_chain_rule_has_no_trace_of_the_euler_relation() -> None:
     graph = dyn.inverse_dynamics(SPRING_MASS, "chain_rule")
     assert not {"dt", "q0_old", "qd0_old"} & set(graph.input_names)
