@@ -9,6 +9,7 @@ import dynamics as dyn
 from dynamics import to_mjcf
 from dynamics.io.mujoco_module import mujoco
 from dynamics.io.mujoco_twin import MujocoTwin
+from dynamics.io.stand_ins import STAND_IN
 from tests.dynamics.models import Array, random_arm
 
 SAME_STEPS = 1e-10  # rad, rad/s: rounding of two codes grown by the motion over a second of RK4 steps
@@ -33,6 +34,13 @@ def test_the_triple_pendulum_moves_as_in_mujoco(model: str) -> None:
 def test_the_mjcf_text_is_the_same_every_time() -> None:
     assert to_mjcf(random_arm(2)) == to_mjcf(random_arm(2))
     assert to_mjcf(random_arm(2)).count("<inertial") == 3  # the tip, which is welded on, too
+
+
+def test_small_masses_are_written_as_they_are_and_only_zeros_are_replaced() -> None:
+    small = dyn.Body("small", dyn.Joint("revolute", (0, 1, 0)), mass=3e-15, center=(1, 0, 0), inertia=(2e-15, 2e-15, 0))
+    model = mujoco().MjModel.from_xml_string(to_mjcf(dyn.Mechanism([small])))
+    assert model.body_mass.tolist() == [0.0, 3e-15]
+    assert model.body_inertia[1].tolist() == [2e-15, 2e-15, STAND_IN]
 
 
 def test_a_warning_while_mujoco_runs_is_python_s_and_leaves_no_file(tmp_path, monkeypatch):

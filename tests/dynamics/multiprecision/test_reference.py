@@ -50,6 +50,7 @@ CLOSED: dict[str, tuple[Any, list[float], Reference]] = {
     ),
     "pendulum": (PENDULUM, [2.5, 0.0], closed_forms.pendulum(TIMES, 2.5, 9.81)),
     "kepler": (KEPLER, ORBIT, closed_forms.kepler(TIMES, ORBIT)),
+    "cosine": (OdeSystem(lambda x, t: [cg.cos(t) - x[0] - cg.sin(t)], "x"), [1.0], closed_forms.cosine(TIMES)),
 }
 
 
