@@ -6,14 +6,13 @@ import inspect
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from fractions import Fraction
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import cgraph as cg
 from cgraph import Graph, Node
 from cgraph.extend import STATEMENTS, Call, Factor, Map, Statement, Sum
 
-Number = Node | float
-Values = Mapping[str, "Number | Sequence[Number]"]
+Values = Mapping[str, Node | float | Sequence[Node | float]]
 Rule = Callable[..., Values]
 W = TypeVar("W", float, Fraction)
 
@@ -60,17 +59,18 @@ def _formula(
 ) -> tuple[Graph, tuple[str, ...], tuple[str, ...]]:
     """The graph of a rule, and the registers that it reads and sets."""
     names = reads or tuple([name.rstrip("_") for name in inspect.signature(rule).parameters])
-    inputs: list[Node] = []
-    given: list[Node | list[Node]] = []
-    for name in names:
-        numbers = cg.variables([f"{name}[{k}]" for k in range(lengths[name])] if name in lengths else [name])
-        inputs += numbers
-        given.append(numbers if name in lengths else numbers[0])
-    results = rule(*given)
-    outputs = [
-        number for result in results.values() for number in ([result] if isinstance(result, Node | float) else result)
+    values: list[Any] = [
+        cg.variables([f"{name}[{k}]" for k in range(lengths[name])]) if name in lengths else cg.variable(name)
+        for name in names
     ]
-    return Graph(inputs, {f"{k}": number for k, number in enumerate(outputs)}), names, tuple(results)
+    results = rule(*values)
+    outputs = enumerate(_end_to_end(results.values()))
+    return Graph(_end_to_end(values), {f"{k}": number for k, number in outputs}), names, tuple(results)
+
+
+def _end_to_end(values: Iterable[Any]) -> list[Any]:
+    """Numbers, and those of lists."""
+    return [number for value in values for number in (value if isinstance(value, list) else [value])]
 
 
 def lengths_of(statements: Iterable[Statement], known: Mapping[str, int]) -> dict[str, int]:
