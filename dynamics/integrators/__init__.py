@@ -7,7 +7,6 @@ from importlib import import_module
 
 from cgraph._shared import doors, memo
 
-from .dop853 import DOP853
 from .explicit import explicit_step
 from .method import Method
 from .momenta import Mechanics, in_form, mechanics, momentum_form
@@ -25,8 +24,7 @@ from .problem import (
 from .statements import call, each, total
 from .step import Step
 from .step_control import measured
-from .symplectic_tableaus import COMPOSITIONS, PARTITIONED, Composition, Partitioned, gauss
-from .tableau import TABLEAUS, Tableau
+from .tableau import COMPOSITIONS, DOP853, PARTITIONED, TABLEAUS, Composition, Partitioned, Tableau, gauss
 
 TYPE_CHECKING = False  # as a checker knows it
 

@@ -1,12 +1,7 @@
 """Chosen steps: a method's step, tried until its error is within the tolerance; the registers, and step control.
 
-A pass is a trial of one step, from t to t_new = t + h exactly. Registers: x the state, t, p the parameters,
-evaluations, as with equal steps; `h` the step, negative for a run back in time; `tried` its size before t_new was
-rounded, `next` the size to try next, `max_step` and `min_step` their limits; `end` where to stop; rtol, and atol for
-each component of the state; accepted (1 or 0), status; rejected, a count; `error`, the estimate of the last trial, 1
-at the tolerance; x_new what the trial arrived at; `fresh`, 1 before the first pass; `at_limit`, accepted steps
-at the stability limit of an explicit method; and of the last accepted step t_old, x_old and, for its dense output,
-dense1, ..
+A pass is a trial of one step, from t to t_new = t + h exactly, over the registers that `Method` lists. `tried` is its size
+before t_new was rounded; `fresh` is 1 before the first pass.
 
 A run begins with `anew` at 1, and goes on to a trial once it is set out, see `simulation.steps.first_step`: registers
 that a step hands on to the next are 0 then. `search` is positive while a first step is looked for: a trial then is none

@@ -33,7 +33,7 @@ from .momenta import mechanics
 from .problem import Problem, reaches
 from .statements import Values, call, compensated, count, each, stage_time, total, used, weighted
 from .step import Step
-from .symplectic_tableaus import MIDPOINT, SYMPLECTIC_EULER, VERLET, Composition, Fractions, Partitioned, over
+from .tableau import MIDPOINT, SYMPLECTIC_EULER, VERLET, Composition, Fractions, Partitioned, over
 
 TURNS = 60.0  # of the iteration for the stages, at most
 CONVERGED = 2.0**-53  # a change below this, relative, is rounding

@@ -77,10 +77,14 @@ class EventLog:
         """Note the events of these steps. The steps up to the event after which the run ends or restarts, or all."""
         for first in range(0, len(block.t), STEPS):
             part = block.part(slice(first, first + STEPS))
-            for (row, share), group in itertools.groupby(self._found(part), lambda one: one[:2]):
-                at, s = np.array([row]), np.array([share])
-                t, x = float(part.times_at(at, s)[0]), part.states_at(at, s)[0]
-                if self._happen(part.part(slice(row + 1)), t, x, {number: one for _, _, number, one in group}):
+            found = self._found(part)
+            rows, s = np.array([one[0] for one in found], dtype=np.intp), np.array([one[1] for one in found])
+            instants = zip(found, part.times_at(rows, s).tolist(), part.states_at(rows, s), strict=True)
+            for (row, share), group in itertools.groupby(instants, lambda one: one[0][:2]):
+                together = list(group)
+                _, t, x = together[0]
+                arrived = {number: one for (_, _, number, one), _, _ in together}
+                if self._happen(part.part(slice(row + 1)), t, x, arrived):
                     return block.part(slice(first + row + (share > 0.0))).ending(t, x)
             self._see(part, len(part.t), part.x[-1])
             self._last = part.part(slice(-1, None))
