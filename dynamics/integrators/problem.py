@@ -114,16 +114,10 @@ def derive(model: Model, bound: Mapping[str, float]) -> Problem:
     if system is None:
         equations: tuple[Any, ...] = (model.ode and model.ode.rates,)
     else:
-        moving = system.kinematics
-        equations = (system.coordinates, system.partial_lagrangians, system.forces, system.damping)
-        equations += (
-            system.lengths,
-            system.velocities,
-            *moving.q_dot,
-            moving.quasi and moving.quasi.normalized,
-            moving.groups,
-        )
-        equations += (tuple(system.constraints.names), system.constraints.positions, system.constraints.velocities)
+        moving, held = system.kinematics, system.constraints
+        equations = (system.coordinates, system.partial_lagrangians, system.forces, system.damping, system.lengths)
+        equations += (system.velocities, *moving.q_dot, moving.quasi and moving.quasi.normalized, moving.groups)
+        equations += (tuple(held.names), held.positions, held.velocities)
     numbers = tuple([(name, float(value).hex()) for name, value in bound.items()])  # 0.0 and -0.0 stay apart
     key = (*equations, inputs.states, inputs.applied, tuple(inputs.parameters), numbers)
     return _derived(_Request(key, model, bound))
@@ -147,13 +141,10 @@ def _derived(request: _Request) -> Problem:
         components = [f"coordinate {name!r}" for name in system.coordinates]
         rated = set(system.coordinates)
         components += [f"velocity {'of ' if name in rated else ''}{name!r}" for name in system.velocities]
-    equation, held = with_multipliers(model)
-    rate = _bind(equation, inputs.states, parameters, bound)
-    multipliers = None if held is None else _bind(held, inputs.states, parameters, bound)
-    step = None if system is None else projection(system)
-    projected = None if step is None else _bind(step, inputs.states, parameters, bound)
-    whole = normalization(model)
-    graphs = (rate, whole, projected, multipliers)
+    every = (*with_multipliers(model), None if system is None else projection(system))
+    rate, multipliers, step = [graph and _bind(graph, inputs.states, parameters, bound) for graph in every]
+    assert rate is not None
+    graphs = (rate, normalization(model), step, multipliers)
     return Problem(model, inputs.states, tuple(components), parameters, bound, *graphs, system)
 
 

@@ -137,8 +137,8 @@ DOPRI5 = Tableau(
 )
 
 
-# DOP853, of order 8 with dense output of order 7, after Dormand and Prince: Hairer, Norsett and Wanner I, second edition,
-# section II.10, with the numbers of their program dop853.f. A row is a stage, or one set of weights, {stage: weight}.
+# DOP853, of order 8 with dense output of order 7, after Dormand and Prince: Hairer, Norsett and Wanner I, second
+# edition, section II.10, with the numbers of their program dop853.f. A row is a stage, or weights, {stage: weight}.
 _Sparse = dict[int, float]
 # fmt: off
 _C = (0.0, 0.05260015195876773, 0.0789002279381516, 0.1183503419072274, 0.2816496580927726, 0.3333333333333333, 0.25,

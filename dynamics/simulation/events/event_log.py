@@ -54,7 +54,7 @@ class EventLog:
     ended: the event that has ended the run, in words.  status: why a reset has stopped it.
     parameters: of the rate, those of the block that is to come.
     restart: (t, x, x_new), the state that was reset and the one to go on from, else None.
-    warnings: a sentence for each event of which some may have been missed.
+    said: {(number of an event, what): sentence}, once each.
     """
 
     def __init__(self, program: EventProgram) -> None:
@@ -62,14 +62,13 @@ class EventLog:
         self.parameters: Sequence[float] = ()
         self.ended = self.status = ""
         self.restart: tuple[float, Array, Array] | None = None
-        self.warnings: list[str] = []
+        self.said: dict[tuple[int, str], str] = {}
         self.happened: list[Happening] = []
         self._sides: list[Side] = []  # none before the first step
         self._from = np.array([-float(event.direction) for event in program.events])  # sides, see `Crossing`
         self._steps = 0
         self._sizes, self._ways = np.zeros((2, 2, len(program.components)))  # of states and rates: largest, and path
         self._done: set[int] = set()  # events that happen again only after they have not been due
-        self._missed: set[int] = set()
         self._reset_at, self._restarts = math.nan, 0  # the instant, and how many in a row from which nothing got away
         self._last: StepBlock | None = None
 
@@ -108,9 +107,8 @@ class EventLog:
             noise = self._noise(number, float(part.t[-1]), part.x[-1]) if side.resting else 0.0
             some, beyond = crossings(WatchedSteps(events[number], self.parameters, part, noise), side)
             found += [(one.row, one.s, number, one) for one in some]
-            if beyond.any() and number not in self._missed:
-                self._missed.add(number)
-                self._warn(number, MISSED.format(part.t_old[np.argmax(beyond)]))
+            if beyond.any():
+                self._say(number, MISSED, part.t_old[np.argmax(beyond)])
         return sorted(found)
 
     def _see(self, part: StepBlock, steps: int, x: Array) -> None:
@@ -141,7 +139,7 @@ class EventLog:
             if one.side:
                 self._from[number] = one.side
             elif events[number].reset is not None:
-                self._warn(number, UNSIDED.format(t))
+                self._say(number, UNSIDED, t)
         if before is None:
             self._note(due, t, x)
             return bool(self.ended)
@@ -232,8 +230,8 @@ class EventLog:
         errors = self._roundings * self._gone[:1] + UNIT * np.abs(end), np.array([self._roundings * abs(t)])
         return float(self.program.events[number].error(np.array([t]), x[None], self.parameters, *errors)[0])
 
-    def _warn(self, number: int, what: str) -> None:
-        self.warnings.append(f"event {self.program.events[number].name!r} {what}")
+    def _say(self, number: int, what: str, t: float) -> None:
+        self.said.setdefault((number, what), f"event {self.program.events[number].name!r} {what.format(t)}")
 
 
 def _sides(look: _Look, own: Sequence[float] | Array) -> list[Side]:
@@ -337,7 +335,7 @@ class WatchedIntegration(Integration):
             setattr(self, name, sum([getattr(segment, name) for segment in self._segments]))
         self.prices, self.slope = run.prices, run.slope
         self.largest, self.stiff = max(self.largest, run.largest), self.stiff or run.stiff
-        self.warnings = list(dict.fromkeys([*self.warnings, *run.warnings, *self.log.warnings]))
+        self.warnings = list(dict.fromkeys([*self.warnings, *run.warnings, *self.log.said.values()]))
 
     def _rest(self, t: float) -> RunOptions:
         """The options of the rest of the run from t on, whose first step is chosen anew."""
