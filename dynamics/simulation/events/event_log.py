@@ -168,7 +168,7 @@ class EventLog:
         again = all([arrived[n].resting for n in new]) or abs(t - self._reset_at) <= RESOLUTION * abs(t)
         self._restarts = self._restarts + 1 if again else 0
         self._reset_at, self.restart = t, (t, start, x)
-        self.status = self._failure(t, x, resets or new)
+        self.status = self._failure(t, x, resets, new)
         self._from = np.where(look.zero & (look.motions != 0.0), np.sign(look.motions), self._from)
         self._sides = _sides(look, self._from)
         return True
@@ -181,20 +181,18 @@ class EventLog:
             if self.program.events[number].terminal and not self.ended:
                 self.ended = f"event {self.program.events[number].name!r} at t = {t:.6g} s"
 
-    def _failure(self, t: float, x: Array, resets: Sequence[int]) -> str:
-        """Reason why resets, the last of which made x, stop the run; empty if they do not."""
-        names = [f"{self.program.events[number].name!r}" for number in resets]
+    def _failure(self, t: float, x: Array, resets: Sequence[int], new: Sequence[int]) -> str:
+        """Reason why resets by new events, the last of which made x, stop the run; empty if they do not."""
+        events, stopped = self.program.events, f"stopped at t = {t:.6g} s:"
         if len(bad := np.flatnonzero(~np.isfinite(x))):
-            component = self.program.components[bad[0]]
-            return f"stopped at t = {t:.6g} s: {component} is {x[bad[0]]} after the reset of event {names[-1]}"
+            after = f" after the reset of event {events[resets[-1]].name!r}" if resets else ""
+            return f"{stopped} {self.program.components[bad[0]]} is {x[bad[0]]}{after}"
         if len(resets) <= RESETS and self._restarts <= AT_ONCE:
             return ""
-        names = [f"{self.program.events[number].name!r}" for number in sorted({*resets[-AT_ONCE:]})]
+        names = [f"{events[number].name!r}" for number in sorted({*(resets[-AT_ONCE:] or new)})]
         which = f"event {names[0]} resets" if len(names) == 1 else f"events {', '.join(names)} reset"
-        return (
-            f"stopped at t = {t:.6g} s: {which} the state again and again at this instant; "
-            "a contact that stays needs other equations from here on"
-        )
+        what = f"{which} the state again and again at this instant"
+        return f"{stopped} {what}; a contact that stays needs other equations from here on"
 
     def _look(self, t: float, x: Array, step: StepBlock | None = None) -> _Look:
         """The quantities at an instant of a step, also after resets there; or at a start."""
