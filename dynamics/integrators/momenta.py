@@ -47,12 +47,8 @@ def mechanics(problem: Problem) -> Mechanics:
     bars = cotangents({system.lagrangian: ONE}, [*system.q, *system.qd], build)
     slopes, momenta = bars[: system.n], bars[system.n :]
     with building(build):
-        force = [
-            slope + tau + applied - damping * qd
-            for slope, tau, applied, damping, qd in zip(
-                slopes, system.tau, system.forces, system.damping, system.qd, strict=True
-            )
-        ]
+        parts = zip(slopes, system.tau, system.forces, system.damping, system.qd, strict=True)
+        force = [slope + tau + applied - damping * qd for slope, tau, applied, damping, qd in parts]
         missing = [wanted - here for wanted, here in zip(p, momenta, strict=True)]
     (before,) = new_variables("singular", 1, system.parameters)
     try:

@@ -223,16 +223,10 @@ def quantity(
 
 def state_arguments(problem: Problem) -> tuple[Any, ...]:
     """Arguments of a function of the state: (q, qd, t, p) as nodes, or (x, t, p) of a first-order system."""
-    p = Parameters(())
-    p.update(_parameters(problem))  # a copy, which a caller may change
+    p = Parameters(state_inputs(problem.model).parameters)
     if problem.system is None:
         return cg.variables(list(problem.states)), cg.variable(TIME), p
     return problem.system.q, problem.system.qd, problem.system.t, p
-
-
-@kept_by_first
-def _parameters(problem: Problem) -> Parameters:
-    return Parameters(state_inputs(problem.model).parameters)
 
 
 @kept_by_first

@@ -67,7 +67,7 @@ class EventLog:
         self._sides: list[Side] = []  # none before the first step
         self._from = np.array([-float(event.direction) for event in program.events])  # sides, see `Crossing`
         self._steps = 0
-        self._sizes, self._ways = np.zeros((2, 2, len(program.components)))  # of states and rates: largest, and path
+        self._gone = np.zeros((2, len(program.components)))  # how far states and their rates, at least their sizes
         self._done: set[int] = set()  # events that happen again only after they have not been due
         self._reset_at, self._restarts = math.nan, 0  # the instant, and how many in a row from which nothing got away
         self._last: StepBlock | None = None
@@ -118,8 +118,8 @@ class EventLog:
         times = np.append(part.t_old[:steps], part.t_old[0] if steps == 0 else part.t[steps - 1])
         for k, values in enumerate((states, self.program.rates(times, states, self.parameters))):
             values = np.where(np.isfinite(values), values, 0.0)
-            np.fmax(self._sizes[k], np.abs(values).max(axis=0), out=self._sizes[k])
-            self._ways[k] += np.abs(np.diff(values, axis=0)).sum(axis=0)
+            self._gone[k] += np.abs(np.diff(values, axis=0)).sum(axis=0)
+            np.fmax(self._gone[k], np.abs(values).max(axis=0), out=self._gone[k])
 
     def _happen(self, part: StepBlock, t: float, x: Array, arrived: Mapping[int, Crossing]) -> bool:
         """Note what reaches zero at an instant of the last of these steps; whether that ends or resets the run.
@@ -217,11 +217,6 @@ class EventLog:
         Roundings of steps add up at random; a rate that is off takes its state off by that share of the whole way.
         """
         return UNIT * ROUNDED * math.sqrt(1.0 + self._steps)
-
-    @property
-    def _gone(self) -> Array:
-        """Distances that states and their rates have gone, (2, m), at least their sizes."""
-        return np.fmax(self._sizes, self._ways)
 
     def _noise(self, number: int, t: float, x: Array, end: Array | float = 0.0) -> float:
         """Error of a quantity by the rounding of states, also inside a step to an end (1, m)."""
