@@ -8,27 +8,35 @@ from importlib import import_module
 from cgraph._shared import doors, memo
 
 from .explicit import explicit_step
-from .method import Method
-from .momenta import in_form, mechanics
+from .method import Method as Method
+from .momenta import in_form as in_form, mechanics as mechanics
 from .problem import (
-    Problem,
-    derive,
-    force,
-    quantity,
-    quantity_inputs,
-    state_arguments,
-    time_derivative,
-    total_energy,
+    Problem as Problem,
+    derive as derive,
+    force as force,
+    quantity as quantity,
+    quantity_inputs as quantity_inputs,
+    state_arguments as state_arguments,
+    time_derivative as time_derivative,
+    total_energy as total_energy,
 )
-from .statements import call, each, total
-from .step import Step
-from .step_control import measured
-from .tableau import COMPOSITIONS, DOP853, PARTITIONED, TABLEAUS, Composition, Partitioned, Tableau, gauss
+from .step import Step as Step, call as call, each as each, total as total
+from .step_control import measured as measured
+from .tableau import (
+    COMPOSITIONS,
+    DOP853,
+    PARTITIONED,
+    TABLEAUS as TABLEAUS,
+    Composition,
+    Partitioned,
+    Tableau as Tableau,
+    gauss,
+)
 
 TYPE_CHECKING = False  # as a checker knows it
 
 if TYPE_CHECKING:
-    from .jacobian_statements import jacobian_statements
+    from .jacobian_statements import jacobian_statements as jacobian_statements
 
 __getattr__, __dir__ = doors(__name__, __file__)
 TAYLOR_ORDER, LEAST_ORDER = 22, 4  # of a tolerance of 2^-52, and of large ones
@@ -101,27 +109,3 @@ METHODS: dict[str, Method] = Methods(
         **{name: _symplectic(method, "composed_step") for name, method in COMPOSITIONS.items()},
     }
 )
-
-__all__ = [
-    "METHODS",
-    "TABLEAUS",
-    "Method",
-    "Problem",
-    "Step",
-    "Tableau",
-    "call",
-    "derive",
-    "each",
-    "force",
-    "in_form",
-    "jacobian_statements",
-    "measured",
-    "mechanics",
-    "quantity",
-    "quantity_inputs",
-    "runge_kutta",
-    "state_arguments",
-    "time_derivative",
-    "total",
-    "total_energy",
-]

@@ -11,8 +11,7 @@ from cgraph import Node
 from cgraph.extend import Call, If, Statement, copied
 
 from .problem import Problem
-from .statements import Values, advanced, call, compensated, count, each, stage_time, total, used, weighted
-from .step import Step
+from .step import Step, Values, advanced, call, compensated, count, each, stage_time, total, used, weighted
 from .step_control import SAFETY, SCALE, nonfinite, scale
 from .tableau import Tableau, real_stability
 
@@ -105,14 +104,13 @@ def _at_limit(tableau: Tableau) -> list[Statement]:
     """
     if tableau.c[-1] != 1.0:
         return []
-    stages, limit = len(tableau.b), real_stability(tableau)
+    stages = len(tableau.b)
 
     def change(a: Node, b: Node, *sizes: Node) -> Values:
         part = (a - b) / scale(*sizes)
         return {"rise": part * part}
 
-    def counted(h: Node, rise: Node, reach: Node, at_limit: Node) -> Values:
-        return {"at_limit": at_limit + (h * h * rise > (SAFETY * limit) ** 2 * reach)}
-
+    most = (SAFETY * real_stability(tableau)) ** 2
+    count = call(lambda h, rise, reach, at_limit: {"at_limit": at_limit + (h * h * rise > most * reach)})
     rise = total(change, f"slope{stages}", f"slope{stages - 1}", *SCALE)
-    return [rise, replace(rise, inputs=("x_new", "at", *SCALE), outputs=("reach",)), call(counted)]
+    return [rise, replace(rise, inputs=("x_new", "at", *SCALE), outputs=("reach",)), count]

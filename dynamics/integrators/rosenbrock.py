@@ -16,8 +16,7 @@ from cgraph.extend import Call, Factor, Map, Solve, Statement, added
 
 from .jacobian_statements import identity, jacobian_statements
 from .problem import Problem, time_derivative
-from .statements import Values, combined, each, stage_time, used, weighted
-from .step import Step
+from .step import Step, Values, combined, each, stage_time, used, weighted
 from .step_control import measured, nonfinite
 from .tableau import RowOfWeights
 

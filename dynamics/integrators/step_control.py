@@ -27,8 +27,7 @@ from cgraph import Node
 from cgraph.extend import STATEMENTS, Call, If, Map, Program, Statement, Sum, copied, effects
 
 from .problem import Problem
-from .statements import Values, call, count, each, total
-from .step import Step, rate_calls, with_registers
+from .step import Step, Values, call, count, each, rate_calls, total, with_registers
 
 RUNNING, DONE, TOO_SMALL = 0.0, 1.0, 2.0  # register `status`
 SAFETY, SMALLEST_FACTOR, LARGEST_FACTOR = 0.9, 0.2, 5.0  # factors from one step to the next

@@ -31,8 +31,7 @@ from cgraph.extend import Call, FixedPoint, Map, Statement, added, copied
 from ..systems.arguments import TIME
 from .momenta import mechanics
 from .problem import Problem, reaches
-from .statements import Values, call, compensated, count, each, stage_time, total, used, weighted
-from .step import Step
+from .step import Step, Values, call, compensated, count, each, stage_time, total, used, weighted
 from .tableau import MIDPOINT, SYMPLECTIC_EULER, VERLET, Composition, Fractions, Partitioned, over
 
 TURNS = 60.0  # of the iteration for the stages, at most

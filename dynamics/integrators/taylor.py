@@ -24,8 +24,7 @@ from cgraph.extend import Call, If, NoSeriesError, Statement, copied, jets, stra
 
 from ..systems.arguments import TIME
 from .problem import Problem
-from .statements import Values, call, compensated, count, each, stage_time, total
-from .step import Step
+from .step import Step, Values, call, compensated, count, each, stage_time, total
 
 # Operations of all coefficients, before folding, that are one straight graph: more take a second to compile, and would
 # run a third faster.
@@ -46,9 +45,7 @@ def taylor_step(problem: Problem, order: int) -> Step:
     else:
         series, lengths = _by_orders(m, graphs, order)
 
-    def begin(next_: Node, end: Node, t: Node) -> Values:
-        return {"unit": cg.minimum(next_, abs(end - t)), "starting": 1.0}
-
+    begin = call(lambda next_, end, t: {"unit": cg.minimum(next_, abs(end - t)), "starting": 1.0})
     # By itself, so that the arrival follows no call that writes coefficients: it would gather them one by one.
     share = replace(call(lambda h, unit: {"s": h / unit}), exact=True)
     at_all = call(lambda unit, h: {"unit": cg.where(unit, unit, h)})  # where nothing is wished
@@ -58,7 +55,7 @@ def taylor_step(problem: Problem, order: int) -> Step:
         [share, _arrival(order)],
         [_rates(graphs, "x", "t"), count(1)],
         [at_all, *series, *_wish(order)],
-        [call(begin)],
+        [begin],
         kept=[copied("rounding_new", "rounding"), call(lambda h: {"unit": h, "starting": 0.0})],
         fixed=("rounding", "rounding_new", "atol", "weight", *controls),
         error=[stage_time("at_t", 1.0), _rates(graphs, "x_new", "at_t"), count(1), *_checked(m, order)],

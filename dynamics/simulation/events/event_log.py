@@ -122,15 +122,12 @@ class EventLog:
             np.fmax(self._gone[k], np.abs(values).max(axis=0), out=self._gone[k])
 
     def _happen(self, part: StepBlock, t: float, x: Array, arrived: Mapping[int, Crossing]) -> bool:
-        """Note what reaches zero at an instant of the last of these steps; whether that ends or resets the run.
-
-        One rule: what is due and has no reset happens, then the first reset that is due, and it is looked again. Due is
-        what is zero and moves to the other side than it has come from; what touches, once. One that ends the run does
-        so before any reset.
-        """
-        events, step, before = self.program.events, part.part(slice(-1, None)), None
+        """Note what reaches zero at an instant of the last of these steps; whether that ends or resets the run."""
+        events = self.program.events
         due = {n for n, one in arrived.items() if one.side and events[n].counts(one.side, touching=one.touching)}
-        if any(events[n].reset for n in due) and not any(events[n].terminal for n in due):
+        resets = any([events[n].reset for n in due]) and not any([events[n].terminal for n in due])
+        step = part.part(slice(-1, None))
+        if resets:
             self._see(part, len(part.t), x)
             before = self._look(step.t_old[0], step.x_old[0], step)
             # another reset may move what only the next step would find at zero
@@ -140,13 +137,23 @@ class EventLog:
                 self._from[number] = one.side
             elif events[number].reset is not None:
                 self._say(number, UNSIDED, t)
-        if before is None:
+        if resets:
+            self._reset(step, t, x, {n: arrived[n] for n in due}, before.zero)
+        else:
             self._note(due, t, x)
-            return bool(self.ended)
-        start, new, resets, look = x, sorted(due), list[int](), self._look(t, x, step)
-        touching = {n for n in due if arrived[n].touching}
-        returns = np.flatnonzero(before.zero & look.zero & (look.motions * self._from > 0.0)).tolist()
-        due = touching | due.difference(returns)  # what was at zero, and returns to its side, has not really left
+        return resets or bool(self.ended)
+
+    def _reset(self, step: StepBlock, t: float, x: Array, new: Mapping[int, Crossing], rested: Flags) -> None:
+        """Reset the state at an instant of a step.
+
+        One rule: what is due and has no reset happens, then the first reset that is due, and it is looked again. Due is
+        what is zero and moves to the other side than it has come from; what touches, once. One that ends the run does
+        so before any reset.  rested: what was at zero at the start of the step.
+        """
+        events, start, resets, look = self.program.events, x, list[int](), self._look(t, x, step)
+        touching = {number for number, one in new.items() if one.touching}
+        returns = np.flatnonzero(rested & look.zero & (look.motions * self._from > 0.0)).tolist()
+        due = touching | {*new}.difference(returns)  # what was at zero, and returns to its side, has not really left
         while len(resets) <= RESETS and np.isfinite(x).all():
             side = np.where(self._from == 0.0, -np.sign(look.motions), self._from)
             away = np.flatnonzero(look.zero & (look.motions * side < 0.0)).tolist()
@@ -165,13 +172,12 @@ class EventLog:
                 resets += first
                 x = values_of(graph, [*x, t, *self.parameters], 1)[:, 0]
                 look = self._look(t, x, step)
-        again = all([arrived[n].resting for n in new]) or abs(t - self._reset_at) <= RESOLUTION * abs(t)
+        again = all([one.resting for one in new.values()]) or abs(t - self._reset_at) <= RESOLUTION * abs(t)
         self._restarts = self._restarts + 1 if again else 0
         self._reset_at, self.restart = t, (t, start, x)
         self.status = self._failure(t, x, resets, new)
         self._from = np.where(look.zero & (look.motions != 0.0), np.sign(look.motions), self._from)
         self._sides = _sides(look, self._from)
-        return True
 
     def _note(self, numbers: Collection[int], t: float, x: Array) -> None:
         """These events happen at an instant and a state, which may end the run."""
@@ -181,7 +187,7 @@ class EventLog:
             if self.program.events[number].terminal and not self.ended:
                 self.ended = f"event {self.program.events[number].name!r} at t = {t:.6g} s"
 
-    def _failure(self, t: float, x: Array, resets: Sequence[int], new: Sequence[int]) -> str:
+    def _failure(self, t: float, x: Array, resets: Sequence[int], new: Collection[int]) -> str:
         """Reason why resets by new events, the last of which made x, stop the run; empty if they do not."""
         events, stopped = self.program.events, f"stopped at t = {t:.6g} s:"
         if len(bad := np.flatnonzero(~np.isfinite(x))):
