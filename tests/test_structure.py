@@ -43,7 +43,7 @@ LAZY = {
     "cgraph/program/runners/native_runner.py::_side": "a program of one memory does without",
     "cgraph/program/runners/runner.py::masked": "a program of one memory does without",
     "dynamics/equations/formulations/formulations.py::_remarks": "loaded when a notebook asks",
-    "dynamics/integrators/momenta.py::momentum_form": "most motions are of velocities",
+    "dynamics/integrators/problem.py::momentum_form": "most motions are of velocities",
     "dynamics/multibody/trees/structure.py::require_values": "one set of values does without",
     "dynamics/multibody/trees/tree_equations.py::torque_derivatives": "most equations do without",
     "dynamics/simulation/prepared_motion.py::ends": "a trajectory does without",

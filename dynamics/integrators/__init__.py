@@ -9,11 +9,11 @@ from cgraph._shared import doors, memo
 
 from .explicit import explicit_step
 from .method import Method as Method
-from .momenta import in_form as in_form, mechanics as mechanics
 from .problem import (
     Problem as Problem,
     derive as derive,
     force as force,
+    in_form as in_form,
     quantity as quantity,
     quantity_inputs as quantity_inputs,
     state_arguments as state_arguments,
@@ -37,6 +37,7 @@ TYPE_CHECKING = False  # as a checker knows it
 
 if TYPE_CHECKING:
     from .jacobian_statements import jacobian_statements as jacobian_statements
+    from .symplectic import mechanics as mechanics
 
 __getattr__, __dir__ = doors(__name__, __file__)
 TAYLOR_ORDER, LEAST_ORDER = 22, 4  # of a tolerance of 2^-52, and of large ones

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
 import cgraph as cg
 from cgraph import Graph, Node
-from cgraph._shared import is_finite, kept_by_first, memo
+from cgraph._shared import is_finite, kept_by_first, memo, require_choice
 from cgraph.extend import topological
 
 from ..equations.constraints.constraint_rank import independent_rows
 from ..equations.constraints.projection import projection
 from ..equations.energies import energy
-from ..equations.state_equation import normalization, state_inputs, with_multipliers
+from ..equations.equations_of_motion import momentum
+from ..equations.state_equation import FORMS, normalization, state_inputs, with_multipliers
 from ..equations.substitute import substitute
 from ..systems.arguments import TIME, Parameters, call_user_function
 from ..systems.model import Equations, Model, as_equations
@@ -243,3 +244,36 @@ def quantity_inputs(problem: Problem) -> list[Node]:
 def reaches(nodes: Iterable[Node], variables: Iterable[Node]) -> bool:
     """Whether any of the nodes depends on any of the variables."""
     return not set(variables).isdisjoint(topological(nodes))
+
+
+def in_form(problem: Problem, form: str) -> Problem:
+    """The problem that the steps of a run are of. Raises ValueError for a form that it has not."""
+    if require_choice("form", form, FORMS) == "velocity":
+        return problem
+    return momentum_form(problem)
+
+
+@kept_by_first
+def momentum_form(problem: Problem) -> Problem:
+    """Problem of the motion in q and p = dL/dqd.
+
+    Raises ValueError for a first-order system; ConstraintError, SingularMassMatrixError and ValueError as
+    `hamilton_equations`.
+    """
+    from ..equations.momentum.hamiltonian import hamilton_equations, missing_momenta, velocities
+
+    system = problem.system
+    if system is None:
+        raise ValueError('form="momentum" needs a Lagrangian, which a system of first order does not have')
+    states = (*problem.states[: problem.nq], *[f"p{i}" for i in range(system.n)])
+    names = [f"momentum of {name!r}" for name in system.velocities]
+    missing = missing_momenta(system)
+    return replace(
+        problem,
+        states=states,
+        components=(*problem.components[: problem.nq], *names),
+        rate=problem.bind(states, hamilton_equations(system)),
+        velocities=problem.bind(states, velocities(system)),
+        momentum=problem.bind(problem.states, momentum(system)),
+        missing=missing and problem.bind(states, missing),
+    )
