@@ -43,20 +43,17 @@ class Side:
     """Side of zero on which a quantity is, between one part of a run and the next.
 
     sign: its last, 0 before it has one; of one at rest on zero, that of the side that it belongs to, if there is one.
-    slope: at the end of the last step; NaN at a start.  left: of a run that starts on zero, the sign with which the
-    quantity leaves, 0 as long as it rests there; NaN elsewhere.
+    slope: at the end of the last step; NaN at a start.
+    leaving: whether it starts on zero and moves to this side.  resting: whether it has been zero, to rounding, since
+    the start of the run or the last reset.
     waiting: whether it is zero at the last instant, and what it does there is for the next step to tell.
     """
 
     sign: float = 0.0
     slope: float = math.nan
-    left: float = math.nan
+    leaving: bool = False
+    resting: bool = False
     waiting: bool = False
-
-    @property
-    def resting(self) -> bool:
-        """Whether the quantity has been zero, to rounding, since the start of the run or the last reset."""
-        return self.left == 0.0
 
 
 class WatchedSteps(NamedTuple):
@@ -218,12 +215,12 @@ def crossings(steps: WatchedSteps, side: Side) -> tuple[list[Crossing], Flags]:
     # the sign before the first look, and those at looks; 0 of a quantity at zero
     signs = np.nan_to_num(np.sign(np.append(side.sign, g)))
     zero = g == 0.0
-    zero[0] |= not math.isnan(side.left)
+    zero[0] |= side.leaving or side.resting
     beside = np.concatenate([np.flatnonzero(signs[:-1] * signs[1:] < 0.0), extrema])
     _add_rounded_zeros(zero, beside, lambda looks: np.abs(g[looks]) <= steps.rounding(rows[looks], s[looks]))
     signs[1:][zero] = 0.0
-    if side.left and not math.isnan(side.left):
-        signs[1], side.left = side.left, math.nan
+    if side.leaving:
+        signs[1], side.leaving = side.sign, False
     found, arrivals = list[Crossing](), list[int]()
 
     def stays(begin: int, end: int) -> bool:
@@ -237,7 +234,7 @@ def crossings(steps: WatchedSteps, side: Side) -> tuple[list[Crossing], Flags]:
     if not len(known):
         return [], beyond
     if side.resting:
-        side.left, look = math.nan, max(int(known[0]) - 2, 0)
+        side.resting, look = False, max(int(known[0]) - 2, 0)
         if side.sign != signs[known[0]]:
             found.append(Crossing(int(rows[look]), float(s[look]), side.sign, touching=False, resting=True))
     here, there, last = known[:-1], known[1:], int(known[-1])

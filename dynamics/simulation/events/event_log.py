@@ -237,7 +237,7 @@ def _sides(look: _Look, own: Sequence[float] | Array) -> list[Side]:
     """Sides of quantities: of one at zero that to which it moves, or rest on its own side."""
     signs = zip(look.zero, np.sign(look.values).tolist(), np.sign(look.motions).tolist(), own, strict=True)
     return [
-        Side(value) if not zero else Side(left=motion) if motion else Side(float(side), left=0.0)
+        Side(value) if not zero else Side(motion, leaving=True) if motion else Side(float(side), resting=True)
         for zero, value, motion, side in signs
     ]
 
