@@ -313,13 +313,8 @@ def over(denominator: int, *numerators: int) -> Fractions:
 SYMPLECTIC_EULER = Partitioned(1, a=((_0,),), b=((_1,),), w=(_1,), c=(_0,))
 VERLET = Partitioned(2, a=(over(2, 0, 0), over(2, 1, 1)), b=(over(2, 1, 0),) * 2, w=over(2, 1, 1), c=(_0, _1))
 MIDPOINT = gauss(1)
-PARTITIONED = {
-    "symplectic_euler": SYMPLECTIC_EULER,
-    "verlet": VERLET,
-    "midpoint": MIDPOINT,
-    "gauss4": gauss(2),
-    "gauss6": gauss(3),
-}
+PARTITIONED = {"symplectic_euler": SYMPLECTIC_EULER, "verlet": VERLET, "midpoint": MIDPOINT}
+PARTITIONED |= {"gauss4": gauss(2), "gauss6": gauss(3)}
 
 
 @dataclass(frozen=True)
@@ -329,21 +324,15 @@ class Composition:
     The base is `verlet` where it is explicit (kinetic energy of the velocities alone, forces of the coordinates), and
     else `midpoint`, which takes any Lagrangian and systems of first order. A palindrome of numbers makes a symmetric
     method, and steps of symplectic maps are symplectic.
-    half: gamma_1 .. up to the middle one, which is last; the rest mirrors them.
     """
 
     order: int
-    half: tuple[float, ...]
-
-    @property
-    def steps(self) -> tuple[float, ...]:
-        """gamma_1, gamma_2, .., which add up to 1."""
-        return (*self.half, *reversed(self.half[:-1]))
+    steps: tuple[float, ...]  # gamma_1, gamma_2, .., which add up to 1
 
 
 def _closed(order: int, *half: float) -> Composition:
-    """Numbers with the middle one that makes their sum 1."""
-    return Composition(order, (*half, 1.0 - 2.0 * sum(half)))
+    """Numbers up to the middle one, which makes their sum 1; the rest mirrors them."""
+    return Composition(order, (*half, 1.0 - 2.0 * sum(half), *reversed(half)))
 
 
 # Yoshida, Phys. Lett. A 150 (1990) 262: the triple jump, solution A of order 6, solution D of order 8.
