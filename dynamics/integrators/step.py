@@ -6,8 +6,7 @@ import inspect
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from fractions import Fraction
-from typing import Any, TypeVar
+from typing import Any
 
 import cgraph as cg
 from cgraph import Graph, Node
@@ -20,7 +19,6 @@ STATES = ("x", "x_new", "atol")
 SHARED = (*STATES, *"t h p rtol leap next end evaluations error at_limit accepted".split())
 Values = Mapping[str, Node | float | Sequence[Node | float]]
 Rule = Callable[..., Values]
-W = TypeVar("W", float, Fraction)
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,7 +150,8 @@ def call(rule: Rule, *reads: str, **lengths: int) -> Call:
 
     rule: a function of nodes, whose parameters are the registers that it reads (without an underscore at the end, where
     the name is one of Python's), and that gives {register: node} of those that it sets.  reads: these registers, where
-    their names are others.  lengths: of those that are lists of several numbers; results may be such lists as well.
+    their names are others; one that no result depends on, such as by a weight of 0, is left out.  lengths: of those
+    that are lists of several numbers; results may be such lists as well.
 
     >>> from dynamics.integrators import call
     >>> later = call(lambda t, h: {"t_new": t + h})
@@ -194,8 +193,11 @@ def _formula(
         for name in names
     ]
     results = rule(*values)
-    outputs = enumerate(_end_to_end(results.values()))
-    return Graph(_end_to_end(values), {f"{k}": number for k, number in outputs}), names, tuple(results)
+    graph = Graph(_end_to_end(values), {f"{k}": number for k, number in enumerate(_end_to_end(results.values()))})
+    if reads and not lengths and not {*graph.inputs} <= (within := {*graph.nodes}):
+        names = tuple([name for name, value in zip(names, values, strict=True) if value in within])
+        graph = Graph([value for value in values if value in within], graph.outputs)
+    return graph, names, tuple(results)
 
 
 def _end_to_end(values: Iterable[Any]) -> list[Any]:
@@ -252,16 +254,15 @@ def weighted(nodes: Sequence[Node], weights: Sequence[float]) -> Node:
     return cg.constant(0.0) if result is None else result
 
 
-def used(weights: Sequence[W], register: str) -> tuple[list[str], list[W]]:
-    """Registers, numbered from 0, whose weight is not 0; and these weights."""
-    numbers = [k for k, weight in enumerate(weights) if weight]
-    return [f"{register}{k}" for k in numbers], [weights[k] for k in numbers]
+def numbered(register: str, count: int, first: int = 0) -> list[str]:
+    """So many registers, by their numbers."""
+    return [f"{register}{k}" for k in range(first, first + count)]
 
 
 def advanced(target: str, weights: Sequence[float]) -> Map:
     """target = x + h * (sum of weight * slope)."""
-    slopes, parts = used(weights, "slope")
-    return each(lambda x, h, *slopes: {target: x + h * weighted(slopes, parts)}, "x", "h", *slopes)
+    slopes = numbered("slope", len(weights))
+    return each(lambda x, h, *slopes: {target: x + h * weighted(slopes, weights)}, "x", "h", *slopes)
 
 
 def combined(rows: Sequence[Sequence[float]], sources: Sequence[str], targets: Sequence[str]) -> Map:

@@ -46,7 +46,7 @@ from ..equations.mass_matrix.singular_mass_matrix import SingularMassMatrixError
 from ..systems.arguments import TIME, new_variables
 from ..systems.system import System
 from .problem import Problem, reaches
-from .step import Step, Values, call, compensated, count, each, stage_time, total, used, weighted
+from .step import Step, Values, call, compensated, count, each, numbered, stage_time, total, weighted
 from .tableau import MIDPOINT, SYMPLECTIC_EULER, VERLET, Composition, Fractions, Partitioned, over
 
 TURNS = 60.0  # of the iteration for the stages, at most
@@ -229,7 +229,7 @@ def _of_rates(method: Partitioned, problem: Problem, composition: Composition) -
 
 def _fixed(method: Partitioned) -> tuple[str, ...]:
     """Registers that the derivative of a step leaves out."""
-    sums = [f"{name}{i}" for name in ("change", "speed") for i in range(len(method.w))]
+    sums = [*numbered("change", len(method.w)), *numbered("speed", len(method.w))]
     return (*sums, *"q_rounding momentum_rounding singular failed failures going turns change_old".split())
 
 
@@ -265,12 +265,11 @@ def _part(step: float, done: float) -> Call:
 
 def _stage(weights: Fractions, base: str, slope: str, target: str) -> Map:
     """target = base + h * (sum of weight * slope)."""
-    slopes, parts = used(weights, slope)
 
     def stage(x: Node, h: Node, *slopes: Node) -> Values:
-        return {target: x + reduce(operator.add, _changes(h, slopes, parts))}
+        return {target: x + reduce(operator.add, _changes(h, slopes, weights))}
 
-    return each(stage, base, "h", *slopes)
+    return each(stage, base, "h", *numbered(slope, len(weights)))
 
 
 def _changes(h: Node, slopes: Sequence[Node], weights: Sequence[Fraction]) -> list[Node]:
@@ -283,7 +282,7 @@ def _changes(h: Node, slopes: Sequence[Node], weights: Sequence[Fraction]) -> li
 def _iterated(method: Partitioned, turn: Sequence[Statement]) -> list[Statement]:
     """Times and a first guess of the stages, and turns from V to W until W = V to rounding."""
     stages = range(len(method.w))
-    changes, speeds = ([f"{name}{i}" for i in stages] for name in ("change", "speed"))
+    changes, speeds = (numbered(name, len(stages)) for name in ("change", "speed"))
 
     def judged(turns: Node, change_old: Node, evaluations: Node, *sums: Node) -> Values:
         """Whether to go on: not when V has settled, no longer comes nearer, or is no number."""
@@ -320,7 +319,7 @@ def _added(base: str, slope: str, weights: Fractions) -> Map:
         x, after = compensated(x, change + reduce(operator.add, rest, before))
         return {base: x, rounding: after}
 
-    return each(end, base, rounding, "h", *[f"{slope}{k}" for k in range(len(weights))])
+    return each(end, base, rounding, "h", *numbered(slope, len(weights)))
 
 
 def _explicit(method: Partitioned, force: Call, velocity: Sequence[Statement], later: Call) -> list[Statement]:

@@ -24,7 +24,7 @@ from cgraph.extend import Call, If, NoSeriesError, Statement, copied, jets, stra
 
 from ..systems.arguments import TIME
 from .problem import Problem
-from .step import Step, Values, call, compensated, count, each, stage_time, total
+from .step import Step, Values, call, compensated, count, each, numbered, stage_time, total
 
 # Operations of all coefficients, before folding, that are one straight graph: more take a second to compile, and would
 # run a third faster.
@@ -38,7 +38,7 @@ SHORTEST = 2.0**-10  # units: the first try where terms say nothing, as of what 
 
 def taylor_step(problem: Problem, order: int) -> Step:
     """The step of an order."""
-    m, graphs, c = problem.size, _jets(problem), _names("c", order)
+    m, graphs, c = problem.size, _jets(problem), numbered("c", order, 1)
     if order * (len(graphs.order.nodes) + graphs.sums * order) <= SHORT_CODE:
         series: list[Statement] = [Call(straight(graphs, order), ("rate", "unit", "zeros"), tuple(c))]
         lengths: dict[str, int] = {}
@@ -65,10 +65,6 @@ def taylor_step(problem: Problem, order: int) -> Step:
     )
 
 
-def _names(name: str, order: int) -> list[str]:
-    return [f"{name}{k}" for k in range(1, order + 1)]
-
-
 def _rates(graphs: Jets, x: str, t: str) -> Call:
     """The rates and coefficients 0 at a state."""
     return Call(graphs.start, (x, t, "p"), ("rate", "zeros"))
@@ -86,9 +82,9 @@ def _jets(problem: Problem) -> Jets:
 
 def _by_orders(m: int, graphs: Jets, order: int) -> tuple[list[Statement], dict[str, int]]:
     """Coefficients of one order after another, and the lengths of registers that it takes; `none` stays 0."""
-    orders = {name: float(k) for k, name in enumerate(_names("order", order), 1)}
+    orders = {name: float(k) for k, name in enumerate(numbered("order", order, 1), 1)}
     body: list[Statement] = [copied("rate", "rates0"), call(lambda: orders)]
-    lengths = dict.fromkeys([*_names("left", order), *_names("right", order), "sums", "none"], graphs.sums)
+    lengths = dict.fromkeys([*numbered("left", order, 1), *numbered("right", order, 1), "sums", "none"], graphs.sums)
     for k in range(1, order + 1):
         if k > 1 and graphs.sums:
             body.append(_products(k - 1))
@@ -99,7 +95,7 @@ def _by_orders(m: int, graphs: Jets, order: int) -> tuple[list[Statement], dict[
 
 def _products(k: int) -> Statement:
     """The sums over products of both sides up to an order."""
-    sides = [*_names("left", k), *_names("right", k)]
+    sides = [*numbered("left", k, 1), *numbered("right", k, 1)]
     return each(lambda *factors: {"sums": convolution(factors[:k], factors[k:])}, *sides)
 
 
@@ -125,7 +121,7 @@ def _wish(order: int) -> list[Statement]:
         h = abs(unit) * cg.where(share > SHORTEST, share, SHORTEST)
         return {"next": cg.where(h < next_, h, next_)}
 
-    c, tolerance = _names("c", order), ("x", "rtol", "atol")
+    c, tolerance = numbered("c", order, 1), ("x", "rtol", "atol")
     last = total(lambda c, weight: {"last": (c * weight) * (c * weight)}, f"c{order}", "weight")
     return [
         If("starting", (each(at_start, *tolerance, *c),), (each(later, *tolerance, "c1"),)),
@@ -152,7 +148,7 @@ def _arrival(order: int) -> Statement:
         slope = s * _polynomial([k * each_one for k, each_one in enumerate(c, 1)], s)
         return {"x_new": x_new, "rounding_new": rounding_new, "slope": slope}
 
-    return each(arrival, "x", "rounding", "s", *_names("c", order))
+    return each(arrival, "x", "rounding", "s", *numbered("c", order, 1))
 
 
 def _polynomial(c: Sequence[Node], s: Node) -> Node:
@@ -191,4 +187,4 @@ def _dense(order: int) -> Statement:
         powers = itertools.accumulate([s] * order, operator.mul)
         return {f"dense{k}": term * power for k, (term, power) in enumerate(zip(c, powers, strict=True), 1)}
 
-    return each(terms, "s", *_names("c", order))
+    return each(terms, "s", *numbered("c", order, 1))
