@@ -30,7 +30,6 @@ if TYPE_CHECKING:
         Along as Along,
         Tape as Tape,
         adjoint as adjoint,
-        along as along,
         run_passes as run_passes,
         tangent as tangent,
     )

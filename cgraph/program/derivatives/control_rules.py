@@ -123,7 +123,7 @@ def push_while(assignment: Assignment, tangent: Tangent) -> None:
     inner = tangent.inner({}, values=True)
     inner.push(turn)
     ends = [copied_or_zero(inner.dots.get(after[at]), dot) for at, dot in dots.items()]
-    tangent.add(replace(loop, body=(*inner.statements, *_handed_on(after), *ends)))  # type: ignore[type-var, call-arg]
+    tangent.add(replace(loop, body=(*inner.statements, *_handed_on(after), *ends)))  # type: ignore[type-var]
 
 
 def pull_while(assignment: Assignment, adjoint: Adjoint) -> None:
@@ -135,8 +135,9 @@ def pull_while(assignment: Assignment, adjoint: Adjoint) -> None:
     outer = {name: adjoint.bars[name] for name in after if name in adjoint.bars}
     if not outer:
         return
-    bars = {name: adjoint.bar(name) for name in outer}
-    inner = adjoint.turned(turn, after, bars)
+    bars = {name: adjoint.bar(name) for name in after if name in adjoint.active}
+    inner = adjoint.inner({after[name]: bar for name, bar in bars.items()})
+    inner.pull(turn)
     inside = {*_written(assignment), *after}
     sums = {name: adjoint.bar(name) for name in inner.bars if name not in inside and name in adjoint.active}
     push: Push = bodies_of(loop)[0][0]  # type: ignore[assignment]
@@ -188,15 +189,10 @@ def assign_fixed_point(statement: FixedPoint, passes: Passes) -> Assignment:
 def push_fixed_point(assignment: Assignment, tangent: Tangent) -> None:
     """v_dot = (dT/dv) v_dot + (dT/de) e_dot, iterated as v was."""
     (turn,), (after,) = assignment.parts, assignment.after
-    moving: dict[str, str] = {}
-    while True:  # which of the registers that turns hand on have tangents
-        inner = tangent.inner(moving)
-        inner.push(turn)
-        more = [name for name in assignment.carried if after[name] in inner.dots and name not in moving]
-        more = [name for name in more if name in tangent.active]
-        if not more:
-            break
-        moving |= {name: tangent.fresh(f"{name}_dot", tangent.lengths[name]) for name in more}
+    carried = [name for name in assignment.carried if name in tangent.active]
+    moving = {name: tangent.fresh(f"{name}_dot", tangent.lengths[name]) for name in carried}
+    inner = tangent.inner(moving)
+    inner.push(turn)
     if tangent.values:
         tangent.add(*flat(turn))
     rows = [(dot, None, inner.dots.get(after[name])) for name, dot in moving.items()]
@@ -210,8 +206,9 @@ def pull_fixed_point(assignment: Assignment, adjoint: Adjoint) -> None:
     outer = {name: adjoint.bars[name] for name in after if name in adjoint.bars}
     if not outer:
         return
-    turning = {name: adjoint.bar(name) for name in outer if name in assignment.carried}
-    inner = adjoint.turned(turn, after, turning, outer)
+    turning = {name: adjoint.bar(name) for name in assignment.carried if name in adjoint.active}
+    inner = adjoint.inner({after[name]: bar for name, bar in {**outer, **turning}.items()})
+    inner.pull(turn)
     rows = [(bar, outer.get(name), inner.bars.get(name)) for name, bar in turning.items()]
     _add_settled(rows, inner.statements, adjoint)
     for name, bar in inner.bars.items():

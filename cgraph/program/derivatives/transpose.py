@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
-from dataclasses import dataclass
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -28,8 +27,6 @@ from .jvp import Assignment, Linearized, Numbers, Passes, Product, Registers, fl
 HEAVY_GRAPH = 4  # operations of a graph for each of its outputs, from which on these are kept and not computed again
 TURNS = 64  # of a loop that its stack has room for, unless more are asked for
 TAPE_BLOCK = 4096  # passes in a block of a tape
-
-
 Pullback = Callable[[Sequence[Node]], Graph]  # a graph's own rule: cotangents of these inputs, see `pulled`
 Rules = Mapping[int, tuple[int, Pullback]]  # by the id of a graph; and how many of its first outputs have cotangents
 
@@ -61,12 +58,7 @@ class Adjoint(Registers):
     """
 
     def __init__(
-        self,
-        bars: Mapping[str, str],
-        active: Set[str],
-        lengths: dict[str, int],
-        own: str,
-        rules: Rules,
+        self, bars: Mapping[str, str], active: Set[str], lengths: dict[str, int], own: str, rules: Rules
     ) -> None:
         super().__init__(lengths, own)
         self.bars, self.active, self.rules, self._kept = dict(bars), active, rules, set(bars.values())
@@ -74,26 +66,6 @@ class Adjoint(Registers):
     def inner(self, bars: Mapping[str, str]) -> Adjoint:
         """Adjoint of a body, from cotangents of its end."""
         return Adjoint(bars, self.active, self.lengths, self.own, self.rules)
-
-    def turned(
-        self,
-        turn: Sequence[Assignment],
-        after: Mapping[str, str],
-        bars: dict[str, str],
-        others: Mapping[str, str] = MappingProxyType({}),
-    ) -> Adjoint:
-        """Adjoint of a turn that begins with what the one before hands on, from cotangents of its end.
-
-        after: {register that a turn begins with: the one that has its value at its end}.  bars: {register: that of its
-        cotangent}, to which those are added that these depend on.  others: those that no turn reads.
-        """
-        while True:
-            inner = self.inner({after[name]: bar for name, bar in {**others, **bars}.items()})
-            inner.pull(turn)
-            more = [name for name in after if name in inner.bars and name not in bars and name in self.active]
-            if not more:
-                return inner
-            bars |= {name: self.bar(name) for name in more}
 
     def pull(self, assignments: Sequence[Assignment]) -> None:
         """Through these assignments, the last first."""
@@ -153,13 +125,15 @@ def _is_heavy(statement: Statement) -> bool:
 
 
 def adjoint(passes: Passes, seeds: Sequence[str], rules: Rules = MappingProxyType({})) -> Linearized:
-    """A pass that pulls cotangents back, of what it hands on, `seeds` and more, and of its inputs.
+    """A pass that pulls cotangents back, of what it hands on, `seeds` among it, and of its inputs.
 
     It is fed what was recorded, the last pass first, and records the cotangents of `varied`.  rules: of graphs.
     """
-    outer = Adjoint({}, passes.active, dict(passes.lengths), passes.own, rules)
-    bars = {name: outer.bar(name) for name in dict.fromkeys(seeds)}
-    inner = outer.turned(passes.plain, passes.handed, bars)
+    handed, lengths = passes.handed, dict(passes.lengths)
+    outer = Adjoint({}, passes.active, lengths, passes.own, rules)
+    bars = {name: outer.bar(name) for name in handed if name in passes.active or name in seeds}
+    inner = outer.inner({handed[name]: bar for name, bar in bars.items()})
+    inner.pull(passes.plain)
     sums, rows = ({name: outer.bar(name) for name in names} for names in (passes.inputs, passes.varied))
     inner.add(*[added(end, inner.bars[name], end) for name, end in sums.items() if name in inner.bars])
     inner.add(*[copied_or_zero(inner.bars.get(name), end) for name, end in {**bars, **rows}.items()])
@@ -186,29 +160,25 @@ def _along(passes: Passes, made: Registers, vectors: Mapping[str, str], record: 
     return Linearized(program, vectors, made.unsolved)
 
 
-@dataclass(frozen=True, eq=False)
 class Along:
-    """Passes that record, and a program that goes along their record, ready to run."""
+    """Passes that record, and a program that goes along their record, ready to run.
 
-    passes: Passes
-    linear: Linearized
-    forward: Runner
-    derivative: Runner
-
-
-def along(passes: Passes, linear: Linearized, results: Sequence[str], backend: str, more: Sequence[str] = ()) -> Along:
-    """The passes, of which `results` are read when all are done, and a program that goes along their record.
-
-    A pass begins with what the one before handed on, in the registers of `handed` after it: the start is put there.
-    more: registers that are recorded besides, after what the linearized program is fed.
+    results: registers that are read when all passes are done.  more: registers that are recorded besides, after what
+    the linearized program is fed. A pass begins with what the one before handed on, in the registers of `handed` after
+    it: the start is put there.
     """
-    handed, record = passes.handed, [*linear.program.feed, *more]
-    ends = [handed.get(name, name) for name in results]
-    body = needed(flat(passes.plain), {*handed.values(), *ends, *record})
-    begin = [copied(after, before) for before, after in handed.items() if passes.lengths[before]]
-    own = [name for name in passes.lengths if passes.own not in name]
-    forward = passes.program(passes, [*begin, *body], record, passes.fed, [*ends, *own])
-    return Along(passes, linear, runner(forward, backend), runner(linear.program, backend))
+
+    def __init__(
+        self, passes: Passes, linear: Linearized, results: Sequence[str], backend: str, more: Sequence[str] = ()
+    ) -> None:
+        handed, record = passes.handed, [*linear.program.feed, *more]
+        ends = [handed.get(name, name) for name in results]
+        body = needed(flat(passes.plain), {*handed.values(), *ends, *record})
+        begin = [copied(after, before) for before, after in handed.items() if passes.lengths[before]]
+        own = [name for name in passes.lengths if passes.own not in name]
+        forward = passes.program(passes, [*begin, *body], record, passes.fed, [*ends, *own])
+        self.passes, self.linear = passes, linear
+        self.forward, self.derivative = runner(forward, backend), runner(linear.program, backend)
 
 
 class Block(NamedTuple):
@@ -229,7 +199,7 @@ class Tape:
     def __init__(
         self,
         of: Along,
-        values: Mapping[str, ArrayLike],
+        values: Mapping[str, Array],
         feed: Callable[[int, int], Array],
         many: int = 1,
         checkpoints: int = 0,
@@ -260,30 +230,32 @@ class Tape:
             yield Block(first, last, rows) if self.checkpoints else block
 
     def value(self, name: str, memory: Array | None = None) -> Array:
-        """A register after the passes, or in another memory of theirs, (k,) or (k, N)."""
+        """A register after the passes, or in another memory of theirs, (k, N)."""
         name = self.of.passes.handed.get(name, name)
-        return self.of.forward.read(self.memory if memory is None else memory, name).copy()
+        return _columns(self.of.forward.read(self.memory if memory is None else memory, name))
 
-    def derivative(self, vectors: Mapping[str, ArrayLike], many: int) -> Array:
+    def derivative(self, vectors: Mapping[str, Array], many: int) -> Array:
         """The memory of the derivative, or many, with these vectors of the registers that have one."""
         names = self.of.linear.vectors
-        values: dict[str, ArrayLike] = {name: self.value(name) for name in self.of.passes.constants}
+        values = {name: self.value(name) for name in self.of.passes.constants}
         values |= {names[name]: vector for name, vector in vectors.items() if name in names}
         return _memory(self.of.derivative, values, many)
 
     def vectors(self, memory: Array) -> tuple[dict[str, Array], Array]:
-        """The vectors in a memory of the derivative, (k,) or (k, N), and what is unsolved, () or (N,)."""
+        """The vectors in a memory of the derivative, (k, N), and whether equations were not solved, (N,)."""
         read, linear = self.of.derivative.read, self.of.linear
-        return {name: read(memory, at).copy() for name, at in linear.vectors.items()}, read(memory, linear.unsolved)[0]
+        found = {name: _columns(read(memory, register)) for name, register in linear.vectors.items()}
+        return found, _columns(read(memory, linear.unsolved))[0]
 
-    def pulled(self, seeds: Mapping[str, ArrayLike]) -> tuple[dict[str, Array], Array, Array]:
-        """Cotangents before the passes, of those after them; the record of each pass; and what `vectors` says."""
-        memory, width, parts = self.derivative(seeds, self.many), self.of.derivative.program.feed_width, []
+    def pulled(self, seeds: Mapping[str, Array]) -> tuple[dict[str, Array], Array, Array]:
+        """Cotangents before the passes, of those after them; the record, (passes, width, N); and what is unsolved."""
+        ready, memory, parts = self.of.derivative, self.derivative(seeds, self.many), []
+        width, shape = ready.program.feed_width, (self.blocks[-1].last, ready.program.width, self.many)
         for first, last, rows in self.recorded(backwards=True):
             fed = rows[::-1, :width] if width else np.empty((last - first, 0))  # without a record there are no rows
-            parts.append(run_passes(self.of.derivative, memory, last - first, 1, fed)[::-1])
+            parts.append(run_passes(ready, memory, last - first, 1, fed)[::-1])
         bars, unsolved = self.vectors(memory)
-        return bars, np.concatenate(parts[::-1]), unsolved
+        return bars, np.concatenate(parts[::-1]).reshape(shape), unsolved
 
 
 def run_passes(ready: Runner, memory: Array, passes: int, every: int, feed: Array) -> Array:
@@ -294,16 +266,20 @@ def run_passes(ready: Runner, memory: Array, passes: int, every: int, feed: Arra
         return ready.run_many(memory, passes, every, feed if feed.ndim == 3 else feed[:, :, None]).rows
 
 
-def _memory(ready: Runner, values: Mapping[str, ArrayLike], many: int) -> Array:
+def _memory(ready: Runner, values: Mapping[str, Array], many: int) -> Array:
     """A memory, or many, with those of the values, (k, N) or for all (k,), that the program has registers for."""
     memory = ready.memory({}, None if many == 1 else many)
-    for name, value in values.items():
+    for name, numbers in values.items():
         if name in ready.program.registers:
-            numbers, register = real_array(f"register {name!r}", value), ready.read(memory, name)
-            if numbers.ndim == 1 < register.ndim:
-                numbers = np.broadcast_to(numbers[:, None], register.shape)
-            ready.write(memory, name, numbers[:, 0] if numbers.ndim == 2 > register.ndim else numbers)
+            register, columns = ready.read(memory, name), numbers[:, None] if numbers.ndim == 1 else numbers
+            one = numbers[:, 0] if numbers.ndim == 2 else numbers
+            ready.write(memory, name, one if register.ndim == 1 else np.broadcast_to(columns, register.shape))
     return memory
+
+
+def _columns(register: Array) -> Array:
+    """(k,) or (k, N) as a copy (k, N)."""
+    return register[:, None].copy() if register.ndim == 1 else register.copy()
 
 
 class Pulled(NamedTuple):
@@ -336,7 +312,7 @@ class ProgramVjp:
     """
 
     def __init__(self, passes: Passes, of: Sequence[str], backend: str, checkpoints: int) -> None:
-        self._along = along(passes, adjoint(passes, of), of, backend)
+        self._along = Along(passes, adjoint(passes, of), of, backend)
         self._of, self._checkpoints = of, checkpoints
         self.handed, self.vectors = dict(passes.handed), dict(self._along.linear.vectors)
         self.forward, self.backward = self._along.forward, self._along.derivative
@@ -361,21 +337,26 @@ class ProgramVjp:
             raise GraphError(f"the feed needs a row for each of {passes} passes, got {len(rows)}")
         inner = {*self.handed.values()}
         own = [name for name in self.forward.program.registers if name not in inner]
-        for what, given, known in (("values", values, own), ("seeds", seeds, self._of)):
-            if strange := [name for name in require_mapping(what, given, "register: numbers") if name not in known]:
-                raise GraphError(f"{what} must be of registers among {', '.join(known)}, got {strange[0]!r:.60}")
-        tape = Tape(self._along, values, lambda first, last: rows[first:last], checkpoints=self._checkpoints)
+        start, cotangents = dict[str, Array](), dict[str, Array]()
+        for what, given, known, to in (("values", values, own, start), ("seeds", seeds, self._of, cotangents)):
+            for name, numbers in require_mapping(what, given, "register: numbers").items():
+                if name not in known:
+                    raise GraphError(f"{what} must be of registers among {', '.join(known)}, got {name!r:.60}")
+                to[name] = real_array(f"{what}[{name!r}]", numbers)
+        tape = Tape(self._along, start, lambda first, last: rows[first:last], checkpoints=self._checkpoints)
         tape.run(0, passes)
-        bars, slopes, unsolved = tape.pulled(seeds)
-        if np.isnan(unsolved):
+        bars, slopes, unsolved = tape.pulled(cotangents)
+        if np.isnan(unsolved[0]):
             turns = self._along.passes.turns
             raise GraphError(f"a loop took more turns than the {turns} there is room for: give turns=")
-        if unsolved:
+        if unsolved[0]:
             raise GraphError("the derivative of a FixedPoint was not solved: its turns do not settle")
-        varied = self._along.passes.varied
-        ends = np.cumsum([self.forward.program.registers[name] for name in varied])[:-1]
-        by_pass = dict(zip(varied, np.split(slopes, ends, axis=1), strict=bool(varied)))
-        return Pulled({name: tape.value(name) for name in self._of}, bars, by_pass)
+        names, lengths, by_pass, at = self._along.passes.varied, self.forward.program.registers, dict[str, Array](), 0
+        for name in names:
+            by_pass[name] = slopes[:, at : at + lengths[name], 0]
+            at += lengths[name]
+        ends = {name: tape.value(name)[:, 0] for name in self._of}
+        return Pulled(ends, {name: bar[:, 0] for name, bar in bars.items()}, by_pass)
 
 
 def program_vjp(

@@ -11,7 +11,6 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -76,10 +75,8 @@ class DifferentiatedRun:
             many=motions.many > 1,
         )
         self.segments: list[Segment] = []
-        begin, x = (
-            float(motions.steps[0].t[0]),
-            self._through(motions.equations.start, motions.x, motions.steps[0].t[0]),
-        )
+        begin = float(motions.steps[0].t[0])
+        x = self._through(motions.equations.start, motions.x, begin)
         for stretch, kept in zip(motions.steps, every or itertools.repeat(0), strict=False):
             self.segments.append(self._segment(stretch.begun(begin), x, kept))
             begin = float(self.segments[-1].steps.t[-1])
@@ -87,7 +84,7 @@ class DifferentiatedRun:
         self.x, self.t = x, np.append(np.concatenate([each.steps.t[:-1] for each in self.segments]), begin)
         self.loss = np.zeros(motions.many)
         if running is not None:
-            self.loss = sum([self._value(each.tape, LOSS)[0] for each in self.segments], self.loss)
+            self.loss = sum([each.tape.value(LOSS)[0] for each in self.segments], self.loss)
 
     @property
     def end(self) -> Array:
@@ -129,22 +126,18 @@ class DifferentiatedRun:
 
         fits = every > 0 or 8 * step_program.forward.program.width * count * many <= MOST_RECORDED
         tape = Tape(step_program, values, fed, many, 0 if fits else math.ceil(math.sqrt(count)), every or 1)
-        segment = Segment(steps, start, tape, self._value(tape, "x"), x)
+        segment = Segment(steps, start, tape, tape.value("x"), x)
         tape.run(0, count - bool(steps.event))
         if steps.event:
             self._arrive(segment, self.events[steps.event])
-        segment.x = self._value(tape, "x")
+        segment.x = tape.value("x")
         bad = ~np.isfinite(segment.x).all(axis=0)
         if failed:
-            bad |= self._value(tape, failed)[0] != 0.0
+            bad |= tape.value(failed)[0] != 0.0
         if bad.any() and many == 1:
             raise MotionError(f"the motion {self.stopped(0, segment)}")
         segment.x[:, bad] = np.nan
         return segment
-
-    def _value(self, tape: Tape, name: str, memory: Array | None = None) -> Array:
-        """A register of a tape, (k, N)."""
-        return _columns(tape.value(name, memory))
 
     def _arrive(self, segment: Segment, event: WatchedEvent) -> None:
         """Make the last step of a segment, as long as it takes to where the event happens."""
@@ -153,12 +146,11 @@ class DifferentiatedRun:
         for _ in range(MOST_TURNS):
             memory = tape.memory.copy()
             run_passes(tape.of.forward, memory, 1, 1, tape.feed(count - 1, count))
-            x = self._value(tape, "x", memory)
+            x = tape.value("x", memory)
             point = self.motions.point(x, t[-1])
-            values = point[len(x) + 1 :, 0].tolist()
-            g, x_dot = event.value(t[-1:], x.T, values), _evaluated(self.motions.problem.rate, point)
+            slopes, x_dot = self._gradient_at(event.name, x, t[-1]), _evaluated(self.motions.problem.rate, point)
             # Newton's method: h -= g / (dg/dx xdot + dg/dt)
-            change = float(g[0] / event.slope(t[-1:], x.T, values, x_dot.T, np.ones(1))[0])
+            change = float((_evaluated(event.values, point) / (slopes[: len(x)].T @ x_dot + slopes[len(x)]))[0, 0])
             if not abs(change) < last:
                 break
             last = abs(change)
@@ -189,7 +181,7 @@ class DifferentiatedRun:
         """After how many steps (T,), and states (T, m, N), from the start to the end: all that are kept."""
         tape, count, m, many = segment.tape, len(segment.steps.h), len(segment.x), self.motions.many
         if tape.checkpoints:
-            kept = [self._value(tape, "x", memory) for *_, memory in tape.blocks]
+            kept = [tape.value("x", memory) for *_, memory in tape.blocks]
             return np.array([*[block.first for block in tape.blocks], count]), np.array([*kept, segment.x])
         numbers = [np.arange(first + tape.every, last + 1, tape.every) for first, last, _ in tape.blocks]
         rows = [kept[:, -m:].reshape(len(kept), m, many) for *_, kept in tape.blocks]
@@ -199,28 +191,26 @@ class DifferentiatedRun:
 
     def pulled(self, bars: Array) -> tuple[Array, Array]:
         """Cotangents (m + 1 + .., N) of start, t and inputs, from those of the end; and rows of forces of each step."""
-        m, motions, varied = len(self.x), self.motions, self.programs.step.passes.varied
+        m, motions = len(self.x), self.motions
         for k, segment in reversed(list(enumerate(self.segments))):
             steps, end, later = segment.steps, segment.steps.t[-1], 0.0
             if (reset := self._reset(steps)) is not None:
                 bars = self._pulled_at(reset, segment.x, end, bars)
             if steps.event:
-                g = self._gradient_at(steps.event, segment)
+                g = self._gradient_at(steps.event, segment.x, end)
                 # lambda with h_bar = x_bar dx/dh + t_bar + lambda (dg/dx dx/dh + dg/dt) = 0
                 slope = self._by_last_length(segment, g[:m]) + g[m]
                 bars = bars - (self._by_last_length(segment, bars[:m]) + bars[m]) / slope * g
                 later = float(bars[m, 0])
-            vectors: dict[str, Any] = {"x": bars[:m], LOSS: 1.0}
-            rows = np.empty((len(steps.h), 0, motions.many))
-            for tape in (segment.tape, segment.start):
-                if tape is not None:
-                    found, record, failed = tape.pulled(vectors)
-                    vectors = self._solved(found, failed)
-                    rows = record.reshape(len(record), -1, motions.many) if tape is segment.tape and varied else rows
+            vectors, rows, failed = segment.tape.pulled({"x": bars[:m], LOSS: np.ones(1)})
+            self._require_solved(failed)
+            if segment.start is not None:
+                vectors, _, failed = segment.start.pulled(vectors)
+                self._require_solved(failed)
             begin, lengths = vectors.get("t", np.zeros((1, motions.many))), motions.equations.lengths
             if k:
                 # cotangents of the instants and lengths of the steps, to which the event adds at the last
-                t, h = (rows[:, varied.index(name), 0].copy() for name in ("t", "h"))
+                t, h = rows[:, :2, 0].T.copy()
                 t[-1] += later
                 if steps.event:
                     h[-1] = 0.0  # which the event determines
@@ -231,11 +221,11 @@ class DifferentiatedRun:
         return self._pulled_at(motions.equations.start, motions.x, float(self.t[0]), bars), rows
 
     def _by_last_length(self, segment: Segment, seed: Array) -> float:
-        """Cotangent of h of the last step of one motion, from the cotangent of x (m, 1) after the step."""
+        """Cotangent of h of the last step of one motion, from that of x (m, 1) after it: t and h are what varies."""
         tape, derivative = segment.tape, segment.tape.of.derivative
         memory, (_, _, rows) = tape.derivative({"x": seed}, 1), next(tape.recorded(backwards=True))
         row = derivative.run(memory, 1, 1, rows[-1:, : derivative.program.feed_width]).rows[0]
-        return float(row[tape.of.passes.varied.index("h")])
+        return float(row[1])
 
     def pushed(self, dots: Array) -> tuple[Array, Array, Array, Array]:
         """Rows of one motion, t (T,) and q with qd (T, m), and the tangents of both, (T, k) and (T, m, k).
@@ -255,7 +245,7 @@ class DifferentiatedRun:
                 lengths[-1, -1] = 1.0
             states, tangents = self._along(segment, given, lengths)
             if steps.event:
-                g = self._gradient_at(steps.event, segment)[:, 0]
+                g = self._gradient_at(steps.event, segment.x, end)[:, 0]
                 tangents, slope = tangents[:, :, :-1], tangents[-1, :, -1]
                 # dg = dg/dx dx + dg/dt dt + dg/dp dp at fixed h, and dh = -dg / (dg/dx dx/dh + dg/dt)
                 length = -(g @ np.concatenate([tangents[-1], times[-2:-1], dots[m + 1 :]])) / (g[:m] @ slope + g[m])
@@ -285,7 +275,9 @@ class DifferentiatedRun:
         if start is not None:
             memory = start.derivative(vectors, many)
             _run_all(start.of.derivative, memory, next(start.recorded(backwards=False)).kept)
-            vectors |= self._solved(*start.vectors(memory))
+            found, failed = start.vectors(memory)
+            self._require_solved(failed)
+            vectors |= found
         push, names, memory = tape.of.derivative, tape.of.linear.vectors, tape.derivative(vectors, many)
         states, tangents = [segment.begin.T], [push.read(memory, names["x"]).copy().reshape(1, m, many)]
         changes = set((np.flatnonzero((np.diff(lengths, axis=0) != 0.0).any(axis=1)) + 1).tolist())
@@ -294,23 +286,19 @@ class DifferentiatedRun:
             for begin, end in itertools.pairwise([first, *[k for k in range(first + 1, last) if k in changes], last]):
                 if len(lengths):
                     push.read(memory, names["h"])[...] = lengths[begin]
-                found = _run_all(push, memory, rows[begin - first : end - first])
-                tangents.append(found.reshape(end - begin, m, many))
-        self._solved(*tape.vectors(memory))
+                pushed = _run_all(push, memory, rows[begin - first : end - first])
+                tangents.append(pushed.reshape(end - begin, m, many))
+        self._require_solved(tape.vectors(memory)[1])
         return np.concatenate(states), np.concatenate(tangents)
 
-    def _solved(self, vectors: dict[str, Array], unsolved: Array) -> dict[str, Array]:
-        """Tangents or cotangents, (k, N) each. Raises MotionError where they are of equations that were not solved."""
-        if ((np.asarray(unsolved) != 0.0) & np.isfinite(self.x).all(axis=0)).any():
+    def _require_solved(self, failed: Array) -> None:
+        """Raises MotionError where tangents or cotangents are those of equations that were not solved."""
+        if ((failed != 0.0) & np.isfinite(self.x).all(axis=0)).any():
             raise MotionError("the equations of a step's derivative were not solved: the step is too long")
-        return {name: _columns(vector) for name, vector in vectors.items()}
 
-    def _gradient_at(self, event: str, segment: Segment) -> Array:
-        """Slopes of an event's quantity by x, t and inputs, (m + 1 + .., 1), at the end of a segment."""
-        return _evaluated(
-            _pullback(self.events[event].values),
-            np.concatenate([self.motions.point(segment.x, segment.steps.t[-1]), [[1.0]]]),
-        )
+    def _gradient_at(self, event: str, x: Array, t: float) -> Array:
+        """Slopes of an event's quantity by x, t and inputs, (m + 1 + .., 1)."""
+        return _evaluated(_pullback(self.events[event].values), np.append(self.motions.point(x, t), [[1.0]], axis=0))
 
     def _pulled_at(self, graph: Graph | None, x: Array, t: float, bars: Array) -> Array:
         """Cotangents (m + 1 + .., N) of x, t and inputs, with those of the state that a graph makes of them."""
@@ -331,11 +319,6 @@ class DifferentiatedRun:
     def _through(self, graph: Graph | None, x: Array, t: float) -> Array:
         """The states (m, N) that a graph over the states, t and parameters makes of some; the same without a graph."""
         return x if graph is None else _evaluated(graph, self.motions.point(x, t))
-
-
-def _columns(numbers: Array) -> Array:
-    """(k,) or (k, N) as (k, N)."""
-    return numbers[:, None] if numbers.ndim == 1 else numbers
 
 
 def _run_all(ready: Runner, memories: Array, rows: Array) -> Array:

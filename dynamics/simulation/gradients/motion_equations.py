@@ -47,8 +47,8 @@ class MotionEquations:
 
     def registers(self, inputs: Array) -> dict[str, Array]:
         """The registers of the parameters, of these end to end."""
-        ends = np.cumsum([*self.lengths.values()])[:-1]
-        return dict(zip(PARAMETERS, np.split(inputs, ends), strict=True))
+        p = self.forces + len(self.names)
+        return dict(zip(PARAMETERS, (inputs[: self.forces], inputs[self.forces : p], inputs[p:]), strict=True))
 
     def values(self, p: Array, backend: str) -> Array:
         """p and c, (P + C, N), from p (P, N)."""

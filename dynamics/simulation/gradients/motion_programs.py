@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph._shared import TURNS, Along, Passes, adjoint, along, memo, tangent
+from cgraph._shared import TURNS, Along, Passes, adjoint, memo, tangent
 from cgraph.extend import STATEMENTS, Call, Map, Program, Statement
 
 from ...integrators import Method
@@ -87,10 +87,10 @@ def motion_programs(
         read = [name for name in (*step.handed, *step.constants) if name not in GIVEN]
         start = make(Program(lengths, begin, record=()), read, [name for name in wrt if name != "h"])
         seeds = [name for name in linear.vectors if name in start.handed]
-        first = along(start, tangent(start, ["x"]) if forwards else adjoint(start, seeds, rules), read, backend)
+        first = Along(start, tangent(start, ["x"]) if forwards else adjoint(start, seeds, rules), read, backend)
     results = [name for name in ("x", LOSS, made.failed) if name in step.handed]
     rows = [step.handed[name] for name in (made.failed, "x") if name in step.handed]
-    return MotionPrograms(first, along(step, linear, results, backend, rows), made.failed)
+    return MotionPrograms(first, Along(step, linear, results, backend, rows), made.failed)
 
 
 def _separate(statements: Sequence[Statement]) -> list[Statement]:

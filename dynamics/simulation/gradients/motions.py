@@ -34,7 +34,7 @@ from .motion_equations import MotionEquations, at, motion_equations
 
 Loss = Callable[..., Node | float]
 START, VELOCITY, TORQUE = "q", "qd", "tau"
-OPTIONS_KEPT = 16  # options that stay for another run
+OPTIONS_KEPT = 16  # options and equal steps that stay for another run
 EQUAL = "rk4"  # by which equal steps are, unless another method is asked for
 _PLAIN = (float, int, str, bool, type(None))
 
@@ -56,6 +56,8 @@ class Stretch(NamedTuple):
     def begun(self, t: float) -> Stretch:
         """The steps where they begin at another instant."""
         later = t - self.t[0]
+        if not (later or self.event):
+            return self
         return self._replace(t=self.t + self.by_t * later, h=self.h + self.by_h * later)
 
     def halved(self) -> Stretch:
@@ -154,14 +156,9 @@ class Motions:
         """The events by name, of states and forces as the steps have them."""
         return {event.name: event for event in event_program(self.problem, self.events).events}
 
-    def of(self, part: slice) -> Motions:
-        """Some of the motions."""
+    def of(self, part: slice | list[int]) -> Motions:
+        """Some of the motions, by number."""
         return replace(self, x=self.x[..., part], tau=self.tau[..., part], values=self.values[..., part])
-
-    def repeated(self, many: int) -> Motions:
-        """One motion as many."""
-        x, tau, values = (np.broadcast_to(each, (*each.shape[:-1], many)) for each in (self.x, self.tau, self.values))
-        return replace(self, x=x, tau=tau, values=values)
 
     def with_steps(self) -> Motions:
         """One motion with the steps that are chosen and cut by events, and what speaks against these.
@@ -317,8 +314,13 @@ def _equal_steps(run: RunOptions, rows: int | None) -> Stretch:
     count = step_count(run.length, run.step) if rows is None or run.dt is not None else rows
     if rows is not None and rows != count:
         raise ValueError(f"tau has {rows} rows, and there are {count} steps of dt = {run.step:g} s: leave out dt")
-    t = run.t0 + np.arange(count) * ((run.t_end - run.t0) / count)
-    return _stretch(np.append(t, run.t_end), count, run.t_end)
+    return _equal_stretch(run.t0, run.t_end, count)
+
+
+@memo(OPTIONS_KEPT)
+def _equal_stretch(t0: float, t_end: float, count: int) -> Stretch:
+    t = t0 + np.arange(count) * ((t_end - t0) / count)
+    return _stretch(np.append(t, t_end), count, t_end)
 
 
 def _stretches(

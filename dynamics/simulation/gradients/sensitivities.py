@@ -133,7 +133,7 @@ def sensitivities(
         warnings.warn(text, SimulationWarning, stacklevel=2)
     # a column for each number of `wrt`: the transpose of how cotangents of it are made of those of x, t and inputs
     units = np.eye(len(motions.point(motions.x, 0.0)))
-    by = motions.repeated(len(units)).by_names(units)
+    by = motions.of([0] * len(units)).by_names(units)
     t, x, t_dot, x_dot = run.pushed(np.concatenate([np.atleast_2d(rows) for rows in by.values()]).T)
     columns: dict[str, int | slice] = {}
     at = 0
