@@ -104,7 +104,8 @@ if TYPE_CHECKING:
     from .simulation.gradients.gradient_many import gradient_many as gradient_many
     from .simulation.gradients.sensitivities import sensitivities as sensitivities
     from .simulation.outcome import MotionError as MotionError
-    from .simulation.prepared_motion import PreparedMotion as PreparedMotion
+    from .simulation.run import Run as Run
+    from .simulation.run_options import Options as Options
     from .simulation.sampled_controller import SampledController as SampledController
     from .simulation.simulate import prepare as prepare, simulate as simulate
     from .simulation.trajectory import SimulationWarning as SimulationWarning, Trajectory as Trajectory

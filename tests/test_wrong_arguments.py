@@ -235,9 +235,9 @@ CALLS = {
         dyn.prepare, ARM, "rk4", max_step=None, rtol=None, atol=None, events=(), dense_output=False, tau=0.0,
         first_step=None, form="velocity", varied=(), **RUNS
     ),
-    "dyn.PreparedMotion.end": call(MOTION.end, [0.1], [0.0], 0.02, 0.0, parameters=None),
-    "dyn.PreparedMotion.ends": call(MOTION.ends, [[0.1], [0.2]], [0.0], 0.02, 0.0, parameters=None, workers=1),
-    "dyn.PreparedMotion.start": call(MOTION.start, [0.1], [0.0], 0.02, 0.0, parameters=None),
+    "dyn.Run.end": call(MOTION.end, [0.1], [0.0], 0.02, 0.0, parameters=None),
+    "dyn.Run.ends": call(MOTION.ends, [[0.1], [0.2]], [0.0], 0.02, 0.0, parameters=None, workers=1),
+    "dyn.Run.start": call(MOTION.start, [0.1], [0.0], 0.02, 0.0, parameters=None),
     "dyn.MotionSteps.propagate_until": call(MOTION.start([0.1], [0.0], 1.0).propagate_until, 0.02),
     "dyn.gradient": call(
         dyn.gradient, ARM, lambda q, qd, t: q[0], [0.1], [0.0], 1.0, "euler", running=lambda q, qd, tau, t: q[0],
@@ -462,7 +462,7 @@ WORDS = {
 
 # Records: plain data that the library fills in, or that is checked when a mechanism is made of it.
 RECORDS = """
-    cg.Compiled cg.Counts cg.Edge cg.Node dyn.Ensemble dyn.Force dyn.JointForce dyn.PreparedMotion
+    cg.Compiled cg.Counts cg.Edge cg.Node dyn.Ensemble dyn.Force dyn.JointForce dyn.Options dyn.Run
     dyn.QuasiVelocities dyn.Subtree dyn.Trajectory dyn.Verdict extend.MathML extend.Statement extend.StatementRow
     extend.Notation extend.Op
 """

@@ -13,7 +13,7 @@ from .trajectory import SimulationWarning
 
 
 class MotionSteps:
-    """A motion as it goes on, made by `PreparedMotion.start`. One thread at a time may move it.
+    """A motion as it goes on, made by `Run.start`. One thread at a time may move it.
 
     By `step` to its end it has the states of the trajectory's rows, to the bit. An instant of `propagate_until` cuts a
     step, so that those that follow are others, within the same tolerance.

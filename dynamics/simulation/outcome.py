@@ -39,7 +39,7 @@ class MotionError(ValueError):
 
 
 class MotionEnd(NamedTuple):
-    """End of a motion, as `PreparedMotion.end` gives it, or of N, as `ends` does.
+    """End of a motion, as `Run.end` gives it, or of N, as `ends` does.
 
     Parameters
     ----------

@@ -20,7 +20,7 @@ from ...simulation.outcome import Recorder
 from ...simulation.run_options import RunOptions
 from ...simulation.steps.integration import integration
 from ...simulation.steps.step_program import CompiledSteps, compile_steps, step_program
-from ...simulation.steps.stepping import Integration, NativeRun
+from ...simulation.steps.stepping import Integration
 from ..accuracy_task import AccuracyTask
 from ..timing import Timed
 
@@ -138,11 +138,11 @@ class Ours(Solver):
         if self.kind == EQUAL and self._at_least(knob) > LONGEST_RUN:  # one that does not look at the clock on its way
             return Run(lambda: Outcome(self.start, status=f"would take longer than {LONGEST_RUN:g} s"))
         compiled, options = self._plain, self._options(knob, [self.task.t_end])
-        return Run(lambda: finished(integration(NativeRun(compiled, options)), self.start))
+        return Run(lambda: finished(integration(compiled, options), self.start))
 
     def _at_least(self, knob: float) -> float:
         """Seconds that so many equal steps take, by the first few of them."""
-        run = integration(NativeRun(self._plain, self._options(knob, [self.task.t_end], TRIAL)))
+        run = integration(self._plain, self._options(knob, [self.task.t_end], TRIAL))
         begin = time.perf_counter()
         finished(run, self.start)
         return (time.perf_counter() - begin) * knob / min(knob, TRIAL)
@@ -151,4 +151,4 @@ class Ours(Solver):
         """The states at the task's times, (T, m); NaN from where it stopped."""
         options = self._options(knob, self.task.times)
         compiled = self._dense if options.between else self._plain
-        return recorded(integration(NativeRun(compiled, options)), self.start, self.task.times)
+        return recorded(integration(compiled, options), self.start, self.task.times)

@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike
 from cgraph._shared import Array
 
 from ...equations.states.initial_value import initial_values
-from ..moving import Moving
 from ..row_values import converted
+from ..run import Run
 from ..run_options import RunOptions
 from ..steps.step_program import step_program
 from ..steps.stepping import BLOCK_TIME
@@ -37,7 +37,7 @@ def single_values(parameters: Mapping[str, Any], varied: Sequence[str]) -> dict[
 
 
 def ends_of(
-    moving: Moving,
+    moving: Run,
     options: RunOptions,
     q: ArrayLike,
     qd: ArrayLike | None,
@@ -60,7 +60,7 @@ def ends_of(
     x, team = converted(problem.momentum, t0, start.x, p), checked(workers)
 
     alike = len(x), t0, options.t_end, team if isinstance(team, int) else None
-    shared = moving.shared_out(alike, lambda: _Shared(moving, options, len(x), team))
+    shared = moving.kept(alike, lambda: _Shared(moving, options, len(x), team))
     rows = shared.by_lanes(x, p) if team == 1 else None
     if rows is None:
         rows = shared.by_chunks(x, p, team)
@@ -71,7 +71,7 @@ def ends_of(
 class _Shared:
     """So many motions to the only row of the options, shared out: what is done once for the calls that are alike."""
 
-    def __init__(self, moving: Moving, options: RunOptions, count: int, team: Team) -> None:
+    def __init__(self, moving: Run, options: RunOptions, count: int, team: Team) -> None:
         options.check(moving.problem.states)
         program = step_program(moving.stepped, options.integrator, dense=False)
         grids, in_lanes = side_by_side(program, options, count)

@@ -20,9 +20,9 @@ from cgraph._shared import Array, require_path, require_whole
 from ...equations.states.initial_value import InitialValues, initial_values
 from ...integrators import Problem, derive, in_form
 from ...systems.model import Model
+from ..applied_force import with_applied
 from ..events.event import Event, EventProgram, as_events, event_program
 from ..events.event_log import split_crossings
-from ..moving import with_applied
 from ..row_values import converted, unreached_momenta
 from ..run_options import METHOD, RunOptions, require_room, time_span
 from ..sampled_controller import SampledController
@@ -145,13 +145,13 @@ def simulate_many(
     arguments = (dt, max_step, rtol, atol, t_eval, first_step, max_steps, backend, progress)
     options = RunOptions(t_end, method, *arguments, t0, estimate_error, fma)
     watched, team = as_events(events), checked(workers)
-    model, applied = with_applied(model, tau, parameters)
-    start = initial_values(model, q, qd, applied.constant, parameters, t0)
+    applied = with_applied(model, tau, parameters)
+    start = initial_values(applied.model, q, qd, applied.constant, parameters, t0)
     options.check(start.states)
     count = _row_count(options, *start.x.shape, stored=store is not None)
 
     # Derive the equations as graphs, and write the steps of the method over them
-    begin, problem = time.perf_counter(), in_form(derive(model, start.bound), form)
+    begin, problem = time.perf_counter(), in_form(derive(applied.model, start.bound), form)
     program = step_program(problem, options.integrator, dense=bool(watched) or options.between)
     watch = event_program(problem, watched)
 

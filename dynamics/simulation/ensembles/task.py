@@ -30,7 +30,6 @@ from ..steps.stepping import (
     BLOCK_TIME,
     Integration,
     NativeIntegration,
-    NativeRun,
     StoppedError,
     begin_equal,
     failed_step,
@@ -339,14 +338,16 @@ class Task:
             if time.perf_counter() >= end:
                 break
             count += 1
-            x, native = chunk.x[k], NativeRun(compiled, self.options, chunk.p[k].tolist(), stopped)
+            x, p = chunk.x[k], chunk.p[k].tolist()
             if isinstance(run, NativeIntegration):
-                run.set_parameters(native.parameters)
+                run.set_parameters(p)
             else:
-                run = integration(native, events=self.events)
+                run = integration(compiled, self.options, p, stopped=stopped, events=self.events)
             by_end = run if ends and isinstance(run, AdaptiveIntegration) else None
             if by_end is None or not run_unseen(by_end, x, part.runs, k, part.rows[k]):
-                run = run if by_end is None else integration(native)  # whose first blocks are short: it says when
+                run = (
+                    run if by_end is None else integration(compiled, self.options, p, stopped=stopped)
+                )  # whose first blocks are short: it says when
                 stats, recorder = outcome(run, x, self.options)
                 if stats.message.startswith(INTERRUPTED):
                     raise KeyboardInterrupt

@@ -20,8 +20,8 @@ from ...systems.arguments import Parameters, call_user_function
 from ...systems.model import Model, as_equations
 from ...systems.ode_system import OdeSystem
 from ...systems.system import System
+from ..applied_force import Constant
 from ..events.event import Event, as_events
-from ..moving import Constant
 from ..trajectory import SimulationWarning
 from .doubts import doubts
 from .motion import START, TORQUE, VELOCITY, MotionRequest, motion_of

@@ -17,8 +17,8 @@ from ...equations.state_equation import state_inputs
 from ...equations.states.initial_value import initial_values
 from ...integrators import Method, Problem, derive, in_form
 from ...systems.model import Model
+from ..applied_force import with_applied
 from ..events.event import Event, event_program
-from ..moving import with_applied
 from ..outcome import MotionError, Recorder, advise
 from ..row_values import converted, unreached_momenta
 from ..run_options import METHOD, RunOptions, time_span
@@ -172,7 +172,8 @@ def motion_of(
     if rows is not None and (run.adaptive or events):
         needed = "equal steps without events" if events else f"equal steps: method {method!r} chooses its steps"
         raise ValueError(f"tau of shape {np.shape(tau)} is one row a step, which needs {needed}")
-    moving, applied = with_applied(model, tau if rows is None else 0.0, parameters)
+    applied = with_applied(model, tau if rows is None else 0.0, parameters)
+    moving = applied.model
     constant = rows[:, 0] if many and rows is not None else applied.constant  # a motion for each of their first forces
     start = initial_values(moving, q, qd, constant, parameters, t0, many=many)
     run.check(start.states)

@@ -15,8 +15,8 @@ from cgraph import Graph, Node
 from cgraph._shared import Array
 
 from ...systems.model import Model
+from ..applied_force import Constant
 from ..events.event import Event, as_events
-from ..moving import Constant
 from ..row_values import values_of
 from ..trajectory import SimulationWarning
 from .doubts import doubts

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -20,8 +20,8 @@ from ..sampled_controller import Hold
 from .dense_output import StepBlock
 from .first_step import TOLERANCE, given, instant
 from .flat_position import CREEP, FlatPosition
-from .step_program import compile_steps, step_program
-from .stepping import FixedStepIntegration, Integration, NativeIntegration, NativeRun, nonfinite
+from .step_program import CompiledSteps, compile_steps, step_program
+from .stepping import FixedStepIntegration, Integration, NativeIntegration, nonfinite
 
 if TYPE_CHECKING:
     from ..events.event import EventProgram
@@ -35,13 +35,24 @@ class AdaptiveIntegration(NativeIntegration):
     A run that goes on after an end has steps as if that had been none, but for the last.
     """
 
-    def __init__(self, run: NativeRun, *, every_step: bool = True) -> None:
-        options, program = run.options, run.compiled.program
+    def __init__(
+        self,
+        compiled: CompiledSteps,
+        options: RunOptions,
+        parameters: Sequence[float] = (),
+        control: Hold | None = None,
+        stopped: Callable[[], bool] = lambda: False,
+        *,
+        every_step: bool = True,
+    ) -> None:
+        program = compiled.program
         self.relative = max(options.relative, program.finest)
-        super().__init__(run, beginning(options, self.relative))
-        self.runner.write(self._start, TOLERANCE, tolerance(options))
+        super().__init__(compiled, options, parameters, control, stopped)
         self._tolerance, self.flat = self.runner.read(self._memory, TOLERANCE), FlatPosition(program)
         self._recorded = every_step or options.relative < self.relative or self.flat.rows is not None  # to be looked at
+
+    def _first(self) -> Mapping[str, ArrayLike]:
+        return {**beginning(self.options, self.relative), TOLERANCE: tolerance(self.options)}
 
     def restart(self) -> None:
         """Nothing of a run is done."""
@@ -60,7 +71,10 @@ class AdaptiveIntegration(NativeIntegration):
                 return
             absolute = self._tolerance.copy()
             most = int(min(left, 2**31 if self.flat.rows is None else CREEP))
-            rows = self._advance(most)[0] if self._recorded else self._last(most)
+            rows = self._advance(most, int(self._recorded))[0]
+            if not self._recorded:
+                made = self._number("longest_made") != 0.0
+                rows = np.array([[self.t, self.t - self._number("t_old"), *self.x.tolist()]][: int(made)])
             status = self._number("status")
             self._count()
             if len(rows):
@@ -72,13 +86,6 @@ class AdaptiveIntegration(NativeIntegration):
             self._judge()
             if status == TOO_SMALL or (status == DONE and not self._next_period()):
                 return
-
-    def _last(self, most: int) -> Array:
-        """Make passes, at most so many: the row of the last step, if there is one."""
-        self._piece(most)
-        if self._number("longest_made") == 0.0:
-            return np.empty((0, 2 + len(self.x)))
-        return np.array([[self.t, self.t - self._number("t_old"), *self.x.tolist()]])
 
     def _count(self, steps: int = 0) -> None:
         self.rejected = int(self._number("rejected"))
@@ -111,15 +118,8 @@ class AdaptiveIntegration(NativeIntegration):
     @property
     def counts(self) -> dict[str, float]:
         """Numbers of `Stats` of an unseen run."""
-        rejected, longest = self._number("rejected"), self._number("longest_made")
-        steps = self._number("trials") - rejected if longest else 0.0
-        evaluations = self._number("evaluations")
-        return {
-            "steps": steps,
-            "rejected": rejected,
-            "nfev": evaluations,
-            "dt": min(longest, self.options.longest_step),
-        }
+        self._count()
+        return {"steps": self.steps, "rejected": self.rejected, "nfev": self.evaluations, "dt": self.largest}
 
     def until(self, t: float) -> None:
         """Steps to t, the last of which ends there."""
@@ -252,7 +252,7 @@ def integration_of(
     problem: Problem,
     options: RunOptions,
     parameters: Sequence[float] = (),
-    hold: Hold | None = None,
+    control: Hold | None = None,
     *,
     events: EventProgram | None,
     between: bool,
@@ -260,26 +260,34 @@ def integration_of(
     """A run of a problem, before its first step. between: with all steps, and the dense output of chosen ones."""
     method = options.integrator
     program = step_program(problem, method, dense=method.adaptive and (between or options.between))
-    run = NativeRun(compile_steps(program, options.backend, options.fma), options, parameters, control=hold)
-    return integration(run, every_step=between, events=events)
+    compiled = compile_steps(program, options.backend, options.fma)
+    return integration(compiled, options, parameters, control, every_step=between, events=events)
 
 
-def integration(run: NativeRun, *, every_step: bool = False, events: EventProgram | None = None) -> Integration:
+def integration(
+    compiled: CompiledSteps,
+    options: RunOptions,
+    parameters: Sequence[float] = (),
+    control: Hold | None = None,
+    stopped: Callable[[], bool] = lambda: False,
+    *,
+    every_step: bool = False,
+    events: EventProgram | None = None,
+) -> Integration:
     """A run, before its first step.  every_step: keep also those between times of t_eval."""
-    options = run.options
-    every_step = every_step or options.times is None
     if events is not None:
-        return _watched(lambda segment: integration(run._replace(options=segment), every_step=True), options, events)
-    if run.compiled.program.adaptive:
-        return AdaptiveIntegration(run, every_step=every_step or options.between)
-    return FixedStepIntegration(run, every_step=every_step or options.estimated)
+        from ..events.event_log import WatchedIntegration  # which a run without events does without
 
+        def segment(rest: RunOptions) -> Integration:
+            return integration(compiled, rest, parameters, control, stopped, every_step=True)
 
-def _watched(segment: Callable[[RunOptions], Integration], options: RunOptions, events: EventProgram) -> Integration:
-    """A run with events; without them what watches is not loaded."""
-    from ..events.event_log import WatchedIntegration
-
-    return WatchedIntegration(segment, options, events)
+        return WatchedIntegration(segment, options, events)
+    every_step = every_step or options.times is None
+    if compiled.program.adaptive:
+        every_step = every_step or options.between
+        return AdaptiveIntegration(compiled, options, parameters, control, stopped, every_step=every_step)
+    every_step = every_step or options.estimated
+    return FixedStepIntegration(compiled, options, parameters, control, stopped, every_step=every_step)
 
 
 END, GOAL, INSTANT = [*over(0.0, 1.0)][1:4]  # names of registers

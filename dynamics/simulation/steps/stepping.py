@@ -8,11 +8,12 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from cgraph import Graph
 from cgraph._shared import Array
 from cgraph.extend import Runner
 
@@ -83,43 +84,35 @@ class Integration(ABC):
         return f"stopped at t = {t:.6g} s after max_steps = {most:g} steps"
 
 
-class NativeRun(NamedTuple):
-    """Run of one of our methods: its program, memory and record.
-
-    parameters: values of the program's inputs that are not built in.
-    stopped: asked before every block; a run that is stopped raises StoppedError.
-    control: the forces that are held over periods, which then are the parameters.
-    """
-
-    compiled: CompiledSteps
-    options: RunOptions
-    parameters: Sequence[float] = ()
-    stopped: Callable[[], bool] = lambda: False
-    control: Hold | None = None
-
-
 class NativeIntegration(Integration):
     """Runs of one of our methods, one after another in a memory that is kept; one thread at a time.
 
     A run is recorded, by `blocks`, or goes on unrecorded: from `begin` by `step`, `until` an instant, or `to_end`.
-    x: the state, (m,), in the memory, whose halves are q and qd.
+    x: the state, (m,), in the memory, whose halves are q and qd.  parameters: inputs of the program.
+    control: the forces that are held over periods, which then are the parameters.
+    stopped: asked before every block; a run that is stopped raises StoppedError.
     """
 
-    def __init__(self, run: NativeRun, start: Mapping[str, float]) -> None:
-        """start: registers of one number before a run, besides its span."""
-        compiled = run.compiled
+    def __init__(
+        self,
+        compiled: CompiledSteps,
+        options: RunOptions,
+        parameters: Sequence[float] = (),
+        control: Hold | None = None,
+        stopped: Callable[[], bool] = lambda: False,
+    ) -> None:
         super().__init__(compiled.program.components)
-        self.run, self.program, self.runner, self.options = run, compiled.program, compiled.runner, run.options
-        self.control = run.control
+        self.compiled, self.program, self.runner = compiled, compiled.program, compiled.runner
+        self.options, self.control, self.stopped = options, control, stopped
         self._passes, self._factored, self.prices = FIRST_PASSES, compiled.factorizations, compiled.prices
         self._stop = compiled.places[str(self.runner.program.stop)]
         self._start, self._memory, self._at = np.zeros(self.runner.size), np.zeros(self.runner.size), compiled.places
         self._numbers: Any = self._memory.data  # whose items are read and written faster
         self._zero: Any = self._start.data
-        for name, value in start.items():
-            self._start[self._at[name]] = value
-        if run.control is None:
-            self.set_parameters(run.parameters)
+        for name, value in self._first().items():
+            self.runner.write(self._start, name, value)
+        if control is None:
+            self.set_parameters(parameters)
         self.x = self.runner.read(self._memory, "x")
         self.q, self.qd = self.x[: self.program.nq], self.x[self.program.nq :]
         self._halves: Any = (self.q.data, self.qd.data)
@@ -155,6 +148,10 @@ class NativeIntegration(Integration):
         return math.isfinite(self.x.dot(self.x))
 
     @abstractmethod
+    def _first(self) -> Mapping[str, ArrayLike]:
+        """Registers before a run, besides its span."""
+
+    @abstractmethod
     def _begin(self, t0: float, t_end: float) -> None: ...
 
     @abstractmethod
@@ -178,31 +175,18 @@ class NativeIntegration(Integration):
         self._unrecorded(min(FIRST_PASSES, most))
         most -= FIRST_PASSES
         while most > 0 and self._numbers[self._stop] == RUNNING:
-            most -= self._piece(most)
+            most -= self._advance(most, 0)[1]
 
-    def _piece(self, most: int) -> int:
-        """How many passes were made, unrecorded, at most so many or until the program stops."""
-        if self.run.stopped():
+    def _advance(self, most: int, every: int = 1) -> tuple[Array, int]:
+        """Make passes, at most so many: the rows of each `every`th, or with 0 of the last alone; and how many."""
+        if self.stopped():
             raise StoppedError
         passes, begin = min(self._passes, most), time.perf_counter()
-        self._unrecorded(passes)
-        if passes == self._passes and self._numbers[self._stop] == RUNNING:
-            self._pace(passes, begin)
-        return passes
-
-    def _advance(self, most: int, *, whole: bool = False) -> tuple[Array, int]:
-        """Make passes, at most so many: their rows (the last alone, with `whole`), and how many."""
-        if self.run.stopped():
-            raise StoppedError
-        passes, begin = min(self._passes, most), time.perf_counter()
-        rows, done = self.runner.run(self._memory, passes, passes if whole else 1)
+        rows, done = self.runner.run(self._memory, passes, every or passes)
         if done == self._passes:
-            self._pace(passes, begin)
+            share = BLOCK_TIME / max(time.perf_counter() - begin, 1e-9)
+            self._passes = max(1, int(passes * min(4.0, share)))
         return rows, done
-
-    def _pace(self, passes: int, begin: float) -> None:
-        """How many passes may go together, since so many took until now."""
-        self._passes = max(1, int(passes * min(4.0, BLOCK_TIME / max(time.perf_counter() - begin, 1e-9))))
 
     def _count(self, steps: int) -> None:
         """So many steps more.
@@ -232,20 +216,30 @@ class FixedStepIntegration(NativeIntegration):
     """
 
     def __init__(
-        self, run: NativeRun, *, every_step: bool = True, stretches: Sequence[EqualSteps] | None = None
+        self,
+        compiled: CompiledSteps,
+        options: RunOptions,
+        parameters: Sequence[float] = (),
+        control: Hold | None = None,
+        stopped: Callable[[], bool] = lambda: False,
+        *,
+        every_step: bool = True,
+        stretches: Sequence[EqualSteps] | None = None,
     ) -> None:
-        super().__init__(run, {"fresh": 1.0} if "fresh" in run.compiled.places else {})
-        self.every_step, options = every_step, run.options
+        super().__init__(compiled, options, parameters, control, stopped)
+        self.every_step = every_step
         if stretches is None:
-            instants = options.instants if run.control is None else run.control.instants(options.instants)
+            instants = options.instants if control is None else control.instants(options.instants)
             stretches = equal_steps(instants, options.step)
-        self.stretches, self.stretch = stretches, stretches[0]
+        self.stretches, self.stretch, self._left = stretches, stretches[0], 0
+
+    def _first(self) -> Mapping[str, ArrayLike]:
+        return {"fresh": 1.0} if "fresh" in self._at else {}
 
     def beside(self, stretches: Sequence[EqualSteps], parameters: Sequence[float]) -> FixedStepIntegration:
         """Run by other steps, with parameters in place of a controller."""
         options = replace(self.options, max_steps=math.inf)
-        run = self.run._replace(options=options, parameters=parameters, control=None)
-        return FixedStepIntegration(run, stretches=stretches)
+        return FixedStepIntegration(self.compiled, options, parameters, None, self.stopped, stretches=stretches)
 
     def blocks(self, x: Array) -> Iterator[StepBlock]:
         """The steps from x (m,) on, some at a time."""
@@ -256,7 +250,7 @@ class FixedStepIntegration(NativeIntegration):
             if self.control is not None:
                 self.parameters = self.control.at(stretch.begin, self.x)
                 self.runner.write(self._memory, "p", self.parameters)
-            yield from self._recorded(stretch)
+            yield from self._recorded(self.every_step, self.options.max_steps)
             if self.status:
                 return
 
@@ -272,7 +266,6 @@ class FixedStepIntegration(NativeIntegration):
         """Steps to t, the last of which ends there."""
         self._enter(equal_steps([self.t, t], self.options.step)[0])
         self._steps(self._left)
-        self._left = 0
 
     def to_end(self) -> None:
         """Take all steps."""
@@ -285,43 +278,42 @@ class FixedStepIntegration(NativeIntegration):
         self._steps(1)
 
     def _steps(self, steps: int) -> None:
-        """So many steps of the stretch, unrecorded; those before one that fails, for the state before it."""
+        """So many steps of the stretch, unrecorded; those before one that fails."""
         before = self._memory.copy()
         self._go(steps)
-        self._left -= steps
         if self._number("nonfinite"):
-            done = int(self._number("count") - before[self._at["count"]])
             self._memory[:] = before
-            self._go(done - 1)
-            before[:] = self._memory
-            self._go(1)
-            self.status = self.failure(self.runner.read(before, "x"))
-            self._memory[:] = before
-        elif not self._left:
+            for _ in self._recorded(every_step=False):
+                pass
+            return
+        self._left -= steps
+        if not self._left:
             self._set(t=self.stretch.end)
 
-    def _recorded(self, stretch: EqualSteps) -> Iterator[StepBlock]:
-        """The steps of a stretch, recorded."""
-        m, most = self.program.size, self.options.max_steps
+    def _recorded(self, every_step: bool, most: float = math.inf) -> Iterator[StepBlock]:
+        """The steps of the stretch, recorded; after one that fails the state is the one before it."""
+        m = self.program.size
         while self._left:
             if self.steps >= most:
                 self.status = self.too_many(self.t, most)
                 return
             before, t_old, x_old = self._memory.copy(), self.t, self.x.copy()
-            rows, done = self._advance(int(min(self._left, most - self.steps)), whole=not self.every_step)
-            self._left -= done
+            rows, done = self._advance(int(min(self._left, most - self.steps)), int(every_step))
             failed = self._number("nonfinite") != 0.0
-            self._count(done - failed)
+            done -= failed
+            self._left -= done
+            self._count(done)
             if failed:
-                rows = rows[:-1] if self.every_step else self.runner.run(before, done - 1, max(1, done - 1))[0]
+                last = self._memory.copy()
+                self._memory[:] = before
+                rows = self.runner.run(self._memory, done, 1 if every_step else max(1, done))[0]
+                self.status = self._failure(last)
             if len(rows):
-                self.largest = max(self.largest, min(abs(stretch.h), self.options.step))
+                self.largest = max(self.largest, min(abs(self.stretch.h), self.options.step))
                 if not self._left and not failed:
-                    rows[-1, 0] = stretch.end
-                block = _block(rows[:, 0], rows[:, 1 : 1 + m], t_old, x_old)
-                yield block._replace(normalization=self.program.normalization)
+                    rows[-1, 0] = self.stretch.end
+                yield _block(rows[:, 0], rows[:, 1 : 1 + m], t_old, x_old, self.program.normalization)
             if failed:
-                self.status = self.failure(rows[-1, 1 : 1 + m] if len(rows) else x_old)
                 return
 
     def with_dense(self, block: StepBlock) -> StepBlock:
@@ -336,20 +328,16 @@ class FixedStepIntegration(NativeIntegration):
             x, t, begin, h = (runner.read(memory, name) for name in ("x", "t", "start", "h"))
             for k, row in np.ndindex(states.shape[:2]):
                 memory[:] = start
-                x[:], t[:], begin[:], h[:] = (
-                    block.x_old[row],
-                    block.t_old[row],
-                    block.t_old[row],
-                    shares[k] * block.h[row],
-                )
+                x[:], t[:], begin[:] = block.x_old[row], block.t_old[row], block.t_old[row]
+                h[:] = shares[k] * block.h[row]
                 call()
                 states[k, row] = x
         return with_hermite(block, self.program.rate, self.parameters, states)
 
-    def failure(self, before: Array) -> str:
-        """Reason why the step from a state (m,) failed."""
-        singular = self._number("singular") if "singular" in self._at else 0.0
-        return failed_step(self.components, self.t, before, self.x, int(singular))
+    def _failure(self, memory: Array) -> str:
+        """Reason why the step from the state to that of a memory failed."""
+        singular, t = (memory[self._at[name]] if name in self._at else 0.0 for name in ("singular", "t"))
+        return failed_step(self.components, float(t), self.x, self.runner.read(memory, "x"), int(singular))
 
 
 def failed_step(components: Sequence[str], t: float, before: Array, x: Array, singular: int) -> str:
@@ -383,7 +371,7 @@ def unsolved(components: Sequence[str], before: Array, x: Array) -> str:
     return f"the equations of the step did not converge; the step is too long, first of all for {first}"
 
 
-def _block(t: Array, states: Array, t_old: float, x_old: Array) -> StepBlock:
+def _block(t: Array, states: Array, t_old: float, x_old: Array, normalization: Graph | None) -> StepBlock:
     """The steps that end at the times t (T,), from x_old at t_old on."""
     times, before = np.append(t_old, t[:-1]), np.concatenate([x_old[None], states[:-1]])
-    return StepBlock(t, states, times, t - times, before, None)
+    return StepBlock(t, states, times, t - times, before, None, normalization)
