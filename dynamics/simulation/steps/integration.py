@@ -48,8 +48,11 @@ class AdaptiveIntegration(NativeIntegration):
         program = compiled.program
         self.relative = max(options.relative, program.finest)
         super().__init__(compiled, options, parameters, control, stopped)
-        self._tolerance, self.flat = self.runner.read(self._memory, TOLERANCE), FlatPosition(program)
-        self._recorded = every_step or options.relative < self.relative or self.flat.rows is not None  # to be looked at
+        self._tolerance, self._flat = self.runner.read(self._memory, TOLERANCE), None
+        self._is_held = program.rows is not None  # by constraints
+        self._recorded = every_step or options.relative < self.relative or self._is_held  # to be looked at
+
+    _flat: FlatPosition | None
 
     def _first(self) -> Mapping[str, ArrayLike]:
         return {**beginning(self.options, self.relative), TOLERANCE: tolerance(self.options)}
@@ -67,10 +70,10 @@ class AdaptiveIntegration(NativeIntegration):
         while True:
             left = options.max_steps - self._number("trials")
             if left <= 0:
-                self.status = self.too_many(self.t, options.max_steps) + self.flat.near(self.parameters)
+                self.status = self.too_many(self.t, options.max_steps) + self._near_flat()
                 return
             absolute = self._tolerance.copy()
-            most = int(min(left, 2**31 if self.flat.rows is None else CREEP))
+            most = int(min(left, CREEP if self._is_held else 2**31))
             rows = self._advance(most, int(self._recorded))[0]
             if not self._recorded:
                 made = self._number("longest_made") != 0.0
@@ -80,11 +83,8 @@ class AdaptiveIntegration(NativeIntegration):
             if len(rows):
                 self._look(rows, absolute)
                 yield self._block(rows)
-            self.status = self.flat.creeping(status == RUNNING, self.steps, self.largest, rows, self.parameters)
-            if self.status:
-                return
-            self._judge()
-            if status == TOO_SMALL or (status == DONE and not self._next_period()):
+            self._judge(rows)
+            if self.status or (status == DONE and not self._next_period()):
                 return
 
     def _count(self, steps: int = 0) -> None:
@@ -100,9 +100,8 @@ class AdaptiveIntegration(NativeIntegration):
             numbers[at[GOAL]] = self._hold(self.control, t0, t_end)
         if self.program.timed:
             numbers[at[INSTANT]] = instant(t0, t_end)
-        if self.flat.rows is not None:
-            self.flat = FlatPosition(self.program)
-            self.flat.begin(t0, self.x, self.parameters)
+        if self._is_held:
+            self._flat = FlatPosition(self.program, t0, self.x, self.parameters)
 
     def unseen(self, x: Array) -> bool:
         """Take all steps from x (m,), none of them looked at; whether that could be, and nothing speaks against them.
@@ -129,8 +128,8 @@ class AdaptiveIntegration(NativeIntegration):
     def to_end(self) -> None:
         """Take all steps."""
         self._go()
-        if self._numbers[self._stop] != DONE or self.flat.rows is not None:
-            self._see()
+        if self._numbers[self._stop] != DONE or self._is_held:
+            self._judge()
 
     def step(self) -> None:
         """Take one step on the way to t_end."""
@@ -139,21 +138,25 @@ class AdaptiveIntegration(NativeIntegration):
         self._go(1)
         while numbers[row] <= 0.0 and numbers[status] == RUNNING:
             self._go(1)
-        self._see()
+        self._judge()
 
     def _towards(self, t: float) -> None:
         self._numbers[self._at[GOAL if self._number("anew") else "end"]] = t
         self._set(status=RUNNING)
 
-    def _see(self) -> None:
-        """What to say of unrecorded steps."""
-        if self.flat.rows is not None:
-            self._see_constraints(np.array([[self.t, self._number("h"), *self.x]]))
-        self._judge()
+    def _near_flat(self) -> str:
+        return "" if self._flat is None else self._flat.near()
 
-    def _judge(self) -> None:
-        if self._numbers[self._stop] == TOO_SMALL:
-            self.status = self.too_small() + self.flat.near(self.parameters)
+    def _judge(self, rows: Array | None = None) -> None:
+        """Note why the run stops after these steps, if it does; without rows, after the last."""
+        stop = self._numbers[self._stop]
+        if self._flat is not None and stop != DONE and (rows is None or len(rows)):
+            last = np.array([[self.t, self._number("h"), *self.x]]) if rows is None else rows
+            self._count()
+            reason = self._flat.reason(last, self.steps, self._number("farthest"), self.largest)
+            self.status = f"stopped at t = {self.t:.6g} s: {reason}" if reason else ""
+        if stop == TOO_SMALL:
+            self.status = self._too_small() + self._near_flat()
 
     def _hold(self, control: Hold, t: float, t_end: float) -> float:
         """Where the period of control from t on ends, for which its forces are taken."""
@@ -188,8 +191,6 @@ class AdaptiveIntegration(NativeIntegration):
                 f"method {options.method!r}, not by its tolerance"
             )
             self.warnings.append(self.stiff)
-        if self.flat.rows is not None:
-            self._see_constraints(rows)
         if options.relative < self.relative and not self._below_rounding:
             size = np.abs(rows[:, 2 : 2 + self.program.size])
             short = (absolute + options.relative * size < self.relative * size).any(axis=0)
@@ -200,10 +201,7 @@ class AdaptiveIntegration(NativeIntegration):
                     f"the rounding of a step: raised to {self.relative:.3g}"
                 )
 
-    def _see_constraints(self, rows: Array) -> None:
-        self.warnings += self.flat.look(rows, self._number("farthest"), self.parameters)
-
-    def too_small(self) -> str:
+    def _too_small(self) -> str:
         """Reason why a run stopped whose step became too small."""
         t, x = self.t, self.x
         where = f"stopped at t = {t:.6g} s: "
