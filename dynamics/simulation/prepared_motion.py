@@ -185,7 +185,7 @@ class PreparedMotion(HoldsNodes):
         >>> motion.ends([1.0], [0.0], t_end=1.0, parameters={"k": [1.0, 4.0]}).q.round(6).tolist()
         [[0.540302], [-0.416147]]
         """
-        from .ensembles.ends import ends_of, single_values  # which a trajectory does not need
+        from .ensembles.simulate_many import ends_of, single_values  # which a trajectory does not need
 
         if self._events:
             raise ValueError("ends of many motions are of those without events: simulate_many looks for them")
