@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from cgraph._shared import Array
+from cgraph._shared import Array, install
 
 from ..outcome import REACHED
 from ..trajectory import Crossings, Stats
-from .tables import to_pandas, to_xarray
 
 if TYPE_CHECKING:
     import pandas
@@ -67,6 +67,17 @@ class EnsembleStats:
     error: Array
     error_at_end: Array
     warnings: tuple[tuple[str, ...], ...]
+
+
+def doubts(stats: EnsembleStats) -> list[str]:
+    """Warnings of the first trajectory that stopped early and of the first in doubt, with their numbers."""
+    early = {k: str(stats.message[k]).removeprefix("stopped ") for k in np.flatnonzero(stats.status < 0).tolist()}
+    doubtful = {k: texts[0] for k, texts in enumerate(stats.warnings) if texts} if any(stats.warnings) else {}
+    many, have = f"of {len(stats.warnings)} trajectories", "has" if len(doubtful) == 1 else "have"
+    said = [f"{len(early)} {many} stopped early: trajectory {k} {text}" for k, text in [*early.items()][:1]]
+    return said + [
+        f"{len(doubtful)} {many} {have} a warning: trajectory {k}: {text}" for k, text in [*doubtful.items()][:1]
+    ]
 
 
 COLUMNS: dict[str, type] = dict.fromkeys(("steps", "rejected", "nfev", "status"), np.int64) | {"success": np.bool_}
@@ -202,7 +213,18 @@ class Ensemble:
         >>> table["q.x"].loc[1, 1.0].round(3), table["k"].loc[1, 1.0]
         (np.float64(-0.416), np.float64(4.0))
         """
-        return to_pandas(self)
+        module, (many, rows, _) = _module("pandas"), self.q.shape
+        blocks = {"q": (self.coordinates, self.q), "qd": (self.velocities, self.qd), "p": (self.velocities, self.p)}
+        columns = {
+            f"{letter}.{name}": values[:, :, k].reshape(-1)
+            for letter, (names, values) in blocks.items()
+            for k, name in enumerate(names if values is not None else ())
+        }
+        message = np.array(self.stats.message, object)
+        own = {**self.parameters, "success": self.stats.success, "message": message}
+        columns |= {name: np.repeat(values, rows) for name, values in own.items()}
+        index = module.MultiIndex.from_product([np.arange(many), self.t], names=["trajectory", "t"])
+        return module.DataFrame(columns, index)
 
     def to_xarray(self) -> xarray.Dataset:
         """Arrays with names (extra `tables`): all but `events`, whose number differs from trajectory to trajectory.
@@ -226,4 +248,34 @@ class Ensemble:
         >>> fan.to_xarray().q.sel(coordinate="joint 1", t=1.0).values.round(4)
         array([-0.077, -0.155])
         """
-        return to_xarray(self)
+        module, stats = _module("xarray"), self.stats
+        by_time, of_start = ("trajectory", "t"), ("trajectory",)
+        columns = {"q": ("coordinate", self.q, self.q_start), "qd": ("velocity", self.qd, self.qd_start)}
+        variables: dict[str, Any] = {}
+        for name, (dimension, rows, start) in columns.items():
+            variables[name] = ((*by_time, dimension), rows)
+            variables[f"{name}_start"] = ((*of_start, dimension), start)
+        if self.p is not None:
+            variables["p"] = ((*by_time, "velocity"), self.p)
+        for name in ("steps", "rejected", "nfev", "dt", "success", "status", "error", "error_at_end"):
+            variables[name] = (of_start, getattr(stats, name))
+        variables["message"] = (of_start, np.array(stats.message))
+        variables["warnings"] = (of_start, np.array(["; ".join(said) for said in stats.warnings]))
+        if shared := sorted({"trajectory", "t", "coordinate", "velocity", *variables} & {*self.parameters}):
+            raise ValueError(f"the parameter {shared[0]!r} has the name of a column of the table: give it another name")
+        coordinates = {
+            "trajectory": np.arange(len(self.q)),
+            "t": self.t,
+            "coordinate": list(self.coordinates),
+            "velocity": list(self.velocities),
+            **{name: (of_start, values) for name, values in self.parameters.items()},
+        }
+        return module.Dataset(variables, coordinates, {"method": stats.method})
+
+
+def _module(name: str) -> Any:
+    """The package. Raises ImportError that names the extra."""
+    try:
+        return import_module(name)
+    except ImportError:
+        raise ImportError(f"this table needs {name}: {install('tables')}") from None

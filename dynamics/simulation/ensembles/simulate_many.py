@@ -7,9 +7,10 @@ import os
 import time
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import AbstractContextManager, closing, nullcontext
+from contextlib import closing, nullcontext
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,20 +21,22 @@ from cgraph._shared import Array, require_path, require_whole
 from ...equations.states.initial_value import InitialValues, initial_values
 from ...integrators import Problem, derive, in_form
 from ...systems.model import Model
-from ..applied_force import with_applied
 from ..events.event import Event, EventProgram, as_events, event_program
 from ..events.event_log import split_crossings
+from ..moving import Moving, with_applied
+from ..progress_bar import Progress
 from ..row_values import converted, unreached_momenta
 from ..run_options import METHOD, RunOptions, require_room, time_span
 from ..sampled_controller import SampledController
 from ..steps.equal_steps import step_count
 from ..steps.step_program import step_program
 from ..trajectory import SimulationWarning
-from .ensemble import Ensemble
-from .shares import chunk_width, doubts, run_chunks, side_by_side
+from .ensemble import Ensemble, doubts
 from .store import Store, sweep_of
-from .task import Part, Task
-from .workers import Workers, checked
+from .task import Chunk, Part, Task, not_begun
+from .workers import Team, Workers, checked, finished
+
+UNKNOWN = 16  # workers behind a map, which does not say
 
 
 def simulate_many(
@@ -145,26 +148,28 @@ def simulate_many(
     arguments = (dt, max_step, rtol, atol, t_eval, first_step, max_steps, backend, progress)
     options = RunOptions(t_end, method, *arguments, t0, estimate_error, fma)
     watched, team = as_events(events), checked(workers)
-    applied = with_applied(model, tau, parameters)
-    start = initial_values(applied.model, q, qd, applied.constant, parameters, t0)
+    model, applied = with_applied(model, tau, parameters)
+    start = initial_values(model, q, qd, applied.constant, parameters, t0)
     options.check(start.states)
-    count = _row_count(options, *start.x.shape, stored=store is not None)
+    _require_room(options, *start.x.shape, stored=store is not None)
 
     # Derive the equations as graphs, and write the steps of the method over them
-    begin, problem = time.perf_counter(), in_form(derive(applied.model, start.bound), form)
+    begin, problem = time.perf_counter(), in_form(derive(model, start.bound), form)
     program = step_program(problem, options.integrator, dense=bool(watched) or options.between)
     watch = event_program(problem, watched)
 
-    # Share out the work: what a worker is sent, and the starts of chunks of trajectories
-    grids, lanes = ([], False) if watched else side_by_side(program, options, len(start.x))
-    sent = replace(options, t_eval=options.row_times) if watched else options
-    task = Task(program, sent, count, tuple(grids), watch if watched else None, lanes)
-    x, p = _stepped(problem, start, t0)
-    width = chunk_width(len(x), chunk, team, count * program.steps.width * lanes, grids, stored=folder is not None)
-
     # Integrate, by whoever takes the chunks and compiles the steps
-    with _opened(folder, problem, task, x, p, width) as kept:
-        whole = run_chunks(task, x, p, width, team, kept)
+    sent = replace(options, t_eval=options.row_times) if watched else options
+    task = Task(program, sent, len(start.x), watch if watched else None)
+    p = np.array([start.varied[name] for name in problem.parameters]).reshape(-1, len(start.x)).T.copy()
+    x = converted(problem.momentum, t0, start.x, p)
+    width = task.width(chunk, team if isinstance(team, int) else UNKNOWN, stored=folder is not None)
+    with (
+        nullcontext()
+        if folder is None
+        else closing(Store(folder, sweep_of(problem, task, x, p), width, (len(x), task.count, x.shape[1])))
+    ) as kept:
+        whole = _run_chunks(task, x, p, width, team, kept)
 
     # Put the result together
     result = _ensemble(problem, watch, options, whole, (start, x, p), time.perf_counter() - begin)
@@ -173,25 +178,97 @@ def simulate_many(
     return result
 
 
-def _stepped(problem: Problem, start: InitialValues, t0: float) -> tuple[Array, Array]:
-    """The states (N, m) that the steps start from, and the parameters of the problem, (N, ..)."""
-    p = np.array([start.varied[name] for name in problem.parameters]).reshape(-1, len(start.x)).T.copy()
-    return converted(problem.momentum, t0, start.x, p), p
+def ends_of(
+    moving: Moving,
+    options: RunOptions,
+    q: ArrayLike,
+    qd: ArrayLike | None,
+    parameters: Mapping[str, ArrayLike] | None,
+    workers: Workers,
+) -> tuple[Array, Array]:
+    """The ends, (N, nq) and (N, n), of motions of one that is prepared, to the only row of the options.
+
+    What is done once for calls that are alike is kept. Raises as `simulate_many`, and for a sampled controller.
+    """
+    if moving.applied.controller is not None:
+        one = "a SampledController may remember what it has seen, and so controls one motion"
+        raise TypeError(f"{one}: ends of many are without")
+    problem, t0 = moving.stepped, options.t0
+    moving.require_given(parameters)
+    start = initial_values(moving.model, q, qd, moving.applied.constant, parameters, t0)
+    p = np.empty((len(start.x), len(problem.parameters)))
+    for k, name in enumerate(problem.parameters):
+        p[:, k] = start.varied[name] if name in start.varied else start.bound[name]
+    x, team = converted(problem.momentum, t0, start.x, p), checked(workers)
+
+    def task() -> Task:
+        options.check(moving.problem.states)
+        return Task(step_program(problem, options.integrator, dense=False), options, len(x))
+
+    kept = moving.shared_out((len(x), t0, options.t_end), task)
+    width = kept.width(None, team if isinstance(team, int) else UNKNOWN, stored=False)
+    whole = _run_chunks(kept, x, p, width, team, None)
+    for text in doubts(whole.runs.stats(options.method, 0.0, {})):
+        warnings.warn(text, SimulationWarning, stacklevel=3)
+    states = converted(problem.velocities, options.t_end, whole.rows[:, 0], p)
+    return states[:, : problem.nq], states[:, problem.nq :]
 
 
-def _opened(
-    folder: Path | None, problem: Problem, task: Task, x: Array, p: Array, width: int
-) -> AbstractContextManager[Store | None]:
-    """The store in that folder, for this call alone."""
-    if folder is None:
-        return nullcontext()
-    return closing(Store(folder, sweep_of(problem, task, x, p), width, (len(x), task.count, x.shape[1])))
+def single_values(parameters: Mapping[str, Any], varied: Sequence[str]) -> dict[str, Any]:
+    """The parameters that are the same for all motions. Raises ValueError for another that has many values."""
+    if not isinstance(parameters, Mapping):
+        raise TypeError(f"parameters must be a mapping of names to numbers, got {parameters!r:.60}")
+    if several := [name for name, value in parameters.items() if np.ndim(value) and name not in varied]:
+        raise ValueError(
+            f"parameter {several[0]!r} has a value for each motion, and the motion was prepared with one for all: "
+            f"prepare(.., varied=[{several[0]!r}]) keeps it open"
+        )
+    return {name: value for name, value in parameters.items() if not np.ndim(value)}
 
 
-def _row_count(options: RunOptions, many: int, m: int, *, stored: bool) -> int:
-    """Rows of a trajectory, T, of so many of m numbers.  stored: in a file, not in memory.
+def _run_chunks(task: Task, x: Array, p: Array, width: int, workers: Team, store: Store | None) -> Part:
+    """Run the chunks, by whoever shares them, until all parts have come.
 
-    Raises ValueError where trajectories would not have the same, MemoryError where all would not fit.
+    Those that a store has are taken from there, and others are kept there as they end.
+    Raises ValueError unless all parts come.
+    """
+    rows = np.empty((len(x), task.count, x.shape[1])) if store is None else store.rows
+    whole, width = not_begun(0, rows, events=task.events is not None), width if store is None else store.width
+    chunks, done = [Chunk(k, x[k : k + width], p[k : k + width]) for k in range(0, len(x), width)], 0
+    if store is not None:
+        known = [part for chunk in chunks if (part := store.part(chunk)) is not None]
+        for part in known:
+            whole.put(part)
+        done, there = sum([len(part.rows) for part in known]), {part.first for part in known}
+        chunks = [chunk for chunk in chunks if chunk.first not in there]
+        if chunks:
+            store.lock()
+    try:
+        with (
+            Progress("simulate", len(x), task.options.progress) as report,
+            closing(finished(task, chunks, workers, whole.rows)) as parts,
+        ):
+            for part in parts:
+                whole.put(part)
+                if store is not None:
+                    store.keep(part)
+                done += len(part.rows)
+                report(done)
+    except KeyboardInterrupt:
+        if store is None:
+            raise
+        raise KeyboardInterrupt(store.kept(done)) from None
+    if done != len(x):
+        raise ValueError(
+            f"workers must give a result for each item, as map does: of {len(x)} trajectories came back {done}"
+        )
+    return whole if store is None else replace(whole, rows=store.read_only())
+
+
+def _require_room(options: RunOptions, many: int, m: int, *, stored: bool) -> None:
+    """Raises ValueError if trajectories would not have the same rows, MemoryError if all would not fit.
+
+    stored: in a file, not in memory.
     """
     if options.times is None and options.adaptive:
         raise ValueError(
@@ -203,7 +280,6 @@ def _row_count(options: RunOptions, many: int, m: int, *, stored: bool) -> int:
     what = f"{many} trajectories of {count} rows of {m} numbers"
     if not stored:
         require_room(8 * many * count * m, what, "record fewer times (t_eval), simulate fewer at once or name a store")
-    return count
 
 
 def _ensemble(

@@ -18,8 +18,7 @@ from ..estimates.state_sizes import Flags
 from ..row_values import converted, values_of
 from ..run_options import RunOptions
 from ..steps.dense_output import UNIT, StepBlock
-from ..steps.equal_steps import EqualSteps
-from ..steps.stepping import FixedStepIntegration, Integration
+from ..steps.stepping import Integration
 from ..trajectory import Crossings
 from .crossings import MOST_CELLS, Crossing, Side, WatchedSteps, crossings
 from .event import EventProgram
@@ -278,13 +277,10 @@ class WatchedIntegration(Integration):
         """Whether there are events that reset the state."""
         return any(event.reset is not None for event in self.log.program.events)
 
-    def beside(self, steps: Callable[[float], Sequence[EqualSteps]]) -> WatchedIntegration:
-        """Run with other equal steps: those of a segment from the time on at which it begins."""
-        first, options = self._segments[0], replace(self.options, max_steps=math.inf)
-        assert isinstance(first, FixedStepIntegration)
-        return WatchedIntegration(
-            lambda segment: first.beside(steps(segment.t0), first.parameters), options, self.log.program
-        )
+    def beside(self, dt: float) -> WatchedIntegration:
+        """Run by other equal steps, which meet its end alone."""
+        options = replace(self.options, dt=dt, t_eval=None, max_steps=math.inf)
+        return WatchedIntegration(self._make, options, self.log.program)
 
     def crossings(self, nq: int, parameters: ArrayLike = 0.0) -> dict[str, Crossings]:
         """Crossings by the event's name, with states split after nq numbers; parameters: of the problem."""

@@ -4,41 +4,28 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Iterator, Sequence
-from typing import NamedTuple
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from cgraph._shared import Array
+
+Numbers = np.ndarray[Any, np.dtype[np.int64]]
+
 SAME_INSTANT = 8.0  # units of the last bit of the time, by which instants that are meant to be the same may differ
 EVEN = 4.0  # units of the last bit of the time, by which instants may miss an even spacing
-ENOUGH_LONGER = 1.5  # times the longest of the steps that make up one twice as long
+FOUR = 4  # steps of a run, at whose ends runs of steps twice and four times as long end a step, too
+GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)  # its multiples spread evenly, and in step with no oscillation
 
 
 class EqualSteps(NamedTuple):
-    """`steps` steps of h [s] from `begin` on, negative in a run back in time; the last one ends at `end` exactly.
-
-    rows: of how many instants, evenly spaced, `end` is the last, at all of which a step ends.
-    """
+    """`steps` steps of h [s] from `begin` on, negative in a run back in time; the last one ends at `end` exactly."""
 
     begin: float
     h: float
     steps: int
     end: float
-    rows: int = 1
-
-    def blocks(self, most_passes: int, most_rows: int) -> Iterator[tuple[int, int, bool]]:
-        """(steps, steps for a row, whether the rows are instants) of blocks with at most so many steps and rows."""
-        every = self.steps // self.rows
-        if every <= most_passes:
-            most = max(1, min(most_passes // every, most_rows))
-            for done in range(0, self.rows, most):
-                yield min(most, self.rows - done) * every, every, True
-            return
-        full, last = divmod(every - 1, most_passes)
-        for _ in range(self.rows):
-            for _ in range(full):
-                yield most_passes, most_passes, False
-            yield last + 1, last + 1, True
 
 
 def step_count(length: float, dt: float) -> int:
@@ -48,11 +35,8 @@ def step_count(length: float, dt: float) -> int:
 
 def equal_steps(instants: Sequence[float], dt: float) -> list[EqualSteps]:
     """Steps of at most dt from the first instant through all others."""
-    result = []
-    for begin, end in itertools.pairwise(instants):
-        count = step_count(end - begin, dt)
-        result.append(EqualSteps(begin, (end - begin) / count, count, end))
-    return result
+    counts = [step_count(end - begin, dt) for begin, end in itertools.pairwise(instants)]
+    return [_divided(*ends, count) for ends, count in zip(itertools.pairwise(instants), counts, strict=True)]
 
 
 def even_steps(instants: Sequence[float], dt: float) -> list[EqualSteps]:
@@ -67,10 +51,15 @@ def even_steps(instants: Sequence[float], dt: float) -> list[EqualSteps]:
         off = np.abs(times[first : last + 1] - (begin + gap * np.arange(rows + 1))).max()
         if off <= EVEN * ulps[first:last].max():
             count = step_count(gap, dt)
-            result.append(EqualSteps(begin, gap / count, rows * count, float(times[last]), rows))
+            result.append(EqualSteps(begin, gap / count, rows * count, float(times[last])))
         else:
             result += equal_steps(times[first : last + 1].tolist(), dt)
     return result
+
+
+def _divided(begin: float, end: float, count: int) -> EqualSteps:
+    """So many steps from begin to end."""
+    return EqualSteps(begin, (end - begin) / count, count, end)
 
 
 def halved(stretches: Iterable[EqualSteps]) -> list[EqualSteps]:
@@ -78,57 +67,59 @@ def halved(stretches: Iterable[EqualSteps]) -> list[EqualSteps]:
     return [part._replace(h=0.5 * part.h, steps=2 * part.steps) for part in stretches]
 
 
-def doubled(stretches: Sequence[EqualSteps]) -> list[EqualSteps]:
-    """Two steps as one; of shorter ones between close instants, as many as it takes."""
-    return _merged(_doubled(stretches))
+def longer(stretches: Iterable[EqualSteps], times: int) -> list[EqualSteps]:
+    """Steps so many times as long in stretches `by_fours`, or as nearly as the stretches allow."""
+    return [
+        _divided(part.begin, part.end, max(1, round((part.end - part.begin) / (times * part.h)))) for part in stretches
+    ]
 
 
-def _doubled(stretches: Sequence[EqualSteps]) -> Iterable[EqualSteps]:
-    at = begin = stretches[0].begin
-    longest = 0.0  # of the steps since `begin`, which are not one yet
+def by_fours(stretches: Sequence[EqualSteps]) -> list[EqualSteps]:
+    """The same way in stretches of a multiple of four steps each, and where there are none of steps of four lengths.
+
+    These, which join stretches, are at least as long as four of the longest steps, but for the last.
+    """
+    longest, at, result = max([part.h for part in stretches], key=abs), stretches[0].begin, list[EqualSteps]()
     for part in stretches:
-        done = 0
-        while done < part.steps:
-            pairs = (part.steps - done) // 2 if at == begin else 0
-            done += 2 * pairs or 1
-            at = part.end if done == part.steps else part.begin + done * part.h
-            longest = max(longest, abs(part.h))
-            if pairs:
-                yield EqualSteps(begin, 2.0 * part.h, pairs, at)
-            elif abs(at - begin) >= ENOUGH_LONGER * longest:
-                yield EqualSteps(begin, at - begin, 1, at)
-            else:
-                continue
-            begin, longest = at, 0.0
-    if at != begin:
-        yield EqualSteps(begin, at - begin, 1, at)
-
-
-def _merged(stretches: Iterable[EqualSteps]) -> list[EqualSteps]:
-    """Stretches of the same step, but for rounding of the times, as one."""
-    result: list[EqualSteps] = []
-    for part in stretches:
-        if result and abs(part.h - result[-1].h) <= SAME_INSTANT * np.spacing(max(abs(part.begin), abs(part.end))):
-            before = result.pop()
-            steps = before.steps + part.steps
-            part = EqualSteps(before.begin, (part.end - before.begin) / steps, steps, part.end)
-        result.append(part)
-    return result
-
-
-def joined(t: float, stretches: Sequence[EqualSteps]) -> list[EqualSteps]:
-    """Steps from t on, of which one, of half a step to one and a half, ends where one of these does."""
-    begin, h = stretches[0][:2]
-    if (begin - t) / h > 0.5:
-        return [*equal_steps([t, begin], abs(h)), *stretches]
-    if t == begin:
-        return list(stretches)
-    for number, part in enumerate(stretches):
-        ahead = max(1, math.ceil((t - part.begin) / part.h + 0.5))
-        if ahead > part.steps and number < len(stretches) - 1:
+        left = FOUR * longest - (part.begin - at) if at != part.begin else 0.0  # of the way of a joint
+        ahead = math.ceil(left / part.h - 1e-9)
+        if ahead > part.steps:
             continue
-        left = part.steps - ahead
-        at = part.end if left <= 0 else part.begin + ahead * part.h
-        rest = [EqualSteps(at, part.h, left, part.end)] if left > 0 else []
-        return [EqualSteps(t, at - t, 1, at), *rest, *stretches[number + 1 :]]
-    return []
+        if at != part.begin:
+            result.append(EqualSteps(at, longest, FOUR, _instant(part, ahead)))
+        fours = (part.steps - ahead) // FOUR * FOUR
+        if fours:
+            result.append(EqualSteps(_instant(part, ahead), part.h, fours, _instant(part, ahead + fours)))
+        at = _instant(part, ahead + fours)
+    end = stretches[-1].end
+    return result if at == end else [*result, EqualSteps(at, longest, FOUR, end)]
+
+
+def _instant(part: EqualSteps, steps: int) -> float:
+    """Where so many steps end."""
+    return part.end if steps == part.steps else part.begin + steps * part.h
+
+
+def instants_of(stretches: Sequence[EqualSteps], every: int, most: int) -> Array:
+    """Instants at which each `every`th step of the stretches ends: of more than so many some, unevenly, and the last."""
+    begin, h, end = (np.array([part[k] for part in stretches]) for k in (0, 1, 3))
+    counts = np.array([part.steps // every for part in stretches])
+    before = np.cumsum(counts) - counts
+    total = int(counts.sum())
+    k = np.arange(min(total, most))
+    chosen = (
+        k if total <= most else np.append(((k[:-1] + k[:-1] * GOLDEN % 1.0) * (total / most)).astype(int), total - 1)
+    )
+    part = np.searchsorted(before, chosen, side="right") - 1
+    steps = chosen - before[part] + 1
+    instants: Array = np.where(steps == counts[part], end[part], begin[part] + every * steps * h[part])
+    return instants
+
+
+def numbers_of(stretches: Sequence[EqualSteps], instants: Array) -> Numbers:
+    """How many of the steps of the stretches are done at instants at which steps end, (T,)."""
+    begin, h, steps = (np.array([part[k] for part in stretches]) for k in range(3))
+    part = np.maximum(np.searchsorted(np.sign(h[0]) * begin, np.sign(h[0]) * instants) - 1, 0)
+    inside = np.rint((instants - begin[part]) / h[part]).astype(np.int64)
+    numbers: Numbers = (np.cumsum(steps) - steps)[part] + inside
+    return numbers
