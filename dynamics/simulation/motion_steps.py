@@ -8,7 +8,7 @@ import warnings
 from cgraph._shared import Array, real_number
 
 from .outcome import MotionError
-from .steps.stepping import NativeIntegration
+from .stepper import Stepper
 from .trajectory import SimulationWarning
 
 
@@ -39,7 +39,7 @@ class MotionSteps:
     1.0 [-0.077]
     """
 
-    def __init__(self, run: NativeIntegration, x: Array, t0: float, t_end: float | None) -> None:
+    def __init__(self, run: Stepper, x: Array, t0: float, t_end: float | None) -> None:
         self._run, self._x, self._t_end = run, x, None if t_end is None else float(t_end)
         self._begun, self._direction = False, 0.0
         run.begin(x, t0, t0 + 1.0 if t_end is None else t_end)

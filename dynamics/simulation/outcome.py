@@ -13,8 +13,8 @@ from cgraph._shared import Array, counted
 
 from .estimates.run_estimate import RunEstimate
 from .run_options import SMALL_MEMORY, TABLES, RunOptions, room
+from .stepper import Stepper
 from .steps.dense_output import StepBlock
-from .steps.stepping import Integration
 from .trajectory import Stats, Trajectory
 
 IMPLICIT = ("radau", "rodas")
@@ -113,10 +113,10 @@ class Recorder:
 
 
 def outcome(
-    run: Integration,
+    run: Stepper,
     x: Array,
     options: RunOptions,
-    again: Callable[[RunOptions], Integration] | None = None,
+    again: Callable[[RunOptions], Stepper] | None = None,
     steps: list[StepBlock] | None = None,
     report: Callable[[float], None] | None = None,
 ) -> tuple[Stats, Recorder]:
@@ -162,7 +162,7 @@ def outcome(
 
 
 def _noted(
-    run: Integration,
+    run: Stepper,
     x: Array,
     recorder: Recorder,
     options: RunOptions,
@@ -186,7 +186,7 @@ def _noted(
 
 
 def advise(
-    run: Integration, reached: float, options: RunOptions, x: Array, again: Callable[[RunOptions], Integration] | None
+    run: Stepper, reached: float, options: RunOptions, x: Array, again: Callable[[RunOptions], Stepper] | None
 ) -> None:
     """Name the method in the warning of a run that is stiff, or in the status of one that lacks a derivative.
 

@@ -9,7 +9,7 @@ import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -19,27 +19,28 @@ from cgraph import Graph
 from cgraph._shared import Array, HoldsNodes, floats, kept_by_first
 
 from ..equations.state_equation import state_inputs
-from ..equations.states.initial_value import other_inputs, start_state
+from ..equations.states.initial_value import initial_values, other_inputs, start_state
 from ..integrators import Problem, derive, force, in_form, quantity_inputs, total_energy
 from ..systems.arguments import parameter_value
 from ..systems.model import Equations, Model, as_equations
 from .applied_force import Applied, Tau, with_applied
 from .events.event import Event, EventProgram, event_program
+from .events.event_log import split_crossings
 from .outcome import INTERRUPTED, REACHED, InterruptedMotion, MotionEnd, MotionError, outcome
 from .progress_bar import Progress
-from .row_values import converted, unreached_momenta
+from .row_values import converted
 from .run_options import RunOptions
 from .sampled_controller import Hold
+from .stepper import Stepper, stepper_of
 from .steps.dense_output import Solution, StepBlock
-from .steps.integration import integration_of
-from .steps.stepping import NativeIntegration
+from .steps.step_program import step_program
 from .trajectory import SimulationWarning, Trajectory
+from .unreached_momenta import unreached_momenta
 
 if TYPE_CHECKING:
     from .ensembles.workers import Workers
     from .motion_steps import MotionSteps
 
-Made = TypeVar("Made")
 KEPT_PARAMETERS = 16  # sets of parameter values, whose equations a run keeps
 
 
@@ -214,13 +215,28 @@ class Run(HoldsNodes):
         >>> motion.ends([1.0], [0.0], t_end=1.0, parameters={"k": [1.0, 4.0]}).q.round(6).tolist()
         [[0.540302], [-0.416147]]
         """
-        from .ensembles.ends import ends_of, single_values  # which a trajectory does not need
+        from .ensembles.simulate_many import ends_of  # which a trajectory does not need
+        from .ensembles.task import Task
 
         if self._events:
             raise ValueError("ends of many motions are of those without events: simulate_many looks for them")
-        bound = self._bound(None if parameters is None else single_values(parameters, self._varied))
-        options = self._options.over(t0, t_end, [t_end])
-        return MotionEnd(options.t_end, *ends_of(bound, options, q, qd, parameters, workers))
+        run = self._bound(None if parameters is None else _single_values(parameters, self._varied))
+        if run.applied.controller is not None:
+            one = "a SampledController may remember what it has seen, and so controls one motion"
+            raise TypeError(f"{one}: ends of many are without")
+        run._require_given(parameters)
+        options, problem = self._options.over(t0, t_end, [t_end]), run.stepped
+        start = initial_values(run.model, q, qd, run.applied.constant, parameters, options.t0)
+        p = np.empty((len(start.x), len(problem.parameters)))
+        for k, name in enumerate(problem.parameters):
+            p[:, k] = start.varied[name] if name in start.varied else start.bound[name]
+        key = len(p), options.t0, options.t_end
+        if run._last[0] != key:  # what is done once for calls that are alike
+            options.check(run.problem.states)
+            run._last = key, Task(step_program(problem, options.integrator, dense=False), options, len(p))
+        x = ends_of(run._last[1], converted(problem.momentum, options.t0, start.x, p), p, workers)
+        states = converted(problem.velocities, options.t_end, x, p)
+        return MotionEnd(options.t_end, states[:, : problem.nq], states[:, problem.nq :])
 
     def start(
         self,
@@ -271,43 +287,35 @@ class Run(HoldsNodes):
                 'form="velocity": call the motion, which gives its rows'
             )
         x = bound._checked_start(q, qd, t0, t0 + 1.0 if t_end is None else t_end, parameters)
-        integration = bound._unrecorded()
-        integration.set_parameters(bound.values(parameters))
-        return MotionSteps(integration, x, float(t0), t_end)
+        stepper = bound._unrecorded()
+        stepper.set_parameters(bound._given(parameters))
+        return MotionSteps(stepper, x, float(t0), t_end)
 
     def compile(self) -> None:
         """Make the machine code of an end, and of rows at steps, with the model's own values of parameters."""
         if self._alone is None:
-            self._integration(self._options, [0.0] * len(self.problem.parameters), self._hold(self._options))
+            self._stepper(self._options, [0.0] * len(self.problem.parameters), self._hold(self._options))
 
-    def values(self, parameters: Mapping[str, Any] | None) -> list[float]:
+    def _given(self, parameters: Mapping[str, Any] | None) -> list[float]:
         """Values of the inputs of the problem that are not built in, with these of parameters."""
         if not self._varied:
             return []
         given = parameters or {}
-        self.require_given(given)
+        self._require_given(given)
         values = dict(self._numbers) | {name: parameter_value(name, value) for name, value in given.items()}
         if given and self.model.system is not None:
             self.model.system.require_values(values)
         return [values[name] for name in self.problem.parameters]
 
-    def require_given(self, parameters: Mapping[str, Any] | None) -> None:
+    def _require_given(self, parameters: Mapping[str, Any] | None) -> None:
         """Raises ValueError where a parameter of the controller has no value."""
         own = as_equations(self._fixed[0]).parameters
         if missing := [name for name in self._varied if name not in own and name not in (parameters or {})]:
             raise ValueError(f"parameter {missing[0]!r} of the controller needs a value")
 
-    def kept(self, key: Any, make: Callable[[], Made]) -> Made:
-        """The result of `make` for this key; the last one is cached."""
-        known, made = self._last
-        if known != key:
-            made = make()
-            self._last = key, made
-        result: Made = made
-        return result
-
     @cached_property
     def _last(self) -> tuple[Any, Any]:
+        """The task of the last call of `ends`, and what it was for."""
         return None, None
 
     @cached_property
@@ -345,18 +353,16 @@ class Run(HoldsNodes):
         """The memory of each thread, in which its motions run one after another."""
         return threading.local()
 
-    def _unrecorded(self) -> NativeIntegration:
+    def _unrecorded(self) -> Stepper:
         """A memory in which motions run by steps alone."""
         zeros = [0.0] * len(self.problem.parameters)
-        made = integration_of(self.stepped, self._options, zeros, events=None, between=False)
-        assert isinstance(made, NativeIntegration)
-        return made
+        return stepper_of(self.stepped, self._options, zeros, events=None, between=False)
 
     @property
-    def _alone(self) -> NativeIntegration | None:
+    def _alone(self) -> Stepper | None:
         """The memory of this thread; None where an end needs more than steps."""
         try:
-            found: NativeIntegration | None = self._memories.made
+            found: Stepper | None = self._memories.made
         except AttributeError:
             options, steps = self._options, self._is_of_steps_alone
             rounded = options.adaptive and steps and options.relative < options.integrator.finest
@@ -381,7 +387,7 @@ class Run(HoldsNodes):
             return MotionEnd(float(run.t[-1]), run.q[-1], run.qd[-1])
         timely = type(t0) is float and type(t_end) is float and self._options.spans(t0, t_end)
         if self._varied:
-            alone.set_parameters(self.values(parameters))
+            alone.set_parameters(self._given(parameters))
         q, qd = floats(q), floats(qd)
         plain = timely and self._is_plain and type(q) is np.ndarray and (qd is None or type(qd) is np.ndarray)
         if not (plain and alone.begins(q, qd, t0, t_end)):  # see what is wrong
@@ -401,7 +407,7 @@ class Run(HoldsNodes):
     ) -> Array:
         """The state (m,) in which a motion starts, all arguments checked."""
         self._options.over(t0, t_end, None).check(self.problem.states)
-        return self._start(q, qd, t0, self.values(parameters))
+        return self._start(q, qd, t0, self._given(parameters))
 
     def _hold(self, options: RunOptions) -> Hold | None:
         """The forces that a sampled controller is to hold. Raises ValueError for a motion that it cannot control."""
@@ -413,25 +419,25 @@ class Run(HoldsNodes):
         observed = None if velocities is None else _compiled(velocities, options.backend)
         return Hold(controller, self.model.velocities, self.stepped.nq, options.t0, observed)
 
-    def _integration(self, options: RunOptions, p: Sequence[float], hold: Hold | None = None) -> Any:
-        return integration_of(self.stepped, options, p, hold, events=self.watched, between=self._between)
+    def _stepper(self, options: RunOptions, p: Sequence[float], hold: Hold | None = None) -> Stepper:
+        return stepper_of(self.stepped, options, p, hold, events=self.watched, between=self._between)
 
     def _trajectory(
         self, q: ArrayLike, qd: ArrayLike | None, options: RunOptions, parameters: Mapping[str, float] | None
     ) -> Trajectory:
         """The motion over the span of options, with parameters built in. Raises InterruptedMotion by Ctrl-C."""
-        p, stepped = self.values(parameters), self.stepped
+        p, stepped = self._given(parameters), self.stepped
         start, values = self._start(q, qd, options.t0, p), p or 0.0
         options.check(self.problem.states)
         options.check_room(len(start))
 
         # Write the steps of the method over the equations, and compile them; the states are (q, qd), or here (q, p)
         hold = self._hold(options)
-        run, x = self._integration(options, p, hold), converted(stepped.momentum, options.t0, start, values)
+        run, x = self._stepper(options, p, hold), converted(stepped.momentum, options.t0, start, values)
 
         # Integrate, noting rows and events
         steps: list[StepBlock] | None = [] if self._fixed[5] else None
-        again = partial(self._integration, p=p) if hold is None else None
+        again = partial(self._stepper, p=p) if hold is None else None
         with Progress("simulate", options.length, options.progress) as report:
             stats, recorder = outcome(run, x, options, again, steps, report)
         if stats.message != REACHED:  # where it ended is its last row, also between the times of t_eval
@@ -451,7 +457,7 @@ class Run(HoldsNodes):
             states[:, :nq],
             states[:, nq:],
             stats,
-            run.crossings(nq, values),
+            {} if run.log is None else split_crossings(run.log.program, run.log.happened, nq, values),
             RunGraphs(self.problem, self.applied, bound) if bound else self._graphs,
             None if steps is None else Solution(options.t0, x, steps, nq, _specialized(stepped.velocities, bound)),
             None if hold is None else hold.held,
@@ -511,6 +517,18 @@ def _specialized(graph: Graph | None, bound: Mapping[str, float]) -> Graph | Non
 def _compiled(velocities: Graph, backend: str) -> cg.Compiled:
     """The velocities of momenta, for a controller."""
     return cg.compile(velocities, backend)
+
+
+def _single_values(parameters: Mapping[str, Any], varied: Sequence[str]) -> dict[str, Any]:
+    """The parameters that are the same for all motions. Raises ValueError for another that has many values."""
+    if not isinstance(parameters, Mapping):
+        raise TypeError(f"parameters must be a mapping of names to numbers, got {parameters!r:.60}")
+    if several := [name for name, value in parameters.items() if np.ndim(value) and name not in varied]:
+        raise ValueError(
+            f"parameter {several[0]!r} has a value for each motion, and the motion was prepared with one for all: "
+            f"prepare(.., varied=[{several[0]!r}]) keeps it open"
+        )
+    return {name: value for name, value in parameters.items() if not np.ndim(value)}
 
 
 def _values_key(parameters: Mapping[str, Any]) -> Any:

@@ -16,14 +16,13 @@ from cgraph._shared import Array, LaneCode, kept_by_first
 from cgraph.extend import Call, FixedPoint, If, Program, While, runner
 
 from ...integrators.step_control import DONE
-from ..estimates.state_sizes import Flags
 from ..run_options import RunOptions
+from ..stepper import BLOCK_TIME, HELD, StoppedError, beginning, over, tolerance
 from ..steps.dense_output import StepBlock
 from ..steps.equal_steps import EqualSteps, Numbers
 from ..steps.first_step import TOLERANCE
-from ..steps.integration import HELD, beginning, over, tolerance
+from ..steps.state_sizes import Flags
 from ..steps.step_program import StepProgram
-from ..steps.stepping import BLOCK_TIME, StoppedError
 
 FEW_TRAJECTORIES = 32  # trajectories: fewer by chosen steps are done one by one before the code of lanes is made
 VECTOR = 8  # lanes, or a multiple of them, of every processor

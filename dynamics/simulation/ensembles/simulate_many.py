@@ -10,7 +10,6 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import closing, nullcontext
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -21,16 +20,17 @@ from cgraph._shared import Array, require_path, require_whole
 from ...equations.states.initial_value import InitialValues, initial_values
 from ...integrators import Problem, derive, in_form
 from ...systems.model import Model
+from ..applied_force import with_applied
 from ..events.event import Event, EventProgram, as_events, event_program
 from ..events.event_log import split_crossings
-from ..moving import Moving, with_applied
 from ..progress_bar import Progress
-from ..row_values import converted, unreached_momenta
+from ..row_values import converted
 from ..run_options import METHOD, RunOptions, require_room, time_span
 from ..sampled_controller import SampledController
 from ..steps.equal_steps import step_count
 from ..steps.step_program import step_program
 from ..trajectory import SimulationWarning
+from ..unreached_momenta import unreached_momenta
 from .ensemble import Ensemble, doubts
 from .store import Store, sweep_of
 from .task import Chunk, Part, Task, not_begun
@@ -148,13 +148,13 @@ def simulate_many(
     arguments = (dt, max_step, rtol, atol, t_eval, first_step, max_steps, backend, progress)
     options = RunOptions(t_end, method, *arguments, t0, estimate_error, fma)
     watched, team = as_events(events), checked(workers)
-    model, applied = with_applied(model, tau, parameters)
-    start = initial_values(model, q, qd, applied.constant, parameters, t0)
+    applied = with_applied(model, tau, parameters)
+    start = initial_values(applied.model, q, qd, applied.constant, parameters, t0)
     options.check(start.states)
     _require_room(options, *start.x.shape, stored=store is not None)
 
     # Derive the equations as graphs, and write the steps of the method over them
-    begin, problem = time.perf_counter(), in_form(derive(model, start.bound), form)
+    begin, problem = time.perf_counter(), in_form(derive(applied.model, start.bound), form)
     program = step_program(problem, options.integrator, dense=bool(watched) or options.between)
     watch = event_program(problem, watched)
 
@@ -178,52 +178,14 @@ def simulate_many(
     return result
 
 
-def ends_of(
-    moving: Moving,
-    options: RunOptions,
-    q: ArrayLike,
-    qd: ArrayLike | None,
-    parameters: Mapping[str, ArrayLike] | None,
-    workers: Workers,
-) -> tuple[Array, Array]:
-    """The ends, (N, nq) and (N, n), of motions of one that is prepared, to the only row of the options.
-
-    What is done once for calls that are alike is kept. Raises as `simulate_many`, and for a sampled controller.
-    """
-    if moving.applied.controller is not None:
-        one = "a SampledController may remember what it has seen, and so controls one motion"
-        raise TypeError(f"{one}: ends of many are without")
-    problem, t0 = moving.stepped, options.t0
-    moving.require_given(parameters)
-    start = initial_values(moving.model, q, qd, moving.applied.constant, parameters, t0)
-    p = np.empty((len(start.x), len(problem.parameters)))
-    for k, name in enumerate(problem.parameters):
-        p[:, k] = start.varied[name] if name in start.varied else start.bound[name]
-    x, team = converted(problem.momentum, t0, start.x, p), checked(workers)
-
-    def task() -> Task:
-        options.check(moving.problem.states)
-        return Task(step_program(problem, options.integrator, dense=False), options, len(x))
-
-    kept = moving.shared_out((len(x), t0, options.t_end), task)
-    width = kept.width(None, team if isinstance(team, int) else UNKNOWN, stored=False)
-    whole = _run_chunks(kept, x, p, width, team, None)
-    for text in doubts(whole.runs.stats(options.method, 0.0, {})):
+def ends_of(task: Task, x: Array, p: Array, workers: Workers) -> Array:
+    """The last rows (N, m) of motions from states x (N, m) with parameters p (N, ..); NaN, with a warning, of some."""
+    team = checked(workers)
+    width = task.width(None, team if isinstance(team, int) else UNKNOWN, stored=False)
+    whole = _run_chunks(task, x, p, width, team, None)
+    for text in doubts(whole.runs.stats(task.options.method, 0.0, {})):
         warnings.warn(text, SimulationWarning, stacklevel=3)
-    states = converted(problem.velocities, options.t_end, whole.rows[:, 0], p)
-    return states[:, : problem.nq], states[:, problem.nq :]
-
-
-def single_values(parameters: Mapping[str, Any], varied: Sequence[str]) -> dict[str, Any]:
-    """The parameters that are the same for all motions. Raises ValueError for another that has many values."""
-    if not isinstance(parameters, Mapping):
-        raise TypeError(f"parameters must be a mapping of names to numbers, got {parameters!r:.60}")
-    if several := [name for name, value in parameters.items() if np.ndim(value) and name not in varied]:
-        raise ValueError(
-            f"parameter {several[0]!r} has a value for each motion, and the motion was prepared with one for all: "
-            f"prepare(.., varied=[{several[0]!r}]) keeps it open"
-        )
-    return {name: value for name, value in parameters.items() if not np.ndim(value)}
+    return whole.rows[:, -1]
 
 
 def _run_chunks(task: Task, x: Array, p: Array, width: int, workers: Team, store: Store | None) -> Part:

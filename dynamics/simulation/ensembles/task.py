@@ -15,13 +15,12 @@ from cgraph._shared import Array
 from ..estimates.error_estimate import ASIDE, RunsBeside, changes, error_estimates, runs_beside
 from ..estimates.unresolved import Watch
 from ..events.event import EventProgram
-from ..events.event_log import Happening, WatchedIntegration
+from ..events.event_log import Happening
 from ..outcome import INTERRUPTED, REACHED, outcome
 from ..run_options import RunOptions
+from ..stepper import ChosenStepper, Stepper, stepper
 from ..steps.equal_steps import EqualSteps, even_steps, numbers_of
-from ..steps.integration import AdaptiveIntegration, integration
 from ..steps.step_program import StepProgram, compile_steps
-from ..steps.stepping import Integration, NativeIntegration, NativeRun
 from .ensemble import RunTable
 from .lanes import ROWS, VECTOR, LaneRuns, Lanes, Stopped, chosen_in_lanes, equal_in_lanes, fits_lanes, lanes_of
 
@@ -166,26 +165,26 @@ class Task:
 
     def _one_by_one(self, chunk: Chunk, part: Part, which: Iterable[int], stopped: Callable[[], bool]) -> None:
         """Run these, each alone."""
-        run: Integration | None = None
+        run: Stepper | None = None
         for k in which:
             with _lock:
                 compiled = compile_steps(self.program, self.options.backend, self.options.fma)
-            x, native = chunk.x[k], NativeRun(compiled, self.options, chunk.p[k].tolist(), stopped)
-            if isinstance(run, NativeIntegration):
-                run.set_parameters(native.parameters)
-            else:
-                run = integration(native, events=self.events)
-            if self._has_end_alone and isinstance(run, AdaptiveIntegration):
+            x, p = chunk.x[k], chunk.p[k].tolist()
+            if run is None or self.events is not None:
+                run = stepper(compiled, self.options, p, stopped=stopped, events=self.events)
+            run.set_parameters(p)
+            if self._has_end_alone and isinstance(run, ChosenStepper) and run.log is None:
                 if run.unseen(x):
-                    part.runs.stopped(k, REACHED, **run.counts, success=True, status=0)
+                    counts = {"steps": run.steps, "rejected": run.rejected, "nfev": run.evaluations, "dt": run.largest}
+                    part.runs.stopped(k, REACHED, **counts, success=True, status=0)
                     part.rows[k, :-1], part.rows[k, -1] = x, run.x
                     continue
-                run = integration(native)  # whose first blocks are short: it says when
+                run = stepper(compiled, self.options, p, stopped=stopped)  # whose first blocks are short: it says when
             stats, recorder = outcome(run, x, self.options)
             if stats.message.startswith(INTERRUPTED):
                 raise KeyboardInterrupt
             part.runs.set(k, stats)
-            if isinstance(run, WatchedIntegration):
+            if run.log is not None:
                 part.happened[k] = run.log.happened
             states = recorder.table()[1]
             part.rows[k, : len(states)], part.rows[k, len(states) :] = states, np.nan

@@ -19,8 +19,8 @@ from cgraph._shared import Array
 
 from ..run_options import RunOptions
 from ..steps.equal_steps import FOUR, EqualSteps, by_fours, halved, instants_of, longer
+from ..steps.state_sizes import Flags, off_by
 from ..steps.step_program import StepProgram
-from .state_sizes import Flags, off_by
 from .unresolved import Watch
 
 APART_RATIO = 1.5  # the ratio of errors from which a difference of two runs tells them

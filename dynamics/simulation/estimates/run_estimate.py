@@ -7,16 +7,16 @@ import math
 import time
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple, cast
+from typing import NamedTuple
 
 import numpy as np
 
 from cgraph._shared import Array
 
 from ..run_options import RunOptions
+from ..stepper import EqualStepper, Stepper
 from ..steps.dense_output import StepBlock
 from ..steps.equal_steps import SAME_INSTANT, EqualSteps, even_steps, halved, numbers_of
-from ..steps.stepping import FixedStepIntegration, Integration
 from .error_estimate import (
     ASIDE,
     LOOKS,
@@ -30,16 +30,13 @@ from .error_estimate import (
 )
 from .unresolved import Watch
 
-if TYPE_CHECKING:
-    from ..events.event_log import WatchedIntegration
-
 LATE, SHARE = 2.0, 0.1  # steps, or of the time since the last reset: a run so much later resets takes another course
 
 
 class RunEstimate:
     """Estimate of a run's error from its blocks as they come; of a run whose error is not estimated it forgets them."""
 
-    def __init__(self, run: Integration, x: Array, options: RunOptions) -> None:
+    def __init__(self, run: Stepper, x: Array, options: RunOptions) -> None:
         self._run, self._x, self._options = run, x, options
         self._compared: _Compared | None = None
         self.seconds = 0.0  # spent here
@@ -50,6 +47,7 @@ class RunEstimate:
             return
         begin = time.perf_counter()
         if self._compared is None:
+            assert isinstance(self._run, EqualStepper)
             self._compared = _kind(self._run)(self._run, self._x, self._options)
         self._compared.add(block)
         self.seconds += time.perf_counter() - begin
@@ -66,19 +64,19 @@ class RunEstimate:
         return float(largest), float(last), (warning,) if warning else ()
 
 
-def _kind(run: Integration) -> type[_Compared]:
-    if _segment(run).control is not None:
+def _kind(run: Stepper) -> type[_Compared]:
+    if run.control is not None:
         return _Periods
-    return _Resets if run is not run.segment and cast("WatchedIntegration", run).resetting else _Steps
+    return _Resets if run.log is not None and any(event.reset for event in run.log.program.events) else _Steps
 
 
 class _Compared(ABC):
     """What is kept of a run, to compare it with others."""
 
-    def __init__(self, run: Integration, x: Array, options: RunOptions) -> None:
-        self.run, self.x, self.options, self.first = run, x, options, _segment(run)
-        self.program = self.first.program
-        p = np.array([self.first.parameters])
+    def __init__(self, run: EqualStepper, x: Array, options: RunOptions) -> None:
+        self.run, self.x, self.options = run, x, options
+        self.program = run.program
+        p = np.array([self.run.parameters])
         self.watch = Watch(self.program.rate, self.program.order, p, options.t0, x[None])
 
     @abstractmethod
@@ -115,10 +113,10 @@ class _Rows:
 class _Steps(_Compared):
     """States of a run without resets where steps of all runs end."""
 
-    def __init__(self, run: Integration, x: Array, options: RunOptions) -> None:
+    def __init__(self, run: EqualStepper, x: Array, options: RunOptions) -> None:
         super().__init__(run, x, options)
         self._beside = runs_beside(even_steps(options.instants, options.step), self.program.order)
-        self._rows = _Rows(self.first.stretches, self._beside.instants, x)
+        self._rows = _Rows(even_steps(options.instants, options.step), self._beside.instants, x)
 
     def add(self, block: StepBlock) -> None:
         self.watch.add(block.t, block.x[None])
@@ -130,7 +128,7 @@ class _Steps(_Compared):
         rows = [self._rows.x[: len(t)]]
         for course in self._beside.courses if len(t) > 1 else ():
             other = _Rows(course, t, self.x)
-            for block in self.first.beside(course, self.first.parameters).blocks(self.x * ASIDE):
+            for block in self.run.beside(course, self.run.parameters).blocks(self.x * ASIDE):
                 other.add(block)
                 if other.done >= other.numbers[-1]:
                     break
@@ -144,7 +142,7 @@ class _Resets(_Compared):
     They are compared by their dense output, but not between a reset, or the end, of one and of the other.
     """
 
-    def __init__(self, run: Integration, x: Array, options: RunOptions) -> None:
+    def __init__(self, run: EqualStepper, x: Array, options: RunOptions) -> None:
         super().__init__(run, x, options)
         self._rows, self._every, self._steps = np.array([[options.t0, *x]]), 1, 0
         self._last, self._resets = self._rows, list[float]()
@@ -181,7 +179,7 @@ class _Resets(_Compared):
 
     def _beside(self, dt: float, t: Array) -> _Course:
         """Run by steps of at most dt, at the instants t."""
-        run, x = cast("WatchedIntegration", self.run).beside(dt), np.full((len(t), len(self.x)), math.nan)
+        run, x = self.run.again(dt), np.full((len(t), len(self.x)), math.nan)
         x[0], resets, direction, at = self.x, list[float](), self.options.direction, float(t[0])
         for block in run.blocks(self.x * ASIDE):
             at = float(block.t[-1])
@@ -202,7 +200,7 @@ class _Course(NamedTuple):
     turns: list[float]
 
 
-def _end(run: Integration, t: float) -> list[float]:
+def _end(run: Stepper, t: float) -> list[float]:
     return [t] if run.event else []
 
 
@@ -222,20 +220,19 @@ class _Periods(_Compared):
     length are made under the same. The differences add up.
     """
 
-    def __init__(self, run: Integration, x: Array, options: RunOptions) -> None:
+    def __init__(self, run: EqualStepper, x: Array, options: RunOptions) -> None:
         super().__init__(run, x, options)
-        self._stretch, self._done, self._t = self.first.stretch, 0, options.t0
+        self._stretch, self._done, self._t = run.stretch, 0, options.t0
         self._start = self._end = x
         self._size, self._sum = np.abs(x), np.zeros(len(x))
 
     def add(self, block: StepBlock) -> None:
-        segment = _segment(self.run)
         if block.h[0] == 0.0:
             self.watch.restart(float(block.t[0]), block.x)
             return
-        if not self._done or segment.stretch is not self._stretch:
+        if not self._done or self.run.stretch is not self._stretch:
             self._compare()
-            self.first, self._forces, self._stretch = segment, segment.parameters, segment.stretch
+            self._forces, self._stretch = self.run.parameters, self.run.stretch
             self._start, self._done = block.x_old[0], 0
             self.watch.restart(float(block.t_old[0]), block.x_old[:1], np.array([self._forces]))
         self.watch.add(block.t, block.x[None])
@@ -254,7 +251,7 @@ class _Periods(_Compared):
             return
         if np.isfinite(self._sum).all():
             self._t = begin + self._done * h
-        other = self.first.beside(halved([EqualSteps(begin, h, self._done, begin + self._done * h)]), self._forces)
+        other = self.run.beside(halved([EqualSteps(begin, h, self._done, begin + self._done * h)]), self._forces)
         *_, last = other.blocks(self._start)
         self._sum = self._sum + (math.nan if other.status else np.abs(last.x[-1] - self._end))
         self._done = 0
@@ -264,10 +261,3 @@ class _Periods(_Compared):
         times = [self.options.t0, self._t][: 1 + (self._t != self.options.t0)]
         found = Changes(np.array(times), self._size[None], [np.stack([0.0 * self._size, self._sum])[None]])
         return self.judged(law_of_halves(self.run.largest, self.program.order), found)
-
-
-def _segment(run: Integration) -> FixedStepIntegration:
-    """The part of a run of equal steps that it is in."""
-    segment = run.segment
-    assert isinstance(segment, FixedStepIntegration)
-    return segment

@@ -10,10 +10,10 @@ import numpy as np
 from cgraph._shared import Array
 
 from ..estimates.error_estimate import LAWLESS
-from ..estimates.state_sizes import off_by
 from ..outcome import MotionError
-from ..row_values import unreached_momenta
+from ..steps.state_sizes import off_by
 from ..steps.step_program import state_kinds
+from ..unreached_momenta import unreached_momenta
 from .motion import Segment
 from .motion_run import MotionRun
 from .segments import MotionSegments

@@ -20,11 +20,12 @@ from ...systems.model import Model
 from ..applied_force import with_applied
 from ..events.event import Event, event_program
 from ..outcome import MotionError, Recorder, advise
-from ..row_values import converted, unreached_momenta
+from ..row_values import converted
 from ..run_options import METHOD, RunOptions, time_span
 from ..sampled_controller import SampledController
+from ..stepper import stepper_of
 from ..steps.equal_steps import step_count
-from ..steps.integration import integration_of
+from ..unreached_momenta import unreached_momenta
 from .motion_equations import PARAMETERS, MotionEquations, motion_equations
 
 START, VELOCITY, TORQUE = "q", "qd", "tau"
@@ -96,7 +97,7 @@ class MotionRequest:
         problem, options, start = self.equations.given, self.options, self.x[:, 0]
         parameters = np.concatenate([self.tau, self.values])[: len(problem.parameters), 0]
         program = event_program(problem, events) if events else None
-        made = partial(integration_of, problem, parameters=parameters.tolist(), events=program, between=bool(events))
+        made = partial(stepper_of, problem, parameters=parameters.tolist(), events=program, between=bool(events))
         x = converted(problem.momentum, options.t0, start, parameters)
         run, recorder = made(options), Recorder(x, None, options.t0, options.direction)
         with np.errstate(all="ignore"):
@@ -106,7 +107,8 @@ class MotionRequest:
         if run.status:
             raise MotionError(f"the motion did not reach t_end, {run.status}")
         t, rows = recorder.table()
-        happened = {name: each.t for name, each in run.crossings(problem.nq, parameters).items()}
+        log = [] if run.log is None else run.log.happened
+        happened = {each.name: np.array([t for k, t, _ in log if k == number]) for number, each in enumerate(events)}
         segments = _segments(t, options, events, happened, ended=bool(run.event))
         unreached = unreached_momenta(problem, t, rows, parameters, start=(options.t0, start, x))
         return replace(self, segments=segments, said=(*run.warnings, *unreached))

@@ -14,8 +14,8 @@ from cgraph._shared import Array, Tape, run_passes
 from cgraph.extend import Runner
 
 from ..outcome import MotionError
+from ..stepper import nonfinite, unsolved
 from ..steps.dense_output import Indices
-from ..steps.stepping import nonfinite, unsolved
 from .motion import MotionRequest
 from .motion_programs import LOSS, MotionPrograms, WithDerivative
 

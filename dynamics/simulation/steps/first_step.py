@@ -21,7 +21,7 @@ from cgraph.extend import Call, If, Map, Program, Statement, Sum, While, copied
 
 from ...integrators import Problem
 from ...integrators.step_control import COLLAPSE, RESOLUTION, SMALLEST_ATOL
-from ..estimates.state_sizes import OTHERS, StateKinds, at_rest, at_rest_registers
+from .state_sizes import OTHERS, StateKinds, at_rest, at_rest_registers
 
 # Registers of its own, whose names no method has to keep clear of, see `_at`
 STATES = "x_start rate_start rate_look tolerance size whole pointing x_ahead rate_ahead rate_before size_ahead".split()

@@ -17,8 +17,8 @@ from ...integrators import Method, Problem
 from ...integrators.jacobian_statements import prices
 from ...integrators.problem import constraint_rates
 from ...integrators.step_control import moved
-from ..estimates.state_sizes import StateKinds
 from .first_step import with_first_step
+from .state_sizes import StateKinds
 
 KEPT = 8  # programs from elsewhere that a process keeps ready
 

@@ -137,7 +137,9 @@ def test_a_second_run_that_fails_says_that_nothing_is_known() -> None:
     dt=st.floats(1e-2, 3.0),
     direction=st.sampled_from([1.0, -1.0]),
 )
-def test_runs_beside_have_longer_steps_that_meet_those_of_the_run(gaps: list[float], dt: float, direction: float) -> None:
+def test_runs_beside_have_longer_steps_that_meet_those_of_the_run(
+    gaps: list[float], dt: float, direction: float
+) -> None:
     instants = (direction * np.cumsum([0.0, *gaps])).tolist()
     first = equal_steps(instants, dt)
     fours, longest = by_fours(first), max(abs(part.h) for part in first)
