@@ -290,19 +290,21 @@ class EqualStepper(Stepper):
                 return
             before, t_old, x_old = self._memory.copy(), self.t, self.x.copy()
             rows, done = self._advance(int(min(self._left, most - self.steps)), int(every_step))
-            if failed := self._number("nonfinite") != 0.0:
+            status = ""
+            if self._number("nonfinite"):
                 done, after = done - 1, self._memory.copy()
                 self._memory[:] = before
                 rows = self.runner.run(self._memory, done, 1 if every_step else max(1, done))[0]
-                self.status = self._failure(after)
+                status = self._failure(after)
                 self._set(evaluations=after[self._at["evaluations"]])
             self._left -= done
             t, x = rows[:, 0], rows[:, 1 : 1 + m]
-            if not (self._left or failed):
+            if not (self._left or status):
                 t[-1] = self.stretch.end
             begin, starts = np.append(t_old, t[:-1])[: len(t)], np.concatenate([x_old[None], x[:-1]])[: len(t)]
             yield StepBlock(t, x, begin, t - begin, starts, None, normalization), done
-            if failed:
+            if status:
+                self.status = status
                 return
 
     def until(self, t: float) -> None:
