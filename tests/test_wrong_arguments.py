@@ -16,7 +16,7 @@ import viz
 from cgraph.extend import OPS
 from cgraph.operations.functions import function
 from dynamics.multiprecision.solution import Reference
-from dynamics.simulation.sampled_controller import HeldForces
+from dynamics.simulation.applied_force import HeldForces
 from viz.graph_drawing.render import RenderError
 
 ARM, TWO = dyn.planar_arm([1.0], [1.0]), dyn.planar_arm([1.0, 0.5], [1.0, 1.0])

@@ -1,16 +1,91 @@
-"""Applied forces of runs: numbers, a controller in closed form, or one that is sampled."""
+"""Applied forces of runs: numbers, a controller in closed form, or a sampled one, and what it has held in a run."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, NamedTuple, TypeAlias
 
+import numpy as np
+from numpy.typing import ArrayLike
+
 from cgraph import Node
-from cgraph._shared import or_nearest
+from cgraph._shared import Array, HoldsNodes, or_nearest, real_array, real_number
 
 from ..systems.controller import with_closed_form
 from ..systems.model import Equations, Model, as_equations
-from .sampled_controller import SampledController
+from .steps.equal_steps import SAME_INSTANT
+
+
+@dataclass(frozen=True)
+class SampledController(HoldsNodes):
+    """A controller as a computer runs it: called at the start of every period, its forces held until the next.
+
+    Steps end where periods do, with every method, so that none goes over a jump of the forces. A reset by an event
+    leaves the forces and the periods as they are. The function may remember what it has seen, such as an integral of
+    the error: it is called once a period, in the order of time. What it raises ends the run, with the time as a note.
+
+    Parameters
+    ----------
+    function : callable
+        (q, qd, t) to the force for each velocity, (n,) [N m or N]; q (nq,) and qd (n,) are arrays [rad or m, per
+        second], t a number [s].
+    period : float
+        Of control [s].
+
+    Raises
+    ------
+    TypeError, ValueError
+        For what is no function, and for a period that is not positive and finite.
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> hold = dyn.SampledController(lambda q, qd, t: 30.0 * (0.5 - q) - 6.0 * qd, period=0.01)
+    >>> run = dyn.simulate(dyn.planar_arm([1.0], [1.0]), [0.0], [0.0], t_end=2.0, tau=hold, t_eval=[0.0, 1.0, 2.0])
+    >>> run.q[:, 0].round(3).tolist(), run.tau[:, 0].round(3).tolist()
+    ([0.0, 0.432, 0.432], [15.0, 2.054, 2.052])
+    """
+
+    function: Callable[[Array, Array, float], ArrayLike]
+    period: float
+
+    def __post_init__(self) -> None:
+        if not callable(self.function) or isinstance(self.function, type):
+            raise TypeError(f"a controller must be a function of (q, qd, t), got {self.function!r:.60}")
+        if not 0.0 < real_number("period", self.period) < math.inf:
+            raise ValueError(f"the period of a controller must be positive and finite, got {self.period!r} s")
+
+
+class HeldForces(NamedTuple):
+    """Forces that a SampledController gave in a run, a row for each period.
+
+    Parameters
+    ----------
+    t : ndarray
+        The starts of the periods, (k,) [s].
+    tau : ndarray
+        The forces held from there on, (k, n) [N m or N].
+
+    Examples
+    --------
+    >>> import dynamics as dyn
+    >>> hold = dyn.SampledController(lambda q, qd, t: -q, period=0.25)
+    >>> dyn.simulate(dyn.planar_arm([1.0], [1.0]), [0.5], [0.0], t_end=1.0, tau=hold).held.t
+    array([0.  , 0.25, 0.5 , 0.75])
+    """
+
+    t: Array
+    tau: Array
+
+    def at(self, t: ArrayLike) -> Array:
+        """The forces at times (T,), (T, n); at the end of a period those of the next, NaN before the first."""
+        times = real_array("t", t)
+        none = np.full((1, self.tau.shape[1]), np.nan)
+        rows: Array = np.concatenate([none, self.tau])[np.searchsorted(self.t, times + _rounding(times), side="right")]
+        return rows
+
 
 Constant: TypeAlias = float | Sequence[float]
 Tau: TypeAlias = Constant | Callable[..., Sequence[Node | float]] | SampledController
@@ -49,3 +124,79 @@ def check_varied(model: Equations, tau: Tau, varied: Sequence[str]) -> None:
     if unknown := [name for name in varied if name not in model.parameters and not callable(tau)]:
         known = or_nearest(unknown[0], list(model.parameters))
         raise ValueError(f"varied: the system has no parameter {unknown[0]!r:.80}; {known}")
+
+
+class Hold:
+    """The forces of a controller along a run that starts at t0: those so far, and the times of the next.
+
+    velocities: their names.  nq: of the numbers of a state, the coordinates.  observed: qd of a state (q, p), t and
+    forces; None where states have qd.  times, forces: one for each period.
+    """
+
+    def __init__(
+        self,
+        controller: SampledController,
+        velocities: Sequence[str],
+        nq: int,
+        t0: float,
+        observed: Callable[[Array], Array] | None = None,
+    ) -> None:
+        self.controller, self.velocities, self.nq, self.t0, self.observed = controller, velocities, nq, t0, observed
+        self.times: list[float] = []
+        self.forces: list[list[float]] = []
+
+    def at(self, t: float, x: Array) -> list[float]:
+        """The forces from t on, (n,); x: the state, (m,)."""
+        if t >= self._start(len(self.times)) - _rounding(t):
+            self.forces.append(self._called(t, x))
+            self.times.append(t)
+        return self.forces[-1]
+
+    def ends(self, t: float, t_end: float) -> Iterator[float]:
+        """The ends of periods from t on, without those at t and t_end but for rounding; then t_end."""
+        number = max(0, math.floor((t - self.t0) / self.controller.period) - 1)
+        while (end := self._start(number)) < t_end - _rounding(t_end):
+            if end > t + _rounding(t):
+                yield end
+            number += 1
+        yield t_end
+
+    def instants(self, instants: Sequence[float]) -> list[float]:
+        """The instants that equal steps have to meet, with the ends of periods between them."""
+        result = [instants[0]]
+        for instant in instants[1:]:
+            result += self.ends(result[-1], instant)
+        return result
+
+    @property
+    def held(self) -> HeldForces:
+        """The forces so far."""
+        return HeldForces(np.array(self.times), np.array(self.forces).reshape(-1, len(self.velocities)))
+
+    def _start(self, number: int) -> float:
+        """The start of a period [s]."""
+        return self.t0 + number * self.controller.period
+
+    def _called(self, t: float, x: Array) -> list[float]:
+        try:
+            qd = x[self.nq :]
+            if self.observed is not None:
+                qd = self.observed(np.concatenate([x, [t], np.zeros(len(qd))]))  # they do not depend on the forces
+            with np.errstate(all="warn"):
+                given = self.controller.function(x[: self.nq].copy(), qd.copy(), t)
+            forces = real_array("the controller's forces", given)
+            if forces.shape != (len(self.velocities),):
+                needed = f"({len(self.velocities)},), one for each of {', '.join(self.velocities)}"
+                raise ValueError(f"the controller's forces must have shape {needed}; got {forces.shape}")
+            if not np.isfinite(forces).all():
+                name = self.velocities[int(np.argmin(np.isfinite(forces)))]
+                raise ValueError(f"the controller's forces must be finite, got {forces.tolist()}: that of {name!r}")
+        except Exception as error:
+            error.add_note(f"in the controller at t = {t:.6g} s")
+            raise
+        return list(forces.tolist())
+
+
+def _rounding(t: float | Array) -> float | Array:
+    """Largest difference of two times that are meant to be the same [s]."""
+    return SAME_INSTANT * np.spacing(np.abs(t))

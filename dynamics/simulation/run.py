@@ -23,23 +23,29 @@ from ..equations.states.initial_value import initial_values, other_inputs, start
 from ..integrators import Problem, derive, force, in_form, quantity_inputs, total_energy
 from ..systems.arguments import parameter_value
 from ..systems.model import Equations, Model, as_equations
-from .applied_force import Applied, Tau, with_applied
+from .applied_force import Applied, Hold, Tau, with_applied
 from .events.event import Event, EventProgram, event_program
-from .events.event_log import split_crossings
-from .outcome import INTERRUPTED, REACHED, InterruptedMotion, MotionEnd, MotionError, outcome
+from .outcome import (
+    INTERRUPTED,
+    REACHED,
+    InterruptedMotion,
+    MotionEnd,
+    MotionError,
+    MotionSteps,
+    outcome,
+    split_crossings,
+)
 from .progress_bar import Progress
-from .row_values import converted
 from .run_options import RunOptions
-from .sampled_controller import Hold
 from .stepper import Stepper, stepper_of
 from .steps.dense_output import Solution, StepBlock
+from .steps.row_values import converted
 from .steps.step_program import step_program
 from .trajectory import SimulationWarning, Trajectory
 from .unreached_momenta import unreached_momenta
 
 if TYPE_CHECKING:
     from .ensembles.workers import Workers
-    from .motion_steps import MotionSteps
 
 KEPT_PARAMETERS = 16  # sets of parameter values, whose equations a run keeps
 
@@ -278,8 +284,6 @@ class Run(HoldsNodes):
         1.0 [-0.077] [0.245]
         1.5 [0.086] [0.195]
         """
-        from .motion_steps import MotionSteps  # which a trajectory does not need
-
         bound = self._bound(parameters)
         if not bound._is_of_steps_alone:
             raise ValueError(

@@ -13,12 +13,11 @@ from cgraph._shared import require_choice, require_flag, require_sequence
 from ..equations.state_equation import FORMS
 from ..equations.states.initial_value import other_inputs
 from ..systems.model import Model, as_equations
-from .applied_force import Tau, check_varied
+from .applied_force import SampledController, Tau, check_varied
 from .events.event import Event, as_events
 from .outcome import InterruptedMotion
 from .run import Run
 from .run_options import METHOD, Options, RunOptions, time_span
-from .sampled_controller import SampledController
 from .trajectory import Trajectory
 
 

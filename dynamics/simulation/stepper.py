@@ -17,13 +17,13 @@ from cgraph._shared import Array
 
 from ..integrators import Problem
 from ..integrators.step_control import DONE, RUNNING, SMALLEST_ATOL, TOO_SMALL
-from .row_values import values_of
+from .applied_force import Hold
 from .run_options import RunOptions
-from .sampled_controller import Hold
 from .steps.dense_output import StepBlock, inside_nodes, with_hermite
 from .steps.equal_steps import EqualSteps, equal_steps
 from .steps.first_step import TOLERANCE, given, instant
 from .steps.flat_position import CREEP, FlatPosition
+from .steps.row_values import values_of
 from .steps.step_program import CompiledSteps, compile_steps, step_program
 
 if TYPE_CHECKING:

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from cgraph._shared import Array
 
 from ..integrators import Problem
-from .row_values import converted, row_values
+from .steps.row_values import converted, row_values
 from .steps.state_sizes import OTHERS
 
 LOOSE = 1e-6  # of a momentum, or so much of the largest: what an iteration may leave of it; of a velocity the same

@@ -20,14 +20,13 @@ from cgraph._shared import Array, require_path, require_whole
 from ...equations.states.initial_value import InitialValues, initial_values
 from ...integrators import Problem, derive, in_form
 from ...systems.model import Model
-from ..applied_force import with_applied
+from ..applied_force import SampledController, with_applied
 from ..events.event import Event, EventProgram, as_events, event_program
-from ..events.event_log import split_crossings
+from ..outcome import split_crossings
 from ..progress_bar import Progress
-from ..row_values import converted
 from ..run_options import METHOD, RunOptions, require_room, time_span
-from ..sampled_controller import SampledController
 from ..steps.equal_steps import step_count
+from ..steps.row_values import converted
 from ..steps.step_program import step_program
 from ..trajectory import SimulationWarning
 from ..unreached_momenta import unreached_momenta

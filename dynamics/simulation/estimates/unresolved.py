@@ -12,7 +12,7 @@ from cgraph._shared import Array, kept_by_first
 from cgraph.extend import Builder, building
 
 from ...systems.arguments import TIME
-from ..row_values import values_of
+from ..steps.row_values import values_of
 
 PARTS, TIMES = 16, 10  # into which the way from one state to the next is divided, and again, to find a branch's change
 BURST = (

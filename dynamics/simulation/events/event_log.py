@@ -8,15 +8,13 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from cgraph._shared import Array
 
 from ...integrators.step_control import RESOLUTION
-from ..row_values import converted, values_of
 from ..steps.dense_output import UNIT, StepBlock
+from ..steps.row_values import values_of
 from ..steps.state_sizes import Flags
-from ..trajectory import Crossings
 from .crossings import MOST_CELLS, Crossing, Side, WatchedSteps, crossings
 from .event import EventProgram
 
@@ -244,17 +242,3 @@ def _sides(look: _Look, own: Sequence[float] | Array) -> list[Side]:
         Side(value) if not zero else Side(left=motion) if motion else Side(float(side), left=0.0)
         for zero, value, motion, side in signs
     ]
-
-
-def split_crossings(
-    program: EventProgram, happened: Sequence[Happening], nq: int, parameters: ArrayLike = 0.0
-) -> dict[str, Crossings]:
-    """Crossings by the event's name, from (number, t, x), with states split after nq numbers into q and qd."""
-    result = {}
-    for number, event in enumerate(program.events):
-        matching = [(t, x) for k, t, x in happened if k == number]
-        times = np.array([t for t, _ in matching])
-        states = np.array([x for _, x in matching]).reshape(len(matching), len(program.components))
-        states = converted(program.velocities, times, states, parameters)
-        result[event.name] = Crossings(times, states[:, :nq], states[:, nq:])
-    return result

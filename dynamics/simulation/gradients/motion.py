@@ -17,14 +17,13 @@ from ...equations.state_equation import state_inputs
 from ...equations.states.initial_value import initial_values
 from ...integrators import Method, Problem, derive, in_form
 from ...systems.model import Model
-from ..applied_force import with_applied
+from ..applied_force import SampledController, with_applied
 from ..events.event import Event, event_program
 from ..outcome import MotionError, Recorder, advise
-from ..row_values import converted
 from ..run_options import METHOD, RunOptions, time_span
-from ..sampled_controller import SampledController
 from ..stepper import stepper_of
 from ..steps.equal_steps import step_count
+from ..steps.row_values import converted
 from ..unreached_momenta import unreached_momenta
 from .motion_equations import PARAMETERS, MotionEquations, motion_equations
 

@@ -19,7 +19,7 @@ from cgraph._shared import Array, kept_by_first
 
 from ..events.event import Event, WatchedEvent, event_program
 from ..outcome import MotionError
-from ..row_values import values_of
+from ..steps.row_values import values_of
 from .motion import TORQUE, MotionRequest, Segment
 from .motion_equations import PARAMETERS
 from .motion_programs import LOSS, MotionPrograms, ProgramRequest, motion_programs

@@ -17,7 +17,7 @@ from cgraph._shared import Array
 from ...systems.model import Model
 from ..applied_force import Constant
 from ..events.event import Event, as_events
-from ..row_values import values_of
+from ..steps.row_values import values_of
 from ..trajectory import SimulationWarning
 from .doubts import doubts
 from .motion import START, TORQUE, VELOCITY, MotionRequest, motion_of

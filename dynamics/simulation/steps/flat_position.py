@@ -12,7 +12,7 @@ import numpy as np
 
 from cgraph._shared import Array
 
-from ..row_values import values_of
+from .row_values import values_of
 from .step_program import StepProgram
 
 NEAR_SINGULAR = 0.1  # of the least singular value at the start: one that is less is on its way to 0
