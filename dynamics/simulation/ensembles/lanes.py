@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -149,54 +151,84 @@ class _Memories:
 
 
 class LaneRuns(NamedTuple):
-    """Flags of runs that reached their end without a remark, (k,), and columns of the runs' statistics."""
+    """Flags of runs that reached their end, (k,), columns of the runs' statistics, and what is said of some of them.
+
+    A run with a remark that depends on its course is made again alone, as one that stopped.
+    """
 
     whole: Flags
     columns: dict[str, Array]
+    said: Mapping[int, str] = MappingProxyType({})
+
+
+class Leg(NamedTuple):
+    """Steps of runs on the way: of a grid, which it begins or goes on with, up to the last of its marks.
+
+    marks: numbers of its steps.  places: of each table of rows, which rows are at marks, and at which.
+    """
+
+    grid: EqualSteps
+    marks: Array
+    places: list[tuple[slice, Numbers]]
+
+
+def legs_of(grids: Sequence[EqualSteps], tables: Sequence[Numbers], most: float = math.inf) -> list[Leg]:
+    """The legs of runs that keep tables of rows, after so many steps each, (T,).
+
+    most: marks of a leg, which then are all steps.
+    """
+    legs, done = list[Leg](), 0
+    for grid in grids:
+        inside = [
+            numbers[slice(*np.searchsorted(numbers, [done + 1, done + grid.steps + 1]))] - done for numbers in tables
+        ]
+        marks = np.unique(np.concatenate([*inside, [grid.steps]])) if most == math.inf else np.arange(1, grid.steps + 1)
+        for part in np.split(marks, range(int(most), len(marks), int(most)) if most < math.inf else []):
+            ends = done + part[0], done + part[-1] + 1
+            here = [slice(*np.searchsorted(numbers, ends).tolist()) for numbers in tables]
+            there = [np.searchsorted(part, numbers[rows] - done) for numbers, rows in zip(tables, here, strict=True)]
+            legs.append(Leg(grid, part.astype(np.float64), list(zip(here, there, strict=True))))
+        done += grid.steps
+    return legs
 
 
 def equal_in_lanes(
     lanes: Lanes,
     x: Array,
     p: Array,
-    grids: Sequence[EqualSteps],
-    kept: Sequence[tuple[Numbers, Array]],
+    legs: Sequence[Leg],
+    tables: Sequence[Array],
     stopped: Stopped,
     see: See | None = None,
 ) -> LaneRuns:
     """Runs by equal steps from states x (k, m) with parameters p (k, ..).
 
-    kept: how many steps are done at instants, (T,), and what receives the states there, (k, T, m), NaN from where a run
-    has not come to.  see: is told times and states after all steps.
+    tables: receive states, (k, T, m), NaN from where a run has not come to.  see: is told those of all marks, and when.
     """
-    run, m, done = _Memories(lanes, len(x), {"x": x, "p": p, "fresh": 1.0}), x.shape[1], 0
-    for numbers, rows in kept:
-        rows[:, numbers == 0] = x[:, None]
-    for grid in grids:
-        run.set({"start": grid.begin, "t": grid.begin, "h": grid.h, "count": 0.0})
-        run.passes[:, 0] = 0
-        inside = [numbers[(numbers > done) & (numbers <= done + grid.steps)] - done for numbers, _ in kept]
-        marks = np.arange(1, grid.steps + 1) if see else np.unique(np.concatenate([*inside, [grid.steps]]))
-        at_once = max(1, ROWS // (len(x) * lanes.code.width))
-        for part in np.split(marks, range(at_once, len(marks), at_once)):
-            end = part[-1]
-            block = run.rows(
-                part.astype(np.float64),
-                lambda end=end: (run.read("nonfinite") == 0.0) & (run.passes[:, 0] < end),
-                lambda which, end=end: float(end - run.passes[which[0], 0]),
-                stopped,
-            )[:, :, 1 : 1 + m]
-            if (run.passes[:, 1] < len(part)).any():
-                block[np.arange(len(part)) >= run.passes[:, 1:]] = np.nan
-            for numbers, rows in kept:
-                here = np.flatnonzero((numbers - done >= part[0]) & (numbers - done <= end))
-                rows[:, here] = block[:, np.searchsorted(part, numbers[here] - done)]
-            if see is not None:
-                see(grid.begin + part * grid.h, block)
-        done += grid.steps
-    longest = np.full(len(x), max([abs(grid.h) for grid in grids]))
-    whole = run.read("nonfinite") == 0.0
-    return LaneRuns(whole, {"steps": np.full(len(x), done), "nfev": run.read("evaluations"), "dt": longest})
+    run, m, grid, done = _Memories(lanes, len(x), {"x": x, "p": p, "fresh": 1.0}), x.shape[1], None, 0
+    for (first, _), rows in zip(legs[0].places, tables, strict=True):
+        rows[:, : first.start] = x[:, None]  # the start
+    for leg in legs:
+        if leg.grid is not grid:
+            grid, done = leg.grid, done + leg.grid.steps
+            run.set({"start": grid.begin, "t": grid.begin, "h": grid.h, "count": 0.0})
+            run.passes[:, 0] = 0
+        end = leg.marks[-1]
+        block = run.rows(
+            leg.marks,
+            lambda end=end: (run.read("nonfinite") == 0.0) & (run.passes[:, 0] < end),
+            lambda which, end=end: float(end - run.passes[which[0], 0]),
+            stopped,
+        )[:, :, 1 : 1 + m]
+        if (run.passes[:, 1] < len(leg.marks)).any():
+            block[np.arange(len(leg.marks)) >= run.passes[:, 1:]] = np.nan
+        for (here, there), rows in zip(leg.places, tables, strict=True):
+            rows[:, here] = block[:, there]
+        if see is not None:
+            see(leg.grid.begin + leg.marks * leg.grid.h, block)
+    longest = max([abs(leg.grid.h) for leg in legs])
+    columns = {"steps": np.full(len(x), done), "nfev": run.read("evaluations"), "dt": np.full(len(x), longest)}
+    return LaneRuns(run.read("nonfinite") == 0.0, columns)
 
 
 def chosen_in_lanes(lanes: Lanes, options: RunOptions, x: Array, p: Array, rows: Array, stopped: Stopped) -> LaneRuns:

@@ -18,12 +18,24 @@ from ..events.event import EventProgram
 from ..events.event_log import Happening, WatchedIntegration
 from ..outcome import INTERRUPTED, REACHED, outcome
 from ..run_options import RunOptions
-from ..steps.equal_steps import EqualSteps, even_steps, numbers_of
+from ..steps.equal_steps import EqualSteps, Numbers, even_steps, numbers_of
 from ..steps.integration import AdaptiveIntegration, integration
 from ..steps.step_program import StepProgram, compile_steps
 from ..steps.stepping import Integration, NativeIntegration, NativeRun
 from .ensemble import RunTable
-from .lanes import ROWS, VECTOR, LaneRuns, Lanes, Stopped, chosen_in_lanes, equal_in_lanes, fits_lanes, lanes_of
+from .lanes import (
+    ROWS,
+    VECTOR,
+    LaneRuns,
+    Lanes,
+    Leg,
+    Stopped,
+    chosen_in_lanes,
+    equal_in_lanes,
+    fits_lanes,
+    lanes_of,
+    legs_of,
+)
 
 LARGEST_CHUNK = 256  # trajectories in a chunk one by one, unless asked for
 LONGEST_CHUNK = 4096  # of those in lanes, of which a chunk's rows of steps have at most `ROWS` numbers
@@ -123,46 +135,65 @@ class Task:
 
         Raises KeyboardInterrupt soon after Ctrl-C, and StoppedError after `stopped`.
         """
-        part, lanes = not_begun(chunk.first, rows, events=self.events is not None), None
-        if self.in_lanes:
-            with _lock:
-                lanes = lanes_of(self.program, self.options.backend, self.options.fma)
-        left: Iterable[int] = range(len(chunk.x))
+        part, left = not_begun(chunk.first, rows, events=self.events is not None), range(len(chunk.x))
         with np.errstate(all="ignore"):
-            if lanes is not None:  # runs that end early are made again, alone
-                left = self._run_lanes(lanes, chunk, part, stopped)
+            if (found := self.run_lanes(chunk.x, chunk.p, rows, stopped)) is not None:
+                done = np.flatnonzero(found.whole)
+                part.runs.reached(done, **{name: values[done] for name, values in found.columns.items()})
+                for k, text in found.said.items():
+                    part.runs.warnings[k] = (text,)
+                left = np.flatnonzero(~found.whole).tolist()  # which are made again, alone
             self._one_by_one(chunk, part, left, stopped)
         return part
 
-    def _run_lanes(self, lanes: Lanes, chunk: Chunk, part: Part, stopped: Stopped) -> list[int]:
-        """The trajectories that do not reach their end without a remark, after all have gone in lanes."""
-        options, x, p = self.options, chunk.x, chunk.p
-        if self.program.adaptive:
-            found = chosen_in_lanes(lanes, options, x, p, part.rows, stopped)
-        elif self.beside is None:
-            kept = [(numbers_of(self.grids, options.row_times), part.rows)]
-            found = equal_in_lanes(lanes, x, p, self.grids, kept, stopped)
-        else:
-            found = self._estimated(lanes, self.beside, chunk, part, stopped)
-        done = np.flatnonzero(found.whole)
-        part.runs.reached(done, **{name: values[done] for name, values in found.columns.items()})
-        return np.flatnonzero(~found.whole).tolist()
+    def run_lanes(self, x: Array, p: Array, rows: Array, stopped: Stopped) -> LaneRuns | None:
+        """Run trajectories from states x (k, m) with parameters p (k, ..) in lanes; None if they do not go there.
 
-    def _estimated(self, lanes: Lanes, beside: RunsBeside, chunk: Chunk, part: Part, stopped: Stopped) -> LaneRuns:
-        """Runs by equal steps, with those beside."""
-        x, p, program, t = chunk.x, chunk.p, self.program, beside.instants
-        courses, rows = (self.grids, *beside.courses), np.empty((1 + len(beside.courses), len(x), len(t), x.shape[1]))
-        watch = Watch(program.rate, program.order, p, self.options.t0, x)
-        kept = [(numbers_of(self.grids, self.options.row_times), part.rows), (numbers_of(self.grids, t), rows[0])]
-        found = equal_in_lanes(lanes, x, p, self.grids, kept, stopped, watch.add if watch.needed else None)
-        for course, states in zip(courses[1:], rows[1:], strict=True):
-            equal_in_lanes(lanes, x * ASIDE, p, course, [(numbers_of(course, t), states)], stopped)
+        rows: (k, T, m), receives their rows.
+        """
+        if self._lanes is None:
+            return None
+        if self.program.adaptive:
+            return chosen_in_lanes(self._lanes, self.options, x, p, rows, stopped)
+        beside, legs = self.beside, self._legs
+        if beside is None:
+            return equal_in_lanes(self._lanes, x, p, legs[0], [rows], stopped)
+        watch = Watch(self.program.rate, self.program.order, p, self.options.t0, x)
+        states = np.empty((len(legs), len(x), len(beside.instants), x.shape[1]))
+        if watch.needed:  # which sees all steps
+            steps = max(1, ROWS // (len(x) * self.program.steps.width))
+            legs = [legs_of(self.grids, self._numbers, steps), *legs[1:]]
+        found = equal_in_lanes(
+            self._lanes, x, p, legs[0], [rows, states[0]], stopped, watch.add if watch.needed else None
+        )
+        for leg, others in zip(legs[1:], states[1:], strict=True):
+            equal_in_lanes(self._lanes, x * ASIDE, p, leg, [others], stopped)
         steps = int(found.columns["steps"][0])
-        estimates = error_estimates(program, self.options, beside.law, watch, steps, changes(t, rows))
-        for k in np.flatnonzero(found.whole).tolist():
-            part.runs.warnings[k] = tuple(filter(None, [estimates.warnings[k]]))
-        columns = {"error": estimates.largest, "error_at_end": estimates.last}
-        return LaneRuns(found.whole, found.columns | columns)
+        errors = error_estimates(self.program, self.options, beside.law, watch, steps, changes(beside.instants, states))
+        said = {k: text for k, text in enumerate(errors.warnings) if text and found.whole[k]}
+        columns = {**found.columns, "error": errors.largest, "error_at_end": errors.last}
+        return LaneRuns(found.whole, columns, said)
+
+    @cached_property
+    def _numbers(self) -> list[Numbers]:
+        """How many equal steps are done at the rows, and at the instants of comparison."""
+        instants = [] if self.beside is None else [self.beside.instants]
+        return [numbers_of(self.grids, times) for times in (self.options.row_times, *instants)]
+
+    @cached_property
+    def _legs(self) -> list[list[Leg]]:
+        """Legs of the runs and of those beside."""
+        courses = () if self.beside is None else self.beside.courses
+        beside = [legs_of(course, [numbers_of(course, self.beside.instants)]) for course in courses]
+        return [legs_of(self.grids, self._numbers), *beside]
+
+    @property
+    def _lanes(self) -> Lanes | None:
+        """The code of lanes, if trajectories go there."""
+        if not self.in_lanes:
+            return None
+        with _lock:
+            return lanes_of(self.program, self.options.backend, self.options.fma)
 
     def _one_by_one(self, chunk: Chunk, part: Part, which: Iterable[int], stopped: Callable[[], bool]) -> None:
         """Run these, each alone."""
