@@ -116,9 +116,7 @@ class Task:
         if not self.in_lanes:
             largest, shares = LARGEST_CHUNK, SHARES
         else:
-            numbers = self.program.steps.width * (
-                self.count + (0 if self.beside is None else len(self.beside.instants))
-            )
+            numbers = self.program.steps.width * (self.count + (0 if self.beside is None else len(self.beside.t)))
             largest = min(LONGEST_CHUNK, max(VECTOR, ROWS // numbers))
             chunk = chunk and min(chunk, largest)
             largest = min(largest, LARGEST_CHUNK) if stored else largest
@@ -159,7 +157,7 @@ class Task:
         if beside is None:
             return equal_in_lanes(self._lanes, x, p, legs[0], [rows], stopped)
         watch = Watch(self.program.rate, self.program.order, p, self.options.t0, x)
-        states = np.empty((len(legs), len(x), len(beside.instants), x.shape[1]))
+        states = np.empty((len(legs), len(x), len(beside.t), x.shape[1]))
         if watch.needed:  # which sees all steps
             steps = max(1, ROWS // (len(x) * self.program.steps.width))
             legs = [legs_of(self.grids, self._numbers, steps), *legs[1:]]
@@ -169,23 +167,22 @@ class Task:
         for leg, others in zip(legs[1:], states[1:], strict=True):
             equal_in_lanes(self._lanes, x * ASIDE, p, leg, [others], stopped)
         steps = int(found.columns["steps"][0])
-        errors = error_estimates(self.program, self.options, beside.law, watch, steps, changes(beside.instants, states))
+        errors = error_estimates(self.program, self.options, beside.law, watch, steps, changes(beside.t, states))
         said = {k: text for k, text in enumerate(errors.warnings) if text and found.whole[k]}
         columns = {**found.columns, "error": errors.largest, "error_at_end": errors.last}
         return LaneRuns(found.whole, columns, said)
 
     @cached_property
     def _numbers(self) -> list[Numbers]:
-        """How many equal steps are done at the rows, and at the instants of comparison."""
-        instants = [] if self.beside is None else [self.beside.instants]
-        return [numbers_of(self.grids, times) for times in (self.options.row_times, *instants)]
+        """How many equal steps are done at the rows, and when runs are looked at to be compared."""
+        looks = [] if self.beside is None else [self.beside.numbers]
+        return [numbers_of(self.grids, self.options.row_times), *looks]
 
     @cached_property
     def _legs(self) -> list[list[Leg]]:
         """Legs of the runs and of those beside."""
-        courses = () if self.beside is None else self.beside.courses
-        beside = [legs_of(course, [numbers_of(course, self.beside.instants)]) for course in courses]
-        return [legs_of(self.grids, self._numbers), *beside]
+        beside = () if self.beside is None else self.beside.runs
+        return [legs_of(self.grids, self._numbers), *[legs_of(run.stretches, [run.numbers]) for run in beside]]
 
     @property
     def _lanes(self) -> Lanes | None:

@@ -18,7 +18,7 @@ import numpy as np
 from cgraph._shared import Array
 
 from ..run_options import RunOptions
-from ..steps.equal_steps import FOUR, EqualSteps, by_fours, halved, instants_of, longer
+from ..steps.equal_steps import EqualSteps, Numbers, halved, instants_of, longer, some_of
 from ..steps.step_program import StepProgram
 from .state_sizes import Flags, off_by
 from .unresolved import Watch
@@ -28,6 +28,7 @@ LEAST_RATIO = 2.0  # times a difference that of steps twice as long is, at least
 LAWLESS = 0.1  # of the size of a component: a difference above it follows no power of the step
 UNIT = 2.0**-52  # the last bit of a number near 1
 ASIDE = 1.0 + 8.0 * UNIT  # times each component, runs beside start: what roundings grow to is part of the error
+FOUR = 4  # steps, at whose ends those of all runs end
 LOOKS = 1024  # instants at which runs are compared, at most
 UNKNOWN = "the error is unknown"
 
@@ -49,32 +50,39 @@ def law_of_halves(longest: float, order: int) -> Law:
     return Law(longest, 1.0 / (1.0 - 0.5**order))
 
 
-class RunsBeside(NamedTuple):
-    """Runs beside one of equal steps.
+class Beside(NamedTuple):
+    """A run beside another: its steps, how many times as long they are, and how many are done when both are looked at."""
 
-    times: how much longer their steps are.  courses: their steps.  instants: the start, and where steps of all runs
-    end, (T,) [s].
-    """
+    stretches: Sequence[EqualSteps]
+    times: float
+    numbers: Numbers
+
+
+class RunsBeside(NamedTuple):
+    """Runs beside one of equal steps, which are looked at after so many of its steps, at the instants t, (T,) each."""
 
     law: Law
-    times: Sequence[float]
-    courses: Sequence[Sequence[EqualSteps]]
-    instants: Array
+    runs: Sequence[Beside]
+    numbers: Numbers
+    t: Array
 
 
 def runs_beside(stretches: Sequence[EqualSteps], order: int) -> RunsBeside:
     """Runs of steps twice and four times as long; if there are too few of them, one of steps half as long."""
-    fours = by_fours(stretches)
-    made, start = [longer(fours, 2), longer(fours, 4)], stretches[0].begin
-    longest = max([abs(part.h) for part in stretches])
+    steps, longest = sum([part.steps for part in stretches]), max([abs(part.h) for part in stretches])
+    numbers = some_of(steps, FOUR, LOOKS)
+    t = instants_of(stretches, numbers)
+    (twice, at_twice), (fourfold, at_fourfold) = longer(t, numbers, 2), longer(t, numbers, 4)
     one, two, four = [
-        sum([part.steps * (abs(part.h) / longest) ** (order + 1) for part in each]) for each in (stretches, *made)
+        sum([part.steps * (abs(part.h) / longest) ** (order + 1) for part in each])
+        for each in (stretches, twice, fourfold)
     ]
     if two >= APART_RATIO * one and four - two >= APART_RATIO * (two - one):
         law = Law(longest, one / (two - one), (four - two) / (two - one))
-        return RunsBeside(law, (2.0, 4.0), made, np.append(start, instants_of(fours, FOUR, LOOKS)))
-    ends = np.append(start, instants_of(stretches, 1, LOOKS))
-    return RunsBeside(law_of_halves(longest, order), (0.5,), [halved(stretches)], ends)
+        return RunsBeside(law, [Beside(twice, 2.0, at_twice), Beside(fourfold, 4.0, at_fourfold)], numbers, t)
+    numbers = some_of(steps, 1, LOOKS)
+    half = Beside(halved(stretches), 0.5, 2 * numbers)
+    return RunsBeside(law_of_halves(longest, order), [half], numbers, instants_of(stretches, numbers))
 
 
 class ErrorEstimates(NamedTuple):

@@ -6,7 +6,6 @@ import itertools
 import math
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
@@ -15,7 +14,7 @@ from cgraph._shared import Array
 
 from ..run_options import RunOptions
 from ..steps.dense_output import StepBlock
-from ..steps.equal_steps import SAME_INSTANT, EqualSteps, even_steps, halved, numbers_of
+from ..steps.equal_steps import EqualSteps, Numbers, equal_steps
 from ..steps.stepping import FixedStepIntegration, Integration
 from .error_estimate import (
     ASIDE,
@@ -95,15 +94,14 @@ class _Compared(ABC):
 
 
 class _Rows:
-    """States of a run that starts with x after some of its steps, by the instants at which these end.
+    """States of a run that starts with x after some of its steps, numbers (T,).
 
-    numbers: of the steps, (T,).  x: (T, m), NaN from where it has not come to.  done: steps.
+    x: (T, m), NaN from where it has not come to.  done: steps.
     """
 
-    def __init__(self, stretches: Sequence[EqualSteps], instants: Array, x: Array) -> None:
-        self.numbers, self.done = numbers_of(stretches, instants), 0
-        self.x = np.full((len(instants), len(x)), math.nan)
-        self.x[self.numbers == 0] = x
+    def __init__(self, numbers: Numbers, x: Array) -> None:
+        self.numbers, self.done, self.x = numbers, 0, np.full((len(numbers), len(x)), math.nan)
+        self.x[0] = x
 
     def add(self, block: StepBlock) -> None:
         """The next steps."""
@@ -113,12 +111,12 @@ class _Rows:
 
 
 class _Steps(_Compared):
-    """States of a run without resets where steps of all runs end."""
+    """States of a run without resets after steps at whose ends those of runs beside end, too."""
 
     def __init__(self, run: Integration, x: Array, options: RunOptions) -> None:
         super().__init__(run, x, options)
-        self._beside = runs_beside(even_steps(options.instants, options.step), self.program.order)
-        self._rows = _Rows(self.first.stretches, self._beside.instants, x)
+        self._runs = runs_beside(self.first.stretches, self.program.order)
+        self._rows = _Rows(self._runs.numbers, x)
 
     def add(self, block: StepBlock) -> None:
         self.watch.add(block.t, block.x[None])
@@ -126,16 +124,15 @@ class _Steps(_Compared):
 
     def estimates(self) -> ErrorEstimates:
         whole = self._rows.done - bool(self.run.event)  # steps: an event may have ended the run inside one
-        t = self._beside.instants[self._rows.numbers <= whole]
-        rows = [self._rows.x[: len(t)]]
-        for course in self._beside.courses if len(t) > 1 else ():
-            other = _Rows(course, t, self.x)
-            for block in self.first.beside(course, self.first.parameters).blocks(self.x * ASIDE):
-                other.add(block)
-                if other.done >= other.numbers[-1]:
+        count = int(np.searchsorted(self._rows.numbers, whole, side="right"))
+        rows = [self._rows]
+        for beside in self._runs.runs if count > 1 else ():
+            rows.append(_Rows(beside.numbers[:count], self.x))
+            for block in self.first.beside(beside.stretches, self.first.parameters).blocks(self.x * ASIDE):
+                rows[-1].add(block)
+                if rows[-1].done >= rows[-1].numbers[-1]:
                     break
-            rows.append(other.x)
-        return self.judged(self._beside.law, changes(t, [each[None] for each in rows]))
+        return self.judged(self._runs.law, changes(self._runs.t[:count], [each.x[None, :count] for each in rows]))
 
 
 class _Resets(_Compared):
@@ -163,18 +160,15 @@ class _Resets(_Compared):
 
     def estimates(self) -> ErrorEstimates:
         rows = np.concatenate([self._rows, self._last[self._last[:, 0] != self._rows[-1, 0]]])
-        t, longest = rows[:, 0], self.run.largest
-        law, times = runs_beside(even_steps([self.options.t0, self.options.t_end], longest), self.program.order)[:2]
+        t, longest, forth = rows[:, 0], self.run.largest, self.options.direction
+        law, beside, *_ = runs_beside(equal_steps([self.options.t0, self.options.t_end], longest), self.program.order)
         courses = [_Course(rows[:, 1:], [*self._resets, *_end(self.run, float(t[-1]))])]
-        courses += [self._beside(each * longest, t) for each in times]
-        forth = self.options.direction
+        courses += [self._beside(each.times * longest, t) for each in beside]
         counts = [np.searchsorted(forth * np.array(each.turns), forth * t) for each in courses]
         alike = [one == other for one, other in itertools.pairwise(counts)]
-        between = [
-            np.abs(other.x - one.x)[same][None]
-            for (one, other), same in zip(itertools.pairwise(courses), alike, strict=True)
-        ]
-        lost = _lost(courses[0].turns, courses[1].turns, t, times[0] * longest)
+        pairs = zip(itertools.pairwise(courses), alike, strict=True)
+        between = [np.abs(other.x - one.x)[same][None] for (one, other), same in pairs]
+        lost = _lost(courses[0].turns, courses[1].turns, t, beside[0].times * longest)
         if 2 * alike[0].sum() < len(t):  # too few to tell
             lost = float(t[~alike[0]][0])
         return self.judged(law, Changes(t[alike[0]], np.abs(rows[:, 1:]).max(axis=0)[None], between, lost))
@@ -224,45 +218,41 @@ class _Periods(_Compared):
 
     def __init__(self, run: Integration, x: Array, options: RunOptions) -> None:
         super().__init__(run, x, options)
-        self._stretch, self._done, self._t = self.first.stretch, 0, options.t0
-        self._start = self._end = x
-        self._size, self._sum = np.abs(x), np.zeros(len(x))
+        self._stretch, self._steps, self._start = self.first.stretch, 0, x
+        self._t, self._end, self._size, self._sum = options.t0, x, np.abs(x), np.zeros(len(x))
+        self._lost = math.nan
 
     def add(self, block: StepBlock) -> None:
         segment = _segment(self.run)
         if block.h[0] == 0.0:
             self.watch.restart(float(block.t[0]), block.x)
             return
-        if not self._done or segment.stretch is not self._stretch:
+        if not self._steps or segment.stretch is not self._stretch:
             self._compare()
             self.first, self._forces, self._stretch = segment, segment.parameters, segment.stretch
-            self._start, self._done = block.x_old[0], 0
+            self._start, self._steps = block.x_old[0], 0
             self.watch.restart(float(block.t_old[0]), block.x_old[:1], np.array([self._forces]))
         self.watch.add(block.t, block.x[None])
         self._size = np.maximum(self._size, np.abs(block.x).max(axis=0))
-        end = self._stretch.begin + (self._done + len(block.t)) * self._stretch.h
-        whole = len(block.t) - bool(
-            abs(end - block.t[-1]) > SAME_INSTANT * np.spacing(abs(end))
-        )  # an event may cut one
-        if whole:
-            self._done, self._end = self._done + whole, block.x[whole - 1]
+        self._steps, self._t, self._end = self._steps + len(block.t), float(block.t[-1]), block.x[-1]
 
     def _compare(self) -> None:
-        """Add the difference of the stretch, in its whole steps."""
-        begin, h, *_ = self._stretch
-        if not self._done:
+        """Add the difference of the stretch, as far as it was gone."""
+        if not self._steps:
             return
-        if np.isfinite(self._sum).all():
-            self._t = begin + self._done * h
-        other = self.first.beside(halved([EqualSteps(begin, h, self._done, begin + self._done * h)]), self._forces)
-        *_, last = other.blocks(self._start)
-        self._sum = self._sum + (math.nan if other.status else np.abs(last.x[-1] - self._end))
-        self._done = 0
+        begin = self._stretch.begin
+        half = EqualSteps(begin, (self._t - begin) / (2 * self._steps), 2 * self._steps, self._t)
+        run, end = self.first.beside([half], self._forces), self._start
+        for block in run.blocks(self._start):
+            end = block.x[-1]
+        self._sum = self._sum + np.abs(end - self._end)
+        if math.isnan(self._lost) and (run.status or not np.isfinite(self._sum).all()):
+            self._lost = self._t
 
     def estimates(self) -> ErrorEstimates:
         self._compare()
-        times = [self.options.t0, self._t][: 1 + (self._t != self.options.t0)]
-        found = Changes(np.array(times), self._size[None], [np.stack([0.0 * self._size, self._sum])[None]])
+        between = np.stack([0.0 * self._sum, self._sum])[None]
+        found = Changes(np.array([self.options.t0, self._t]), self._size[None], [between], self._lost)
         return self.judged(law_of_halves(self.run.largest, self.program.order), found)
 
 
