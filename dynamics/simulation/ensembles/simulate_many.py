@@ -213,7 +213,7 @@ def ends_of(
         width = kept.width(None, team if isinstance(team, int) else UNKNOWN, stored=False)
         whole = _run_chunks(kept, x, p, width, team, None)
         rows = whole.rows
-        for text in doubts(whole.runs.stats(options.method, 0.0, {})):
+        for text in doubts(whole.runs.stats(options.method, 0.0)):
             warnings.warn(text, SimulationWarning, stacklevel=3)
     states = converted(problem.velocities, options.t_end, rows[:, 0], p)
     return states[:, : problem.nq], states[:, problem.nq :]
@@ -299,17 +299,16 @@ def _ensemble(
     times, rows, nq, (start, x, p) = options.row_times, whole.rows, problem.nq, starts
     logs = [split_crossings(watch, log, nq, p[k]) for k, log in enumerate(whole.happened)]
     crossings = {event.name: tuple([named[event.name] for named in logs]) for event in watch.events}
-    missed: dict[int, list[str]] = {}
     for k in range(len(x)) if problem.missing is not None else ():
-        missed[k] = unreached_momenta(problem, times, rows[k], p[k], start=(options.t0, start.x[k], x[k]))
-    stats = whole.runs.stats(options.method, seconds, missed)
+        missed = unreached_momenta(problem, times, rows[k], p[k], start=(options.t0, start.x[k], x[k]))
+        whole.runs.columns["warnings"][k] += tuple(missed)
     states = converted(problem.velocities, times, rows, p[:, None])
     momenta = rows[:, :, nq:] if problem.momenta else None
     return Ensemble(
         times,
         rows[:, :, :nq],
         states[:, :, nq:],
-        stats,
+        whole.runs.stats(options.method, seconds),
         crossings,
         momenta,
         start.x[:, :nq],

@@ -16,13 +16,13 @@ from ..estimates.error_estimate import ASIDE, RunsBeside, changes, error_estimat
 from ..estimates.unresolved import Watch
 from ..events.event import EventProgram
 from ..events.event_log import Happening, WatchedIntegration
-from ..outcome import INTERRUPTED, REACHED, outcome
+from ..outcome import INTERRUPTED, outcome
 from ..run_options import RunOptions
 from ..steps.equal_steps import EqualSteps, Numbers, even_steps, numbers_of
 from ..steps.integration import AdaptiveIntegration, integration
 from ..steps.step_program import StepProgram, compile_steps
 from ..steps.stepping import Integration, NativeIntegration, NativeRun
-from .ensemble import RunTable
+from .ensemble import COLUMNS, RunTable
 from .lanes import (
     ROWS,
     VECTOR,
@@ -66,7 +66,7 @@ class Part:
         here = slice(part.first, part.first + len(part.rows))
         if not np.may_share_memory(part.rows, self.rows):  # from another process
             self.rows[here] = part.rows
-        self.runs.put(here, part.runs)
+        self.runs.put(here, **part.runs.columns)
         self.happened[here] = part.happened
 
 
@@ -139,7 +139,7 @@ class Task:
                 done = np.flatnonzero(found.whole)
                 part.runs.reached(done, **{name: values[done] for name, values in found.columns.items()})
                 for k, text in found.said.items():
-                    part.runs.warnings[k] = (text,)
+                    part.runs.put(k, warnings=(text,))
                 left = np.flatnonzero(~found.whole).tolist()  # which are made again, alone
             self._one_by_one(chunk, part, left, stopped)
         return part
@@ -205,14 +205,14 @@ class Task:
                 run = integration(native, events=self.events)
             if self._has_end_alone and isinstance(run, AdaptiveIntegration):
                 if run.unseen(x):
-                    part.runs.stopped(k, REACHED, **run.counts, success=True, status=0)
+                    part.runs.reached(k, **run.counts)
                     part.rows[k, :-1], part.rows[k, -1] = x, run.x
                     continue
                 run = integration(native)  # whose first blocks are short: it says when
             stats, recorder = outcome(run, x, self.options)
             if stats.message.startswith(INTERRUPTED):
                 raise KeyboardInterrupt
-            part.runs.set(k, stats)
+            part.runs.put(k, **{name: getattr(stats, name) for name in COLUMNS})
             if isinstance(run, WatchedIntegration):
                 part.happened[k] = run.log.happened
             states = recorder.table()[1]
