@@ -79,7 +79,8 @@ COLUMNS: dict[str, type] = {
 
 def doubts(stats: EnsembleStats) -> list[str]:
     """Warnings of the first trajectory that stopped early and of the first in doubt, with their numbers."""
-    early, doubtful = np.flatnonzero(stats.status < 0), [k for k, texts in enumerate(stats.warnings) if texts]
+    early = np.flatnonzero(stats.status < 0)
+    doubtful = [k for k, texts in enumerate(stats.warnings) if texts] if any(stats.warnings) else []
     many, have, said = f"of {len(stats.warnings)} trajectories", "has" if len(doubtful) == 1 else "have", list[str]()
     for k in early[:1].tolist():
         said.append(f"{len(early)} {many} stopped early: trajectory {k} {stats.message[k].removeprefix('stopped ')}")

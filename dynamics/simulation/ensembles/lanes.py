@@ -169,7 +169,7 @@ class Leg(NamedTuple):
 
     grid: EqualSteps
     marks: Array
-    places: list[tuple[slice, Numbers]]
+    places: list[tuple[slice, slice | Numbers]]
 
 
 def legs_of(grids: Sequence[EqualSteps], tables: Sequence[Numbers], most: float = math.inf) -> list[Leg]:
@@ -186,10 +186,18 @@ def legs_of(grids: Sequence[EqualSteps], tables: Sequence[Numbers], most: float 
         for part in np.split(marks, range(int(most), len(marks), int(most)) if most < math.inf else []):
             ends = done + part[0], done + part[-1] + 1
             here = [slice(*np.searchsorted(numbers, ends).tolist()) for numbers in tables]
-            there = [np.searchsorted(part, numbers[rows] - done) for numbers, rows in zip(tables, here, strict=True)]
-            legs.append(Leg(grid, part.astype(np.float64), list(zip(here, there, strict=True))))
+            places = [
+                (rows, _together(np.searchsorted(part, numbers[rows] - done)))
+                for numbers, rows in zip(tables, here, strict=True)
+            ]
+            legs.append(Leg(grid, part.astype(np.float64), places))
         done += grid.steps
     return legs
+
+
+def _together(at: Numbers) -> slice | Numbers:
+    """Indices as a slice, which copies nothing, if they follow one another."""
+    return slice(int(at[0]), int(at[-1]) + 1) if len(at) and at[-1] - at[0] == len(at) - 1 else at
 
 
 def equal_in_lanes(
