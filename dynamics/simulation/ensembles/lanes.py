@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -151,20 +149,16 @@ class _Memories:
 
 
 class LaneRuns(NamedTuple):
-    """Flags of runs that reached their end, (k,), columns of the runs' statistics, and what is said of some of them.
-
-    A run with a remark that depends on its course is made again alone, as one that stopped.
-    """
+    """Flags of runs that reached their end without a remark on their course, (k,), and columns of their statistics."""
 
     whole: Flags
     columns: dict[str, Array]
-    said: Mapping[int, str] = MappingProxyType({})
 
 
 class Leg(NamedTuple):
-    """Steps of runs on the way: of a grid, which it begins or goes on with, up to the last of its marks.
+    """Steps of a grid, up to the last of these marks, which are numbers of its steps.
 
-    marks: numbers of its steps.  places: of each table of rows, which rows are at marks, and at which.
+    places: for each table of rows, which of them are at marks, and at which.
     """
 
     grid: EqualSteps
@@ -172,25 +166,20 @@ class Leg(NamedTuple):
     places: list[tuple[slice, slice | Numbers]]
 
 
-def legs_of(grids: Sequence[EqualSteps], tables: Sequence[Numbers], most: float = math.inf) -> list[Leg]:
+def legs_of(grids: Sequence[EqualSteps], tables: Sequence[Numbers], every: int = 0) -> list[Leg]:
     """The legs of runs that keep tables of rows, after so many steps each, (T,).
 
-    most: marks of a leg, which then are all steps.
+    every: all steps are marks, so many of a leg; 0: those that the tables ask for, and the last of a grid.
     """
     legs, done = list[Leg](), 0
+    asked = np.unique(np.concatenate([*tables, np.cumsum([grid.steps for grid in grids])]))
     for grid in grids:
-        inside = [
-            numbers[slice(*np.searchsorted(numbers, [done + 1, done + grid.steps + 1]))] - done for numbers in tables
-        ]
-        marks = np.unique(np.concatenate([*inside, [grid.steps]])) if most == math.inf else np.arange(1, grid.steps + 1)
-        for part in np.split(marks, range(int(most), len(marks), int(most)) if most < math.inf else []):
-            ends = done + part[0], done + part[-1] + 1
-            here = [slice(*np.searchsorted(numbers, ends).tolist()) for numbers in tables]
-            places = [
-                (rows, _together(np.searchsorted(part, numbers[rows] - done)))
-                for numbers, rows in zip(tables, here, strict=True)
-            ]
-            legs.append(Leg(grid, part.astype(np.float64), places))
+        inside = slice(*np.searchsorted(asked, [done + 1, done + grid.steps + 1]).tolist())
+        marks = done + np.arange(1, grid.steps + 1) if every else asked[inside]
+        for part in np.split(marks, range(every, len(marks), every) if every else []):
+            here = [slice(*np.searchsorted(numbers, [part[0], part[-1] + 1]).tolist()) for numbers in tables]
+            there = [np.searchsorted(part, numbers[rows]) for numbers, rows in zip(tables, here, strict=True)]
+            legs.append(Leg(grid, part - float(done), list(zip(here, map(_together, there), strict=True))))
         done += grid.steps
     return legs
 
@@ -213,29 +202,31 @@ def equal_in_lanes(
 
     tables: receive states, (k, T, m), NaN from where a run has not come to.  see: is told those of all marks, and when.
     """
-    run, m, grid, done = _Memories(lanes, len(x), {"x": x, "p": p, "fresh": 1.0}), x.shape[1], None, 0
+    run, m, steps = _Memories(lanes, len(x), {"x": x, "p": p, "fresh": 1.0}), x.shape[1], 0
     for (first, _), rows in zip(legs[0].places, tables, strict=True):
         rows[:, : first.start] = x[:, None]  # the start
-    for leg in legs:
-        if leg.grid is not grid:
-            grid, done = leg.grid, done + leg.grid.steps
+    at = 0.0  # steps of the grid
+    for grid, marks, places in legs:
+        if at == 0.0:
             run.set({"start": grid.begin, "t": grid.begin, "h": grid.h, "count": 0.0})
             run.passes[:, 0] = 0
-        end = leg.marks[-1]
+        at = marks[-1]
         block = run.rows(
-            leg.marks,
-            lambda end=end: (run.read("nonfinite") == 0.0) & (run.passes[:, 0] < end),
-            lambda which, end=end: float(end - run.passes[which[0], 0]),
+            marks,
+            lambda at=at: (run.read("nonfinite") == 0.0) & (run.passes[:, 0] < at),
+            lambda which, at=at: float(at - run.passes[which[0], 0]),
             stopped,
         )[:, :, 1 : 1 + m]
-        if (run.passes[:, 1] < len(leg.marks)).any():
-            block[np.arange(len(leg.marks)) >= run.passes[:, 1:]] = np.nan
-        for (here, there), rows in zip(leg.places, tables, strict=True):
+        if (run.passes[:, 1] < len(marks)).any():
+            block[np.arange(len(marks)) >= run.passes[:, 1:]] = np.nan
+        for (here, there), rows in zip(places, tables, strict=True):
             rows[:, here] = block[:, there]
         if see is not None:
-            see(leg.grid.begin + leg.marks * leg.grid.h, block)
+            see(grid.begin + marks * grid.h, block)
+        if at == grid.steps:
+            at, steps = 0.0, steps + grid.steps
     longest = max([abs(leg.grid.h) for leg in legs])
-    columns = {"steps": np.full(len(x), done), "nfev": run.read("evaluations"), "dt": np.full(len(x), longest)}
+    columns = {"steps": np.full(len(x), steps), "nfev": run.read("evaluations"), "dt": np.full(len(x), longest)}
     return LaneRuns(run.read("nonfinite") == 0.0, columns)
 
 

@@ -209,7 +209,7 @@ def ends_of(
     with np.errstate(all="ignore"):
         here = team == 1 and kept.width(len(x), 1, stored=False) >= len(x)
         found = kept.run_lanes(x, p, rows, lambda: False) if here else None
-    if found is None or found.said or not found.whole.all():
+    if found is None or not found.whole.all() or any(found.columns.get("warnings", ())):
         width = kept.width(None, team if isinstance(team, int) else UNKNOWN, stored=False)
         whole = _run_chunks(kept, x, p, width, team, None)
         rows = whole.rows

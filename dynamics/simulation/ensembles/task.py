@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -13,12 +13,12 @@ import numpy as np
 from cgraph._shared import Array
 
 from ..estimates.error_estimate import ASIDE, RunsBeside, changes, error_estimates, runs_beside
-from ..estimates.unresolved import Watch
+from ..estimates.unresolved import Watch, is_watched
 from ..events.event import EventProgram
 from ..events.event_log import Happening, WatchedIntegration
 from ..outcome import INTERRUPTED, outcome
 from ..run_options import RunOptions
-from ..steps.equal_steps import EqualSteps, Numbers, even_steps, numbers_of
+from ..steps.equal_steps import EqualSteps, even_steps, numbers_of
 from ..steps.integration import AdaptiveIntegration, integration
 from ..steps.step_program import StepProgram, compile_steps
 from ..steps.stepping import Integration, NativeIntegration, NativeRun
@@ -138,8 +138,6 @@ class Task:
             if (found := self.run_lanes(chunk.x, chunk.p, rows, stopped)) is not None:
                 done = np.flatnonzero(found.whole)
                 part.runs.reached(done, **{name: values[done] for name, values in found.columns.items()})
-                for k, text in found.said.items():
-                    part.runs.put(k, warnings=(text,))
                 left = np.flatnonzero(~found.whole).tolist()  # which are made again, alone
             self._one_by_one(chunk, part, left, stopped)
         return part
@@ -149,40 +147,33 @@ class Task:
 
         rows: (k, T, m), receives their rows.
         """
-        if self._lanes is None:
+        lanes = self._lanes
+        if lanes is None:
             return None
         if self.program.adaptive:
-            return chosen_in_lanes(self._lanes, self.options, x, p, rows, stopped)
-        beside, legs = self.beside, self._legs
+            return chosen_in_lanes(lanes, self.options, x, p, rows, stopped)
+        (own, *others), beside = self._legs, self.beside
         if beside is None:
-            return equal_in_lanes(self._lanes, x, p, legs[0], [rows], stopped)
+            return equal_in_lanes(lanes, x, p, own, [rows], stopped)
         watch = Watch(self.program.rate, self.program.order, p, self.options.t0, x)
-        states = np.empty((len(legs), len(x), len(beside.t), x.shape[1]))
-        if watch.needed:  # which sees all steps
-            steps = max(1, ROWS // (len(x) * self.program.steps.width))
-            legs = [legs_of(self.grids, self._numbers, steps), *legs[1:]]
-        found = equal_in_lanes(
-            self._lanes, x, p, legs[0], [rows, states[0]], stopped, watch.add if watch.needed else None
-        )
-        for leg, others in zip(legs[1:], states[1:], strict=True):
-            equal_in_lanes(self._lanes, x * ASIDE, p, leg, [others], stopped)
+        states = np.empty((1 + len(others), len(x), len(beside.t), x.shape[1]))
+        found = equal_in_lanes(lanes, x, p, own, [rows, states[0]], stopped, watch.add if watch.needed else None)
+        for legs, each in zip(others, states[1:], strict=True):
+            equal_in_lanes(lanes, x * ASIDE, p, legs, [each], stopped)
         steps = int(found.columns["steps"][0])
         errors = error_estimates(self.program, self.options, beside.law, watch, steps, changes(beside.t, states))
-        said = {k: text for k, text in enumerate(errors.warnings) if text and found.whole[k]}
-        columns = {**found.columns, "error": errors.largest, "error_at_end": errors.last}
-        return LaneRuns(found.whole, columns, said)
-
-    @cached_property
-    def _numbers(self) -> list[Numbers]:
-        """How many equal steps are done at the rows, and when runs are looked at to be compared."""
-        looks = [] if self.beside is None else [self.beside.numbers]
-        return [numbers_of(self.grids, self.options.row_times), *looks]
+        return LaneRuns(found.whole, found.columns | errors)
 
     @cached_property
     def _legs(self) -> list[list[Leg]]:
-        """Legs of the runs and of those beside."""
-        beside = () if self.beside is None else self.beside.runs
-        return [legs_of(self.grids, self._numbers), *[legs_of(run.stretches, [run.numbers]) for run in beside]]
+        """Legs of the runs, and of those beside."""
+        rows = numbers_of(self.grids, self.options.row_times)
+        if self.beside is None:
+            return [legs_of(self.grids, [rows])]
+        at_once = max(1, ROWS // (min(self.many, LONGEST_CHUNK) * self.program.steps.width))
+        every = at_once if is_watched(self.program.rate) else 0
+        others = [legs_of(run.stretches, [run.numbers]) for run in self.beside.runs]
+        return [legs_of(self.grids, [rows, self.beside.numbers], every), *others]
 
     @property
     def _lanes(self) -> Lanes | None:
@@ -192,9 +183,10 @@ class Task:
         with _lock:
             return lanes_of(self.program, self.options.backend, self.options.fma)
 
-    def _one_by_one(self, chunk: Chunk, part: Part, which: Iterable[int], stopped: Callable[[], bool]) -> None:
+    def _one_by_one(self, chunk: Chunk, part: Part, which: Iterable[int], stopped: Stopped) -> None:
         """Run these, each alone."""
         run: Integration | None = None
+        has_end = self.options.row_times[-1] == self.options.t_end
         for k in which:
             with _lock:
                 compiled = compile_steps(self.program, self.options.backend, self.options.fma)
@@ -203,7 +195,7 @@ class Task:
                 run.set_parameters(native.parameters)
             else:
                 run = integration(native, events=self.events)
-            if self._has_end_alone and isinstance(run, AdaptiveIntegration):
+            if has_end and isinstance(run, AdaptiveIntegration):  # steps need not be looked at if it is their only row
                 if run.unseen(x):
                     part.runs.reached(k, **run.counts)
                     part.rows[k, :-1], part.rows[k, -1] = x, run.x
@@ -217,11 +209,6 @@ class Task:
                 part.happened[k] = run.log.happened
             states = recorder.table()[1]
             part.rows[k, : len(states)], part.rows[k, len(states) :] = states, np.nan
-
-    @cached_property
-    def _has_end_alone(self) -> bool:
-        """Whether the end is a row, so that steps need not be looked at if it is the only one that they make."""
-        return self.options.row_times[-1] == self.options.t_end
 
 
 _lock = threading.Lock()  # threads that come at the same time wait for one to make the code

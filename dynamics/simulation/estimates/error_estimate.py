@@ -51,7 +51,7 @@ def law_of_halves(longest: float, order: int) -> Law:
 
 
 class Beside(NamedTuple):
-    """A run beside another: its steps, how many times as long they are, and how many are done when both are looked at."""
+    """A run beside another: its steps, how many times as long they are, and how many are done when it is looked at."""
 
     stretches: Sequence[EqualSteps]
     times: float
@@ -85,17 +85,6 @@ def runs_beside(stretches: Sequence[EqualSteps], order: int) -> RunsBeside:
     return RunsBeside(law_of_halves(longest, order), [half], numbers, instants_of(stretches, numbers))
 
 
-class ErrorEstimates(NamedTuple):
-    """Of k runs: the largest errors and those at the end, relative to the sizes of components, (k,); NaN if unknown.
-
-    warnings: where more was asked for, a sentence each, else empty.
-    """
-
-    largest: Array
-    last: Array
-    warnings: list[str]
-
-
 class Changes(NamedTuple):
     """Differences of k runs from those beside them.
 
@@ -119,11 +108,16 @@ def changes(t: Array, rows: Sequence[Array]) -> Changes:
 
 def error_estimates(
     program: StepProgram, options: RunOptions, law: Law, watch: Watch, steps: int, found: Changes
-) -> ErrorEstimates:
-    """Estimates for k runs of so many steps, and whether they are as good as asked; NaN if nothing was compared."""
+) -> dict[str, Array]:
+    """Columns of the statistics of k runs of so many steps: "error", "error_at_end" and, of less than asked, "warnings".
+
+    The errors are relative to the sizes of components, and NaN if nothing was compared.
+    """
+    warnings: Array = np.zeros(len(found.size), dtype=np.object_)
+    warnings.fill(())
     if len(found.t) < 2 and math.isnan(found.lost):
-        nothing = np.full(len(found.size), math.nan)
-        return ErrorEstimates(nothing, nothing, [""] * len(nothing))
+        nothing = np.full(len(warnings), math.nan)
+        return {"error": nothing, "error_at_end": nothing, "warnings": warnings}
     watch.look()
     scale, first = program.kinds.scale(found.size), found.between[0]
     peaks = [np.where(np.isfinite(peak), peak, math.inf) for peak in [each.max(axis=1) for each in found.between]]
@@ -139,7 +133,7 @@ def error_estimates(
     resolved = math.pi * max(1.0, 0.5 * program.order) / law.longest  # rad/s: two evaluations in a turn
     for unseen in (watch.turning > resolved, ~np.isnan(lost)):
         largest[unseen] = last[unseen] = math.inf
-    allowed, warnings = options.absolute + options.relative * scale, [""] * len(scale)
+    allowed = options.absolute + options.relative * scale
     for k in np.flatnonzero(~(largest * scale <= allowed).all(axis=1)).tolist():
         if watch.turning[k] > resolved:
             said = (
@@ -151,11 +145,9 @@ def error_estimates(
             said = f"{UNKNOWN}: beside it a run of other steps stops, or takes another course, at {at}"
         else:
             said = off_by(largest[k], scale[k], allowed[k], program.components)
-        warnings[k] = (
-            f"{said}; rtol = {options.relative:g} allows less: take a dt shorter than {options.step:g} s, or "
-            "method='dop853', which chooses its steps"
-        )
-    return ErrorEstimates(largest.max(axis=1), last.max(axis=1), warnings)
+        how = f"a dt shorter than {options.step:g} s, or method='dop853', which chooses its steps"
+        warnings[k] = (f"{said}; rtol = {options.relative:g} allows less: take {how}",)
+    return {"error": largest.max(axis=1), "error_at_end": last.max(axis=1), "warnings": warnings}
 
 
 def _errors(first: Array, measured: Array, law: Law, bent: Flags) -> Array:

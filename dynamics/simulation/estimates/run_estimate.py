@@ -20,7 +20,6 @@ from .error_estimate import (
     ASIDE,
     LOOKS,
     Changes,
-    ErrorEstimates,
     Law,
     changes,
     error_estimates,
@@ -58,11 +57,9 @@ class RunEstimate:
         if self._compared is None:
             return None, None, ()
         begin = time.perf_counter()
-        (largest,), (last,), (warning,) = self._compared.estimates()
+        error, last, said = [column[0] for column in self._compared.estimates().values()]
         self.seconds += time.perf_counter() - begin
-        if math.isnan(largest):  # nothing could be compared
-            return None, None, ()
-        return float(largest), float(last), (warning,) if warning else ()
+        return (None, None, ()) if math.isnan(error) else (float(error), float(last), said)
 
 
 def _kind(run: Integration) -> type[_Compared]:
@@ -85,10 +82,10 @@ class _Compared(ABC):
         """The next steps of the run, or a reset."""
 
     @abstractmethod
-    def estimates(self) -> ErrorEstimates:
+    def estimates(self) -> dict[str, Array]:
         """The estimates, after the last step."""
 
-    def judged(self, law: Law, found: Changes) -> ErrorEstimates:
+    def judged(self, law: Law, found: Changes) -> dict[str, Array]:
         """The estimates by what has been found."""
         return error_estimates(self.program, self.options, law, self.watch, self.run.steps, found)
 
@@ -122,7 +119,7 @@ class _Steps(_Compared):
         self.watch.add(block.t, block.x[None])
         self._rows.add(block)
 
-    def estimates(self) -> ErrorEstimates:
+    def estimates(self) -> dict[str, Array]:
         whole = self._rows.done - bool(self.run.event)  # steps: an event may have ended the run inside one
         count = int(np.searchsorted(self._rows.numbers, whole, side="right"))
         rows = [self._rows]
@@ -158,7 +155,7 @@ class _Resets(_Compared):
         while len(self._rows) > LOOKS:
             self._rows, self._every = self._rows[::2], 2 * self._every
 
-    def estimates(self) -> ErrorEstimates:
+    def estimates(self) -> dict[str, Array]:
         rows = np.concatenate([self._rows, self._last[self._last[:, 0] != self._rows[-1, 0]]])
         t, longest, forth = rows[:, 0], self.run.largest, self.options.direction
         law, beside, *_ = runs_beside(equal_steps([self.options.t0, self.options.t_end], longest), self.program.order)
@@ -249,7 +246,7 @@ class _Periods(_Compared):
         if math.isnan(self._lost) and (run.status or not np.isfinite(self._sum).all()):
             self._lost = self._t
 
-    def estimates(self) -> ErrorEstimates:
+    def estimates(self) -> dict[str, Array]:
         self._compare()
         between = np.stack([0.0 * self._sum, self._sum])[None]
         found = Changes(np.array([self.options.t0, self._t]), self._size[None], [between], self._lost)
