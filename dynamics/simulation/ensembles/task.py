@@ -12,7 +12,7 @@ import numpy as np
 
 from cgraph._shared import Array
 
-from ..estimates.error_estimate import ASIDE, RunsBeside, changes, error_estimates, runs_beside
+from ..estimates.error_estimate import ASIDE, RunsBeside, error_estimates, runs_beside
 from ..estimates.unresolved import Watch, is_watched
 from ..events.event import EventProgram
 from ..events.event_log import Happening, WatchedIntegration
@@ -161,7 +161,7 @@ class Task:
         for legs, each in zip(others, states[1:], strict=True):
             equal_in_lanes(lanes, x * ASIDE, p, legs, [each], stopped)
         steps = int(found.columns["steps"][0])
-        errors = error_estimates(self.program, self.options, beside.law, watch, steps, changes(beside.t, states))
+        errors = error_estimates(self.program, self.options, beside.law, watch, steps, beside.t, states)
         return LaneRuns(found.whole, found.columns | errors)
 
     @cached_property
@@ -172,7 +172,7 @@ class Task:
             return [legs_of(self.grids, [rows])]
         at_once = max(1, ROWS // (min(self.many, LONGEST_CHUNK) * self.program.steps.width))
         every = at_once if is_watched(self.program.rate) else 0
-        others = [legs_of(run.stretches, [run.numbers]) for run in self.beside.runs]
+        others = [legs_of(stretches, [numbers]) for stretches, numbers in self.beside.runs]
         return [legs_of(self.grids, [rows, self.beside.numbers], every), *others]
 
     @property

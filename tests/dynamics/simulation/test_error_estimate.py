@@ -145,7 +145,7 @@ def test_runs_beside_have_other_steps_that_meet_those_of_the_run(
     first = equal_steps(instants, dt)
     law, beside, numbers, t = runs_beside(first, 4)
     assert law.longest == max(abs(part.h) for part in first)
-    for steps, times, done in [(first, 1.0, numbers), *beside]:
+    for times, (steps, done) in zip((1.0, 2.0, 4.0), [(first, numbers), *beside], strict=False):
         assert (steps[0].begin, steps[-1].end) == (0.0, instants[-1])
         assert all(part.end == after.begin for part, after in zip(steps, steps[1:], strict=False))
         assert all(0.0 < direction * part.h <= 2.0 * times * law.longest * (1.0 + 1e-9) for part in steps)
