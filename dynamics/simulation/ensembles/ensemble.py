@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -12,7 +12,7 @@ import numpy as np
 from cgraph._shared import Array, install
 
 from ..outcome import REACHED
-from ..trajectory import Crossings, Stats
+from ..trajectory import Crossings
 
 if TYPE_CHECKING:
     import pandas
@@ -69,67 +69,50 @@ class EnsembleStats:
     warnings: tuple[tuple[str, ...], ...]
 
 
+COLUMNS: dict[str, type] = {
+    **dict.fromkeys(("steps", "rejected", "nfev", "status"), np.int64),
+    **dict.fromkeys(("dt", "error", "error_at_end"), np.float64),  # None is NaN
+    "success": np.bool_,
+    **dict.fromkeys(("message", "warnings"), np.object_),
+}
+
+
 def doubts(stats: EnsembleStats) -> list[str]:
     """Warnings of the first trajectory that stopped early and of the first in doubt, with their numbers."""
-    early = {k: str(stats.message[k]).removeprefix("stopped ") for k in np.flatnonzero(stats.status < 0).tolist()}
-    doubtful = {k: texts[0] for k, texts in enumerate(stats.warnings) if texts} if any(stats.warnings) else {}
-    many, have = f"of {len(stats.warnings)} trajectories", "has" if len(doubtful) == 1 else "have"
-    said = [f"{len(early)} {many} stopped early: trajectory {k} {text}" for k, text in [*early.items()][:1]]
-    return said + [
-        f"{len(doubtful)} {many} {have} a warning: trajectory {k}: {text}" for k, text in [*doubtful.items()][:1]
-    ]
-
-
-COLUMNS: dict[str, type] = dict.fromkeys(("steps", "rejected", "nfev", "status"), np.int64) | {"success": np.bool_}
-COLUMNS |= dict.fromkeys(("dt", "error", "error_at_end"), np.float64)  # None is NaN
+    early = np.flatnonzero(stats.status < 0)
+    doubtful = [k for k, texts in enumerate(stats.warnings) if texts] if any(stats.warnings) else []
+    many, have, said = f"of {len(stats.warnings)} trajectories", "has" if len(doubtful) == 1 else "have", list[str]()
+    for k in early[:1].tolist():
+        said.append(f"{len(early)} {many} stopped early: trajectory {k} {stats.message[k].removeprefix('stopped ')}")
+    for k in doubtful[:1]:
+        said.append(f"{len(doubtful)} {many} {have} a warning: trajectory {k}: {stats.warnings[k][0]}")
+    return said
 
 
 class RunTable:
     """Statistics of runs side by side, a row of `Stats` each, set as they end.
 
-    columns: {name: numbers of all}.  messages, warnings: of each.
+    columns: {name: of all}.
     """
 
     def __init__(self, count: int) -> None:
         self.columns: dict[str, Any] = {name: np.zeros(count, dtype=kind) for name, kind in COLUMNS.items()}
-        self.columns["status"][:] = -1
-        self.columns["error"][:] = self.columns["error_at_end"][:] = np.nan
-        self.messages: list[str] = [""] * count
-        self.warnings: list[tuple[str, ...]] = [()] * count
+        self.put(slice(None), status=-1, error=np.nan, error_at_end=np.nan, message="")
+        self.columns["warnings"].fill(())
 
-    def set(self, k: int, stats: Stats) -> None:
-        """Row k."""
-        for name, column in self.columns.items():
-            column[k] = getattr(stats, name)
-        self.messages[k], self.warnings[k] = stats.message, stats.warnings
-
-    def stopped(self, k: int, message: str, **columns: float) -> None:
-        """Row k, of a run that stopped early."""
-        for name, value in columns.items():
-            self.columns[name][k] = value
-        self.messages[k] = message
-
-    def reached(self, which: Counts, **columns: Any) -> None:
-        """The rows `which`, of runs that reached their end."""
-        for name, values in {**columns, "success": True, "status": 0}.items():
+    def put(self, which: Any, **columns: Any) -> None:
+        """Set columns in these rows."""
+        for name, values in columns.items():
             self.columns[name][which] = values
-        if len(which) == len(self.messages):
-            self.messages = [REACHED] * len(which)
-        for k in which.tolist() if len(which) < len(self.messages) else ():
-            self.messages[k] = REACHED
 
-    def put(self, here: slice, part: RunTable) -> None:
-        """The rows of a part, in their place."""
-        for name, column in self.columns.items():
-            column[here] = part.columns[name]
-        self.messages[here], self.warnings[here] = part.messages, part.warnings
+    def reached(self, which: Any, **columns: Any) -> None:
+        """Set these rows, of runs that reached their end."""
+        self.put(which, **columns, success=True, status=0, message=REACHED)
 
-    def stats(self, method: str, seconds: float, more: Mapping[int, Sequence[str]]) -> EnsembleStats:
-        """The statistics.  more: what speaks against results besides."""
-        for k, texts in more.items():
-            self.warnings[k] = (*self.warnings[k], *texts)
-        said = tuple(self.warnings)
-        return EnsembleStats(method, seconds=seconds, message=tuple(self.messages), warnings=said, **self.columns)
+    def stats(self, method: str, seconds: float) -> EnsembleStats:
+        """The statistics."""
+        texts = {name: tuple(self.columns[name].tolist()) for name in ("message", "warnings")}
+        return EnsembleStats(method, seconds=seconds, **{**self.columns, **texts})
 
 
 @dataclass(frozen=True)

@@ -148,54 +148,85 @@ class _Memories:
 
 
 class LaneRuns(NamedTuple):
-    """Flags of runs that reached their end without a remark, (k,), and columns of the runs' statistics."""
+    """Flags of runs that reached their end without a remark on their course, (k,), and columns of their statistics."""
 
     whole: Flags
     columns: dict[str, Array]
+
+
+class Leg(NamedTuple):
+    """Steps of a grid, up to the last of these marks, which are numbers of its steps.
+
+    places: for each table of rows, which of them are at marks, and at which.
+    """
+
+    grid: EqualSteps
+    marks: Array
+    places: list[tuple[slice, slice | Numbers]]
+
+
+def legs_of(grids: Sequence[EqualSteps], tables: Sequence[Numbers], every: int = 0) -> list[Leg]:
+    """The legs of runs that keep tables of rows, after so many steps each, (T,).
+
+    every: all steps are marks, so many of a leg; 0: those that the tables ask for, and the last of a grid.
+    """
+    legs, done = list[Leg](), 0
+    asked = np.unique(np.concatenate([*tables, np.cumsum([grid.steps for grid in grids])]))
+    for grid in grids:
+        inside = slice(*np.searchsorted(asked, [done + 1, done + grid.steps + 1]).tolist())
+        marks = done + np.arange(1, grid.steps + 1) if every else asked[inside]
+        for part in np.split(marks, range(every, len(marks), every) if every else []):
+            here = [slice(*np.searchsorted(numbers, [part[0], part[-1] + 1]).tolist()) for numbers in tables]
+            there = [np.searchsorted(part, numbers[rows]) for numbers, rows in zip(tables, here, strict=True)]
+            legs.append(Leg(grid, part - float(done), list(zip(here, map(_together, there), strict=True))))
+        done += grid.steps
+    return legs
+
+
+def _together(at: Numbers) -> slice | Numbers:
+    """Indices as a slice, which copies nothing, if they follow one another."""
+    return slice(int(at[0]), int(at[-1]) + 1) if len(at) and at[-1] - at[0] == len(at) - 1 else at
 
 
 def equal_in_lanes(
     lanes: Lanes,
     x: Array,
     p: Array,
-    grids: Sequence[EqualSteps],
-    kept: Sequence[tuple[Numbers, Array]],
+    legs: Sequence[Leg],
+    tables: Sequence[Array],
     stopped: Stopped,
     see: See | None = None,
 ) -> LaneRuns:
     """Runs by equal steps from states x (k, m) with parameters p (k, ..).
 
-    kept: how many steps are done at instants, (T,), and what receives the states there, (k, T, m), NaN from where a run
-    has not come to.  see: is told times and states after all steps.
+    tables: receive states, (k, T, m), NaN from where a run has not come to.  see: is told those of all marks, and when.
     """
-    run, m, done = _Memories(lanes, len(x), {"x": x, "p": p, "fresh": 1.0}), x.shape[1], 0
-    for numbers, rows in kept:
-        rows[:, numbers == 0] = x[:, None]
-    for grid in grids:
-        run.set({"start": grid.begin, "t": grid.begin, "h": grid.h, "count": 0.0})
-        run.passes[:, 0] = 0
-        inside = [numbers[(numbers > done) & (numbers <= done + grid.steps)] - done for numbers, _ in kept]
-        marks = np.arange(1, grid.steps + 1) if see else np.unique(np.concatenate([*inside, [grid.steps]]))
-        at_once = max(1, ROWS // (len(x) * lanes.code.width))
-        for part in np.split(marks, range(at_once, len(marks), at_once)):
-            end = part[-1]
-            block = run.rows(
-                part.astype(np.float64),
-                lambda end=end: (run.read("nonfinite") == 0.0) & (run.passes[:, 0] < end),
-                lambda which, end=end: float(end - run.passes[which[0], 0]),
-                stopped,
-            )[:, :, 1 : 1 + m]
-            if (run.passes[:, 1] < len(part)).any():
-                block[np.arange(len(part)) >= run.passes[:, 1:]] = np.nan
-            for numbers, rows in kept:
-                here = np.flatnonzero((numbers - done >= part[0]) & (numbers - done <= end))
-                rows[:, here] = block[:, np.searchsorted(part, numbers[here] - done)]
-            if see is not None:
-                see(grid.begin + part * grid.h, block)
-        done += grid.steps
-    longest = np.full(len(x), max([abs(grid.h) for grid in grids]))
-    whole = run.read("nonfinite") == 0.0
-    return LaneRuns(whole, {"steps": np.full(len(x), done), "nfev": run.read("evaluations"), "dt": longest})
+    run, m, steps = _Memories(lanes, len(x), {"x": x, "p": p, "fresh": 1.0}), x.shape[1], 0
+    for (first, _), rows in zip(legs[0].places, tables, strict=True):
+        rows[:, : first.start] = x[:, None]  # the start
+    at = 0.0  # steps of the grid
+    for grid, marks, places in legs:
+        if at == 0.0:
+            run.set({"start": grid.begin, "t": grid.begin, "h": grid.h, "count": 0.0})
+            run.passes[:, 0] = 0
+        at = marks[-1]
+        block = run.rows(
+            marks,
+            lambda at=at: (run.read("nonfinite") == 0.0) & (run.passes[:, 0] < at),
+            lambda which, at=at: float(at - run.passes[which[0], 0]),
+            stopped,
+        )[:, :, 1 : 1 + m]
+        if (run.passes[:, 1] < len(marks)).any():
+            block[np.arange(len(marks)) >= run.passes[:, 1:]] = np.nan
+        for (here, there), rows in zip(places, tables, strict=True):
+            rows[:, here] = block[:, there]
+        if see is not None:
+            see(grid.begin + marks * grid.h, block)
+        if at == grid.steps:
+            at, steps = 0.0, steps + grid.steps
+    longest = max([abs(leg.grid.h) for leg in legs])
+    columns = {"steps": np.full(len(x), steps), "nfev": run.read("evaluations"), "dt": np.full(len(x), longest)}
+    return LaneRuns(run.read("nonfinite") == 0.0, columns)
 
 
 def chosen_in_lanes(lanes: Lanes, options: RunOptions, x: Array, p: Array, rows: Array, stopped: Stopped) -> LaneRuns:

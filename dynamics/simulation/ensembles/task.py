@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -12,17 +12,29 @@ import numpy as np
 
 from cgraph._shared import Array
 
-from ..estimates.error_estimate import ASIDE, RunsBeside, changes, error_estimates, runs_beside
-from ..estimates.unresolved import Watch
+from ..estimates.error_estimate import ASIDE, RunsBeside, error_estimates, runs_beside
+from ..estimates.unresolved import Watch, is_watched
 from ..events.event import EventProgram
 from ..events.event_log import Happening
-from ..outcome import INTERRUPTED, REACHED, outcome
+from ..outcome import INTERRUPTED, outcome
 from ..run_options import RunOptions
 from ..stepper import ChosenStepper, Stepper, stepper
 from ..steps.equal_steps import EqualSteps, even_steps, numbers_of
 from ..steps.step_program import StepProgram, compile_steps
-from .ensemble import RunTable
-from .lanes import ROWS, VECTOR, LaneRuns, Lanes, Stopped, chosen_in_lanes, equal_in_lanes, fits_lanes, lanes_of
+from .ensemble import COLUMNS, RunTable
+from .lanes import (
+    ROWS,
+    VECTOR,
+    LaneRuns,
+    Lanes,
+    Leg,
+    Stopped,
+    chosen_in_lanes,
+    equal_in_lanes,
+    fits_lanes,
+    lanes_of,
+    legs_of,
+)
 
 LARGEST_CHUNK = 256  # trajectories in a chunk one by one, unless asked for
 LONGEST_CHUNK = 4096  # of those in lanes, of which a chunk's rows of steps have at most `ROWS` numbers
@@ -53,7 +65,7 @@ class Part:
         here = slice(part.first, part.first + len(part.rows))
         if not np.may_share_memory(part.rows, self.rows):  # from another process
             self.rows[here] = part.rows
-        self.runs.put(here, part.runs)
+        self.runs.put(here, **part.runs.columns)
         self.happened[here] = part.happened
 
 
@@ -103,9 +115,7 @@ class Task:
         if not self.in_lanes:
             largest, shares = LARGEST_CHUNK, SHARES
         else:
-            numbers = self.program.steps.width * (
-                self.count + (0 if self.beside is None else len(self.beside.instants))
-            )
+            numbers = self.program.steps.width * (self.count + (0 if self.beside is None else len(self.beside.t)))
             largest = min(LONGEST_CHUNK, max(VECTOR, ROWS // numbers))
             chunk = chunk and min(chunk, largest)
             largest = min(largest, LARGEST_CHUNK) if stored else largest
@@ -122,50 +132,60 @@ class Task:
 
         Raises KeyboardInterrupt soon after Ctrl-C, and StoppedError after `stopped`.
         """
-        part, lanes = not_begun(chunk.first, rows, events=self.events is not None), None
-        if self.in_lanes:
-            with _lock:
-                lanes = lanes_of(self.program, self.options.backend, self.options.fma)
-        left: Iterable[int] = range(len(chunk.x))
+        part, left = not_begun(chunk.first, rows, events=self.events is not None), range(len(chunk.x))
         with np.errstate(all="ignore"):
-            if lanes is not None:  # runs that end early are made again, alone
-                left = self._run_lanes(lanes, chunk, part, stopped)
+            if (found := self.run_lanes(chunk.x, chunk.p, rows, stopped)) is not None:
+                done = np.flatnonzero(found.whole)
+                part.runs.reached(done, **{name: values[done] for name, values in found.columns.items()})
+                left = np.flatnonzero(~found.whole).tolist()  # which are made again, alone
             self._one_by_one(chunk, part, left, stopped)
         return part
 
-    def _run_lanes(self, lanes: Lanes, chunk: Chunk, part: Part, stopped: Stopped) -> list[int]:
-        """The trajectories that do not reach their end without a remark, after all have gone in lanes."""
-        options, x, p = self.options, chunk.x, chunk.p
+    def run_lanes(self, x: Array, p: Array, rows: Array, stopped: Stopped) -> LaneRuns | None:
+        """Run trajectories from states x (k, m) with parameters p (k, ..) in lanes; None if they do not go there.
+
+        rows: (k, T, m), receives their rows.
+        """
+        lanes = self._lanes
+        if lanes is None:
+            return None
         if self.program.adaptive:
-            found = chosen_in_lanes(lanes, options, x, p, part.rows, stopped)
-        elif self.beside is None:
-            kept = [(numbers_of(self.grids, options.row_times), part.rows)]
-            found = equal_in_lanes(lanes, x, p, self.grids, kept, stopped)
-        else:
-            found = self._estimated(lanes, self.beside, chunk, part, stopped)
-        done = np.flatnonzero(found.whole)
-        part.runs.reached(done, **{name: values[done] for name, values in found.columns.items()})
-        return np.flatnonzero(~found.whole).tolist()
-
-    def _estimated(self, lanes: Lanes, beside: RunsBeside, chunk: Chunk, part: Part, stopped: Stopped) -> LaneRuns:
-        """Runs by equal steps, with those beside."""
-        x, p, program, t = chunk.x, chunk.p, self.program, beside.instants
-        courses, rows = (self.grids, *beside.courses), np.empty((1 + len(beside.courses), len(x), len(t), x.shape[1]))
-        watch = Watch(program.rate, program.order, p, self.options.t0, x)
-        kept = [(numbers_of(self.grids, self.options.row_times), part.rows), (numbers_of(self.grids, t), rows[0])]
-        found = equal_in_lanes(lanes, x, p, self.grids, kept, stopped, watch.add if watch.needed else None)
-        for course, states in zip(courses[1:], rows[1:], strict=True):
-            equal_in_lanes(lanes, x * ASIDE, p, course, [(numbers_of(course, t), states)], stopped)
+            return chosen_in_lanes(lanes, self.options, x, p, rows, stopped)
+        (own, *others), beside = self._legs, self.beside
+        if beside is None:
+            return equal_in_lanes(lanes, x, p, own, [rows], stopped)
+        watch = Watch(self.program.rate, self.program.order, p, self.options.t0, x)
+        states = np.empty((1 + len(others), len(x), len(beside.t), x.shape[1]))
+        found = equal_in_lanes(lanes, x, p, own, [rows, states[0]], stopped, watch.add if watch.needed else None)
+        for legs, each in zip(others, states[1:], strict=True):
+            equal_in_lanes(lanes, x * ASIDE, p, legs, [each], stopped)
         steps = int(found.columns["steps"][0])
-        estimates = error_estimates(program, self.options, beside.law, watch, steps, changes(t, rows))
-        for k in np.flatnonzero(found.whole).tolist():
-            part.runs.warnings[k] = tuple(filter(None, [estimates.warnings[k]]))
-        columns = {"error": estimates.largest, "error_at_end": estimates.last}
-        return LaneRuns(found.whole, found.columns | columns)
+        errors = error_estimates(self.program, self.options, beside.law, watch, steps, beside.t, states)
+        return LaneRuns(found.whole, found.columns | errors)
 
-    def _one_by_one(self, chunk: Chunk, part: Part, which: Iterable[int], stopped: Callable[[], bool]) -> None:
+    @cached_property
+    def _legs(self) -> list[list[Leg]]:
+        """Legs of the runs, and of those beside."""
+        rows = numbers_of(self.grids, self.options.row_times)
+        if self.beside is None:
+            return [legs_of(self.grids, [rows])]
+        at_once = max(1, ROWS // (min(self.many, LONGEST_CHUNK) * self.program.steps.width))
+        every = at_once if is_watched(self.program.rate) else 0
+        others = [legs_of(stretches, [numbers]) for stretches, numbers in self.beside.runs]
+        return [legs_of(self.grids, [rows, self.beside.numbers], every), *others]
+
+    @property
+    def _lanes(self) -> Lanes | None:
+        """The code of lanes, if trajectories go there."""
+        if not self.in_lanes:
+            return None
+        with _lock:
+            return lanes_of(self.program, self.options.backend, self.options.fma)
+
+    def _one_by_one(self, chunk: Chunk, part: Part, which: Iterable[int], stopped: Stopped) -> None:
         """Run these, each alone."""
         run: Stepper | None = None
+        has_end = self.options.row_times[-1] == self.options.t_end
         for k in which:
             with _lock:
                 compiled = compile_steps(self.program, self.options.backend, self.options.fma)
@@ -173,26 +193,21 @@ class Task:
             if run is None or self.events is not None:
                 run = stepper(compiled, self.options, p, stopped=stopped, events=self.events)
             run.set_parameters(p)
-            if self._has_end_alone and isinstance(run, ChosenStepper) and run.log is None:
+            if has_end and isinstance(run, ChosenStepper):  # steps need not be looked at if it is their only row
                 if run.unseen(x):
                     counts = {"steps": run.steps, "rejected": run.rejected, "nfev": run.evaluations, "dt": run.largest}
-                    part.runs.stopped(k, REACHED, **counts, success=True, status=0)
+                    part.runs.reached(k, **counts)
                     part.rows[k, :-1], part.rows[k, -1] = x, run.x
                     continue
                 run = stepper(compiled, self.options, p, stopped=stopped)  # whose first blocks are short: it says when
             stats, recorder = outcome(run, x, self.options)
             if stats.message.startswith(INTERRUPTED):
                 raise KeyboardInterrupt
-            part.runs.set(k, stats)
+            part.runs.put(k, **{name: getattr(stats, name) for name in COLUMNS})
             if run.log is not None:
                 part.happened[k] = run.log.happened
             states = recorder.table()[1]
             part.rows[k, : len(states)], part.rows[k, len(states) :] = states, np.nan
-
-    @cached_property
-    def _has_end_alone(self) -> bool:
-        """Whether the end is a row, so that steps need not be looked at if it is the only one that they make."""
-        return self.options.row_times[-1] == self.options.t_end
 
 
 _lock = threading.Lock()  # threads that come at the same time wait for one to make the code

@@ -18,7 +18,7 @@ import numpy as np
 from cgraph._shared import Array
 
 from ..run_options import RunOptions
-from ..steps.equal_steps import FOUR, EqualSteps, by_fours, halved, instants_of, longer
+from ..steps.equal_steps import EqualSteps, Numbers, halved, instants_of, longer, some_of
 from ..steps.state_sizes import Flags, off_by
 from ..steps.step_program import StepProgram
 from .unresolved import Watch
@@ -28,6 +28,7 @@ LEAST_RATIO = 2.0  # times a difference that of steps twice as long is, at least
 LAWLESS = 0.1  # of the size of a component: a difference above it follows no power of the step
 UNIT = 2.0**-52  # the last bit of a number near 1
 ASIDE = 1.0 + 8.0 * UNIT  # times each component, runs beside start: what roundings grow to is part of the error
+FOUR = 4  # steps, at whose ends those of all runs end
 LOOKS = 1024  # instants at which runs are compared, at most
 UNKNOWN = "the error is unknown"
 
@@ -35,8 +36,8 @@ UNKNOWN = "the error is unknown"
 class Law(NamedTuple):
     """How differences tell the error of a run whose longest step is so long [s].
 
-    ratio: of the second difference to the first, if the error is a power of the step.  share: of the first difference,
-    that is error then.
+    share: of the first difference, that is error, if the error is a power of the step.  ratio: of the second difference
+    to the first then.
     """
 
     longest: float
@@ -50,104 +51,92 @@ def law_of_halves(longest: float, order: int) -> Law:
 
 
 class RunsBeside(NamedTuple):
-    """Runs beside one of equal steps.
+    """Runs beside one of equal steps, which is looked at after so many of its steps, at instants t, (T,) each.
 
-    times: how much longer their steps are.  courses: their steps.  instants: the start, and where steps of all runs
-    end, (T,) [s].
+    runs: the steps of each, and how many are done then.
     """
 
     law: Law
-    times: Sequence[float]
-    courses: Sequence[Sequence[EqualSteps]]
-    instants: Array
+    runs: list[tuple[list[EqualSteps], Numbers]]
+    numbers: Numbers
+    t: Array
 
 
 def runs_beside(stretches: Sequence[EqualSteps], order: int) -> RunsBeside:
     """Runs of steps twice and four times as long; if there are too few of them, one of steps half as long."""
-    fours = by_fours(stretches)
-    made, start = [longer(fours, 2), longer(fours, 4)], stretches[0].begin
-    longest = max([abs(part.h) for part in stretches])
+    steps, longest = sum([part.steps for part in stretches]), max([abs(part.h) for part in stretches])
+    numbers = some_of(steps, FOUR, LOOKS)
+    t = instants_of(stretches, numbers)
+    runs = [longer(t, numbers, times) for times in (2, 4)]
     one, two, four = [
-        sum([part.steps * (abs(part.h) / longest) ** (order + 1) for part in each]) for each in (stretches, *made)
+        sum([part.steps * (abs(part.h) / longest) ** (order + 1) for part in each])
+        for each in (stretches, runs[0][0], runs[1][0])
     ]
     if two >= APART_RATIO * one and four - two >= APART_RATIO * (two - one):
-        law = Law(longest, one / (two - one), (four - two) / (two - one))
-        return RunsBeside(law, (2.0, 4.0), made, np.append(start, instants_of(fours, FOUR, LOOKS)))
-    ends = np.append(start, instants_of(stretches, 1, LOOKS))
-    return RunsBeside(law_of_halves(longest, order), (0.5,), [halved(stretches)], ends)
-
-
-class ErrorEstimates(NamedTuple):
-    """Of k runs: the largest errors and those at the end, relative to the sizes of components, (k,); NaN if unknown.
-
-    warnings: where more was asked for, a sentence each, else empty.
-    """
-
-    largest: Array
-    last: Array
-    warnings: list[str]
-
-
-class Changes(NamedTuple):
-    """Differences of k runs from those beside them.
-
-    t: instants (T,).  size: of the components, (k, m).  between: from the run to the first beside it, and from that to
-    the second, (k, T, m) each, not finite where one of them is not.  lost: when one takes another course [s], else NaN.
-    """
-
-    t: Array
-    size: Array
-    between: Sequence[Array]
-    lost: float = math.nan
-
-
-def changes(t: Array, rows: Sequence[Array]) -> Changes:
-    """Changes of the states (k, T, m) of runs and those beside at the same instants."""
-    between = [other - one for one, other in itertools.pairwise(rows)]
-    for each in between:
-        np.abs(each, out=each)
-    return Changes(t, np.maximum(rows[0].max(axis=1), -rows[0].min(axis=1)), between)
+        return RunsBeside(Law(longest, one / (two - one), (four - two) / (two - one)), runs, numbers, t)
+    numbers = some_of(steps, 1, LOOKS)
+    half = [(halved(stretches), 2 * numbers)]
+    return RunsBeside(law_of_halves(longest, order), half, numbers, instants_of(stretches, numbers))
 
 
 def error_estimates(
-    program: StepProgram, options: RunOptions, law: Law, watch: Watch, steps: int, found: Changes
-) -> ErrorEstimates:
-    """Estimates for k runs of so many steps, and whether they are as good as asked; NaN if nothing was compared."""
-    if len(found.t) < 2 and math.isnan(found.lost):
-        nothing = np.full(len(found.size), math.nan)
-        return ErrorEstimates(nothing, nothing, [""] * len(nothing))
+    program: StepProgram,
+    options: RunOptions,
+    law: Law,
+    watch: Watch,
+    steps: int,
+    t: Array,
+    rows: Sequence[Array],
+    alike: Sequence[Flags] = (),
+    lost: float = math.nan,
+) -> dict[str, Array]:
+    """Columns of the statistics of k runs of so many steps: "error", "error_at_end" and "warnings" of what is too large.
+
+    The errors are relative to the sizes of components, NaN if nothing was compared, and infinite if unknown.
+
+    t: instants (T,).  rows: states (k, T, m) of the runs and of those beside, not finite where one has stopped.
+    alike: of each run and the next, which rows can be compared; all by default.  lost: when one takes another course.
+    """
+    between = [other - one for one, other in itertools.pairwise(rows)]
+    for k, each in enumerate(between):
+        np.abs(each, out=each)
+        if alike:
+            each[:, ~alike[k]] = 0.0
+    many, at_end = len(rows[0]), int(np.flatnonzero(alike[0])[-1]) if alike else -1
+    warnings: Array = np.zeros(many, dtype=np.object_)
+    warnings.fill(())
+    if not between:
+        return {"error": np.full(many, math.nan), "error_at_end": np.full(many, math.nan), "warnings": warnings}
     watch.look()
-    scale, first = program.kinds.scale(found.size), found.between[0]
-    peaks = [np.where(np.isfinite(peak), peak, math.inf) for peak in [each.max(axis=1) for each in found.between]]
-    lost = np.full(len(scale), found.lost)
+    scale = program.kinds.scale(np.maximum(rows[0].max(axis=1), -rows[0].min(axis=1)))
+    peaks = [np.where(np.isfinite(peak), peak, math.inf) for peak in [each.max(axis=1) for each in between]]
+    since = np.full(many, lost)
     for k in np.flatnonzero(np.isinf(peaks[0]).any(axis=1)).tolist():
-        lost[k] = found.t[np.argmin(np.isfinite(first[k]).all(axis=1))]
+        since[k] = t[np.argmin(np.isfinite(between[0][k]).all(axis=1))]
     with np.errstate(all="ignore"):
         measured = peaks[-1] / peaks[0]
-        shares = [np.where(each > 0.0, each / scale, 0.0) for each in (peaks[0], first[:, -1], watch.missed)]
+        shares = [np.where(each > 0.0, each / scale, 0.0) for each in (peaks[0], between[0][:, at_end], watch.missed)]
     least = np.maximum(shares[2], UNIT * math.sqrt(steps))
     largest, last = [np.maximum(least, _errors(each, measured, law, watch.bent)) for each in shares[:2]]
     largest = np.maximum(largest, last)  # where the law that holds for one does not for the other
     resolved = math.pi * max(1.0, 0.5 * program.order) / law.longest  # rad/s: two evaluations in a turn
-    for unseen in (watch.turning > resolved, ~np.isnan(lost)):
+    for unseen in (watch.turning > resolved, ~np.isnan(since)):
         largest[unseen] = last[unseen] = math.inf
-    allowed, warnings = options.absolute + options.relative * scale, [""] * len(scale)
+    allowed = options.absolute + options.relative * scale
     for k in np.flatnonzero(~(largest * scale <= allowed).all(axis=1)).tolist():
         if watch.turning[k] > resolved:
             said = (
                 f"{UNKNOWN}: a sine or cosine of the equations turns at {watch.turning[k]:.3g} rad/s, and steps of "
                 f"{law.longest:.3g} s by method {options.method!r} resolve {resolved:.3g} rad/s"
             )
-        elif not math.isnan(lost[k]):
-            at = f"t = {lost[k]:.6g} s"
+        elif not math.isnan(since[k]):
+            at = f"t = {since[k]:.6g} s"
             said = f"{UNKNOWN}: beside it a run of other steps stops, or takes another course, at {at}"
         else:
             said = off_by(largest[k], scale[k], allowed[k], program.components)
-        warnings[k] = (
-            f"{said}; rtol = {options.relative:g} allows less: take a dt shorter than {options.step:g} s, or "
-            "method='dop853', which chooses its steps"
-        )
-    return ErrorEstimates(largest.max(axis=1), last.max(axis=1), warnings)
+        how = f"a dt shorter than {options.step:g} s, or method='dop853', which chooses its steps"
+        warnings[k] = (f"{said}; rtol = {options.relative:g} allows less: take {how}",)
+    return {"error": largest.max(axis=1), "error_at_end": last.max(axis=1), "warnings": warnings}
 
 
 def _errors(first: Array, measured: Array, law: Law, bent: Flags) -> Array:

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 import time
-from abc import ABC, abstractmethod
-from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 
@@ -16,21 +12,12 @@ from cgraph._shared import Array
 from ..run_options import RunOptions
 from ..stepper import EqualStepper, Stepper
 from ..steps.dense_output import StepBlock
-from ..steps.equal_steps import SAME_INSTANT, EqualSteps, even_steps, halved, numbers_of
-from .error_estimate import (
-    ASIDE,
-    LOOKS,
-    Changes,
-    ErrorEstimates,
-    Law,
-    changes,
-    error_estimates,
-    law_of_halves,
-    runs_beside,
-)
+from ..steps.equal_steps import SAME_INSTANT, EqualSteps, equal_steps
+from ..steps.state_sizes import Flags
+from .error_estimate import ASIDE, error_estimates, law_of_halves, runs_beside
 from .unresolved import Watch
 
-LATE, SHARE = 2.0, 0.1  # steps, or of the time since the last reset: a run so much later resets takes another course
+LATE, SHARE = 2.0, 0.1  # steps, or of the time between resets: runs parted for longer take other courses
 
 
 class RunEstimate:
@@ -38,7 +25,7 @@ class RunEstimate:
 
     def __init__(self, run: Stepper, x: Array, options: RunOptions) -> None:
         self._run, self._x, self._options = run, x, options
-        self._compared: _Compared | None = None
+        self._compared: _Whole | _Periods | None = None
         self.seconds = 0.0  # spent here
 
     def add(self, block: StepBlock) -> None:
@@ -48,7 +35,8 @@ class RunEstimate:
         begin = time.perf_counter()
         if self._compared is None:
             assert isinstance(self._run, EqualStepper)
-            self._compared = _kind(self._run)(self._run, self._x, self._options)
+            kind = _Whole if self._run.control is None else _Periods
+            self._compared = kind(self._run, self._x, self._options)
         self._compared.add(block)
         self.seconds += time.perf_counter() - begin
 
@@ -57,163 +45,93 @@ class RunEstimate:
         if self._compared is None:
             return None, None, ()
         begin = time.perf_counter()
-        (largest,), (last,), (warning,) = self._compared.estimates()
+        error, last, said = [column[0] for column in self._compared.columns().values()]
         self.seconds += time.perf_counter() - begin
-        if math.isnan(largest):  # nothing could be compared
-            return None, None, ()
-        return float(largest), float(last), (warning,) if warning else ()
+        return (None, None, ()) if math.isnan(error) else (float(error), float(last), said)
 
 
-def _kind(run: Stepper) -> type[_Compared]:
-    if run.control is not None:
-        return _Periods
-    return _Resets if run.log is not None and any(event.reset for event in run.log.program.events) else _Steps
-
-
-class _Compared(ABC):
-    """What is kept of a run, to compare it with others."""
-
-    def __init__(self, run: EqualStepper, x: Array, options: RunOptions) -> None:
-        self.run, self.x, self.options = run, x, options
-        self.program = run.program
-        p = np.array([self.run.parameters])
-        self.watch = Watch(self.program.rate, self.program.order, p, options.t0, x[None])
-
-    @abstractmethod
-    def add(self, block: StepBlock) -> None:
-        """The next steps of the run, or a reset."""
-
-    @abstractmethod
-    def estimates(self) -> ErrorEstimates:
-        """The estimates, after the last step."""
-
-    def judged(self, law: Law, found: Changes) -> ErrorEstimates:
-        """The estimates by what has been found."""
-        return error_estimates(self.program, self.options, law, self.watch, self.run.steps, found)
+def _watch(run: EqualStepper, t0: float, x: Array) -> Watch:
+    return Watch(run.program.rate, run.program.order, np.array([run.parameters]), t0, x[None])
 
 
 class _Rows:
-    """States of a run that starts with x after some of its steps, by the instants at which these end.
+    """States (T, m) of a run that starts with x, at instants t (T,), and how many resets it has had.
 
-    numbers: of the steps, (T,).  x: (T, m), NaN from where it has not come to.  done: steps.
+    count: of the instants that it has come to; beyond the states are NaN.
     """
 
-    def __init__(self, stretches: Sequence[EqualSteps], instants: Array, x: Array) -> None:
-        self.numbers, self.done = numbers_of(stretches, instants), 0
-        self.x = np.full((len(instants), len(x)), math.nan)
-        self.x[self.numbers == 0] = x
+    def __init__(self, t: Array, x: Array) -> None:
+        self.t, self.x, self.resets, self.count = t, np.full((len(t), len(x)), math.nan), np.zeros(len(t)), 1
+        self.x[0], self._forth = x, np.sign(t[-1] - t[0])
+        self._times = self._forth * t - SAME_INSTANT * np.spacing(np.abs(t).max())  # for those at which steps end
 
-    def add(self, block: StepBlock) -> None:
-        """The next steps."""
-        first, last = np.searchsorted(self.numbers, [self.done + 1, self.done + len(block.t) + 1])
-        self.x[first:last] = block.x[self.numbers[first:last] - self.done - 1]
-        self.done += len(block.t)
-
-
-class _Steps(_Compared):
-    """States of a run without resets where steps of all runs end."""
-
-    def __init__(self, run: EqualStepper, x: Array, options: RunOptions) -> None:
-        super().__init__(run, x, options)
-        self._beside = runs_beside(even_steps(options.instants, options.step), self.program.order)
-        self._rows = _Rows(even_steps(options.instants, options.step), self._beside.instants, x)
-
-    def add(self, block: StepBlock) -> None:
-        self.watch.add(block.t, block.x[None])
-        self._rows.add(block)
-
-    def estimates(self) -> ErrorEstimates:
-        whole = self._rows.done - bool(self.run.event)  # steps: an event may have ended the run inside one
-        t = self._beside.instants[self._rows.numbers <= whole]
-        rows = [self._rows.x[: len(t)]]
-        for course in self._beside.courses if len(t) > 1 else ():
-            other = _Rows(course, t, self.x)
-            for block in self.run.beside(course, self.run.parameters).blocks(self.x * ASIDE):
-                other.add(block)
-                if other.done >= other.numbers[-1]:
-                    break
-            rows.append(other.x)
-        return self.judged(self._beside.law, changes(t, [each[None] for each in rows]))
+    def add(self, block: StepBlock, resets: int) -> None:
+        """The next steps, before which it had so many resets."""
+        ends = self._forth * block.t
+        here = slice(self.count, int(np.searchsorted(self._times, ends[-1], side="right")))
+        if block.dense is None:
+            self.x[here] = block.x[np.searchsorted(ends, self._times[here])]
+        else:
+            self.x[here] = block.at(self._forth * np.minimum(self._forth * self.t[here], ends[-1]))
+        self.resets[here], self.count = resets, max(self.count, here.stop)
 
 
-class _Resets(_Compared):
-    """States of a run with resets, at some of its steps: runs beside, whose resets come at other times, are whole ones.
+class _Whole:
+    """A run and runs beside it that go all the way, at instants at which steps of all end.
 
-    They are compared by their dense output, but not between a reset, or the end, of one and of the other.
+    Runs with resets have these at other times, and are compared by their dense output where both have had as many.
     """
 
     def __init__(self, run: EqualStepper, x: Array, options: RunOptions) -> None:
-        super().__init__(run, x, options)
-        self._rows, self._every, self._steps = np.array([[options.t0, *x]]), 1, 0
-        self._last, self._resets = self._rows, list[float]()
+        stretches = equal_steps(options.instants, options.step)
+        self._resets = run.log is not None and any([event.reset for event in run.log.program.events])
+        if self._resets:
+            stretches = equal_steps([options.t0, options.t_end], max([abs(part.h) for part in stretches]))
+        self._run, self._x, self._options = run, x, options
+        self._beside, self._watch = runs_beside(stretches, run.program.order), _watch(run, options.t0, x)
+        self._rows = _Rows(self._beside.t, x)
 
     def add(self, block: StepBlock) -> None:
+        """The next steps of the run, or a reset."""
         if block.h[0] == 0.0:
-            self._resets += [float(block.t[0])] * (self.run.resets - len(self._resets))
-            self.watch.restart(float(block.t[0]), block.x)
-            return
-        self.watch.add(block.t, block.x[None])
-        rows = np.column_stack([block.t, block.x])
-        self._rows = np.concatenate([self._rows, rows[-(self._steps + 1) % self._every :: self._every]])
-        self._steps, self._last = self._steps + len(rows), rows[-1:]
-        while len(self._rows) > LOOKS:
-            self._rows, self._every = self._rows[::2], 2 * self._every
+            self._watch.restart(float(block.t[0]), block.x)
+        else:
+            self._watch.add(block.t, block.x[None])
+            self._rows.add(block, self._run.resets)
 
-    def estimates(self) -> ErrorEstimates:
-        rows = np.concatenate([self._rows, self._last[self._last[:, 0] != self._rows[-1, 0]]])
-        t, longest = rows[:, 0], self.run.largest
-        law, times = runs_beside(even_steps([self.options.t0, self.options.t_end], longest), self.program.order)[:2]
-        courses = [_Course(rows[:, 1:], [*self._resets, *_end(self.run, float(t[-1]))])]
-        courses += [self._beside(each * longest, t) for each in times]
-        forth = self.options.direction
-        counts = [np.searchsorted(forth * np.array(each.turns), forth * t) for each in courses]
-        alike = [one == other for one, other in itertools.pairwise(counts)]
-        between = [
-            np.abs(other.x - one.x)[same][None]
-            for (one, other), same in zip(itertools.pairwise(courses), alike, strict=True)
-        ]
-        lost = _lost(courses[0].turns, courses[1].turns, t, times[0] * longest)
-        if 2 * alike[0].sum() < len(t):  # too few to tell
-            lost = float(t[~alike[0]][0])
-        return self.judged(law, Changes(t[alike[0]], np.abs(rows[:, 1:]).max(axis=0)[None], between, lost))
-
-    def _beside(self, dt: float, t: Array) -> _Course:
-        """Run by steps of at most dt, at the instants t."""
-        run, x = self.run.again(dt), np.full((len(t), len(self.x)), math.nan)
-        x[0], resets, direction, at = self.x, list[float](), self.options.direction, float(t[0])
-        for block in run.blocks(self.x * ASIDE):
-            at = float(block.t[-1])
-            if block.h[0] == 0.0:
-                resets += [at] * (run.resets - len(resets))
-                continue
-            here = slice(*np.searchsorted(direction * t, direction * np.array([block.t_old[0], at]), side="right"))
-            x[here] = block.at(t[here])
-            if here.stop == len(t):
-                break
-        return _Course(x, [*resets, *_end(run, at)])
+    def columns(self) -> dict[str, Array]:
+        """The estimates, after the last step."""
+        first, one = self._run, self._rows
+        t = one.t[: one.count]
+        rows, alike = [one.x[None, : len(t)]], list[Flags]()
+        for stretches, _ in self._beside.runs if len(t) > 1 else ():
+            longest = max([abs(part.h) for part in stretches])
+            run = first.again(longest) if self._resets else first.beside(stretches, first.parameters)
+            other = _Rows(t, self._x)
+            for block in run.blocks(self._x * ASIDE):
+                if block.h[0] != 0.0:
+                    other.add(block, run.resets)
+                if other.count == len(t):
+                    break
+            if run.event:  # which has ended it before the other
+                other.resets[other.count :] = math.inf
+            rows.append(other.x[None])
+            alike.append(one.resets[: len(t)] == other.resets)
+            one = other
+        lost = _parted(t, alike[0], self._beside.law.longest, self._run.resets) if alike else math.nan
+        what = first.program, self._options, self._beside.law, self._watch, self._run.steps
+        return error_estimates(*what, t, rows, alike, lost)
 
 
-class _Course(NamedTuple):
-    """States of a run with resets, (T, m), and when it was reset, or ended by an event."""
-
-    x: Array
-    turns: list[float]
-
-
-def _end(run: Stepper, t: float) -> list[float]:
-    return [t] if run.event else []
+def _parted(t: Array, alike: Flags, longest: float, resets: int) -> float:
+    """When runs with so many resets have other ones for longer than their steps explain; NaN if they have not."""
+    begins, ends = np.flatnonzero(np.diff(~alike, prepend=False, append=False)).reshape(-1, 2).T
+    late = max(LATE * longest, SHARE * abs(t[-1] - t[0]) / (1 + resets))
+    apart = np.flatnonzero((np.abs(t[ends - 1] - t[begins]) > late) | (2 * alike.sum() < len(t)))
+    return float(t[begins[apart[0]]]) if len(apart) else math.nan
 
 
-def _lost(turns: list[float], others: list[float], t: Array, longest: float) -> float:
-    """When a run with other turns, in steps of at most so long, takes another course; NaN if it does not."""
-    count = max(len(turns), len(others))
-    one, other = (np.array([*each, *[t[-1]] * (count - len(each))]) for each in (turns, others))
-    late = np.maximum(LATE * longest, SHARE * np.abs(np.diff(one, prepend=t[0])))
-    apart = np.flatnonzero(np.abs(one - other) > late)
-    return float(min(one[apart[0]], other[apart[0]], key=lambda at: abs(at - t[0]))) if len(apart) else math.nan
-
-
-class _Periods(_Compared):
+class _Periods:
     """Differences of a run's stretches of steps under the same forces of a controller, each compared by itself.
 
     These forces answer the states of the run, and would be others beside it: from where the run is, steps of half the
@@ -221,43 +139,42 @@ class _Periods(_Compared):
     """
 
     def __init__(self, run: EqualStepper, x: Array, options: RunOptions) -> None:
-        super().__init__(run, x, options)
-        self._stretch, self._done, self._t = run.stretch, 0, options.t0
+        self._run, self._options = run, options
+        self._watch, self._stretch = _watch(run, options.t0, x), run.stretch
         self._start = self._end = x
-        self._size, self._sum = np.abs(x), np.zeros(len(x))
+        self._size, self._sum, self._t, self._steps, self._since = np.abs(x), np.zeros(len(x)), options.t0, 0, math.inf
 
     def add(self, block: StepBlock) -> None:
+        """The next steps of the run, or a reset."""
         if block.h[0] == 0.0:
-            self.watch.restart(float(block.t[0]), block.x)
+            self._watch.restart(float(block.t[0]), block.x)
             return
-        if not self._done or self.run.stretch is not self._stretch:
+        if not self._steps or self._run.stretch is not self._stretch:
             self._compare()
-            self._forces, self._stretch = self.run.parameters, self.run.stretch
-            self._start, self._done = block.x_old[0], 0
-            self.watch.restart(float(block.t_old[0]), block.x_old[:1], np.array([self._forces]))
-        self.watch.add(block.t, block.x[None])
+            self._stretch, self._forces = self._run.stretch, self._run.parameters
+            self._start, self._steps = block.x_old[0], 0
+            self._watch.restart(float(block.t_old[0]), block.x_old[:1], np.array([self._forces]))
+        self._watch.add(block.t, block.x[None])
         self._size = np.maximum(self._size, np.abs(block.x).max(axis=0))
-        end = self._stretch.begin + (self._done + len(block.t)) * self._stretch.h
-        whole = len(block.t) - bool(
-            abs(end - block.t[-1]) > SAME_INSTANT * np.spacing(abs(end))
-        )  # an event may cut one
-        if whole:
-            self._done, self._end = self._done + whole, block.x[whole - 1]
+        self._steps, self._t, self._end = self._steps + len(block.t), float(block.t[-1]), block.x[-1]
 
     def _compare(self) -> None:
-        """Add the difference of the stretch, in its whole steps."""
-        begin, h, *_ = self._stretch
-        if not self._done:
+        """Add the difference of the stretch, as far as it went."""
+        if not self._steps:
             return
-        if np.isfinite(self._sum).all():
-            self._t = begin + self._done * h
-        other = self.run.beside(halved([EqualSteps(begin, h, self._done, begin + self._done * h)]), self._forces)
-        *_, last = other.blocks(self._start)
-        self._sum = self._sum + (math.nan if other.status else np.abs(last.x[-1] - self._end))
-        self._done = 0
+        begin, steps = self._stretch.begin, 2 * self._steps
+        run = self._run.beside([EqualSteps(begin, (self._t - begin) / steps, steps, self._t)], self._forces)
+        end = self._start
+        for block in run.blocks(self._start):
+            end = block.x[-1]
+        self._sum = self._sum + (math.nan if run.status else np.abs(end - self._end))
+        if not np.isfinite(self._sum).all():
+            self._since = min(self._since, self._t)
 
-    def estimates(self) -> ErrorEstimates:
+    def columns(self) -> dict[str, Array]:
+        """The estimates, after the last step."""
         self._compare()
-        times = [self.options.t0, self._t][: 1 + (self._t != self.options.t0)]
-        found = Changes(np.array(times), self._size[None], [np.stack([0.0 * self._size, self._sum])[None]])
-        return self.judged(law_of_halves(self.run.largest, self.program.order), found)
+        program, size = self._run.program, np.array([[self._size] * 2])
+        rows, t = [size, size + [np.zeros(len(self._sum)), self._sum]], np.array([self._options.t0, self._since])
+        law = law_of_halves(self._run.largest, program.order)
+        return error_estimates(program, self._options, law, self._watch, self._run.steps, t, rows)

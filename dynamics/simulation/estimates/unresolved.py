@@ -89,6 +89,11 @@ def _sides(rate: Graph, names: dict[Node, str]) -> Graph:
     return Graph([*rate.inputs, *given.values()], {name: new[node] for name, node in rate.outputs.items()})
 
 
+def is_watched(rate: Graph) -> bool:
+    """Whether a rate has parts that steps may not resolve."""
+    return any(graph is not None for graph in unresolved(rate))
+
+
 class Watch:
     """What steps of k runs side by side cannot resolve, as the states after all of them come.
 
@@ -98,8 +103,7 @@ class Watch:
 
     def __init__(self, rate: Graph, order: int, p: Array, t: float, x: Array) -> None:
         """The runs start from x (k, m) at t."""
-        self._what, self._order, self._p = unresolved(rate), order, p
-        self.needed = self._what.waves is not None or self._what.branches is not None
+        self._what, self._order, self._p, self.needed = unresolved(rate), order, p, is_watched(rate)
         self.turning, self.bent, self.missed = np.zeros(len(x)), np.zeros(len(x), dtype=bool), np.zeros(x.shape)
         self._seen = [(np.array([t]), x[:, None])]
 

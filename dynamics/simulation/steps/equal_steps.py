@@ -15,7 +15,7 @@ Numbers = np.ndarray[Any, np.dtype[np.int64]]
 
 SAME_INSTANT = 8.0  # units of the last bit of the time, by which instants that are meant to be the same may differ
 EVEN = 4.0  # units of the last bit of the time, by which instants may miss an even spacing
-FOUR = 4  # steps of a run, at whose ends runs of steps twice and four times as long end a step, too
+ALIKE = 1e-9  # of a step, by which steps of runs beside may differ that are meant to be the same
 GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)  # its multiples spread evenly, and in step with no oscillation
 
 
@@ -35,8 +35,12 @@ def step_count(length: float, dt: float) -> int:
 
 def equal_steps(instants: Sequence[float], dt: float) -> list[EqualSteps]:
     """Steps of at most dt from the first instant through all others."""
-    counts = [step_count(end - begin, dt) for begin, end in itertools.pairwise(instants)]
-    return [_divided(*ends, count) for ends, count in zip(itertools.pairwise(instants), counts, strict=True)]
+    return [_divided(begin, end, step_count(end - begin, dt)) for begin, end in itertools.pairwise(instants)]
+
+
+def _divided(begin: float, end: float, count: int) -> EqualSteps:
+    """So many steps from begin to end."""
+    return EqualSteps(begin, (end - begin) / count, count, end)
 
 
 def even_steps(instants: Sequence[float], dt: float) -> list[EqualSteps]:
@@ -57,69 +61,44 @@ def even_steps(instants: Sequence[float], dt: float) -> list[EqualSteps]:
     return result
 
 
-def _divided(begin: float, end: float, count: int) -> EqualSteps:
-    """So many steps from begin to end."""
-    return EqualSteps(begin, (end - begin) / count, count, end)
-
-
 def halved(stretches: Iterable[EqualSteps]) -> list[EqualSteps]:
     """Two steps in place of each."""
     return [part._replace(h=0.5 * part.h, steps=2 * part.steps) for part in stretches]
 
 
-def longer(stretches: Iterable[EqualSteps], times: int) -> list[EqualSteps]:
-    """Steps so many times as long in stretches `by_fours`, or as nearly as the stretches allow."""
-    return [
-        _divided(part.begin, part.end, max(1, round((part.end - part.begin) / (times * part.h)))) for part in stretches
-    ]
+def some_of(steps: int, every: int, most: int) -> Numbers:
+    """0, so many steps, and between them multiples of `every`: all, or of more than `most` some, unevenly."""
+    count = steps // every
+    k = np.arange(min(count, most))
+    chosen = k if count <= most else ((k + k * GOLDEN % 1.0) * (count / most)).astype(np.int64)
+    return np.unique(np.concatenate([[0], every * (chosen + 1), [steps]]))
 
 
-def by_fours(stretches: Sequence[EqualSteps]) -> list[EqualSteps]:
-    """The same way in stretches of a multiple of four steps each, and where there are none of steps of four lengths.
-
-    These, which join stretches, are at least as long as four of the longest steps, but for the last.
-    """
-    longest, at, result = max([part.h for part in stretches], key=abs), stretches[0].begin, list[EqualSteps]()
-    for part in stretches:
-        left = FOUR * longest - (part.begin - at) if at != part.begin else 0.0  # of the way of a joint
-        ahead = math.ceil(left / part.h - 1e-9)
-        if ahead > part.steps:
-            continue
-        if at != part.begin:
-            result.append(EqualSteps(at, longest, FOUR, _instant(part, ahead)))
-        fours = (part.steps - ahead) // FOUR * FOUR
-        if fours:
-            result.append(EqualSteps(_instant(part, ahead), part.h, fours, _instant(part, ahead + fours)))
-        at = _instant(part, ahead + fours)
-    end = stretches[-1].end
-    return result if at == end else [*result, EqualSteps(at, longest, FOUR, end)]
-
-
-def _instant(part: EqualSteps, steps: int) -> float:
-    """Where so many steps end."""
-    return part.end if steps == part.steps else part.begin + steps * part.h
-
-
-def instants_of(stretches: Sequence[EqualSteps], every: int, most: int) -> Array:
-    """Instants at which each `every`th step of the stretches ends: of more than so many some, unevenly, and the last."""
-    begin, h, end = (np.array([part[k] for part in stretches]) for k in (0, 1, 3))
-    counts = np.array([part.steps // every for part in stretches])
-    before = np.cumsum(counts) - counts
-    total = int(counts.sum())
-    k = np.arange(min(total, most))
-    chosen = (
-        k if total <= most else np.append(((k[:-1] + k[:-1] * GOLDEN % 1.0) * (total / most)).astype(int), total - 1)
-    )
-    part = np.searchsorted(before, chosen, side="right") - 1
-    steps = chosen - before[part] + 1
-    instants: Array = np.where(steps == counts[part], end[part], begin[part] + every * steps * h[part])
-    return instants
+def instants_of(stretches: Sequence[EqualSteps], numbers: Numbers) -> Array:
+    """When so many steps are done."""
+    begin, h, steps, end = (np.array(column) for column in zip(*stretches, strict=True))
+    ends = np.cumsum(steps)
+    part = np.searchsorted(ends, numbers)
+    inside = numbers - (ends - steps)[part]
+    return np.where(inside == steps[part], end[part], begin[part] + inside * h[part])
 
 
 def numbers_of(stretches: Sequence[EqualSteps], instants: Array) -> Numbers:
-    """How many of the steps of the stretches are done at instants at which steps end, (T,)."""
-    begin, h, steps = (np.array([part[k] for part in stretches]) for k in range(3))
+    """How many steps are done at instants at which steps end, (T,): the other way round."""
+    begin, h, steps, _ = (np.array(column) for column in zip(*stretches, strict=True))
     part = np.maximum(np.searchsorted(np.sign(h[0]) * begin, np.sign(h[0]) * instants) - 1, 0)
     inside = np.rint((instants - begin[part]) / h[part]).astype(np.int64)
     numbers: Numbers = (np.cumsum(steps) - steps)[part] + inside
     return numbers
+
+
+def longer(t: Array, numbers: Numbers, times: int) -> tuple[list[EqualSteps], Numbers]:
+    """Steps so many times as long as those of which so many are done at instants; and how many of them are done there.
+
+    Between two instants they are equal, and in all to the last if there are as many.
+    """
+    counts = np.maximum(1, np.rint(np.diff(numbers) / times)).astype(np.int64)
+    h, done = np.diff(t) / counts, np.append(0, np.cumsum(counts))
+    new = np.flatnonzero(~(np.abs(np.diff(h, prepend=math.inf)) <= ALIKE * np.abs(h))).tolist()
+    ends = itertools.pairwise([*new, len(h)])
+    return [_divided(float(t[a]), float(t[b]), int(done[b] - done[a])) for a, b in ends], done

@@ -12,7 +12,8 @@ from pytest import approx, mark, raises, warns
 import cgraph as cg
 import dynamics as dyn
 from dynamics import METHODS
-from dynamics.simulation.steps.equal_steps import FOUR, by_fours, equal_steps, instants_of, longer, numbers_of
+from dynamics.simulation.estimates.error_estimate import runs_beside
+from dynamics.simulation.steps.equal_steps import equal_steps, some_of
 from tests.dynamics.models import random_arm
 from tests.dynamics.step_options import LIKE_OTHERS
 from tests.slow import slow
@@ -137,22 +138,23 @@ def test_a_second_run_that_fails_says_that_nothing_is_known() -> None:
     dt=st.floats(1e-2, 3.0),
     direction=st.sampled_from([1.0, -1.0]),
 )
-def test_runs_beside_have_longer_steps_that_meet_those_of_the_run(
+def test_runs_beside_have_other_steps_that_meet_those_of_the_run(
     gaps: list[float], dt: float, direction: float
 ) -> None:
     instants = (direction * np.cumsum([0.0, *gaps])).tolist()
     first = equal_steps(instants, dt)
-    fours, longest = by_fours(first), max(abs(part.h) for part in first)
-    met = instants_of(fours, FOUR, 1000)
-    for times, steps in ((1, first), (2, longer(fours, 2)), (4, longer(fours, 4))):
+    law, beside, numbers, t = runs_beside(first, 4)
+    assert law.longest == max(abs(part.h) for part in first)
+    for times, (steps, done) in zip((1.0, 2.0, 4.0), [(first, numbers), *beside], strict=False):
         assert (steps[0].begin, steps[-1].end) == (0.0, instants[-1])
         assert all(part.end == after.begin for part, after in zip(steps, steps[1:], strict=False))
-        assert all(0.0 < direction * part.h <= 2.0 * times * longest * (1.0 + 1e-9) for part in steps)
+        assert all(0.0 < direction * part.h <= 2.0 * times * law.longest * (1.0 + 1e-9) for part in steps)
         ends = [part.begin + part.h * np.arange(1.0, part.steps + 1.0) for part in steps]
-        assert np.concatenate(ends)[numbers_of(steps, met) - 1] == approx(met, rel=1e-12, abs=1e-12)
-        assert sum(part.steps for part in steps) <= sum(part.steps for part in first) / min(times, 1.5) + 1
-    assert met[-1] == instants[-1]
-    assert len(instants_of(fours, FOUR, 3)) <= 3
+        assert np.concatenate([[0.0], *ends])[done] == approx(t, rel=1e-12, abs=1e-12)
+    assert (t[0], t[-1]) == (0.0, instants[-1])
+    few = some_of(numbers[-1], 4, 3)
+    assert len(few) <= 5
+    assert (few[1:-1] % 4 == 0).all()
 
 
 def test_the_estimate_does_not_compare_momenta_with_coordinates() -> None:
