@@ -193,7 +193,9 @@ class Task:
             if run is None or self.events is not None:
                 run = stepper(compiled, self.options, p, stopped=stopped, events=self.events)
             run.set_parameters(p)
-            if has_end and isinstance(run, ChosenStepper):  # steps need not be looked at if it is their only row
+            if (
+                has_end and isinstance(run, ChosenStepper) and run.log is None
+            ):  # steps need not be looked at if it is their only row
                 if run.unseen(x):
                     counts = {"steps": run.steps, "rejected": run.rejected, "nfev": run.evaluations, "dt": run.largest}
                     part.runs.reached(k, **counts)

@@ -60,7 +60,7 @@ def starts(model: Any, seed: int) -> tuple[Any, Any]:
 def in_lanes(*arguments: Any, **options: Any) -> dyn.Ensemble:
     """An ensemble, of which no trajectory may be run alone."""
     pytest.importorskip("llvmlite")
-    with patch.object(task, "integration", side_effect=AssertionError("a trajectory is run alone")):
+    with patch.object(task, "stepper", side_effect=AssertionError("a trajectory is run alone")):
         return simulate_many(*arguments, **options)
 
 
