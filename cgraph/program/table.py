@@ -40,7 +40,7 @@ def _bodies(file: str, kind: str, masked: str, **more: Any) -> dict[str, Any]:
 ROWS = [  # read by columns: kind, reads, writes; in Python, check; as machine code; of many memories; more
     StatementRow(
         call.Call, ("inputs",), ("outputs",), call.run_call, call.check_call,
-        text=call.call_text, beside=call.call_beside, graph="graph", **_derivatives("call_rules", "call", "elements"),
+        text=call.call_text, beside=call.call_beside, graph="graph", **_derivatives("call_rules", "elements"),
     ),
     StatementRow(
         call.Map, ("shared", "inputs", "asked"), ("outputs",), call.run_map, call.check_elements,
@@ -69,7 +69,7 @@ ROWS = [  # read by columns: kind, reads, writes; in Python, check; as machine c
     StatementRow(  # with the derivative of its equations in place of its turns
         control.FixedPoint, ("register",), (), control.run_while, control.check_control, bodies=("body",),
         text=control.while_text, beside=control.run_while,
-        **_bodies("fixed_point_rules", "fixed_point", "masked_while"),
+        **_bodies("control_rules", "fixed_point", "masked_while"),
     ),
     StatementRow(
         memory.Take, ("source",), ("target",), memory.run_take, memory.check_take,

@@ -7,9 +7,8 @@ from ...core.node import constant
 from ...writing.naming import variables
 from ..statements.call import Call, copied
 from ..statements.matrix import Factor, Solve
-from .adjoint import Adjoint
-from .single_assignment import Assignment
-from .tangent import Tangent
+from .jvp import Assignment, Tangent
+from .transpose import Adjoint
 
 # The tangent, and the cotangent, of a factored matrix are those of the matrix A itself.
 
@@ -38,7 +37,7 @@ def push_solve(assignment: Assignment, tangent: Tangent) -> None:
     if matrix is None and side is None:
         return
     dot = tangent.dot(solve.vector)
-    side = tangent.dot_or_zero(right)
+    side = side or tangent.zero(right)
     if matrix is None:
         tangent.add(copied(side, dot))
     else:
@@ -67,7 +66,7 @@ def pull_solve(assignment: Assignment, adjoint: Adjoint) -> None:
 def _less_product(n: int, transposed: bool) -> Graph:
     """b - A x, or b - A^T x."""
     b, x = (variables([f"{name}{k}" for k in range(n)]) for name in "bx")
-    a = variables([f"a{i}_{j}" for i in range(n) for j in range(n)])
+    a = variables([f"a{k}" for k in range(n * n)])
     at = [[a[n * j + i] if transposed else a[n * i + j] for j in range(n)] for i in range(n)]
     rows = [sum([at[i][j] * x[j] for j in range(n)], constant(0.0)) for i in range(n)]
     return Graph([*b, *a, *x], {f"{i}": b[i] - row for i, row in enumerate(rows)})

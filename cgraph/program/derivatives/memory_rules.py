@@ -8,11 +8,10 @@ from ...core.graph import Graph
 from ...core.node import Node, constant
 from ...writing.naming import variables
 from ..statement import names_in, row_of, with_names
-from ..statements.call import Call, copied, copied_or_zero, zeroed
+from ..statements.call import Call, copied, copied_or_zero
 from ..statements.memory import Pop, Push, Scatter, Take
-from .adjoint import Adjoint
-from .single_assignment import Assignment
-from .tangent import Tangent
+from .jvp import Assignment, Tangent
+from .transpose import Adjoint
 
 # The tangent of a stack is a stack of tangents with a count of its own, and what is put on one comes off the other.
 # What a Scatter does not write stays as it was, and so does its tangent; its cotangent goes on to before.
@@ -31,7 +30,7 @@ def push_moved(assignment: Assignment, tangent: Tangent) -> None:
     givers = {*names_in(statement, read), *[before[name] for name in written if name in before]}
     if givers.isdisjoint(tangent.dots) or tangent.active.isdisjoint(written):
         return
-    pushed = with_names(statement, read, tangent.dot_or_zero)
+    pushed = with_names(statement, read, lambda name: tangent.dots.get(name) or tangent.zero(name))
     dots = {name: tangent.dot(name) for name in written}
     works = {name: dots.get(name) or tangent.fresh(name, tangent.lengths[name]) for name in changed}
     for name, work in works.items():
@@ -67,8 +66,8 @@ def pull_scatter(assignment: Assignment, adjoint: Adjoint) -> None:
     if scatter.target not in adjoint.bars:
         return
     if before in adjoint.active:
-        bar, none = adjoint.bar(before), adjoint.fresh("none", 1)
-        adjoint.add(copied(adjoint.bars[scatter.target], bar), zeroed(none))
+        bar, none = adjoint.bar(before), adjoint.zero(scatter.source)
+        adjoint.add(copied(adjoint.bars[scatter.target], bar))
         adjoint.add(Scatter(none, bar, (0,) * len(scatter.places), scatter.places))
         adjoint.collect(before, bar)
     if scatter.source in adjoint.active:
@@ -84,10 +83,9 @@ def pull_push(assignment: Assignment, adjoint: Adjoint) -> None:
         return
     stack = assignment.sources[0]
     work, left = adjoint.bar(push.stack), adjoint.fresh("count", 1)
-    bars = tuple([adjoint.bar(name) for name in push.rows])
-    none = tuple([adjoint.bar(name) for name in push.rows])
-    adjoint.add(copied(adjoint.bars[push.stack], work), copied(push.count, left), Pop(work, left, bars))
-    adjoint.add(*[zeroed(name) for name in none], Push(work, left, none))
+    bars, none = tuple([adjoint.bar(name) for name in push.rows]), tuple([adjoint.zero(name) for name in push.rows])
+    adjoint.add(copied(adjoint.bars[push.stack], work), copied(push.count, left))
+    adjoint.add(Pop(work, left, bars), Push(work, left, none))
     adjoint.collect(stack, work)
     for name, bar in zip(push.rows, bars, strict=True):
         if name in adjoint.active:
@@ -98,8 +96,8 @@ def pull_pop(assignment: Assignment, adjoint: Adjoint) -> None:
     """The cotangents of the row go onto a stack that is 0 elsewhere."""
     pop = assignment.statement
     assert isinstance(pop, Pop)
-    if adjoint.seeded(pop.rows) and pop.stack in adjoint.active:
-        bar, left = adjoint.bar(pop.stack), adjoint.fresh("count", 1)
-        adjoint.add(zeroed(bar), copied(pop.count, left))
-        adjoint.add(Push(bar, left, tuple([adjoint.bar_or_zero(name) for name in pop.rows])))
+    if not adjoint.bars.keys().isdisjoint(pop.rows) and pop.stack in adjoint.active:
+        bar, left = adjoint.zero(pop.stack), adjoint.fresh("count", 1)
+        rows = tuple([adjoint.bars.get(name) or adjoint.zero(name) for name in pop.rows])
+        adjoint.add(copied(pop.count, left), Push(bar, left, rows))
         adjoint.collect(pop.stack, bar)

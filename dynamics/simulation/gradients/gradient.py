@@ -13,22 +13,18 @@ from numpy.typing import ArrayLike
 import cgraph as cg
 from cgraph import Graph, Node
 from cgraph._shared import Array, kept_by_first, memo
-from cgraph.extend import Builder, topological
+from cgraph.extend import topological
 
 from ...integrators import Problem, quantity
-from ...systems.arguments import Parameters, call_user_function
-from ...systems.model import Model, as_equations
-from ...systems.ode_system import OdeSystem
-from ...systems.system import System
+from ...systems.model import Model
 from ..applied_force import Constant
 from ..events.event import Event, as_events
 from ..trajectory import SimulationWarning
+from .differentiated_run import DifferentiatedRun
 from .doubts import doubts
-from .motion import START, TORQUE, VELOCITY, MotionRequest, motion_of
 from .motion_equations import at
-from .segments import Bars, MotionSegments, segments_of
+from .motions import TORQUE, Loss, Motions, motions_of
 
-Loss = Callable[..., Node | float]
 LOSSES_KEPT = 64  # losses whose graphs stay for another run
 
 
@@ -165,94 +161,39 @@ def gradient(
     """
     options: dict[str, Any] = {"dt": dt, "max_step": max_step, "rtol": rtol, "atol": atol, "first_step": first_step}
     options |= {"estimate_error": estimate_error, "backend": backend}
-    span, watched = (t_end, t0, t_span), as_events(events)
-    model = with_loss_parameters(model, parameters, loss, running)
-    motion = motion_of(model, q, qd, span, method, tau, parameters, wrt, form, watched, **options)
-    values, slopes, segments, ends = differentiated(motion, loss, running, watched)
-    for text in doubts(segments, values, slopes, ends)[0]:
+    span, losses = (t_end, t0, t_span), (loss, running)
+    motions = motions_of(model, q, qd, span, method, tau, parameters, wrt, form, as_events(events), losses, **options)
+    run, values, slopes, bars = differentiated(motions, *losses)
+    for text in doubts(run, values, slopes, bars)[0]:
         warnings.warn(text, SimulationWarning, stacklevel=2)
-    nq, x, checkpoints = motion.problem.nq, segments.end[:, 0], max([run.tape.checkpoints for run in segments.runs])
+    nq, x = motions.problem.nq, run.end[:, 0]
     gradients = {name: each[..., 0] if each.ndim > 1 else float(each[0]) for name, each in slopes.items()}
-    return MotionGradient(float(values[0]), gradients, segments.t, x[:nq], x[nq:], checkpoints)
-
-
-def with_loss_parameters(model: Model, parameters: object, loss: Loss | None, running: Loss | None) -> Model:
-    """The model, with those given parameters that it has not and a loss reads: inputs that its equations do not use."""
-    own = as_equations(model)
-    given = parameters if isinstance(parameters, Mapping) else {}
-    new = [name for name in given if name not in own.parameters]
-    if not new or not all([isinstance(name, str) for name in new]):
-        return model
-    p, t, system = Parameters([*own.parameters, *new]), cg.variable("t"), own.system
-    state = [cg.variables(list(own.coordinates))] if system is None else [system.q, system.qd]
-    force = [] if system is None else [list(system.tau)]
-    called = [("loss", loss, state), ("running", running, [*state, *force])]
-    read = [call_user_function(what, each, *at, t, p) for what, each, at in called if each is not None]
-    used = {node.name for node in topological([node for node in read if isinstance(node, Node)])}
-    extended = dict(own.parameters) | {name: 0.0 for name in new if name in used}
-    if system is not None:
-        return system.changed(parameters=extended)
-    ode = own.ode
-    assert ode is not None
-    return OdeSystem(lambda x, t: ode.rates, ode.states, extended)
+    return MotionGradient(float(values[0]), gradients, run.t, x[:nq], x[nq:], run.checkpoints)
 
 
 def differentiated(
-    motion: MotionRequest, loss: Loss | None, running: Loss | None, watched: Sequence[Event] = ()
-) -> tuple[Array, dict[str, Array], MotionSegments, tuple[Array, Array]]:
-    """Losses (N,) of motions, their gradients (.., N) by names, the motions, and the losses' slopes by both ends."""
-    problem = motion.problem
+    motions: Motions, loss: Loss | None, running: Loss | None
+) -> tuple[DifferentiatedRun, Array, dict[str, Array], tuple[Array, Array]]:
+    """The run of motions, losses (N,), their gradients (.., N) by names, and their slopes by start and end, (m, N)."""
+    problem, equations = motions.problem, motions.equations
     if loss is None and running is None:
         raise ValueError("a loss is needed: of the end of the motion, `loss`, of how it goes, `running`, or both")
     final = None if loss is None else loss_graph(problem, quantity(problem, "loss", loss, constant=True))
     total = None
     if running is not None:
-        total = loss_graph(problem, quantity(problem, "running", running, motion.applied, constant=True))
-    segments = segments_of(motion, watched, total, forwards=False)
-    values, end = _final(final, motion, segments)
-    start, inputs, rows = segments.pulled(end)
-    return values + segments.loss, _gradients(motion, start, inputs, rows, end), segments, (start, end.x)
-
-
-def _final(graph: Graph | None, motion: MotionRequest, segments: MotionSegments) -> tuple[Array, Bars]:
-    """The final losses, (N,), and their slopes."""
-    m, many = segments.x.shape
-    if graph is None:
-        inputs = np.zeros((motion.forces + len(motion.values), many))
-        return np.zeros(many), Bars(np.zeros_like(segments.x), np.zeros(many), inputs)
-    values = at(with_slopes(graph, motion.backend), motion.at_end(segments.x, float(segments.t[-1])))
-    return values[0], Bars(values[1 : m + 1], values[m + 1], values[m + 2 :])
-
-
-def _gradients(motion: MotionRequest, start: Array, inputs: Array, rows: Array, end: Bars) -> dict[str, Array]:
-    """Gradients by the names of `wrt`, of cotangents of the start, of the inputs, and of the forces of each step."""
-    nq, forces, equations = motion.problem.nq, motion.forces, motion.equations
-    result: dict[str, Array] = {}
-    if motion.by_parameters:
-        p = motion.values[: len(equations.names)]
-        result = dict(zip(equations.names, equations.by_parameters(p, inputs[forces:], motion.backend), strict=True))
-    if TORQUE in motion.wrt:
-        if motion.each_step:
-            rows[-1] += end.inputs[:forces]  # what the final loss has of the force itself
-        result[TORQUE] = rows if motion.each_step else inputs[:forces]
-    result |= {START: _displaced(motion, start), VELOCITY: start[nq:]}
-    return {name: result[name] for name in motion.wrt}
-
-
-def _displaced(motion: MotionRequest, bar: Array) -> Array:
-    """The cotangent of the coordinates; of quasi-velocities by displacements, G^T q_bar."""
-    system, nq = motion.problem.system, motion.problem.nq
-    if system is None or system.kinematics.quasi is None or START not in motion.wrt:
-        return bar[:nq]
-    return at(_by_displacements(system, motion.backend), np.concatenate([motion.x[:nq], bar[:nq]]))
-
-
-@kept_by_first
-def _by_displacements(system: System, backend: str) -> Any:
-    """(q, q_bar) -> G^T q_bar as a function."""
-    bars = cg.variables([f"bar{k}" for k in range(system.nq)])
-    pulled = system.kinematics.pulled_back(bars, Builder())
-    return cg.compile(Graph([*system.q, *bars], {f"{k}": node for k, node in enumerate(pulled)}), backend)
+        total = loss_graph(problem, quantity(problem, "running", running, motions.applied, constant=True))
+    run = DifferentiatedRun(motions, total)
+    point = run.motions.point(run.x, float(run.t[-1]))
+    value, *slopes = (
+        np.zeros_like(point[:1]) if final is None else at(with_slopes(final, motions.options.backend), point)
+    )
+    end = np.array(slopes) if slopes else np.zeros_like(point)
+    start, rows = run.pulled(end)
+    gradients = motions.by_names(start)
+    if motions.each_step and TORQUE in gradients:
+        rows[-1] += end[problem.size + 1 :][: equations.forces]  # what the final loss has of the force itself
+        gradients[TORQUE] = rows
+    return run, value + run.loss, gradients, (start[: problem.size], end[: problem.size])
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,8 +18,8 @@ from ...systems.model import Model
 from ..outcome import MotionError
 from ..trajectory import SimulationWarning
 from .doubts import doubts
-from .gradient import Loss, differentiated, with_loss_parameters
-from .motion import START, TORQUE, VELOCITY, MotionRequest, motion_of
+from .gradient import differentiated
+from .motions import START, TORQUE, VELOCITY, Loss, Motions, motions_of
 
 FEW_MOTIONS = 4  # motions: fewer by a method that iterates are done sooner one by one
 WIDE_BLOCK = 16  # motions side by side: whole vectors of any processor, of which what is recorded stays in its caches
@@ -125,31 +125,29 @@ def gradient_many(
     """
     options: dict[str, Any] = {"dt": dt, "max_step": max_step, "rtol": rtol, "atol": atol, "first_step": first_step}
     options |= {"estimate_error": estimate_error, "backend": backend}
-    span = (t_end, t0, t_span)
-    model = with_loss_parameters(model, parameters, loss, running)
-    motions = motion_of(model, q, qd, span, method, tau, parameters, wrt, form, many=True, **options)
-    count, problem, run = motions.many, motions.problem, motions.options
-    parts = _parts(motions)
+    span, losses = (t_end, t0, t_span), (loss, running)
+    motions = motions_of(model, q, qd, span, method, tau, parameters, wrt, form, (), losses, many=True, **options)
+    count, problem = motions.many, motions.problem
     value, end = np.full(count, np.nan), np.full((count, problem.size), np.nan)
     by_name = {name: np.full((count, *shape), np.nan) for name, shape in _shapes(motions).items()}
-    early, said = dict[int, str](), dict[int, str]()
+    early, said, parts = dict[int, str](), dict[int, str](), _parts(motions)
     for part in parts:
         try:
-            losses, slopes, segments, ends = differentiated(_some(motions, part), loss, running)
+            run, losses_of_part, slopes, bars = differentiated(motions.of(slice(part.start, part.stop)), *losses)
         except MotionError as error:
             if len(part) == 1:
                 early[part[0]] = str(error)
             else:  # one of them has no derivative
                 parts += [range(k, k + 1) for k in part]
             continue
-        arrived = np.array([np.isfinite(end_of_one).all() for end_of_one in segments.end.T])
-        texts = doubts(segments, losses, slopes, ends)
+        arrived = np.asarray(np.isfinite(run.end).all(axis=0))
         rows = part.start + np.flatnonzero(arrived)
-        for table, array in [(value, losses), (end, segments.end), *[(by_name[name], slopes[name]) for name in slopes]]:
+        results = [(value, losses_of_part), (end, run.end), *[(by_name[name], slopes[name]) for name in slopes]]
+        for table, array in results:
             table[rows] = np.moveaxis(array, -1, 0)[arrived]
-        for number, whole, sentences in zip(part, arrived, texts, strict=True):
+        for number, whole, sentences in zip(part, arrived, doubts(run, losses_of_part, slopes, bars), strict=True):
             if not whole:
-                early[number] = f"the motion {segments.runs[0].stopped(number - part[0])}"
+                early[number] = f"the motion {run.stopped(number - part[0], run.segments[0])}"
             elif sentences:
                 said[number] = sentences[0]
     for each, what in ((early, "stopped early"), (said, "doubtful")):
@@ -157,11 +155,11 @@ def gradient_many(
             first, text = min(each.items())
             text = f"{len(each)} of {count} motions {what}: motion {first}: {text}"
             warnings.warn(text, SimulationWarning, stacklevel=2)
-    t = motions.segments[0].t.copy() if motions.segments else np.array([run.t0, run.t_end])
+    t = motions.steps[0].t if motions.steps else np.array([motions.options.t0, motions.options.t_end])
     return MotionGradients(value, by_name, t, end[:, : problem.nq], end[:, problem.nq :])
 
 
-def _parts(motions: MotionRequest) -> list[range]:
+def _parts(motions: Motions) -> list[range]:
     """The motions that go one by one, or side by side, of which a last one goes with those before it."""
     count = motions.many
     alone = motions.options.adaptive or (count < FEW_MOTIONS and motions.method.step(motions.problem).iterates)
@@ -169,16 +167,9 @@ def _parts(motions: MotionRequest) -> list[range]:
     return [range(begin, end) for begin, end in itertools.pairwise(begins)]
 
 
-def _shapes(motions: MotionRequest) -> dict[str, tuple[int, ...]]:
+def _shapes(motions: Motions) -> dict[str, tuple[int, ...]]:
     """Shapes of the gradients of a motion, by the names of `wrt`."""
     problem, nq = motions.problem, motions.problem.nq
     n = problem.size - nq
     shapes = {START: (nq if problem.system is None else n,), VELOCITY: (n,), TORQUE: motions.tau.shape[:-1]}
     return {name: shapes.get(name, ()) for name in motions.wrt}
-
-
-def _some(motions: MotionRequest, part: range) -> MotionRequest:
-    """Subset of the motions; one by chosen steps with these."""
-    here = slice(part.start, part.stop)
-    x, tau, values = (array[..., here] for array in (motions.x, motions.tau, motions.values))
-    return replace(motions, x=x, tau=tau, values=values).with_segments()

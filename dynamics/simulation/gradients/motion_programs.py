@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import cgraph as cg
 from cgraph import Graph
-from cgraph._shared import Linearization, Linearized, memo
-from cgraph.extend import STATEMENTS, Call, Map, Program, Runner, Statement, runner
+from cgraph._shared import TURNS, Along, Passes, adjoint, along, memo, tangent
+from cgraph.extend import STATEMENTS, Call, Map, Program, Statement
 
-from ...integrators import Method, Step
+from ...integrators import Method
 from ...integrators.method import equal_registers
 from ...integrators.step import with_registers
 from ...systems.arguments import TIME, new_variables
 from ..steps.step_program import normalizing
-from .motion_equations import PARAMETERS, MotionEquations, sharing
+from .motion_equations import PARAMETERS, MotionEquations
+from .rate_pullback import sharing
 
 LOSS = "loss"  # register: the running loss so far
 GIVEN = (*PARAMETERS, "t", "rtol", "atol")  # registers: what a motion has from without
@@ -26,18 +27,7 @@ _T, _H = cg.variables("t h")
 _LATER = Graph([_T, _H], {"t": _T + _H})
 
 
-@dataclass(frozen=True, eq=False)
-class WithDerivative:
-    """Passes and what goes along them: the passes themselves, and their linearization, compiled."""
-
-    passes: Linearization
-    forward: Runner
-    linear: Linearized
-    derivative: Runner
-
-
-@dataclass(frozen=True, eq=False)
-class MotionPrograms:
+class MotionPrograms(NamedTuple):
     """The programs of a motion.
 
     start: from x to what the first step reads; None where that is x.
@@ -45,76 +35,62 @@ class MotionPrograms:
     failed: a register that is not 0 after steps whose equations were not solved; empty where there is none.
     """
 
-    start: WithDerivative | None
-    step: WithDerivative
+    start: Along | None
+    step: Along
     failed: str
 
 
-@dataclass(frozen=True)
-class ProgramRequest:
-    """Request for the programs of a motion.
-
-    each_step: whether the applied forces are new in every step.  wrt: among "tau", "p", "c", "h" and "t", besides the
-    state.  forwards: tangents are pushed on, else cotangents pulled back.  many: motions go side by side.
-    running: the loss of a step, a graph over the states, t and parameters.
-    """
-
-    equations: MotionEquations
-    method: Method
-    each_step: bool
-    wrt: tuple[str, ...]
-    forwards: bool
-    backend: str
-    many: bool = False
-    running: Graph | None = None
-
-
 @memo(PROGRAMS_KEPT)
-def motion_programs(request: ProgramRequest) -> MotionPrograms:
-    """The programs; of the last few requests, those made before."""
-    made = request.method.step(request.equations.problem)
-    (step, start), first = _linearizations(request, made), None
-    if request.forwards:
-        then = [Map(_LATER, ("t:dot", "h:dot"), ("t:dot",))] if {"t", "h"} <= set(step.wrt) else []
-        linear = step.tangent(step.wrt, ["x"], then)
-    else:
-        linear = step.adjoint(["x", LOSS] if LOSS in step.handed else ["x"])
-    if start is not None:
-        seeds = [name for name in linear.vectors if name in start.handed]
-        pass_on = start.tangent(start.wrt, ["x"]) if request.forwards else start.adjoint(seeds)
-        first = _with_derivative(start, pass_on, list(start.handed), request.backend)
-    results = [name for name in ("x", LOSS, made.failed) if name in step.handed]
-    return MotionPrograms(first, _with_derivative(step, linear, results, request.backend), made.failed)
+def motion_programs(
+    equations: MotionEquations,
+    method: Method,
+    wrt: tuple[str, ...],
+    running: Graph | None,
+    backend: str,
+    *,
+    each_step: bool,
+    forwards: bool,
+    many: bool,
+) -> MotionPrograms:
+    """The programs; of the last few motions, those made before.
 
-
-def _with_derivative(passes: Linearization, linear: Linearized, results: list[str], backend: str) -> WithDerivative:
-    forward = passes.forward([*linear.program.feed, passes.handed["x"]], results)
-    return WithDerivative(passes, runner(forward, backend), linear, runner(linear.program, backend))
-
-
-def _linearizations(request: ProgramRequest, made: Step) -> tuple[Linearization, Linearization | None]:
-    """Linearizations of a step with its running loss, and of the statements before the first step."""
-    equations, problem, running = request.equations, request.equations.problem, request.running
+    wrt: among "tau", "p", "c", "h" and "t", besides the state.  running: the loss of a step, over the states, t and
+    parameters.  each_step: whether the applied forces are new in every step.  forwards: tangents are pushed on, else
+    cotangents pulled back.  many: motions go side by side.
+    """
+    problem, made = equations.problem, method.step(equations.problem)
     lengths = with_registers(made, {**equal_registers(problem), **equations.lengths, "arrival": 1, LOSS: 1})
     body: list[Statement] = list(made.derived)
     if arrived := normalizing(problem, "arrival"):
         body += [Call(_LATER, ("t", "h"), ("arrival",)), *arrived]
-    carried = ["x"]
+    carried = ["x"] if running is None else ["x", LOSS]
     if running is not None:
         (before,) = new_variables(LOSS, 1, running.input_names)
         total = Graph([*running.inputs, before], {LOSS: running.only_output() + before})
         body.insert(0, Call(total, ("x", "t", "p", LOSS), (LOSS,)))
-        carried.append(LOSS)
-    pullbacks = {} if equations.pullback is None else {id(problem.rate): equations.pullback}
-    if not request.forwards and not request.many and (both := sharing(equations)) is not None:
-        body = _sharing(body, problem.rate, both[0], lengths)
-        pullbacks[id(both[0])] = both[1]
-    make = partial(Linearization, constant=(*made.fixed, "evaluations", "nonfinite"), rules=pullbacks)
-    fed = ("t", "h", "tau") if request.each_step else ("t", "h")
-    step = make(Program(lengths, _separate(body), record=(), feed=fed), carried, request.wrt)
-    read = [name for name in (*step.handed, *step.constants) if name not in GIVEN]
-    begin, wrt = _separate([*normalizing(problem, TIME), *made.start]), [name for name in request.wrt if name != "h"]
-    return step, make(Program(lengths, begin, record=()), read, wrt) if begin else None
+    rate, rule = problem.rate, equations.pullback
+    rules = {} if rule is None else {id(rate): (problem.size, rule)}
+    if rule is not None and not forwards and not many:
+        both = sharing(rate, rule)
+        body, rules[id(both[0])] = _sharing(body, rate, both[0], lengths), (problem.size, both[1])
+    constant, turns = (*made.fixed, "evaluations", "nonfinite"), 0 if forwards else TURNS
+    make = partial(Passes, constant=constant, turns=turns)
+    fed = ("t", "h", "tau") if each_step else ("t", "h")
+    step = make(Program(lengths, _separate(body), record=(), feed=fed), carried, wrt)
+    if forwards:
+        then = [Map(_LATER, ("t:dot", "h:dot"), ("t:dot",))] if {"t", "h"} <= set(wrt) else []
+        linear = tangent(step, ["x"], then)
+    else:
+        linear = adjoint(step, carried, rules)
+    first = None
+    if begin := _separate([*normalizing(problem, TIME), *made.start]):
+        read = [name for name in (*step.handed, *step.constants) if name not in GIVEN]
+        start = make(Program(lengths, begin, record=()), read, [name for name in wrt if name != "h"])
+        seeds = [name for name in linear.vectors if name in start.handed]
+        first = along(start, tangent(start, ["x"]) if forwards else adjoint(start, seeds, rules), read, backend)
+    results = [name for name in ("x", LOSS, made.failed) if name in step.handed]
+    rows = [step.handed[name] for name in (made.failed, "x") if name in step.handed]
+    return MotionPrograms(first, along(step, linear, results, backend, rows), made.failed)
 
 
 def _separate(statements: Sequence[Statement]) -> list[Statement]:
@@ -138,7 +114,7 @@ def _sharing(body: list[Statement], rate: Graph, sharing_rate: Graph, lengths: d
     for k, statement in enumerate(body):
         if isinstance(statement, Call) and statement.graph is rate:
             register = f"shared{k}"
-            lengths[register] = len(sharing_rate.outputs) - len(statement.graph.outputs)
+            lengths[register] = len(sharing_rate.outputs) - len(rate.outputs)
             statement = Call(sharing_rate, statement.inputs, (*statement.outputs, register))
         result.append(statement)
     return result

@@ -10,18 +10,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-import cgraph as cg
-from cgraph import Graph, Node
+from cgraph import Node
 from cgraph._shared import Array
 
 from ...systems.model import Model
 from ..applied_force import Constant
 from ..events.event import Event, as_events
-from ..steps.row_values import values_of
 from ..trajectory import SimulationWarning
+from .differentiated_run import DifferentiatedRun
 from .doubts import doubts
-from .motion import START, TORQUE, VELOCITY, MotionRequest, motion_of
-from .segments import segments_of
+from .motions import motions_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,48 +124,22 @@ def sensitivities(
     """
     options: dict[str, Any] = {"dt": dt, "max_step": max_step, "rtol": rtol, "atol": atol, "first_step": first_step}
     options |= {"estimate_error": estimate_error, "backend": backend}
-    span, watched = (t_end, t0, t_span), as_events(events)
-    motion = motion_of(model, q, qd, span, method, tau, parameters, wrt, form, watched, **options)
-    if motion.each_step:
-        raise ValueError(f"tau must be constant, (n,), got shape {motion.tau.shape[:-1]}: gradient takes a row a step")
-    directions, columns = _directions(motion)
-    segments = segments_of(motion, watched, forwards=True)
-    for text in doubts(segments, np.zeros(1), {})[0]:
+    span = (t_end, t0, t_span)
+    motions = motions_of(model, q, qd, span, method, tau, parameters, wrt, form, as_events(events), **options)
+    if motions.each_step:
+        raise ValueError(f"tau must be constant, (n,), got shape {motions.tau.shape[:-1]}: gradient takes a row a step")
+    run = DifferentiatedRun(motions, forwards=True)
+    for text in doubts(run)[0]:
         warnings.warn(text, SimulationWarning, stacklevel=2)
-    t, x, t_dot, x_dot = segments.tangents(directions)
-    derivatives = {name: x_dot[:, :, place] for name, place in columns.items()}
-    times = {name: t_dot[:, place] for name, place in columns.items()}
-    nq = motion.problem.nq
-    return Sensitivities(t, x[:, :nq], x[:, nq:], derivatives, times)
-
-
-def _directions(motion: MotionRequest) -> tuple[dict[str, Array], dict[str, int | slice]]:
-    """Tangents of x, tau and p, a column for each number of `wrt`; and where the columns of each name are."""
-    problem, nq, equations = motion.problem, motion.problem.nq, motion.equations
-    lengths = {"x": problem.size, **equations.lengths}
-    begin = dict(zip(lengths, np.cumsum([0, *lengths.values()]), strict=False))  # of rows, those of each register
-    units = np.eye(sum(lengths.values()))
-    by = {VELOCITY: units[:, nq : problem.size], TORQUE: units[:, begin[TORQUE] :][:, : motion.forces]}
-    if motion.by_parameters:
-        along = units[:, begin["p"] :] @ equations.columns(motion.values[: len(equations.names), 0], motion.backend)
-        by |= {name: along[:, [k]] for k, name in enumerate(equations.names)}
-    if START in motion.wrt:
-        by[START] = units[:, :nq] @ _displacements(motion)
+    # a column for each number of `wrt`: the transpose of how cotangents of it are made of those of x, t and inputs
+    units = np.eye(len(motions.point(motions.x, 0.0)))
+    by = motions.repeated(len(units)).by_names(units)
+    t, x, t_dot, x_dot = run.pushed(np.concatenate([np.atleast_2d(rows) for rows in by.values()]).T)
     columns: dict[str, int | slice] = {}
     at = 0
-    for name in motion.wrt:
-        columns[name] = slice(at, at + by[name].shape[1]) if name in (START, VELOCITY, TORQUE) else at
-        at += by[name].shape[1]
-    whole = np.concatenate([by[name] for name in motion.wrt], axis=1)
-    return {name: whole[begin[name] :][:length] for name, length in lengths.items()}, columns
-
-
-def _displacements(motion: MotionRequest) -> Array:
-    """dq of displacements of the coordinates, (nq, n): G(q), or 1."""
-    system, nq = motion.problem.system, motion.problem.nq
-    if system is None or system.kinematics.quasi is None:
-        return np.eye(nq)
-    rates = cg.jacobian(
-        Graph([*system.q, *system.qd], {f"{k}": rate for k, rate in enumerate(system.q_dot)}), system.qd
-    )
-    return values_of(rates, motion.x[:, 0].tolist()).reshape(nq, system.n)
+    for name, rows in by.items():
+        columns[name] = at if rows.ndim == 1 else slice(at, at + len(rows))
+        at += len(np.atleast_2d(rows))
+    derivatives = {name: x_dot[:, :, place] for name, place in columns.items()}
+    times, nq = {name: t_dot[:, place] for name, place in columns.items()}, motions.problem.nq
+    return Sensitivities(t, x[:, :nq], x[:, nq:], derivatives, times)

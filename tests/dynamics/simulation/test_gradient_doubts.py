@@ -136,7 +136,7 @@ def test_a_loss_that_is_no_number_is_said() -> None:
         assert words == ["2 of 3 motions doubtful: motion 1: the loss is nan of a motion that is finite"]
 
 
-@patch("dynamics.simulation.gradients.motion_run.PIECE", 16)
+@patch("dynamics.simulation.gradients.differentiated_run.PIECE", 16)
 def test_a_motion_that_does_not_arrive_is_told_with_time_and_coordinate() -> None:
     """`gradient` raises, in the words of `simulate`; `gradient_many` gives NaN, and the others are as alone."""
 
