@@ -63,7 +63,8 @@ class Loop:
         )
         registers = {"carry": len(moving), "held": len(held), "invariant": len(stand_ins)}
         program = Program(registers, [Call(one_pass, ("carry", "held", "invariant"), ("carry",))], record=["carry"])
-        self._runner = runner(program, backend, fast=fast, fma=fma).prepared()
+        self._runner = runner(program, backend, fast=fast, fma=fma)
+        self._runner.run(self._runner.memory({}), 0)  # makes the code that a call runs
 
     def __call__(self, x: ArrayLike, passes: int, every: int = 1) -> Array:
         """Run the passes from one start.
@@ -94,7 +95,7 @@ class Loop:
 
         The last axis counts the starts, as in `Compiled.batch`.
         """
-        return self._runner.run_many(self._memory(X, 2), passes, every).rows
+        return self._runner.run(self._memory(X, 2), passes, every).rows
 
     def _memory(self, x: ArrayLike, dimensions: int) -> Array:
         values = real_array("x", x)

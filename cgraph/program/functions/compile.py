@@ -17,7 +17,7 @@ from ...codegen.llvm_engine import MissingFunctionError
 from ...core.graph import Graph
 from ...util.require import require_choice, require_flag, require_graph
 from ...util.version import __version__
-from ..runners.native_runner import NativeRunner, flags_of
+from ..runners.native_runner import NativeRunner
 from ..runners.python_runner import PythonRunner
 from .compiled import Compiled, Options
 
@@ -100,8 +100,8 @@ def compile(
         )
     if backend == "llvm" or (backend == "auto" and not large):
         try:
-            flags, kept = flags_of(options["fast"], options["fma"]), open_cache(options["cache"])
-            ready = partial(NativeRunner, flags=flags, cache=kept)
+            kept = open_cache(options["cache"])
+            ready = partial(NativeRunner, fast=options["fast"], fma=options["fma"], cache=kept)
             return Compiled(graph, backend, options, ready, ready)
         except (ImportError, MissingFunctionError):
             if backend == "llvm":

@@ -6,7 +6,8 @@ from ...codegen.llvm_engine import MissingFunctionError
 from ...util.explain_failure import explain_failure
 from ...util.require import require_choice, require_flag
 from ..program import Program
-from .native_runner import NativeRunner, flags_of
+from .native_runner import NativeRunner
+from .python_runner import PythonRunner
 from .runner import Runner
 
 BACKENDS = ("auto", "python", "llvm")
@@ -32,10 +33,8 @@ def runner(program: Program, backend: str = "auto", *, fast: bool = False, fma: 
     fast, fma = require_flag("fast", fast), require_flag("fma", fma)
     if backend != "python":
         try:
-            return NativeRunner(program, flags_of(fast, fma))
+            return NativeRunner(program, fast=fast, fma=fma)
         except (ImportError, MissingFunctionError):
             if backend == "llvm":
                 raise
-    from .python_runner import PythonRunner
-
     return PythonRunner(program, fma=fma)

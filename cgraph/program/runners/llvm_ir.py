@@ -87,6 +87,7 @@ def point_ir(
 
 _ARGUMENTS = "ptr noalias %memory, ptr noalias %records, i64 %passes, i64 %every, ptr %done, ptr noalias %feed, "
 _ARGUMENTS += "i64 %stride"
+ONE_RUN = "call i64 @run(ptr %w, ptr null, i64 1, i64 2, ptr {done}, ptr null, i64 0)"  # a pass without a record
 
 
 def _run_function(program: Program, ir: Writer) -> list[str]:
