@@ -38,20 +38,16 @@ class Functions:
         products: Mapping[Node, Node] | None = None,
         *,
         exact: bool = False,
-        offsets: Lengths = (),
     ) -> str:
         """y = graph(x), where of its registers some, end to end, are x, and some y; a register may be both.
 
         products: see `instructions`.  exact: no product is joined with a sum.
-        offsets: where the registers lie in the memory, whose address is then the function's one argument: addresses are
-        constants of the instructions. Without, each register has an argument.
         """
         arithmetic = self.arithmetic.unfused if exact else self.arithmetic
-        pointers = ["%in0"] if offsets else [f"%in{k}" for k in range(len(registers))]
-        where = [("%in0", begin) for begin in offsets] or [(pointer, 0) for pointer in pointers]
+        pointers = [f"%in{k}" for k in range(len(registers))]
         places = [
-            [f"{arithmetic.type}, ptr {pointer}, i64 {begin + k}" for k in range(length)]
-            for (pointer, begin), length in zip(where, registers, strict=True)
+            [f"{arithmetic.type}, ptr {pointer}, i64 {k}" for k in range(length)]
+            for pointer, length in zip(pointers, registers, strict=True)
         ]
         x, y = ([place for k in which for place in places[k]] for which in (reads, writes))
         known = set(x)
@@ -60,7 +56,7 @@ class Functions:
         def text(ir: FunctionWriter, name: str) -> None:
             self._body(ir, name, graph, x, y, pointers, products=products, last=again)
 
-        key = (id(graph), registers, tuple(reads), tuple(writes), exact, offsets)
+        key = (id(graph), registers, tuple(reads), tuple(writes), exact)
         return self._define(key, "call", text, arithmetic, len(pointers), 0)
 
     def map(

@@ -14,7 +14,6 @@ class Writer(FunctionWriter):
 
     functions: those of the module, which statements call.  size: of a number in a register, in bytes.
     pointers: {register: its address}.  before: the statement that has been written last.
-    offsets: {register: its place in %memory}, where they all lie there.  alone: ids of graphs that one statement calls.
     """
 
     def __init__(self, registers: Registers, functions: Functions) -> None:
@@ -22,8 +21,6 @@ class Writer(FunctionWriter):
         self.registers, self.functions, self.size = registers, functions, 8 * self.lanes
         self.pointers = {name: f"%r{number}" for number, name in enumerate(registers)}
         self.before: Statement | None = None
-        self.offsets: Registers = {}
-        self.alone: frozenset[int] = frozenset()
 
     def run(self, statements: Sequence[Statement]) -> None:
         """Statements, one after another."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 
 from ...codegen.arithmetic import REGISTERS, Arithmetic
@@ -12,7 +11,6 @@ from ...codegen.llvm_ir import libm_functions, point_arithmetic, preamble, scala
 from ..llvm_functions import Functions
 from ..program import Program, whole_graph
 from ..statement import row_of
-from ..statements.call import Call
 from ..writer import Writer
 
 
@@ -97,10 +95,8 @@ def _run_function(program: Program, ir: Writer) -> list[str]:
         read; statements; done++; if (--until == 0) { until = every; record } if (stop) break
     }
     """
-    ir.offsets = places = offsets(program.registers, ir.functions.width)
+    places = offsets(program.registers, ir.functions.width)
     ir.pointers = {name: ir.at("%memory", places[name]) for name in program.registers}
-    calls = Counter([id(each.graph) for each in program.statements() if isinstance(each, Call)])
-    ir.alone = frozenset([graph for graph, count in calls.items() if count == 1])
     row, until = ir.room(1, "ptr"), ir.room(1, "i64")
     ir.store_at("%records", row, "ptr")
     ir.store_at("%every", until, "i64")
