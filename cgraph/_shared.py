@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from .operations.operation import columns as columns
     from .program.derivatives.linearization import Linearization as Linearization, Linearized as Linearized
     from .program.derivatives.tape import Tape as Tape, run_passes as run_passes
-    from .program.runners.lane_code import LaneCode as LaneCode
+    from .program.runners.batch_code import LaneCode as LaneCode
     from .simplification.identities import shortened as shortened
     from .simplification.ordered_terms import ink as ink
     from .simplification.polynomial import (

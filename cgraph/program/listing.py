@@ -5,17 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
+from fractions import Fraction
 from textwrap import wrap
 
 from ..core.graph import Graph
 from ..core.node import Node
 from ..operations.operation import FUNCTION, LEAF, PRODUCT, SUM, columns
 from ..util.words import counted
-from ..writing.formulas import Text, fraction
 from .statement import Lengths, Names, Statement, bodies_of, names_in, row_of
 from .statements.call import Call, Map, Sum, elements, several
 from .statements.control import FixedPoint, If
 
+Text = tuple[str, int]  # a formula, and how strongly it binds, as in the table of operations
 INLINE, WIDE = 20, 100  # operations of a graph that is written as formulas, and letters of one, at most
 SHORT, LINE = 60, 120  # letters of a field, and of a line of registers
 
@@ -114,8 +115,9 @@ class Listing:
 
 
 def _number(value: float) -> Text:
-    if math.isfinite(value) and (found := fraction(abs(value))):
-        return f"{'-' if value < 0.0 else ''}{found[0]}/{found[1]}", PRODUCT
+    near = Fraction(value).limit_denominator(12) if math.isfinite(value) else Fraction(0)
+    if near.denominator > 1 and float(near) == value:
+        return str(near), PRODUCT
     return f"{value:.6g}", LEAF if value >= 0.0 else PRODUCT
 
 

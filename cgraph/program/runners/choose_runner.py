@@ -7,7 +7,6 @@ from ...util.explain_failure import explain_failure
 from ...util.require import require_choice, require_flag
 from ..program import Program
 from .native_runner import NativeRunner
-from .python_runner import PythonRunner
 from .runner import Runner
 
 BACKENDS = ("auto", "python", "llvm")
@@ -37,4 +36,6 @@ def runner(program: Program, backend: str = "auto", *, fast: bool = False, fma: 
         except (ImportError, MissingFunctionError):
             if backend == "llvm":
                 raise
+    from .python_runner import PythonRunner
+
     return PythonRunner(program, fma=fma)

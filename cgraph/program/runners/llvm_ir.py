@@ -8,10 +8,9 @@ from ...codegen.arithmetic import REGISTERS, Arithmetic
 from ...codegen.function_writer import copied_bytes
 from ...codegen.llvm_engine import MissingFunctionError
 from ...codegen.llvm_ir import libm_functions, point_arithmetic, preamble, scalar_ir
-from ..llvm_functions import Functions
 from ..program import Program, whole_graph
 from ..statement import row_of
-from ..writer import Writer
+from ..writer import Functions, Writer
 
 
 def program_functions(program: Program) -> dict[str, int]:

@@ -7,29 +7,28 @@ import threading
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
+from types import ModuleType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ...codegen import llvm_engine as llvm
 from ...codegen.arithmetic import Arithmetic
-from ...codegen.batch_ir import Batch
 from ...codegen.bound_call import LONG, SHORT, bound_call
 from ...codegen.llvm_ir import point_arithmetic
 from ...core.evaluation import Array
 from ...core.scope import without_collection
 from ...util.memory import aligned
 from ..fuse import fused
-from ..many import many_keeping
 from ..program import Program, outliving, whole_graph
 from ..statement import row_of
-from .batch_code import BatchCode, pass_ir
-from .lane_code import LaneCode, lane_ir
 from .llvm_ir import offsets, point_ir, program_functions, program_ir, require_texts
 from .runner import NONE, Record, Runner
 
 if TYPE_CHECKING:
+    from ...codegen.batch_ir import Batch
     from ...codegen.disk_cache import Cache
+    from .batch_code import BatchCode, LaneCode
 
 _NUMBER = 8  # bytes
 _POINTER, _COUNT = ctypes.c_void_p, ctypes.c_int64
@@ -77,6 +76,19 @@ class NativeRunner(Runner):
 
     def _compiled(self, text: str, lanes: int = 1, *, looped: bool = False) -> llvm.Code:
         return self._host.compile(text, self._functions, self._nodes, self._cache, lanes=lanes, looped=looped)
+
+    @cached_property
+    def _side(self) -> ModuleType:
+        """The module for memories side by side."""
+        from . import batch_code  # which a program of one memory does without
+
+        return batch_code
+
+    @cached_property
+    def masked(self) -> Program:
+        """The program of memories side by side, see `many`."""
+        program: Program = self._side.beside(self.program)
+        return program
 
     @cached_property
     def _fused_many(self) -> Program:
@@ -165,7 +177,7 @@ class NativeRunner(Runner):
             places = offsets(self._fused_many.registers, 1) if start else {}
             begin = {places[other]: numbers for other, numbers in start.items()}
             width = max(WORK // max(1, self._nodes) // lanes, 1) * lanes
-            return width, BatchCode(code, lanes, text.size, begin, columns=alone)
+            return width, self._side.BatchCode(code, lanes, text.size, begin, columns=alone)
 
         code: tuple[int, BatchCode] = self._once(("columns", name), made)
         return code
@@ -179,10 +191,11 @@ class NativeRunner(Runner):
         first = {*outliving(self._fused), *results}
         kept = [name for name in lengths if name in first]
         ordered = {name: lengths[name] for name in dict.fromkeys([*kept, *lengths])}
-        masked = fused(many_keeping(replace(self._fused, registers=ordered), kept), alike=alike)
         with without_collection():
-            text = lane_ir(masked, sum([lengths[name] for name in kept]), clock, arithmetic)
-        return LaneCode(self._compiled(text.source, lanes), masked, kept, lanes, text.size)
+            masked = self._side.kept_beside(replace(self._fused, registers=ordered), kept, alike)
+            text = self._side.lane_ir(masked, sum([lengths[name] for name in kept]), clock, arithmetic)
+        code: LaneCode = self._side.LaneCode(self._compiled(text.source, lanes), masked, kept, lanes, text.size)
+        return code
 
     def text(self, x: str, *, side_by_side: bool = False) -> str:
         """The text in LLVM's language."""
@@ -192,4 +205,5 @@ class NativeRunner(Runner):
         """The module of one pass at many values of a register."""
         how = self._host.lanes, self._flags, self._host.registers
         with without_collection():
-            return pass_ir(self._fused, lambda: self._fused_many, name, *how)
+            text: Batch = self._side.pass_ir(self._fused, lambda: self._fused_many, name, *how)
+        return text

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...codegen.python_function import OnArrays, OnFloats
 from ...core.evaluation import Array
 from ...core.graph import Graph
+from ..many import many
 from ..program import Program, whole_graph
 from ..statement import Execution
 from ..statements.call import spread
-from .lane_code import LaneCode
 from .runner import NONE, Record, Runner
+
+if TYPE_CHECKING:
+    from .batch_code import LaneCode
 
 BLOCK = 4096  # points that NumPy takes at once: temporaries stay in the cache
 STATES = 512  # states of a batch that are run between looks at the keyboard
@@ -35,6 +39,11 @@ class PythonRunner(Runner):
         self._fma, self._backend = fma, backend
         self._functions: dict[int, OnFloats] = {}
         self._arrays: dict[int, OnArrays] = {}
+
+    @cached_property
+    def masked(self) -> Program:
+        """The program of memories side by side, see `many`."""
+        return many(self.program)
 
     def _run(self, memory: Array, passes: int, every: int, feed: Array) -> Record:
         program = self.program

@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from functools import cached_property
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,10 +16,11 @@ from ...core.evaluation import Array, real_array
 from ...util.memory import describe, require_memory, require_out
 from ...util.require import require_mapping, require_whole
 from ...util.threads import thread_count, write_batch
-from ..many import many
 from ..program import Program, outliving
-from .lane_code import LaneCode
 from .llvm_ir import offsets
+
+if TYPE_CHECKING:
+    from .batch_code import LaneCode
 
 NONE: Mapping[str, Array] = MappingProxyType({})
 
@@ -66,10 +66,10 @@ class Runner(ABC):
         self._slices = {name: slice(places[name], places[name] + n) for name, n in program.registers.items()}
         self.size = places[""]
 
-    @cached_property
+    @property
+    @abstractmethod
     def masked(self) -> Program:
         """The program of memories side by side, see `many`."""
-        return many(self.program)
 
     def memory(self, values: Mapping[str, ArrayLike], count: int | None = None) -> Array:
         """A memory, (size,) or (size, count), with these values of registers, 0 elsewhere.

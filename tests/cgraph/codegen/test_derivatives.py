@@ -12,7 +12,7 @@ from hypothesis import given, settings, strategies as st
 import cgraph as cg
 from cgraph import GraphError
 from cgraph.codegen import parts
-from cgraph.program.functions import compile as functions, derivative
+from cgraph.program.functions import compiled as functions, derivative
 from tests import high_precision
 from tests.each_row import each_row
 from tests.strategies import cases, examples
