@@ -123,7 +123,7 @@ def push_while(assignment: Assignment, tangent: Tangent) -> None:
     inner = tangent.inner({}, values=True)
     inner.push(turn)
     ends = [copied_or_zero(inner.dots.get(after[at]), dot) for at, dot in dots.items()]
-    tangent.add(replace(loop, body=(*inner.statements, *_handed_on(after), *ends)))  # type: ignore[type-var, call-arg]
+    tangent.add(replace(loop, body=(*inner.statements, *_handed_on(after), *ends)))  # type: ignore[type-var]
 
 
 def pull_while(assignment: Assignment, adjoint: Adjoint) -> None:

@@ -168,4 +168,6 @@ def _arrived(pickled: bytes) -> StepProgram:
 @kept_by_first
 def compile_steps(program: StepProgram, backend: str, fma: bool) -> CompiledSteps:
     """The steps, ready to run."""
-    return CompiledSteps(program, runner(program.steps, backend, fma=fma).prepared())
+    run = runner(program.steps, backend, fma=fma)
+    run.run(run.memory({}), 0)  # makes the code that a motion runs
+    return CompiledSteps(program, run)
