@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
@@ -163,13 +164,21 @@ class RunOptions:
         self.__dict__.update(span(self.t0, self.t_end, self.t_eval), max_steps=most)
 
     @classmethod
-    def of(cls, method: str, options: Options, t0: float = 0.0, t_end: float = 1.0) -> RunOptions:
-        """Those of a method and keywords.  Raises TypeError for a keyword that there is not."""
-        if unknown := [name for name in options if name not in cls.__dataclass_fields__ or name == "t0"]:
-            known = [name for name in Options.__annotations__ if name not in ("t0", "t_span")]
-            raise TypeError(f"a run has no option {unknown[0]!r:.60} here; {or_nearest(unknown[0], known)}")
-        given: dict[str, Any] = {**options}
-        return cls(t_end, method, t0=t0, **given)
+    def of(
+        cls,
+        method: str,
+        options: Mapping[str, Any],
+        t0: float = 0.0,
+        t_end: float = 1.0,
+        t_eval: ArrayLike | None = None,
+        without: Sequence[str] = (),
+    ) -> RunOptions:
+        """Those of a method and keywords of `Options`, but some.  Raises TypeError for a keyword that there is not."""
+        fields = cls.__dataclass_fields__.keys() - {"t0", "t_end", "t_eval", "method", *without}
+        if unknown := [name for name in options if name not in fields]:
+            known = [name for name in Options.__annotations__ if name not in without]
+            raise TypeError(f"there is no option {unknown[0]!r:.60} here; {or_nearest(unknown[0], known)}")
+        return cls(t_end, method, t0=t0, t_eval=t_eval, **options)
 
     def over(self, t0: float, t_end: float, t_eval: ArrayLike | None) -> RunOptions:
         """Options of another run. Raises as a run does for its times."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import time
 import warnings
@@ -10,6 +9,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import closing, nullcontext
 from dataclasses import replace
 from pathlib import Path
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 from cgraph import Node
 from cgraph._shared import Array, require_path, require_whole
 
+from ...equations.state_equation import FORMS
 from ...equations.states.initial_value import InitialValues, initial_values
 from ...integrators import Problem, derive, in_form
 from ...systems.model import Model
@@ -24,7 +25,7 @@ from ..applied_force import SampledController, with_applied
 from ..events.event import Event, EventProgram, as_events, event_program
 from ..outcome import split_crossings
 from ..progress_bar import Progress
-from ..run_options import METHOD, RunOptions, require_room, time_span
+from ..run_options import METHOD, Options, RunOptions, require_room, time_span
 from ..steps.equal_steps import step_count
 from ..steps.row_values import converted
 from ..steps.step_program import step_program
@@ -38,6 +39,12 @@ from .workers import Team, Workers, checked, finished
 UNKNOWN = 16  # workers behind a map, which does not say
 
 
+class ManyOptions(Options, total=False):
+    """Keywords of many runs."""
+
+    chunk: int | None
+
+
 def simulate_many(
     model: Model,
     q: ArrayLike,
@@ -45,26 +52,13 @@ def simulate_many(
     t_end: float | None = None,
     method: str = METHOD,
     *,
-    t0: float = 0.0,
-    t_span: ArrayLike | None = None,
-    dt: float | None = None,
-    max_step: float | None = None,
-    rtol: float | None = None,
-    atol: ArrayLike | None = None,
     t_eval: ArrayLike | None = None,
     events: Event | Iterable[Event] = (),
     tau: ArrayLike | Callable[..., Sequence[Node | float]] = 0.0,
     parameters: Mapping[str, ArrayLike] | None = None,
     workers: Workers = 1,
-    chunk: int | None = None,
-    first_step: float | None = None,
-    max_steps: float = math.inf,
-    estimate_error: bool | None = None,
-    backend: str = "auto",
-    fma: bool = True,
-    progress: bool | None = None,
-    form: str = "velocity",
     store: str | os.PathLike[str] | None = None,
+    **options: Unpack[ManyOptions],
 ) -> Ensemble:
     """The motions of a system from N starts at t0 to t_end, by one program that is compiled once.
 
@@ -81,10 +75,8 @@ def simulate_many(
     q, qd : array_like
         The starts, (N, nq) and (N, n) [rad or m, per second], or (nq,) and (n,) for all, as in `simulate`; of an
         OdeSystem q is the state, and qd None.
-    t_end, method, t0, t_span, dt, max_step, rtol, atol, first_step, max_steps, estimate_error
+    t_end, method
         As in `simulate`.
-    backend, fma, progress, form
-        As in `simulate`, too.
     t_eval : array_like, optional
         Times from t0 to t_end to record, in this order, (T,) [s]; by default every step. Methods that choose their
         steps need it.
@@ -103,14 +95,14 @@ def simulate_many(
         How many threads share the work, None for one on each core; or an executor of `concurrent.futures`, such as
         Dask's `client.get_executor()`; or any map, `workers(function, iterable)`. The numbers are the same to the last
         bit.
-    chunk : int, optional
-        Trajectories that a worker takes at a time; by default up to four chunks for each worker, of at most 4096
-        trajectories, fewer where they have many rows, and of at most 256 one by one or with a `store`. Side by side it
-        is rounded up to whole vectors, multiples of 8.
     store : path, optional
         A folder, empty or not there, in which chunks are kept as they end. The same call again takes up where the first
         was ended, by whatever, with the chunks as they were cut then, and at last reads all from the folder, which one
         call at a time writes. A chunk that had not ended is lost.
+    **options
+        Those of `dyn.Options` but `dense_output`; and `chunk`, how many trajectories a worker takes at a time: by
+        default up to four chunks for each worker, of at most 4096 trajectories, fewer where they have many rows, and of
+        at most 256 one by one or with a `store`. Side by side it is rounded up to whole vectors, multiples of 8.
 
     Returns
     -------
@@ -142,23 +134,23 @@ def simulate_many(
     [-0.077, -0.155, -0.2348]
     """
     # Check
+    chunk, form = options.pop("chunk", None), options.pop("form", FORMS[0])
     folder = _check(chunk, tau, store)
-    t0, t_end = time_span(t_end, t0, t_span)
-    arguments = (dt, max_step, rtol, atol, t_eval, first_step, max_steps, backend, progress)
-    options = RunOptions(t_end, method, *arguments, t0, estimate_error, fma)
+    t0, t_end = time_span(t_end, options.pop("t0", 0.0), options.pop("t_span", None))
+    run = RunOptions.of(method, options, t0, t_end, t_eval, without=["dense_output"])
     watched, team = as_events(events), checked(workers)
     applied = with_applied(model, tau, parameters)
     start = initial_values(applied.model, q, qd, applied.constant, parameters, t0)
-    options.check(start.states)
-    _require_room(options, *start.x.shape, stored=store is not None)
+    run.check(start.states)
+    _require_room(run, *start.x.shape, stored=store is not None)
 
     # Derive the equations as graphs, and write the steps of the method over them
     begin, problem = time.perf_counter(), in_form(derive(applied.model, start.bound), form)
-    program = step_program(problem, options.integrator, dense=bool(watched) or options.between)
+    program = step_program(problem, run.integrator, dense=bool(watched) or run.between)
     watch = event_program(problem, watched)
 
     # Integrate, by whoever takes the chunks and compiles the steps
-    sent = replace(options, t_eval=options.row_times) if watched else options
+    sent = replace(run, t_eval=run.row_times) if watched else run
     task = Task(program, sent, len(start.x), watch if watched else None)
     p = np.array([start.varied[name] for name in problem.parameters]).reshape(-1, len(start.x)).T.copy()
     x = converted(problem.momentum, t0, start.x, p)
@@ -171,7 +163,7 @@ def simulate_many(
         whole = _run_chunks(task, x, p, width, team, kept)
 
     # Put the result together
-    result = _ensemble(problem, watch, options, whole, (start, x, p), time.perf_counter() - begin)
+    result = _ensemble(problem, watch, run, whole, (start, x, p), time.perf_counter() - begin)
     for text in doubts(result.stats):
         warnings.warn(text, SimulationWarning, stacklevel=2)
     return result

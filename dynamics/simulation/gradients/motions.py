@@ -15,7 +15,7 @@ from cgraph import Graph, Node
 from cgraph._shared import Array, kept_by_first, memo, or_nearest, real_array, require_sequence
 from cgraph.extend import Builder, topological
 
-from ...equations.state_equation import state_inputs
+from ...equations.state_equation import FORMS, state_inputs
 from ...equations.states.initial_value import initial_values
 from ...integrators import Method, Problem, derive, in_form
 from ...systems.arguments import Parameters, call_user_function
@@ -25,7 +25,7 @@ from ...systems.system import System
 from ..applied_force import SampledController, with_applied
 from ..events.event import Event, WatchedEvent, event_program
 from ..outcome import MotionError, Recorder, advise
-from ..run_options import METHOD, RunOptions, time_span
+from ..run_options import METHOD, Options, RunOptions, time_span
 from ..stepper import stepper_of
 from ..steps.equal_steps import step_count
 from ..steps.row_values import converted
@@ -35,6 +35,7 @@ Loss = Callable[..., Node | float]
 START, VELOCITY, TORQUE = "q", "qd", "tau"
 OPTIONS_KEPT = 16  # options that stay for another run
 EQUAL = "rk4"  # by which equal steps are, unless another method is asked for
+NOT_TAKEN = "max_steps", "dense_output", "fma", "progress"
 _PLAIN = (float, int, str, bool, type(None))
 
 
@@ -191,19 +192,18 @@ def motions_of(
     model: Model,
     q: ArrayLike,
     qd: ArrayLike | None,
-    span: tuple[float | None, float, ArrayLike | None],
+    t_end: float | None,
     method: str | None,
     tau: Any,
     parameters: Mapping[str, ArrayLike] | None,
     wrt: str | Iterable[str] | None,
-    form: str,
-    events: Sequence[Event] = (),
-    losses: tuple[Loss | None, Loss | None] = (None, None),
+    events: Sequence[Event],
+    losses: tuple[Loss | None, Loss | None],
+    options: Options,
     *,
     many: bool = False,
-    **options: Any,
 ) -> Motions:
-    """The motions of checked arguments.  span: t_end, t0, t_span.  options: those of `simulate` besides.
+    """The motions of checked arguments.
 
     losses: of the end, and of each step.  many: N motions, else one, whose arguments have no axis N.
     Raises TypeError or ValueError naming the argument.
@@ -214,10 +214,11 @@ def motions_of(
             "derivative"
         )
     own = _with_loss_parameters(as_equations(model), parameters, *losses)
-    t0, t_end = time_span(*span)
+    t0, t_end = time_span(t_end, options.pop("t0", 0.0), options.pop("t_span", None))
+    form = options.pop("form", FORMS[0])
     rows = None if callable(tau) else _rows(tau, len(state_inputs(own).applied), many=many)
     if method is None:
-        method = EQUAL if rows is not None or options["dt"] is not None else METHOD
+        method = EQUAL if rows is not None or options.get("dt") is not None else METHOD
     plain = all([type(each) in _PLAIN for each in (t_end, method, t0, *options.values())])
     run = (_options if plain else _options.__wrapped__)(t_end, method, t0, *options.items())
     if rows is not None and (run.adaptive or events):
@@ -276,7 +277,7 @@ def _by_displacements(system: System, backend: str) -> Any:
 
 @memo(OPTIONS_KEPT)
 def _options(t_end: float, method: str, t0: float, *options: tuple[str, Any]) -> RunOptions:
-    return RunOptions(t_end, method, t0=t0, **dict(options))
+    return RunOptions.of(method, dict(options), t0, t_end, without=NOT_TAKEN)
 
 
 def _rows(tau: Any, n: int, *, many: bool) -> Array | None:
