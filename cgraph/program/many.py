@@ -23,8 +23,8 @@ def many(program: Program) -> Program:
     What its `If` and `While` decide by is 1 where they apply and else 0, and what they write is put back where they do
     not. So every memory, a lane, ends with the same numbers whether other lanes take another course or not: an `If` is
     run if any lane is positive, and a `While` as long as any is; a `FixedPoint` becomes a `While`, so that derivatives
-    are taken before. Registers for masks, and for what is put back, stand after those of the program. `Runner.run_many`
-    makes it.
+    are taken before. Registers for masks, and for what is put back, stand after those of the program. `Runner.run`
+    makes it of N memories.
 
     >>> import cgraph as cg
     >>> from cgraph.extend import Call, Program, While, many

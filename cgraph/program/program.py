@@ -4,21 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence, Set
 from dataclasses import dataclass
+from types import MappingProxyType
 
 from ..core.checks import GraphError
 from ..core.graph import Graph
 from ..util.explain_failure import explain_failure
 from . import table  # noqa: F401 (which fills the table)
-from .statement import (
-    Statement,
-    bodies_of,
-    length_of,
-    names_in,
-    reads_and_writes,
-    require_length,
-    require_once,
-    row_of,
-)
+from .listing import Listing
+from .statement import Statement, bodies_of, length_of, names_in, reads_and_writes, require_length, require_once, row_of
 from .statements.call import Call
 
 
@@ -76,6 +69,30 @@ class Program:
             statement = waiting.pop()
             yield statement
             waiting += reversed([each for body in bodies_of(statement) for each in body])
+
+    def listing(self, names: Mapping[str, Graph] = MappingProxyType({})) -> str:
+        """The program as a person would write it: lengths of registers, then the statements of a pass.
+
+        Short graphs are formulas of registers, element by element where these hold several numbers; a longer one is a
+        function with its number of operations.  names: {name of a function: its graph}; others are f1, f2, ..
+
+        >>> import cgraph as cg
+        >>> from cgraph.extend import Call, If, Program
+        >>> x = cg.variable("x")
+        >>> halve = Call(cg.Graph([x], {"next": 0.5 * x}), ("x",), ("x",))
+        >>> print(Program({"x": 1, "more": 1}, [If("more", (halve,))], record=["x"]).listing())
+        1 number: x, more
+        each pass:
+            if more > 0:
+                x = 1/2 * x
+        record: x
+        """
+        text = Listing(self.registers, names)
+        fed = [f"before each pass: {', '.join(self.feed)} from the feed"] if self.feed else []
+        condition = f" if {self.record_if} > 0" if self.record_if else ""
+        record = f"record{condition}: {', '.join(self.record) or 'nothing'}"
+        stop = [f"stop if {self.stop} != 0"] if self.stop else []
+        return "\n".join([*text.registers(), *fed, "each pass:", *text.body(self.body), record, *stop])
 
     @property
     def width(self) -> int:

@@ -22,6 +22,7 @@ from .problem import (
     time_derivative,
     total_energy,
 )
+from .statements import call, each, total
 from .step import Step
 from .step_control import measured
 from .symplectic_tableaus import COMPOSITIONS, PARTITIONED, Composition, Partitioned, gauss
@@ -119,7 +120,9 @@ __all__ = [
     "Problem",
     "Step",
     "Tableau",
+    "call",
     "derive",
+    "each",
     "force",
     "in_form",
     "jacobian_statements",
@@ -132,5 +135,6 @@ __all__ = [
     "state_arguments",
     "state_jacobian",
     "time_derivative",
+    "total",
     "total_energy",
 ]

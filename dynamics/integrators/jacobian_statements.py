@@ -7,22 +7,26 @@ from cgraph._shared import CompressedJacobian, kept_by_first
 from cgraph.extend import Call, Factor, Map, Program, Statement, compressed_jacobian
 
 from .problem import Problem, state_jacobian
+from .statements import call
 
 
-def jacobian_statements(problem: Problem) -> tuple[list[Statement], dict[str, int]]:
-    """df/dx of the registers x, t and p to the register "jacobian", row by row; and the registers used on the way."""
-    parts, m = _compressed(problem), problem.size
+def jacobian_statements(problem: Problem) -> list[Statement]:
+    """df/dx of the registers x, t and p to the register "jacobian", row by row."""
+    parts = _compressed(problem)
     if parts is None:
-        return [Call(state_jacobian(problem), ("x", "t", "p"), ("jacobian",))], {}
-    colors = Graph([], {f"{k}": float(k) for k in range(parts.colors)})
-    rows = tuple([f"jacobian{k}" for k in range(m)])
-    statements: list[Statement] = [
+        return [Call(state_jacobian(problem), ("x", "t", "p"), ("jacobian",))]
+    rows = tuple([f"jacobian{k}" for k in range(problem.size)])
+    return [
         Call(parts.primal, ("x", "t", "p"), ("known",)),
-        Call(colors, (), ("color",)),
+        call(lambda: {"color": [float(k) for k in range(parts.colors)]}),
         Map(parts.product, ("color",), rows, shared=("known",)),
         Call(parts.entries, rows, ("jacobian",)),
     ]
-    return statements, {"known": len(parts.primal.outputs)} | dict.fromkeys(("color", *rows), parts.colors)
+
+
+def identity(m: int) -> Call:
+    """Register `unit` = the identity matrix, row by row."""
+    return call(lambda: {"unit": [1.0 if row == column else 0.0 for row in range(m) for column in range(m)]})
 
 
 def prices(steps: Program, rate: Graph) -> tuple[float, float]:

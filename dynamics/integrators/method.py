@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import cgraph as cg
-from cgraph import Graph, Node
+from cgraph import Node
 from cgraph._shared import memo
-from cgraph.extend import Call, Program, Statement
+from cgraph.extend import Program
 
 from .problem import Problem
+from .statements import Values, call
 from .step import Step, arriving, rate_calls, with_registers
 from .step_control import HERMITE, chosen, first_pass, nonfinite
 
@@ -133,30 +134,22 @@ def equal_registers(problem: Problem) -> dict[str, int]:
 def equal(step: Step, problem: Problem) -> Program:
     """Equal steps: one step a pass, of a length that is given, over and over."""
     lengths = with_registers(step, equal_registers(problem))
-    body = arriving([*step.rates, *step.prepare, *step.body, *step.kept])
-    body += _advance(rate_calls(problem, step.rates, step.prepare, step.body))
+    made = float(rate_calls(problem, step.rates, step.prepare, step.body))
+
+    def ended(start: Node, count: Node, h: Node, evaluations: Node) -> Values:
+        """The next time, computed from the start without drift."""
+        return {"t": start + (count + 1.0) * h, "count": count + 1.0, "evaluations": evaluations + made}
+
+    def failed(nonfinite: Node, failed: Node, *singular: Node) -> Values:
+        """Of what goes on, an inertia that is negative says nothing."""
+        bad = nonfinite + failed
+        kept = {"singular": cg.where(bad, singular[0], 0.0)} if singular else {}
+        return {"nonfinite": bad, step.failed: 0.0, **kept}
+
+    body = [*arriving([*step.rates, *step.prepare, *step.body, *step.kept]), call(ended), nonfinite("nonfinite", "x")]
     if step.failed:
-        body.append(_judged(step.failed, "singular" in step.lengths))
+        body.append(call(failed, "nonfinite", step.failed, *(["singular"] if "singular" in lengths else [])))
     if step.start:
         body.insert(0, first_pass(*step.start))
         lengths["fresh"] = 1
     return Program(lengths, body, record=["t", "x"], stop="nonfinite")
-
-
-def _advance(evaluations: int) -> list[Statement]:
-    """Call after a step: the next time, computed from the start without drift; whether the state is finite."""
-    names = ("start", "count", "h", "evaluations")
-    start, count, h, done = inputs = cg.variables(names)
-    outputs = {"t": start + (count + 1.0) * h, "count": count + 1.0, "evaluations": done + float(evaluations)}
-    return [Call(Graph(inputs, outputs), names, tuple(outputs)), nonfinite("nonfinite", "x")]
-
-
-def _judged(failed: str, singular: bool) -> Call:
-    """Whether the step failed; of what goes on, an inertia that is negative says nothing."""
-    names = ["nonfinite", failed, *(["singular"] if singular else [])]
-    inputs = cg.variables(names)
-    bad = inputs[0] + inputs[1]
-    outputs: dict[str, Node | float] = {"nonfinite": bad, failed: 0.0}
-    if singular:
-        outputs["singular"] = cg.where(bad, inputs[2], 0.0)
-    return Call(Graph(inputs, outputs), tuple(names), tuple(names))

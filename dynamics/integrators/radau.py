@@ -9,19 +9,20 @@ steps are alike the factors do.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import reduce
 
 import numpy as np
 
 import cgraph as cg
-from cgraph import Graph, Node
-from cgraph.extend import Call, Factor, FixedPoint, If, Map, Solve, Statement, Sum, added, copied
+from cgraph import Node
+from cgraph.extend import Call, Factor, FixedPoint, If, Solve, Statement, added, copied, effects
 
-from .elementwise import combined, end_to_end, identity, stage_time, weighted
-from .jacobian_statements import jacobian_statements
+from .jacobian_statements import identity, jacobian_statements
 from .problem import Problem
+from .statements import Values, call, combined, count, each, stage_time, total, weighted
 from .step import Step
-from .step_control import SCALE, count, measured, nonfinite, scale
+from .step_control import SCALE, measured, nonfinite, scale
 from .tableau import RowOfWeights
 
 _R6 = math.sqrt(6.0)
@@ -45,7 +46,8 @@ FAST = 1e-3  # rate of convergence, below which the Jacobian serves the next ste
 LONGER_STEP = 1.1  # times as long as the one before: a step up to which is as long, since that saves its factorization
 SAME_LENGTH = 1e-10  # relative: lengths of steps that are the same but for the rounding of the time
 SMALL_COMPONENT = 1e-6  # of the largest coordinate or velocity, below which a component is measured by it
-CHANGES = ("right0", "F1", "F2")  # of W in a turn
+Z, W, F = (tuple([f"{name}{k}" for k in range(3)]) for name in "ZWF")
+POWERS, CHANGES = ("power1", "power2", "power3"), ("right0", "F1", "F2")  # of the guess; of W in a turn
 
 
 def _transformation() -> tuple[list[RowOfWeights], list[RowOfWeights]]:
@@ -67,141 +69,138 @@ _POWERS = [tuple(row) for row in (np.linalg.inv(np.vander(_C, 3, increasing=True
 
 def radau_step(problem: Problem) -> Step:
     """The step, with a guess from the polynomial of the one before."""
-    m = problem.size
-    z, w, f = (tuple([f"{name}{k}" for k in range(3)]) for name in ("Z", "W", "F"))
-    powers = tuple([f"power{k + 1}" for k in range(3)])
-    slopes, on_the_way = jacobian_statements(problem)
-    factor = [*_matrices(m), copied("h", "h_factored"), count(2, "factorizations")]
+    m, slopes = problem.size, jacobian_statements(problem)
+    zeros = call(lambda: {"size": [0.0] * m})
+    turn: list[Statement] = [
+        *_rights(problem),
+        Solve("real", "pivots", "right0"),
+        call(lambda F1, F2: {"right12": [*F1, *F2]}, F1=m, F2=m),
+        Solve("complex", "pivots2", "right12"),
+        call(lambda right12: {"F1": right12[:m], "F2": right12[m:]}, right12=2 * m),
+        *[added(name, change, name) for name, change in zip(W, CHANGES, strict=True)],
+        combined(_T, W, Z),
+        added("x", "Z2", "x_new"),
+        total(_change, *SCALE, "least", *CHANGES),
+        _judged(3 * m),
+    ]
     body: list[Statement] = [
-        _renewed(),
+        renewed,
         If("renewed", (*slopes, count(1, "jacobians"))),
         _sizes(problem),
-        _factored(),
-        If("factored", tuple(factor)),
+        factored,
+        If("factored", (*_matrices(m), copied("h", "h_factored"), count(2, "factorizations"))),
         *[stage_time(f"time{k}", _C[k]) for k in range(3)],
-        *_guess(z, powers),
-        combined(_T_INVERSE, z, w),
-        _begin(),
-        FixedPoint("going", (*_turn(problem, z, w, f), *_compared(m))),
-        _unsolved(),
+        *[_guess(z, c) for z, c in zip(Z, _C, strict=True)],
+        combined(_T_INVERSE, Z, W),
+        begin,
+        FixedPoint("going", tuple(turn)),
+        call(lambda failed, converged: {"failed": failed + (1.0 - converged)}),
     ]
-    controls = "h_old nonfinite_real nonfinite_complex going turns stalled change change_old exact newton".split()
-    controls += "converged failed again sum renewed current slow h_factored factored theta accepted next".split()
-    controls += ["jacobians", "factorizations"]
-    lengths = _lengths(m) | on_the_way | dict.fromkeys((*powers, "error_vector", "size", "least"), m)
-    lengths |= {"rtol": 1, "atol": m, "leap": 1, "evaluations": 1} | dict.fromkeys(controls, 1)
-    zeros = Graph([], {f"{k}": 0.0 for k in range(m)})
+    fixed = "jacobian real complex size least rtol atol leap h_old nonfinite_real nonfinite_complex going turns".split()
+    fixed += "stalled change change_old exact newton converged failed again sum renewed current slow theta".split()
+    fixed += "h_factored factored accepted next jacobians factorizations".split()
     return Step(
-        lengths,
+        {"size": m},
         body,
         prepare=[Call(problem.rate, ("x", "t", "p"), ("rate",))],
-        start=[identity(m), *[Call(zeros, (), (name,)) for name in (*powers, "size")], _nothing_kept()],
-        kept=[combined(_POWERS, z, powers), copied("h", "h_old"), _keeping()],
-        fixed=("jacobian", "real", "complex", "size", "least", "rtol", "atol", "leap", *powers, *on_the_way, *controls),
+        start=[
+            identity(m),
+            *[replace(zeros, outputs=(name,)) for name in (*POWERS, "size")],
+            call(lambda: {"current": 0.0, "h_factored": 0.0}),  # forgets Jacobian and factors of the step before
+        ],
+        kept=[combined(_POWERS, Z, POWERS), copied("h", "h_old"), keeping],
+        fixed=(*fixed, *POWERS, *effects(slopes)[1]),
         failed="failed",
-        error=_estimate(problem, z),
+        error=_estimate(problem),
         estimate=4,
-        dense=[combined(_POWERS, z, ("dense1", "dense2", "dense3"))],
+        dense=[combined(_POWERS, Z, ("dense1", "dense2", "dense3"))],
     )
 
 
-def _nothing_kept() -> Call:
-    """Statements that forget Jacobian and factors of the step before."""
-    return Call(Graph([], {"current": 0.0, "h_factored": 0.0}), (), ("current", "h_factored"))
-
-
-def _renewed() -> Call:
+@call
+def renewed(current: Node, accepted: Node, slow: Node, h_factored: Node) -> Values:
     """Whether the Jacobian is evaluated: not if it is that of this state, or the last step converged fast by it.
 
     After a trial by that of another state it is, and without an error to choose steps by always.
     """
-    names = ("current", "accepted", "slow", "h_factored")
-    current, accepted, slow, before = inputs = cg.variables(names)
-    fast = accepted * cg.equal(slow, 0.0) * cg.not_equal(before, 0.0)
-    renewed = (1.0 - current) * (1.0 - fast)
-    outputs = {"renewed": renewed, "current": cg.maximum(current, renewed)}
-    return Call(Graph(inputs, outputs), names, tuple(outputs))
+    fast = accepted * cg.equal(slow, 0.0) * cg.not_equal(h_factored, 0.0)
+    result = (1.0 - current) * (1.0 - fast)
+    return {"renewed": result, "current": cg.maximum(current, result)}
 
 
-def _factored() -> Call:
+@call
+def factored(h: Node, h_factored: Node, renewed: Node) -> Values:
     """Whether the matrices are made and factored: for another Jacobian, or a step of another length."""
-    h, before, renewed = inputs = cg.variables("h before renewed")
-    other = abs(h - before) > SAME_LENGTH * abs(h)
-    return Call(Graph(inputs, {"y": cg.maximum(renewed, other)}), ("h", "h_factored", "renewed"), ("factored",))
+    return {"factored": cg.maximum(renewed, abs(h - h_factored) > SAME_LENGTH * abs(h))}
 
 
-def _keeping() -> Call:
-    """Statements after an accepted step: whether the Jacobian serves the next, its factors, too, if hardly longer."""
-    theta, h, wanted = inputs = cg.variables("theta h next")
+@call
+def keeping(theta: Node, h: Node, next_: Node) -> Values:
+    """After an accepted step: whether the Jacobian serves the next, its factors, too, if hardly longer."""
     slow, same = theta > FAST, abs(h)
-    alike = (1.0 - slow) * (wanted >= same) * (wanted <= LONGER_STEP * same)
-    outputs: dict[str, Node | float] = {"slow": slow, "current": 0.0, "next": cg.where(alike, same, wanted)}
-    return Call(Graph(inputs, outputs), ("theta", "h", "next"), tuple(outputs))
-
-
-def _lengths(m: int) -> dict[str, int]:
-    lengths = {"unit": m * m, "jacobian": m * m, "real": m * m, "complex": 4 * m * m, "pivots": m, "pivots2": 2 * m}
-    lengths |= dict.fromkeys([f"{name}{k}" for name in "ZWF" for k in range(3)], m)
-    lengths |= dict.fromkeys(("rate", "at", "right0"), m) | {"right12": 2 * m}
-    return lengths | dict.fromkeys("time0 time1 time2".split(), 1)
+    alike = (1.0 - slow) * (next_ >= same) * (next_ <= LONGER_STEP * same)
+    return {"slow": slow, "current": 0.0, "next": cg.where(alike, same, next_)}
 
 
 def _sizes(problem: Problem) -> Call:
     """Call for the size of each component so far, and its rounding: of no less than 1e-6 of the largest of its kind."""
     m, nq = problem.size, problem.nq
-    names = ["size", "x", "rate"]
-    size, x, rate = ([cg.variable(f"{name}{k}") for k in range(m)] for name in names)
-    h = cg.variable("h")
-    largest = [cg.maximum(cg.maximum(a, abs(b)), abs(h * c)) for a, b, c in zip(size, x, rate, strict=True)]
     kinds = [range(nq), range(nq, m)] if problem.system is not None else [range(k, k + 1) for k in range(m)]
-    scales: list[Node] = []
-    for kind in kinds:
-        most = reduce(cg.maximum, [largest[k] for k in kind], cg.constant(0.0))
-        scales += [EPSILON * cg.maximum(largest[k], SMALL_COMPONENT * most) for k in kind]
-    outputs = {f"{k}": node for k, node in enumerate([*largest, *scales])}
-    return Call(Graph([*size, *x, *rate, h], outputs), (*names, "h"), ("size", "least"))
+
+    def sizes(size: list[Node], x: list[Node], rate: list[Node], h: Node) -> Values:
+        largest = [cg.maximum(cg.maximum(a, abs(b)), abs(h * c)) for a, b, c in zip(size, x, rate, strict=True)]
+        least: list[Node] = []
+        for kind in kinds:
+            most = reduce(cg.maximum, [largest[k] for k in kind], cg.constant(0.0))
+            least += [EPSILON * cg.maximum(largest[k], SMALL_COMPONENT * most) for k in kind]
+        return {"size": largest, "least": least}
+
+    return call(sizes, size=m, x=m, rate=m)
 
 
 def _matrices(m: int) -> list[Statement]:
     """Statements that factor the real and the complex matrix of Newton's iteration."""
-    unit, h, slope = cg.variables("unit h slope")
-    real = Map(Graph([unit, h, slope], {"w": _REAL / h * unit - slope}), ("unit", "h", "jacobian"), ("real",))
-    jacobian = [cg.variables([f"j{row}_{column}" for column in range(m)]) for row in range(m)]
-    a, b = _COMPLEX.real / h, _COMPLEX.imag / h
-    entries: list[Node | float] = []  # [[a - J, b], [-b, a - J]]
-    for upper in (True, False):
-        for k, row in enumerate(jacobian):
-            same = [a - entry if column == k else -entry for column, entry in enumerate(row)]
-            other: list[Node | float] = [0.0] * m
-            other[k] = b if upper else -b
-            entries += [*same, *other] if upper else [*other, *same]
-    outputs = {f"{k}": entry for k, entry in enumerate(entries)}
-    both = Graph([*(entry for row in jacobian for entry in row), h], outputs)
-    both_factored = [Call(both, ("jacobian", "h"), ("complex",)), Factor("complex", "pivots2")]
-    return [real, Factor("real", "pivots"), *both_factored]
+
+    def complex_matrix(jacobian: list[Node], h: Node) -> Values:
+        """[[a - J, b], [-b, a - J]], of the size 2 m, row by row."""
+        a, b = _COMPLEX.real / h, _COMPLEX.imag / h
+        entries: list[Node | float] = []
+        for upper in (True, False):
+            for k in range(m):
+                row = jacobian[k * m : (k + 1) * m]
+                same = [a - entry if column == k else -entry for column, entry in enumerate(row)]
+                other: list[Node | float] = [0.0] * m
+                other[k] = b if upper else -b
+                entries += [*same, *other] if upper else [*other, *same]
+        return {"complex": entries}
+
+    return [
+        each(lambda unit, h, jacobian: {"real": _REAL / h * unit - jacobian}),
+        Factor("real", "pivots"),
+        call(complex_matrix, jacobian=m * m),
+        Factor("complex", "pivots2"),
+    ]
 
 
-def _guess(z: tuple[str, ...], powers: tuple[str, ...]) -> list[Statement]:
+def _guess(z: str, c: float) -> Statement:
     """Z from the polynomial of the step before, carried on."""
-    h, old, *coefficients = inputs = cg.variables(["h", "h_old", *powers])
-    body: list[Statement] = []
-    for k, c in enumerate(_C):
-        ratio = cg.where(old, h / old, 0.0)
-        s = 1.0 + c * ratio
-        ahead = [power * (s ** float(j + 1) - 1.0) for j, power in enumerate(coefficients)]
-        graph = Graph(inputs, {"z": ahead[0] + ahead[1] + ahead[2]})
-        body.append(Map(graph, ("h", "h_old", *powers), (z[k],)))
-    return body
+
+    def ahead(h: Node, h_old: Node, *powers: Node) -> Values:
+        s = 1.0 + c * cg.where(h_old, h / h_old, 0.0)
+        terms = [power * (s ** float(k) - 1.0) for k, power in enumerate(powers, 1)]
+        return {z: terms[0] + terms[1] + terms[2]}
+
+    return each(ahead, "h", "h_old", *POWERS)
 
 
-def _begin() -> Call:
+@call
+def begin(rtol: Node) -> Values:
     """Newton's iteration starts; it ends where a change is small beside the tolerance of the step.
 
     Without a tolerance, where the step cannot be halved: beside rounding, after as many turns as it takes.
     """
-    rtol = cg.variable("rtol")
     newton = cg.maximum(10.0 * EPSILON / rtol, cg.minimum(0.03, cg.sqrt(rtol)))
-    outputs: dict[str, Node | float] = {
+    return {
         "going": 1.0,
         "turns": 0.0,
         "stalled": 0.0,
@@ -210,41 +209,31 @@ def _begin() -> Call:
         "exact": cg.equal(rtol, 0.0),
         "newton": cg.where(rtol, newton, 10.0),
     }
-    return Call(Graph([rtol], outputs), ("rtol",), tuple(outputs))
 
 
-def _turn(problem: Problem, z: tuple[str, ...], w: tuple[str, ...], f: tuple[str, ...]) -> list[Statement]:
-    """W += (systems)^-1 (T^-1 F(Z) - eigenvalues / h * W)."""
-    m = problem.size
+def _rights(problem: Problem) -> list[Statement]:
+    """The right-hand sides of Newton's equations, T^-1 F(Z) - eigenvalues / h * W."""
+
+    def right(h: Node, w0: Node, w1: Node, w2: Node, *f: Node) -> Values:
+        parts = [weighted(f, row) for row in _T_INVERSE]
+        a, b = _COMPLEX.real / h, _COMPLEX.imag / h
+        return {
+            "right0": parts[0] - _REAL / h * w0,
+            "F1": parts[1] - (a * w1 + b * w2),
+            "F2": parts[2] - (a * w2 - b * w1),
+        }
+
     body: list[Statement] = []
     for k in range(3):
-        body += [added("x", z[k], "at"), Call(problem.rate, ("at", f"time{k}", "p"), (f[k],))]
-    h, *nodes = inputs = cg.variables(["h", *w, *f])
-    ws, fs = nodes[:3], nodes[3:]
-    parts = [weighted(fs, row) for row in _T_INVERSE]
-    a, b = _COMPLEX.real / h, _COMPLEX.imag / h
-    outputs: dict[str, Node | float] = {
-        "0": parts[0] - _REAL / h * ws[0],
-        "1": parts[1] - (a * ws[1] + b * ws[2]),
-        "2": parts[2] - (a * ws[2] - b * ws[1]),
-    }
-    rights = Map(Graph(inputs, outputs), ("h", *w, *f), ("right0", "F1", "F2"))
-    joined = end_to_end(2 * m, ("F1", "F2"), ("right12",))
-    parted = end_to_end(2 * m, ("right12",), ("F1", "F2"))
-    body += [rights, Solve("real", "pivots", "right0"), joined, Solve("complex", "pivots2", "right12"), parted]
-    body += [added(name, change, name) for name, change in zip(w, CHANGES, strict=True)]
-    return [*body, combined(_T, w, z), added("x", z[2], "x_new")]
+        body += [added("x", Z[k], "at"), Call(problem.rate, ("at", f"time{k}", "p"), (F[k],))]
+    return [*body, each(right, "h", *W, *F)]
 
 
-def _compared(m: int) -> list[Statement]:
-    """The change of a turn beside the tolerance of the step, or rounding, and what follows from it."""
-    names = (*SCALE, "least")
-    *sizes, least = inputs = cg.variables(names)
-    changes = cg.variables("d0 d1 d2")
-    size = cg.where(sizes[SCALE.index("rtol")], scale(*sizes), least)
+def _change(x: Node, x_new: Node, rtol: Node, atol: Node, leap: Node, least: Node, *changes: Node) -> Values:
+    """The changes of a turn beside the tolerance of the step, or rounding."""
+    size = cg.where(rtol, scale(x, x_new, rtol, atol, leap), least)
     squares = [cg.where(change, (change / size) * (change / size), 0.0) for change in changes]
-    graph = Graph([*inputs, *changes], {"y": squares[0] + squares[1] + squares[2]})
-    return [Sum(graph, (*names, *CHANGES), "change"), _judged(3 * m)]
+    return {"change": squares[0] + squares[1] + squares[2]}
 
 
 def _judged(numbers: int) -> Call:
@@ -252,62 +241,55 @@ def _judged(numbers: int) -> Call:
 
     One that will not come to the tolerance in time has not; beside rounding, one that comes no nearer has.
     """
-    names = ("change", "change_old", "turns", "stalled", "exact", "newton", "evaluations")
-    total, old, turns, stalled, exact, newton, done = inputs = cg.variables(names)
-    change = cg.sqrt(total / numbers)
-    rate = change / old  # 0 in the first turn
-    left = rate / (1.0 - rate) * change
-    hopeful = (rate < 1.0) * (rate ** (TURNS - 1.0 - turns) / (1.0 - rate) * change <= newton)
-    first = cg.equal(turns, 0.0)
-    settled = cg.maximum(cg.equal(change, 0.0), (1.0 - first) * (rate < 1.0) * (left < newton))
-    finite = change < math.inf
-    stalls = stalled + (1.0 - (rate < 1.0))
-    hope = cg.where(exact, stalls < STALLS, cg.maximum(first, hopeful))
-    going = finite * (1.0 - settled) * hope * (turns + 1.0 < cg.where(exact, MOST_TURNS, TURNS))
-    outputs = {
-        "going": going,
-        "converged": cg.maximum(settled, exact * finite * (stalls >= STALLS)),
-        "turns": turns + 1.0,
-        "stalled": stalls,
-        "change_old": change,
-        "theta": rate,
-        "evaluations": done + 3.0,
-    }
-    return Call(Graph(inputs, outputs), names, tuple(outputs))
+
+    def judged(
+        change: Node, change_old: Node, turns: Node, stalled: Node, exact: Node, newton: Node, evaluations: Node
+    ) -> Values:
+        size = cg.sqrt(change / numbers)
+        rate = size / change_old  # 0 in the first turn
+        left = rate / (1.0 - rate) * size
+        hopeful = (rate < 1.0) * (rate ** (TURNS - 1.0 - turns) / (1.0 - rate) * size <= newton)
+        first = cg.equal(turns, 0.0)
+        settled = cg.maximum(cg.equal(size, 0.0), (1.0 - first) * (rate < 1.0) * (left < newton))
+        finite = size < math.inf
+        stalls = stalled + (1.0 - (rate < 1.0))
+        hope = cg.where(exact, stalls < STALLS, cg.maximum(first, hopeful))
+        going = finite * (1.0 - settled) * hope * (turns + 1.0 < cg.where(exact, MOST_TURNS, TURNS))
+        return {
+            "going": going,
+            "converged": cg.maximum(settled, exact * finite * (stalls >= STALLS)),
+            "turns": turns + 1.0,
+            "stalled": stalls,
+            "change_old": size,
+            "theta": rate,
+            "evaluations": evaluations + 3.0,
+        }
+
+    return call(judged)
 
 
-def _unsolved() -> Call:
-    """Register `failed`, of a step that cannot be halved."""
-    failed, converged = cg.variables("failed converged")
-    graph = Graph([failed, converged], {"failed": failed + (1.0 - converged)})
-    return Call(graph, ("failed", "converged"), ("failed",))
-
-
-def _estimate(problem: Problem, z: tuple[str, ...]) -> list[Statement]:
+def _estimate(problem: Problem) -> list[Statement]:
     """The error as the real system filters it; filtered twice when the first says no (section IV.8, eq. 8.19 and 8.20).
 
     Where Newton's iteration did not converge, an error that halves the step.
     """
-    m = problem.size
-    rate, h, *nodes = inputs = cg.variables(["rate", "h", *z])
-    right = Map(Graph(inputs, {"e": rate + weighted(nodes, _ERROR) / h}), ("rate", "h", *z), ("error_vector",))
-    once: list[Statement] = [right, Solve("real", "pivots", "error_vector"), *measured("error_vector", m)]
-    error, before, old, converged = cg.variables("error accepted h_old converged")
-    doubt = Graph([error, before, old], {"again": (error > 1.0) * cg.maximum(1.0 - before, cg.equal(old, 0.0))})
-    twice = (
-        added("x", "error_vector", "at"),
-        Call(problem.rate, ("at", "t", "p"), ("F0",)),
-        Map(Graph(inputs, {"e": rate + weighted(nodes, _ERROR) / h}), ("F0", "h", *z), ("error_vector",)),
-        Solve("real", "pivots", "error_vector"),
-        *measured("error_vector", m),
-    )
-    none, none2 = cg.variables("nonfinite_real nonfinite_complex")
-    halved = Graph([error, converged, none, none2], {"error": cg.where(converged, error + none + none2, HALVES)})
+
+    def filtered(rate: str) -> list[Statement]:
+        right = each(lambda rate, h, *z: {"error_vector": rate + weighted(z, _ERROR) / h}, rate, "h", *Z)
+        return [right, Solve("real", "pivots", "error_vector"), *measured("error_vector", problem.size)]
+
+    def doubt(error: Node, accepted: Node, h_old: Node) -> Values:
+        return {"again": (error > 1.0) * cg.maximum(1.0 - accepted, cg.equal(h_old, 0.0))}
+
+    def halved(error: Node, converged: Node, nonfinite_real: Node, nonfinite_complex: Node) -> Values:
+        return {"error": cg.where(converged, error + nonfinite_real + nonfinite_complex, HALVES)}
+
+    rate = Call(problem.rate, ("at", "t", "p"), ("F0",))
     return [
         nonfinite("nonfinite_real", "real"),
         nonfinite("nonfinite_complex", "complex"),
-        *once,
-        Call(doubt, ("error", "accepted", "h_old"), ("again",)),
-        If("again", twice),
-        Call(halved, ("error", "converged", "nonfinite_real", "nonfinite_complex"), ("error",)),
+        *filtered("rate"),
+        call(doubt),
+        If("again", (added("x", "error_vector", "at"), rate, *filtered("F0"))),
+        call(halved),
     ]

@@ -11,13 +11,12 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import cgraph as cg
-from cgraph import Graph
+from cgraph import Node
 from cgraph.extend import Call, Factor, Map, Solve, Statement, added
 
-from .elementwise import combined, identity, stage_time, used, weighted
-from .jacobian_statements import jacobian_statements
+from .jacobian_statements import identity, jacobian_statements
 from .problem import Problem, time_derivative
+from .statements import Values, combined, each, stage_time, used, weighted
 from .step import Step
 from .step_control import measured, nonfinite
 from .tableau import RowOfWeights
@@ -81,71 +80,64 @@ RODAS5P = Rosenbrock(
 
 def rodas_step(problem: Problem, method: Rosenbrock = RODAS5P) -> Step:
     """The step of Rodas5P, or of another method of this form."""
-    m, stages, degree = problem.size, [f"U{k}" for k in range(len(method.c))], len(method.dense) + 1
-    slopes, on_the_way = jacobian_statements(problem)
-    lengths = dict.fromkeys(("unit", "jacobian", "matrix"), m * m) | dict.fromkeys(("pivots", "at", "rate", *stages), m)
-    lengths |= {"time_slope": m if problem.timed else 0, "at_t": 1, "sum": 1, "nonfinite_matrix": 1, **on_the_way}
+    stages = [f"U{k}" for k in range(len(method.c))]
+    body: list[Statement] = [
+        each(lambda unit, h, jacobian: {"matrix": unit / (method.gamma * h) - jacobian}),
+        Factor("matrix", "pivots"),
+    ]
+    for k, stage in enumerate(stages):
+        # the last ones go on from where the stage before arrived
+        at = _state(method.a[k]) if k < len(method.a) else added("at", stages[k - 1], "at")
+        rate = Call(problem.rate, ("at", "at_t", "p"), ("rate",))
+        body += [
+            at,
+            stage_time("at_t", method.c[k]),
+            rate,
+            _right(method, problem, k),
+            Solve("matrix", "pivots", stage),
+        ]
     by_time = [Call(time_derivative(problem), ("x", "t", "p"), ("time_slope",))] if problem.timed else []
-    names = [("h_", degree - 1), ("dense", degree)]
     return Step(
-        lengths,
-        [_matrix(method.gamma), Factor("matrix", "pivots"), *_stages(method, problem)],
-        prepare=[*slopes, *by_time],
-        start=[identity(m)],
+        body=[*body, added("at", stages[-1], "x_new")],
+        prepare=[*jacobian_statements(problem), *by_time],
+        start=[identity(problem.size)],
         error=[
-            *measured(stages[-1], m),
+            *measured(stages[-1], problem.size),
             nonfinite("nonfinite_matrix", "matrix"),
             added("error", "nonfinite_matrix", "error"),
         ],
         estimate=method.order,
         dense=_dense(method, stages),
-        dense_lengths={f"{name}{k + 1}": m for name, count in names for k in range(count)},
     )
-
-
-def _matrix(gamma: float) -> Map:
-    unit, h, slope = cg.variables("unit h slope")
-    return Map(Graph([unit, h, slope], {"w": unit / (gamma * h) - slope}), ("unit", "h", "jacobian"), ("matrix",))
-
-
-def _stages(method: Rosenbrock, problem: Problem) -> list[Statement]:
-    """Registers U0, U1, .. and x_new."""
-    last = len(method.c) - 1
-    body: list[Statement] = []
-    for k in range(last + 1):
-        if k < len(method.a):
-            body.append(_state(method.a[k]))
-        else:  # on from where the stage before arrived
-            body.append(added("at", f"U{k - 1}", "at"))
-        body += [stage_time("at_t", method.c[k]), Call(problem.rate, ("at", "at_t", "p"), ("rate",))]
-        body += [_right(method, problem, k), Solve("matrix", "pivots", f"U{k}")]
-    return [*body, added("at", f"U{last}", "x_new")]
 
 
 def _state(weights: RowOfWeights) -> Map:
     """at = x + sum of weight * U."""
-    x = cg.variable("x")
-    nodes, parts, names = used(weights, "U")
-    graph = Graph([x, *nodes], {"y": x + weighted(nodes, parts) if nodes else x})
-    return Map(graph, ("x", *names), ("at",))
+    stages, parts = used(weights, "U")
+    return each(lambda x, *u: {"at": x + weighted(u, parts) if u else x}, "x", *stages)
 
 
 def _right(method: Rosenbrock, problem: Problem, k: int) -> Map:
     """The right-hand side of stage k, in register U{k}."""
-    rate, h, slope = cg.variables("rate h slope")
-    nodes, parts, names = used(method.slopes[k], "U")
-    right = rate + weighted(nodes, parts) / h if nodes else rate
-    inputs, registers = [rate, h, *nodes], ("rate", "h", *names)
-    if problem.timed and method.d[k]:
-        right = right + method.d[k] * (h * slope)
-        inputs, registers = [*inputs, slope], (*registers, "time_slope")
-    return Map(Graph(inputs, {"r": right}), registers, (f"U{k}",))
+    stages, parts = used(method.slopes[k], "U")
+    timed = ["time_slope"] if problem.timed and method.d[k] else []
+
+    def right(rate: Node, h: Node, *others: Node) -> Values:
+        u, time_slope = others[: len(stages)], others[len(stages) :]
+        result = rate + weighted(u, parts) / h if u else rate
+        for slope in time_slope:
+            result = result + method.d[k] * (h * slope)
+        return {f"U{k}": result}
+
+    return each(right, "rate", "h", *stages, *timed)
 
 
 def _dense(method: Rosenbrock, stages: Sequence[str]) -> list[Statement]:
     """The powers of s in x + s (x_new - x) + s (1 - s) (h_1 + s h_2 + ..)."""
     parts = [f"h_{k + 1}" for k in range(len(method.dense))]
-    x, x_new, *h = cg.variables(["x", "x_new", *parts])
-    powers = [x_new - x + h[0], *[after - before for before, after in itertools.pairwise(h)], -h[-1]]
-    graph = Graph([x, x_new, *h], {f"dense{k + 1}": node for k, node in enumerate(powers)})
-    return [combined(method.dense, stages, parts), Map(graph, ("x", "x_new", *parts), tuple(graph.outputs))]
+
+    def powers(x: Node, x_new: Node, *h: Node) -> Values:
+        values = [x_new - x + h[0], *[after - before for before, after in itertools.pairwise(h)], -h[-1]]
+        return {f"dense{k}": value for k, value in enumerate(values, 1)}
+
+    return [combined(method.dense, stages, parts), each(powers, "x", "x_new", *parts)]

@@ -8,10 +8,11 @@ from dataclasses import dataclass, field, replace
 from cgraph.extend import Call, FixedPoint, Map, Statement, While, copied, effects
 
 from .problem import Problem
+from .statements import lengths_of
 
-# What a step may read of a run; in equal steps and derivatives those for which it has lengths are 0.
-SHARED: tuple[str, ...] = ("x", "x_new", "t", "h", "p", "rtol", "atol", "leap", "next", "end", "evaluations", "error")
-SHARED += ("at_limit", "accepted")
+# What a step may read of a run; in equal steps and derivatives, which have no tolerance, the others are 0.
+STATES = ("x", "x_new", "atol")
+SHARED = (*STATES, *"t h p rtol leap next end evaluations error at_limit accepted".split())
 
 
 @dataclass(frozen=True, eq=False)
@@ -19,13 +20,13 @@ class Step:
     """One step of a method: from the state x at t, of the length h, to x_new, and what is known of it besides.
 
     It is statements over registers. Every step has x (m), x_new (m), t, h and p, the values of the problem's
-    parameters; whatever else it needs it names in `lengths`. Whether it is accepted, how long the next one is, which
-    forces act in it and what its derivatives are is the business of `equal`, `chosen` and `dyn.gradient`.
+    parameters, and may set others under any name. Whether it is accepted, how long the next one is, which forces act in
+    it and what its derivatives are is the business of `equal`, `chosen` and `dyn.gradient`.
 
     Parameters
     ----------
-    lengths : dict
-        Of the registers that it needs besides.
+    lengths : dict, optional
+        Of registers of its own, where its statements do not tell: such as those of one `Call` that sets several.
     body : sequence of Statement
         x_new of x, t, h, p and what comes before.
     rates : sequence of Statement, optional
@@ -54,28 +55,25 @@ class Step:
         After an accepted step: registers dense1, dense2, .. (m), with x(t + s h) = x + sum_k dense_k s^k. Without it
         the cubic through states and rates at both ends.
     dense_lengths : dict, optional
-        Of the registers that only `dense` needs, those of its result included.
+        As `lengths`, of those that only `dense` needs.
 
     Examples
     --------
     Heun's method, which goes by the mean of the slopes at both ends:
 
     >>> import dynamics as dyn
-    >>> import cgraph as cg
-    >>> from cgraph.extend import Call, Map
-    >>> from dynamics.integrators import Method, Step
+    >>> from cgraph.extend import Call
+    >>> from dynamics.integrators import Method, Step, call, each
     >>> def heun(problem):
-    ...     x, h, a, b = cg.variables("x h a b")
-    ...     along, mean = cg.Graph([x, h, a], {"x": x + h * a}), cg.Graph([x, h, a, b], {"x": x + h * (a + b) / 2})
-    ...     t, later = cg.variables("t h")
-    ...     body = [
-    ...         Map(along, ("x", "h", "slope"), ("at",)),
-    ...         Call(cg.Graph([t, later], {"t": t + later}), ("t", "h"), ("end",)),
-    ...         Call(problem.rate, ("at", "end", "p"), ("slope_at_end",)),
-    ...         Map(mean, ("x", "h", "slope", "slope_at_end"), ("x_new",)),
-    ...     ]
-    ...     lengths = dict.fromkeys(("slope", "at", "slope_at_end"), problem.size) | {"end": 1}
-    ...     return Step(lengths, body, rates=[Call(problem.rate, ("x", "t", "p"), ("slope",))])
+    ...     return Step(
+    ...         rates=[Call(problem.rate, ("x", "t", "p"), ("slope",))],
+    ...         body=[
+    ...             each(lambda x, h, slope: {"at": x + h * slope}),
+    ...             call(lambda t, h: {"end": t + h}),
+    ...             Call(problem.rate, ("at", "end", "p"), ("slope_at_end",)),
+    ...             each(lambda x, h, slope, slope_at_end: {"x_new": x + h * (slope + slope_at_end) / 2}),
+    ...         ],
+    ...     )
     >>> dyn.METHODS["heun"] = Method(2, heun)
     >>> decay = dyn.OdeSystem(lambda x, t: [-x[0]], ["x"])
     >>> dyn.simulate(decay, [1.0], None, 1.0, "heun", dt=0.01).q[-1].round(4)
@@ -83,8 +81,8 @@ class Step:
     >>> del dyn.METHODS["heun"]
     """
 
-    lengths: Mapping[str, int]
-    body: Sequence[Statement]
+    lengths: Mapping[str, int] = field(default_factory=dict)
+    body: Sequence[Statement] = ()
     rates: Sequence[Statement] = ()
     prepare: Sequence[Statement] = ()
     start: Sequence[Statement] = ()
@@ -116,18 +114,24 @@ def arriving(statements: Sequence[Statement]) -> list[Statement]:
     return [*statements, copied("x_new", "x")]
 
 
-def with_registers(step: Step, own: Mapping[str, int]) -> dict[str, int]:
-    """All registers: a step's, and those of what wraps it.
+def with_registers(step: Step, own: Mapping[str, int], *more: Statement) -> dict[str, int]:
+    """All registers: those of what wraps a step, and its own.
 
+    more: its statements besides those from x to the new x.
     Raises ValueError where one name has two meanings, and for a step that does not make x_new of x.
     """
+    every = [*step.start, *step.rates, *step.prepare, *step.body, *more, *step.kept]
     written = effects([*step.rates, *step.prepare, *step.body, *step.kept])[1]
     if "x_new" not in written or "x" in written:
         raise ValueError("a step has to write register 'x_new', and to leave 'x' as it is")
-    twice = [name for name in (*step.lengths, *step.dense_lengths) if name in own and name not in SHARED]
-    if twice:
+    given = {**step.lengths, **step.dense_lengths}
+    reads, writes = effects(every)
+    if twice := [name for name in (*given, *writes) if name in own and name not in SHARED]:
         raise ValueError(f"a step cannot have a register {twice[0]!r}: a run has another of that name")
-    return {**step.lengths, **own}
+    shared = {name: own["x"] if name in STATES else 1 for name in SHARED if name not in own}
+    lengths = lengths_of(every, {**shared, **given, **own})
+    lengths |= dict.fromkeys([name for name in step.fixed if name not in lengths], 1)
+    return {name: lengths[name] for name in (*given, *reads, *writes, *step.fixed, *own) if name in lengths}
 
 
 def rate_calls(problem: Problem, *statements: Sequence[Statement]) -> int:

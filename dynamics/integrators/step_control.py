@@ -28,12 +28,12 @@ import math
 from collections.abc import Sequence
 
 import cgraph as cg
-from cgraph import Graph, Node
+from cgraph import Node
 from cgraph.extend import STATEMENTS, Call, If, Map, Program, Statement, Sum, copied, effects
 
-from .elementwise import function
 from .problem import Problem
-from .step import SHARED, Step, rate_calls, with_registers
+from .statements import Values, call, count, each, total
+from .step import Step, rate_calls, with_registers
 
 RUNNING, DONE, TOO_SMALL = 0.0, 1.0, 2.0  # register `status`
 SAFETY, SMALLEST_FACTOR, LARGEST_FACTOR = 0.9, 0.2, 5.0  # factors from one step to the next
@@ -61,19 +61,17 @@ def recorded(dense: bool, degree: int) -> list[str]:
     return ["t", "h", "x", *(["t_old", "x_old", *(f"dense{k + 1}" for k in range(degree))] if dense else [])]
 
 
-def trial() -> Call:
+@call
+def trial(t: Node, next_: Node, max_step: Node, end: Node, rtol: Node, jump: Node, longest: Node) -> Values:
     """The step to try: `next`, or what is left; of a little more than one step, half, so that no sliver remains.
 
     h = t_new - t, so that the clock and the state make the same step.
     """
-    names = ("t", "next", "max_step", "end", "rtol", "jump", "longest")
-    t, wanted, max_step, end, rtol, jump, longest = inputs = cg.variables(names)
-    left, most = abs(end - t), cg.minimum(wanted, max_step)
+    left, most = abs(end - t), cg.minimum(next_, max_step)
     tried = cg.where(most >= left, left, cg.where(2.0 * most > left, 0.5 * left, most))
     t_new = cg.where(most >= left, end, t + cg.where(end > t, tried, -tried))
     h = t_new - t
-    outputs = {"tried": tried, "t_new": t_new, "h": h, "leap": rtol * jump * longest / abs(h)}
-    return Call(Graph(inputs, outputs), names, tuple(outputs))
+    return {"tried": tried, "t_new": t_new, "h": h, "leap": rtol * jump * longest / abs(h)}
 
 
 def scale(x: Node, x_new: Node, rtol: Node, atol: Node, leap: Node) -> Node:
@@ -81,51 +79,36 @@ def scale(x: Node, x_new: Node, rtol: Node, atol: Node, leap: Node) -> Node:
     return atol + rtol * cg.maximum(abs(x), abs(x_new)) + leap * abs(x_new - x)
 
 
-def control(evaluations: int) -> Call:
+def control(more: int) -> Call:
     """Call that accepts a trial or not, by its estimate. A NaN is an error beyond measure.
 
     A step below the resolution of t, or of the run, is not accepted whatever its error: only one that ends the run may
     be so short.
 
-    evaluations: of the rate in a trial.
+    more: evaluations of the rate in a trial.
     """
     names = "error t t_new end next max_step min_step rejected evaluations accepted search trials sized seen".split()
-    names += ["h", "longest_made"]
-    error, t, t_new, end, wanted, max_step, min_step, rejected, done, before, *rest = inputs = cg.variables(names)
-    search, trials, sized, seen, h, made = rest
-    arrives = cg.equal(t_new, end)
-    able = cg.maximum(arrives, cg.minimum(wanted, max_step) > cg.maximum(min_step, RESOLUTION * abs(t)))
-    accepted = able * (error <= 1.0)
-    row = cg.where(search, 0.0, accepted)
-    outputs = {
-        "accepted": accepted,
-        "status": cg.where(accepted, cg.where(arrives, DONE, RUNNING), cg.where(able, RUNNING, TOO_SMALL)),
-        "rejected": rejected + (1.0 - accepted),
-        "evaluations": done + float(evaluations),
-        "largest": cg.where(before, LARGEST_FACTOR, 1.0),  # no growth after a rejection
-        "row": row,
-        "longest_made": cg.where(row, cg.maximum(made, abs(h)), made),
-        "trials": trials + 1.0,
-        "due": sized * (trials + 1.0 >= seen),
-    }
-    return Call(Graph(inputs, outputs), tuple(names), tuple(outputs))
 
+    def judged(*values: Node) -> Values:
+        error, t, t_new, end, wanted, max_step, min_step, rejected, done, before, *rest = values
+        search, trials, sized, seen, h, made = rest
+        arrives = cg.equal(t_new, end)
+        able = cg.maximum(arrives, cg.minimum(wanted, max_step) > cg.maximum(min_step, RESOLUTION * abs(t)))
+        accepted = able * (error <= 1.0)
+        row = cg.where(search, 0.0, accepted)
+        return {
+            "accepted": accepted,
+            "status": cg.where(accepted, cg.where(arrives, DONE, RUNNING), cg.where(able, RUNNING, TOO_SMALL)),
+            "rejected": rejected + (1.0 - accepted),
+            "evaluations": done + float(more),
+            "largest": cg.where(before, LARGEST_FACTOR, 1.0),  # no growth after a rejection
+            "row": row,
+            "longest_made": cg.where(row, cg.maximum(made, abs(h)), made),
+            "trials": trials + 1.0,
+            "due": sized * (trials + 1.0 >= seen),
+        }
 
-def _grown(order: int) -> Call:
-    """The step after an accepted one. order: of the step's size in the estimate."""
-    names = ("error", "error_old", "tried", "next", "largest")
-    error, old, tried, wanted, largest = inputs = cg.variables(names)
-    growth = SAFETY * error ** -(1.0 / order - 0.75 * MEMORY) * cg.maximum(old, 1e-4) ** MEMORY
-    after = tried * cg.minimum(cg.maximum(growth, SMALLEST_FACTOR), largest)
-    after = cg.where(tried < wanted, cg.maximum(wanted, after), after)  # a step cut short says less
-    return Call(Graph(inputs, {"next": after, "error_old": error}), names, ("next", "error_old"))
-
-
-def _shrunk(order: int) -> Call:
-    """The step after a rejected one."""
-    error, tried = inputs = cg.variables("error tried")
-    shrink = cg.where(error < 1e300, cg.maximum(SAFETY * error ** (-1.0 / order), SMALLEST_FACTOR), 0.1)
-    return Call(Graph(inputs, {"next": tried * shrink}), ("error", "tried"), ("next",))
+    return call(judged, *names, "h", "longest_made")
 
 
 def accept_step(order: int, *after: Statement, starts: bool) -> If:
@@ -133,45 +116,50 @@ def accept_step(order: int, *after: Statement, starts: bool) -> If:
 
     order: of the step's size in the estimate.  starts: see `chosen`.
     """
+
+    def grown(error: Node, error_old: Node, tried: Node, next_: Node, largest: Node) -> Values:
+        growth = SAFETY * error ** -(1.0 / order - 0.75 * MEMORY) * cg.maximum(error_old, 1e-4) ** MEMORY
+        longer = tried * cg.minimum(cg.maximum(growth, SMALLEST_FACTOR), largest)
+        # a step cut short says less
+        return {"next": cg.where(tried < next_, cg.maximum(next_, longer), longer), "error_old": error}
+
+    def shrunk(error: Node, tried: Node) -> Values:
+        shrink = cg.where(error < 1e300, cg.maximum(SAFETY * error ** (-1.0 / order), SMALLEST_FACTOR), 0.1)
+        return {"next": tried * shrink}
+
     kept = (copied("x", "x_old"), copied("t", "t_old"))
     arrived = (copied("x_new", "x"), copied("t_new", "t"))
     if starts:
-        free, again = (
-            Call(Graph([], {name: value}), (), (name,)) for name, value in (("next", math.inf), ("fresh", 1.0))
-        )
-        return If("accepted", (*kept, *after, *arrived, free), (_shrunk(order), again))
-    h, longest, turned = cg.variables("h longest turned")
+        free, again = call(lambda: {"next": math.inf}), call(lambda: {"fresh": 1.0})
+        return If("accepted", (*kept, *after, *arrived, free), (call(shrunk), again))
+    way = total(lambda x, x_new: {"moved": abs(x_new - x)})
+    short = call(lambda moved, next_, still: {"next": cg.where(moved, next_, cg.minimum(next_, still))})
+    steps = (call(grown), turn_of_rates, *kept, *after, way, short, longest_step, *arrived)
+    return If("accepted", steps, (call(shrunk),))
+
+
+@call
+def longest_step(h: Node, longest: Node, turned: Node) -> Values:
+    """The longest of the last steps, of which a share is lost as rates grow."""
     lost = cg.minimum(cg.sqrt(turned), FORGOTTEN) * longest
-    after_h = Graph([h, longest, turned], {"longest": cg.maximum(abs(h), longest - lost)})
-    x, x_new, moved, wanted, still = cg.variables("x x_new moved next still")
-    way = Sum(Graph([x, x_new], {"way": abs(x_new - x)}), ("x", "x_new"), "moved")
-    short = Graph([moved, wanted, still], {"next": cg.where(moved, wanted, cg.minimum(wanted, still))})
-    remembered = Call(after_h, ("h", "longest", "turned"), ("longest",))
-    steps = (way, Call(short, ("moved", "next", "still"), ("next",)), remembered)
-    return If("accepted", (_grown(order), _turn(), *kept, *after, *steps, *arrived), (_shrunk(order),))
+    return {"longest": cg.maximum(abs(h), longest - lost)}
 
 
-def _turn() -> Sum:
-    """Register `turned`: the sum over the state of squares of changes of the mean rate, each a share of the larger one.
+@total
+def turn_of_rates(h: Node, t: Node, t_old: Node, x: Node, x_new: Node, x_old: Node) -> Values:
+    """Squares of changes of the mean rate, each a share of the larger one, as ways in the time of this step.
 
-    Both rates are compared as ways in the time of this step; before the first one there is none.
+    Before the first step there is none.
     """
-    t, h, t_old, x, x_new, x_old = cg.variables("t h t_old x x_new x_old")
     before = cg.where(cg.equal(t, t_old), 0.0, h / (t - t_old)) * (x - x_old)
     way = x_new - x
     share = abs(way - before) / cg.maximum(cg.maximum(abs(way), abs(before)), SMALLEST_ATOL)
-    names = ("h", "t", "t_old", "x", "x_new", "x_old")
-    return Sum(Graph([h, t, t_old, x, x_new, x_old], {"square": share * share}), names, "turned")
-
-
-def count(more: int, register: str = "evaluations") -> Call:
-    """That many more in a register."""
-    return Call(function("done", sum=cg.variable("done") + float(more)), (register,), (register,))
+    return {"turned": share * share}
 
 
 def first_pass(*statements: Statement) -> If:
     """Branch before the first trial alone."""
-    return If("fresh", (*statements, Call(function("fresh", none=0.0), ("fresh",), ("fresh",))))
+    return If("fresh", (*statements, call(lambda fresh: {"fresh": 0.0})))
 
 
 def chosen(step: Step, problem: Problem, *, dense: bool, degree: int, starts: bool) -> Program:
@@ -180,38 +168,46 @@ def chosen(step: Step, problem: Problem, *, dense: bool, degree: int, starts: bo
     starts: whether the next step is at most what the derivatives at its start allow, whatever the one before was. After
     a trial that was too long the rates are those of its end, so that all begins again.
     """
-    lengths = with_registers(step, registers(problem))
+    polynomial = (step.dense or _hermite(problem)) if dense else ()
+    statements = [*step.error, *(step.handed or ()), *polynomial]
+    lengths = with_registers(step, registers(problem), *statements)
+    if dense:
+        lengths |= dict.fromkeys([f"dense{k + 1}" for k in range(degree)], problem.size)
     rates, prepare = ([*part, *_counted(problem, part)] for part in (step.rates, step.prepare))
     first, again = ([*step.start, *rates], prepare) if step.handed is not None else (step.start, [*rates, *prepare])
-    body = _forgotten(step)
+    body = _forgotten(step, problem)
     if first:
         body.append(first_pass(*first))
     if again:
         body += again if starts else [If("accepted", tuple(again))]
-    body += [trial(), *step.body, *step.error]
+    body += [trial, *step.body, *step.error]
     body.append(control(rate_calls(problem, step.body, step.error)))
-    after: list[Statement] = []
-    if dense:
-        polynomial, more = (step.dense, step.dense_lengths) if step.dense else _hermite(problem)
-        after.append(If("row", (*polynomial, *_counted(problem, polynomial))))
-        lengths |= {**dict.fromkeys([f"dense{k + 1}" for k in range(degree)], problem.size), **more}
+    after = [If("row", (*polynomial, *_counted(problem, polynomial)))] if dense else []
     body.append(accept_step(step.estimate, *after, *step.kept, *(step.handed or ()), starts=starts))
     return Program(lengths, body, recorded(dense, degree), record_if="row", stop="status")
 
 
-def _forgotten(step: Step) -> list[Statement]:
+def _forgotten(step: Step, problem: Problem) -> list[Statement]:
     """Registers that are 0 before the first trial: those that a step reads before it is sure to write them."""
     first: dict[str, None] = {}
-    written: set[str] = set()
-    for each in (*step.start, *step.rates, *step.prepare, *step.body, *step.error, *step.kept, *(step.handed or ())):
-        reads, writes = effects([each])
-        first |= {name: None for name in reads if name in step.lengths and name not in SHARED and name not in written}
-        if not STATEMENTS[type(each)].bodies:  # which may run no time at all
+    written = {*registers(problem)}
+    for each_one in (
+        *step.start,
+        *step.rates,
+        *step.prepare,
+        *step.body,
+        *step.error,
+        *step.kept,
+        *(step.handed or ()),
+    ):
+        reads, writes = effects([each_one])
+        first |= {name: None for name in reads if name not in written}
+        if not STATEMENTS[type(each_one)].bodies:  # which may run no time at all
             written |= {*writes}
-    return [If("anew", tuple([Map(_ZERO, (name,), (name,)) for name in (*first, "anew")]), seldom=True)]
+    return [If("anew", tuple([Map(ZERO, (name,), (name,)) for name in (*first, "anew")]), seldom=True)]
 
 
-_ZERO = function("a", zero=0.0)
+ZERO = each(lambda a: {"zero": 0.0}).graph
 
 
 def _counted(problem: Problem, statements: Sequence[Statement]) -> list[Call]:
@@ -220,21 +216,15 @@ def _counted(problem: Problem, statements: Sequence[Statement]) -> list[Call]:
     return [count(calls)] if calls else []
 
 
-def _hermite(problem: Problem) -> tuple[list[Statement], dict[str, int]]:
+def _hermite(problem: Problem) -> list[Statement]:
     """The cubic through states and rates at both ends."""
-    x, x_new, h, a, b = inputs = cg.variables("x x_new h a b")
-    way, first, last = x_new - x, h * a, h * b
-    powers = {"1": first, "2": 3.0 * way - 2.0 * first - last, "3": first + last - 2.0 * way}
-    statements: list[Statement] = [
-        Call(problem.rate, ("x", "t", "p"), ("rate_before",)),
-        Call(problem.rate, ("x_new", "t_new", "p"), ("rate_after",)),
-        Map(
-            Graph(inputs, powers),
-            ("x", "x_new", "h", "rate_before", "rate_after"),
-            tuple([f"dense{k + 1}" for k in range(HERMITE)]),
-        ),
-    ]
-    return statements, dict.fromkeys(("rate_before", "rate_after"), problem.size)
+
+    def powers(x: Node, x_new: Node, h: Node, rate_before: Node, rate_after: Node) -> Values:
+        way, first, last = x_new - x, h * rate_before, h * rate_after
+        return {"dense1": first, "dense2": 3.0 * way - 2.0 * first - last, "dense3": first + last - 2.0 * way}
+
+    before = Call(problem.rate, ("x", "t", "p"), ("rate_before",))
+    return [before, Call(problem.rate, ("x_new", "t_new", "p"), ("rate_after",)), each(powers)]
 
 
 def measured(error: str, m: int) -> list[Statement]:
@@ -242,19 +232,23 @@ def measured(error: str, m: int) -> list[Statement]:
 
     NaN where x_new is not finite: its scale would hide any error.
     """
-    *sizes, e = inputs = cg.variables((*SCALE, "e"))
-    part, x_new = e / scale(*sizes), sizes[1]
-    total = Sum(Graph(inputs, {"y": part * part + (x_new - x_new)}), (*SCALE, error), "sum")
-    return [total, Call(function("sum", y=cg.sqrt(cg.variable("sum") / m)), ("sum",), ("error",))]
+
+    def square(x: Node, x_new: Node, rtol: Node, atol: Node, leap: Node, e: Node) -> Values:
+        part = e / scale(x, x_new, rtol, atol, leap)
+        return {"sum": part * part + (x_new - x_new)}
+
+    return [total(square, *SCALE, error), call(lambda sum_: {"error": cg.sqrt(sum_ / m)})]
 
 
 def moved(m: int) -> list[Statement]:
     """x = register `onto`; `farthest`, the largest of such moves so far, a root mean square of move over tolerance."""
-    x, rtol, atol, onto, way, far = cg.variables("x rtol atol onto way farthest")
-    part = (onto - x) / scale(x, onto, rtol, atol, cg.constant(0.0))
-    total = Sum(Graph([x, rtol, atol, onto], {"y": part * part}), ("x", "rtol", "atol", "onto"), "way")
-    longer = Graph([way, far], {"far": cg.maximum(cg.sqrt(way / m), far)})
-    return [total, Call(longer, ("way", "farthest"), ("farthest",)), copied("onto", "x")]
+
+    def square(x: Node, rtol: Node, atol: Node, onto: Node) -> Values:
+        part = (onto - x) / scale(x, onto, rtol, atol, cg.constant(0.0))
+        return {"way": part * part}
+
+    longer = call(lambda way, farthest: {"farthest": cg.maximum(cg.sqrt(way / m), farthest)})
+    return [total(square), longer, copied("onto", "x")]
 
 
 def nonfinite(target: str, *registers: str) -> Sum:
@@ -262,6 +256,8 @@ def nonfinite(target: str, *registers: str) -> Sum:
 
     Divided by an infinite number, an error is 0: that of a step with infinite pivots.
     """
-    first, *others = inputs = cg.variables([f"a{k}" for k in range(len(registers))])
-    none = sum([other - other for other in others], first - first)
-    return Sum(Graph(inputs, {"none": none}), registers, target)
+
+    def none(first: Node, *others: Node) -> Values:
+        return {target: sum([other - other for other in others], first - first)}
+
+    return total(none, *registers)

@@ -16,20 +16,23 @@ reversible motions without drift.
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Callable, Sequence
+import operator
+from collections.abc import Sequence
+from dataclasses import replace
 from fractions import Fraction
+from functools import reduce
 
 import cgraph as cg
-from cgraph import Graph, Node
-from cgraph.extend import Call, FixedPoint, Map, Statement, Sum, added, copied
+from cgraph import Node
+from cgraph.extend import Call, FixedPoint, Map, Statement, added, copied
 
 from ..systems.arguments import TIME
-from .elementwise import compensated, end_to_end, function, stage_time, weighted
-from .momenta import Mechanics, mechanics
+from .momenta import mechanics
 from .problem import Problem, reaches
+from .statements import Values, call, compensated, count, each, stage_time, total, used, weighted
 from .step import Step
-from .step_control import count
 from .symplectic_tableaus import MIDPOINT, SYMPLECTIC_EULER, VERLET, Composition, Fractions, Partitioned, over
 
 TURNS = 60.0  # of the iteration for the stages, at most
@@ -79,33 +82,36 @@ def _separable(problem: Problem) -> bool:
 
 def _of_momenta(method: Partitioned, problem: Problem, composition: Composition) -> Step:
     """States q and qd: momenta are read at the start, and the velocity that belongs to them is solved for."""
-    graphs, n = mechanics(problem), problem.nq
-    stages = range(len(method.w))
-    lengths = dict.fromkeys(("q", "v", "momentum", "q_rounding", "momentum_rounding"), n)
-    lengths |= {f"{name}{i}": n for name in "QVPFW" for i in stages}
-    read = Call(graphs.momentum, ("x", "t", "p"), ("momentum",))
-    start = [end_to_end(problem.size, ("x",), ("q", "v")), read, *[copied("v", f"V{i}") for i in stages]]
+    graphs, n, stages = mechanics(problem), problem.nq, range(len(method.w))
+
+    def force(q: str, v: str, t: str, target: str) -> Call:
+        return Call(graphs.force, (q, v, t, "p"), (target,))
+
+    def velocity(q: str, v: str, momentum: str, t: str, target: str) -> Call:
+        return Call(graphs.velocity, (q, v, momentum, t, "p", "singular"), (target, "singular"))
+
+    settled = velocity("q", "v", "momentum", "later", "v")
     if graphs.separable and method in (SYMPLECTIC_EULER, VERLET):
-        body = _explicit(
-            method,
-            lambda t: [_force(graphs, "q", "v", t, "F0")],
-            lambda t: [_velocity(graphs, "q", "v", "momentum", t, "v")],
-            after=[copied("v", "V0")],
-        )
-        body += [_velocity(graphs, "q", "v", "momentum", "later", "v"), count(2)] if method is VERLET else [count(1)]
+        at_start = [velocity("q", "v", "momentum", "t", "v"), copied("v", "V0")]
+        body = _explicit(method, force("q", "v", "t", "F0"), at_start, force("q", "v", "later", "F0"))
+        body += [settled, count(2)] if method is VERLET else [count(1)]
     else:
         turn: list[Statement] = []
         for i in stages:
-            turn += [_stage(method.a[i], "q", "V", f"Q{i}"), _force(graphs, f"Q{i}", f"V{i}", f"time{i}", f"F{i}")]
+            turn += [_stage(method.a[i], "q", "V", f"Q{i}"), force(f"Q{i}", f"V{i}", f"time{i}", f"F{i}")]
         for i in stages:
             turn.append(_stage(method.b[i], "momentum", "F", f"P{i}"))
-            turn.append(_velocity(graphs, f"Q{i}", f"V{i}", f"P{i}", f"time{i}", f"W{i}"))
-        body = _iterated(method, turn)
-        body += [_added("q", "V", method.w), _added("momentum", "F", method.w), stage_time("later", 1.0)]
-        settled = _velocity(graphs, "q", "v", "momentum", "later", "v")
-        body += [settled] * (1 if graphs.quadratic else REPEATS)
-    body = [*_in_turn(composition, body), end_to_end(problem.size, ("q", "v"), ("x_new",))]
-    return _step(method, lengths, start, body)
+            turn.append(velocity(f"Q{i}", f"V{i}", f"P{i}", f"time{i}", f"W{i}"))
+        body = [*_iterated(method, turn), _added("q", "V", method.w), _added("momentum", "F", method.w)]
+        body += [stage_time("later", 1.0), *[settled] * (1 if graphs.quadratic else REPEATS)]
+    read = Call(graphs.momentum, ("x", "t", "p"), ("momentum",))
+    return Step(
+        {"q": n, "v": n, "failed": 1, "singular": 1},
+        [*_in_turn(composition, body), _joined(("q", "v"), (n, n))],
+        start=[_parted(("q", "v"), (n, n)), read, *[copied("v", f"V{i}") for i in stages]],
+        fixed=_fixed(method),
+        failed="failures",
+    )
 
 
 def _of_rates(method: Partitioned, problem: Problem, composition: Composition) -> Step:
@@ -113,132 +119,134 @@ def _of_rates(method: Partitioned, problem: Problem, composition: Composition) -
     stages = range(len(method.w))
     parts = [("q", "Q", "V", method.a), ("momentum", "P", "F", method.b)][: 2 if problem.momenta else 1]
     bases, slopes = tuple([part[0] for part in parts]), [part[2] for part in parts]
-    m, first = problem.size, problem.nq if problem.momenta else problem.size
-    lengths = {f"W{i}": first for i in stages}
-    for (base, stage, slope, _), length in zip(parts, (first, m - first), strict=False):
-        names = base, f"{base}_rounding", *[f"{name}{i}" for name in (stage, slope) for i in stages]
-        lengths |= dict.fromkeys(names, length)
+    sizes = (problem.nq, problem.size - problem.nq) if problem.momenta else (problem.size,)
+    lengths = dict(
+        zip([*bases, *[f"{name}{i}" for i in stages for name in slopes]], sizes * (1 + len(stages)), strict=True)
+    )
 
     def rates(at: Sequence[str], t: str, velocity: str, i: int = 0) -> Call:
         return Call(problem.rate, (*at, t, "p"), tuple([f"{name}{i}" for name in (velocity, *slopes[1:])]))
 
-    start = [rates("x", "t", "V"), *[copied(f"{slope}0", f"{slope}{i}") for slope in slopes for i in stages[1:]]]
-    body: list[Statement]
     if method in (SYMPLECTIC_EULER, VERLET) and _separable(problem):
-        body = _explicit(method, lambda t: [rates(bases, t, "V")], lambda t: [rates(bases, t, "V")])
+        now = rates(bases, "t", "V")
+        body = _explicit(method, now, [now], rates(bases, "later", "V"))
     else:
         turn: list[Statement] = [count(len(stages))] if problem.momenta else []
         for velocity in ("V", "W") if problem.momenta else "W":  # twice, since an error of V comes back to V by F
             turn += [_stage(a[i], base, slope, f"{stage}{i}") for i in stages for base, stage, slope, a in parts]
             turn += [rates([f"{part[1]}{i}" for part in parts], f"time{i}", velocity, i) for i in stages]
         body = [*_iterated(method, turn), *[_added(base, slope, method.w) for base, _, slope, _ in parts]]
-    body = [end_to_end(m, ("x",), bases), *_in_turn(composition, body), end_to_end(m, bases, ("x_new",))]
-    return _step(method, lengths, start, body)
+    return Step(
+        {**lengths, "failed": 1},
+        [_parted(bases, sizes), *_in_turn(composition, body), _joined(bases, sizes)],
+        start=[rates("x", "t", "V"), *[copied(f"{slope}0", f"{slope}{i}") for slope in slopes for i in stages[1:]]],
+        fixed=_fixed(method),
+        failed="failures",
+    )
 
 
-def _step(method: Partitioned, lengths: dict[str, int], start: Sequence[Statement], body: list[Statement]) -> Step:
-    numbers = [f"{name}{i}" for name in ("change", "speed") for i in range(len(method.w))]
-    numbers += "singular failed failures going turns change speed change_old".split()
-    times = ["later", "whole_t", "whole_h", *[f"time{i}" for i in range(len(method.w))]]
-    fixed = [*[name for name in lengths if name.endswith("rounding")], *numbers]
-    lengths = lengths | dict.fromkeys([*numbers, *times], 1)
-    return Step(lengths, body, start=start, fixed=tuple(fixed), failed="failures")
+def _fixed(method: Partitioned) -> tuple[str, ...]:
+    """Registers that the derivative of a step leaves out."""
+    sums = [f"{name}{i}" for name in ("change", "speed") for i in range(len(method.w))]
+    return (*sums, *"q_rounding momentum_rounding singular failed failures going turns change_old".split())
 
 
-def _in_turn(composition: Composition, body: list[Statement]) -> list[Statement]:
+def _parted(registers: Sequence[str], lengths: Sequence[int]) -> Call:
+    """Registers = the numbers of x, end to end."""
+    ends = list(itertools.accumulate(lengths, initial=0))
+    return call(
+        lambda x: {name: x[begin:end] for name, (begin, end) in zip(registers, itertools.pairwise(ends), strict=True)},
+        x=ends[-1],
+    )
+
+
+def _joined(registers: Sequence[str], lengths: Sequence[int]) -> Call:
+    """x_new = the numbers of registers, end to end."""
+    sizes = dict(zip(registers, lengths, strict=True))
+    return call(lambda *parts: {"x_new": [number for part in parts for number in part]}, *registers, **sizes)
+
+
+def _in_turn(composition: Composition, body: Sequence[Statement]) -> list[Statement]:
     """The body, a step of h from t, once for every step of a composition; a step that failed is counted."""
     counted = added("failures", "failed", "failures")
     if composition is ONCE:
         return [*body, counted]
-    h, t = cg.variables("whole_h whole_t")
     result: list[Statement] = [copied("h", "whole_h"), copied("t", "whole_t")]
-    done = 0.0
-    for step in composition.steps:
-        here = Graph([h, t], {"h": step * h, "t": t + done * h})
-        result += [Call(here, ("whole_h", "whole_t"), ("h", "t")), *body, counted]
-        done += step
+    for step, done in zip(composition.steps, itertools.accumulate(composition.steps, initial=0.0), strict=False):
+        result += [_part(step, done), *body, counted]
     return [*result, copied("whole_h", "h")]
+
+
+def _part(step: float, done: float) -> Call:
+    return call(lambda whole_h, whole_t: {"h": step * whole_h, "t": whole_t + done * whole_h})
 
 
 def _stage(weights: Fractions, base: str, slope: str, target: str) -> Map:
     """target = base + h * (sum of weight * slope)."""
-    used = [k for k, weight in enumerate(weights) if weight]
-    x, h, *slopes = cg.variables(["x", "h", *(f"s{k}" for k in used)])
-    change, rest = _change(h, slopes, [weights[k] for k in used])
-    graph = Graph([x, h, *slopes], {"y": x + (change if rest is None else change + rest)})
-    return Map(graph, (base, "h", *[f"{slope}{k}" for k in used]), (target,))
+    slopes, parts = used(weights, slope)
+
+    def stage(x: Node, h: Node, *slopes: Node) -> Values:
+        return {target: x + reduce(operator.add, _changes(h, slopes, parts))}
+
+    return each(stage, base, "h", *slopes)
 
 
-def _change(h: Node, slopes: Sequence[Node], weights: Sequence[Fraction]) -> tuple[Node, Node | None]:
-    """h * (sum of weight * slope), by the weights as float64 holds them, and by what it leaves of them."""
+def _changes(h: Node, slopes: Sequence[Node], weights: Sequence[Fraction]) -> list[Node]:
+    """h * (sum of weight * slope), by the weights as float64 holds them, and by what it leaves of them, if anything."""
     first = [float(weight) for weight in weights]
     left = [float(weight - Fraction(number)) for weight, number in zip(weights, first, strict=True)]
-    return h * weighted(slopes, first), h * weighted(slopes, left) if any(left) else None
+    return [h * weighted(slopes, numbers) for numbers in (first, left) if numbers is first or any(left)]
 
 
-def _force(graphs: Mechanics, q: str, v: str, t: str, target: str) -> Call:
-    return Call(graphs.force, (q, v, t, "p"), (target,))
-
-
-def _velocity(graphs: Mechanics, q: str, v: str, momentum: str, t: str, target: str) -> Call:
-    return Call(graphs.velocity, (q, v, momentum, t, "p", "singular"), (target, "singular"))
-
-
-def _iterated(method: Partitioned, turn: list[Statement]) -> list[Statement]:
+def _iterated(method: Partitioned, turn: Sequence[Statement]) -> list[Statement]:
     """Times and a first guess of the stages, and turns from V to W until W = V to rounding."""
     stages = range(len(method.w))
-    body: list[Statement] = [stage_time(f"time{i}", float(method.c[i])) for i in stages]
-    begin = Graph([], {"going": 1.0, "turns": 0.0, "change_old": math.inf})
-    body.append(Call(begin, (), ("going", "turns", "change_old")))
-    difference = function("w v", change=(cg.variable("w") - cg.variable("v")) ** 2.0)
-    square = function("w", speed=cg.variable("w") * cg.variable("w"))
-    measured: list[Statement] = []
+    changes, speeds = ([f"{name}{i}" for i in stages] for name in ("change", "speed"))
+
+    def judged(turns: Node, change_old: Node, evaluations: Node, *sums: Node) -> Values:
+        """Whether to go on: not when V has settled, no longer comes nearer, or is no number."""
+        change, speed = (reduce(operator.add, part) for part in (sums[: len(stages)], sums[len(stages) :]))
+        nearer = cg.maximum(change < change_old, turns < 2.0)
+        going = (change > CONVERGED * CONVERGED * speed) * nearer * (turns + 1.0 < TURNS)
+        settled = change <= DIVERGED * DIVERGED * speed + 2.0**-1000
+        return {
+            "going": going,
+            "turns": turns + 1.0,
+            "change_old": change,
+            "failed": (1.0 - going) * (1.0 - settled),
+            "evaluations": evaluations + float(len(stages)),
+        }
+
+    difference = total(lambda w, v: {"change": (w - v) ** 2.0}, "W", "V")
+    square = total(lambda w: {"speed": w * w}, "W")
+    turn = list(turn)
     for i in stages:
-        measured += [Sum(difference, (f"W{i}", f"V{i}"), f"change{i}"), Sum(square, (f"W{i}",), f"speed{i}")]
-        measured.append(copied(f"W{i}", f"V{i}"))
-    body.append(FixedPoint("going", (*turn, *measured, _judged(len(method.w)))))
-    return body
-
-
-def _judged(stages: int) -> Call:
-    """Whether to go on: not when V has settled, no longer comes nearer, or is no number."""
-    changes, speeds = ([f"{name}{i}" for i in range(stages)] for name in ("change", "speed"))
-    change, speed = (sum(cg.variables(names)[1:], cg.variable(names[0])) for names in (changes, speeds))
-    turns, old, done = cg.variables("turns change_old evaluations")
-    nearer = cg.maximum(change < old, turns < 2.0)
-    going = (change > CONVERGED * CONVERGED * speed) * nearer * (turns + 1.0 < TURNS)
-    settled = change <= DIVERGED * DIVERGED * speed + 2.0**-1000
-    outputs = {
-        "going": going,
-        "turns": turns + 1.0,
-        "change_old": change,
-        "failed": (1.0 - going) * (1.0 - settled),
-        "evaluations": done + float(stages),
-    }
-    inputs = (*changes, *speeds, "turns", "change_old", "evaluations")
-    return Call(Graph(cg.variables(inputs), outputs), inputs, tuple(outputs))
+        turn.append(replace(difference, inputs=(f"W{i}", f"V{i}"), outputs=(changes[i],)))
+        turn += [replace(square, inputs=(f"W{i}",), outputs=(speeds[i],)), copied(f"W{i}", f"V{i}")]
+    turn.append(call(judged, "turns", "change_old", "evaluations", *changes, *speeds))
+    begin = call(lambda: {"going": 1.0, "turns": 0.0, "change_old": math.inf})
+    times = [stage_time(f"time{i}", float(method.c[i])) for i in stages]
+    return [*times, begin, FixedPoint("going", tuple(turn))]
 
 
 def _added(base: str, slope: str, weights: Fractions) -> Map:
     """base += h * (sum of weight * slope), with what rounding took off kept for the next step."""
-    x, before, h, *slopes = cg.variables(["x", "rounding", "h", *(f"s{k}" for k in range(len(weights)))])
-    change, rest = _change(h, slopes, weights)
-    total, after = compensated(x, change + (before if rest is None else before + rest))
-    graph, rounding = Graph([x, before, h, *slopes], {"x": total, "rounding": after}), f"{base}_rounding"
-    return Map(graph, (base, rounding, "h", *[f"{slope}{k}" for k in range(len(weights))]), (base, rounding))
+    rounding = f"{base}_rounding"
+
+    def end(x: Node, before: Node, h: Node, *slopes: Node) -> Values:
+        change, *rest = _changes(h, slopes, weights)
+        x, after = compensated(x, change + reduce(operator.add, rest, before))
+        return {base: x, rounding: after}
+
+    return each(end, base, rounding, "h", *[f"{slope}{k}" for k in range(len(weights))])
 
 
-def _explicit(
-    method: Partitioned,
-    force: Callable[[str], list[Statement]],
-    velocity: Callable[[str], list[Statement]],
-    after: Sequence[Statement] = (),
-) -> list[Statement]:
+def _explicit(method: Partitioned, force: Call, velocity: Sequence[Statement], later: Call) -> list[Statement]:
     """Kinetic energy of the velocities alone with a constant mass matrix, forces of the coordinates: no iteration.
 
-    force, velocity: registers F0 and V0 at q and the momentum, at a time; V0 needs what is `after` besides.
+    force, velocity: registers F0 and V0 at q and the momentum, at t.  later: F0 at a later time.
     """
     half = method is VERLET
     kick = _stage(over(2, 1 if half else 2), "momentum", "F", "momentum")
-    body = [*force("t"), kick, *velocity("t"), *after, _added("q", "V", (Fraction(1),)), stage_time("later", 1.0)]
-    return [*body, *force("later"), kick] if half else body
+    body = [force, kick, *velocity, _added("q", "V", (Fraction(1),)), stage_time("later", 1.0)]
+    return [*body, later, kick] if half else body

@@ -11,19 +11,21 @@ with sums of products over many nodes at a time.
 
 from __future__ import annotations
 
+import itertools
 import math
+import operator
 from collections.abc import Sequence
+from dataclasses import replace
 
 import cgraph as cg
-from cgraph import Graph, Node
+from cgraph import Node
 from cgraph._shared import Jets, convolution, kept_by_first
-from cgraph.extend import Call, If, Map, NoSeriesError, Statement, Sum, copied, jets, straight
+from cgraph.extend import Call, If, NoSeriesError, Statement, copied, jets, straight
 
 from ..systems.arguments import TIME
-from .elementwise import compensated, function, stage_time
 from .problem import Problem
+from .statements import Values, call, compensated, count, each, stage_time, total
 from .step import Step
-from .step_control import count
 
 # Operations of all coefficients, before folding, that are one straight graph: more take a second to compile, and would
 # run a third faster.
@@ -43,30 +45,26 @@ def taylor_step(problem: Problem, order: int) -> Step:
         lengths: dict[str, int] = {}
     else:
         series, lengths = _by_orders(m, graphs, order)
-    unit, h = cg.variables("unit h")
+
+    def begin(next_: Node, end: Node, t: Node) -> Values:
+        return {"unit": cg.minimum(next_, abs(end - t)), "starting": 1.0}
+
     # By itself, so that the arrival follows no call that writes coefficients: it would gather them one by one.
-    share = Call(function("h unit", s=h / unit), ("h", "unit"), ("s",), exact=True)
-    at_all = Call(function("unit h", unit=cg.where(unit, unit, h)), ("unit", "h"), ("unit",))  # where nothing is wished
-    at_most = cg.minimum(cg.variable("next"), abs(cg.variable("end") - cg.variable("t")))
+    share = replace(call(lambda h, unit: {"s": h / unit}), exact=True)
+    at_all = call(lambda unit, h: {"unit": cg.where(unit, unit, h)})  # where nothing is wished
     controls = ["unit", "last", "before", "next", "end", "rtol", "s", "at_t", "starting"]
-    lengths |= dict.fromkeys([*c, "rate", "rounding", "rounding_new", "slope", "atol", "weight"], m)
-    lengths |= {"zeros": graphs.zeros} | dict.fromkeys(controls, 1)
     return Step(
-        lengths,
+        lengths | dict.fromkeys([*c, "rate"], m) | {"zeros": graphs.zeros},
         [share, _arrival(order)],
         [_rates(graphs, "x", "t"), count(1)],
         [at_all, *series, *_wish(order)],
-        [Call(function("next end t", unit=at_most, starting=1.0), ("next", "end", "t"), ("unit", "starting"))],
-        kept=[
-            copied("rounding_new", "rounding"),
-            Call(function("h", unit=h, starting=0.0), ("h",), ("unit", "starting")),
-        ],
+        [call(begin)],
+        kept=[copied("rounding_new", "rounding"), call(lambda h: {"unit": h, "starting": 0.0})],
         fixed=("rounding", "rounding_new", "atol", "weight", *controls),
         error=[stage_time("at_t", 1.0), _rates(graphs, "x_new", "at_t"), count(1), *_checked(m, order)],
         estimate=order,
         handed=(),
         dense=[_dense(order)],
-        dense_lengths=dict.fromkeys(_names("dense", order), m),
     )
 
 
@@ -90,19 +88,22 @@ def _jets(problem: Problem) -> Jets:
 
 
 def _by_orders(m: int, graphs: Jets, order: int) -> tuple[list[Statement], dict[str, int]]:
-    """Coefficients of one order after another, and the registers that it takes; `none` stays 0."""
-    numbers = Graph([], {name: float(k) for k, name in enumerate(_names("order", order), 1)})
-    body: list[Statement] = [copied("rate", "rates0"), Call(numbers, (), tuple(numbers.outputs))]
+    """Coefficients of one order after another, and the lengths of registers that it takes; `none` stays 0."""
+    orders = {name: float(k) for k, name in enumerate(_names("order", order), 1)}
+    body: list[Statement] = [copied("rate", "rates0"), call(lambda: orders)]
     lengths = dict.fromkeys([*_names("left", order), *_names("right", order), "sums", "none"], graphs.sums)
     for k in range(1, order + 1):
         if k > 1 and graphs.sums:
-            sides = [*_names("left", k - 1), *_names("right", k - 1)]
-            factors = cg.variables(sides)
-            total = Graph(factors, {"sum": convolution(factors[: k - 1], factors[k - 1 :])})
-            body.append(Map(total, tuple(sides), ("sums",)))
+            body.append(_products(k - 1))
         inputs = (f"rates{(k - 1) % 2}", "unit", f"order{k}", "zeros", "sums" if k > 1 else "none")
         body.append(Call(graphs.order, inputs, (f"c{k}", f"rates{k % 2}", f"left{k}", f"right{k}")))
-    return body, lengths | dict.fromkeys(("rates0", "rates1"), m) | dict.fromkeys(_names("order", order), 1)
+    return body, lengths | dict.fromkeys(("rates0", "rates1"), m)
+
+
+def _products(k: int) -> Statement:
+    """The sums over products of both sides up to an order."""
+    sides = [*_names("left", k), *_names("right", k)]
+    return each(lambda *factors: {"sums": convolution(factors[:k], factors[k:])}, *sides)
 
 
 def _wish(order: int) -> list[Statement]:
@@ -111,24 +112,29 @@ def _wish(order: int) -> list[Statement]:
     That is y^(-1 / 2k) units, y the sum of squares of c_k over the tolerance, with a safety factor. Both are taken as a
     power of the higher order alone, which is the same for a step as long as the one before, and takes half the time.
     """
-    names = _names("c", order)
-    x, rtol, atol, *terms = inputs = cg.variables(["x", "rtol", "atol", *names])
-    size = cg.maximum(abs(x), abs(terms[0]))  # what starts at 0 is as large as its first change
-    weight = Graph(inputs[:4], {"weight": 1.0 / (atol + rtol * size)})
-    size = cg.where(size, size, _largest(terms))  # under a force that begins at 0 that is 0, too, but not its largest
-    of_start = Graph(inputs, {"weight": 1.0 / (atol + rtol * size)})
-    at_start, later = (Map(each, each.input_names, ("weight",)) for each in (of_start, weight))
-    c, each = inputs = cg.variables("c weight")
-    square = Graph(inputs, {"y": (c * each) * (c * each)})
-    last, before, unit, wanted = inputs = cg.variables("last before unit next")
-    both = cg.maximum(math.exp(1.4) * before, math.exp(4.0 + 1.4 * order / (order - 1.0)) * last)
-    share = both ** (-0.5 / order)
-    h = abs(unit) * cg.where(share > SHORTEST, share, SHORTEST)
-    graph = Graph(inputs, {"h": cg.where(h < wanted, h, wanted)})
+
+    def later(x: Node, rtol: Node, atol: Node, first: Node) -> Values:
+        """What starts at 0 is as large as its first change."""
+        return {"weight": 1.0 / (atol + rtol * cg.maximum(abs(x), abs(first)))}
+
+    def at_start(x: Node, rtol: Node, atol: Node, *terms: Node) -> Values:
+        """Under a force that begins at 0 that is 0, too, but not its largest."""
+        size = cg.maximum(abs(x), abs(terms[0]))
+        return {"weight": 1.0 / (atol + rtol * cg.where(size, size, _largest(terms)))}
+
+    def wish(last: Node, before: Node, unit: Node, next_: Node) -> Values:
+        both = cg.maximum(math.exp(1.4) * before, math.exp(4.0 + 1.4 * order / (order - 1.0)) * last)
+        share = both ** (-0.5 / order)
+        h = abs(unit) * cg.where(share > SHORTEST, share, SHORTEST)
+        return {"next": cg.where(h < next_, h, next_)}
+
+    c, tolerance = _names("c", order), ("x", "rtol", "atol")
+    last = total(lambda c, weight: {"last": (c * weight) * (c * weight)}, f"c{order}", "weight")
     return [
-        If("starting", (at_start,), (later,)),
-        *[Sum(square, (f"c{k}", "weight"), name) for name, k in (("last", order), ("before", order - 1))],
-        Call(graph, ("last", "before", "unit", "next"), ("next",)),
+        If("starting", (each(at_start, *tolerance, *c),), (each(later, *tolerance, "c1"),)),
+        last,
+        replace(last, inputs=(f"c{order - 1}", "weight"), outputs=("before",)),
+        call(wish),
     ]
 
 
@@ -141,13 +147,15 @@ def _largest(c: Sequence[Node]) -> Node:
     return sizes[0]
 
 
-def _arrival(order: int) -> Map:
+def _arrival(order: int) -> Statement:
     """x_new = x + sum of c_k s^k, with what rounding took off; slope = h times the polynomial's derivative there."""
-    x, before, s, *c = cg.variables(["x", "rounding", "s", *_names("c", order)])
-    total, rounding = compensated(x, s * _polynomial(c, s) + before)
-    slope = s * _polynomial([k * each for k, each in enumerate(c, 1)], s)
-    graph = Graph([x, before, s, *c], {"x": total, "rounding": rounding, "slope": slope})
-    return Map(graph, ("x", "rounding", "s", *_names("c", order)), ("x_new", "rounding_new", "slope"))
+
+    def arrival(x: Node, rounding: Node, s: Node, *c: Node) -> Values:
+        x_new, rounding_new = compensated(x, s * _polynomial(c, s) + rounding)
+        slope = s * _polynomial([k * each_one for k, each_one in enumerate(c, 1)], s)
+        return {"x_new": x_new, "rounding_new": rounding_new, "slope": slope}
+
+    return each(arrival, "x", "rounding", "s", *_names("c", order))
 
 
 def _polynomial(c: Sequence[Node], s: Node) -> Node:
@@ -165,24 +173,25 @@ def _checked(m: int, order: int) -> list[Statement]:
 
     One that has to be tried again misses a tolerance more.
     """
-    slope, rate, x, x_new, rtol, atol, h = inputs = cg.variables("slope rate x x_new rtol atol h")
-    scale = atol + cg.maximum(rtol, CHECKED) * cg.maximum(abs(x), abs(x_new)) + CHECKED * abs(slope)
-    part = (slope - h * rate) / scale
-    names = ("error", "h", "t", "next", "unit")
-    total, h, t, wanted, unit = of_all = cg.variables(names)
-    missed = cg.sqrt(total * (1.0 / (m * (order + 1.0) ** 2)))
-    error = cg.where(cg.not_equal(t, t + h), cg.where(APART * wanted < abs(unit), missed + 1.0, missed), math.inf)
-    return [
-        Sum(Graph(inputs, {"y": part * part}), ("slope", "rate", "x", "x_new", "rtol", "atol", "h"), "error"),
-        Call(Graph(of_all, {"error": error}), names, ("error",)),
-    ]
+
+    def square(slope: Node, rate: Node, x: Node, x_new: Node, rtol: Node, atol: Node, h: Node) -> Values:
+        scale = atol + cg.maximum(rtol, CHECKED) * cg.maximum(abs(x), abs(x_new)) + CHECKED * abs(slope)
+        part = (slope - h * rate) / scale
+        return {"error": part * part}
+
+    def judged(error: Node, h: Node, t: Node, next_: Node, unit: Node) -> Values:
+        missed = cg.sqrt(error * (1.0 / (m * (order + 1.0) ** 2)))
+        again = cg.where(APART * next_ < abs(unit), missed + 1.0, missed)
+        return {"error": cg.where(cg.not_equal(t, t + h), again, math.inf)}
+
+    return [total(square), call(judged)]
 
 
-def _dense(order: int) -> Map:
+def _dense(order: int) -> Statement:
     """dense_k = c_k s^k."""
-    s, *c = cg.variables(["s", *_names("c", order)])
-    outputs, power = {}, s
-    for k, each in enumerate(c, start=1):
-        outputs[f"dense{k}"] = each * power
-        power = power * s
-    return Map(Graph([s, *c], outputs), ("s", *_names("c", order)), tuple(outputs))
+
+    def terms(s: Node, *c: Node) -> Values:
+        powers = itertools.accumulate([s] * order, operator.mul)
+        return {f"dense{k}": term * power for k, (term, power) in enumerate(zip(c, powers, strict=True), 1)}
+
+    return each(terms, "s", *_names("c", order))

@@ -15,9 +15,9 @@ from numpy.typing import ArrayLike
 from cgraph import Graph, _shared
 from cgraph._shared import Array, counted, or_nearest
 
-from .row_values import origin, row_values
-from .sampled_controller import HeldForces
+from .applied_force import HeldForces
 from .steps.dense_output import Solution
+from .steps.row_values import origin, row_values
 
 if TYPE_CHECKING:
     from cgraph._shared import WhyNan

@@ -22,7 +22,7 @@ import cgraph as cg
 from cgraph._shared import Array, Json, atomic_write
 
 from ...integrators import Problem
-from .ensemble import RunTable
+from .ensemble import COLUMNS, RunTable
 from .task import Chunk, Part, Task
 
 if TYPE_CHECKING:
@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
 SWEEP, ROWS, LOCK = "sweep.json", "rows.npy", "lock.sqlite"
 FORMAT = 1
+NUMBERS = [name for name, kind in COLUMNS.items() if kind is not np.object_]
 AGAIN = "remove the folder, and the sweep begins anew"
 
 
@@ -118,31 +119,34 @@ class Store:
 
     def part(self, chunk: Chunk) -> Part | None:
         """The results of a chunk, if they are there."""
-        count = len(chunk.x)
-        runs = RunTable(count)
+        rows, runs = self.rows[chunk.first : chunk.first + len(chunk.x)], RunTable(len(chunk.x))
         try:
             with np.load(self._file(chunk.first), allow_pickle=False) as kept:
-                for name, column in runs.columns.items():
-                    column[:] = kept[name]
+                runs.put(slice(None), **{name: kept[name] for name in NUMBERS})
                 texts, checksum = json.loads(kept["texts"].tobytes()), int(kept["checksum"])
         except (OSError, ValueError, KeyError, EOFError, BadZipFile):  # not there, or damaged: the chunk is run again
             return None
-        rows = self.rows[chunk.first : chunk.first + count]
         if crc32(rows.data) != checksum:
             return None
-        runs.messages, runs.warnings = texts["messages"], [tuple(each) for each in texts["warnings"]]
+        runs.put(slice(None), message=texts["messages"])
+        for k, said in enumerate(texts["warnings"]):
+            runs.put(k, warnings=tuple(said))
         happened = [[(number, t, np.array(x)) for number, t, x in log] for log in texts["happened"]]
         return Part(chunk.first, rows, runs, happened)
 
     def keep(self, part: Part) -> None:
         """Write how the trajectories of a part went; their rows are in the table."""
         self.rows.flush()  # type: ignore[attr-defined]  # of a memmap
+        columns, written = part.runs.columns, BytesIO()
         happened = [[(number, t, x.tolist()) for number, t, x in log] for log in part.happened]
-        texts = {"messages": part.runs.messages, "warnings": part.runs.warnings, "happened": happened}
-        kept = {"texts": np.frombuffer(json.dumps(texts).encode(), np.uint8), **part.runs.columns}
+        texts = {
+            "messages": columns["message"].tolist(),
+            "warnings": columns["warnings"].tolist(),
+            "happened": happened,
+        }
         checksum = crc32(self.rows[part.first : part.first + len(part.rows)].data)
-        written = BytesIO()
-        np.savez(written, checksum=np.array(checksum, np.uint32), **kept)
+        kept = {"texts": np.frombuffer(json.dumps(texts).encode(), np.uint8), "checksum": np.array(checksum, np.uint32)}
+        np.savez(written, **kept, **{name: columns[name] for name in NUMBERS})
         atomic_write(self._file(part.first), written.getvalue())
 
     def read_only(self) -> Array:

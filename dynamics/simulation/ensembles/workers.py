@@ -15,7 +15,7 @@ import numpy as np
 
 from cgraph._shared import Array, thread_count
 
-from ..steps.stepping import StoppedError
+from ..stepper import StoppedError
 from .task import Chunk, Part, Task
 
 Map = Callable[[Callable[[Chunk], Part], Sequence[Chunk]], Iterable[Part]]

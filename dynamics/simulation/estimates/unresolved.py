@@ -12,13 +12,13 @@ from cgraph._shared import Array, kept_by_first
 from cgraph.extend import Builder, building
 
 from ...systems.arguments import TIME
-from ..row_values import values_of
-from .state_sizes import Flags
+from ..steps.row_values import values_of
 
 PARTS, TIMES = 16, 10  # into which the way from one state to the next is divided, and again, to find a branch's change
 BURST = (
     4  # steps, by which changes of branches are apart that are those of one passage, as where friction comes to rest
 )
+TOGETHER = 512  # states that are looked at once
 WAVES = ("sin", "cos", "tan")
 
 
@@ -89,38 +89,71 @@ def _sides(rate: Graph, names: dict[Node, str]) -> Graph:
     return Graph([*rate.inputs, *given.values()], {name: new[node] for name, node in rate.outputs.items()})
 
 
-def turning(waves: Graph, t: Array, x: Array, p: Array) -> Array:
-    """Largest angular velocity of sines and cosines [rad/s], (k,), between states x (k, r, m) at times t (r,)."""
-    phases = _values(waves, t, x, p[:, None])
-    return np.asarray((np.abs(np.diff(phases)) / np.abs(np.diff(t))).max(axis=(0, 2)))
+def is_watched(rate: Graph) -> bool:
+    """Whether a rate has parts that steps may not resolve."""
+    return any(graph is not None for graph in unresolved(rate))
 
 
-def missed(what: Unresolved, order: int, t: Array, x: Array, p: Array) -> tuple[Flags, Array]:
-    """Whether runs pass jumps or kinks of the rate, (k,), and by how much the steps that do are off, added up, (k, m).
+class Watch:
+    """What steps of k runs side by side cannot resolve, as the states after all of them come.
 
-    x: the states after all steps, (k, r, m), at times t (r,).  A step across a jump may be off by the jump times the
-    way from there to the nearer end of the step; of order 1, where the rate is that of one end, by all of the step.
-    Farther from its ends than a share 1 / order a step evaluates the rate on both sides, and steps of other lengths
-    differ. Across a kink the two sides differ by what the rate has become since: least at the nearer end, too.
+    p: values of the parameters, (k, ..).  turning: of sines and cosines [rad/s], (k,).  bent: whether a jump or a kink
+    was passed, (k,).  missed: by how much steps across these are off, added up, (k, m).
     """
-    assert what.branches is not None
-    assert what.sides is not None
-    branch = _values(what.branches, t, x, p[:, None])
-    run, row = np.nonzero((branch[:, :, 1:] != branch[:, :, :-1]).any(axis=0))
-    bent, error = np.zeros(len(x), dtype=bool), np.zeros((len(x), x.shape[2]))
-    if not len(run):
-        return bent, error
-    bent[run], p = True, p[run]
-    ends = [_End(t[at], x[run, at], branch[:, run, at]) for at in (row, row + 1)]
-    apart = [
-        np.abs(np.subtract(*[_values(what.sides, end.t, end.x, p, each.branch) for each in ends])).T for end in ends
-    ]
-    way = np.ones(len(run)) if order == 1 else np.minimum(_way(what.branches, ends[0], ends[1], p), 1.0 / order)
-    off = np.fmin(*apart) * (np.abs(ends[1].t - ends[0].t) * way)[:, None]
-    first = np.flatnonzero(np.diff(run, prepend=-1) + (np.diff(row, prepend=row[0]) > BURST))
-    largest = np.maximum.reduceat(np.where(np.isfinite(off), off, 0.0), first)
-    np.add.at(error, run[first], largest)
-    return bent, error
+
+    def __init__(self, rate: Graph, order: int, p: Array, t: float, x: Array) -> None:
+        """The runs start from x (k, m) at t."""
+        self._what, self._order, self._p, self.needed = unresolved(rate), order, p, is_watched(rate)
+        self.turning, self.bent, self.missed = np.zeros(len(x)), np.zeros(len(x), dtype=bool), np.zeros(x.shape)
+        self._seen = [(np.array([t]), x[:, None])]
+
+    def add(self, t: Array, x: Array) -> None:
+        """The next states, (k, r, m), at times t (r,)."""
+        if self.needed:
+            self._seen.append((t, x))
+            if sum([len(times) for times, _ in self._seen]) > TOGETHER:
+                self.look()
+
+    def restart(self, t: float, x: Array, p: Array | None = None) -> None:
+        """The runs go on from other states x (k, m), or with other parameters."""
+        self.look()
+        self._p, self._seen = self._p if p is None else p, [(np.array([t]), x[:, None])]
+
+    def look(self) -> None:
+        """Look at what has come."""
+        if len(self._seen) == 1:
+            return
+        t, x = np.concatenate([t for t, _ in self._seen]), np.concatenate([x for _, x in self._seen], axis=1)
+        self._seen = [(t[-1:], x[:, -1:])]
+        if self._what.waves is not None:
+            phases = _values(self._what.waves, t, x, self._p[:, None])
+            speeds = np.abs(np.diff(phases)) / np.abs(np.diff(t))
+            self.turning = np.maximum(self.turning, speeds.max(axis=(0, 2)))
+        if self._what.branches is not None:
+            self._look_for_branches(self._what.branches, t, x)
+
+    def _look_for_branches(self, branches: Graph, t: Array, x: Array) -> None:
+        """Note the steps across jumps and kinks.
+
+        A step across a jump may be off by the jump times the way from there to the nearer end of the step; of order 1,
+        where the rate is that of one end, by all of the step. Farther from its ends than a share 1 / order a step
+        evaluates the rate on both sides, and steps of other lengths differ. Across a kink the two sides differ by what
+        the rate has become since: least at the nearer end, too.
+        """
+        assert self._what.sides is not None
+        branch = _values(branches, t, x, self._p[:, None])
+        run, row = np.nonzero((branch[:, :, 1:] != branch[:, :, :-1]).any(axis=0))
+        if not len(run):
+            return
+        self.bent[run], p = True, self._p[run]
+        ends = [_End(t[at], x[run, at], branch[:, run, at]) for at in (row, row + 1)]
+        rates = [[_values(self._what.sides, end.t, end.x, p, each.branch) for each in ends] for end in ends]
+        apart = np.fmin(*[np.abs(here - there).T for here, there in rates])
+        way = np.ones(len(run)) if self._order == 1 else np.minimum(_way(branches, *ends, p), 1.0 / self._order)
+        off = apart * (np.abs(ends[1].t - ends[0].t) * way)[:, None]
+        first = np.flatnonzero(np.diff(run, prepend=-1) + (np.diff(row, prepend=row[0]) > BURST))
+        largest = np.maximum.reduceat(np.where(np.isfinite(off), off, 0.0), first)
+        np.add.at(self.missed, run[first], largest)
 
 
 class _End(NamedTuple):

@@ -16,8 +16,8 @@ from cgraph.extend import Builder, building, topological
 from ...equations.substitute import substitute
 from ...integrators import Problem, quantity, quantity_inputs, state_arguments
 from ...systems.arguments import call_user_function, node_or_number, sequence
-from ..row_values import values_of
 from ..steps.dense_output import UNIT
+from ..steps.row_values import values_of
 
 ROUNDINGS = 8.0  # that the interpolation of a state, and the sum of a motion, may take
 
@@ -158,30 +158,6 @@ class EventProgram:
     rate: Graph
     velocities: Graph | None
 
-    def motions(
-        self,
-        which: np.ndarray[Any, np.dtype[np.bool_]],
-        t: Array,
-        x: Array,
-        p: Sequence[float],
-        fastest: Array,
-        off: float,
-    ) -> Array:
-        """The derivatives of quantities by the time (1,) at one state (1, m); 0 of others, and where they are rounding.
-
-        fastest: how far the rates of the states have gone, at least the largest so far, (1, m).  off: what of these is
-        rounding.
-        """
-        x_dot = self.rates(t, x, p)
-        fastest = np.fmax(fastest, np.where(np.isfinite(x_dot), np.abs(x_dot), 0.0))
-        motions, none = np.zeros(len(self.events)), np.zeros_like(x)
-        for number in np.flatnonzero(which):
-            event = self.events[number]
-            motion = event.slope(t, x, p, x_dot, np.ones(1))
-            most = event.error(t, x, p, fastest, np.ones(1)) - event.error(t, x, p, none, np.zeros(1))
-            motions[number] = np.where(np.abs(motion) <= off * most, 0.0, motion)[0]
-        return motions
-
     def rates(self, t: Array, x: Array, p: Sequence[float]) -> Array:
         """The derivatives of the states by the time, (k, m), at times (k,) and states (k, m)."""
         return values_of(self.rate, [*x.T, t, *p], len(t)).T
@@ -194,39 +170,34 @@ class EventProgram:
 
 def event_program(problem: Problem, events: Sequence[Event]) -> EventProgram:
     """The graphs of these events of a problem. Raises TypeError or ValueError for what is no node of the state."""
-    watched = tuple([_watched(problem, event) for event in events])
-    return EventProgram(watched, problem.components, problem.rate, problem.velocities)
+    watched = []
+    for event in events:
+        values = problem.observed({"g": quantity(problem, f"event {event.name!r}", event.value)})
+        moving = values.inputs[: problem.size + 1]
+        slopes, errors = cg.simplify(cg.jvp(values, list(moving))), _errors(values, moving)
+        reset = None if event.reset is None else _reset(problem, f"the reset of event {event.name!r}", event.reset)
+        watched.append(WatchedEvent(event.name, event.direction, event.terminal, values, slopes, errors, reset))
+    return EventProgram(tuple(watched), problem.components, problem.rate, problem.velocities)
 
 
-def _watched(problem: Problem, event: Event) -> WatchedEvent:
-    node = quantity(problem, f"event {event.name!r}", event.value)
-    values = problem.observed({"g": node})
-    moving = values.inputs[: problem.size + 1]
-    slopes = cg.simplify(cg.jvp(values, list(moving)))
-    reset = None if event.reset is None else _reset(problem, event.name, event.reset)
-    errors = _errors(values, moving)
-    return WatchedEvent(event.name, event.direction, event.terminal, values, slopes, errors, reset)
-
-
-def _reset(problem: Problem, name: str, function: Callable[..., Any]) -> Graph:
+def _reset(problem: Problem, what: str, function: Callable[..., Any]) -> Graph:
     """The state after an event: inputs the states, t, parameters; outputs the states."""
-    what = f"the reset of event {name!r}"
-    inputs = quantity_inputs(problem)
-    changed = call_user_function(what, function, *state_arguments(problem))
-    parts = [changed] if problem.system is None else sequence(f"{what} must be (q, qd),", changed)
+    changed, system, nq = call_user_function(what, function, *state_arguments(problem)), problem.system, problem.nq
+    parts = [changed] if system is None else sequence(f"{what} must be (q, qd),", changed)
     halves = [sequence(f"{what} must be" + (" a pair of" if len(parts) == 2 else ""), part) for part in parts]
-    nq, n = problem.nq, problem.size - problem.nq
-    if [len(half) for half in halves] != ([nq] if problem.system is None else [nq, n]):
-        needed = f"({nq} coordinates, {n} velocities)" if problem.system else f"{nq} states"
-        raise ValueError(f"{what} must be {needed}, got lengths {[len(half) for half in halves]}")
+    lengths, n = [len(half) for half in halves], problem.size - nq
+    if lengths != ([nq] if system is None else [nq, n]):
+        needed = f"({nq} coordinates, {n} velocities)" if system else f"{nq} states"
+        raise ValueError(f"{what} must be {needed}, got lengths {lengths}")
     nodes = [node_or_number(what, node) for half in halves for node in half]
+    inputs = quantity_inputs(problem)
     for node in topological(nodes):
         if node.op.name == "variable" and node not in inputs:
             raise ValueError(f"{what} must depend on the state, t and the parameters alone, got {node.name!r}")
-    if problem.system is not None:
-        nodes[:nq] = problem.system.kinematics.normalized(nodes[:nq])
+    if system is not None:
+        nodes[:nq] = system.kinematics.normalized(nodes[:nq])
         if problem.momentum is not None:
-            after = dict(zip([*problem.system.q, *problem.system.qd], nodes, strict=True))
+            after = dict(zip([*system.q, *system.qd], nodes, strict=True))
             nodes[nq:] = substitute(list(problem.momentum.outputs.values()), after)
     return problem.observed({f"x{k}": node for k, node in enumerate(nodes)})
 

@@ -21,9 +21,9 @@ from cgraph.extend import Runner
 
 from ..events.event import WatchedEvent
 from ..outcome import MotionError
-from ..row_values import values_of
+from ..stepper import nonfinite, unsolved
 from ..steps.dense_output import Indices
-from ..steps.stepping import nonfinite, unsolved
+from ..steps.row_values import values_of
 from .motion_programs import LOSS, motion_programs
 from .motions import TORQUE, Motions, Stretch
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,8 +17,9 @@ from cgraph.extend import topological
 
 from ...integrators import Problem, quantity
 from ...systems.model import Model
+from ..applied_force import Constant
 from ..events.event import Event, as_events
-from ..moving import Constant
+from ..run_options import Options
 from ..trajectory import SimulationWarning
 from .differentiated_run import DifferentiatedRun
 from .doubts import doubts
@@ -78,19 +79,10 @@ def gradient(
     *,
     running: Loss | None = None,
     wrt: str | Iterable[str] | None = None,
-    t0: float = 0.0,
-    t_span: ArrayLike | None = None,
-    dt: float | None = None,
-    max_step: float | None = None,
-    rtol: float | None = None,
-    atol: ArrayLike | None = None,
-    first_step: float | None = None,
     tau: Constant | ArrayLike | Callable[..., Sequence[Node | float]] = 0.0,
     parameters: Mapping[str, float] | None = None,
     events: Event | Iterable[Event] = (),
-    estimate_error: bool | None = None,
-    backend: str = "auto",
-    form: str = "velocity",
+    **options: Unpack[Options],
 ) -> MotionGradient:
     """A loss of a motion and its gradient, by reverse mode through every step, in a few times the motion itself.
 
@@ -108,7 +100,7 @@ def gradient(
     loss : callable, optional
         (q, qd, t) or (q, qd, t, p) of the state and time where the motion ends, to a node or a number; of an OdeSystem
         (x, t) or (x, t, p). None for a running loss alone.
-    q, qd, t_end, t0, t_span, dt, max_step, rtol, atol, first_step, backend, form
+    q, qd, t_end
         As for `simulate`.
     parameters : mapping, optional
         {name: value} in place of the model's own, and of those of a controller, as for `simulate`; and of those that
@@ -129,10 +121,9 @@ def gradient(
         Those of `simulate`: where one ends the motion or resets its state depends on all before, and so do the steps
         after it. The motion arrives there by a step of its own length, where `simulate` reads the state off its dense
         output: `value` may differ from that of its run by the error of a step. Not with a row of forces a step.
-    estimate_error : bool, optional
-        Of equal steps, whether a motion in steps of half the length estimates the error of the state, with a
-        `SimulationWarning` where it is beyond `rtol`, 1e-3, and `atol`, 0; which takes half as long again. By
-        default it does. The numbers are the same without.
+    **options
+        Those of `dyn.Options` but `max_steps`, `dense_output`, `fma` and `progress`. The error of equal steps is
+        estimated by a motion in steps of half the length, which takes half as long again.
 
     Returns
     -------
@@ -159,10 +150,8 @@ def gradient(
     >>> round(result.value, 6), result["q"].round(6).tolist(), result["tau"].shape
     (-0.403412, [-0.880376], (100, 1))
     """
-    options: dict[str, Any] = {"dt": dt, "max_step": max_step, "rtol": rtol, "atol": atol, "first_step": first_step}
-    options |= {"estimate_error": estimate_error, "backend": backend}
-    span, losses = (t_end, t0, t_span), (loss, running)
-    motions = motions_of(model, q, qd, span, method, tau, parameters, wrt, form, as_events(events), losses, **options)
+    losses = loss, running
+    motions = motions_of(model, q, qd, t_end, method, tau, parameters, wrt, as_events(events), losses, options)
     run, values, slopes, bars = differentiated(motions, *losses)
     for text in doubts(run, values, slopes, bars)[0]:
         warnings.warn(text, SimulationWarning, stacklevel=2)

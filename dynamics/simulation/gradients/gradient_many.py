@@ -6,7 +6,7 @@ import itertools
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,6 +16,7 @@ from cgraph._shared import Array
 
 from ...systems.model import Model
 from ..outcome import MotionError
+from ..run_options import Options
 from ..trajectory import SimulationWarning
 from .doubts import doubts
 from .gradient import differentiated
@@ -71,18 +72,9 @@ def gradient_many(
     *,
     running: Loss | None = None,
     wrt: str | Iterable[str] | None = None,
-    t0: float = 0.0,
-    t_span: ArrayLike | None = None,
-    dt: float | None = None,
-    max_step: float | None = None,
-    rtol: float | None = None,
-    atol: ArrayLike | None = None,
-    first_step: float | None = None,
     tau: ArrayLike | Callable[..., Sequence[Node | float]] = 0.0,
     parameters: Mapping[str, ArrayLike] | None = None,
-    estimate_error: bool | None = None,
-    backend: str = "auto",
-    form: str = "velocity",
+    **options: Unpack[Options],
 ) -> MotionGradients:
     """Losses of N motions and their gradients, each by its own start, forces and parameters: `gradient`, N times.
 
@@ -96,7 +88,7 @@ def gradient_many(
         What moves.
     q, qd : array_like
         The starts, (N, nq) and (N, n), or (nq,) and (n,) for all; of an OdeSystem q is the state, and qd None.
-    loss, t_end, running, wrt, t0, t_span, dt, max_step, rtol, atol, first_step, estimate_error, backend, form
+    loss, t_end, running, wrt, **options
         As for `gradient`.
     method : str, optional
         As for `gradient`: "dop853", and "rk4" where `dt` or a row of forces a step asks for equal steps.
@@ -123,10 +115,8 @@ def gradient_many(
     >>> fan["q"].round(4).tolist()
     [[-0.8804], [-1.1123], [-0.595]]
     """
-    options: dict[str, Any] = {"dt": dt, "max_step": max_step, "rtol": rtol, "atol": atol, "first_step": first_step}
-    options |= {"estimate_error": estimate_error, "backend": backend}
-    span, losses = (t_end, t0, t_span), (loss, running)
-    motions = motions_of(model, q, qd, span, method, tau, parameters, wrt, form, (), losses, many=True, **options)
+    losses = loss, running
+    motions = motions_of(model, q, qd, t_end, method, tau, parameters, wrt, (), losses, options, many=True)
     count, problem = motions.many, motions.problem
     value, end = np.full(count, np.nan), np.full((count, problem.size), np.nan)
     by_name = {name: np.full((count, *shape), np.nan) for name, shape in _shapes(motions).items()}

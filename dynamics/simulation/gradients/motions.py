@@ -15,27 +15,27 @@ from cgraph import Graph, Node
 from cgraph._shared import Array, kept_by_first, memo, or_nearest, real_array, require_sequence
 from cgraph.extend import Builder, topological
 
-from ...equations.state_equation import state_inputs
+from ...equations.state_equation import FORMS, state_inputs
 from ...equations.states.initial_value import initial_values
 from ...integrators import Method, Problem, derive, in_form
 from ...systems.arguments import Parameters, call_user_function
 from ...systems.model import Equations, Model, as_equations
 from ...systems.ode_system import OdeSystem
 from ...systems.system import System
+from ..applied_force import SampledController, with_applied
 from ..events.event import Event, WatchedEvent, event_program
-from ..moving import with_applied
 from ..outcome import MotionError, Recorder, advise
-from ..row_values import converted
-from ..run_options import METHOD, RunOptions, time_span
-from ..sampled_controller import SampledController
+from ..run_options import METHOD, Options, RunOptions, time_span
+from ..stepper import stepper_of
 from ..steps.equal_steps import step_count
-from ..steps.integration import integration_of
+from ..steps.row_values import converted
 from .motion_equations import MotionEquations, at, motion_equations
 
 Loss = Callable[..., Node | float]
 START, VELOCITY, TORQUE = "q", "qd", "tau"
 OPTIONS_KEPT = 16  # options and equal steps that stay for another run
 EQUAL = "rk4"  # by which equal steps are, unless another method is asked for
+NOT_TAKEN = "max_steps", "dense_output", "fma", "progress"
 _PLAIN = (float, int, str, bool, type(None))
 
 
@@ -170,9 +170,7 @@ class Motions:
         problem, options, start = self.equations.given, self.options, self.x[:, 0]
         parameters = self.inputs[: len(problem.parameters), 0]
         program = event_program(problem, self.events) if self.events else None
-        made = partial(
-            integration_of, problem, parameters=parameters.tolist(), events=program, between=bool(self.events)
-        )
+        made = partial(stepper_of, problem, parameters=parameters.tolist(), events=program, between=bool(self.events))
         x = converted(problem.momentum, options.t0, start, parameters)
         run, recorder = made(options), Recorder(x, None, options.t0, options.direction)
         with np.errstate(all="ignore"):
@@ -181,7 +179,8 @@ class Motions:
         advise(run, recorder.last, options, x, made)
         if run.status:
             raise MotionError(f"the motion did not reach t_end, {run.status}")
-        happened = {name: each.t for name, each in run.crossings(problem.nq, parameters).items()}
+        log = [] if run.log is None else run.log.happened
+        happened = {each.name: np.array([t for k, t, _ in log if k == n]) for n, each in enumerate(self.events)}
         steps = _stretches(recorder.table()[0], options, self.events, happened, ended=bool(run.event))
         return replace(self, steps=steps, said=tuple(run.warnings))
 
@@ -190,19 +189,18 @@ def motions_of(
     model: Model,
     q: ArrayLike,
     qd: ArrayLike | None,
-    span: tuple[float | None, float, ArrayLike | None],
+    t_end: float | None,
     method: str | None,
     tau: Any,
     parameters: Mapping[str, ArrayLike] | None,
     wrt: str | Iterable[str] | None,
-    form: str,
-    events: Sequence[Event] = (),
-    losses: tuple[Loss | None, Loss | None] = (None, None),
+    events: Sequence[Event],
+    losses: tuple[Loss | None, Loss | None],
+    options: Options,
     *,
     many: bool = False,
-    **options: Any,
 ) -> Motions:
-    """The motions of checked arguments.  span: t_end, t0, t_span.  options: those of `simulate` besides.
+    """The motions of checked arguments.
 
     losses: of the end, and of each step.  many: N motions, else one, whose arguments have no axis N.
     Raises TypeError or ValueError naming the argument.
@@ -213,16 +211,18 @@ def motions_of(
             "derivative"
         )
     own = _with_loss_parameters(as_equations(model), parameters, *losses)
-    t0, t_end = time_span(*span)
+    t0, t_end = time_span(t_end, options.pop("t0", 0.0), options.pop("t_span", None))
+    form = options.pop("form", FORMS[0])
     rows = None if callable(tau) else _rows(tau, len(state_inputs(own).applied), many=many)
     if method is None:
-        method = EQUAL if rows is not None or options["dt"] is not None else METHOD
+        method = EQUAL if rows is not None or options.get("dt") is not None else METHOD
     plain = all([type(each) in _PLAIN for each in (t_end, method, t0, *options.values())])
     run = (_options if plain else _options.__wrapped__)(t_end, method, t0, *options.items())
     if rows is not None and (run.adaptive or events):
         needed = "equal steps without events" if events else f"equal steps: method {method!r} chooses its steps"
         raise ValueError(f"tau of shape {np.shape(tau)} is one row a step, which needs {needed}")
-    moving, applied = with_applied(own, tau if rows is None else 0.0, parameters)
+    applied = with_applied(own, tau if rows is None else 0.0, parameters)
+    moving = applied.model
     constant = rows[:, 0] if many and rows is not None else applied.constant  # a motion for each of their first forces
     start = initial_values(moving, q, qd, constant, parameters, t0, many=many)
     run.check(start.states)
@@ -274,7 +274,7 @@ def _by_displacements(system: System, backend: str) -> Any:
 
 @memo(OPTIONS_KEPT)
 def _options(t_end: float, method: str, t0: float, *options: tuple[str, Any]) -> RunOptions:
-    return RunOptions(t_end, method, t0=t0, **dict(options))
+    return RunOptions.of(method, dict(options), t0, t_end, without=NOT_TAKEN)
 
 
 def _rows(tau: Any, n: int, *, many: bool) -> Array | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,8 +14,9 @@ from cgraph import Node
 from cgraph._shared import Array
 
 from ...systems.model import Model
+from ..applied_force import Constant
 from ..events.event import Event, as_events
-from ..moving import Constant
+from ..run_options import Options
 from ..trajectory import SimulationWarning
 from .differentiated_run import DifferentiatedRun
 from .doubts import doubts
@@ -68,19 +69,10 @@ def sensitivities(
     method: str | None = None,
     *,
     wrt: str | Iterable[str] | None = None,
-    t0: float = 0.0,
-    t_span: ArrayLike | None = None,
-    dt: float | None = None,
-    max_step: float | None = None,
-    rtol: float | None = None,
-    atol: ArrayLike | None = None,
-    first_step: float | None = None,
     tau: Constant | Callable[..., Sequence[Node | float]] = 0.0,
     parameters: Mapping[str, float] | None = None,
     events: Event | Iterable[Event] = (),
-    estimate_error: bool | None = None,
-    backend: str = "auto",
-    form: str = "velocity",
+    **options: Unpack[Options],
 ) -> Sensitivities:
     """A motion and the derivatives of all its states, by forward mode through every step.
 
@@ -91,9 +83,9 @@ def sensitivities(
     ----------
     model : System, OdeSystem, Mechanism or Scene
         What moves.
-    q, qd, t_end, t0, t_span, dt, max_step, rtol, atol, first_step, parameters, backend, form
+    q, qd, t_end, parameters
         As for `simulate`.
-    method, estimate_error
+    method, **options
         As for `gradient`.
     wrt : str or sequence of str, optional
         What to differentiate by: "q", "qd", "tau" and names of parameters. By default the start and the applied force.
@@ -122,10 +114,7 @@ def sensitivities(
     >>> result["m"][[100, 200]].round(4).tolist()
     [[-0.1275, 0.4627], [0.0445, -0.6321]]
     """
-    options: dict[str, Any] = {"dt": dt, "max_step": max_step, "rtol": rtol, "atol": atol, "first_step": first_step}
-    options |= {"estimate_error": estimate_error, "backend": backend}
-    span = (t_end, t0, t_span)
-    motions = motions_of(model, q, qd, span, method, tau, parameters, wrt, form, as_events(events), **options)
+    motions = motions_of(model, q, qd, t_end, method, tau, parameters, wrt, as_events(events), (None, None), options)
     if motions.each_step:
         raise ValueError(f"tau must be constant, (n,), got shape {motions.tau.shape[:-1]}: gradient takes a row a step")
     run = DifferentiatedRun(motions, forwards=True)

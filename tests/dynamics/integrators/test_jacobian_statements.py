@@ -7,6 +7,7 @@ import dynamics as dyn
 from cgraph.extend import Map, Program, runner
 from dynamics.integrators.jacobian_statements import jacobian_statements
 from dynamics.integrators.problem import derive, state_jacobian
+from dynamics.integrators.statements import lengths_of
 from tests.tolerances import EQUATIONS
 
 
@@ -14,10 +15,10 @@ from tests.tolerances import EQUATIONS
 @pytest.mark.parametrize("backend", ["auto", "python"])
 def test_the_statements_give_the_jacobian_of_the_rate(links, compressed, backend):
     problem = derive(dyn.planar_arm([1.0] * links, [1.0] * links), {})
-    statements, lengths = jacobian_statements(problem)
+    statements = jacobian_statements(problem)
     assert any(isinstance(each, Map) for each in statements) is compressed
     m, p = problem.size, len(problem.parameters)
-    registers = {"x": m, "t": 1, "p": p, "jacobian": m * m} | lengths
+    registers = lengths_of(statements, {"x": m, "t": 1, "p": p})
     run = runner(Program(registers, statements, record=["jacobian"]), backend)
     rng = np.random.default_rng(links)
     x, more = rng.uniform(-1.0, 1.0, m), rng.uniform(0.5, 1.5, p)

@@ -1,0 +1,357 @@
+"""Crossings: where a quantity is zero in a block of steps, by bounds on cells of the steps, in order."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from cgraph._shared import Array
+
+from ..steps.dense_output import Indices, StepBlock
+from ..steps.state_sizes import Flags
+from .event import WatchedEvent
+
+CELLS = 8  # of a step before the first split, so that it is looked at sixteen times at least
+NODES = 0.5 - 0.5 * np.cos(np.pi * np.arange(CELLS + 1) / CELLS)  # not evenly spaced: no oscillation hides between them
+MOST_CELLS = 1024  # cells of a step
+COARSER = 8.0  # than a neighbor a cell may not be: it would agree by chance
+SHORTEST = 2.0**-48  # of a step, a cell
+DECAY = 16.0  # of what a cubic misses, from a cell to its halves
+MARGIN = 12.0  # by which a cubic has to tell more than it misses
+PARTS, AT_ONCE = 32, 8192  # into which a cell is divided again and again, and those of all cells together
+WHILE = 2.0**-20  # of a step
+BITS = 56.0  # of where in a cell
+PROBES = 0.5 ** np.arange(50, 0, -5)  # of a cell: how far from a zero the sign beside it is asked for
+
+
+class Crossing(NamedTuple):
+    """Crossing of zero by a quantity."""
+
+    row: int  # of the step
+    s: float  # share of the step
+    side: float  # the sign with which it comes; 0 of one that has none, and leaves zero
+    touching: bool  # whether it turns back
+    resting: bool = False  # whether it was at rest there, and leaves
+
+
+@dataclass
+class Side:
+    """Side of zero on which a quantity is, between one part of a run and the next.
+
+    sign: its last, 0 before it has one; of one at rest on zero, that of the side that it belongs to, if there is one.
+    slope: at the end of the last step; NaN at a start.  left: of a run that starts on zero, the sign with which the
+    quantity leaves, 0 as long as it rests there; NaN elsewhere.
+    waiting: whether it is zero at the last instant, and what it does there is for the next step to tell.
+    """
+
+    sign: float = 0.0
+    slope: float = math.nan
+    left: float = math.nan
+    waiting: bool = False
+
+    @property
+    def resting(self) -> bool:
+        """Whether the quantity has been zero, to rounding, since the start of the run or the last reset."""
+        return self.left == 0.0
+
+
+class WatchedSteps(NamedTuple):
+    """Consecutive steps with dense output, and the quantity of an event at shares s, (k,) or (k, parts), of rows (k,).
+
+    noise: what the rounding of the quantity is at least.
+    """
+
+    event: WatchedEvent
+    parameters: Sequence[float]
+    block: StepBlock
+    noise: float = 0.0
+
+    def _points(self, rows: Indices, s: Array) -> tuple[Indices, Array, Array, Array]:
+        rows, s = np.repeat(rows, s.size // max(1, len(rows))), s.ravel()
+        return rows, s, self.block.times_at(rows, s), self.block.states_at(rows, s)
+
+    def values(self, rows: Indices, s: Array) -> Array:
+        """The quantity."""
+        _, _, t, x = self._points(rows, s)
+        return self.event.value(t, x, self.parameters).reshape(s.shape)
+
+    def slopes(self, rows: Indices, s: Array) -> Array:
+        """Its derivatives by the share of the step."""
+        rows, shares, t, x = self._points(rows, s)
+        x_dot, t_dot = self.block.slopes_at(rows, shares), self.block.h[rows]
+        return self.event.slope(t, x, self.parameters, x_dot, t_dot).reshape(s.shape)
+
+    def rounding(self, rows: Indices, s: Array) -> Array:
+        """Rounding errors of its values."""
+        rows, _, t, x = self._points(rows, s)
+        error = self.event.error(t, x, self.parameters, *self.block.rounding(rows, t, x))
+        return np.maximum(self.noise, error).reshape(s.shape)
+
+
+class Cells(NamedTuple):
+    """Parts of steps, from share a to share b, with values and slopes of a quantity at both, (k,) each."""
+
+    rows: Indices
+    a: Array
+    b: Array
+    g_a: Array
+    g_b: Array
+    slope_a: Array
+    slope_b: Array
+    miss: Array  # an estimate of how far the cubic through both ends is off
+    rounding: Array
+
+    def take(self, which: Flags | Indices) -> Cells:
+        """Subset of the cells."""
+        return Cells._make([array[which] for array in self])
+
+    def replaced(self, split: Flags, *halves: Cells) -> Cells:
+        """The cells with left and right parts in place of those of `split`, in order."""
+        cells = Cells._make([np.concatenate(parts) for parts in zip(self.take(~split), *halves, strict=True)])
+        return cells.take(np.lexsort((cells.a, cells.rows)))
+
+    def beside(self, extreme: Callable[[Array, Array], Array], values: Array) -> Array:
+        """Smallest or largest of a cell's value and its neighbors'."""
+        result = values.copy()
+        left = np.flatnonzero((self.rows[:-1] == self.rows[1:]) & (self.b[:-1] == self.a[1:]))
+        result[left] = extreme(result[left], values[left + 1])
+        result[left + 1] = extreme(result[left + 1], values[left])
+        return result
+
+    def control_points(self) -> Array:
+        """Control points, (4, k), of the cubics through values and slopes at the ends, which their hull contains."""
+        third = (self.b - self.a) / 3.0
+        return np.stack([self.g_a, self.g_a + self.slope_a * third, self.g_b - self.slope_b * third, self.g_b])
+
+    def clear(self) -> Flags:
+        """Whether the quantity cannot be zero there, (k,).
+
+        It stays in the hull of the control points, and where it turns between the ends, as |x| may do at once, also on
+        this side of the point where the tangents at the ends meet.
+        """
+        points, sign = self.control_points(), np.sign(self.g_a)
+        hull = (points * sign > MARGIN * self.miss).all(axis=0)
+        turns = (self.slope_a * sign < 0.0) & (self.slope_b * sign > 0.0)
+        bend = np.where(turns, self.slope_b - self.slope_a, 1.0)
+        meet = self.g_a + self.slope_a * (self.slope_b * (self.b - self.a) - (self.g_b - self.g_a)) / bend
+        clear: Flags = hull & ~(turns & (meet * sign <= MARGIN * self.miss))
+        return clear
+
+    def resolved(self) -> Flags:
+        """Whether the ends tell how often it is zero, (k,).
+
+        It is not; or it is monotone; or its slope is, so that it has one extremum; or it is zero all over; or it is no
+        number, and nothing can be told.
+        """
+        points, margin = self.control_points(), MARGIN * self.miss
+        zero, none = np.abs(points).max(axis=0) <= 2.0 * self.rounding, ~np.isfinite(points).all(axis=0)
+        told: Flags = self.clear() | zero | none
+        for order in (1, 2):
+            differences = np.diff(points, order, axis=0)
+            told |= (differences > margin).all(axis=0) | (differences < -margin).all(axis=0)
+        return told
+
+
+def event_cells(steps: WatchedSteps) -> tuple[Cells, Flags]:
+    """The cells of all steps in order, and for which steps, (steps,), `MOST_CELLS` were too few."""
+    count = len(steps.block.t)
+    rows, s = np.arange(count), np.tile(NODES, (count, 1))
+    ends = [(each[:, :-1].ravel(), each[:, 1:].ravel()) for each in (s, steps.values(rows, s), steps.slopes(rows, s))]
+    none = np.zeros(CELLS * count)
+    cells = Cells._make([np.repeat(rows, CELLS), *[end for pair in ends for end in pair], none, none])
+    cells = cells.replaced(none == 0.0, *_halves(steps, cells, bounded=False))
+    worst = cells.miss.reshape(count, 2 * CELLS).max(axis=1)
+    cells = cells._replace(miss=np.maximum(cells.miss, worst[cells.rows] / DECAY))
+    beyond = np.zeros(count, dtype=bool)
+    while True:
+        width = cells.b - cells.a
+        unresolved = ~cells.resolved() & (width > SHORTEST)
+        split = unresolved | (cells.beside(np.minimum, width) * COARSER < width)
+        size = np.bincount(cells.rows, minlength=count) + np.bincount(cells.rows[split], minlength=count)
+        late = (size > MOST_CELLS)[cells.rows]
+        beyond[cells.rows[unresolved & late]] = True
+        split &= ~late
+        if not split.any():
+            return cells, beyond
+        cells = cells.replaced(split, *_halves(steps, cells.take(split), bounded=True))
+
+
+def _halves(steps: WatchedSteps, cells: Cells, *, bounded: bool) -> tuple[Cells, Cells]:
+    """Halves of cells. The cubic of a cell, compared with value and slope in its middle, tells how far theirs are off.
+
+    bounded: whether the rounding is asked for; that of whole steps seldom matters.
+    """
+    width = cells.b - cells.a
+    middle = cells.a + 0.5 * width
+    g, slope = steps.values(cells.rows, middle), steps.slopes(cells.rows, middle)
+    g_off = g - 0.5 * (cells.g_a + cells.g_b) - 0.125 * width * (cells.slope_a - cells.slope_b)
+    slope_off = width * (slope + 0.25 * (cells.slope_a + cells.slope_b)) - 1.5 * (cells.g_b - cells.g_a)
+    off = np.maximum(np.abs(g_off), 0.25 * np.abs(slope_off))
+    wide = 4.0 * cells.beside(np.maximum, cells.beside(np.maximum, off))  # one that is far off may agree by chance
+    miss = np.maximum(wide, cells.miss) / DECAY
+    rounding = steps.rounding(cells.rows, middle) if bounded else cells.rounding
+    halves = cells._replace(miss=miss, rounding=rounding)
+    return halves._replace(b=middle, g_b=g, slope_b=slope), halves._replace(a=middle, g_a=g, slope_a=slope)
+
+
+def crossings(steps: WatchedSteps, side: Side) -> tuple[list[Crossing], Flags]:
+    """Crossings in these steps, and flags of (steps,) in which more may have happened; moves `side` on.
+
+    A quantity crosses zero where its sign turns, and touches it where an extremum is zero to the rounding of its
+    evaluation. One that stays zero does so from where it arrives; one that rests there, and leaves to the other side
+    than its own, crosses zero where it leaves.
+    """
+    cells, beyond = event_cells(steps)
+    # where steps meet, the slope is that at the end of the step before: a turn counts once
+    first = np.flatnonzero(np.diff(cells.rows)) + 1
+    cells.slope_a[first] = cells.slope_b[first - 1]
+    if not math.isnan(side.slope):
+        cells.slope_a[0] = side.slope
+    side.slope = float(cells.slope_b[-1])
+    return _Looks(steps, *_at_extrema(steps, cells), side).crossings(side), beyond
+
+
+def _at_extrema(steps: WatchedSteps, cells: Cells) -> tuple[Cells, Indices]:
+    """The cells, parted at extrema where a quantity may come to zero and turn back; and the looks there."""
+    sign = np.sign(cells.g_a)
+    dips = (sign * np.sign(cells.g_b) > 0.0) & (cells.slope_a * sign < 0.0) & (cells.slope_b * sign >= 0.0)
+    dips[dips] = ~cells.take(dips).clear()
+    few, sign = cells.take(dips), sign[dips]
+    if not len(sign):
+        return cells, np.zeros(0, dtype=np.intp)
+    pair = _turn(lambda s: steps.slopes(few.rows, s) * sign[:, None] < 0.0, few.a, few.b)
+    at, g = np.stack(pair), np.stack([steps.values(few.rows, s) for s in pair])
+    nearest = np.argmin(g * sign, axis=0)[None]
+    s, value = (np.take_along_axis(table, nearest, axis=0)[0] for table in (at, g))
+    parted = cells.replaced(dips, few._replace(b=s, g_b=value), few._replace(a=s, g_a=value))
+    return parted, np.flatnonzero(dips) + np.arange(1, len(s) + 1)
+
+
+class _Looks:
+    """The quantity along the cells: looks 0 .. k at their ends, and the signs beside them."""
+
+    def __init__(self, steps: WatchedSteps, cells: Cells, extrema: Indices, side: Side) -> None:
+        self.steps, self.cells = steps, cells
+        self.rows = np.concatenate([cells.rows[:1], cells.rows])
+        self.shares = np.concatenate([cells.a[:1], cells.b])
+        g = np.concatenate([cells.g_a[:1], cells.g_b])
+        self.exact = g == 0.0
+        signs = np.nan_to_num(np.sign(g))
+        beside = np.flatnonzero(np.concatenate([[side.sign], signs[:-1]]) * signs < 0.0)
+        self.zero = self._zeros(g, np.concatenate([beside, extrema]), start=not math.isnan(side.left))
+        looks = np.flatnonzero(self.zero)
+        before, after = signs.copy(), signs.copy()
+        before[looks], after[looks] = self._beside(looks, -1), self._beside(looks, 1)
+        if side.left and not math.isnan(side.left):
+            after[0], side.left = side.left, math.nan
+        # [sign before look 0, start of cell 0, its end, start of cell 1, ..]: even entries stand before their look
+        self.signs = np.empty(2 * len(cells.a) + 1)
+        self.signs[0] = side.sign
+        self.signs[1::2], self.signs[2::2] = after[:-1], before[1:]
+
+    def _zeros(self, g: Array, beside: Indices, *, start: bool) -> Flags:
+        """Flags of the looks at zero: exactly, or to rounding near an extremum, a change of sign or such a look.
+
+        beside: looks at extrema, and those before which the sign changes.  start: whether the first look is at zero.
+        """
+        zero: Flags = g == 0.0
+        zero[0] |= start
+        tested, near = np.zeros(len(g), dtype=bool), np.flatnonzero(zero)
+        while True:
+            looks = np.unique(np.concatenate([near - 1, near, near + 1, beside - 1, beside]))
+            looks = looks[(looks >= 0) & (looks < len(g))]
+            looks, beside = looks[~tested[looks]], beside[:0]
+            if not len(looks):
+                return zero
+            tested[looks] = True
+            near = looks[np.abs(g[looks]) <= self.steps.rounding(self.rows[looks], self.shares[looks])]
+            zero[near] = True
+
+    def _beside(self, looks: Indices, direction: int) -> Array:
+        """The signs of the quantity just before or after looks at which it is zero; 0 where it stays zero."""
+        cells = self.cells
+        if not len(looks):
+            return np.zeros(0)
+        cell = np.clip(looks - (direction < 0), 0, len(cells.a) - 1)
+        start, end = (cells.a[cell, None], cells.b[cell, None])[::direction]
+        s = np.clip(start + (end - start) * PROBES, 0.0, 1.0)
+        g = self.steps.values(cells.rows[cell], s)
+        sure = np.abs(g) > self.steps.rounding(cells.rows[cell], s)
+        nearest = np.take_along_axis(g, np.argmax(sure, axis=1)[:, None], axis=1)[:, 0]
+        outside = looks == (0 if direction < 0 else len(cells.a))
+        beside: Array = np.where(sure.any(axis=1) & ~outside, np.sign(nearest), 0.0)
+        return beside
+
+    def crossings(self, side: Side) -> list[Crossing]:
+        """Where signs turn, and where a quantity that was zero at a look goes back; `side` moves on."""
+        signs, found, arrivals = self.signs, list[Crossing](), list[int]()
+        known = np.flatnonzero(signs)
+        known = known[known > 0] if side.resting else known
+        if not len(known):
+            return []
+        if side.resting:
+            side.left, look = math.nan, (int(known[0]) - 1) // 2
+            if side.sign != signs[known[0]]:
+                found.append(Crossing(int(self.rows[look]), float(self.shares[look]), side.sign, False, resting=True))
+        i, j, last = known[:-1], known[1:], int(known[-1])
+        at_zero = (i % 2 == 0) & self.zero[i // 2]
+        for k in np.flatnonzero((signs[i] != signs[j]) | (j > i + 1) | at_zero).tolist():
+            start, end = int(i[k]), int(j[k])
+            if signs[start] != signs[end] or self._stays(slice((start + 1) // 2, (end + 1) // 2)):
+                arrivals.append(start)
+            else:
+                found.append(self._touch(start, end))
+        side.sign = float(signs[last])
+        if self._stays(slice((last + 1) // 2, None)):
+            arrivals.append(last)
+            side.sign = 0.0
+        side.waiting = bool(self.zero[-1]) and side.sign != 0.0
+        return found + self._arrivals(np.array(arrivals, dtype=np.intp))
+
+    def _stays(self, looks: slice) -> bool:
+        """Whether the quantity is exactly zero for a while, not only at looks that lie side by side at a touch."""
+        zeros = np.flatnonzero(self.exact[looks]) + looks.start
+        place = self.rows[zeros] + self.shares[zeros]
+        return len(zeros) > 1 and bool(place[-1] - place[0] > WHILE)
+
+    def _touch(self, start: int, end: int) -> Crossing:
+        """Touch where the slope turns between two entries, or, where no turn is seen, at a look between them."""
+        sign, first, last = float(self.signs[start]), start // 2, end // 2
+        look = (first + last + start % 2) // 2
+        row, s = self.rows[[look]], self.shares[[look]]
+        if start % 2 and self.rows[first + 1] == self.rows[last]:
+            low, high = self.cells.a[[first]], self.shares[[last]]
+            toward = self.steps.slopes(row, np.stack([low, high], axis=1))[0] * sign < 0.0
+            if toward[0] and not toward[1]:
+                s = _turn(lambda s: self.steps.slopes(row, s) * sign < 0.0, low, high)[0]
+        return Crossing(int(row[0]), float(s[0]), sign, touching=True)
+
+    def _arrivals(self, entries: Indices) -> list[Crossing]:
+        """First instants, to the last bit, at which the quantity has not the sign that it has at these entries."""
+        signs, looks, inside = self.signs[entries], entries // 2, entries % 2 == 1
+        rows, s, cells = self.rows[looks], self.shares[looks], self.cells.take(looks[inside])
+        rows[inside] = cells.rows
+        s[inside] = _turn(lambda s: self.steps.values(cells.rows, s) * signs[inside, None] > 0.0, cells.a, cells.b)[1]
+        places = zip(rows.tolist(), s.tolist(), signs.tolist(), strict=True)
+        return [Crossing(row, share, sign, touching=False) for row, share, sign in places]
+
+
+def _turn(same: Callable[[Array], Flags], low: Array, high: Array) -> tuple[Array, Array]:
+    """The shares (k,) between which `same`, true at `low` and false at `high`, first turns: one apart in the last bit.
+
+    same: of shares (k, parts) whether it is true.
+    """
+    if not len(low):
+        return low, high
+    parts = max(2, min(PARTS, AT_ONCE // len(low)))
+    for _ in range(math.ceil(BITS / math.log2(parts))):
+        s = low[:, None] + (high - low)[:, None] * np.linspace(0.0, 1.0, parts + 1)
+        s[:, -1] = high
+        turned = ~same(s[:, 1:-1])
+        first = np.where(turned.any(axis=1), np.argmax(turned, axis=1) + 1, parts)[:, None]
+        low, high = (np.take_along_axis(s, at, axis=1)[:, 0] for at in (first - 1, first))
+    return low, high
