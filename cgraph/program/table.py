@@ -52,11 +52,11 @@ ROWS = [  # read by columns: kind, reads, writes; in Python, check; as machine c
     ),
     StatementRow(
         matrix.Factor, ("matrix",), ("matrix", "pivots"), matrix.run_factor, matrix.check_matrix,
-        text=matrix.factor_text, beside=matrix.run_factor, **_derivatives("matrix_rules", "factor"),
+        text=matrix.factor_text, beside=matrix.run_factor, **_derivatives("linear_rules", "factor"),
     ),
     StatementRow(
         matrix.Solve, ("matrix", "pivots", "vector"), ("vector",), matrix.run_solve, matrix.check_matrix,
-        text=matrix.solve_text, beside=matrix.run_solve, **_derivatives("matrix_rules", "solve"),
+        text=matrix.solve_text, beside=matrix.run_solve, **_derivatives("linear_rules", "solve"),
     ),
     StatementRow(
         control.If, ("register",), (), control.run_if, control.check_control, bodies=("body", "otherwise"),
@@ -73,20 +73,20 @@ ROWS = [  # read by columns: kind, reads, writes; in Python, check; as machine c
     ),
     StatementRow(
         memory.Take, ("source",), ("target",), memory.run_take, memory.check_take,
-        text=memory.take_text, beside=memory.run_take, **_derivatives("memory_rules", "take", "moved"),
+        text=memory.take_text, beside=memory.run_take, **_derivatives("linear_rules", "take", "moved"),
     ),
     StatementRow(
         memory.Scatter, ("source", "target"), ("target",), memory.run_scatter, memory.check_scatter,
-        text=memory.scatter_text, beside=memory.run_scatter, **_derivatives("memory_rules", "scatter", "moved"),
+        text=memory.scatter_text, beside=memory.run_scatter, **_derivatives("linear_rules", "scatter", "moved"),
     ),
     StatementRow(
         memory.Push, ("stack", "count", "rows"), ("stack", "count"), memory.run_push, memory.check_stack,
         text=memory.push_text, beside=memory.run_push, masked=_later("many", "masked_push"),
-        **_derivatives("memory_rules", "push", "moved"),
+        **_derivatives("linear_rules", "push", "moved"),
     ),
     StatementRow(
         memory.Pop, ("stack", "count"), ("count", "rows"), memory.run_pop, memory.check_stack,
-        text=memory.pop_text, beside=memory.run_pop, **_derivatives("memory_rules", "pop", "moved"),
+        text=memory.pop_text, beside=memory.run_pop, **_derivatives("linear_rules", "pop", "moved"),
     ),
 ]
 # fmt: on

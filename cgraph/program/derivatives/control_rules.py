@@ -45,42 +45,45 @@ def assign_if(statement: If, passes: Passes) -> Assignment:
 
 def push_if(assignment: Assignment, tangent: Tangent) -> None:
     """The tangents of the branch that is taken."""
-    statement: If = assignment.statement  # type: ignore[assignment]
     inner = [tangent.inner({}) for _ in assignment.parts]
     for each, part in zip(inner, assignment.parts, strict=True):
         each.push(part)
     ways = list(zip(inner, assignment.after, strict=True))
-    moved = {
-        name: tangent.dot(name)
-        for name in assignment.after[0]
-        if name in tangent.active and any([after[name] in each.dots for each, after in ways])
-    }
-    bodies = [
-        (*each.statements, *[copied_or_zero(each.dots.get(after[name]), dot) for name, dot in moved.items()])
-        for each, after in ways
-    ]
-    if moved:
-        tangent.add(If(statement.register, *bodies))
+    found = [{name: each.dots[end] for name, end in after.items() if end in each.dots} for each, after in ways]
+    names = [name for name in assignment.after[0] if name in tangent.active and any([name in of for of in found])]
+    _add_if(assignment, tangent, inner, found, {name: tangent.dot(name) for name in names})
 
 
 def pull_if(assignment: Assignment, adjoint: Adjoint) -> None:
     """The cotangents of the branch that was taken."""
-    statement: If = assignment.statement  # type: ignore[assignment]
     seeds = {name: adjoint.bars[name] for name in assignment.after[0] if name in adjoint.bars}
     if not seeds:
         return
     inner = [adjoint.inner({after[name]: bar for name, bar in seeds.items()}) for after in assignment.after]
     for each, part in zip(inner, assignment.parts, strict=True):
         each.pull(part)
-    outer = dict.fromkeys([name for each in inner for name in each.bars if name not in _written(assignment)])
-    terms = {name: adjoint.bar(name) for name in outer if name in adjoint.active}
-    ways = [
-        (*each.statements, *[copied_or_zero(each.bars.get(name), bar) for name, bar in terms.items()]) for each in inner
-    ]
-    if terms:
-        adjoint.add(If(statement.register, *ways))
+    names = dict.fromkeys([name for each in inner for name in each.bars if name in adjoint.active])
+    terms = {name: adjoint.bar(name) for name in names if name not in _written(assignment)}
+    _add_if(assignment, adjoint, inner, [each.bars for each in inner], terms)
     for name, bar in terms.items():
         adjoint.collect(name, bar)
+
+
+def _add_if(
+    assignment: Assignment,
+    to: Registers,
+    inner: Sequence[Registers],
+    found: Sequence[Mapping[str, str]],
+    ends: Mapping[str, str],
+) -> None:
+    """Add both branches, at whose ends what each has `found` for a register is in that of `ends`, or else 0."""
+    statement: If = assignment.statement  # type: ignore[assignment]
+    ways = [
+        (*each.statements, *[copied_or_zero(of.get(name), end) for name, end in ends.items()])
+        for each, of in zip(inner, found, strict=True)
+    ]
+    if ends:
+        to.add(If(statement.register, *ways))
 
 
 def _written(assignment: Assignment) -> set[str]:
@@ -91,24 +94,28 @@ def _written(assignment: Assignment) -> set[str]:
 # While: a turn goes from registers `at` on, to which its ends are copied, {at: the same after the turn}
 
 
+def _turn(body: Sequence[Statement], passes: Passes) -> tuple[dict[str, str], tuple[Assignment, ...], dict[str, str]]:
+    """{register that a body writes: `at`}, its assignments from these on, and {at: the same after the turn}."""
+    at = {name: passes.write(name) for name in effects(body)[1]}
+    outside = dict(passes.current)
+    turn = tuple([passes.assignment(each) for each in body])
+    after = {place: passes.now(name) for name, place in at.items()}
+    passes.current = outside
+    return at, turn, after
+
+
 def assign_while(statement: While, passes: Passes) -> Assignment:
     """Assignment of a turn, which begins with the record of `at` on a stack where there is a way back."""
-    writes = list(effects(statement.body)[1])
-    before = [passes.now(name) for name in writes]
-    at = [passes.write(name) for name in writes]
-    outside = dict(passes.current)
-    turn = tuple([passes.assignment(each) for each in statement.body])
-    after = dict(zip(at, [passes.now(name) for name in writes], strict=True))
-    passes.current = outside
-    copies = [copied(source, name) for source, name in zip(before, at, strict=True)]
+    before = dict(passes.current)
+    at, turn, after = _turn(statement.body, passes)
+    copies = [copied(before.get(name, name), place) for name, place in at.items()]
     body: list[Statement] = [*flat(turn), *_handed_on(after)]
     if passes.turns:
-        width = sum([passes.lengths[name] for name in at])
+        width = sum([passes.lengths[name] for name in after])
         stack, turns = passes.fresh("stack", passes.turns * width), passes.fresh("turns", 1)
         copies.append(zeroed(turns))
-        body.insert(0, Push(stack, turns, tuple(at)))
-    loop = While(passes.now(statement.register), tuple(body))
-    return Assignment(loop, tuple(copies), parts=(turn,), after=(after,))
+        body.insert(0, Push(stack, turns, tuple(after)))
+    return Assignment(While(passes.now(statement.register), tuple(body)), tuple(copies), (turn,), (after,))
 
 
 def push_while(assignment: Assignment, tangent: Tangent) -> None:
@@ -168,22 +175,16 @@ _UNLESS_FULL = Graph([_BAR, _TURNS], {"bar": where(_TURNS >= 0.0, _BAR, _TURNS)}
 
 def assign_fixed_point(statement: FixedPoint, passes: Passes) -> Assignment:
     """The iteration in registers of its own, and one more turn from where it ends, in single assignment."""
-    reads, writes = effects(statement.body)
-    carried = [name for name in dict.fromkeys((*reads, statement.register)) if name in writes]
-    before = [passes.now(name) for name in carried]
-    at = {name: passes.write(name) for name in writes}
-    copies = tuple([copied(source, at[name]) for source, name in zip(before, carried, strict=True)])
-    for each in statement.body:
-        if bodies_of(each):
-            raise TypeError(f"a FixedPoint with a {type(each).__name__} in its turns has no derivatives")
+    if bad := [each for each in statement.body if bodies_of(each)]:
+        raise TypeError(f"a FixedPoint with a {type(bad[0]).__name__} in its turns has no derivatives")
+    before, first = dict(passes.current), (*effects(statement.body)[0], statement.register)
+    at, turn, after = _turn(statement.body, passes)
+    carried = [name for name in dict.fromkeys(first) if name in at]
+    copies = tuple([copied(before.get(name, name), at[name]) for name in carried])
     rows = [(each, row_of(each)) for each in statement.body]
     body = tuple([with_names(each, dict.fromkeys((*row.reads, *row.writes)), passes.now) for each, row in rows])
-    outside = dict(passes.current)
-    turn = tuple([passes.assignment(each) for each in statement.body])
-    after = {at[name]: passes.now(name) for name in writes}
-    passes.current = outside
     loop = FixedPoint(passes.now(statement.register), body)
-    return Assignment(loop, copies, parts=(turn,), after=(after,), carried=tuple([at[name] for name in carried]))
+    return Assignment(loop, copies, (turn,), (after,), tuple([at[name] for name in carried]))
 
 
 def push_fixed_point(assignment: Assignment, tangent: Tangent) -> None:

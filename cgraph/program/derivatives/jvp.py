@@ -149,10 +149,6 @@ class Linearized(NamedTuple):
     vectors: {register of a value: that of its cotangent or tangent, before and after a pass}.
     unsolved: a register that is not 0 after passes in which equations of a `FixedPoint` were not solved, and NaN after
     a loop of more turns than there is room for.
-
-    >>> from cgraph.extend import Program, program_jvp
-    >>> dict(program_jvp(Program({"x": 1}, [], record=["x"])).vectors)
-    {'x': 'x:dot'}
     """
 
     program: Program

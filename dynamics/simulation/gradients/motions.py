@@ -29,7 +29,7 @@ from ..run_options import METHOD, Options, RunOptions, time_span
 from ..stepper import stepper_of
 from ..steps.equal_steps import step_count
 from ..steps.row_values import converted
-from .motion_equations import MotionEquations, at, motion_equations
+from .motion_programs import MotionEquations, at, motion_equations
 
 Loss = Callable[..., Node | float]
 START, VELOCITY, TORQUE = "q", "qd", "tau"

@@ -17,7 +17,7 @@ from dynamics.equations.states.consistent_state import nearest_state
 from dynamics.integrators import derive
 from dynamics.simulation.gradients import differentiated_run
 from dynamics.simulation.gradients.gradient import MotionGradient
-from dynamics.simulation.gradients.motion_equations import motion_equations
+from dynamics.simulation.gradients.motion_programs import motion_equations
 from dynamics.simulation.gradients.rate_pullback import rate_pullback, sharing
 from tests.bench.speed.scenes import load
 from tests.dynamics.mechanisms import random_mechanism
