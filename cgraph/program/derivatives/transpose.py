@@ -129,11 +129,16 @@ def adjoint(passes: Passes, seeds: Sequence[str], rules: Rules = MappingProxyTyp
 
     It is fed what was recorded, the last pass first, and records the cotangents of `varied`.  rules: of graphs.
     """
-    handed, lengths = passes.handed, dict(passes.lengths)
-    outer = Adjoint({}, passes.active, lengths, passes.own, rules)
-    bars = {name: outer.bar(name) for name in handed if name in passes.active or name in seeds}
-    inner = outer.inner({handed[name]: bar for name, bar in bars.items()})
-    inner.pull(passes.plain)
+    handed, outer = passes.handed, Adjoint({}, passes.active, dict(passes.lengths), passes.own, rules)
+    bars: dict[str, str] = {}
+    more = [*dict.fromkeys(seeds)]
+    while True:  # until there are those of all registers that these come from
+        bars |= {name: outer.bar(name) for name in more}
+        inner = outer.inner({handed[name]: bar for name, bar in bars.items()})
+        inner.pull(passes.plain)
+        more = [name for name in handed if name in inner.bars and name not in bars and name in passes.active]
+        if not more:
+            break
     sums, rows = ({name: outer.bar(name) for name in names} for names in (passes.inputs, passes.varied))
     inner.add(*[added(end, inner.bars[name], end) for name, end in sums.items() if name in inner.bars])
     inner.add(*[copied_or_zero(inner.bars.get(name), end) for name, end in {**bars, **rows}.items()])
