@@ -98,6 +98,9 @@ class Options(TypedDict, total=False):
     progress: bool | None
 
 
+TAKEN = Options.__annotations__.keys() - {"t0", "t_span", "dense_output", "form"}  # by `RunOptions`
+
+
 @dataclass(frozen=True)
 class RunOptions:
     """The options that `simulate`, `simulate_many` and gradients share, checked when they are put together.
@@ -174,8 +177,7 @@ class RunOptions:
         without: Sequence[str] = (),
     ) -> RunOptions:
         """Those of a method and keywords of `Options`, but some.  Raises TypeError for a keyword that there is not."""
-        fields = cls.__dataclass_fields__.keys() - {"t0", "t_end", "t_eval", "method", *without}
-        if unknown := [name for name in options if name not in fields]:
+        if unknown := [name for name in options if name not in TAKEN or name in without]:
             known = [name for name in Options.__annotations__ if name not in without]
             raise TypeError(f"there is no option {unknown[0]!r:.60} here; {or_nearest(unknown[0], known)}")
         return cls(t_end, method, t0=t0, t_eval=t_eval, **options)

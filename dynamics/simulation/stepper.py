@@ -191,18 +191,29 @@ class Stepper(ABC):
         self._unrecorded(min(FIRST_PASSES, most))
         most -= FIRST_PASSES
         while most > 0 and self._numbers[self._stop] == RUNNING:
-            most -= self._advance(most, 0)[1]
+            passes, begin = self._next(most)
+            self._unrecorded(passes)
+            self._pace(passes, begin)
+            most -= passes
 
     def _advance(self, most: int, every: int = 1) -> tuple[Array, int]:
         """Make passes, at most so many: the rows of each `every`th, or with 0 of the last alone; and how many."""
+        passes, begin = self._next(most)
+        rows, done = self.runner.run(self._memory, passes, every or passes)
+        self._pace(done, begin)
+        return rows, done
+
+    def _next(self, most: int) -> tuple[int, float]:
+        """How many passes may go together, and now [s]."""
         if self.stopped():
             raise StoppedError
-        passes, begin = min(self._passes, most), time.perf_counter()
-        rows, done = self.runner.run(self._memory, passes, every or passes)
-        if done == self._passes:
+        return min(self._passes, most), time.perf_counter()
+
+    def _pace(self, passes: int, begin: float) -> None:
+        """How many passes may go together from here on, since so many took until now."""
+        if passes == self._passes:
             share = BLOCK_TIME / max(time.perf_counter() - begin, 1e-9)
             self._passes = max(1, int(passes * min(4.0, share)))
-        return rows, done
 
     def _count(self, steps: int, rejected: int, longest: float) -> None:
         """So many steps since the last reset.
