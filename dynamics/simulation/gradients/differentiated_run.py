@@ -19,7 +19,7 @@ from cgraph import Graph
 from cgraph._shared import Array, Tape, kept_by_first, run_passes
 from cgraph.extend import Runner
 
-from ..events.event import WatchedEvent
+from ..events.event import WatchedEvent, event_program
 from ..outcome import MotionError
 from ..stepper import nonfinite, unsolved
 from ..steps.dense_output import Indices
@@ -62,11 +62,12 @@ class DifferentiatedRun:
     ) -> None:
         self.motions = motions = motions.with_steps()
         self.running, self.forwards = running, forwards
-        self.events = motions.watched() if motions.events else {}
+        watched = event_program(motions.problem, motions.events).events if motions.events else ()
+        self.events = {event.name: event for event in watched}
         by = (["p", "c"] if motions.by_parameters else []) + (["t", "h"] if motions.events else [])
         self.programs = motion_programs(
             motions.equations,
-            motions.method,
+            motions.options.integrator,
             (*[name for name in motions.wrt if name == TORQUE], *by),
             running,
             motions.options.backend,
@@ -106,7 +107,7 @@ class DifferentiatedRun:
         start_program, step_program, failed = self.programs
         tau = motions.tau[0] if motions.each_step else motions.tau
         values = motions.equations.registers(np.concatenate([tau, motions.values])) | {"t": steps.t[:1], "x": x}
-        if motions.method.adaptive and not failed:  # rtol = 0: what is iterated is solved to rounding
+        if motions.options.adaptive and not failed:  # rtol = 0: what is iterated is solved to rounding
             tolerances = {"rtol": motions.options.relative, "atol": motions.options.absolute}
             values |= {name: np.asarray(value) for name, value in tolerances.items()}
         start = None

@@ -65,7 +65,7 @@ def _grown(run: DifferentiatedRun, start: Array, end: Array) -> list[list[str]]:
     start, end: slopes of the loss by the state there. Of a loss along the way alone, its value is compared.
     """
     motion, options = run.motions, run.motions.options
-    left = min(options.relative, LOOSE_TOLERANCE) if motion.method.adaptive else ASIDE - 1.0
+    left = min(options.relative, LOOSE_TOLERANCE) if options.adaptive else ASIDE - 1.0
     with np.errstate(all="ignore"):
         change = left * (np.abs(start) * np.maximum(np.abs(motion.x), np.abs(run.end))).sum(axis=0)
         slope, loss = np.abs(end), np.abs(run.loss)
@@ -74,7 +74,7 @@ def _grown(run: DifferentiatedRun, start: Array, end: Array) -> list[list[str]]:
         at_end = np.max([np.abs(run.states(each)[1]).max(axis=0) for each in run.segments], axis=0)
         whole = (slope * at_end).sum(axis=0) + loss
         ratios = np.where(whole > 0.0, change / whole, 0.0)
-    what = f"rtol = {left:g}" if motion.method.adaptive else "rounding"
+    what = f"rtol = {left:g}" if options.adaptive else "rounding"
     text = (
         f"the motion is chaotic, or nearly so: by its end {what} at its start has grown to {{:.2g}} times its size, "
         "and the gradient is that of the numbers computed, not of the motion"
@@ -107,7 +107,7 @@ def _half_steps(run: DifferentiatedRun) -> list[list[str]]:
     allowed = options.absolute + options.relative * scale
     relative = np.divide(difference, scale, out=np.zeros_like(scale), where=difference != 0.0)
     # with an error C h^p the two differ by (1 - 2^-p) of it
-    error = np.where(relative > LAWLESS, relative, relative / (1.0 - 0.5**motions.method.order))
+    error = np.where(relative > LAWLESS, relative, relative / (1.0 - 0.5**options.integrator.order))
     longest = float(np.abs(run.segments[0].steps.h[0]))
     said: list[list[str]] = [[] for _ in size]
     for k in np.flatnonzero(np.isfinite(size).all(axis=1)).tolist():  # of the motions that have an end

@@ -26,7 +26,7 @@ from ..trajectory import SimulationWarning
 from .differentiated_run import DifferentiatedRun
 from .doubts import doubts
 from .motion_programs import at
-from .motions import START, TORQUE, VELOCITY, Loss, Motions, motions_of
+from .motions import TORQUE, Loss, Motions, motions_of
 
 LOSSES_KEPT = 64  # losses whose graphs stay for another run
 FEW_MOTIONS = 4  # motions: fewer by a method that iterates are done sooner one by one
@@ -280,10 +280,15 @@ def gradient_many(
     """
     losses = loss, running
     motions = motions_of(model, q, qd, t_end, method, tau, parameters, wrt, (), losses, options, many=True)
-    count, problem = motions.many, motions.problem
+    count, problem, run_options = motions.many, motions.problem, motions.options
     value, end = np.full(count, np.nan), np.full((count, problem.size), np.nan)
-    by_name = {name: np.full((count, *shape), np.nan) for name, shape in _shapes(motions).items()}
-    early, said, parts = dict[int, str](), dict[int, str](), _parts(motions)
+    by_name = {name: each.T.copy() for name, each in motions.by_names(np.full_like(motions.point(), np.nan)).items()}
+    if motions.each_step and TORQUE in by_name:
+        by_name[TORQUE] = np.full((count, *motions.tau.shape[:-1]), np.nan)
+    # one by one, or side by side, of which a last one goes with those before it
+    alone = run_options.adaptive or (count < FEW_MOTIONS and run_options.integrator.step(problem).iterates)
+    begins = [*(range(count) if alone else range(0, max(1, count - 1), WIDE_BLOCK)), count]
+    early, said, parts = dict[int, str](), dict[int, str](), [range(*ends) for ends in itertools.pairwise(begins)]
     for part in parts:
         try:
             run, losses_of_part, slopes, bars = differentiated(motions.of(slice(part.start, part.stop)), *losses)
@@ -308,24 +313,8 @@ def gradient_many(
             first, text = min(each.items())
             text = f"{len(each)} of {count} motions {what}: motion {first}: {text}"
             warnings.warn(text, SimulationWarning, stacklevel=2)
-    t = motions.steps[0].t if motions.steps else np.array([motions.options.t0, motions.options.t_end])
+    t = motions.steps[0].t.copy() if motions.steps else np.array([run_options.t0, run_options.t_end])
     return MotionGradients(value, by_name, t, end[:, : problem.nq], end[:, problem.nq :])
-
-
-def _parts(motions: Motions) -> list[range]:
-    """The motions that go one by one, or side by side, of which a last one goes with those before it."""
-    count = motions.many
-    alone = motions.options.adaptive or (count < FEW_MOTIONS and motions.method.step(motions.problem).iterates)
-    begins = [*(range(count) if alone else range(0, max(1, count - 1), WIDE_BLOCK)), count]
-    return [range(begin, end) for begin, end in itertools.pairwise(begins)]
-
-
-def _shapes(motions: Motions) -> dict[str, tuple[int, ...]]:
-    """Shapes of the gradients of a motion, by the names of `wrt`."""
-    problem, nq = motions.problem, motions.problem.nq
-    n = problem.size - nq
-    shapes = {START: (nq if problem.system is None else n,), VELOCITY: (n,), TORQUE: motions.tau.shape[:-1]}
-    return {name: shapes.get(name, ()) for name in motions.wrt}
 
 
 @dataclass(frozen=True)

@@ -17,13 +17,13 @@ from cgraph.extend import Builder, topological
 
 from ...equations.state_equation import FORMS, state_inputs
 from ...equations.states.initial_value import initial_values
-from ...integrators import Method, Problem, derive, in_form
+from ...integrators import Problem, derive, in_form
 from ...systems.arguments import Parameters, call_user_function
 from ...systems.model import Equations, Model, as_equations
 from ...systems.ode_system import OdeSystem
 from ...systems.system import System
 from ..applied_force import SampledController, with_applied
-from ..events.event import Event, WatchedEvent, event_program
+from ..events.event import Event, event_program
 from ..outcome import MotionError, Recorder, advise
 from ..run_options import METHOD, Options, RunOptions, time_span
 from ..stepper import stepper_of
@@ -62,12 +62,10 @@ class Stretch(NamedTuple):
 
     def halved(self) -> Stretch:
         """Steps of half the length."""
-        halves = [np.repeat(0.5 * lengths, 2) for lengths in (self.h, self.by_h)]
-        pairs = [np.repeat(each[:-1], 2) for each in (self.t, self.by_t)]
-        for begins, half in zip(pairs, halves, strict=True):
-            begins[1::2] += half[1::2]
-        t, by_t = (np.append(begins, each[-1]) for begins, each in zip(pairs, (self.t, self.by_t), strict=True))
-        return Stretch(t, halves[0], by_t, halves[1], self.event)
+        half, by_half = 0.5 * self.h, 0.5 * self.by_h
+        ways = [(self.t, half), (self.by_t, by_half)]
+        t, by_t = [np.append(np.stack([at[:-1], at[:-1] + each], axis=1), at[-1]) for at, each in ways]
+        return Stretch(t, np.repeat(half, 2), by_t, np.repeat(by_half, 2), self.event)
 
 
 def _stretch(t: Array, equal: int, end: float, event: str = "") -> Stretch:
@@ -109,11 +107,6 @@ class Motions:
         return self.equations.problem
 
     @property
-    def method(self) -> Method:
-        """Method of the steps."""
-        return self.options.integrator
-
-    @property
     def many(self) -> int:
         """Number N of motions side by side."""
         return len(self.x.T)
@@ -133,9 +126,9 @@ class Motions:
         """Forces of the last step, and values of parameters, (.., N)."""
         return np.concatenate([self.tau[-1] if self.each_step else self.tau, self.values])
 
-    def point(self, x: Array, t: float) -> Array:
+    def point(self, x: Array | None = None, t: float = 0.0) -> Array:
         """The inputs, (.., N), of a graph over the states, t and parameters, at an instant of the last step."""
-        return np.concatenate([x, np.full((1, self.many), t), self.inputs])
+        return np.concatenate([self.x if x is None else x, np.full((1, self.many), t), self.inputs])
 
     def by_names(self, bars: Array) -> dict[str, Array]:
         """Derivatives (k, N) by the names of `wrt`, of cotangents (m + 1 + .., N) of the start, of t and of `inputs`.
@@ -147,14 +140,10 @@ class Motions:
         if START in self.wrt and problem.system is not None and problem.system.kinematics.quasi is not None:
             q = at(_by_displacements(problem.system, self.options.backend), np.concatenate([self.x[: problem.nq], q]))
         by = {START: q, VELOCITY: x[problem.nq :], TORQUE: inputs[: equations.forces]}
-        if not set(self.wrt).isdisjoint(equations.names):
+        if self.by_parameters:
             p, of_p = self.values[: len(equations.names)], inputs[equations.forces :]
             by |= dict(zip(equations.names, equations.by_parameters(p, of_p, self.options.backend), strict=True))
         return {name: by[name] for name in self.wrt}
-
-    def watched(self) -> dict[str, WatchedEvent]:
-        """The events by name, of states and forces as the steps have them."""
-        return {event.name: event for event in event_program(self.problem, self.events).events}
 
     def of(self, part: slice | list[int]) -> Motions:
         """Some of the motions, by number."""
@@ -179,9 +168,8 @@ class Motions:
         advise(run, recorder.last, options, x, made)
         if run.status:
             raise MotionError(f"the motion did not reach t_end, {run.status}")
-        log = [] if run.log is None else run.log.happened
-        happened = {each.name: np.array([t for k, t, _ in log if k == n]) for n, each in enumerate(self.events)}
-        steps = _stretches(recorder.table()[0], options, self.events, happened, ended=bool(run.event))
+        happened = [] if run.log is None else [(self.events[k], t) for k, t, _ in run.log.happened]
+        steps = _stretches(recorder.table()[0], options, happened, ended=bool(run.event))
         return replace(self, steps=steps, said=tuple(run.warnings))
 
 
@@ -324,26 +312,23 @@ def _equal_stretch(t0: float, t_end: float, count: int) -> Stretch:
 
 
 def _stretches(
-    times: Array, run: RunOptions, events: Sequence[Event], happened: Mapping[str, Array], *, ended: bool
+    times: Array, run: RunOptions, happened: Sequence[tuple[Event, float]], *, ended: bool
 ) -> tuple[Stretch, ...]:
     """The accepted steps of a motion, between the events that reset its state or end it.
 
     times: (T,), the start, the ends of the steps, and an instant twice where an event resets the state.
-    happened: the instants of the events, by name.  ended: whether one ended the motion.
+    happened: events, and when they did.  ended: whether one ended the motion.
     """
     parts = np.split(times, np.flatnonzero(np.diff(times) == 0.0) + 1)
     stretches = []
     for number, t in enumerate(parts):
         resets = number < len(parts) - 1
-        stops = ended and not resets
-        at = [
-            each.name for each in events if (each.reset if resets else each.terminal) and t[-1] in happened[each.name]
-        ]
-        if (resets or stops) and len(at) != 1:
+        at = [event.name for event, when in happened if when == t[-1] and (event.reset if resets else event.terminal)]
+        if (resets or ended) and len(at) != 1:
             raise ValueError(
                 f"events {', '.join(at)} happen at one instant, t = {t[-1]:.6g} s, which has no derivative"
             )
         count = 0 if run.adaptive else step_count(run.t_end - t[0], run.step)
         if len(t) > 1:
-            stretches.append(_stretch(t, count, run.t_end, at[0] if resets or stops else ""))
+            stretches.append(_stretch(t, count, run.t_end, at[0] if resets or ended else ""))
     return tuple(stretches)

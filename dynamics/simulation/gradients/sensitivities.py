@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Unpack
+from typing import Any, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -121,14 +121,12 @@ def sensitivities(
     for text in doubts(run)[0]:
         warnings.warn(text, SimulationWarning, stacklevel=2)
     # a column for each number of `wrt`: the transpose of how cotangents of it are made of those of x, t and inputs
-    units = np.eye(len(motions.point(motions.x, 0.0)))
-    by = motions.of([0] * len(units)).by_names(units)
-    t, x, t_dot, x_dot = run.pushed(np.concatenate([np.atleast_2d(rows) for rows in by.values()]).T)
-    columns: dict[str, int | slice] = {}
-    at = 0
-    for name, rows in by.items():
-        columns[name] = at if rows.ndim == 1 else slice(at, at + len(rows))
-        at += len(np.atleast_2d(rows))
+    units = np.eye(len(motions.point()))
+    by = {name: np.atleast_2d(rows) for name, rows in motions.of([0] * len(units)).by_names(units).items()}
+    t, x, t_dot, x_dot = run.pushed(np.concatenate([*by.values()]).T)
+    ends, nq = np.cumsum([len(rows) for rows in by.values()]), motions.problem.nq
+    columns: dict[str, Any] = {name: slice(end - len(by[name]), end) for name, end in zip(by, ends, strict=True)}
+    columns |= {name: end - 1 for name, end in zip(by, ends, strict=True) if name in motions.equations.names}
     derivatives = {name: x_dot[:, :, place] for name, place in columns.items()}
-    times, nq = {name: t_dot[:, place] for name, place in columns.items()}, motions.problem.nq
+    times = {name: t_dot[:, place] for name, place in columns.items()}
     return Sensitivities(t, x[:, :nq], x[:, nq:], derivatives, times)
