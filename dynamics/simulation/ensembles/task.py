@@ -26,8 +26,8 @@ from .ensemble import COLUMNS, RunTable
 from .lanes import (
     ROWS,
     VECTOR,
+    Code,
     LaneRuns,
-    Lanes,
     Leg,
     Stopped,
     chosen_in_lanes,
@@ -151,7 +151,7 @@ class Task:
         if lanes is None:
             return None
         if self.program.adaptive:
-            return chosen_in_lanes(lanes, self.options, x, p, rows, stopped)
+            return chosen_in_lanes(lanes, self.program, self.options, x, p, rows, stopped)
         (own, *others), beside = self._legs, self.beside
         if beside is None:
             return equal_in_lanes(lanes, x, p, own, [rows], stopped)
@@ -176,7 +176,7 @@ class Task:
         return [legs_of(self.grids, [rows, self.beside.numbers], every), *others]
 
     @property
-    def _lanes(self) -> Lanes | None:
+    def _lanes(self) -> Code | None:
         """The code of lanes, if trajectories go there."""
         if not self.in_lanes:
             return None

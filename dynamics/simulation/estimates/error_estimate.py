@@ -90,7 +90,7 @@ def error_estimates(
     alike: Sequence[Flags] = (),
     lost: float = math.nan,
 ) -> dict[str, Array]:
-    """Columns of the statistics of k runs of so many steps: "error", "error_at_end" and "warnings" of what is too large.
+    """Columns of the statistics of k runs of so many steps: "error", "error_at_end", "warnings" of too large ones.
 
     The errors are relative to the sizes of components, NaN if nothing was compared, and infinite if unknown.
 
