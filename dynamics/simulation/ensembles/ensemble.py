@@ -197,11 +197,12 @@ class Ensemble:
         (np.float64(-0.416), np.float64(4.0))
         """
         module, (many, rows, _) = _module("pandas"), self.q.shape
-        blocks = {"q": (self.coordinates, self.q), "qd": (self.velocities, self.qd), "p": (self.velocities, self.p)}
+        blocks = {"q": (self.coordinates, self.q), "qd": (self.velocities, self.qd)}
+        blocks |= {} if self.p is None else {"p": (self.velocities, self.p)}
         columns = {
             f"{letter}.{name}": values[:, :, k].reshape(-1)
             for letter, (names, values) in blocks.items()
-            for k, name in enumerate(names if values is not None else ())
+            for k, name in enumerate(names)
         }
         message = np.array(self.stats.message, object)
         own = {**self.parameters, "success": self.stats.success, "message": message}

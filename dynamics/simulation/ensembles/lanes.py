@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -29,7 +30,7 @@ FEW_TRAJECTORIES = 32  # trajectories: fewer by chosen steps are done one by one
 VECTOR = 8  # lanes, or a multiple of them, of every processor
 PASSES = 64  # of the first block, before it is known how long one takes
 ROWS = 2**22  # numbers in the rows of lanes, at most
-RESULTS = ("status", "t", "trials", "rejected", "evaluations", "at_limit", "longest_made")
+RESULTS = ["status", "t", "trials", "rejected", "evaluations", "at_limit", "longest_made"]
 
 Stopped = Callable[[], bool]
 
@@ -47,7 +48,7 @@ class VectorCode:
             body = [live, If("live", tuple(steps.body))]
         self._runner = runner(replace(steps, registers=registers, body=body, stop=None), "python")
         self.size, self.width = self._runner.size, steps.width
-        places = {name: self._runner.read(np.arange(self.size), name) for name in registers}
+        places = {name: self._runner.read(np.arange(float(self.size)), name) for name in registers}
         self.numbers = {name: slice(int(at[0]), int(at[-1]) + 1) for name, at in places.items() if len(at)}
 
     def __call__(self, memories: Array, which: Numbers, passes: Numbers, most: int, rows: Array, marks: Array) -> None:
@@ -72,7 +73,7 @@ def lanes_of(program: StepProgram, backend: str, fma: bool) -> Code | None:
 
     Sines of equal steps are those of vectors.
     """
-    steps, clock, results = program.steps, "count", ("t", "evaluations", "nonfinite")
+    steps, clock, results = program.steps, "count", ["t", "evaluations", "nonfinite"]
     if program.adaptive:
         toward, t = inputs = cg.variables("toward t")
         body = Call(Graph(inputs, {"clock": toward * t}), ("lanes.toward", "t"), ("lanes.clock",))
@@ -204,12 +205,8 @@ def equal_in_lanes(
         if at == 0.0:
             run.set({"start": grid.begin, "t": grid.begin, "h": grid.h, "count": 0.0})
             run.passes[:, 0] = 0
-        at = marks[-1]
-        block = run.rows(
-            marks,
-            lambda at=at: np.where(run.read("nonfinite") == 0.0, at - run.passes[:, 0], 0.0),
-            stopped,
-        )[:, :, 1 : 1 + m]
+        at = float(marks[-1])
+        block = run.rows(marks, partial(_left, run, at), stopped)[:, :, 1 : 1 + m]
         if (run.passes[:, 1] < len(marks)).any():
             block[np.arange(len(marks)) >= run.passes[:, 1:]] = np.nan
         for (here, there), rows in zip(places, tables, strict=True):
@@ -221,6 +218,11 @@ def equal_in_lanes(
     longest = max([abs(leg.grid.h) for leg in legs])
     columns = {"steps": np.full(len(x), steps), "nfev": run.read("evaluations"), "dt": np.full(len(x), longest)}
     return LaneRuns(run.read("nonfinite") == 0.0, columns)
+
+
+def _left(run: _Memories, steps: float) -> Array:
+    """Passes to the end of so many steps of a grid, (k,)."""
+    return np.where(run.read("nonfinite") == 0.0, steps - run.passes[:, 0], 0.0)
 
 
 def chosen_in_lanes(

@@ -145,7 +145,10 @@ class Store:
             "happened": happened,
         }
         checksum = crc32(self.rows[part.first : part.first + len(part.rows)].data)
-        kept = {"texts": np.frombuffer(json.dumps(texts).encode(), np.uint8), "checksum": np.array(checksum, np.uint32)}
+        kept: dict[str, Any] = {
+            "texts": np.frombuffer(json.dumps(texts).encode(), np.uint8),
+            "checksum": np.array(checksum, np.uint32),
+        }
         np.savez(written, **kept, **{name: columns[name] for name in NUMBERS})
         atomic_write(self._file(part.first), written.getvalue())
 

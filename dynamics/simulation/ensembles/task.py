@@ -133,7 +133,7 @@ class Task:
 
         Raises KeyboardInterrupt soon after Ctrl-C, and StoppedError after `stopped`.
         """
-        part, left = not_begun(chunk.first, rows, events=self.events is not None), range(len(chunk.x))
+        part, left = not_begun(chunk.first, rows, events=self.events is not None), list(range(len(chunk.x)))
         with np.errstate(all="ignore"):
             if (found := self.run_lanes(chunk.x, chunk.p, rows, stopped)) is not None:
                 done = np.flatnonzero(found.whole)
@@ -161,7 +161,7 @@ class Task:
         for legs, each in zip(others, states[1:], strict=True):
             equal_in_lanes(lanes, x * ASIDE, p, legs, [each], stopped)
         steps = int(found.columns["steps"][0])
-        errors = error_estimates(self.program, self.options, beside.law, watch, steps, beside.t, states)
+        errors = error_estimates(self.program, self.options, beside.law, watch, steps, beside.t, [*states])
         return LaneRuns(found.whole, found.columns | errors)
 
     @cached_property

@@ -1,5 +1,6 @@
 """The error of equal steps is told with the result, in every unit, and a warning says where it is too large."""
 
+import itertools
 import math
 import warnings
 from functools import cache
@@ -147,7 +148,7 @@ def test_runs_beside_have_other_steps_that_meet_those_of_the_run(
     assert law.longest == max(abs(part.h) for part in first)
     for times, (steps, done) in zip((1.0, 2.0, 4.0), [(first, numbers), *beside], strict=False):
         assert (steps[0].begin, steps[-1].end) == (0.0, instants[-1])
-        assert all(part.end == after.begin for part, after in zip(steps, steps[1:], strict=False))
+        assert all(part.end == after.begin for part, after in itertools.pairwise(steps))
         assert all(0.0 < direction * part.h <= 2.0 * times * law.longest * (1.0 + 1e-9) for part in steps)
         ends = [part.begin + part.h * np.arange(1.0, part.steps + 1.0) for part in steps]
         assert np.concatenate([[0.0], *ends])[done] == approx(t, rel=1e-12, abs=1e-12)
