@@ -47,9 +47,8 @@ class Store:
 
     def __init__(self, folder: Path, sweep: dict[str, Json], width: int, shape: tuple[int, ...]) -> None:
         """Open the folder, or begin it. Raises ValueError where it keeps something else, OSError where it cannot be."""
-        self._folder = folder
+        self._folder, self._name, self.width = folder, f"store {str(folder)!r}", width
         self._lock: sqlite3.Connection | None = None
-        self.width = width
         folder.mkdir(parents=True, exist_ok=True)
         try:
             self._open(sweep, shape)
@@ -58,22 +57,24 @@ class Store:
             raise
 
     def _open(self, sweep: dict[str, Json], shape: tuple[int, ...]) -> None:
-        folder, width = self._folder, self.width
+        folder, known = self._folder, self._read()
         left_over = list(folder.glob(".*.tmp"))  # of files that a process was writing when it was ended
-        if left_over or not self._whole(shape[0]):
+        chunks = [self._file(first) for first in range(0, shape[0], known["chunk"])] if known else []
+        if left_over or not chunks or not all(path.exists() for path in chunks):  # else the folder is read alone
             self.lock()
             for path in left_over:
                 path.unlink(missing_ok=True)
-        if (folder / SWEEP).exists():
             known = self._read()
-            _require_same(folder, known, sweep)
-            self.width = int(known["chunk"])
+        if known:
+            for name, value in sweep.items():
+                if known.get(name) != value:
+                    there = f"there {name} is {known.get(name)!r:.60}, here {value!r:.60}"
+                    raise ValueError(f"{self._name} keeps another sweep: {there}")
+            self.width = known["chunk"]
         elif any(path.name != LOCK for path in folder.iterdir()):
-            raise ValueError(
-                f"store {str(folder)!r} is a folder with other files and without a sweep: name an empty one"
-            )
+            raise ValueError(f"{self._name} is a folder with other files and without a sweep: name an empty one")
         else:
-            atomic_write(folder / SWEEP, json.dumps({**sweep, "chunk": width}, indent=1))
+            atomic_write(folder / SWEEP, json.dumps({**sweep, "chunk": self.width}, indent=1))
         if not (folder / ROWS).exists():
             self._make_rows(shape)
         self.rows = self._table(shape)
@@ -94,11 +95,9 @@ class Store:
         except sqlite3.OperationalError as error:
             lock.close()
             if error.sqlite_errorcode != sqlite3.SQLITE_BUSY:
-                raise OSError(f"store {str(self._folder)!r} cannot be locked: {error}") from None
-            raise OSError(
-                f"store {str(self._folder)!r} is being written by another call of simulate_many, here or in another "
-                "process: wait for it, or name another folder"
-            ) from None
+                raise OSError(f"{self._name} cannot be locked: {error}") from None
+            other = "another call of simulate_many, here or in another process"
+            raise OSError(f"{self._name} is being written by {other}: wait for it, or name another folder") from None
         self._lock = lock
 
     def close(self) -> None:
@@ -107,15 +106,9 @@ class Store:
             self._lock.close()
             self._lock = None
 
-    def _whole(self, count: int) -> bool:
-        """Whether all chunks of so many trajectories are there, so that the folder is read alone."""
-        if not (self._folder / SWEEP).exists():
-            return False
-        return all(self._file(first).exists() for first in range(0, count, int(self._read()["chunk"])))
-
     def kept(self, done: int) -> str:
         """Sentence on what the folder has of a sweep that was interrupted."""
-        return f"store {str(self._folder)!r} keeps {done} of {len(self.rows)} trajectories: the same call goes on"
+        return f"{self._name} keeps {done} of {len(self.rows)} trajectories: the same call goes on"
 
     def part(self, chunk: Chunk) -> Part | None:
         """The results of a chunk, if they are there."""
@@ -161,21 +154,23 @@ class Store:
         return self._folder / f"chunk-{first:09d}.npz"
 
     def _read(self) -> dict[str, Any]:
+        """What the folder keeps; empty if nothing."""
         try:
             known = json.loads((self._folder / SWEEP).read_text(encoding="utf-8"))
+        except FileNotFoundError:
+            return {}
         except ValueError:
             known = None
         if not isinstance(known, dict) or not isinstance(known.get("chunk"), int):
-            raise ValueError(f"store {str(self._folder)!r} is damaged: its {SWEEP} is not one that was written here")
+            raise ValueError(f"{self._name} is damaged: its {SWEEP} is not one that was written here")
         return known
 
     def _table(self, shape: tuple[int, ...]) -> Array:
         """The table, in its file. Raises ValueError for a file that was cut: a memory map would fill it with zeros."""
-        path, header = self._folder / ROWS, BytesIO()
+        path, header, damaged = self._folder / ROWS, BytesIO(), f"{self._name} is damaged: its {ROWS}"
         described: dict[str, Any] = {"descr": "<f8", "fortran_order": False, "shape": shape}
         np.lib.format.write_array_header_1_0(header, described)
         size, expected = path.stat().st_size, header.tell() + 8 * math.prod(shape)
-        damaged = f"store {str(self._folder)!r} is damaged: its {ROWS}"
         if size != expected:
             raise ValueError(f"{damaged} has {size} bytes, not {expected}; {AGAIN}")
         try:
@@ -188,12 +183,12 @@ class Store:
 
     def _make_rows(self, shape: tuple[int, ...]) -> None:
         if any(self._folder.glob("chunk-*.npz")):
-            raise ValueError(f"store {str(self._folder)!r} is damaged: it has results of chunks, and no {ROWS}")
-        size, free = 8 * int(np.prod(shape)), shutil.disk_usage(self._folder).free
+            raise ValueError(f"{self._name} is damaged: it has results of chunks, and no {ROWS}")
+        size, free = 8 * math.prod(shape), shutil.disk_usage(self._folder).free
         if size > free:  # a write through a memory map would end the process
+            needed = f"{shape[0]} trajectories of {shape[1]} rows of {shape[2]} numbers, and {free / 2**30:.3g} GiB"
             raise OSError(
-                f"store {str(self._folder)!r} needs {size / 2**30:.3g} GiB for {shape[0]} trajectories of {shape[1]} "
-                f"rows of {shape[2]} numbers, and {free / 2**30:.3g} GiB are free: record fewer times (t_eval)"
+                f"{self._name} needs {size / 2**30:.3g} GiB for {needed} are free: record fewer times (t_eval)"
             )
         made = self._folder / f".{ROWS}.{os.getpid()}.tmp"
         try:
@@ -204,7 +199,7 @@ class Store:
         except OSError as error:
             made.unlink(missing_ok=True)
             needs = f"needs a {ROWS} of {size / 2**30:.3g} GiB, which cannot be made"
-            raise OSError(error.errno, f"store {str(self._folder)!r} {needs}: {error.strerror}") from None
+            raise OSError(error.errno, f"{self._name} {needs}: {error.strerror}") from None
         made.replace(self._folder / ROWS)
 
 
@@ -238,15 +233,6 @@ def sweep_of(problem: Problem, task: Task, x: Array, p: Array) -> dict[str, Json
     }
     sweep: dict[str, Json] = json.loads(json.dumps(given))
     return sweep
-
-
-def _require_same(folder: Path, known: dict[str, Any], sweep: dict[str, Json]) -> None:
-    for name, value in sweep.items():
-        if known.get(name) != value:
-            raise ValueError(
-                f"store {str(folder)!r} keeps another sweep: there {name} is {known.get(name)!r:.60}, "
-                f"here {value!r:.60}"
-            )
 
 
 def _number(value: float | None) -> float | None:

@@ -40,6 +40,7 @@ from .lanes import (
 LARGEST_CHUNK = 256  # trajectories in a chunk one by one, unless asked for
 LONGEST_CHUNK = 4096  # of those in lanes, of which a chunk's rows of steps have at most `ROWS` numbers
 SHORT = 2**20  # equal steps of all trajectories, which take some hundredths of a second: a chunk for each worker
+UNKNOWN = 16  # workers behind a map, which does not say
 SHARES = 4  # chunks for each worker, so that workers of unlike speed finish together
 
 
@@ -107,22 +108,23 @@ class Task:
         """Whether trajectories go in lanes, if the program can."""
         return self.events is None and fits_lanes(self.program, self.options, self.grids, self.many)
 
-    def width(self, chunk: int | None, workers: int, *, stored: bool) -> int:
-        """Trajectories in a chunk.
+    @cached_property
+    def largest(self) -> int:
+        """Trajectories in a chunk at most; 0 unless they go in lanes."""
+        numbers = self.program.steps.width * (self.count + (0 if self.beside is None else len(self.beside.t)))
+        return min(LONGEST_CHUNK, max(VECTOR, ROWS // numbers)) if self.in_lanes else 0
+
+    def width(self, chunk: int | None, workers: object, *, stored: bool = False) -> int:
+        """Trajectories in a chunk: in lanes, of whole vectors.
 
         chunk: as asked for.  stored: whether a chunk that has not ended is lost when the process is, so that it should
-        be small. Chunks in lanes are of whole vectors.
+        be small.
         """
-        if not self.in_lanes:
-            largest, shares = LARGEST_CHUNK, SHARES
-        else:
-            numbers = self.program.steps.width * (self.count + (0 if self.beside is None else len(self.beside.t)))
-            largest = min(LONGEST_CHUNK, max(VECTOR, ROWS // numbers))
-            chunk = chunk and min(chunk, largest)
-            largest = min(largest, LARGEST_CHUNK) if stored else largest
-            shares = 1 if self.grids and self.many * self.grids[0].steps <= SHORT else SHARES
-        chunk = chunk or min(largest, math.ceil(self.many / (shares * workers)))
-        return math.ceil(chunk / VECTOR) * VECTOR if self.in_lanes and self.grids else int(chunk)
+        largest = self.largest or chunk or LARGEST_CHUNK
+        short = self.in_lanes and self.grids and self.many * self.grids[0].steps <= SHORT
+        shares = (1 if short else SHARES) * (workers if isinstance(workers, int) else UNKNOWN)
+        width = chunk or min(math.ceil(self.many / shares), LARGEST_CHUNK if stored else largest)
+        return math.ceil(min(width, largest) / VECTOR) * VECTOR if self.in_lanes and self.grids else min(width, largest)
 
     def __call__(self, chunk: Chunk) -> Part:
         """Run the chunk."""

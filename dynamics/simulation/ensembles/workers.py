@@ -50,44 +50,39 @@ def finished(task: Task, chunks: Sequence[Chunk], workers: Team, table: Array) -
 
     Raises TypeError for a map that gives something else than results, RuntimeError for a process that was ended.
     """
-    if not isinstance(workers, int):
-        done = 0
-        try:
-            for part in _elsewhere(task, chunks, workers):
-                yield part
-                done += 1
-        except BrokenExecutor:
-            raise RuntimeError(
-                "a process of workers was ended from outside, as where memory runs out, when "
-                f"{done} of {len(chunks)} chunks were here"
-            ) from None
-    elif workers == 1 or len(chunks) <= 1:
+    if isinstance(workers, int) and (workers == 1 or len(chunks) <= 1):
         for chunk in chunks:
             yield task.run(chunk, _rows(table, chunk), lambda: False)
-    else:
+        return
+    if isinstance(workers, int):
         with closing(_by_threads(task, chunks, min(workers, len(chunks)), table)) as parts:
             yield from parts
+        return
+    done, wanted = 0, "workers must give the results of the function, as map does, got"
+    try:
+        results = _elsewhere(task, chunks, workers)
+        if not isinstance(results, Iterable):
+            raise TypeError(f"{wanted} {results!r:.60}")
+        for part in results:
+            if not isinstance(part, Part):
+                raise TypeError(f"{wanted} {type(part).__name__}: {part!r:.60}")
+            yield part
+            done += 1
+    except BrokenExecutor:
+        came = f"{done} of {len(chunks)} chunks were here"
+        ended = f"a process of workers was ended from outside, as where memory runs out, when {came}"
+        raise RuntimeError(ended) from None
 
 
-def _elsewhere(task: Task, chunks: Sequence[Chunk], workers: Map | Executor) -> Generator[Part, None, None]:
-    """The parts that others make, looked at: from an executor or a pool, or from their maps, as they end."""
+def _elsewhere(task: Task, chunks: Sequence[Chunk], workers: Map | Executor) -> object:
+    """What others make: an executor or a pool, also by their maps, as chunks end; or another map."""
     pool = workers if isinstance(workers, Executor) else getattr(workers, "__self__", None)
-    parts: object
     if isinstance(pool, Executor):
-        parts = _by_executor(pool, task, chunks)
-    elif isinstance(pool, Pool):
-        parts = _by_pool(pool, task, chunks)
-    else:
-        assert not isinstance(workers, Executor)
-        parts = workers(task, chunks)
-    if not isinstance(parts, Iterable):
-        raise TypeError(f"workers must give the results of the function, as map does, got {parts!r:.60}")
-    for part in parts:
-        if not isinstance(part, Part):
-            raise TypeError(
-                f"workers must give the results of the function, as map does, got {type(part).__name__}: {part!r:.60}"
-            )
-        yield part
+        return _by_executor(pool, task, chunks)
+    if isinstance(pool, Pool):
+        return _by_pool(pool, task, chunks)
+    assert not isinstance(workers, Executor)
+    return workers(task, chunks)
 
 
 def _by_executor(pool: Executor, task: Task, chunks: Sequence[Chunk]) -> Generator[Part, None, None]:
