@@ -11,7 +11,7 @@ import numpy as np
 
 from cgraph._shared import Array, counted
 
-from .estimates.run_estimate import RunEstimate
+from .estimates.error_estimate import RunEstimate
 from .run_options import SMALL_MEMORY, TABLES, RunOptions, room
 from .steps.dense_output import StepBlock
 from .steps.stepping import Integration

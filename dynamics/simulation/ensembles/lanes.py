@@ -143,11 +143,8 @@ class _Memories:
         return rows
 
 
-class LaneRuns(NamedTuple):
-    """Flags of runs that reached their end without a remark on their course, (k,), and columns of their statistics."""
-
-    whole: Flags
-    columns: dict[str, Array]
+# Of runs: flags of those that reached their end without a remark on their course, (k,), and columns of statistics.
+LaneRuns: TypeAlias = tuple[Flags, dict[str, Array]]
 
 
 class Leg(NamedTuple):
@@ -217,7 +214,7 @@ def equal_in_lanes(
             at, steps = 0.0, steps + grid.steps
     longest = max([abs(leg.grid.h) for leg in legs])
     columns = {"steps": np.full(len(x), steps), "nfev": run.read("evaluations"), "dt": np.full(len(x), longest)}
-    return LaneRuns(run.read("nonfinite") == 0.0, columns)
+    return run.read("nonfinite") == 0.0, columns
 
 
 def _left(run: _Memories, steps: float) -> Array:
@@ -248,7 +245,7 @@ def chosen_in_lanes(
     whole = (run.read("status") == DONE) & (run.read("at_limit") < HELD)
     rejected, longest = run.read("rejected"), np.minimum(run.read("longest_made"), options.longest_step)
     columns = {"steps": run.read("trials") - rejected, "rejected": rejected}
-    return LaneRuns(whole, {**columns, "nfev": run.read("evaluations"), "dt": longest})
+    return whole, {**columns, "nfev": run.read("evaluations"), "dt": longest}
 
 
 def _states(program: StepProgram, rows: Array, times: Array) -> Array:

@@ -227,7 +227,7 @@ def ends_of(
     kept, rows = moving.shared_out((len(x), t0, options.t_end), task), np.empty((len(x), 1, x.shape[1]))
     with np.errstate(all="ignore"):
         found = kept.run_lanes(x, p, rows, lambda: False) if team == 1 and len(x) <= kept.largest else None
-    if found is None or not found.whole.all() or any(found.columns.get("warnings", ())):
+    if found is None or not found[0].all() or any(found[1].get("warnings", ())):
         whole = _run_chunks(kept, x, p, kept.width(None, team), team)
         rows = whole.rows
         for text in doubts(whole.runs.stats(options.method, 0.0)):

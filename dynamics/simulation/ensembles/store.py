@@ -7,7 +7,6 @@ import math
 import os
 import platform
 import shutil
-from collections.abc import Iterable
 from hashlib import blake2b
 from importlib.metadata import PackageNotFoundError, version
 from io import BytesIO
@@ -217,33 +216,26 @@ def sweep_of(problem: Problem, task: Task, x: Array, p: Array) -> dict[str, Json
         "llvmlite": _version("llvmlite"),
         "machine": platform.machine(),
         **{name: getattr(options, name) for name in ("method", "backend", "fma", "estimate_error")},
-        **{name: _number(getattr(options, name)) for name in ("t0", "t_end", "dt", "max_step", "first_step")},
-        "max_steps": _number(options.max_steps),
+        **{name: getattr(options, name) for name in ("t0", "t_end", "dt", "max_step", "first_step")},
+        "max_steps": None if options.max_steps == math.inf else options.max_steps,
         "rtol": options.relative,
         "atol": np.asarray(options.absolute, dtype=np.float64).tolist(),
-        "times": _digest([options.row_times.tobytes()]),
+        "times": _digest(options.row_times.tobytes()),
         "states": program.components,
         "varied": problem.parameters,
         "events": [f"{event.name} {event.direction} {event.terminal}" for event in watched],
-        "model": _digest([cg.structure_hash(graph).encode() for graph in [*model, *events] if graph is not None]),
-        "steps": _digest([cg.structure_hash(graph).encode() for graph in program.steps.graphs()]),
+        "model": _digest(*[cg.structure_hash(graph).encode() for graph in [*model, *events] if graph is not None]),
+        "steps": _digest(*[cg.structure_hash(graph).encode() for graph in program.steps.graphs()]),
         "trajectories": len(x),
-        "starts": _digest([x.tobytes()]),
-        "parameters": _digest([p.tobytes()]),
+        "starts": _digest(x.tobytes()),
+        "parameters": _digest(p.tobytes()),
     }
-    sweep: dict[str, Json] = json.loads(json.dumps(given))
+    sweep: dict[str, Json] = json.loads(json.dumps(given, default=float))
     return sweep
 
 
-def _number(value: float | None) -> float | None:
-    return None if value is None or value == math.inf else float(value)
-
-
-def _digest(parts: Iterable[bytes]) -> str:
-    digest = blake2b(digest_size=16)
-    for part in parts:
-        digest.update(part)
-    return digest.hexdigest()
+def _digest(*parts: bytes) -> str:
+    return blake2b(b"".join(parts), digest_size=16).hexdigest()
 
 
 def _version(package: str) -> str:

@@ -138,9 +138,9 @@ class Task:
         part, left = not_begun(chunk.first, rows, events=self.events is not None), list(range(len(chunk.x)))
         with np.errstate(all="ignore"):
             if (found := self.run_lanes(chunk.x, chunk.p, rows, stopped)) is not None:
-                done = np.flatnonzero(found.whole)
-                part.runs.reached(done, **{name: values[done] for name, values in found.columns.items()})
-                left = np.flatnonzero(~found.whole).tolist()  # which are made again, alone
+                whole, columns = found
+                part.runs.reached(whole, **{name: values[whole] for name, values in columns.items()})
+                left = np.flatnonzero(~whole).tolist()  # which are made again, alone
             self._one_by_one(chunk, part, left, stopped)
         return part
 
@@ -159,12 +159,13 @@ class Task:
             return equal_in_lanes(lanes, x, p, own, [rows], stopped)
         watch = Watch(self.program.rate, self.program.order, p, self.options.t0, x)
         states = np.empty((1 + len(others), len(x), len(beside.t), x.shape[1]))
-        found = equal_in_lanes(lanes, x, p, own, [rows, states[0]], stopped, watch.add if watch.needed else None)
+        see = watch.add if watch.needed else None
+        whole, columns = equal_in_lanes(lanes, x, p, own, [rows, states[0]], stopped, see)
         for legs, each in zip(others, states[1:], strict=True):
             equal_in_lanes(lanes, x * ASIDE, p, legs, [each], stopped)
-        steps = int(found.columns["steps"][0])
+        steps = int(columns["steps"][0])
         errors = error_estimates(self.program, self.options, beside.law, watch, steps, beside.t, [*states])
-        return LaneRuns(found.whole, found.columns | errors)
+        return whole, columns | errors
 
     @cached_property
     def _legs(self) -> list[list[Leg]]:

@@ -5,11 +5,18 @@ from __future__ import annotations
 import multiprocessing
 import threading
 from collections.abc import Callable, Generator, Iterable, Sequence
-from concurrent.futures import BrokenExecutor, Executor, Future, ThreadPoolExecutor, as_completed
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    Executor,
+    Future,
+    ThreadPoolExecutor,
+    as_completed,
+    wait,
+)
 from contextlib import closing, suppress
 from multiprocessing.pool import Pool
 from multiprocessing.process import BaseProcess
-from queue import Empty, SimpleQueue
 
 import numpy as np
 
@@ -112,19 +119,18 @@ def _by_pool(pool: Pool, task: Task, chunks: Sequence[Chunk]) -> Generator[Part,
 
 
 def _by_threads(task: Task, chunks: Sequence[Chunk], threads: int, table: Array) -> Generator[Part, None, None]:
-    stop, ended = threading.Event(), SimpleQueue[Future[Part]]()
-    futures: list[Future[Part]] = []
+    stop, futures = threading.Event(), list[Future[Part]]()
     with ThreadPoolExecutor(threads) as pool:
         try:  # threads run from the first submission on, and the pool waits for them at any exit
             futures.extend(pool.submit(task.run, chunk, _rows(table, chunk), stop.is_set) for chunk in chunks)
-            for future in futures:
-                future.add_done_callback(ended.put)
-            for _ in futures:
-                yield _next(ended).result()
+            waiting = set(futures)
+            while waiting:
+                ended, waiting = wait(waiting, LOOK, FIRST_COMPLETED)
+                for future in ended:
+                    yield future.result()
         except KeyboardInterrupt:
             stop.set()
-            running = [future for future in futures if not future.cancel()]
-            for future in running:
+            for future in [each for each in futures if not each.cancel()]:
                 with suppress(StoppedError):
                     yield future.result()
             raise
@@ -133,12 +139,6 @@ def _by_threads(task: Task, chunks: Sequence[Chunk], threads: int, table: Array)
             for future in futures:
                 future.cancel()
             raise
-
-
-def _next(ended: SimpleQueue[Future[Part]]) -> Future[Part]:
-    while True:
-        with suppress(Empty):
-            return ended.get(timeout=LOOK)
 
 
 def _rows(table: Array, chunk: Chunk) -> Array:
