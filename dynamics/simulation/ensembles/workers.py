@@ -5,16 +5,8 @@ from __future__ import annotations
 import multiprocessing
 import threading
 from collections.abc import Callable, Generator, Iterable, Sequence
-from concurrent.futures import (
-    FIRST_COMPLETED,
-    BrokenExecutor,
-    Executor,
-    Future,
-    ThreadPoolExecutor,
-    as_completed,
-    wait,
-)
-from contextlib import closing, suppress
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, ThreadPoolExecutor, wait
+from contextlib import suppress
 from multiprocessing.pool import Pool
 from multiprocessing.process import BaseProcess
 
@@ -22,7 +14,6 @@ import numpy as np
 
 from cgraph._shared import Array, thread_count
 
-from ..steps.stepping import StoppedError
 from .task import Chunk, Part, Task
 
 Map = Callable[[Callable[[Chunk], Part], Sequence[Chunk]], Iterable[Part]]
@@ -57,13 +48,20 @@ def finished(task: Task, chunks: Sequence[Chunk], workers: Team, table: Array) -
 
     Raises TypeError for a map that gives something else than results, RuntimeError for a process that was ended.
     """
-    if isinstance(workers, int) and (workers == 1 or len(chunks) <= 1):
-        for chunk in chunks:
-            yield task.run(chunk, _rows(table, chunk), lambda: False)
-        return
     if isinstance(workers, int):
-        with closing(_by_threads(task, chunks, min(workers, len(chunks)), table)) as parts:
-            yield from parts
+        stop = threading.Event()
+
+        def run(chunk: Chunk) -> Part:
+            return task.run(chunk, table[chunk.first : chunk.first + len(chunk.x)], stop.is_set)
+
+        if workers == 1 or len(chunks) <= 1:
+            yield from map(run, chunks)
+            return
+        with ThreadPoolExecutor(min(workers, len(chunks))) as pool:  # which waits for its threads at any exit
+            try:
+                yield from _by_executor(pool, run, chunks)
+            finally:
+                stop.set()
         return
     done, wanted = 0, "workers must give the results of the function, as map does, got"
     try:
@@ -92,14 +90,14 @@ def _elsewhere(task: Task, chunks: Sequence[Chunk], workers: Map | Executor) -> 
     return workers(task, chunks)
 
 
-def _by_executor(pool: Executor, task: Task, chunks: Sequence[Chunk]) -> Generator[Part, None, None]:
+def _by_executor(pool: Executor, run: Callable[[Chunk], Part], chunks: Sequence[Chunk]) -> Generator[Part, None, None]:
     """The parts as they end, none of which is kept: an executor's own map waits for the first, and holds the others."""
-    waiting = {pool.submit(task, chunk) for chunk in chunks}
+    waiting = {pool.submit(run, chunk) for chunk in chunks}
     try:
-        for future in as_completed(waiting):
-            waiting.discard(future)
-            yield future.result()
-            del future
+        while waiting:
+            ended, waiting = wait(waiting, LOOK, FIRST_COMPLETED)
+            while ended:
+                yield ended.pop().result()
     finally:
         for each in waiting:
             each.cancel()
@@ -116,30 +114,3 @@ def _by_pool(pool: Pool, task: Task, chunks: Sequence[Chunk]) -> Generator[Part,
                 break
             if any([each.exitcode not in (None, 0) for each in watched]):
                 raise BrokenExecutor
-
-
-def _by_threads(task: Task, chunks: Sequence[Chunk], threads: int, table: Array) -> Generator[Part, None, None]:
-    stop, futures = threading.Event(), list[Future[Part]]()
-    with ThreadPoolExecutor(threads) as pool:
-        try:  # threads run from the first submission on, and the pool waits for them at any exit
-            futures.extend(pool.submit(task.run, chunk, _rows(table, chunk), stop.is_set) for chunk in chunks)
-            waiting = set(futures)
-            while waiting:
-                ended, waiting = wait(waiting, LOOK, FIRST_COMPLETED)
-                for future in ended:
-                    yield future.result()
-        except KeyboardInterrupt:
-            stop.set()
-            for future in [each for each in futures if not each.cancel()]:
-                with suppress(StoppedError):
-                    yield future.result()
-            raise
-        except BaseException:  # an error in a thread, or nobody wants the rest
-            stop.set()
-            for future in futures:
-                future.cancel()
-            raise
-
-
-def _rows(table: Array, chunk: Chunk) -> Array:
-    return table[chunk.first : chunk.first + len(chunk.x)]
