@@ -12,7 +12,7 @@ import itertools
 import math
 import time
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple, cast
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias, cast
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from cgraph._shared import Array
 
 from ..run_options import RunOptions
 from ..steps.dense_output import StepBlock
-from ..steps.equal_steps import SAME_INSTANT, EqualSteps, Numbers, equal_steps, halved, instants_of, longer, some_of
+from ..steps.equal_steps import SAME_INSTANT, EqualSteps, Numbers, equal_steps, instants_of, longer, some_of
 from ..steps.step_program import StepProgram
 from ..steps.stepping import FixedStepIntegration, Integration
 from .state_sizes import Flags, off_by
@@ -81,9 +81,11 @@ def runs_beside(stretches: Sequence[EqualSteps], order: int) -> RunsBeside:
     ]
     if two >= APART_RATIO * one and four - two >= APART_RATIO * (two - one):
         return RunsBeside(Law(longest, one / (two - one), (four - two) / (two - one)), runs, numbers, t)
-    numbers = some_of(steps, 1, LOOKS)
-    half = [(halved(stretches), 2 * numbers)]
-    return RunsBeside(law_of_halves(longest, order), half, numbers, instants_of(stretches, numbers))
+    numbers, half = (
+        some_of(steps, 1, LOOKS),
+        [part._replace(h=0.5 * part.h, steps=2 * part.steps) for part in stretches],
+    )
+    return RunsBeside(law_of_halves(longest, order), [(half, 2 * numbers)], numbers, instants_of(stretches, numbers))
 
 
 def error_estimates(
@@ -172,32 +174,32 @@ class RunEstimate:
         """The next steps of the run, or a reset."""
         if not self._options.estimated or not len(block.t):
             return
-        begin = time.perf_counter()
+        begin, segment = time.perf_counter(), self._run.segment
+        assert isinstance(segment, FixedStepIntegration)
         if self._compared is None:
-            kind = _Whole if _segment(self._run).control is None else _Periods
-            self._compared = kind(self._run, self._x, self._options)
-        self._compared.add(block)
-        self.seconds += time.perf_counter() - begin
+            p, program = np.array([segment.parameters]), segment.program
+            self._watch = Watch(program.rate, program.order, p, self._options.t0, self._x[None])
+            if segment.control is None:
+                self._compared = _Whole(self._run, self._x, self._options, segment)
+            else:
+                self._compared = _Periods(self._x, self._options.t0, self._watch)
+        if block.h[0] == 0.0:
+            self._watch.restart(float(block.t[0]), block.x)
+        else:
+            self._compared.add(block, segment)
+            self._watch.add(block.t, block.x[None])
+        self._segment, self.seconds = segment, self.seconds + time.perf_counter() - begin
 
     def result(self) -> tuple[float | None, float | None, tuple[str, ...]]:
         """After the last step: the largest error and that at the end, None if unknown, and what to say of them."""
         if self._compared is None:
             return None, None, ()
-        begin = time.perf_counter()
-        error, last, said = [column[0] for column in self._compared.columns().values()]
+        begin, program = time.perf_counter(), self._segment.program
+        law, found = self._compared.found(self._run.largest, program.order)
+        columns = error_estimates(program, self._options, law, self._watch, self._run.steps, *found)
+        error, last, said = [column[0] for column in columns.values()]
         self.seconds += time.perf_counter() - begin
         return (None, None, ()) if math.isnan(error) else (float(error), float(last), said)
-
-
-def _segment(run: Integration) -> FixedStepIntegration:
-    """The part of a run of equal steps that it is in."""
-    segment = run.segment
-    assert isinstance(segment, FixedStepIntegration)
-    return segment
-
-
-def _watch(segment: FixedStepIntegration, t0: float, x: Array) -> Watch:
-    return Watch(segment.program.rate, segment.program.order, np.array([segment.parameters]), t0, x[None])
 
 
 class _Rows:
@@ -222,38 +224,35 @@ class _Rows:
         self.resets[here], self.count = resets, max(self.count, here.stop)
 
 
+Found: TypeAlias = tuple[Array, list[Array], list[Flags], float]  # as `error_estimates` takes it
+
+
 class _Whole:
     """A run and runs beside it that go all the way, at instants at which steps of all end.
 
     Runs with resets have these at other times, and are compared by their dense output where both have had as many.
     """
 
-    def __init__(self, run: Integration, x: Array, options: RunOptions) -> None:
-        first = _segment(run)
-        stretches = first.stretches
-        if run is not first and cast("WatchedIntegration", run).resetting:
+    def __init__(self, run: Integration, x: Array, options: RunOptions, first: FixedStepIntegration) -> None:
+        self._run, self._x, self._first, stretches = run, x, first, first.stretches
+        self._resetting = run is not first and cast("WatchedIntegration", run).resetting
+        if self._resetting:
             stretches = equal_steps([options.t0, options.t_end], max([abs(part.h) for part in stretches]))
-        self._run, self._x, self._options, self._first, self._stretches = run, x, options, first, stretches
-        self._beside, self._watch = runs_beside(stretches, first.program.order), _watch(first, options.t0, x)
+        self._beside = runs_beside(stretches, first.program.order)
         self._rows = _Rows(self._beside.t, x)
 
-    def add(self, block: StepBlock) -> None:
-        """The next steps of the run, or a reset."""
-        if block.h[0] == 0.0:
-            self._watch.restart(float(block.t[0]), block.x)
-        else:
-            self._watch.add(block.t, block.x[None])
-            self._rows.add(block, self._run.resets)
+    def add(self, block: StepBlock, segment: FixedStepIntegration) -> None:
+        """The next steps of the run."""
+        self._rows.add(block, self._run.resets)
 
-    def columns(self) -> dict[str, Array]:
-        """The estimates, after the last step."""
-        first, one = self._first, self._rows
+    def found(self, longest: float, order: int) -> tuple[Law, Found]:
+        """What the runs beside tell, after the last step."""
+        one, law = self._rows, self._beside.law
         t = one.t[: one.count]
         rows, alike = [one.x[None, : len(t)]], list[Flags]()
         for stretches, _ in self._beside.runs if len(t) > 1 else ():
-            if self._stretches is first.stretches:
-                run: Integration = first.beside(stretches, first.parameters)
-            else:
+            run: Integration = self._first.beside(stretches, self._first.parameters)
+            if self._resetting:
                 run = cast("WatchedIntegration", self._run).beside(max([abs(part.h) for part in stretches]))
             other = _Rows(t, self._x)
             for block in run.blocks(self._x * ASIDE):
@@ -266,9 +265,8 @@ class _Whole:
             rows.append(other.x[None])
             alike.append(one.resets[: len(t)] == other.resets)
             one = other
-        lost = _parted(t, alike[0], self._beside.law.longest, self._run.resets) if alike else math.nan
-        what = first.program, self._options, self._beside.law, self._watch, self._run.steps
-        return error_estimates(*what, t, rows, alike, lost)
+        lost = _parted(t, alike[0], law.longest, self._run.resets) if alike else math.nan
+        return law, (t, rows, alike, lost)
 
 
 def _parted(t: Array, alike: Flags, longest: float, resets: int) -> float:
@@ -286,24 +284,19 @@ class _Periods:
     length are made under the same. The differences add up.
     """
 
-    def __init__(self, run: Integration, x: Array, options: RunOptions) -> None:
-        self._run, self._options, self._segment = run, options, _segment(run)
-        self._watch, self._stretch = _watch(self._segment, options.t0, x), self._segment.stretch
-        self._start = self._end = x
-        self._size, self._sum, self._t, self._steps, self._since = np.abs(x), np.zeros(len(x)), options.t0, 0, math.inf
+    _stretch: EqualSteps  # of which so many steps are done
 
-    def add(self, block: StepBlock) -> None:
-        """The next steps of the run, or a reset."""
-        segment = _segment(self._run)
-        if block.h[0] == 0.0:
-            self._watch.restart(float(block.t[0]), block.x)
-            return
+    def __init__(self, x: Array, t0: float, watch: Watch) -> None:
+        self._watch, self._t0, self._since, self._steps = watch, t0, math.inf, 0
+        self._size, self._sum = np.abs(x), np.zeros(len(x))
+
+    def add(self, block: StepBlock, segment: FixedStepIntegration) -> None:
+        """The next steps of the run."""
         if not self._steps or segment.stretch is not self._stretch:
             self._compare()
             self._segment, self._stretch, self._forces = segment, segment.stretch, segment.parameters
             self._start, self._steps = block.x_old[0], 0
             self._watch.restart(float(block.t_old[0]), block.x_old[:1], np.array([self._forces]))
-        self._watch.add(block.t, block.x[None])
         self._size = np.maximum(self._size, np.abs(block.x).max(axis=0))
         self._steps, self._t, self._end = self._steps + len(block.t), float(block.t[-1]), block.x[-1]
 
@@ -311,19 +304,16 @@ class _Periods:
         """Add the difference of the stretch, as far as it went."""
         if not self._steps:
             return
-        begin, steps = self._stretch.begin, 2 * self._steps
+        begin, steps, end = self._stretch.begin, 2 * self._steps, self._start
         run = self._segment.beside([EqualSteps(begin, (self._t - begin) / steps, steps, self._t)], self._forces)
-        end = self._start
         for block in run.blocks(self._start):
             end = block.x[-1]
         self._sum = self._sum + (math.nan if run.status else np.abs(end - self._end))
         if not np.isfinite(self._sum).all():
             self._since = min(self._since, self._t)
 
-    def columns(self) -> dict[str, Array]:
-        """The estimates, after the last step."""
+    def found(self, longest: float, order: int) -> tuple[Law, Found]:
+        """What the differences tell, after the last step, as those of two rows."""
         self._compare()
-        program, size = self._segment.program, np.array([[self._size] * 2])
-        rows, t = [size, size + [np.zeros(len(self._sum)), self._sum]], np.array([self._options.t0, self._since])
-        law = law_of_halves(self._run.largest, program.order)
-        return error_estimates(program, self._options, law, self._watch, self._run.steps, t, rows)
+        rows = [np.array([[self._size] * 2]), np.array([[self._size, self._size + self._sum]])]
+        return law_of_halves(longest, order), (np.array([self._t0, self._since]), rows, [], math.nan)

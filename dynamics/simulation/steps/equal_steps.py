@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -59,11 +59,6 @@ def even_steps(instants: Sequence[float], dt: float) -> list[EqualSteps]:
         else:
             result += equal_steps(times[first : last + 1].tolist(), dt)
     return result
-
-
-def halved(stretches: Iterable[EqualSteps]) -> list[EqualSteps]:
-    """Two steps in place of each."""
-    return [part._replace(h=0.5 * part.h, steps=2 * part.steps) for part in stretches]
 
 
 def some_of(steps: int, every: int, most: int) -> Numbers:
