@@ -188,11 +188,11 @@ def equal_in_lanes(
     legs: Sequence[Leg],
     tables: Sequence[Array],
     stopped: Stopped,
-    see: Callable[[Array, Array], None] | None = None,
+    watch: Callable[[Array, Array], None] | None = None,
 ) -> LaneRuns:
     """Runs by equal steps from states x (k, m) with parameters p (k, ..).
 
-    tables: receive states, (k, T, m), NaN from where a run has not come to.  see: is told those of all marks, and when.
+    tables: receive states, (k, T, m), NaN from where a run has not come to.  watch: is told those of all marks.
     """
     run, m, steps = _Memories(code, len(x), {"x": x, "p": p, "fresh": 1.0}), x.shape[1], 0
     for (first, _), rows in zip(legs[0].places, tables, strict=True):
@@ -208,8 +208,8 @@ def equal_in_lanes(
             block[np.arange(len(marks)) >= run.passes[:, 1:]] = np.nan
         for (here, there), rows in zip(places, tables, strict=True):
             rows[:, here] = block[:, there]
-        if see is not None:
-            see(grid.begin + marks * grid.h, block)
+        if watch is not None:
+            watch(grid.begin + marks * grid.h, block)
         if at == grid.steps:
             at, steps = 0.0, steps + grid.steps
     longest = max([abs(leg.grid.h) for leg in legs])

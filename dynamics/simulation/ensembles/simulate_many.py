@@ -30,9 +30,9 @@ from ..sampled_controller import SampledController
 from ..steps.equal_steps import step_count
 from ..steps.step_program import step_program
 from ..trajectory import SimulationWarning
-from .ensemble import Ensemble, doubts
+from .ensemble import Ensemble, Part, doubts
 from .store import Store, sweep_of
-from .task import Chunk, Part, Task, not_begun
+from .task import Chunk, Task
 from .workers import Team, Workers, checked, finished
 
 
@@ -175,11 +175,11 @@ def simulate_many(
 
     # Put the result together
     times, rows = options.row_times, whole.rows
-    logs = [split_crossings(watch, log, nq, p[k]) for k, log in enumerate(whole.happened)]
+    logs = [split_crossings(watch, log, nq, p[k]) for k, log in enumerate(whole.columns["happened"]) if watched]
     for k in range(len(x)) if problem.missing is not None else ():
         missed = unreached_momenta(problem, times, rows[k], p[k], start=(t0, start.x[k], x[k]))
-        whole.runs.columns["warnings"][k] += tuple(missed)
-    stats = whole.runs.stats(method, time.perf_counter() - begin)
+        whole.columns["warnings"][k] += tuple(missed)
+    stats = whole.stats(method, time.perf_counter() - begin)
     for text in doubts(stats):
         warnings.warn(text, SimulationWarning, stacklevel=2)
     return Ensemble(
@@ -230,7 +230,7 @@ def ends_of(
     if found is None or not found[0].all() or any(found[1].get("warnings", ())):
         whole = _run_chunks(kept, x, p, kept.width(None, team), team)
         rows = whole.rows
-        for text in doubts(whole.runs.stats(options.method, 0.0)):
+        for text in doubts(whole.stats(options.method, 0.0)):
             warnings.warn(text, SimulationWarning, stacklevel=3)
     states = converted(problem.velocities, options.t_end, rows[:, 0], p)
     return states[:, : problem.nq], states[:, problem.nq :]
@@ -255,12 +255,12 @@ def _run_chunks(task: Task, x: Array, p: Array, width: int, workers: Team, store
     Raises ValueError unless all parts come.
     """
     rows = np.empty((len(x), task.count, x.shape[1])) if store is None else store.rows
-    whole, came = not_begun(0, rows, events=task.events is not None), dict[int, int]()  # trajectories, by the first
+    whole, came = Part(0, rows), dict[int, int]()  # trajectories, by the first
     chunks = [Chunk(k, x[k : k + width], p[k : k + width]) for k in range(0, len(x), width)]
     if store is not None:
         known = {chunk.first: part for chunk in chunks if (part := store.part(chunk)) is not None}
         for part in known.values():
-            whole.put(part)
+            whole.place(part)
             came[part.first] = len(part.rows)
         chunks = [chunk for chunk in chunks if chunk.first not in known]
         if chunks:
@@ -271,7 +271,7 @@ def _run_chunks(task: Task, x: Array, p: Array, width: int, workers: Team, store
             closing(finished(task, chunks, workers, whole.rows)) as parts,
         ):
             for part in parts:
-                whole.put(part)
+                whole.place(part)
                 if store is not None:
                     store.keep(part)
                 came[part.first] = len(part.rows)
@@ -283,7 +283,9 @@ def _run_chunks(task: Task, x: Array, p: Array, width: int, workers: Team, store
     if (done := sum(came.values())) != len(x):
         back = f"of {len(x)} trajectories came back {done}"
         raise ValueError(f"workers must give a result for each item, as map does: {back}")
-    return whole if store is None else replace(whole, rows=store.read_only())
+    if store is not None:
+        whole.rows = store.read_only()
+    return whole
 
 
 def _require_room(options: RunOptions, many: int, m: int, *, stored: bool) -> None:

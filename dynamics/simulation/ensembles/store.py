@@ -21,8 +21,8 @@ import cgraph as cg
 from cgraph._shared import Array, Json, atomic_write
 
 from ...integrators import Problem
-from .ensemble import COLUMNS, RunTable
-from .task import Chunk, Part, Task
+from .ensemble import COLUMNS, Part
+from .task import Chunk, Task
 
 if TYPE_CHECKING:
     import sqlite3
@@ -111,36 +111,29 @@ class Store:
 
     def part(self, chunk: Chunk) -> Part | None:
         """The results of a chunk, if they are there."""
-        rows, runs = self.rows[chunk.first : chunk.first + len(chunk.x)], RunTable(len(chunk.x))
+        part = Part(chunk.first, self.rows[chunk.first : chunk.first + len(chunk.x)])
         try:
             with np.load(self._file(chunk.first), allow_pickle=False) as kept:
-                runs.put(slice(None), **{name: kept[name] for name in NUMBERS})
+                part.put(slice(None), **{name: kept[name] for name in NUMBERS})
                 texts, checksum = json.loads(kept["texts"].tobytes()), int(kept["checksum"])
         except (OSError, ValueError, KeyError, EOFError, BadZipFile):  # not there, or damaged: the chunk is run again
             return None
-        if crc32(rows.data) != checksum:
-            return None
-        runs.put(slice(None), message=texts["messages"])
+        part.put(slice(None), message=texts["messages"])
         for k, said in enumerate(texts["warnings"]):
-            runs.put(k, warnings=tuple(said))
-        happened = [[(number, t, np.array(x)) for number, t, x in log] for log in texts["happened"]]
-        return Part(chunk.first, rows, runs, happened)
+            part.put(k, warnings=tuple(said))
+        for k, log in enumerate(texts["happened"]):
+            part.put(k, happened=[(number, t, np.array(x)) for number, t, x in log])
+        return part if crc32(part.rows.data) == checksum else None
 
     def keep(self, part: Part) -> None:
         """Write how the trajectories of a part went; their rows are in the table."""
         self.rows.flush()  # type: ignore[attr-defined]  # of a memmap
-        columns, written = part.runs.columns, BytesIO()
-        happened = [[(number, t, x.tolist()) for number, t, x in log] for log in part.happened]
-        texts = {
-            "messages": columns["message"].tolist(),
-            "warnings": columns["warnings"].tolist(),
-            "happened": happened,
-        }
+        columns, written = part.columns, BytesIO()
+        happened = [[(number, t, x.tolist()) for number, t, x in log] for log in columns["happened"]]
+        texts = {"messages": columns["message"].tolist(), "warnings": columns["warnings"].tolist()}
+        words = json.dumps({**texts, "happened": happened if any(happened) else []}).encode()
         checksum = crc32(self.rows[part.first : part.first + len(part.rows)].data)
-        kept: dict[str, Any] = {
-            "texts": np.frombuffer(json.dumps(texts).encode(), np.uint8),
-            "checksum": np.array(checksum, np.uint32),
-        }
+        kept: dict[str, Any] = {"texts": np.frombuffer(words, np.uint8), "checksum": np.array(checksum, np.uint32)}
         np.savez(written, **kept, **{name: columns[name] for name in NUMBERS})
         atomic_write(self._file(part.first), written.getvalue())
 

@@ -15,14 +15,14 @@ from cgraph._shared import Array
 from ..estimates.error_estimate import ASIDE, RunsBeside, error_estimates, runs_beside
 from ..estimates.unresolved import Watch, is_watched
 from ..events.event import EventProgram
-from ..events.event_log import Happening, WatchedIntegration
+from ..events.event_log import WatchedIntegration
 from ..outcome import INTERRUPTED, outcome
 from ..run_options import RunOptions
 from ..steps.equal_steps import EqualSteps, even_steps, numbers_of
 from ..steps.integration import AdaptiveIntegration, integration
 from ..steps.step_program import StepProgram, compile_steps
 from ..steps.stepping import Integration, NativeIntegration, NativeRun
-from .ensemble import COLUMNS, RunTable
+from .ensemble import COLUMNS, Part
 from .lanes import (
     ROWS,
     VECTOR,
@@ -51,29 +51,6 @@ class Chunk:
     first: int
     x: Array
     p: Array
-
-
-@dataclass(frozen=True)
-class Part:
-    """Results of a chunk, or of all: rows (k, T, m), NaN after a trajectory has stopped, and the runs' statistics."""
-
-    first: int
-    rows: Array
-    runs: RunTable
-    happened: list[list[Happening]]  # the events of each, if any are looked for
-
-    def put(self, part: Part) -> None:
-        """Put the results of a part in their place."""
-        here = slice(part.first, part.first + len(part.rows))
-        if not np.may_share_memory(part.rows, self.rows):  # from another process
-            self.rows[here] = part.rows
-        self.runs.put(here, **part.runs.columns)
-        self.happened[here] = part.happened
-
-
-def not_begun(first: int, rows: Array, *, events: bool) -> Part:
-    """The part of the chunk whose rows are to be here, before its first step."""
-    return Part(first, rows, RunTable(len(rows)), [[] for _ in rows] if events else [])
 
 
 @dataclass(frozen=True)
@@ -111,8 +88,10 @@ class Task:
     @cached_property
     def largest(self) -> int:
         """Trajectories in a chunk at most; 0 unless they go in lanes."""
+        if not self.in_lanes:
+            return 0
         numbers = self.program.steps.width * (self.count + (0 if self.beside is None else len(self.beside.t)))
-        return min(LONGEST_CHUNK, max(VECTOR, ROWS // numbers)) if self.in_lanes else 0
+        return min(LONGEST_CHUNK, max(VECTOR, ROWS // numbers))
 
     def width(self, chunk: int | None, workers: object, *, stored: bool = False) -> int:
         """Trajectories in a chunk: in lanes, of whole vectors.
@@ -135,11 +114,11 @@ class Task:
 
         Raises KeyboardInterrupt soon after Ctrl-C, and StoppedError after `stopped`.
         """
-        part, left = not_begun(chunk.first, rows, events=self.events is not None), list(range(len(chunk.x)))
+        part, left = Part(chunk.first, rows), list(range(len(chunk.x)))
         with np.errstate(all="ignore"):
             if (found := self.run_lanes(chunk.x, chunk.p, rows, stopped)) is not None:
                 whole, columns = found
-                part.runs.reached(whole, **{name: values[whole] for name, values in columns.items()})
+                part.reached(whole, **{name: values[whole] for name, values in columns.items()})
                 left = np.flatnonzero(~whole).tolist()  # which are made again, alone
             self._one_by_one(chunk, part, left, stopped)
         return part
@@ -159,8 +138,9 @@ class Task:
             return equal_in_lanes(lanes, x, p, own, [rows], stopped)
         watch = Watch(self.program.rate, self.program.order, p, self.options.t0, x)
         states = np.empty((1 + len(others), len(x), len(beside.t), x.shape[1]))
-        see = watch.add if watch.needed else None
-        whole, columns = equal_in_lanes(lanes, x, p, own, [rows, states[0]], stopped, see)
+        whole, columns = equal_in_lanes(
+            lanes, x, p, own, [rows, states[0]], stopped, watch.add if watch.needed else None
+        )
         for legs, each in zip(others, states[1:], strict=True):
             equal_in_lanes(lanes, x * ASIDE, p, legs, [each], stopped)
         steps = int(columns["steps"][0])
@@ -200,16 +180,16 @@ class Task:
                 run = integration(native, events=self.events)
             if has_end and isinstance(run, AdaptiveIntegration):  # steps need not be looked at if it is their only row
                 if run.unseen(x):
-                    part.runs.reached(k, **run.counts)
+                    part.reached(k, **run.counts)
                     part.rows[k, :-1], part.rows[k, -1] = x, run.x
                     continue
                 run = integration(native)  # whose first blocks are short: it says when
             stats, recorder = outcome(run, x, self.options)
             if stats.message.startswith(INTERRUPTED):
                 raise KeyboardInterrupt
-            part.runs.put(k, **{name: getattr(stats, name) for name in COLUMNS})
+            part.put(k, **{name: getattr(stats, name) for name in COLUMNS})
             if isinstance(run, WatchedIntegration):
-                part.happened[k] = run.log.happened
+                part.put(k, happened=run.log.happened)
             states = recorder.table()[1]
             part.rows[k, : len(states)], part.rows[k, len(states) :] = states, np.nan
 

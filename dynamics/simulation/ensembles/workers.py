@@ -14,7 +14,8 @@ import numpy as np
 
 from cgraph._shared import Array, thread_count
 
-from .task import Chunk, Part, Task
+from .ensemble import Part
+from .task import Chunk, Task
 
 Map = Callable[[Callable[[Chunk], Part], Sequence[Chunk]], Iterable[Part]]
 Team = int | Map | Executor  # number of threads, or who does the work

@@ -20,7 +20,15 @@ from cgraph._shared import Array
 
 from ..run_options import RunOptions
 from ..steps.dense_output import StepBlock
-from ..steps.equal_steps import SAME_INSTANT, EqualSteps, Numbers, equal_steps, instants_of, longer, some_of
+from ..steps.equal_steps import (
+    SAME_INSTANT,
+    EqualSteps,
+    Numbers,
+    equal_steps,
+    instants_of,
+    longer_steps,
+    sampled_numbers,
+)
 from ..steps.step_program import StepProgram
 from ..steps.stepping import FixedStepIntegration, Integration
 from .state_sizes import Flags, off_by
@@ -72,9 +80,9 @@ class RunsBeside(NamedTuple):
 def runs_beside(stretches: Sequence[EqualSteps], order: int) -> RunsBeside:
     """Runs of steps twice and four times as long; if there are too few of them, one of steps half as long."""
     steps, longest = sum([part.steps for part in stretches]), max([abs(part.h) for part in stretches])
-    numbers = some_of(steps, FOUR, LOOKS)
+    numbers = sampled_numbers(steps, FOUR, LOOKS)
     t = instants_of(stretches, numbers)
-    runs = [longer(t, numbers, times) for times in (2, 4)]
+    runs = [longer_steps(t, numbers, times) for times in (2, 4)]
     one, two, four = [
         sum([part.steps * (abs(part.h) / longest) ** (order + 1) for part in each])
         for each in (stretches, runs[0][0], runs[1][0])
@@ -82,7 +90,7 @@ def runs_beside(stretches: Sequence[EqualSteps], order: int) -> RunsBeside:
     if two >= APART_RATIO * one and four - two >= APART_RATIO * (two - one):
         return RunsBeside(Law(longest, one / (two - one), (four - two) / (two - one)), runs, numbers, t)
     numbers, half = (
-        some_of(steps, 1, LOOKS),
+        sampled_numbers(steps, 1, LOOKS),
         [part._replace(h=0.5 * part.h, steps=2 * part.steps) for part in stretches],
     )
     return RunsBeside(law_of_halves(longest, order), [(half, 2 * numbers)], numbers, instants_of(stretches, numbers))
@@ -195,8 +203,8 @@ class RunEstimate:
         if self._compared is None:
             return None, None, ()
         begin, program = time.perf_counter(), self._segment.program
-        law, found = self._compared.found(self._run.largest, program.order)
-        columns = error_estimates(program, self._options, law, self._watch, self._run.steps, *found)
+        law, rows = self._compared.comparison(self._run.largest, program.order)
+        columns = error_estimates(program, self._options, law, self._watch, self._run.steps, *rows)
         error, last, said = [column[0] for column in columns.values()]
         self.seconds += time.perf_counter() - begin
         return (None, None, ()) if math.isnan(error) else (float(error), float(last), said)
@@ -224,7 +232,7 @@ class _Rows:
         self.resets[here], self.count = resets, max(self.count, here.stop)
 
 
-Found: TypeAlias = tuple[Array, list[Array], list[Flags], float]  # as `error_estimates` takes it
+Comparison: TypeAlias = tuple[Array, list[Array], list[Flags], float]  # what `error_estimates` takes
 
 
 class _Whole:
@@ -245,7 +253,7 @@ class _Whole:
         """The next steps of the run."""
         self._rows.add(block, self._run.resets)
 
-    def found(self, longest: float, order: int) -> tuple[Law, Found]:
+    def comparison(self, longest: float, order: int) -> tuple[Law, Comparison]:
         """What the runs beside tell, after the last step."""
         one, law = self._rows, self._beside.law
         t = one.t[: one.count]
@@ -265,11 +273,11 @@ class _Whole:
             rows.append(other.x[None])
             alike.append(one.resets[: len(t)] == other.resets)
             one = other
-        lost = _parted(t, alike[0], law.longest, self._run.resets) if alike else math.nan
+        lost = _parting_time(t, alike[0], law.longest, self._run.resets) if alike else math.nan
         return law, (t, rows, alike, lost)
 
 
-def _parted(t: Array, alike: Flags, longest: float, resets: int) -> float:
+def _parting_time(t: Array, alike: Flags, longest: float, resets: int) -> float:
     """When runs with so many resets have other ones for longer than their steps explain; NaN if they have not."""
     begins, ends = np.flatnonzero(np.diff(~alike, prepend=False, append=False)).reshape(-1, 2).T
     late = max(LATE * longest, SHARE * abs(t[-1] - t[0]) / (1 + resets))
@@ -312,7 +320,7 @@ class _Periods:
         if not np.isfinite(self._sum).all():
             self._since = min(self._since, self._t)
 
-    def found(self, longest: float, order: int) -> tuple[Law, Found]:
+    def comparison(self, longest: float, order: int) -> tuple[Law, Comparison]:
         """What the differences tell, after the last step, as those of two rows."""
         self._compare()
         rows = [np.array([[self._size] * 2]), np.array([[self._size, self._size + self._sum]])]

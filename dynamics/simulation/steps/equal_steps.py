@@ -61,7 +61,7 @@ def even_steps(instants: Sequence[float], dt: float) -> list[EqualSteps]:
     return result
 
 
-def some_of(steps: int, every: int, most: int) -> Numbers:
+def sampled_numbers(steps: int, every: int, most: int) -> Numbers:
     """0, so many steps, and between them multiples of `every`: all, or of more than `most` some, unevenly."""
     count = steps // every
     k = np.arange(min(count, most))
@@ -87,7 +87,7 @@ def numbers_of(stretches: Sequence[EqualSteps], instants: Array) -> Numbers:
     return numbers
 
 
-def longer(t: Array, numbers: Numbers, times: int) -> tuple[list[EqualSteps], Numbers]:
+def longer_steps(t: Array, numbers: Numbers, times: int) -> tuple[list[EqualSteps], Numbers]:
     """Steps so many times as long as those of which so many are done at instants; and how many of them are done there.
 
     Between two instants they are equal, and in all to the last if there are as many.

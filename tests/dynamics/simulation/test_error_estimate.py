@@ -14,7 +14,7 @@ import cgraph as cg
 import dynamics as dyn
 from dynamics import METHODS
 from dynamics.simulation.estimates.error_estimate import runs_beside
-from dynamics.simulation.steps.equal_steps import equal_steps, some_of
+from dynamics.simulation.steps.equal_steps import equal_steps, sampled_numbers
 from tests.dynamics.models import random_arm
 from tests.dynamics.step_options import LIKE_OTHERS
 from tests.slow import slow
@@ -153,7 +153,7 @@ def test_runs_beside_have_other_steps_that_meet_those_of_the_run(
         ends = [part.begin + part.h * np.arange(1.0, part.steps + 1.0) for part in steps]
         assert np.concatenate([[0.0], *ends])[done] == approx(t, rel=1e-12, abs=1e-12)
     assert (t[0], t[-1]) == (0.0, instants[-1])
-    few = some_of(numbers[-1], 4, 3)
+    few = sampled_numbers(numbers[-1], 4, 3)
     assert len(few) <= 5
     assert (few[1:-1] % 4 == 0).all()
 
