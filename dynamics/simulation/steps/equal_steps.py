@@ -62,11 +62,16 @@ def even_steps(instants: Sequence[float], dt: float) -> list[EqualSteps]:
 
 
 def sampled_numbers(steps: int, every: int, most: int) -> Numbers:
-    """0, so many steps, and between them multiples of `every`: all, or of more than `most` some, unevenly."""
+    """0, so many steps, and between them multiples of `every`: all, or of more than `most` some.
+
+    Half of these are spread over the run, unevenly, and half are denser toward its start, for it may end early.
+    """
     count = steps // every
-    k = np.arange(min(count, most))
-    chosen = k if count <= most else ((k + k * GOLDEN % 1.0) * (count / most)).astype(np.int64)
-    return np.unique(np.concatenate([[0], every * (chosen + 1), [steps]]))
+    chosen = np.arange(1.0, count + 1.0)
+    if count > most:
+        k = np.arange(most // 2)
+        chosen = np.append((k + k * GOLDEN % 1.0) * (count / len(k)), np.geomspace(1.0, count, len(k)))
+    return np.unique(np.concatenate([[0], every * chosen.astype(np.int64), [steps]]))
 
 
 def instants_of(stretches: Sequence[EqualSteps], numbers: Numbers) -> Array:
