@@ -89,10 +89,8 @@ def runs_beside(stretches: Sequence[EqualSteps], order: int) -> RunsBeside:
     ]
     if two >= APART_RATIO * one and four - two >= APART_RATIO * (two - one):
         return RunsBeside(Law(longest, one / (two - one), (four - two) / (two - one)), runs, numbers, t)
-    numbers, half = (
-        sampled_numbers(steps, 1, LOOKS),
-        [part._replace(h=0.5 * part.h, steps=2 * part.steps) for part in stretches],
-    )
+    half = [part._replace(h=0.5 * part.h, steps=2 * part.steps) for part in stretches]
+    numbers = sampled_numbers(steps, 1, LOOKS)
     return RunsBeside(law_of_halves(longest, order), [(half, 2 * numbers)], numbers, instants_of(stretches, numbers))
 
 
@@ -114,17 +112,17 @@ def error_estimates(
     t: instants (T,).  rows: states (k, T, m) of the runs and of those beside, not finite where one has stopped.
     alike: of each run and the next, which rows can be compared; all by default.  lost: when one takes another course.
     """
+    many, warnings = len(rows[0]), np.zeros(len(rows[0]), dtype=np.object_)
+    warnings.fill(())
+    if len(rows) == 1:
+        return {"error": np.full(many, math.nan), "error_at_end": np.full(many, math.nan), "warnings": warnings}
+    watch.look()
     between = [other - one for one, other in itertools.pairwise(rows)]
     for k, each in enumerate(between):
         np.abs(each, out=each)
         if alike:
             each[:, ~alike[k]] = 0.0
-    many, at_end = len(rows[0]), int(np.flatnonzero(alike[0])[-1]) if alike else -1
-    warnings: Array = np.zeros(many, dtype=np.object_)
-    warnings.fill(())
-    if not between:
-        return {"error": np.full(many, math.nan), "error_at_end": np.full(many, math.nan), "warnings": warnings}
-    watch.look()
+    at_end = int(np.flatnonzero(alike[0])[-1]) if alike else -1
     scale = program.kinds.scale(np.maximum(rows[0].max(axis=1), -rows[0].min(axis=1)))
     peaks = [np.where(np.isfinite(peak), peak, math.inf) for peak in [each.max(axis=1) for each in between]]
     since = np.full(many, lost)

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from cgraph._shared import Array
-from cgraph.extend import Runner
 
 from ...integrators.step_control import RUNNING
 from ..run_options import RunOptions
@@ -348,26 +347,11 @@ class FixedStepIntegration(NativeIntegration):
 
     def failure(self, before: Array) -> str:
         """Reason why the step from a state (m,) failed."""
-        singular = self._number("singular") if "singular" in self._at else 0.0
-        return failed_step(self.components, self.t, before, self.x, int(singular))
-
-
-def failed_step(components: Sequence[str], t: float, before: Array, x: Array, singular: int) -> str:
-    """Reason why a step from one state to another, (m,), at t, failed.
-
-    singular: the number of the component whose inertia is not positive, from 1 on; else 0.
-    """
-    if singular:
-        reason = f"{components[singular - 1]} has an inertia that is not positive"
-    else:
-        reason = nonfinite(components, x) or unsolved(components, before, x)
-    return f"stopped at t = {t:.6g} s: {reason}"
-
-
-def begin_equal(runner: Runner, memory: Array, begin: float, h: float) -> None:
-    """The steps that follow are of h [s], from `begin` on."""
-    for name, value in (("start", begin), ("t", begin), ("count", 0.0), ("h", h)):
-        runner.write(memory, name, value)
+        if "singular" in self._at and (singular := int(self._number("singular"))):
+            reason = f"{self.components[singular - 1]} has an inertia that is not positive"
+        else:
+            reason = nonfinite(self.components, self.x) or unsolved(self.components, before, self.x)
+        return f"stopped at t = {self.t:.6g} s: {reason}"
 
 
 def nonfinite(components: Sequence[str], state: Array) -> str:
