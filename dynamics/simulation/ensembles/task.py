@@ -12,8 +12,8 @@ import numpy as np
 
 from cgraph._shared import Array
 
-from ..estimates.error_estimate import ASIDE, RunsBeside, error_estimates, runs_beside
-from ..estimates.unresolved import Watch, is_watched
+from ..estimates.error_estimate import ASIDE, Comparison, RunsBeside, error_estimates, runs_beside
+from ..estimates.unresolved import Watch, unresolved
 from ..events.event import EventProgram
 from ..events.event_log import WatchedIntegration
 from ..outcome import INTERRUPTED, outcome
@@ -144,7 +144,7 @@ class Task:
         for legs, each in zip(others, states[1:], strict=True):
             equal_in_lanes(lanes, x * ASIDE, p, legs, [each], stopped)
         steps = int(columns["steps"][0])
-        errors = error_estimates(self.program, self.options, beside.law, watch, steps, beside.t, [*states])
+        errors = error_estimates(self.program, self.options, beside.law, watch, steps, Comparison(beside.t, [*states]))
         return whole, columns | errors
 
     @cached_property
@@ -154,7 +154,7 @@ class Task:
         if self.beside is None:
             return [legs_of(self.grids, [rows])]
         at_once = max(1, ROWS // (min(self.many, LONGEST_CHUNK) * self.program.steps.width))
-        every = at_once if is_watched(self.program.rate) else 0
+        every = at_once if unresolved(self.program.rate).there else 0
         others = [legs_of(stretches, [numbers]) for stretches, numbers in self.beside.runs]
         return [legs_of(self.grids, [rows, self.beside.numbers], every), *others]
 

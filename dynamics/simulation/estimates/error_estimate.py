@@ -12,7 +12,7 @@ import itertools
 import math
 import time
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias, cast
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
 
@@ -94,24 +94,27 @@ def runs_beside(stretches: Sequence[EqualSteps], order: int) -> RunsBeside:
     return RunsBeside(law_of_halves(longest, order), [(half, 2 * numbers)], numbers, instants_of(stretches, numbers))
 
 
+class Comparison(NamedTuple):
+    """States of k runs, and of those beside them, at instants t (T,).
+
+    rows: (k, T, m) each, not finite where a run has stopped.  alike: of each and the next, which rows can be compared;
+    all by default.  lost: when one takes another course.
+    """
+
+    t: Array
+    rows: Sequence[Array]
+    alike: Sequence[Flags] = ()
+    lost: float = math.nan
+
+
 def error_estimates(
-    program: StepProgram,
-    options: RunOptions,
-    law: Law,
-    watch: Watch,
-    steps: int,
-    t: Array,
-    rows: Sequence[Array],
-    alike: Sequence[Flags] = (),
-    lost: float = math.nan,
+    program: StepProgram, options: RunOptions, law: Law, watch: Watch, steps: int, compared: Comparison
 ) -> dict[str, Array]:
     """Columns of the statistics of k runs of so many steps: "error", "error_at_end", "warnings" of too large ones.
 
     The errors are relative to the sizes of components, NaN if nothing was compared, and infinite if unknown.
-
-    t: instants (T,).  rows: states (k, T, m) of the runs and of those beside, not finite where one has stopped.
-    alike: of each run and the next, which rows can be compared; all by default.  lost: when one takes another course.
     """
+    t, rows, alike, lost = compared
     many, warnings = len(rows[0]), np.zeros(len(rows[0]), dtype=np.object_)
     warnings.fill(())
     if len(rows) == 1:
@@ -201,8 +204,8 @@ class RunEstimate:
         if self._compared is None:
             return None, None, ()
         begin, program = time.perf_counter(), self._segment.program
-        law, rows = self._compared.comparison(self._run.largest, program.order)
-        columns = error_estimates(program, self._options, law, self._watch, self._run.steps, *rows)
+        law, compared = self._compared.comparison(self._run.largest, program.order)
+        columns = error_estimates(program, self._options, law, self._watch, self._run.steps, compared)
         error, last, said = [column[0] for column in columns.values()]
         self.seconds += time.perf_counter() - begin
         return (None, None, ()) if math.isnan(error) else (float(error), float(last), said)
@@ -228,9 +231,6 @@ class _Rows:
         else:
             self.x[here] = block.at(self._forth * np.minimum(self._forth * self.t[here], ends[-1]))
         self.resets[here], self.count = resets, max(self.count, here.stop)
-
-
-Comparison: TypeAlias = tuple[Array, list[Array], list[Flags], float]  # what `error_estimates` takes
 
 
 class _Whole:
@@ -272,7 +272,7 @@ class _Whole:
             alike.append(one.resets[: len(t)] == other.resets)
             one = other
         lost = _parting_time(t, alike[0], law.longest, self._run.resets) if alike else math.nan
-        return law, (t, rows, alike, lost)
+        return law, Comparison(t, rows, alike, lost)
 
 
 def _parting_time(t: Array, alike: Flags, longest: float, resets: int) -> float:
@@ -322,4 +322,4 @@ class _Periods:
         """What the differences tell, after the last step, as those of two rows."""
         self._compare()
         rows = [np.array([[self._size] * 2]), np.array([[self._size, self._size + self._sum]])]
-        return law_of_halves(longest, order), (np.array([self._t0, self._since]), rows, [], math.nan)
+        return law_of_halves(longest, order), Comparison(np.array([self._t0, self._since]), rows)

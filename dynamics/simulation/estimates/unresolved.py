@@ -44,6 +44,11 @@ class Unresolved(NamedTuple):
     branches: Graph | None
     sides: Graph | None
 
+    @property
+    def there(self) -> bool:
+        """Whether there are any."""
+        return self.waves is not None or self.branches is not None
+
 
 @kept_by_first
 def unresolved(rate: Graph) -> Unresolved:
@@ -82,7 +87,8 @@ class Watch:
 
     def __init__(self, rate: Graph, order: int, p: Array, t: float, x: Array) -> None:
         """The runs start from x (k, m) at t."""
-        self._what, self._order, self.needed = unresolved(rate), order, is_watched(rate)
+        self._what, self._order = unresolved(rate), order
+        self.needed = self._what.there
         self.turning, self.bent, self.missed = np.zeros(len(x)), np.zeros(len(x), dtype=bool), np.zeros(x.shape)
         self._p, self._seen = p, [(np.array([t]), x[:, None])]
 
@@ -132,11 +138,6 @@ class Watch:
         first = np.flatnonzero(np.diff(run, prepend=-1) + (np.diff(row, prepend=row[0]) > BURST))
         largest = np.maximum.reduceat(np.where(np.isfinite(off), off, 0.0), first)
         np.add.at(self.missed, run[first], largest)
-
-
-def is_watched(rate: Graph) -> bool:
-    """Whether a rate has parts that steps may not resolve."""
-    return any(graph is not None for graph in unresolved(rate))
 
 
 def _way(branches: Graph, t: Array, x: Array, branch: Array, p: Array) -> Array:
