@@ -12,21 +12,20 @@ import numpy as np
 
 from cgraph._shared import Array
 
-from ..estimates.error_estimate import ASIDE, RunsBeside, error_estimates, runs_beside
-from ..estimates.unresolved import Watch, is_watched
+from ..estimates.error_estimate import ASIDE, Comparison, RunsBeside, error_estimates, runs_beside
+from ..estimates.unresolved import Watch, unresolved
 from ..events.event import EventProgram
-from ..events.event_log import Happening
 from ..outcome import INTERRUPTED, outcome
 from ..run_options import RunOptions
 from ..stepper import ChosenStepper, Stepper, stepper
 from ..steps.equal_steps import EqualSteps, even_steps, numbers_of
 from ..steps.step_program import StepProgram, compile_steps
-from .ensemble import COLUMNS, RunTable
+from .ensemble import COLUMNS, Part
 from .lanes import (
     ROWS,
     VECTOR,
+    Code,
     LaneRuns,
-    Lanes,
     Leg,
     Stopped,
     chosen_in_lanes,
@@ -39,6 +38,7 @@ from .lanes import (
 LARGEST_CHUNK = 256  # trajectories in a chunk one by one, unless asked for
 LONGEST_CHUNK = 4096  # of those in lanes, of which a chunk's rows of steps have at most `ROWS` numbers
 SHORT = 2**20  # equal steps of all trajectories, which take some hundredths of a second: a chunk for each worker
+UNKNOWN = 16  # workers behind a map, which does not say
 SHARES = 4  # chunks for each worker, so that workers of unlike speed finish together
 
 
@@ -49,29 +49,6 @@ class Chunk:
     first: int
     x: Array
     p: Array
-
-
-@dataclass(frozen=True)
-class Part:
-    """Results of a chunk, or of all: rows (k, T, m), NaN after a trajectory has stopped, and the runs' statistics."""
-
-    first: int
-    rows: Array
-    runs: RunTable
-    happened: list[list[Happening]]  # the events of each, if any are looked for
-
-    def put(self, part: Part) -> None:
-        """Put the results of a part in their place."""
-        here = slice(part.first, part.first + len(part.rows))
-        if not np.may_share_memory(part.rows, self.rows):  # from another process
-            self.rows[here] = part.rows
-        self.runs.put(here, **part.runs.columns)
-        self.happened[here] = part.happened
-
-
-def not_begun(first: int, rows: Array, *, events: bool) -> Part:
-    """The part of the chunk whose rows are to be here, before its first step."""
-    return Part(first, rows, RunTable(len(rows)), [[] for _ in rows] if events else [])
 
 
 @dataclass(frozen=True)
@@ -106,22 +83,25 @@ class Task:
         """Whether trajectories go in lanes, if the program can."""
         return self.events is None and fits_lanes(self.program, self.options, self.grids, self.many)
 
-    def width(self, chunk: int | None, workers: int, *, stored: bool) -> int:
-        """Trajectories in a chunk.
+    @cached_property
+    def largest(self) -> int:
+        """Trajectories in a chunk at most; 0 unless they go in lanes."""
+        if not self.in_lanes:
+            return 0
+        numbers = self.program.steps.width * (self.count + (0 if self.beside is None else len(self.beside.t)))
+        return min(LONGEST_CHUNK, max(VECTOR, ROWS // numbers))
+
+    def width(self, chunk: int | None, workers: object, *, stored: bool = False) -> int:
+        """Trajectories in a chunk: in lanes, of whole vectors.
 
         chunk: as asked for.  stored: whether a chunk that has not ended is lost when the process is, so that it should
-        be small. Chunks in lanes are of whole vectors.
+        be small.
         """
-        if not self.in_lanes:
-            largest, shares = LARGEST_CHUNK, SHARES
-        else:
-            numbers = self.program.steps.width * (self.count + (0 if self.beside is None else len(self.beside.t)))
-            largest = min(LONGEST_CHUNK, max(VECTOR, ROWS // numbers))
-            chunk = chunk and min(chunk, largest)
-            largest = min(largest, LARGEST_CHUNK) if stored else largest
-            shares = 1 if self.grids and self.many * self.grids[0].steps <= SHORT else SHARES
-        chunk = chunk or min(largest, math.ceil(self.many / (shares * workers)))
-        return math.ceil(chunk / VECTOR) * VECTOR if self.in_lanes and self.grids else int(chunk)
+        largest = self.largest or chunk or LARGEST_CHUNK
+        short = self.in_lanes and self.grids and self.many * self.grids[0].steps <= SHORT
+        shares = (1 if short else SHARES) * (workers if isinstance(workers, int) else UNKNOWN)
+        width = chunk or min(math.ceil(self.many / shares), LARGEST_CHUNK if stored else largest)
+        return math.ceil(min(width, largest) / VECTOR) * VECTOR if self.in_lanes and self.grids else min(width, largest)
 
     def __call__(self, chunk: Chunk) -> Part:
         """Run the chunk."""
@@ -132,12 +112,12 @@ class Task:
 
         Raises KeyboardInterrupt soon after Ctrl-C, and StoppedError after `stopped`.
         """
-        part, left = not_begun(chunk.first, rows, events=self.events is not None), range(len(chunk.x))
+        part, left = Part(chunk.first, rows), list(range(len(chunk.x)))
         with np.errstate(all="ignore"):
             if (found := self.run_lanes(chunk.x, chunk.p, rows, stopped)) is not None:
-                done = np.flatnonzero(found.whole)
-                part.runs.reached(done, **{name: values[done] for name, values in found.columns.items()})
-                left = np.flatnonzero(~found.whole).tolist()  # which are made again, alone
+                whole, columns = found
+                part.reached(whole, **{name: values[whole] for name, values in columns.items()})
+                left = np.flatnonzero(~whole).tolist()  # which are made again, alone
             self._one_by_one(chunk, part, left, stopped)
         return part
 
@@ -150,18 +130,20 @@ class Task:
         if lanes is None:
             return None
         if self.program.adaptive:
-            return chosen_in_lanes(lanes, self.options, x, p, rows, stopped)
+            return chosen_in_lanes(lanes, self.program, self.options, x, p, rows, stopped)
         (own, *others), beside = self._legs, self.beside
         if beside is None:
             return equal_in_lanes(lanes, x, p, own, [rows], stopped)
         watch = Watch(self.program.rate, self.program.order, p, self.options.t0, x)
         states = np.empty((1 + len(others), len(x), len(beside.t), x.shape[1]))
-        found = equal_in_lanes(lanes, x, p, own, [rows, states[0]], stopped, watch.add if watch.needed else None)
+        whole, columns = equal_in_lanes(
+            lanes, x, p, own, [rows, states[0]], stopped, watch.add if watch.needed else None
+        )
         for legs, each in zip(others, states[1:], strict=True):
             equal_in_lanes(lanes, x * ASIDE, p, legs, [each], stopped)
-        steps = int(found.columns["steps"][0])
-        errors = error_estimates(self.program, self.options, beside.law, watch, steps, beside.t, states)
-        return LaneRuns(found.whole, found.columns | errors)
+        steps = int(columns["steps"][0])
+        errors = error_estimates(self.program, self.options, beside.law, watch, steps, Comparison(beside.t, [*states]))
+        return whole, columns | errors
 
     @cached_property
     def _legs(self) -> list[list[Leg]]:
@@ -170,12 +152,12 @@ class Task:
         if self.beside is None:
             return [legs_of(self.grids, [rows])]
         at_once = max(1, ROWS // (min(self.many, LONGEST_CHUNK) * self.program.steps.width))
-        every = at_once if is_watched(self.program.rate) else 0
+        every = at_once if unresolved(self.program.rate).there else 0
         others = [legs_of(stretches, [numbers]) for stretches, numbers in self.beside.runs]
         return [legs_of(self.grids, [rows, self.beside.numbers], every), *others]
 
     @property
-    def _lanes(self) -> Lanes | None:
+    def _lanes(self) -> Code | None:
         """The code of lanes, if trajectories go there."""
         if not self.in_lanes:
             return None
@@ -193,21 +175,19 @@ class Task:
             if run is None or self.events is not None:
                 run = stepper(compiled, self.options, p, stopped=stopped, events=self.events)
             run.set_parameters(p)
-            if (
-                has_end and isinstance(run, ChosenStepper) and run.log is None
-            ):  # steps need not be looked at if it is their only row
+            if has_end and isinstance(run, ChosenStepper) and run.log is None:  # steps need not be looked at
                 if run.unseen(x):
                     counts = {"steps": run.steps, "rejected": run.rejected, "nfev": run.evaluations, "dt": run.largest}
-                    part.runs.reached(k, **counts)
+                    part.reached(k, **counts)
                     part.rows[k, :-1], part.rows[k, -1] = x, run.x
                     continue
                 run = stepper(compiled, self.options, p, stopped=stopped)  # whose first blocks are short: it says when
             stats, recorder = outcome(run, x, self.options)
             if stats.message.startswith(INTERRUPTED):
                 raise KeyboardInterrupt
-            part.runs.put(k, **{name: getattr(stats, name) for name in COLUMNS})
+            part.put(k, **{name: getattr(stats, name) for name in COLUMNS})
             if run.log is not None:
-                part.happened[k] = run.log.happened
+                part.put(k, happened=run.log.happened)
             states = recorder.table()[1]
             part.rows[k, : len(states)], part.rows[k, len(states) :] = states, np.nan
 

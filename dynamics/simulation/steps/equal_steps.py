@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -61,17 +61,17 @@ def even_steps(instants: Sequence[float], dt: float) -> list[EqualSteps]:
     return result
 
 
-def halved(stretches: Iterable[EqualSteps]) -> list[EqualSteps]:
-    """Two steps in place of each."""
-    return [part._replace(h=0.5 * part.h, steps=2 * part.steps) for part in stretches]
+def sampled_numbers(steps: int, every: int, most: int) -> Numbers:
+    """0, so many steps, and between them multiples of `every`: all, or of more than `most` some.
 
-
-def some_of(steps: int, every: int, most: int) -> Numbers:
-    """0, so many steps, and between them multiples of `every`: all, or of more than `most` some, unevenly."""
+    Half of these are spread over the run, unevenly, and half are denser toward its start, for it may end early.
+    """
     count = steps // every
-    k = np.arange(min(count, most))
-    chosen = k if count <= most else ((k + k * GOLDEN % 1.0) * (count / most)).astype(np.int64)
-    return np.unique(np.concatenate([[0], every * (chosen + 1), [steps]]))
+    chosen = np.arange(1.0, count + 1.0)
+    if count > most:
+        k = np.arange(most // 2)
+        chosen = np.append((k + k * GOLDEN % 1.0) * (count / len(k)), np.geomspace(1.0, count, len(k)))
+    return np.unique(np.concatenate([[0], every * chosen.astype(np.int64), [steps]]))
 
 
 def instants_of(stretches: Sequence[EqualSteps], numbers: Numbers) -> Array:
@@ -92,7 +92,7 @@ def numbers_of(stretches: Sequence[EqualSteps], instants: Array) -> Numbers:
     return numbers
 
 
-def longer(t: Array, numbers: Numbers, times: int) -> tuple[list[EqualSteps], Numbers]:
+def longer_steps(t: Array, numbers: Numbers, times: int) -> tuple[list[EqualSteps], Numbers]:
     """Steps so many times as long as those of which so many are done at instants; and how many of them are done there.
 
     Between two instants they are equal, and in all to the last if there are as many.
