@@ -113,13 +113,15 @@ def made_once(method: Callable[..., Result]) -> Callable[..., Result]:
 
     @wraps(method)
     def call(self: Any, *arguments: Hashable) -> Result:
-        made: dict[Hashable, Any] = self.__dict__.setdefault("_made", {})
-        if (method, arguments) not in made:
-            with self.__dict__.setdefault("_making", RLock()):
+        try:
+            return self._made[method, arguments]  # type: ignore[no-any-return]
+        except (AttributeError, KeyError):
+            own: dict[str, Any] = self.__dict__
+            with own.setdefault("_making", RLock()):
+                made = own.setdefault("_made", {})
                 if (method, arguments) not in made:
                     made[method, arguments] = method(self, *arguments)
-        result: Result = made[method, arguments]
-        return result
+                return cast("Result", made[method, arguments])
 
     return call
 

@@ -245,7 +245,8 @@ class Compiled(BoundFunction):
         >>> cg.compile(cg.Graph([x], {"y": x * x})).jacobian([[1.0], [2.0], [3.0]]).ravel().tolist()
         [2.0, 4.0, 6.0]
         """
-        return self._matrix(self._derivatives.jacobian(self._chosen(wrt)), self._points(x), sparse, threads)
+        chosen = None if wrt is None else self._chosen(wrt)
+        return self._matrix(self._derivatives.jacobian(chosen), self._points(x), sparse, threads)
 
     def hessian(
         self,
@@ -376,7 +377,7 @@ class Compiled(BoundFunction):
         return result
 
     def _matrix(self, matrix: ColoredMatrix, points: Array, sparse: bool, threads: int | None) -> Any:
-        count = thread_count(threads)
+        count = threads if type(threads) is int and threads > 0 else thread_count(threads)
         if not require_flag("sparse", sparse):
             return matrix.at(points, True, count)
         module, (columns, starts) = scipy_module("sparse", "a sparse derivative"), matrix.compressed
