@@ -34,7 +34,6 @@ CHECK = 256  # operations that take as long as to look whether slopes are infini
 LANES = 8  # directions that count as one where colorings are compared, whatever the processor's vectors
 LEAST_BLOCK = 64  # points in a block, a multiple of every processor's vectors
 LARGE_MATRIX = 2**16  # numbers in a matrix, of which no copy is kept for another call
-PANEL_NUMBERS = 2**22  # numbers in the rows of points and directions that are written at a time
 
 
 class Derivative(NamedTuple):
@@ -111,14 +110,11 @@ class DirectionProducts:
 
     def many(self, points: Array, directions: Array, results: Array, threads: int) -> None:
         """The results, (N, k, results), of N points, each along k directions of its own, (N, k, entries)."""
-        count, n, width = directions.shape[1], points.shape[1], self._beside.program.registers["x"]
-        size = max(1, PANEL_NUMBERS // (count * width))
-        for start in range(0, len(points), size):
-            here = slice(start, start + size)
-            rows = np.empty((len(points[here]), count, width))
-            rows[:, :, :n], rows[:, :, n:] = points[here, None], directions[here]
-            found = results[here].reshape(-1, results.shape[2])
-            write_batch(*self._beside.columns("x"), rows.reshape(-1, width).T, found.T, threads)
+        count, n = directions.shape[1], points.shape[1]
+        rows = np.empty((len(points), count, n + directions.shape[2]))
+        rows[:, :, :n], rows[:, :, n:] = points[:, None], directions
+        found = results.reshape(-1, results.shape[2])
+        write_batch(*self._beside.columns("x"), rows.reshape(-1, rows.shape[2]).T, found.T, threads)
         if self._derivative.guarded is not None:
             _mend(results, lambda at, found: self._careful.many(points[at], directions[at], found, threads))
 
@@ -183,10 +179,8 @@ class MatrixPart(NamedTuple):
 
     def seeds(self, lanes: int) -> Array:
         """Sum of the unit vectors of each color, a column each."""
-        seeds = np.zeros((len(self.colors), self.directions(lanes)))
-        for k, color in enumerate(self.colors):
-            if color != NONE:
-                seeds[k, color] = 1.0
+        colors = np.array(self.colors)
+        seeds: Array = (colors[:, None] == np.arange(self.directions(lanes))) * 1.0  # none of NONE
         return seeds.ravel()
 
 
