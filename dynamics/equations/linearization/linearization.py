@@ -25,8 +25,9 @@ from ..states.initial_value import normalized
 from .linearization_parts import by_upper, linearization_parts
 from .momentum_parts import momentum_parts, of_momenta
 
-# Nodes, about; beyond, slopes along directions are made in a fraction of the time, and soon are as fast.
+# Nodes; beyond, slopes along directions are made in a fraction of the time, and soon are as fast.
 WRITTEN_OUT = 20_000
+FORWARD_SHARE = 3  # of the nodes of all entries, at most one in so many is forward dynamics
 
 
 @Equation("q qd tau", Output("A_{}_{}", ("2n", "2n")), Output("B_{}_{}", ("2n", "n"))).describes
@@ -108,11 +109,14 @@ def linear_rows(system: System, form: str) -> LinearRows:
 @kept_by_first
 def _linear_rows(system: System, form: str, _: tuple[object, ...]) -> LinearRows:
     """The last: forces and damping of the system, which may be given anew."""
-    n = system.n
-    if form == "velocity" and n * len(forward_dynamics(system).nodes) >= WRITTEN_OUT:
+    n, velocity = system.n, form == "velocity"
+    if velocity and len(forward_dynamics(system).nodes) >= WRITTEN_OUT // FORWARD_SHARE:
         return _displaced(system)
-    graph = (linearization_parts(system) if form == "velocity" else momentum_parts(system)).written_out()
-    above = np.eye(n if form == "velocity" and system.kinematics.quasi is None else 0, 3 * n, n)
+    parts = linearization_parts(system) if velocity else momentum_parts(system)
+    if velocity and parts.size >= WRITTEN_OUT:
+        return _displaced(system)
+    graph = parts.written_out()
+    above = np.eye(n if velocity and system.kinematics.quasi is None else 0, 3 * n, n)
     below = range(len(above), 2 * n)
     names = [[*[f"A_{i}_{j}" for j in range(2 * n)], *[f"B_{i}_{j}" for j in range(n)]] for i in below]
     rows = _numbered(graph.inputs, [graph.outputs[name] for row in names for name in row])
