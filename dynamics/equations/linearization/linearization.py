@@ -124,22 +124,20 @@ def _linear_rows(system: System, form: str, _: tuple[object, ...]) -> LinearRows
 
 
 def _displaced(system: System) -> LinearRows:
-    """The rates (xi_dot, qdd) at a state moved by displacements xi, from 0; qdd alone where q is what moves."""
+    """The rates (xi_dot, qdd) at a state moved by displacements xi from 0, which where velocities are rates are q."""
     equations, kinematics, n = forward_dynamics(system), system.kinematics, system.n
-    names, nodes = equations.input_names, list(equations.outputs.values())[:n]  # without multipliers
-    if kinematics.quasi is None:
-        wrt = (*system.q, *system.qd, *system.tau)
-        return LinearRows(_numbered(equations.inputs, nodes), names, wrt, np.eye(n, 3 * n, n))
-    xi, build = cg.variables([f"xi:{i}" for i in range(n)]), Builder()
-    moves, brackets = folded(kinematics.rate(xi), build), kinematics.brackets(build)
-    with building(build):
-        at = {q: q + move for q, move in zip(system.q, moves, strict=True)}
-        rates = [
-            u + sum([c * x for c, x in zip(row, xi, strict=True)], ZERO)
-            for row, u in zip(brackets, system.qd, strict=True)
-        ]
-    graph = _numbered([*equations.inputs, *xi], [*rates, *folded(nodes, build, at)])
-    return LinearRows(graph, names, (*xi, *system.qd, *system.tau), np.empty((0, 3 * n)))
+    inputs, xi, rates = equations.inputs, system.q, system.qd
+    nodes, none = list(equations.outputs.values())[:n], np.empty((0, 3 * n))  # without multipliers
+    if kinematics.quasi is not None:
+        xi, build = cg.variables([f"xi:{i}" for i in range(n)]), Builder()
+        moves, brackets = folded(kinematics.rate(xi), build), kinematics.brackets(build)
+        with building(build):
+            at = {q: q + move for q, move in zip(system.q, moves, strict=True)}
+            turned = [sum([c * x for c, x in zip(row, xi, strict=True)], ZERO) for row in brackets]
+            rates = [u + turn for u, turn in zip(rates, turned, strict=True)]  # xi_dot = dqd + C xi
+        inputs, nodes = (*inputs, *xi), folded(nodes, build, at)
+    graph = _numbered(inputs, [*rates, *nodes])
+    return LinearRows(graph, equations.input_names, (*xi, *system.qd, *system.tau), none)
 
 
 def _numbered(inputs: Sequence[Node], outputs: Sequence[Node]) -> Graph:
