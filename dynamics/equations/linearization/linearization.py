@@ -204,7 +204,7 @@ def linearize(
 
     >>> pendulum = dyn.planar_arm(masses=[1.0, 1.0], lengths=[1.0, 1.0])
     >>> A, B = dyn.linearize(pendulum, [0.0, 0.0], [0.0, 0.0], form="momentum")
-    >>> A.round(3).tolist()
+    >>> (A.round(3) + 0.0).tolist()
     [[0.0, 0.0, 1.714, -4.286], [0.0, 0.0, -4.286, 13.714], [-19.62, -4.905, 0.0, 0.0], [-4.905, -4.905, 0.0, 0.0]]
     """
     system, state = as_system(model), {"q": q, "qd": qd, "tau": tau}
