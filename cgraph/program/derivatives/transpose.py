@@ -195,10 +195,12 @@ class Block(NamedTuple):
 
 
 class Tape:
-    """A run of passes, of one memory (size,) or of many (size, N), with what is recorded for its derivative, in blocks.
+    """A run of passes, of N memories side by side, with what is recorded for its derivative, in blocks.
 
-    feed: (first, last) -> what the passes first .. last - 1 are fed.  checkpoints: passes between two memories from
-    which the record is made again; 0: the record is kept.  every: record only after each so many passes.
+    values: {register: (k,), or (k, N), before the first pass}; of those that there are, 0 of others.
+    feed: (first, last) -> what the passes first .. last - 1 are fed, (passes, width, N), or one for all.
+    checkpoints: passes between two memories from which the record is made again; 0: the record is kept.
+    every: record only after each so many passes.
     """
 
     def __init__(
@@ -210,8 +212,7 @@ class Tape:
         checkpoints: int = 0,
         every: int = 1,
     ) -> None:
-        """values: {register: (k,), or (k, N), before the first pass}; of those that there are, 0 of others."""
-        self.of, self.feed, self.many, self.checkpoints, self.every = of, feed, many, checkpoints, every
+        self.of, self.feed, self.checkpoints, self.every = of, feed, checkpoints, every
         handed = of.passes.handed
         self.memory = _memory(of.forward, {handed.get(name, name): value for name, value in values.items()}, many)
         self.first, self.blocks = self.memory.copy(), list[Block]()
@@ -227,7 +228,7 @@ class Tape:
             self.blocks.append(Block(first, last, rows if before is None else before))
 
     def recorded(self, *, backwards: bool) -> Iterator[Block]:
-        """The blocks with the rows of every pass, from the last one back if asked."""
+        """The blocks with the rows of every pass, (passes, width, N), from the last one back if asked."""
         for block in reversed(self.blocks) if backwards else self.blocks:
             first, last, kept = block
             if self.checkpoints:
@@ -235,56 +236,48 @@ class Tape:
             yield Block(first, last, rows) if self.checkpoints else block
 
     def value(self, name: str, memory: Array | None = None) -> Array:
-        """A register after the passes, or in another memory of theirs, (k, N)."""
+        """A register after the passes, or in other memories of theirs, (k, N)."""
         name = self.of.passes.handed.get(name, name)
-        return _columns(self.of.forward.read(self.memory if memory is None else memory, name))
+        return self.of.forward.read(self.memory if memory is None else memory, name).copy()
 
     def derivative(self, vectors: Mapping[str, Array], many: int) -> Array:
-        """The memory of the derivative, or many, with these vectors of the registers that have one."""
+        """Memories of the derivative, with these vectors of the registers that have one."""
         names = self.of.linear.vectors
         values = {name: self.value(name) for name in self.of.passes.constants}
         values |= {names[name]: vector for name, vector in vectors.items() if name in names}
         return _memory(self.of.derivative, values, many)
 
     def vectors(self, memory: Array) -> tuple[dict[str, Array], Array]:
-        """The vectors in a memory of the derivative, (k, N), and whether equations were not solved, (N,)."""
+        """The vectors in memories of the derivative, (k, N), and whether equations were not solved, (N,)."""
         read, linear = self.of.derivative.read, self.of.linear
-        found = {name: _columns(read(memory, register)) for name, register in linear.vectors.items()}
-        return found, _columns(read(memory, linear.unsolved))[0]
+        return {name: read(memory, at).copy() for name, at in linear.vectors.items()}, read(memory, linear.unsolved)[0]
 
     def pulled(self, seeds: Mapping[str, Array]) -> tuple[dict[str, Array], Array, Array]:
         """Cotangents before the passes, of those after them; the record, (passes, width, N); and what is unsolved."""
-        ready, memory, parts = self.of.derivative, self.derivative(seeds, self.many), []
-        width, shape = ready.program.feed_width, (self.blocks[-1].last, ready.program.width, self.many)
+        ready, memory, parts = self.of.derivative, self.derivative(seeds, self.memory.shape[1]), []
         for first, last, rows in self.recorded(backwards=True):
-            fed = rows[::-1, :width] if width else np.empty((last - first, 0))  # without a record there are no rows
+            fed = rows[::-1, : ready.program.feed_width]
             parts.append(run_passes(ready, memory, last - first, 1, fed)[::-1])
         bars, unsolved = self.vectors(memory)
-        return bars, np.concatenate(parts[::-1]).reshape(shape), unsolved
+        return bars, np.concatenate(parts[::-1]), unsolved
 
 
 def run_passes(ready: Runner, memory: Array, passes: int, every: int, feed: Array) -> Array:
-    """The rows of passes of one memory, or of many side by side, as `Runner.run` and `Runner.run_many`."""
-    if memory.ndim == 1:
-        return ready.run(memory, passes, every, feed).rows
+    """The rows, (passes, width, N), of passes of N memories side by side."""
+    shape = passes // every, ready.program.width, memory.shape[1]
+    if memory.shape[1] == 1:
+        return ready.run(memory[:, 0], passes, every, feed[:, :, 0]).rows.reshape(shape)
     with np.errstate(all="ignore"):
-        return ready.run_many(memory, passes, every, feed if feed.ndim == 3 else feed[:, :, None]).rows
+        return ready.run_many(memory, passes, every, feed).rows.reshape(shape)
 
 
 def _memory(ready: Runner, values: Mapping[str, Array], many: int) -> Array:
-    """A memory, or many, with those of the values, (k, N) or for all (k,), that the program has registers for."""
-    memory = ready.memory({}, None if many == 1 else many)
+    """Memories with those of the values, (k, N) or for all (k,), that the program has registers for."""
+    memory = ready.memory({}, many)
     for name, numbers in values.items():
         if name in ready.program.registers:
-            register, columns = ready.read(memory, name), numbers[:, None] if numbers.ndim == 1 else numbers
-            one = numbers[:, 0] if numbers.ndim == 2 else numbers
-            ready.write(memory, name, one if register.ndim == 1 else np.broadcast_to(columns, register.shape))
+            ready.read(memory, name)[...] = numbers[:, None] if numbers.ndim == 1 else numbers
     return memory
-
-
-def _columns(register: Array) -> Array:
-    """(k,) or (k, N) as a copy (k, N)."""
-    return register[:, None].copy() if register.ndim == 1 else register.copy()
 
 
 class Pulled(NamedTuple):
@@ -338,17 +331,18 @@ class ProgramVjp:
         """
         require_whole("passes", passes, 1)
         rows = np.empty((passes, 0)) if feed is None else real_array("feed", feed)
-        if len(rows) != passes:
-            raise GraphError(f"the feed needs a row for each of {passes} passes, got {len(rows)}")
-        inner = {*self.handed.values()}
-        own = [name for name in self.forward.program.registers if name not in inner]
-        start, cotangents = dict[str, Array](), dict[str, Array]()
+        if rows.ndim != 2 or len(rows) != passes:
+            raise GraphError(f"the feed needs a row for each of {passes} passes, got shape {rows.shape}")
+        lengths, inner = self.forward.program.registers, {*self.handed.values()}
+        own, start, cotangents = [name for name in lengths if name not in inner], dict[str, Array](), dict[str, Array]()
         for what, given, known, to in (("values", values, own, start), ("seeds", seeds, self._of, cotangents)):
             for name, numbers in require_mapping(what, given, "register: numbers").items():
                 if name not in known:
                     raise GraphError(f"{what} must be of registers among {', '.join(known)}, got {name!r:.60}")
                 to[name] = real_array(f"{what}[{name!r}]", numbers)
-        tape = Tape(self._along, start, lambda first, last: rows[first:last], checkpoints=self._checkpoints)
+                if to[name].shape not in ((), (lengths[name],)):
+                    raise GraphError(f"{what}[{name!r}] needs shape ({lengths[name]},), got {to[name].shape}")
+        tape = Tape(self._along, start, lambda first, last: rows[first:last, :, None], checkpoints=self._checkpoints)
         tape.run(0, passes)
         bars, slopes, unsolved = tape.pulled(cotangents)
         if np.isnan(unsolved[0]):
@@ -356,8 +350,8 @@ class ProgramVjp:
             raise GraphError(f"a loop took more turns than the {turns} there is room for: give turns=")
         if unsolved[0]:
             raise GraphError("the derivative of a FixedPoint was not solved: its turns do not settle")
-        names, lengths, by_pass, at = self._along.passes.varied, self.forward.program.registers, dict[str, Array](), 0
-        for name in names:
+        by_pass, at = dict[str, Array](), 0
+        for name in self._along.passes.varied:
             by_pass[name] = slopes[:, at : at + lengths[name], 0]
             at += lengths[name]
         ends = {name: tape.value(name)[:, 0] for name in self._of}

@@ -112,18 +112,18 @@ class DifferentiatedRun:
             values |= {name: np.asarray(value) for name, value in tolerances.items()}
         start = None
         if start_program is not None:
-            start = Tape(start_program, values, lambda first, last: np.empty((last - first, 0)), many)
+            start = Tape(start_program, values, lambda first, last: np.empty((last - first, 0, 1)), many)
             start.run(0, 1)
             values |= {name: start.value(name) for name in start_program.passes.handed}
 
         def fed(first: int, last: int) -> Array:
-            """Inputs of the steps first .. last - 1, (.., width), or (.., width, N) where motions have own forces."""
+            """Inputs of the steps first .. last - 1, (.., width, N), or one for all motions without own forces."""
             part = slice(first, last)
             if not motions.each_step:
-                return np.stack([steps.t[part], steps.h[part]], axis=1)
+                return np.stack([steps.t[part], steps.h[part]], axis=1)[:, :, None]
             rows = np.empty((last - first, 2 + motions.equations.forces, many))
             rows[:, 0].T[...], rows[:, 1].T[...], rows[:, 2:] = steps.t[part], steps.h[part], motions.tau[part]
-            return rows[:, :, 0] if many == 1 else rows
+            return rows
 
         fits = every > 0 or 8 * step_program.forward.program.width * count * many <= MOST_RECORDED
         tape = Tape(step_program, values, fed, many, 0 if fits else math.ceil(math.sqrt(count)), every or 1)
@@ -167,8 +167,8 @@ class DifferentiatedRun:
         memory, before, names = tape.first.copy(), segment.begin[:, k], motions.problem.components
         for first in range(0, len(segment.steps.h), PIECE):
             last = min(first + PIECE, len(segment.steps.h))
-            rows = run_passes(tape.of.forward, memory, last - first, 1, tape.feed(first, last))
-            rows = rows.reshape(last - first, -1, motions.many)[:, :, k]  # a row ends with the state after the step
+            # a row ends with the state after the step
+            rows = run_passes(tape.of.forward, memory, last - first, 1, tape.feed(first, last))[:, :, k]
             bad = ~np.isfinite(rows[:, -m:]).all(axis=1) | (rows[:, -m - 1] != 0.0 if self.programs.failed else False)
             if bad.any():
                 break
@@ -180,12 +180,12 @@ class DifferentiatedRun:
 
     def states(self, segment: Segment) -> tuple[Indices, Array]:
         """After how many steps (T,), and states (T, m, N), from the start to the end: all that are kept."""
-        tape, count, m, many = segment.tape, len(segment.steps.h), len(segment.x), self.motions.many
+        tape, count, m = segment.tape, len(segment.steps.h), len(segment.x)
         if tape.checkpoints:
             kept = [tape.value("x", memory) for *_, memory in tape.blocks]
             return np.array([*[block.first for block in tape.blocks], count]), np.array([*kept, segment.x])
         numbers = [np.arange(first + tape.every, last + 1, tape.every) for first, last, _ in tape.blocks]
-        rows = [kept[:, -m:].reshape(len(kept), m, many) for *_, kept in tape.blocks]
+        rows = [kept[:, -m:] for *_, kept in tape.blocks]
         if not len(numbers[-1]) or numbers[-1][-1] != count:
             numbers, rows = [*numbers, np.array([count])], [*rows, segment.x[None]]
         return np.concatenate([[0], *numbers]), np.concatenate([segment.begin[None], *rows])
@@ -225,8 +225,7 @@ class DifferentiatedRun:
         """Cotangent of h of the last step of one motion, from that of x (m, 1) after it: t and h are what varies."""
         tape, derivative = segment.tape, segment.tape.of.derivative
         memory, (_, _, rows) = tape.derivative({"x": seed}, 1), next(tape.recorded(backwards=True))
-        row = derivative.run(memory, 1, 1, rows[-1:, : derivative.program.feed_width]).rows[0]
-        return float(row[1])
+        return float(run_passes(derivative, memory, 1, 1, rows[-1:, : derivative.program.feed_width])[0, 1, 0])
 
     def pushed(self, dots: Array) -> tuple[Array, Array, Array, Array]:
         """Rows of one motion, t (T,) and q with qd (T, m), and the tangents of both, (T, k) and (T, m, k).
@@ -280,15 +279,14 @@ class DifferentiatedRun:
             self._require_solved(failed)
             vectors |= found
         push, names, memory = tape.of.derivative, tape.of.linear.vectors, tape.derivative(vectors, many)
-        states, tangents = [segment.begin.T], [push.read(memory, names["x"]).copy().reshape(1, m, many)]
+        states, tangents = [segment.begin.T], [push.read(memory, names["x"]).copy()[None]]
         changes = set((np.flatnonzero((np.diff(lengths, axis=0) != 0.0).any(axis=1)) + 1).tolist())
         for first, last, rows in tape.recorded(backwards=False):
-            states.append(rows[:, -m:])
+            states.append(rows[:, -m:, 0])
             for begin, end in itertools.pairwise([first, *[k for k in range(first + 1, last) if k in changes], last]):
                 if len(lengths):
                     push.read(memory, names["h"])[...] = lengths[begin]
-                pushed = _run_all(push, memory, rows[begin - first : end - first])
-                tangents.append(pushed.reshape(end - begin, m, many))
+                tangents.append(_run_all(push, memory, rows[begin - first : end - first]))
         self._require_solved(tape.vectors(memory)[1])
         return np.concatenate(states), np.concatenate(tangents)
 
@@ -324,14 +322,14 @@ class DifferentiatedRun:
 
 def _run_all(ready: Runner, memories: Array, rows: Array) -> Array:
     """The rows (passes, width, k) of k memories that are fed the same."""
-    feed = rows[:, : ready.program.feed_width]
-    if memories.ndim == 1 or ready.masked is ready.program or memories.shape[1] >= FEW_DIRECTIONS:
+    feed, many = rows[:, : ready.program.feed_width], memories.shape[1]
+    if ready.masked is ready.program or many >= FEW_DIRECTIONS:
         return run_passes(ready, memories, len(feed), 1, feed)
-    found = np.empty((len(feed), ready.program.width, memories.shape[1]))
-    for k in range(memories.shape[1]):
-        memory = memories[:, k].copy()
-        found[:, :, k] = ready.run(memory, len(feed), 1, feed).rows
-        memories[:, k] = memory
+    found = np.empty((len(feed), ready.program.width, many))
+    for k in range(many):
+        memory = memories[:, [k]]
+        found[:, :, [k]] = run_passes(ready, memory, len(feed), 1, feed)
+        memories[:, [k]] = memory
     return found
 
 

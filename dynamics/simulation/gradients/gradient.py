@@ -35,18 +35,19 @@ WIDE_BLOCK = 16  # motions side by side: whole vectors of any processor, of whic
 
 @dataclass(frozen=True, eq=False)
 class MotionGradient:
-    """The value of a loss of a motion, and its gradient.
+    """The value of a loss of a motion, and its gradient; or of N motions, arrays with an axis of N first.
 
     Attributes
     ----------
     value : float
-        The loss.
+        The loss; of N motions (N,), NaN as all else of one that does not stay finite or does not reach its end.
     gradients : dict of str to ndarray or float
         By the names of `wrt`: "q" and "qd" (n,), of an OdeSystem "q" (m,); "tau" (n,), or (steps, n) where tau has a
         row a step; of a parameter a number. Where velocities are no rates of coordinates, as of quaternions, "q" is by
         small displacements xi, dq = G(q) xi, (n,).
     t : ndarray, (steps + 1,)
-        Where the steps begin, and the last one ends [s].
+        Where the steps begin, and the last one ends [s]. Of N motions in chosen steps, which each has for itself, start
+        and end alone, (2,).
     q, qd : ndarray, (nq,) and (n,)
         Where the motion ends; of an OdeSystem q is its state and qd is empty.
     checkpoints : int
@@ -61,7 +62,7 @@ class MotionGradient:
     (['q', 'qd', 'tau'], [0.0, 0.05, 0.1], 0)
     """
 
-    value: float
+    value: Any
     gradients: dict[str, Any]
     t: Array
     q: Array
@@ -189,42 +190,6 @@ def differentiated(
     return run, value + run.loss, gradients, (start[: problem.size], end[: problem.size])
 
 
-@dataclass(frozen=True, eq=False)
-class MotionGradients:
-    """The losses of N motions, and their gradients.
-
-    Attributes
-    ----------
-    value : ndarray, (N,)
-        The losses; NaN, as all else, of a motion that does not stay finite or does not reach its end.
-    gradients : dict of str to ndarray
-        As of `MotionGradient`, with an axis of N first.
-    t : ndarray, (steps + 1,)
-        Where equal steps begin, and the last one ends [s]. Of chosen steps, which each motion has for itself, its start
-        and end alone, (2,).
-    q, qd : ndarray, (N, nq) and (N, n)
-        Where the motions end.
-
-    Examples
-    --------
-    >>> import dynamics as dyn
-    >>> arm = dyn.planar_arm([1.0], [1.0])
-    >>> fan = dyn.gradient_many(arm, lambda q, qd, t: q[0], [[0.1], [0.2], [0.3]], [0.0], t_end=0.1, dt=0.05)
-    >>> fan.value.shape, fan["q"].shape, fan.q.shape
-    ((3,), (3, 1), (3, 1))
-    """
-
-    value: Array
-    gradients: dict[str, Array]
-    t: Array
-    q: Array
-    qd: Array
-
-    def __getitem__(self, name: str) -> Array:
-        """The gradients by one of `wrt`. Raises KeyError for another name."""
-        return self.gradients[name]
-
-
 def gradient_many(
     model: Model,
     loss: Loss | None,
@@ -238,7 +203,7 @@ def gradient_many(
     tau: ArrayLike | Callable[..., Sequence[Node | float]] = 0.0,
     parameters: Mapping[str, ArrayLike] | None = None,
     **options: Unpack[Options],
-) -> MotionGradients:
+) -> MotionGradient:
     """Losses of N motions and their gradients, each by its own start, forces and parameters: `gradient`, N times.
 
     Motions in equal steps go side by side, a vector of them at a time; those that choose their steps go one by one, as
@@ -262,8 +227,8 @@ def gradient_many(
 
     Returns
     -------
-    MotionGradients
-        `value`, (N,), and the gradients by each name of `wrt`.
+    MotionGradient
+        `value`, (N,), and the gradients by each name of `wrt`, with an axis of N first.
 
     Raises
     ------
@@ -275,13 +240,13 @@ def gradient_many(
     >>> import dynamics as dyn
     >>> arm = dyn.planar_arm([1.0], [1.0])
     >>> fan = dyn.gradient_many(arm, lambda q, qd, t: q[0], [[0.5], [1.0], [2.0]], [0.0], t_end=1.0, wrt="q")
-    >>> fan["q"].round(4).tolist()
-    [[-0.8804], [-1.1123], [-0.595]]
+    >>> fan["q"].round(4).tolist(), fan.value.shape
+    ([[-0.8804], [-1.1123], [-0.595]], (3,))
     """
     losses = loss, running
     motions = motions_of(model, q, qd, t_end, method, tau, parameters, wrt, (), losses, options, many=True)
     count, problem, run_options = motions.many, motions.problem, motions.options
-    value, end = np.full(count, np.nan), np.full((count, problem.size), np.nan)
+    value, end, checkpoints = np.full(count, np.nan), np.full((count, problem.size), np.nan), 0
     by_name = {name: each.T.copy() for name, each in motions.by_names(np.full_like(motions.point(), np.nan)).items()}
     if motions.each_step and TORQUE in by_name:
         by_name[TORQUE] = np.full((count, *motions.tau.shape[:-1]), np.nan)
@@ -298,6 +263,7 @@ def gradient_many(
             else:  # one of them has no derivative
                 parts += [range(k, k + 1) for k in part]
             continue
+        checkpoints = max(checkpoints, run.checkpoints)
         arrived = np.asarray(np.isfinite(run.end).all(axis=0))
         rows = part.start + np.flatnonzero(arrived)
         results = [(value, losses_of_part), (end, run.end), *[(by_name[name], slopes[name]) for name in slopes]]
@@ -314,7 +280,7 @@ def gradient_many(
             text = f"{len(each)} of {count} motions {what}: motion {first}: {text}"
             warnings.warn(text, SimulationWarning, stacklevel=2)
     t = motions.steps[0].t.copy() if motions.steps else np.array([run_options.t0, run_options.t_end])
-    return MotionGradients(value, by_name, t, end[:, : problem.nq], end[:, problem.nq :])
+    return MotionGradient(value, by_name, t, end[:, : problem.nq], end[:, problem.nq :], checkpoints)
 
 
 @dataclass(frozen=True)

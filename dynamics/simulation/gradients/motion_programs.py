@@ -186,9 +186,13 @@ def motion_programs(
         body.insert(0, Call(total, ("x", "t", "p", LOSS), (LOSS,)))
     rate, rule = problem.rate, equations.pullback
     rules = {} if rule is None else {id(rate): (problem.size, rule)}
-    if rule is not None and not forwards and not many:
-        both = sharing(rate, rule)
-        body, rules[id(both[0])] = _sharing(body, rate, both[0], lengths), (problem.size, both[1])
+    if rule is not None and not forwards and not many:  # calls of the rate record what the pullback shares with it
+        shared, pullback = sharing(rate, rule)
+        rules[id(shared)] = problem.size, pullback
+        for k, each in enumerate(body):
+            if isinstance(each, Call) and each.graph is rate:
+                lengths[f"shared{k}"] = len(shared.outputs) - len(rate.outputs)
+                body[k] = Call(shared, each.inputs, (*each.outputs, f"shared{k}"))
     constant, turns = (*made.fixed, "evaluations", "nonfinite"), 0 if forwards else TURNS
     make = partial(Passes, constant=constant, turns=turns)
     fed = ("t", "h", "tau") if each_step else ("t", "h")
@@ -221,16 +225,4 @@ def _separate(statements: Sequence[Statement]) -> list[Statement]:
                 parts = [PARAMETERS if each == "p" else (each,) for each in registers]
                 changed[name] = tuple([each for part in parts for each in part])
         result.append(replace(statement, **changed) if changed else statement)  # type: ignore[type-var]
-    return result
-
-
-def _sharing(body: list[Statement], rate: Graph, sharing_rate: Graph, lengths: dict[str, int]) -> list[Statement]:
-    """The statements, of which those that call the rate record what its pullback shares with it."""
-    result: list[Statement] = []
-    for k, statement in enumerate(body):
-        if isinstance(statement, Call) and statement.graph is rate:
-            register = f"shared{k}"
-            lengths[register] = len(sharing_rate.outputs) - len(rate.outputs)
-            statement = Call(sharing_rate, statement.inputs, (*statement.outputs, register))
-        result.append(statement)
     return result

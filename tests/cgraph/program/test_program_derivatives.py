@@ -10,7 +10,7 @@ import pytest
 
 import cgraph as cg
 from cgraph import GraphError
-from cgraph._shared import Along, Array, Passes, Tape, tangent
+from cgraph._shared import Along, Array, Passes, Tape, run_passes, tangent
 from cgraph.extend import (
     Call,
     Factor,
@@ -303,13 +303,13 @@ def test_tangents_along_a_tape_are_those_beside_the_values(seed: int) -> None:
     passes = Passes(program, program.record, [*START, "f"], constant=["turns", "count"])
     names = [name for name in program.record if name in passes.handed]
     ready = Along(passes, tangent(passes, names), [], "python")
-    tape = Tape(ready, start, lambda first, last: feed[first:last])
+    tape = Tape(ready, start, lambda first, last: feed[first:last, :, None])
     tape.run(0, PASSES)
     memory, vectors = tape.derivative(along_dots, 1), ready.linear.vectors
     for k in range(PASSES):
-        ready.derivative.write(memory, vectors["f"], feed_along[k])
+        ready.derivative.write(memory, vectors["f"], feed_along[k][:, None])
         (block,) = tape.recorded(backwards=False)
-        dots = ready.derivative.run(memory, 1, 1, block.kept[k : k + 1]).rows[0]
+        dots = run_passes(ready.derivative, memory, 1, 1, block.kept[k : k + 1])[0, :, 0]
     moved = program_jvp(program, [*START, "f"], constant=["turns", "count"])
     beside = runner(moved.program, "python")
     known = {moved.vectors[name]: along_dots[name] for name in START if name in moved.vectors}
