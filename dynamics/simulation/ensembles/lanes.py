@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple, TypeAlias
@@ -160,23 +160,22 @@ class Leg(NamedTuple):
     places: list[tuple[slice, slice | Numbers]]
 
 
-def legs_of(grids: Sequence[EqualSteps], tables: Sequence[Numbers], every: int = 0) -> list[Leg]:
+def legs_of(grids: Sequence[EqualSteps], tables: Sequence[Numbers], every: int = 0) -> Iterator[Leg]:
     """The legs of runs that keep tables of rows, after so many steps each, (T,).
 
     every: all steps are marks, so many of a leg; 0: those that the tables ask for, and the last of a grid.
     """
-    legs, done = list[Leg](), 0
-    asked = tables[0] if len(tables) == 1 else np.unique(np.concatenate(tables))
+    done, asked = 0, tables[0] if len(tables) == 1 else np.unique(np.concatenate(tables))
     for grid in grids:
         end = done + grid.steps
-        marks = np.arange(done + 1, end + 1) if every else asked[slice(*asked.searchsorted((done + 1, end + 1)))]
+        marks = asked[slice(*asked.searchsorted((done + 1, end + 1)))]
         marks = marks if len(marks) and marks[-1] == end else np.append(marks, end)
-        for part in np.split(marks, range(every, len(marks), every)) if every else [marks]:
+        all_steps = (np.arange(k, min(k + every, end + 1)) for k in range(done + 1, end + 1, every or end))
+        for part in all_steps if every else [marks]:
             here = [slice(*numbers.searchsorted((part[0], part[-1] + 1)).tolist()) for numbers in tables]
             there = [_together(part.searchsorted(numbers[rows])) for numbers, rows in zip(tables, here, strict=True)]
-            legs.append(Leg(grid, np.array(part - done, dtype=np.float64), list(zip(here, there, strict=True))))
+            yield Leg(grid, np.array(part - done, dtype=np.float64), list(zip(here, there, strict=True)))
         done = end
-    return legs
 
 
 def _together(at: Numbers) -> slice | Numbers:
@@ -188,7 +187,7 @@ def equal_in_lanes(
     code: Code,
     x: Array,
     p: Array,
-    legs: Sequence[Leg],
+    legs: Iterable[Leg],
     tables: Sequence[Array],
     stopped: Stopped,
     watch: Callable[[Array, Array], None] | None = None,
@@ -197,14 +196,15 @@ def equal_in_lanes(
 
     tables: receive states, (k, T, m), NaN from where a run has not come to.  watch: is told those of all marks.
     """
-    run, m, steps = _Memories(code, len(x), {"x": x, "p": p, "fresh": 1.0}), x.shape[1], 0
-    for (first, _), rows in zip(legs[0].places, tables, strict=True):
-        rows[:, : first.start] = x[:, None]  # the start
+    run, m, steps, longest = _Memories(code, len(x), {"x": x, "p": p, "fresh": 1.0}), x.shape[1], 0, 0.0
     at = 0.0  # steps of the grid
     for grid, marks, places in legs:
         if at == 0.0:
             run.set({"start": grid.begin, "t": grid.begin, "h": grid.h, "count": 0.0})
             run.passes[:, 0] = 0
+            longest = max(longest, abs(grid.h))
+        for (here, _), rows in zip(places, tables, strict=True) if not steps and at == 0.0 else ():
+            rows[:, : here.start] = x[:, None]  # the start
         at = float(marks[-1])
         block = run.rows(marks, partial(_going, run, at), stopped)[:, :, 1 : 1 + m]
         if (run.passes[:, 1] < len(marks)).any():
@@ -215,7 +215,6 @@ def equal_in_lanes(
             watch(grid.begin + marks * grid.h, block)
         if at == grid.steps:
             at, steps = 0.0, steps + grid.steps
-    longest = max([abs(leg.grid.h) for leg in legs])
     columns = {"steps": np.full(len(x), steps), "nfev": run.read("evaluations"), "dt": np.full(len(x), longest)}
     return run.read("nonfinite") == 0.0, columns
 

@@ -13,12 +13,12 @@ import numpy as np
 from cgraph._shared import Array
 
 from ..estimates.error_estimate import ASIDE, Comparison, RunsBeside, error_estimates, runs_beside
-from ..estimates.unresolved import Watch, unresolved
+from ..estimates.unresolved import Watch
 from ..events.event import EventProgram
 from ..events.event_log import WatchedIntegration
 from ..outcome import INTERRUPTED, outcome
 from ..run_options import RunOptions
-from ..steps.equal_steps import EqualSteps, even_steps
+from ..steps.equal_steps import EqualSteps, Numbers, even_steps
 from ..steps.integration import AdaptiveIntegration, integration
 from ..steps.step_program import StepProgram, compile_steps
 from ..steps.stepping import Integration, NativeIntegration, NativeRun
@@ -119,6 +119,9 @@ class Task:
         if beside is None:
             return equal_in_lanes(lanes, x, p, own, [rows], stopped)
         watch = Watch(self.program.rate, self.program.order, p, self.options.t0, x)
+        if watch.needed:  # which sees all steps, so many at once
+            every = max(1, ROWS // (len(x) * self.program.steps.width))
+            own = legs_of(self._grids, self._tables, every)
         states = np.empty((1 + len(others), len(x), len(beside.t), x.shape[1]))
         whole, columns = equal_in_lanes(
             lanes, x, p, own, [rows, states[0]], stopped, watch.add if watch.needed else None
@@ -130,16 +133,20 @@ class Task:
         return whole, columns | errors
 
     @cached_property
-    def _legs(self) -> list[list[Leg]]:
+    def _tables(self) -> list[Numbers]:
+        """How many equal steps are done at the rows, and when runs are looked at to be compared."""
+        times, numbers = self.options.times, self._numbers
+        rows = (
+            np.arange(numbers[-1] + 1) if times is None else numbers[int(times[0] != self.options.t0) :][: len(times)]
+        )
+        return [rows, *([] if self._beside is None else [self._beside.numbers])]
+
+    @cached_property
+    def _legs(self) -> list[Iterable[Leg]]:
         """Legs of the runs, and of those beside."""
-        times, rows, beside = self.options.times, self._numbers, self._beside
-        rows = np.arange(rows[-1] + 1) if times is None else rows[int(times[0] != self.options.t0) :][: len(times)]
-        if beside is None:
-            return [legs_of(self._grids, [rows])]
-        every = max(1, ROWS // (min(self._many, LONGEST_CHUNK) * self.program.steps.width))
-        every = every if unresolved(self.program.rate).there else 0
-        others = [legs_of(stretches, [numbers]) for stretches, numbers in beside.runs]
-        return [legs_of(self._grids, [rows, beside.numbers], every), *others]
+        beside = () if self._beside is None else self._beside.runs
+        others = [list(legs_of(stretches, [numbers])) for stretches, numbers in beside]
+        return [list(legs_of(self._grids, self._tables)), *others]
 
     @property
     def _lanes(self) -> Code | None:

@@ -73,10 +73,10 @@ def sampled_numbers(steps: int, every: int, most: int) -> Numbers:
     Half of these are spread over the run, unevenly, and half are denser toward its start, for it may end early.
     """
     count = steps // every
-    chosen = np.arange(1.0, count + 1.0)
+    chosen = np.arange(1.0, min(count, most) + 1.0)
     if count > most:
-        k = np.arange(most // 2)
-        chosen = np.append((k + k * GOLDEN % 1.0) * (count / len(k)), np.geomspace(1.0, count, len(k)))
+        k = chosen[: most // 2]
+        chosen = np.append((k - 1.0 + k * GOLDEN % 1.0) * (count / len(k)), np.geomspace(1.0, count, len(k)))
     return np.unique(np.concatenate([[0], every * chosen.astype(np.int64), [steps]]))
 
 
