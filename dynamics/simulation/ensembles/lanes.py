@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple, TypeAlias
@@ -124,21 +124,23 @@ class _Memories:
         """A number of each."""
         return self._memories[:, self._code.numbers[name]][:, 0]
 
-    def rows(self, marks: Array, left: Callable[[], Array], stopped: Stopped) -> Array:
-        """Go on until none has passes left, (k,): the rows (k, len(marks), width), NaN in time of those not there.
+    def rows(self, marks: Array, going: Callable[[], tuple[Numbers, float]], stopped: Stopped) -> Array:
+        """Go on until none is going: the rows (k, len(marks), width), NaN in time of those not there.
 
-        Raises StoppedError after `stopped`.
+        going: those that are, and how many passes they may make.  Raises StoppedError after `stopped`.
         """
         rows = np.empty((len(self._memories), len(marks), self._code.width))
         rows[:, :, 0] = np.nan
         self.passes[:, 1] = 0
-        while len(which := np.flatnonzero((ahead := left()) > 0)):
+        which, left = going()
+        while len(which):
             if stopped():
                 raise StoppedError
-            begin, most = time.perf_counter(), int(min(self._most, ahead[which].min()))
+            begin, most = time.perf_counter(), int(min(self._most, left))
             self._code(self._memories, which, self.passes, most, rows, marks)
             if most == self._most:
                 self._most = max(1, int(most * min(4.0, BLOCK_TIME / max(time.perf_counter() - begin, 1e-9))))
+            which, left = going()
         return rows
 
 
@@ -157,22 +159,22 @@ class Leg(NamedTuple):
     places: list[tuple[slice, slice | Numbers]]
 
 
-def legs_of(grids: Sequence[EqualSteps], tables: Sequence[Numbers], every: int = 0) -> list[Leg]:
+def legs_of(grids: Sequence[EqualSteps], tables: Sequence[Numbers], every: int = 0) -> Iterator[Leg]:
     """The legs of runs that keep tables of rows, after so many steps each, (T,).
 
     every: all steps are marks, so many of a leg; 0: those that the tables ask for, and the last of a grid.
     """
-    legs, done = list[Leg](), 0
-    asked = np.unique(np.concatenate([*tables, np.cumsum([grid.steps for grid in grids])]))
+    done, asked = 0, tables[0] if len(tables) == 1 else np.unique(np.concatenate(tables))
     for grid in grids:
-        inside = slice(*np.searchsorted(asked, [done + 1, done + grid.steps + 1]).tolist())
-        marks = done + np.arange(1, grid.steps + 1) if every else asked[inside]
-        for part in np.split(marks, range(every, len(marks), every) if every else []):
-            here = [slice(*np.searchsorted(numbers, [part[0], part[-1] + 1]).tolist()) for numbers in tables]
-            there = [np.searchsorted(part, numbers[rows]) for numbers, rows in zip(tables, here, strict=True)]
-            legs.append(Leg(grid, part - float(done), list(zip(here, map(_together, there), strict=True))))
-        done += grid.steps
-    return legs
+        end = done + grid.steps
+        marks = asked[slice(*asked.searchsorted((done + 1, end + 1)))]
+        marks = marks if len(marks) and marks[-1] == end else np.append(marks, end)
+        all_steps = (np.arange(k, min(k + every, end + 1)) for k in range(done + 1, end + 1, every or end))
+        for part in all_steps if every else [marks]:
+            here = [slice(*numbers.searchsorted((part[0], part[-1] + 1)).tolist()) for numbers in tables]
+            there = [_together(part.searchsorted(numbers[rows])) for numbers, rows in zip(tables, here, strict=True)]
+            yield Leg(grid, np.array(part - done, dtype=np.float64), list(zip(here, there, strict=True)))
+        done = end
 
 
 def _together(at: Numbers) -> slice | Numbers:
@@ -184,7 +186,7 @@ def equal_in_lanes(
     code: Code,
     x: Array,
     p: Array,
-    legs: Sequence[Leg],
+    legs: Iterable[Leg],
     tables: Sequence[Array],
     stopped: Stopped,
     watch: Callable[[Array, Array], None] | None = None,
@@ -193,16 +195,17 @@ def equal_in_lanes(
 
     tables: receive states, (k, T, m), NaN from where a run has not come to.  watch: is told those of all marks.
     """
-    run, m, steps = _Memories(code, len(x), {"x": x, "p": p, "fresh": 1.0}), x.shape[1], 0
-    for (first, _), rows in zip(legs[0].places, tables, strict=True):
-        rows[:, : first.start] = x[:, None]  # the start
+    run, m, steps, longest = _Memories(code, len(x), {"x": x, "p": p, "fresh": 1.0}), x.shape[1], 0, 0.0
     at = 0.0  # steps of the grid
     for grid, marks, places in legs:
         if at == 0.0:
             run.set({"start": grid.begin, "t": grid.begin, "h": grid.h, "count": 0.0})
             run.passes[:, 0] = 0
+            longest = max(longest, abs(grid.h))
+        for (here, _), rows in zip(places, tables, strict=True) if not steps and at == 0.0 else ():
+            rows[:, : here.start] = x[:, None]  # the start
         at = float(marks[-1])
-        block = run.rows(marks, partial(_left, run, at), stopped)[:, :, 1 : 1 + m]
+        block = run.rows(marks, partial(_going, run, at), stopped)[:, :, 1 : 1 + m]
         if (run.passes[:, 1] < len(marks)).any():
             block[np.arange(len(marks)) >= run.passes[:, 1:]] = np.nan
         for (here, there), rows in zip(places, tables, strict=True):
@@ -211,14 +214,14 @@ def equal_in_lanes(
             watch(grid.begin + marks * grid.h, block)
         if at == grid.steps:
             at, steps = 0.0, steps + grid.steps
-    longest = max([abs(leg.grid.h) for leg in legs])
     columns = {"steps": np.full(len(x), steps), "nfev": run.read("evaluations"), "dt": np.full(len(x), longest)}
     return run.read("nonfinite") == 0.0, columns
 
 
-def _left(run: _Memories, steps: float) -> Array:
-    """Passes to the end of so many steps of a grid, (k,)."""
-    return np.where(run.read("nonfinite") == 0.0, steps - run.passes[:, 0], 0.0)
+def _going(run: _Memories, steps: float) -> tuple[Numbers, float]:
+    """Runs that are on their way to so many steps of a grid, and how many are left to them."""
+    which = np.flatnonzero((run.read("nonfinite") == 0.0) & (run.passes[:, 0] < steps))
+    return which, steps - run.passes[which[0], 0] if len(which) else 0.0
 
 
 def chosen_in_lanes(
@@ -232,11 +235,13 @@ def chosen_in_lanes(
     start = beginning(options, max(options.relative, program.finest)) | over(options.t0, options.t_end)
     values = {"x": x, "p": p, TOLERANCE: tolerance(options), "lanes.toward": options.direction}
     run = _Memories(code, len(x), start | values)
-    made = run.rows(
-        options.direction * options.row_times[first:],
-        lambda: np.where(run.read("status") == 0.0, options.max_steps - run.read("trials"), 0.0),
-        stopped,
-    )
+
+    def going() -> tuple[Numbers, float]:
+        trials = run.read("trials")
+        which = np.flatnonzero((run.read("status") == 0.0) & (trials < options.max_steps))
+        return which, options.max_steps - trials[which].max(initial=0.0)
+
+    made = run.rows(options.direction * options.row_times[first:], going, stopped)
     rows[:, :first] = x[:, None]
     rows[:, first:] = _states(program, made, options.row_times[first:])
     rows[:, first:][np.arange(made.shape[1]) >= run.passes[:, 1:]] = np.nan

@@ -13,12 +13,12 @@ import numpy as np
 from cgraph._shared import Array
 
 from ..estimates.error_estimate import ASIDE, Comparison, RunsBeside, error_estimates, runs_beside
-from ..estimates.unresolved import Watch, unresolved
+from ..estimates.unresolved import Watch
 from ..events.event import EventProgram
 from ..outcome import INTERRUPTED, outcome
 from ..run_options import RunOptions
 from ..stepper import ChosenStepper, Stepper, stepper
-from ..steps.equal_steps import EqualSteps, even_steps, numbers_of
+from ..steps.equal_steps import EqualSteps, Numbers, even_steps
 from ..steps.step_program import StepProgram, compile_steps
 from .ensemble import COLUMNS, Part
 from .lanes import (
@@ -51,45 +51,26 @@ class Chunk:
     p: Array
 
 
-@dataclass(frozen=True)
 class Task:
     """The function that runs chunks. It goes to other processes as it is, and is compiled there once.
 
-    many: trajectories, of all chunks.
+    count: rows of a trajectory.  largest: trajectories in a chunk at most, if they go in lanes, else 0.
     """
 
-    program: StepProgram
-    options: RunOptions
-    many: int
-    events: EventProgram | None = None
-
-    @cached_property
-    def count(self) -> int:
-        """Rows of a trajectory."""
-        return len(self.options.row_times)
-
-    @cached_property
-    def grids(self) -> list[EqualSteps]:
-        """Equal steps; none of chosen ones."""
-        return [] if self.program.adaptive else even_steps(self.options.instants, self.options.step)
-
-    @cached_property
-    def beside(self) -> RunsBeside | None:
-        """Runs beside those in lanes; None where no error is estimated."""
-        return runs_beside(self.grids, self.program.order) if self.options.estimated else None
-
-    @cached_property
-    def in_lanes(self) -> bool:
-        """Whether trajectories go in lanes, if the program can."""
-        return self.events is None and fits_lanes(self.program, self.options, self.grids, self.many)
-
-    @cached_property
-    def largest(self) -> int:
-        """Trajectories in a chunk at most; 0 unless they go in lanes."""
-        if not self.in_lanes:
-            return 0
-        numbers = self.program.steps.width * (self.count + (0 if self.beside is None else len(self.beside.t)))
-        return min(LONGEST_CHUNK, max(VECTOR, ROWS // numbers))
+    def __init__(
+        self, program: StepProgram, options: RunOptions, many: int, events: EventProgram | None = None
+    ) -> None:
+        """many: trajectories, of all chunks."""
+        self.program, self.options, self.events, self._many = program, options, events, many
+        self._grids: list[EqualSteps] = []
+        if not program.adaptive:
+            self._grids, self._numbers = even_steps(options.instants, options.step)
+        self._beside: RunsBeside | None = None
+        self.count, self.largest = len(options.row_times), 0
+        if events is None and fits_lanes(program, options, self._grids, many):
+            self._beside = runs_beside(self._grids, program.order) if options.estimated else None
+            rows = self.count if self._beside is None else self.count + len(self._beside.t)
+            self.largest = min(LONGEST_CHUNK, max(VECTOR, ROWS // (program.steps.width * rows)))
 
     def width(self, chunk: int | None, workers: object, *, stored: bool = False) -> int:
         """Trajectories in a chunk: in lanes, of whole vectors.
@@ -97,11 +78,11 @@ class Task:
         chunk: as asked for.  stored: whether a chunk that has not ended is lost when the process is, so that it should
         be small.
         """
-        largest = self.largest or chunk or LARGEST_CHUNK
-        short = self.in_lanes and self.grids and self.many * self.grids[0].steps <= SHORT
-        shares = (1 if short else SHARES) * (workers if isinstance(workers, int) else UNKNOWN)
-        width = chunk or min(math.ceil(self.many / shares), LARGEST_CHUNK if stored else largest)
-        return math.ceil(min(width, largest) / VECTOR) * VECTOR if self.in_lanes and self.grids else min(width, largest)
+        largest, equal = self.largest or chunk or LARGEST_CHUNK, self.largest and self._grids
+        shares = 1 if equal and self._many * self._grids[0].steps <= SHORT else SHARES
+        shares *= workers if isinstance(workers, int) else UNKNOWN
+        width = min(chunk or min(math.ceil(self._many / shares), LARGEST_CHUNK if stored else largest), largest)
+        return math.ceil(width / VECTOR) * VECTOR if equal else width
 
     def __call__(self, chunk: Chunk) -> Part:
         """Run the chunk."""
@@ -116,8 +97,9 @@ class Task:
         with np.errstate(all="ignore"):
             if (found := self.run_lanes(chunk.x, chunk.p, rows, stopped)) is not None:
                 whole, columns = found
-                part.reached(whole, **{name: values[whole] for name, values in columns.items()})
                 left = np.flatnonzero(~whole).tolist()  # which are made again, alone
+                done = whole if left else slice(None)
+                part.reached(done, **{name: values[done] for name, values in columns.items()})
             self._one_by_one(chunk, part, left, stopped)
         return part
 
@@ -131,10 +113,13 @@ class Task:
             return None
         if self.program.adaptive:
             return chosen_in_lanes(lanes, self.program, self.options, x, p, rows, stopped)
-        (own, *others), beside = self._legs, self.beside
+        (own, *others), beside = self._legs, self._beside
         if beside is None:
             return equal_in_lanes(lanes, x, p, own, [rows], stopped)
         watch = Watch(self.program.rate, self.program.order, p, self.options.t0, x)
+        if watch.needed:  # which sees all steps, so many at once
+            every = max(1, ROWS // (len(x) * self.program.steps.width))
+            own = legs_of(self._grids, self._tables, every)
         states = np.empty((1 + len(others), len(x), len(beside.t), x.shape[1]))
         whole, columns = equal_in_lanes(
             lanes, x, p, own, [rows, states[0]], stopped, watch.add if watch.needed else None
@@ -146,20 +131,25 @@ class Task:
         return whole, columns | errors
 
     @cached_property
-    def _legs(self) -> list[list[Leg]]:
+    def _tables(self) -> list[Numbers]:
+        """How many equal steps are done at the rows, and when runs are looked at to be compared."""
+        times, numbers = self.options.times, self._numbers
+        rows = (
+            np.arange(numbers[-1] + 1) if times is None else numbers[int(times[0] != self.options.t0) :][: len(times)]
+        )
+        return [rows, *([] if self._beside is None else [self._beside.numbers])]
+
+    @cached_property
+    def _legs(self) -> list[Iterable[Leg]]:
         """Legs of the runs, and of those beside."""
-        rows = numbers_of(self.grids, self.options.row_times)
-        if self.beside is None:
-            return [legs_of(self.grids, [rows])]
-        at_once = max(1, ROWS // (min(self.many, LONGEST_CHUNK) * self.program.steps.width))
-        every = at_once if unresolved(self.program.rate).there else 0
-        others = [legs_of(stretches, [numbers]) for stretches, numbers in self.beside.runs]
-        return [legs_of(self.grids, [rows, self.beside.numbers], every), *others]
+        beside = () if self._beside is None else self._beside.runs
+        others = [list(legs_of(stretches, [numbers])) for stretches, numbers in beside]
+        return [list(legs_of(self._grids, self._tables)), *others]
 
     @property
     def _lanes(self) -> Code | None:
         """The code of lanes, if trajectories go there."""
-        if not self.in_lanes:
+        if not self.largest:
             return None
         with _lock:
             return lanes_of(self.program, self.options.backend, self.options.fma)

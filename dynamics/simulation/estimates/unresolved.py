@@ -44,11 +44,6 @@ class Unresolved(NamedTuple):
     branches: Graph | None
     sides: Graph | None
 
-    @property
-    def there(self) -> bool:
-        """Whether there are any."""
-        return self.waves is not None or self.branches is not None
-
 
 @kept_by_first
 def unresolved(rate: Graph) -> Unresolved:
@@ -88,7 +83,7 @@ class Watch:
     def __init__(self, rate: Graph, order: int, p: Array, t: float, x: Array) -> None:
         """The runs start from x (k, m) at t."""
         self._what, self._order = unresolved(rate), order
-        self.needed = self._what.there
+        self.needed = self._what.waves is not None or self._what.branches is not None
         self.turning, self.bent, self.missed = np.zeros(len(x)), np.zeros(len(x), dtype=bool), np.zeros(x.shape)
         self._p, self._seen = p, [(np.array([t]), x[:, None])]
 
